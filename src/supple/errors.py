@@ -1,0 +1,27 @@
+"""The errors a user can meet. Each text names the thing, what is wrong with it, and the mend."""
+
+from __future__ import annotations
+
+
+class SuppleError(Exception):
+    """Base of every error that Supple raises for bad input or an impossible request."""
+
+
+class MeshError(SuppleError):
+    """A surface or tetrahedral mesh, or a file that should hold one, cannot be used."""
+
+
+class MeshingError(SuppleError):
+    """Tetrahedralization failed, ran out of time or memory, or its input is not meshable."""
+
+
+class SceneError(SuppleError):
+    """A scene, or the file that describes it, is contradictory or incomplete."""
+
+
+class SolverError(SuppleError):
+    """A solver was given parameters, or a scene, that it cannot work with."""
+
+
+class OutputError(SuppleError):
+    """A recording, export or plot cannot be read or written."""

@@ -1,0 +1,64 @@
+"""A soft body: a tetrahedral mesh, what it is made of, where it starts and how it moves there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+from supple.errors import SceneError
+from supple.materials.material import Material
+from supple.mesh.surface import SurfaceMesh
+from supple.mesh.tetmesh import TetMesh
+from supple.scene.values import check_name, finite_vector, non_negative
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """One soft body of a scene.
+
+    Parameters
+    ----------
+    name : unique in its scene; frames and recordings are indexed by it.
+    mesh : rest shape, in the body's own coordinates [m].
+    material : what it is made of.
+    position : (3,) where the mesh's origin is placed [m].
+    rotation : (3,) rotation vector that turns the mesh about its origin before it is placed [rad].
+    velocity : (3,) initial velocity of the center of mass [m/s].
+    angular_velocity : (3,) initial spin about the center of mass [rad/s].
+    friction : Coulomb coefficient against other bodies and itself; a pair uses the geometric mean of its two.
+    skin : a finer surface, in the mesh's coordinates, that follows the body in pages and exports.
+
+    Raises
+    ------
+    SceneError : where a value is of the wrong kind, not finite or out of range; the text names the body.
+    """
+
+    name: str
+    mesh: TetMesh
+    material: Material
+    position: ArrayLike = (0.0, 0.0, 0.0)
+    rotation: ArrayLike = (0.0, 0.0, 0.0)
+    velocity: ArrayLike = (0.0, 0.0, 0.0)
+    angular_velocity: ArrayLike = (0.0, 0.0, 0.0)
+    friction: float = 0.0
+    skin: SurfaceMesh | None = field(default=None)
+
+    def __post_init__(self) -> None:
+        check_name(self.name, "body")
+        owner = f"body {self.name!r}"
+        if not isinstance(self.mesh, TetMesh):
+            raise SceneError(f"{owner}: mesh is a {type(self.mesh).__name__}; give a TetMesh (see supple.tetrahedralize)")
+        if not isinstance(self.material, Material):
+            raise SceneError(f"{owner}: material is {self.material!r}; give a material such as StableNeoHookean(...)")
+        if self.skin is not None and not isinstance(self.skin, SurfaceMesh):
+            raise SceneError(f"{owner}: skin is a {type(self.skin).__name__}; give a SurfaceMesh")
+        for key in ("position", "rotation", "velocity", "angular_velocity"):
+            object.__setattr__(self, key, finite_vector(getattr(self, key), f"{owner}: {key}"))
+        object.__setattr__(self, "friction", non_negative(self.friction, f"{owner}: friction"))
+
+    def place(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """World positions (k, 3) [m] at the start of points (k, 3) given in the mesh's coordinates."""
+        return Rotation.from_rotvec(np.asarray(self.rotation)).apply(points) + np.asarray(self.position)

@@ -1,0 +1,133 @@
+"""How something scripted moves: nothing, keyframes, or a function of time.
+
+A motion is a displacement of points from where they are at time 0. Keyframes may turn as well; a function of time
+returns a displacement, one for all points (3,) or one for each (k, 3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+from supple.errors import SceneError
+
+
+@dataclass(frozen=True, eq=False)
+class Keyframes:
+    """Piecewise linear motion through keyframes; constant before the first and after the last.
+
+    Parameters
+    ----------
+    times : (k,) strictly increasing [s]
+    displacements : (k, 3) [m], or None for no translation
+    angles : (k,) [rad], or None for no rotation
+    axis, pivot : (3,) the line that the angles turn about, through `pivot` [m] along `axis`
+
+    Raises
+    ------
+    SceneError : where shapes disagree, times do not increase, or a value is not finite.
+    """
+
+    times: ArrayLike
+    displacements: ArrayLike | None = None
+    angles: ArrayLike | None = None
+    axis: ArrayLike = (0.0, 0.0, 1.0)
+    pivot: ArrayLike = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        times = self._array("times", self.times, (-1,))
+        k = len(times)
+        if k == 0:
+            raise SceneError("Keyframes: times is empty; give at least one keyframe")
+        if np.any(np.diff(times) <= 0.0):
+            at = int(np.flatnonzero(np.diff(times) <= 0.0)[0]) + 1
+            raise SceneError(f"Keyframes: times[{at}] = {times[at]:g} s does not come after {times[at - 1]:g} s")
+        if self.displacements is None and self.angles is None:
+            raise SceneError("Keyframes: give displacements, angles, or both")
+        object.__setattr__(self, "times", times)
+        zeros = np.zeros((k, 3))
+        displacements = zeros if self.displacements is None else self._array("displacements", self.displacements, (k, 3))
+        angles = zeros[:, 0] if self.angles is None else self._array("angles", self.angles, (k,))
+        axis = self._array("axis", self.axis, (3,))
+        length = np.linalg.norm(axis)
+        if length == 0.0:
+            raise SceneError("Keyframes: axis has no length; give a direction such as [0, 0, 1]")
+        object.__setattr__(self, "displacements", displacements)
+        object.__setattr__(self, "angles", angles)
+        object.__setattr__(self, "axis", axis / length)
+        object.__setattr__(self, "pivot", self._array("pivot", self.pivot, (3,)))
+
+    @staticmethod
+    def _array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
+        try:
+            array = np.array(value, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise SceneError(f"Keyframes: {name} is not an array of numbers") from None
+        if array.ndim != len(shape) or any(want not in (-1, got) for want, got in zip(shape, array.shape, strict=True)):
+            want = tuple("k" if s == -1 else s for s in shape)
+            raise SceneError(f"Keyframes: {name} has shape {array.shape}; it must have shape {want}, one per keyframe")
+        if not np.isfinite(array).all():
+            raise SceneError(f"Keyframes: {name} holds a value that is not finite")
+        return array
+
+    def pose(self, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Rotation (3, 3) and translation (3,) [m] at `time`: x -> R x + t."""
+        times, angles, displacements = np.asarray(self.times), np.asarray(self.angles), np.asarray(self.displacements)
+        axis, pivot = np.asarray(self.axis), np.asarray(self.pivot)
+        angle = np.interp(time, times, angles)
+        shift = np.array([np.interp(time, times, displacements[:, k]) for k in range(3)])
+        R = Rotation.from_rotvec(angle * axis).as_matrix() if angle else np.eye(3)
+        return R, pivot - R @ pivot + shift
+
+
+Motion = Keyframes | Callable[[float], ArrayLike] | None
+
+
+def check_motion(motion: object, owner: str) -> None:
+    """Raise `SceneError` unless `motion` is None, `Keyframes` or a function of time."""
+    if motion is not None and not isinstance(motion, Keyframes) and not callable(motion):
+        raise SceneError(f"{owner}: motion is {motion!r}; give None, Keyframes, or a function t -> displacement")
+
+
+def displacement_at(motion: Callable[[float], ArrayLike], time: float, owner: str, count: int | None) -> NDArray[np.float64]:
+    """What a scripted function returns at `time`, checked: (3,), or (count, 3) where `count` is given."""
+    value = np.asarray(motion(time), dtype=np.float64)
+    if value.shape != (3,) and (count is None or value.shape != (count, 3)):
+        want = "(3,)" if count is None else f"(3,) or ({count}, 3)"
+        raise SceneError(f"{owner}: motion({time:g}) has shape {value.shape}; it must have shape {want}")
+    if not np.isfinite(value).all():
+        raise SceneError(f"{owner}: motion({time:g}) is not finite")
+    return value
+
+
+def moved_points(motion: Motion, points: NDArray[np.float64], time: float, owner: str) -> NDArray[np.float64]:
+    """Where points (k, 3), given at time 0, are at `time`."""
+    if motion is None:
+        return points
+    if isinstance(motion, Keyframes):
+        R, t = motion.pose(time)
+        return points @ R.T + t
+    return points + displacement_at(motion, time, owner, len(points))
+
+
+def points_at_origin(motion: Motion, points: NDArray[np.float64], time: float, owner: str) -> NDArray[np.float64]:
+    """The inverse of `moved_points`: where points (k, 3), given at `time`, are at time 0."""
+    if motion is None:
+        return points
+    if isinstance(motion, Keyframes):
+        R, t = motion.pose(time)
+        return (points - t) @ R
+    return points - displacement_at(motion, time, owner, len(points))
+
+
+def rigid_pose(motion: Motion, time: float, owner: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Rotation (3, 3) and translation (3,) at `time`, for what cannot deform (obstacles)."""
+    if motion is None:
+        return np.eye(3), np.zeros(3)
+    if isinstance(motion, Keyframes):
+        return motion.pose(time)
+    return np.eye(3), displacement_at(motion, time, owner, None)

@@ -1,0 +1,98 @@
+"""Vertices that are held, or moved along a script."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from supple.errors import SceneError
+from supple.scene.motion import Motion, check_motion
+from supple.scene.values import check_name, finite_vector
+
+
+@dataclass(frozen=True, eq=False)
+class InBox:
+    """Selects the vertices inside an axis-aligned box, in world coordinates at the start.
+
+    Parameters
+    ----------
+    low, high : (3,) opposite corners [m]; the faces belong to the box.
+    """
+
+    low: ArrayLike
+    high: ArrayLike
+
+    def __post_init__(self) -> None:
+        low, high = finite_vector(self.low, "InBox: low"), finite_vector(self.high, "InBox: high")
+        if np.any(low > high):
+            raise SceneError(f"InBox: low {low.tolist()} is above high {high.tolist()}; swap them")
+        object.__setattr__(self, "low", low)
+        object.__setattr__(self, "high", high)
+
+    def select(self, points: NDArray[np.float64]) -> NDArray[np.int32]:
+        """Indices of the points (k, 3) inside."""
+        inside = np.all((points >= np.asarray(self.low)) & (points <= np.asarray(self.high)), axis=1)
+        return np.flatnonzero(inside).astype(np.int32)
+
+
+@dataclass(frozen=True, eq=False)
+class Pin:
+    """Holds vertices of one body where they start, or carries them along `motion` from there.
+
+    Parameters
+    ----------
+    body : name of the body.
+    vertices : indices into the body's mesh, or an `InBox`.
+    motion : None, `Keyframes`, or t -> displacement [m], (3,) for all or (k, 3) for each vertex.
+    name : stands in messages and in the reaction forces of a report.
+    """
+
+    body: str
+    vertices: ArrayLike | InBox
+    motion: Motion = None
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        check_name(self.body, "pin: body")
+        if self.name is not None:
+            check_name(self.name, "pin")
+        check_motion(self.motion, self.label)
+        if isinstance(self.vertices, InBox):
+            return
+        try:
+            indices = np.atleast_1d(np.asarray(self.vertices))
+        except (TypeError, ValueError):
+            raise SceneError(f"{self.label}: vertices is {self.vertices!r}; give indices or an InBox") from None
+        if indices.ndim != 1 or indices.size == 0 or not np.issubdtype(indices.dtype, np.integer):
+            raise SceneError(f"{self.label}: vertices must be a non-empty list of whole numbers, or an InBox")
+        unique = np.unique(indices)
+        if len(unique) != len(indices):
+            raise SceneError(f"{self.label}: vertices names a vertex twice; name each once")
+        if indices.min() < 0 or indices.max() > np.iinfo(np.int32).max:
+            raise SceneError(f"{self.label}: vertex {indices.min()} is negative; indices begin at 0")
+        object.__setattr__(self, "vertices", indices.astype(np.int32))
+
+    @property
+    def label(self) -> str:
+        """How messages call this pin."""
+        return f"pin {self.name!r} of body {self.body!r}" if self.name else f"pin of body {self.body!r}"
+
+    def select(self, placed: NDArray[np.float64]) -> NDArray[np.int32]:
+        """Vertex indices (k,) of the body, given its vertices placed in the world (n, 3).
+
+        Raises
+        ------
+        SceneError : where an index is out of range, or the box holds no vertex.
+        """
+        if isinstance(self.vertices, InBox):
+            indices = self.vertices.select(placed)
+            if len(indices) == 0:
+                low, high = placed.min(axis=0).round(6).tolist(), placed.max(axis=0).round(6).tolist()
+                raise SceneError(f"{self.label}: its box holds no vertex; the body reaches from {low} to {high}")
+            return indices
+        indices = np.asarray(self.vertices, dtype=np.int32)
+        if indices.max() >= len(placed):
+            raise SceneError(f"{self.label}: vertex {indices.max()} does not exist; the body has {len(placed)} vertices")
+        return indices

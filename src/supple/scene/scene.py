@@ -1,0 +1,81 @@
+"""The scene: everything a user describes, checked, and free of any solver."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from supple.errors import SceneError
+from supple.scene.body import Body
+from supple.scene.obstacles import Obstacle
+from supple.scene.pins import Pin
+from supple.scene.values import finite_vector
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Bodies, obstacles and pins under gravity.
+
+    Parameters
+    ----------
+    bodies : at least one; names are unique.
+    obstacles : rigid things that bodies collide with.
+    pins : vertices held or scripted.
+    gravity : (3,) acceleration [m/s^2].
+
+    Raises
+    ------
+    SceneError : where the parts contradict each other.
+    """
+
+    bodies: Sequence[Body]
+    obstacles: Sequence[Obstacle] = ()
+    pins: Sequence[Pin] = ()
+    gravity: ArrayLike = (0.0, -9.81, 0.0)
+
+    def __post_init__(self) -> None:
+        for key, kind in (("bodies", Body), ("obstacles", Obstacle), ("pins", Pin)):
+            try:
+                items = tuple(getattr(self, key))
+            except TypeError:
+                raise SceneError(f"scene: {key} is {getattr(self, key)!r}; give a list") from None
+            for i, item in enumerate(items):
+                if not isinstance(item, kind):
+                    raise SceneError(f"scene: {key}[{i}] is a {type(item).__name__}; give a {kind.__name__}")
+            object.__setattr__(self, key, items)
+        if not self.bodies:
+            raise SceneError("scene: there is no body; give at least one")
+        object.__setattr__(self, "gravity", finite_vector(self.gravity, "scene: gravity"))
+        for key in ("bodies", "obstacles"):
+            names = Counter(item.name for item in getattr(self, key) if item.name is not None)
+            twice = [name for name, count in names.items() if count > 1]
+            if twice:
+                raise SceneError(f"scene: two {key} are named {twice[0]!r}; give each a name of its own")
+        known = [body.name for body in self.bodies]
+        held: dict[str, np.ndarray] = {}
+        for pin in self.pins:
+            if pin.body not in known:
+                raise SceneError(f"{pin.label}: there is no such body; the scene has {', '.join(map(repr, known))}")
+            body = self.body(pin.body)
+            chosen = pin.select(body.place(body.mesh.vertices))
+            taken = held.setdefault(pin.body, np.zeros(len(body.mesh.vertices), dtype=bool))
+            if taken[chosen].any():
+                vertex = chosen[taken[chosen]][0]
+                raise SceneError(f"{pin.label}: vertex {vertex} is held by another pin already; hold it once")
+            taken[chosen] = True
+
+    def body(self, name: str) -> Body:
+        """The body of that name.
+
+        Raises
+        ------
+        SceneError : where there is none.
+        """
+        for body in self.bodies:
+            if body.name == name:
+                return body
+        raise SceneError(f"scene: there is no body {name!r}; there are {', '.join(repr(b.name) for b in self.bodies)}")

@@ -1,0 +1,64 @@
+"""Checks of the values that a user types into a scene; each failure is one line that names the thing and the mend."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.errors import SceneError
+
+
+def check_name(name: object, kind: str) -> None:
+    """Raise unless `name` is a non-empty text that can stand in a file name and an HDF5 path."""
+    if not isinstance(name, str) or not name.strip():
+        raise SceneError(f"{kind}: name is {name!r}; give a non-empty text")
+    if len(name) > 100 or any(c in name for c in '/\\:*?"<>|\0') or not name.isprintable() or name in (".", ".."):
+        raise SceneError(f"{kind} {name[:100]!r}: a name may hold at most 100 letters, digits, spaces, '-', '_' and '.'")
+
+
+def finite_vector(value: object, what: str, *, nonzero: bool = False) -> NDArray[np.float64]:
+    """`value` as a read-only (3,) float64 array; raise where it is not three finite numbers."""
+    try:
+        vector = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise SceneError(f"{what} is {value!r}; give three numbers") from None
+    if vector.shape != (3,):
+        raise SceneError(f"{what} has shape {vector.shape}; give three numbers")
+    if not np.isfinite(vector).all():
+        raise SceneError(f"{what} is {vector.tolist()}; it must be finite")
+    if nonzero and not vector.any():
+        raise SceneError(f"{what} has no length; give a direction such as (0, 1, 0)")
+    vector.flags.writeable = False
+    return vector
+
+
+def _number(value: object, what: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
+        raise SceneError(f"{what} is {value!r}; give a number")
+    number = float(value)
+    if not np.isfinite(number):
+        raise SceneError(f"{what} is {number}; it must be finite")
+    return number
+
+
+def non_negative(value: object, what: str) -> float:
+    """`value` as a float that is finite and zero or more."""
+    number = _number(value, what)
+    if number < 0.0:
+        raise SceneError(f"{what} is {number:g}; it must be zero or more")
+    return number
+
+
+def positive(value: object, what: str) -> float:
+    """`value` as a float that is finite and above zero."""
+    number = _number(value, what)
+    if number <= 0.0:
+        raise SceneError(f"{what} is {number:g}; it must be above zero")
+    return number
+
+
+def positive_integer(value: object, what: str) -> int:
+    """`value` as an int of one or more."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or int(value) < 1:
+        raise SceneError(f"{what} is {value!r}; give a whole number of one or more")
+    return int(value)

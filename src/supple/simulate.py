@@ -1,0 +1,189 @@
+"""The one loop. Whoever reads this file has seen the whole program."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from supple.diagnostics import Diagnostics, deformation_gradients, determinants, measure
+from supple.errors import SceneError, SolverError
+from supple.scene.scene import Scene
+from supple.solver import Solver
+from supple.state import State, Status, StepReport
+from supple.system import System, build_system, initial_state
+
+
+@dataclass(frozen=True, eq=False)
+class Report(Diagnostics):
+    """What is known of one frame: how its step ended, and what was measured on its state.
+
+    Attributes
+    ----------
+    status, iterations, message, min_distance, details : see `StepReport`
+    wall_seconds : time the step took [s]
+    """
+
+    status: Status
+    iterations: int
+    wall_seconds: float
+    message: str = ""
+    min_distance: float | None = None
+    details: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """The scene at one time.
+
+    Attributes
+    ----------
+    index : number of steps since the start; time : [s]
+    report : see `Report`; state : flat arrays of all bodies; system : what they belong to
+    """
+
+    index: int
+    state: State
+    system: System
+    report: Report
+
+    @property
+    def time(self) -> float:
+        return self.state.time
+
+    @cached_property
+    def positions(self) -> dict[str, NDArray[np.float64]]:
+        """By body name, (n, 3) [m]."""
+        return self.system.split(self.state.positions)
+
+    @cached_property
+    def velocities(self) -> dict[str, NDArray[np.float64]]:
+        """By body name, (n, 3) [m/s]."""
+        return self.system.split(self.state.velocities)
+
+    @cached_property
+    def det_F(self) -> NDArray[np.float64]:
+        """(m,) J of every tet, all bodies after each other."""
+        F = deformation_gradients(self.state.positions, self.system.tets, self.system.rest_shape_inverse)
+        return determinants(F)
+
+
+class Sink(Protocol):
+    """Something that frames flow into: a recording, a progress bar, a page."""
+
+    def begin(self, first: Frame, dt: float, steps: int) -> None:
+        """Called once, with the frame at the start."""
+        ...
+
+    def write(self, frame: Frame) -> None:
+        """Called with every frame that was simulated."""
+        ...
+
+    def end(self) -> None:
+        """Called once, also when the simulation stops early."""
+        ...
+
+
+class NullSink:
+    """A sink that keeps nothing."""
+
+    def begin(self, first: Frame, dt: float, steps: int) -> None: ...
+
+    def write(self, frame: Frame) -> None: ...
+
+    def end(self) -> None: ...
+
+
+def simulate(
+    scene: Scene,
+    solver: Solver,
+    dt: float,
+    steps: int,
+    *,
+    initial_positions: Mapping[str, ArrayLike] | None = None,
+    initial_velocities: Mapping[str, ArrayLike] | None = None,
+    start: Frame | State | None = None,
+    sinks: Sequence[Sink] = (),
+) -> Iterator[Frame]:
+    """Advance a scene and yield a frame after each step.
+
+    Ends early, after yielding the frame that says why, where the solver cannot go on.
+
+    Parameters
+    ----------
+    scene : what to simulate.
+    solver : `XPBD(...)` or `Implicit(...)`.
+    dt : time from frame to frame [s].
+    steps : number of frames.
+    initial_positions, initial_velocities : by body name, (n, 3) [m], [m/s]; others start as the scene says.
+    start : a frame (of this scene, from either solver) to go on from; excludes the two above.
+    sinks : receive the start, every frame, and the end.
+
+    Raises
+    ------
+    SceneError, SolverError : before the first step, where the input cannot be simulated.
+    """
+    if not isinstance(scene, Scene):
+        raise SceneError(f"simulate: the scene is a {type(scene).__name__}; give a Scene")
+    if not isinstance(solver, Solver):
+        raise SolverError(f"simulate: the solver is {solver!r}; give XPBD(...) or Implicit(...)")
+    if isinstance(dt, bool) or not isinstance(dt, (int, float, np.number)) or not math.isfinite(dt) or dt <= 0.0:
+        raise SolverError(f"simulate: dt is {dt!r}; it must be finite and above zero [s]")
+    if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 0:
+        raise SolverError(f"simulate: steps is {steps!r}; give a whole number of zero or more")
+    if start is not None and (initial_positions is not None or initial_velocities is not None):
+        raise SceneError("simulate: give `start`, or initial positions and velocities, not both")
+    first = first_frame(scene, start if start is not None else initial_state(scene, initial_positions, initial_velocities))
+    workspace = solver.prepare(first.system)
+    return _steps(first, solver, float(dt), int(steps), workspace, sinks)
+
+
+def first_frame(scene: Scene, start: Frame | State) -> Frame:
+    """The frame at the start: number 0 (or that of `start`), before any step."""
+    state = start.state if isinstance(start, Frame) else start
+    index = start.index if isinstance(start, Frame) else 0
+    count = sum(len(body.mesh.vertices) for body in scene.bodies)
+    if state.positions.shape != (count, 3):
+        raise SceneError(f"simulate: start has {len(state.positions)} vertices, the scene has {count}; they must be the same")
+    system = build_system(scene, state)
+    return Frame(index, state, system, _report(system, state, StepReport(Status.CONVERGED, 0), 0.0))
+
+
+def _steps(first: Frame, solver: Solver, dt: float, steps: int, workspace: Any, sinks: Sequence[Sink]) -> Iterator[Frame]:
+    system, state = first.system, first.state
+    begun: list[Sink] = []
+    try:
+        for sink in sinks:
+            begun.append(sink)
+            sink.begin(first, dt, steps)
+        for index in range(first.index + 1, first.index + steps + 1):
+            began = time.perf_counter()
+            state, said = solver.step(system, state, dt, workspace)
+            seconds = time.perf_counter() - began
+            frame = Frame(index, state, system, _report(system, state, said, seconds))
+            for sink in sinks:
+                sink.write(frame)
+            yield frame
+            if not said.status.can_go_on:
+                break
+    finally:
+        for sink in begun:
+            sink.end()
+
+
+def _report(system: System, state: State, said: StepReport, seconds: float) -> Report:
+    return Report(
+        **vars(measure(system, state)),
+        status=said.status,
+        iterations=said.iterations,
+        wall_seconds=seconds,
+        message=said.message,
+        min_distance=said.min_distance,
+        details=said.details,
+    )

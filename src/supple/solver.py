@@ -1,0 +1,26 @@
+"""What `simulate` asks of a solver."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+from supple.state import State, StepReport
+from supple.system import System
+
+
+class Solver(ABC):
+    """An immutable description of a method and its parameters; all that changes is in the State and the workspace."""
+
+    @abstractmethod
+    def prepare(self, system: System) -> Any:
+        """Everything that is computed once for a system: colorings, sparsity patterns, scratch arrays.
+
+        Raises
+        ------
+        SolverError : where this solver cannot work with something in the scene; the text names it.
+        """
+
+    @abstractmethod
+    def step(self, system: System, state: State, dt: float, workspace: Any) -> tuple[State, StepReport]:
+        """Advance `state` by `dt` [s]. Where that is impossible, the last good state and a named status."""

@@ -1,0 +1,229 @@
+"""A scene as flat arrays: what solvers see.
+
+The bodies' vertices, tets, edges and surface triangles are concatenated; `BodyRange` says which part is whose. A System
+knows nothing of solvers, files or viewers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from supple.errors import SceneError
+from supple.scene.body import Body
+from supple.scene.motion import moved_points, points_at_origin
+from supple.scene.obstacles import Obstacle
+from supple.scene.pins import Pin
+from supple.scene.scene import Scene
+from supple.state import State
+
+
+@dataclass(frozen=True, eq=False)
+class BodyRange:
+    """Which rows of the System's arrays belong to one body."""
+
+    body: Body
+    vertices: slice
+    tets: slice
+    edges: slice
+    triangles: slice
+
+    @property
+    def name(self) -> str:
+        return self.body.name
+
+
+@dataclass(frozen=True, eq=False)
+class PinRange:
+    """The vertices of one pin, and where they are when its motion is undone (at time 0)."""
+
+    pin: Pin
+    vertices: NDArray[np.int32]
+    anchors: NDArray[np.float64]
+
+    def targets(self, time: float) -> NDArray[np.float64]:
+        """Where the pinned vertices (k, 3) must be at `time` [m]."""
+        return moved_points(self.pin.motion, self.anchors, time, self.pin.label)
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """Flat arrays of a whole scene. All arrays are C-contiguous; indices are int32 and global.
+
+    Attributes
+    ----------
+    rest_positions : (n, 3) [m] rest shapes, each in its body's own coordinates (not placed)
+    masses : (n,) lumped, rho V / 4 to each node of a tet [kg]
+    tets : (m, 4); rest_shape_inverse : (m, 3, 3) Dm^-1 [1/m]; rest_volumes : (m,) [m^3]
+    edges : (e, 2); rest_lengths : (e,) [m]
+    triangles : (t, 3) surfaces, counter-clockwise from outside
+    components : (n,) which connected piece a vertex belongs to
+    gravity : (3,) [m/s^2]
+    """
+
+    scene: Scene
+    bodies: tuple[BodyRange, ...]
+    pins: tuple[PinRange, ...]
+    rest_positions: NDArray[np.float64]
+    masses: NDArray[np.float64]
+    tets: NDArray[np.int32]
+    rest_shape_inverse: NDArray[np.float64]
+    rest_volumes: NDArray[np.float64]
+    edges: NDArray[np.int32]
+    rest_lengths: NDArray[np.float64]
+    triangles: NDArray[np.int32]
+    components: NDArray[np.int32]
+    gravity: NDArray[np.float64]
+
+    @property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        return tuple(self.scene.obstacles)
+
+    @cached_property
+    def pinned_vertices(self) -> NDArray[np.int32]:
+        """(k,) vertices of all pins, in the order of `pin_targets`."""
+        parts = [pin.vertices for pin in self.pins]
+        return np.concatenate(parts).astype(np.int32) if parts else np.zeros(0, dtype=np.int32)
+
+    def pin_targets(self, time: float) -> NDArray[np.float64]:
+        """(k, 3) where the pinned vertices must be at `time` [m]."""
+        parts = [pin.targets(time) for pin in self.pins]
+        return np.concatenate(parts) if parts else np.zeros((0, 3))
+
+    @cached_property
+    def inverse_masses(self) -> NDArray[np.float64]:
+        """(n,) 1/m [1/kg], zero where a vertex is pinned."""
+        w = 1.0 / self.masses
+        w[self.pinned_vertices] = 0.0
+        return w
+
+    def split(self, values: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+        """Per-vertex values (n, ...) as one array per body, by name."""
+        return {part.name: values[part.vertices] for part in self.bodies}
+
+
+def build_system(scene: Scene, start: State | None = None) -> System:
+    """Flatten a scene. `start` is the state that the simulation begins from; pins hold its vertices where they are there.
+
+    Raises
+    ------
+    SceneError : where a material does not fit its mesh.
+    """
+    ranges, rest, masses, tets, Dm_inv, volumes, edges, triangles = [], [], [], [], [], [], [], []
+    n = m = e = t = 0
+    for body in scene.bodies:
+        mesh = body.mesh
+        counts = len(mesh.vertices), len(mesh.tets), len(mesh.edges), len(mesh.surface.triangles)
+        ranges.append(
+            BodyRange(body, slice(n, n + counts[0]), slice(m, m + counts[1]), slice(e, e + counts[2]), slice(t, t + counts[3]))
+        )
+        density = np.asarray(body.material.density, dtype=np.float64)
+        if density.ndim and len(density) != counts[1]:
+            raise SceneError(f"body {body.name!r}: density has {len(density)} values for {counts[1]} tets; give one per tet")
+        share = np.broadcast_to(density, counts[1]) * mesh.volumes / 4.0
+        rest.append(mesh.vertices)
+        masses.append(np.bincount(mesh.tets.ravel(), weights=np.repeat(share, 4), minlength=counts[0]))
+        tets.append(mesh.tets + n)
+        Dm_inv.append(mesh.rest_shape_inverse)
+        volumes.append(mesh.volumes)
+        edges.append(mesh.edges + n)
+        triangles.append(mesh.surface.triangles + n)
+        n, m, e, t = n + counts[0], m + counts[1], e + counts[2], t + counts[3]
+    rest_positions = np.concatenate(rest)
+    all_edges = np.concatenate(edges).astype(np.int32)
+    lengths = np.linalg.norm(rest_positions[all_edges[:, 0]] - rest_positions[all_edges[:, 1]], axis=1)
+    graph = coo_matrix((np.ones(len(all_edges)), (all_edges[:, 0], all_edges[:, 1])), shape=(n, n))
+    return System(
+        scene=scene,
+        bodies=tuple(ranges),
+        pins=_pin_ranges(scene, ranges, start),
+        rest_positions=np.ascontiguousarray(rest_positions),
+        masses=np.concatenate(masses),
+        tets=np.ascontiguousarray(np.concatenate(tets), dtype=np.int32),
+        rest_shape_inverse=np.ascontiguousarray(np.concatenate(Dm_inv)),
+        rest_volumes=np.concatenate(volumes),
+        edges=all_edges,
+        rest_lengths=lengths,
+        triangles=np.ascontiguousarray(np.concatenate(triangles), dtype=np.int32),
+        components=connected_components(graph, directed=False)[1].astype(np.int32),
+        gravity=np.asarray(scene.gravity, dtype=np.float64),
+    )
+
+
+def _pin_ranges(scene: Scene, ranges: list[BodyRange], start: State | None) -> tuple[PinRange, ...]:
+    pins = []
+    for pin in scene.pins:
+        part = next(r for r in ranges if r.name == pin.body)
+        placed = part.body.place(part.body.mesh.vertices)
+        local = pin.select(placed)
+        vertices = (local + part.vertices.start).astype(np.int32)
+        if start is None:
+            anchors = placed[local]
+        elif start.time == 0.0:
+            anchors = start.positions[vertices]
+        else:
+            anchors = points_at_origin(pin.motion, start.positions[vertices], start.time, pin.label)
+        pins.append(PinRange(pin, vertices, np.ascontiguousarray(anchors)))
+    return tuple(pins)
+
+
+def initial_state(
+    scene: Scene,
+    positions: Mapping[str, ArrayLike] | None = None,
+    velocities: Mapping[str, ArrayLike] | None = None,
+) -> State:
+    """The state at time 0: bodies placed, moving as the scene says; or with the given positions and velocities.
+
+    Parameters
+    ----------
+    positions, velocities : by body name, (n, 3) [m] and [m/s]; bodies not named start as the scene says.
+
+    Raises
+    ------
+    SceneError : where a name is unknown, a shape is wrong or a value is not finite.
+    """
+    names = {body.name for body in scene.bodies}
+    for what, given in (("initial_positions", positions), ("initial_velocities", velocities)):
+        unknown = set(given or ()) - names
+        if unknown:
+            raise SceneError(f"{what}: there is no body {sorted(unknown)[0]!r}; there are {', '.join(map(repr, sorted(names)))}")
+    x, v = [], []
+    for body in scene.bodies:
+        count = len(body.mesh.vertices)
+        if positions is not None and body.name in positions:
+            placed = _given(positions[body.name], count, f"initial_positions[{body.name!r}]")
+        else:
+            placed = body.place(body.mesh.vertices)
+        if velocities is not None and body.name in velocities:
+            moving = _given(velocities[body.name], count, f"initial_velocities[{body.name!r}]")
+        else:
+            moving = _rigid_velocity(body, placed)
+        x.append(placed)
+        v.append(moving)
+    return State(0.0, np.ascontiguousarray(np.concatenate(x)), np.ascontiguousarray(np.concatenate(v)))
+
+
+def _given(value: ArrayLike, count: int, what: str) -> NDArray[np.float64]:
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise SceneError(f"{what} is not an array of numbers") from None
+    if array.shape != (count, 3):
+        raise SceneError(f"{what} has shape {array.shape}; the body's mesh needs ({count}, 3)")
+    if not np.isfinite(array).all():
+        row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
+        raise SceneError(f"{what}: row {row} is not finite")
+    return array
+
+
+def _rigid_velocity(body: Body, placed: NDArray[np.float64]) -> NDArray[np.float64]:
+    share = np.broadcast_to(np.asarray(body.material.density, dtype=np.float64), len(body.mesh.tets)) * body.mesh.volumes
+    masses = np.bincount(body.mesh.tets.ravel(), weights=np.repeat(share, 4), minlength=len(placed))
+    center = masses @ placed / masses.sum()
+    return np.asarray(body.velocity) + np.cross(np.asarray(body.angular_velocity), placed - center)
