@@ -1,0 +1,1 @@
+"""Meshes: surfaces, tetrahedra, shapes, files, TetGen, skinning."""

@@ -1,0 +1,171 @@
+"""A triangle surface: what a soft body is made from, and what it looks like."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from supple.errors import MeshError
+from supple.mesh.checked_arrays import frozen, index_array, vertex_array
+from supple.mesh.topology import Components, connected_components, unique_edges
+
+if TYPE_CHECKING:
+    from supple.mesh.surface_checks import SurfaceReport
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceMesh:
+    """Triangles in space, counter-clockwise seen from outside.
+
+    The arrays are checked for what no program could use (wrong shapes, indices out of range, coordinates that are
+    not finite). Holes, self-intersections and the like are allowed here; `check` reports them.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float [m]
+    triangles : (m, 3) int, rows of `vertices`
+    shares_vertices : bool
+        True where `vertices` belong to a larger mesh (the surface of a `TetMesh`), so that vertices that no
+        triangle uses are no fault.
+
+    Raises
+    ------
+    MeshError : naming the row at fault.
+    """
+
+    vertices: NDArray[np.float64]
+    triangles: NDArray[np.int32]
+    shares_vertices: bool = False
+
+    def __init__(self, vertices: ArrayLike, triangles: ArrayLike, *, shares_vertices: bool = False) -> None:
+        checked = vertex_array(vertices, "SurfaceMesh")
+        object.__setattr__(self, "vertices", checked)
+        object.__setattr__(self, "triangles", index_array(triangles, 3, len(checked), "SurfaceMesh", "triangle"))
+        object.__setattr__(self, "shares_vertices", bool(shares_vertices))
+
+    def __repr__(self) -> str:
+        return f"SurfaceMesh({len(self.vertices)} vertices, {len(self.triangles)} triangles)"
+
+    @classmethod
+    def load(cls, path: str | Path) -> SurfaceMesh:
+        """Read a surface from an STL, OBJ, PLY, OFF, VTP, VTK or VTU file, known by its extension.
+
+        Polygons are cut into triangles. Vertices closer than 2e-7 of the bounding box's diagonal (two units in the
+        last place of the single precision that most files are written in) become one; triangles that collapse by
+        this, and vertices that no triangle uses, are dropped. The log says how many.
+
+        Raises
+        ------
+        MeshError : where the file is missing, broken, of another kind, or holds no surface; the text starts with
+            the path.
+        """
+        from supple.mesh.mesh_files import load_surface
+
+        return load_surface(path)
+
+    def save(self, path: str | Path) -> None:
+        """Write the surface as STL (binary), OBJ, PLY, OFF, VTP, VTK or VTU, by the extension of `path`.
+
+        Raises
+        ------
+        MeshError : where the extension is none of these, or the file cannot be written. No partial file is left.
+        """
+        from supple.mesh.mesh_files import save_surface
+
+        save_surface(self, path)
+
+    @cached_property
+    def edges(self) -> NDArray[np.int32]:
+        """Unique edges (e, 2), lower vertex first, sorted."""
+        return frozen(unique_edges(self.triangles, len(self.vertices)))
+
+    @cached_property
+    def area_vectors(self) -> NDArray[np.float64]:
+        """Normal of each triangle times its area (m, 3) [m^2], pointing outward."""
+        a, b, c = self.vertices[self.triangles].transpose(1, 0, 2)
+        return frozen(0.5 * np.cross(b - a, c - a))
+
+    @cached_property
+    def area(self) -> float:
+        """Total area [m^2]."""
+        return float(np.linalg.norm(self.area_vectors, axis=1).sum())
+
+    @cached_property
+    def volume(self) -> float:
+        """Enclosed volume [m^3] by the divergence theorem; negative where triangles face inward.
+
+        Means little unless the surface is watertight.
+        """
+        low, high = self.bounds
+        a = self.vertices[self.triangles[:, 0]] - 0.5 * (low + high)
+        return float(np.einsum("ij,ij->i", a, self.area_vectors).sum() / 3.0)
+
+    @cached_property
+    def used_vertices(self) -> NDArray[np.int32]:
+        """Rows of `vertices` that some triangle uses, sorted."""
+        used = np.zeros(len(self.vertices), dtype=bool)
+        used[self.triangles] = True
+        return frozen(np.flatnonzero(used).astype(np.int32))
+
+    @cached_property
+    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Lowest and highest coordinates (3,), (3,) [m] of the vertices in use."""
+        points = self.vertices[self.used_vertices]
+        return frozen(points.min(axis=0)), frozen(points.max(axis=0))
+
+    @cached_property
+    def components(self) -> Components:
+        """How many connected pieces there are, and which one each triangle (m,) belongs to."""
+        count, labels = connected_components(self.triangles, len(self.vertices))
+        return Components(count, frozen(labels))
+
+    def check(self) -> SurfaceReport:
+        """Look for everything that would keep a mesher or a contact solver from using this surface."""
+        from supple.mesh.surface_checks import check_surface
+
+        return check_surface(self)
+
+    def compact(self) -> SurfaceMesh:
+        """The same surface without the vertices that no triangle uses."""
+        rows = np.full(len(self.vertices), -1, dtype=np.int32)
+        rows[self.used_vertices] = np.arange(len(self.used_vertices), dtype=np.int32)
+        return SurfaceMesh(self.vertices[self.used_vertices], rows[self.triangles])
+
+    def flipped(self) -> SurfaceMesh:
+        """The same surface turned inside out."""
+        return SurfaceMesh(self.vertices, self.triangles[:, ::-1], shares_vertices=self.shares_vertices)
+
+    def transformed(
+        self,
+        scale: float | ArrayLike = 1.0,
+        rotation: ArrayLike | None = None,
+        translation: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> SurfaceMesh:
+        """The surface scaled, then turned by a matrix (3, 3), then moved by a vector (3,) [m].
+
+        A map that mirrors also turns the triangles, so that they still face outward.
+        """
+        linear, shift = linear_map(scale, rotation, translation, "SurfaceMesh.transformed")
+        triangles = self.triangles[:, ::-1] if np.linalg.det(linear) < 0.0 else self.triangles
+        return SurfaceMesh(self.vertices @ linear.T + shift, triangles, shares_vertices=self.shares_vertices)
+
+
+def linear_map(
+    scale: float | ArrayLike, rotation: ArrayLike | None, translation: ArrayLike, owner: str
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Matrix (3, 3) and shift (3,) of scaling, then rotating, then translating; `MeshError` where they are unusable."""
+    try:
+        factors = np.broadcast_to(np.asarray(scale, dtype=np.float64), (3,))
+        turn = np.eye(3) if rotation is None else np.asarray(rotation, dtype=np.float64).reshape(3, 3)
+        shift = np.asarray(translation, dtype=np.float64).reshape(3)
+    except (TypeError, ValueError):
+        raise MeshError(f"{owner}: give scale as 1 or 3 numbers, rotation as (3, 3), translation as (3,)") from None
+    linear = turn * factors
+    if not (np.isfinite(linear).all() and np.isfinite(shift).all()) or np.linalg.det(linear) == 0.0:
+        raise MeshError(f"{owner}: scale, rotation and translation must be finite, and must not flatten the mesh")
+    return linear, shift

@@ -1,0 +1,266 @@
+"""A tetrahedral mesh: the rest shape of a soft body."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from supple.errors import MeshError
+from supple.mesh.checked_arrays import frozen, index_array, place, vertex_array
+from supple.mesh.surface import SurfaceMesh, linear_map
+from supple.mesh.topology import TET_EDGES, TET_FACETS, Components, connected_components, facet_keys, unique_edges
+
+logger = logging.getLogger(__name__)
+
+# A determinant is wrong by a few units of round-off of its largest terms; below this many it says nothing.
+ROUND_OFF_UNITS = 64.0
+
+
+@dataclass(frozen=True, eq=False)
+class TetMesh:
+    """Tetrahedra in space, each with det[x1-x0, x2-x0, x3-x0] > 0.
+
+    Tets given with the other winding are turned by swapping their last two vertices; `turned` says how many.
+
+    A tet is refused as flat when its thickness |det| / L^2, with L its longest edge, is at most 64 eps times the
+    larger of L and its largest coordinate (eps = 2.2e-16): then round-off alone decides on its sign.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float [m], each used by some tet (`TetMesh.dropping_unused` drops the others)
+    tets : (m, 4) int, rows of `vertices`
+
+    Attributes
+    ----------
+    turned : int
+        How many tets were given with negative winding.
+
+    Raises
+    ------
+    MeshError : naming the vertex, tet or facet at fault: not finite, out of range, repeated, flat, given twice,
+        in no tet, or shared by more than two tets.
+    """
+
+    vertices: NDArray[np.float64]
+    tets: NDArray[np.int32]
+    turned: int
+
+    def __init__(self, vertices: ArrayLike, tets: ArrayLike) -> None:
+        points = vertex_array(vertices, "TetMesh")
+        given = index_array(tets, 4, len(points), "TetMesh", "tet")
+        _refuse_repeated_corners(given)
+        positive, turned = _positive_winding(points, given)
+        _refuse_unused(points, positive)
+        _refuse_duplicates(positive, len(points))
+        object.__setattr__(self, "vertices", points)
+        object.__setattr__(self, "tets", frozen(positive))
+        object.__setattr__(self, "turned", turned)
+        _ = self.adjacency  # refuses facets that three or more tets claim
+
+    def __repr__(self) -> str:
+        return f"TetMesh({len(self.vertices)} vertices, {len(self.tets)} tets)"
+
+    @classmethod
+    def dropping_unused(cls, vertices: ArrayLike, tets: ArrayLike) -> TetMesh:
+        """A `TetMesh` of the vertices that some tet uses, in their order; the log says how many were dropped."""
+        points = vertex_array(vertices, "TetMesh")
+        given = index_array(tets, 4, len(points), "TetMesh", "tet")
+        used = np.zeros(len(points), dtype=bool)
+        used[given] = True
+        if used.all():
+            return cls(points, given)
+        logger.warning("dropped %d of %d vertices that belong to no tet", np.count_nonzero(~used), len(points))
+        return cls(points[used], (np.cumsum(used) - 1)[given])
+
+    @classmethod
+    def load(cls, path: str | Path) -> TetMesh:
+        """Read a tet mesh from TetGen's .node/.ele/.edge/.face, Gmsh .msh, .vtu or .vtk, known by the extension.
+
+        Vertices that belong to no tet are dropped, and negative tets turned; the log says how many.
+
+        Raises
+        ------
+        MeshError : where the file is missing, broken, of another kind, or holds no usable tets; the text starts
+            with the path.
+        """
+        from supple.mesh.mesh_files import load_tetmesh
+
+        return load_tetmesh(path)
+
+    def save(self, path: str | Path) -> None:
+        """Write the mesh as TetGen's four files (.node, .ele, .edge or .face), .msh, .vtu or .vtk, by the extension.
+
+        Raises
+        ------
+        MeshError : where the extension is none of these, or the file cannot be written. No partial file is left.
+        """
+        from supple.mesh.mesh_files import save_tetmesh
+
+        save_tetmesh(self, path)
+
+    @cached_property
+    def edges(self) -> NDArray[np.int32]:
+        """Unique edges (e, 2), lower vertex first, sorted."""
+        return frozen(unique_edges(self.tets, len(self.vertices)))
+
+    @cached_property
+    def volumes(self) -> NDArray[np.float64]:
+        """Volume of each tet (m,) [m^3], all positive."""
+        return frozen(_determinants(self.vertices, self.tets) / 6.0)
+
+    @cached_property
+    def volume(self) -> float:
+        """Total volume [m^3]."""
+        return float(self.volumes.sum())
+
+    @cached_property
+    def rest_shape_inverse(self) -> NDArray[np.float64]:
+        """Inverse of Dm = [x1-x0, x2-x0, x3-x0] (columns) of each tet (m, 3, 3) [1/m].
+
+        Its rows are the gradients of the barycentric coordinates of vertices 1, 2 and 3.
+        """
+        x0, x1, x2, x3 = self.vertices[self.tets].transpose(1, 0, 2)
+        a, b, c = x1 - x0, x2 - x0, x3 - x0
+        rows = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
+        return frozen(rows / (6.0 * self.volumes)[:, None, None])
+
+    @cached_property
+    def adjacency(self) -> NDArray[np.int32]:
+        """Neighbour of each tet across the facet opposite each of its vertices (m, 4); -1 on the boundary."""
+        return frozen(_neighbours(self.tets, len(self.vertices)))
+
+    @cached_property
+    def surface(self) -> SurfaceMesh:
+        """The boundary, counter-clockwise from outside; its triangles index into this mesh's whole vertex array."""
+        tet, facet = np.nonzero(self.adjacency < 0)
+        triangles = self.tets[tet[:, None], TET_FACETS[facet]]
+        return SurfaceMesh(self.vertices, triangles, shares_vertices=True)
+
+    @cached_property
+    def components(self) -> Components:
+        """How many connected pieces there are, and which one each tet (m,) belongs to."""
+        count, labels = connected_components(self.tets, len(self.vertices))
+        return Components(count, frozen(labels))
+
+    @cached_property
+    def min_dihedrals(self) -> NDArray[np.float64]:
+        """Smallest dihedral angle of each tet (m,) [degrees]; 70.5 in the regular one."""
+        from supple.mesh.quality import min_dihedrals
+
+        return frozen(min_dihedrals(self.vertices, self.tets))
+
+    @cached_property
+    def radius_ratios(self) -> NDArray[np.float64]:
+        """Three times inscribed over circumscribed radius of each tet (m,): 1 in the regular one, 0 in a flat one."""
+        from supple.mesh.quality import radius_ratios
+
+        return frozen(radius_ratios(self.vertices, self.tets))
+
+    def transformed(
+        self,
+        scale: float | ArrayLike = 1.0,
+        rotation: ArrayLike | None = None,
+        translation: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> TetMesh:
+        """The mesh scaled, then turned by a matrix (3, 3), then moved by a vector (3,) [m]."""
+        linear, shift = linear_map(scale, rotation, translation, "TetMesh.transformed")
+        return TetMesh(self.vertices @ linear.T + shift, self.tets)
+
+
+def _determinants(vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> NDArray[np.float64]:
+    x0, x1, x2, x3 = vertices[tets].transpose(1, 0, 2)
+    return np.einsum("ij,ij->i", x1 - x0, np.cross(x2 - x0, x3 - x0))
+
+
+def _positive_winding(vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> tuple[NDArray[np.int32], int]:
+    """Tets with positive determinants, and how many were turned; refuses flat ones."""
+    det = _determinants(vertices, tets)
+    corners = vertices[tets]
+    longest = np.zeros(len(tets))
+    for i, j in TET_EDGES:
+        d = corners[:, j] - corners[:, i]
+        np.maximum(longest, np.einsum("ij,ij->i", d, d), out=longest)
+    reach = np.maximum(np.sqrt(longest), np.abs(corners).max(axis=(1, 2)))
+    flat = np.abs(det) <= ROUND_OFF_UNITS * np.finfo(np.float64).eps * longest * reach
+    if flat.any():
+        rows = np.flatnonzero(flat)
+        t = int(rows[0])
+        length = float(np.sqrt(longest[t]))
+        # A tet of coinciding vertices has no length to compare with.
+        thickness = f"{abs(det[t]) / length**2:.3g} m" if length > 0.0 else "0 m"
+        more = f" (and {len(rows) - 1} more)" if len(rows) > 1 else ""
+        raise MeshError(
+            f"TetMesh: tet {t} {tets[t].tolist()} at {place(corners[t].mean(axis=0))} is flat: it is {thickness} thick "
+            f"with edges up to {length:.3g} m{more}; remove it or remesh"
+        )
+    negative = det < 0.0
+    positive = tets.copy()
+    positive[negative, 2], positive[negative, 3] = tets[negative, 3], tets[negative, 2]
+    return positive, int(np.count_nonzero(negative))
+
+
+def _refuse_repeated_corners(tets: NDArray[np.int32]) -> None:
+    repeated = np.zeros(len(tets), dtype=bool)
+    for i, j in TET_EDGES:
+        repeated |= tets[:, i] == tets[:, j]
+    if repeated.any():
+        t = int(np.flatnonzero(repeated)[0])
+        raise MeshError(f"TetMesh: tet {t} is {tets[t].tolist()}, with a vertex twice; remove it")
+
+
+def _refuse_unused(vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> None:
+    used = np.zeros(len(vertices), dtype=bool)
+    used[tets] = True
+    if not used.all():
+        rows = np.flatnonzero(~used)
+        more = f" (and {len(rows) - 1} more)" if len(rows) > 1 else ""
+        raise MeshError(
+            f"TetMesh: vertex {rows[0]} at {place(vertices[rows[0]])}{more} belongs to no tet; "
+            "drop such vertices with TetMesh.dropping_unused(vertices, tets)"
+        )
+
+
+def _refuse_duplicates(tets: NDArray[np.int32], n_vertices: int) -> None:
+    corners = np.sort(tets, axis=1).astype(np.int64)
+    first, second = corners[:, 0] * n_vertices + corners[:, 1], corners[:, 2] * n_vertices + corners[:, 3]
+    # Equal tets have equal sums of keys; only where two sums agree is the dearer exact comparison needed.
+    sums = np.sort(first.astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15) + second.astype(np.uint64))
+    if not (sums[1:] == sums[:-1]).any():
+        return
+    order = np.lexsort((second, first))
+    same = (first[order][1:] == first[order][:-1]) & (second[order][1:] == second[order][:-1])
+    if same.any():
+        k = int(np.flatnonzero(same)[0])
+        a, b = sorted((int(order[k]), int(order[k + 1])))
+        raise MeshError(
+            f"TetMesh: tet {b} {tets[b].tolist()} has the same four vertices as tet {a}; remove one of them"
+        )
+
+
+def _neighbours(tets: NDArray[np.int32], n_vertices: int) -> NDArray[np.int32]:
+    keys = np.concatenate([facet_keys(tets[:, facet], n_vertices) for facet in TET_FACETS])
+    # Position in `keys` is facet * m + tet.
+    order = np.argsort(keys, kind="stable")
+    ordered = keys[order]
+    same = ordered[1:] == ordered[:-1]
+    crowded = same[1:] & same[:-1]
+    m = len(tets)
+    if crowded.any():
+        k = int(np.flatnonzero(crowded)[0])
+        facet, tet = divmod(int(order[k]), m)
+        owners = sorted(int(t) % m for t in order[k : k + 3])
+        corners = sorted(tets[tet, TET_FACETS[facet]].tolist())
+        raise MeshError(
+            f"TetMesh: tets {owners[0]}, {owners[1]} and {owners[2]} all share the facet {corners}; a facet can have "
+            "two tets at most, so some of them overlap: remove them or remesh"
+        )
+    first, second = order[:-1][same], order[1:][same]
+    neighbour = np.full(4 * m, -1, dtype=np.int32)
+    neighbour[first] = second % m
+    neighbour[second] = first % m
+    return np.ascontiguousarray(neighbour.reshape(4, m).T)

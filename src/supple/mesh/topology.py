@@ -1,0 +1,58 @@
+"""What can be said of a mesh from its indices alone: unique edges, facets, connected components."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Facet k of a positive tet lies opposite its vertex k and is counter-clockwise seen from outside.
+TET_FACETS = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+TET_EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
+
+
+class Components(NamedTuple):
+    """Connected pieces: how many, and which of them (0 .. count - 1) each element belongs to."""
+
+    count: int
+    labels: NDArray[np.int32]
+
+
+def edge_keys(simplices: NDArray[np.int32], n_vertices: int) -> NDArray[np.int64]:
+    """One 64-bit key, lower vertex * n + higher vertex, for each edge of each simplex: (m, edges per simplex)."""
+    width = simplices.shape[1]
+    pairs = TET_EDGES if width == 4 else np.array([[0, 1], [1, 2], [2, 0]])
+    corners = simplices.astype(np.int64)
+    first, second = corners[:, pairs[:, 0]], corners[:, pairs[:, 1]]
+    return np.minimum(first, second) * n_vertices + np.maximum(first, second)
+
+
+def unique_edges(simplices: NDArray[np.int32], n_vertices: int) -> NDArray[np.int32]:
+    """Edges (e, 2) int32 of triangles or tets, each once, lower vertex first, in lexicographic order."""
+    keys = np.unique(edge_keys(simplices, n_vertices))
+    return np.ascontiguousarray(np.column_stack(np.divmod(keys, n_vertices)).astype(np.int32))
+
+
+def facet_keys(triangles: NDArray[np.int32], n_vertices: int) -> NDArray[np.int64]:
+    """One 64-bit key for each triangle (m, 3), the same whatever the order of its corners."""
+    low, middle, high = np.sort(triangles, axis=1).astype(np.int64).T
+    if n_vertices < 2**21:
+        return (low * n_vertices + middle) * n_vertices + high
+    # Three indices no longer fit into 63 bits: number the pairs first.
+    _, rank = np.unique(low * n_vertices + middle, return_inverse=True)
+    return rank.astype(np.int64) * n_vertices + high
+
+
+def connected_components(simplices: NDArray[np.int32], n_vertices: int) -> Components:
+    """Pieces of a mesh; elements that share a vertex belong together."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components as graph_components
+
+    first = np.repeat(simplices[:, 0], simplices.shape[1] - 1)
+    others = simplices[:, 1:].ravel()
+    graph = coo_array((np.ones(len(first), dtype=np.int8), (first, others)), shape=(n_vertices, n_vertices))
+    _, of_vertex = graph_components(graph.tocsr(), directed=False)
+    # Vertices that no element uses would count as pieces of their own; renumber by the elements alone.
+    used, labels = np.unique(of_vertex[simplices[:, 0]], return_inverse=True)
+    return Components(len(used), labels.astype(np.int32))
