@@ -1,0 +1,60 @@
+# Every target sets itself up: it creates .venv from the lock files and reuses it.
+PYTHON ?= python3
+UV_VERSION := 0.13.8
+ifeq ($(OS),Windows_NT)
+  BIN := .venv/Scripts
+else
+  BIN := .venv/bin
+endif
+# uv installs in seconds; where it cannot be had or cannot reach the index, pip reads the same lock file.
+install = ($(BIN)/python -m uv pip install -q --python $(BIN)/python $(1) || $(BIN)/python -m pip install -q $(1))
+
+.PHONY: demo test test-all bench lint format lock clean
+.DELETE_ON_ERROR:
+
+demo: .venv/.base
+	$(BIN)/supple demo squash --output out/squash
+	$(BIN)/supple demo bears --output out/bears
+
+test: .venv/.dev
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"
+
+test-all: .venv/.dev
+	$(BIN)/python -m pytest -n 2 --dist worksteal
+
+bench: .venv/.dev
+	$(BIN)/python -m benchmarks
+
+lint: .venv/.dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/pyright
+
+format: .venv/.dev
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+# Run after changing dependencies in pyproject.toml.
+lock: .venv/.dev
+	$(BIN)/python -m uv pip compile -q --universal -p 3.11 --generate-hashes --no-emit-index-url --no-header \
+	  --all-extras --group dev pyproject.toml -o requirements/dev.lock
+	$(BIN)/python -m uv pip compile -q --universal -p 3.11 --generate-hashes --no-emit-index-url --no-header \
+	  -c requirements/dev.lock pyproject.toml -o requirements/base.lock
+
+.venv/.made:
+	$(PYTHON) -c "import sys; sys.version_info >= (3, 11) or sys.exit('Supple needs Python 3.11 or newer; set PYTHON=python3.x')"
+	$(PYTHON) -m venv .venv
+	-$(BIN)/python -m pip install -q uv==$(UV_VERSION)
+	$(BIN)/python -c "open('.venv/.made', 'w')"
+
+.venv/.base: .venv/.made requirements/base.lock pyproject.toml
+	$(call install,-r requirements/base.lock)
+	$(call install,--no-deps -e .)
+	$(BIN)/python -c "open('.venv/.base', 'w')"
+
+.venv/.dev: .venv/.base requirements/dev.lock
+	$(call install,-r requirements/dev.lock)
+	$(BIN)/python -c "open('.venv/.dev', 'w')"
+
+clean:
+	rm -rf .venv out build dist .pytest_cache .ruff_cache .hypothesis
