@@ -3,8 +3,10 @@ PYTHON ?= python3
 UV_VERSION := 0.13.8
 ifeq ($(OS),Windows_NT)
   BIN := .venv/Scripts
+  PEERS_BIN := .venv-peers/Scripts
 else
   BIN := .venv/bin
+  PEERS_BIN := .venv-peers/bin
 endif
 # uv installs in seconds; where it cannot be had or cannot reach the index, pip reads the same lock file.
 install = ($(BIN)/python -m uv pip install -q --python $(BIN)/python $(1) || $(BIN)/python -m pip install -q $(1))
@@ -22,7 +24,7 @@ test: .venv/.dev
 test-all: .venv/.dev
 	$(BIN)/python -m pytest -n 2 --dist worksteal
 
-bench: .venv/.dev
+bench: .venv/.dev .venv-peers/.made
 	$(BIN)/python -m benchmarks
 
 lint: .venv/.dev
@@ -40,6 +42,8 @@ lock: .venv/.dev
 	  --all-extras --group dev pyproject.toml -o requirements/dev.lock
 	$(BIN)/python -m uv pip compile -q --universal -p 3.11 --generate-hashes --no-emit-index-url --no-header \
 	  -c requirements/dev.lock pyproject.toml -o requirements/base.lock
+	$(BIN)/python -m uv pip compile -q --universal -p 3.11 --generate-hashes --no-emit-index-url --no-header \
+	  requirements/peers.in -o requirements/peers.lock
 
 .venv/.made:
 	$(PYTHON) -c "import sys; sys.version_info >= (3, 11) or sys.exit('Supple needs Python 3.11 or newer; set PYTHON=python3.x')"
@@ -56,5 +60,12 @@ lock: .venv/.dev
 	$(call install,-r requirements/dev.lock)
 	$(BIN)/python -c "open('.venv/.dev', 'w')"
 
+# The peers live in an environment of their own, so that their dependencies never meet ours.
+.venv-peers/.made: .venv/.base requirements/peers.lock
+	$(PYTHON) -m venv .venv-peers
+	$(BIN)/python -m uv pip install -q --python $(PEERS_BIN)/python -r requirements/peers.lock \
+	  || $(PEERS_BIN)/python -m pip install -q -r requirements/peers.lock
+	$(BIN)/python -c "open('.venv-peers/.made', 'w')"
+
 clean:
-	rm -rf .venv out build dist .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-peers out build dist .pytest_cache .ruff_cache .hypothesis

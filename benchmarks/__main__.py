@@ -1,0 +1,9 @@
+"""All benchmarks after each other: `make bench`, or `python -m benchmarks`."""
+
+from benchmarks import hanging_beam, projections, startup
+
+if __name__ == "__main__":
+    startup.main()
+    projections.main()
+    hanging_beam.main()
+    hanging_beam.main(busy=True)

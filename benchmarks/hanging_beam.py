@@ -1,0 +1,50 @@
+"""The hanging beam in Supple, Newton and MuJoCo flex, in turns in one run: ms per frame of 1/60 s, and ratios.
+
+usage: python -m benchmarks.hanging_beam [--busy]
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from functools import partial
+from pathlib import Path
+
+from benchmarks.measuring import PEERS_PYTHON, busy_core, in_turns, peers_installed, run_json
+
+HERE = Path(__file__).parent
+OURS = "Supple XPBD, 20 substeps"
+
+
+def main(busy: bool = False, rounds: int = 3, frames: int = 20) -> None:
+    if not peers_installed():
+        sys.exit("the peers are not installed; run `make bench`, which does it")
+    ours = partial(run_json, sys.executable, HERE / "our_beam.py", "xpbd")
+    newton = partial(run_json, PEERS_PYTHON, HERE / "peers" / "newton_beam.py")
+    mujoco = partial(run_json, PEERS_PYTHON, HERE / "peers" / "mujoco_beam.py")
+    contenders = {
+        OURS: partial(ours, 2, 20, frames),
+        "Newton XPBD, 20 substeps x 1 iteration": partial(newton, "xpbd", 2, 20, 1, frames),
+        "Newton VBD, 10 substeps x 10 iterations": partial(newton, "vbd", 2, 10, 10, 5),
+        "MuJoCo flex, explicit, 1 ms": partial(mujoco, 2, 1e-3, "Euler", frames),
+        "MuJoCo flex, discrete, 10 ms": partial(mujoco, 2, 1e-2, "discrete", frames),
+        "MuJoCo flex, discrete, 1/60 s": partial(mujoco, 2, 1 / 60, "discrete", frames),
+    }
+    with busy_core(busy):
+        best = in_turns(contenders, rounds)
+    # Tet counts differ by mesh generator (5 or 6 tets a cell), so the ratio compares time per tet.
+    our_cost = best[OURS]["ms_per_frame"] / best[OURS]["tets"]
+    print(f"\nHanging beam 1.2 x 0.4 x 0.4 m, {'one core busy' if busy else 'quiet machine'}, best of {rounds} rounds")
+    print(f"{'solver':44}{'tets':>8}{'ms/frame':>11}{'us/tet':>9}{'ratio/tet':>11}{'ratio':>8}  {'finite':6}")
+    for name, r in best.items():
+        cost = r["ms_per_frame"] / r["tets"]
+        print(
+            f"{name:44}{r['tets']:8d}{r['ms_per_frame']:11.2f}{1e3 * cost:9.3f}{cost / our_cost:11.1f}"
+            f"{r['ms_per_frame'] / best[OURS]['ms_per_frame']:8.1f}  {r['finite']!s:6}"
+        )
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--busy", action="store_true", help="let another process spin on one core meanwhile")
+    main(busy=parser.parse_args().busy)

@@ -1,0 +1,56 @@
+"""How benchmarks measure: contenders take turns, several rounds, the fastest round counts; and a busy machine on request."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+_SCRIPTS = "Scripts" if os.name == "nt" else "bin"
+PEERS_PYTHON = ROOT / ".venv-peers" / _SCRIPTS / "python"
+
+
+def in_turns(contenders: dict[str, Callable[[], dict]], rounds: int) -> dict[str, dict]:
+    """Run every contender once a round; keep each one's fastest round, by `ms_per_frame`."""
+    best: dict[str, dict] = {}
+    for _ in range(rounds):
+        for name, run in contenders.items():
+            result = run()
+            if name not in best or result["ms_per_frame"] < best[name]["ms_per_frame"]:
+                best[name] = result
+    return best
+
+
+def run_json(python: str | Path, script: Path, *arguments: object, threads: int | None = None) -> dict:
+    """Run a script that prints one JSON line at the end, and return it."""
+    environment = dict(os.environ)
+    if threads is not None:
+        environment["NUMBA_NUM_THREADS"] = str(threads)
+    done = subprocess.run(
+        [str(python), str(script), *map(str, arguments)], capture_output=True, text=True, env=environment, cwd=ROOT
+    )
+    if done.returncode != 0:
+        raise RuntimeError(f"{script.name} {arguments} failed:\n{done.stderr[-2000:]}")
+    return json.loads(done.stdout.strip().splitlines()[-1])
+
+
+@contextlib.contextmanager
+def busy_core(wanted: bool) -> Iterator[None]:
+    """Another process that spins on one core for as long as the block lasts, if wanted."""
+    spinner = subprocess.Popen([sys.executable, "-c", "while True: pass"]) if wanted else None
+    try:
+        yield
+    finally:
+        if spinner is not None:
+            spinner.kill()
+            spinner.wait()
+
+
+def peers_installed() -> bool:
+    """Whether the environment of the peers is there (see the Makefile's `bench`)."""
+    return PEERS_PYTHON.exists()
