@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from abc import ABC
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.materials.lame import lame_from_engineering
+from supple.materials.per_tet import NOT_ELASTIC, TetMaterial, one_per_tet
+
+if TYPE_CHECKING:
+    from supple.materials.stretches import StretchFunctions
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -47,6 +52,26 @@ class Material(ABC):
             must = "above zero" if positive else "zero or more"
             raise SceneError(f"{kind}: {field} is {first:g}{at}; it must be finite and {must} [{unit}]")
 
+    def per_tet(self, n_tets: int) -> TetMaterial:
+        """This material as one row per tet of a body.
+
+        Parameters
+        ----------
+        n_tets : number of tets of the body's mesh.
+
+        Raises
+        ------
+        SceneError : where a parameter is given per tet, for another number of tets.
+        """
+        name = type(self).__name__
+        return TetMaterial(
+            density=one_per_tet(self.density, n_tets, f"{name}: density"),
+            damping=one_per_tet(self.damping, n_tets, f"{name}: damping"),
+            kind=np.full(n_tets, NOT_ELASTIC, dtype=np.int32),
+            mu=np.zeros(n_tets),
+            lam=np.zeros(n_tets),
+        )
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Elastic(Material):
@@ -61,6 +86,9 @@ class Elastic(Material):
     ------
     SceneError : where a value is not finite or out of range.
     """
+
+    stretch_functions: ClassVar[StretchFunctions]
+    needs_positive_volume: ClassVar[bool] = False
 
     youngs: float | NDArray[np.float64]
     poisson: float | NDArray[np.float64]
@@ -82,3 +110,65 @@ class Elastic(Material):
     def lame_parameters(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The mu and lam [Pa] that stand in this material's own energy density (scalars or per tet)."""
         return lame_from_engineering(self.youngs, self.poisson)
+
+    def per_tet(self, n_tets: int) -> TetMaterial:
+        from supple.materials.registry import kind_of
+
+        base = super().per_tet(n_tets)
+        name = type(self).__name__
+        one_per_tet(self.youngs, n_tets, f"{name}: youngs")
+        one_per_tet(self.poisson, n_tets, f"{name}: poisson")
+        mu, lam = self.lame_parameters()
+        return TetMaterial(
+            density=base.density,
+            damping=base.damping,
+            kind=np.full(n_tets, kind_of(type(self)), dtype=np.int32),
+            mu=one_per_tet(mu, n_tets, f"{name}: mu"),
+            lam=one_per_tet(lam, n_tets, f"{name}: lam"),
+        )
+
+    def energy_density(self, F: ArrayLike) -> NDArray[np.float64]:
+        """Strain energy per rest volume, zero at rest.
+
+        Parameters
+        ----------
+        F : (..., 3, 3) deformation gradients; (m, 3, 3) where parameters are given per tet.
+
+        Returns
+        -------
+        (...) energy densities [Pa].
+        """
+        from supple.materials.isotropic import batch_energy_densities
+
+        return batch_energy_densities(self, F)
+
+    def first_piola(self, F: ArrayLike) -> NDArray[np.float64]:
+        """First Piola-Kirchhoff stress P = d psi / d F.
+
+        Parameters
+        ----------
+        F : (..., 3, 3) deformation gradients; (m, 3, 3) where parameters are given per tet.
+
+        Returns
+        -------
+        (..., 3, 3) stresses [Pa].
+        """
+        from supple.materials.isotropic import batch_first_piolas
+
+        return batch_first_piolas(self, F)
+
+    def hessian(self, F: ArrayLike, project: bool = False) -> NDArray[np.float64]:
+        """Second derivative of the energy density, H[3 i + j, 3 k + l] = d^2 psi / (dF_ij dF_kl).
+
+        Parameters
+        ----------
+        F : (..., 3, 3) deformation gradients; (m, 3, 3) where parameters are given per tet.
+        project : return the nearest positive semi-definite matrix instead (negative eigenvalues become 0).
+
+        Returns
+        -------
+        (..., 9, 9) symmetric [Pa].
+        """
+        from supple.materials.isotropic import batch_hessians
+
+        return batch_hessians(self, F, project)

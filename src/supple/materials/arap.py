@@ -1,0 +1,46 @@
+"""As-rigid-as-possible elasticity: psi = mu sum (s_i - 1)^2 = mu |F - R|^2.
+
+Source: Sorkine, Alexa, "As-Rigid-As-Possible Surface Modeling" (2007); Kim, Eberle, "Dynamic Deformables" (2022), chapter 5.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from numba import njit
+
+from supple.materials.material import Elastic
+from supple.materials.stretches import StretchFunctions, distance_from_rotations, rotation_quotients
+
+
+@njit
+def _density(s, mu, lam):
+    return mu * distance_from_rotations(s)
+
+
+@njit
+def _gradient(s, mu, lam):
+    return (2.0 * mu * (s[0] - 1.0), 2.0 * mu * (s[1] - 1.0), 2.0 * mu * (s[2] - 1.0))
+
+
+@njit
+def _curvature(s, mu, lam):
+    return (2.0 * mu, 2.0 * mu, 2.0 * mu, 0.0, 0.0, 0.0)
+
+
+@njit
+def _quotients(s, mu, lam):
+    """d_ij = 2 mu;  t_ij = 2 mu (1 - 2 / (s_i + s_j))"""
+    q = rotation_quotients(s)
+    return (2.0 * mu, 2.0 * mu, 2.0 * mu, 2.0 * mu * q[0], 2.0 * mu * q[1], 2.0 * mu * q[2])
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ARAP(Elastic):
+    """As-rigid-as-possible: distance to the nearest rotation. Only mu = E / (2 (1 + nu)) enters.
+
+    There is no term of volume: small strains behave as if the first Lamé parameter were 0, that is with Poisson's ratio 0
+    and Young's modulus 2 mu.
+    """
+
+    stretch_functions = StretchFunctions(_density, _gradient, _curvature, _quotients)

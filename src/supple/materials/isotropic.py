@@ -1,0 +1,344 @@
+"""Isotropic hyperelasticity in principal stretches: energy, stress and Hessian of any material, and of tetrahedra.
+
+With F = U diag(s) V^T (rotations U, V) and psi(s):
+
+    P = U diag(psi_i) V^T
+    d^2 psi: in the frame of U and V, dF' = U^T dF V,
+        the diagonal entries are coupled by the 3x3 matrix psi_ij,
+        the entries (i, j) and (j, i) by [[alpha, beta], [beta, alpha]], alpha = (d + t)/2, beta = (d - t)/2,
+        d_ij = (psi_i - psi_j)/(s_i - s_j),  t_ij = (psi_i + psi_j)/(s_i + s_j).
+
+The nine eigenvalues are those of psi_ij, the three d_ij and the three t_ij: projection to the nearest positive
+semi-definite matrix clamps them at zero. In this frame the Hessian is so sparse that contracting it with the shape
+gradients costs less than writing the result.
+
+Sources: Stomakhin et al., "Energetically Consistent Invertible Elasticity" (2012), section 4; Smith, de Goes, Kim,
+"Analytic Eigensystems for Isotropic Distortion Energies" (2019); Li, Jiang, Luo, "Physics-Based Simulation", chapter
+"Stress and Its Derivatives".
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import ArrayLike, NDArray
+
+from supple.materials.registry import ELASTIC_MATERIALS
+from supple.materials.stretches import UNKNOWN_ONE, UNKNOWN_SIX, UNKNOWN_THREE, dispatch
+from supple.numerics import mat3, svd3
+from supple.numerics.kernel_cache import fingerprint
+from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed, symmetric_eigen
+from supple.numerics.svd3 import svd3 as decompose
+
+if TYPE_CHECKING:
+    from supple.materials.material import Elastic
+
+_density = dispatch([kind.stretch_functions.density for kind in ELASTIC_MATERIALS], UNKNOWN_ONE)
+_gradient = dispatch([kind.stretch_functions.gradient for kind in ELASTIC_MATERIALS], UNKNOWN_THREE)
+_curvature = dispatch([kind.stretch_functions.curvature for kind in ELASTIC_MATERIALS], UNKNOWN_SIX)
+_quotients = dispatch([kind.stretch_functions.quotients for kind in ELASTIC_MATERIALS], UNKNOWN_SIX)
+
+
+@njit
+def deformation_gradient(x, tets, Dm_inv, e):
+    """F = Ds Dm^-1 of tet e, nine numbers row after row."""
+    a, b, c, d = tets[e, 0], tets[e, 1], tets[e, 2], tets[e, 3]
+    Ds = (
+        x[b, 0] - x[a, 0],
+        x[c, 0] - x[a, 0],
+        x[d, 0] - x[a, 0],
+        x[b, 1] - x[a, 1],
+        x[c, 1] - x[a, 1],
+        x[d, 1] - x[a, 1],
+        x[b, 2] - x[a, 2],
+        x[c, 2] - x[a, 2],
+        x[d, 2] - x[a, 2],
+    )
+    return mat_mul(Ds, load_mat(Dm_inv, e))
+
+
+@njit
+def energy_density(F, kind, mu, lam):
+    """psi of one F."""
+    _, s, _ = decompose(F)
+    return _density(kind, s, mu, lam)
+
+
+@njit
+def first_piola(F, kind, mu, lam):
+    """P = U diag(psi_i) V^T of one F, nine numbers."""
+    U, s, V = decompose(F)
+    p = _gradient(kind, s, mu, lam)
+    Up = (
+        U[0] * p[0],
+        U[1] * p[1],
+        U[2] * p[2],
+        U[3] * p[0],
+        U[4] * p[1],
+        U[5] * p[2],
+        U[6] * p[0],
+        U[7] * p[1],
+        U[8] * p[2],
+    )
+    return mat_mul_transposed(Up, V)
+
+
+@njit
+def _nearest_semidefinite(A):
+    """A symmetric 3x3 matrix (a00, a11, a22, a12, a02, a01) with its negative eigenvalues set to zero."""
+    a00, a11, a22, a12, a02, a01 = A
+    scale = abs(a00) + abs(a11) + abs(a22)
+    minor = a00 * a11 - a01 * a01
+    full = a22 * minor - a12 * (a00 * a12 - a01 * a02) + a02 * (a01 * a12 - a11 * a02)
+    # Sylvester's criterion, with a margin far above round-off: nothing to clamp.
+    if a00 > 1e-9 * scale and minor > 1e-9 * scale * scale and full > 1e-9 * scale * scale * scale:
+        return A
+    w, Q = symmetric_eigen(a00, a11, a22, a12, a02, a01)
+    x, y, z = max(w[0], 0.0), max(w[1], 0.0), max(w[2], 0.0)
+    return (
+        x * Q[0] * Q[0] + y * Q[1] * Q[1] + z * Q[2] * Q[2],
+        x * Q[3] * Q[3] + y * Q[4] * Q[4] + z * Q[5] * Q[5],
+        x * Q[6] * Q[6] + y * Q[7] * Q[7] + z * Q[8] * Q[8],
+        x * Q[3] * Q[6] + y * Q[4] * Q[7] + z * Q[5] * Q[8],
+        x * Q[0] * Q[6] + y * Q[1] * Q[7] + z * Q[2] * Q[8],
+        x * Q[0] * Q[3] + y * Q[1] * Q[4] + z * Q[2] * Q[5],
+    )
+
+
+@njit
+def principal_hessian(s, kind, mu, lam, project):
+    """The Hessian in the frame of U and V.
+
+    Returns
+    -------
+    A : psi_ij as (a00, a11, a22, a12, a02, a01)
+    alpha, beta : (three numbers each, for the pairs 12, 02, 01)
+    """
+    A = _curvature(kind, s, mu, lam)
+    q = _quotients(kind, s, mu, lam)
+    if project:
+        A = _nearest_semidefinite(A)
+        q = (max(q[0], 0.0), max(q[1], 0.0), max(q[2], 0.0), max(q[3], 0.0), max(q[4], 0.0), max(q[5], 0.0))
+    alpha = (0.5 * (q[0] + q[3]), 0.5 * (q[1] + q[4]), 0.5 * (q[2] + q[5]))
+    beta = (0.5 * (q[0] - q[3]), 0.5 * (q[1] - q[4]), 0.5 * (q[2] - q[5]))
+    return A, alpha, beta
+
+
+@njit
+def hessian_block(U, A, alpha, beta, g, h):
+    """sum_jl (d^2 psi / dF_ij dF_kl) G_j H_l for g = V^T G, h = V^T H: the 3x3 block (i, k) of two nodes with shape
+    gradients G and H, per rest volume."""
+    x, y, z = g[0] * h[0], g[1] * h[1], g[2] * h[2]
+    K = (
+        A[0] * x + alpha[2] * y + alpha[1] * z,
+        A[5] * g[0] * h[1] + beta[2] * g[1] * h[0],
+        A[4] * g[0] * h[2] + beta[1] * g[2] * h[0],
+        A[5] * g[1] * h[0] + beta[2] * g[0] * h[1],
+        alpha[2] * x + A[1] * y + alpha[0] * z,
+        A[3] * g[1] * h[2] + beta[0] * g[2] * h[1],
+        A[4] * g[2] * h[0] + beta[1] * g[0] * h[2],
+        A[3] * g[2] * h[1] + beta[0] * g[1] * h[2],
+        alpha[1] * x + alpha[0] * y + A[2] * z,
+    )
+    return mat_mul_transposed(mat_mul(U, K), U)
+
+
+@njit
+def _symmetric(K):
+    """A block of one node with itself, made symmetric to the last bit."""
+    a, b, c = 0.5 * (K[1] + K[3]), 0.5 * (K[2] + K[6]), 0.5 * (K[5] + K[7])
+    return (K[0], a, b, a, K[4], c, b, c, K[8])
+
+
+@njit
+def _put_pair(out, e, p, q, K):
+    """Write block (p, q) of a 12x12 matrix, and its transpose as block (q, p)."""
+    for i in range(3):
+        for j in range(3):
+            value = K[3 * i + j]
+            out[e, 3 * p + i, 3 * q + j] = value
+            out[e, 3 * q + j, 3 * p + i] = value
+
+
+@njit
+def _minus_sum(A, B, C):
+    return (
+        -(A[0] + B[0] + C[0]),
+        -(A[1] + B[1] + C[1]),
+        -(A[2] + B[2] + C[2]),
+        -(A[3] + B[3] + C[3]),
+        -(A[4] + B[4] + C[4]),
+        -(A[5] + B[5] + C[5]),
+        -(A[6] + B[6] + C[6]),
+        -(A[7] + B[7] + C[7]),
+        -(A[8] + B[8] + C[8]),
+    )
+
+
+@njit
+def _tet_hessian(F, B, volume, kind, mu, lam, project, out, e):
+    """The 12x12 Hessian of one tet into out[e]; B = Dm^-1, whose rows are the shape gradients of nodes 1, 2, 3."""
+    U, s, V = decompose(F)
+    A, alpha, beta = principal_hessian(s, kind, mu, lam, project)
+    v = volume
+    A = (v * A[0], v * A[1], v * A[2], v * A[3], v * A[4], v * A[5])
+    alpha = (v * alpha[0], v * alpha[1], v * alpha[2])
+    beta = (v * beta[0], v * beta[1], v * beta[2])
+    G = mat_mul(B, V)
+    g1, g2, g3 = (G[0], G[1], G[2]), (G[3], G[4], G[5]), (G[6], G[7], G[8])
+    H11 = _symmetric(hessian_block(U, A, alpha, beta, g1, g1))
+    H12 = hessian_block(U, A, alpha, beta, g1, g2)
+    H13 = hessian_block(U, A, alpha, beta, g1, g3)
+    H22 = _symmetric(hessian_block(U, A, alpha, beta, g2, g2))
+    H23 = hessian_block(U, A, alpha, beta, g2, g3)
+    H33 = _symmetric(hessian_block(U, A, alpha, beta, g3, g3))
+    # Shape gradients sum to zero, hence the blocks of every row do: translations cost nothing, exactly.
+    H01 = _minus_sum(H11, mat3.transpose(H12), mat3.transpose(H13))
+    H02 = _minus_sum(H12, H22, mat3.transpose(H23))
+    H03 = _minus_sum(H13, H23, H33)
+    _put_pair(out, e, 0, 0, _symmetric(_minus_sum(H01, H02, H03)))
+    _put_pair(out, e, 0, 1, H01)
+    _put_pair(out, e, 0, 2, H02)
+    _put_pair(out, e, 0, 3, H03)
+    _put_pair(out, e, 1, 1, H11)
+    _put_pair(out, e, 1, 2, H12)
+    _put_pair(out, e, 1, 3, H13)
+    _put_pair(out, e, 2, 2, H22)
+    _put_pair(out, e, 2, 3, H23)
+    _put_pair(out, e, 3, 3, H33)
+
+
+class _Kernels(NamedTuple):
+    element_energies: Any
+    element_gradients: Any
+    element_hessians: Any
+    densities: Any
+    piolas: Any
+    hessians: Any
+
+
+def _build_kernels(version: int) -> _Kernels:
+    """The compiled loops. `version` is in their closures, so that no cached kernel outlives a change of a material."""
+
+    @njit(parallel=True, cache=True)
+    def element_energies(x, tets, Dm_inv, volumes, kind, mu, lam, out):
+        _ = version
+        for e in prange(len(tets)):
+            F = deformation_gradient(x, tets, Dm_inv, e)
+            out[e] = volumes[e] * energy_density(F, kind[e], mu[e], lam[e])
+
+    @njit(parallel=True, cache=True)
+    def element_gradients(x, tets, Dm_inv, volumes, kind, mu, lam, out):
+        _ = version
+        for e in prange(len(tets)):
+            P = first_piola(deformation_gradient(x, tets, Dm_inv, e), kind[e], mu[e], lam[e])
+            G = mat_mul_transposed(P, load_mat(Dm_inv, e))
+            for i in range(3):
+                total = 0.0
+                for p in range(3):
+                    force = volumes[e] * G[3 * i + p]
+                    out[e, p + 1, i] = force
+                    total += force
+                out[e, 0, i] = -total
+
+    @njit(parallel=True, cache=True)
+    def element_hessians(x, tets, Dm_inv, volumes, kind, mu, lam, project, out):
+        _ = version
+        for e in prange(len(tets)):
+            F = deformation_gradient(x, tets, Dm_inv, e)
+            _tet_hessian(F, load_mat(Dm_inv, e), volumes[e], kind[e], mu[e], lam[e], project, out, e)
+
+    @njit(parallel=True, cache=True)
+    def densities(F, kind, mu, lam, out):
+        _ = version
+        for e in prange(len(F)):
+            out[e] = energy_density(load_mat(F, e), kind[e], mu[e], lam[e])
+
+    @njit(cache=True)
+    def piolas(F, kind, mu, lam, out):
+        _ = version
+        for e in range(len(F)):
+            mat3.store_mat(first_piola(load_mat(F, e), kind[e], mu[e], lam[e]), out, e)
+
+    @njit(cache=True)
+    def hessians(F, kind, mu, lam, project, out):
+        _ = version
+        for e in range(len(F)):
+            U, s, V = decompose(load_mat(F, e))
+            A, alpha, beta = principal_hessian(s, kind[e], mu[e], lam[e], project)
+            for j in range(3):
+                g = (V[3 * j], V[3 * j + 1], V[3 * j + 2])
+                for k in range(j + 1):
+                    K = hessian_block(U, A, alpha, beta, g, (V[3 * k], V[3 * k + 1], V[3 * k + 2]))
+                    for i in range(3):
+                        for n in range(3):
+                            out[e, 3 * i + j, 3 * n + k] = K[3 * i + n]
+                            out[e, 3 * n + k, 3 * i + j] = K[3 * i + n]
+
+    return _Kernels(element_energies, element_gradients, element_hessians, densities, piolas, hessians)
+
+
+_KERNELS = _build_kernels(fingerprint([*Path(__file__).parent.glob("*.py"), Path(mat3.__file__), Path(svd3.__file__)]))
+
+
+def element_energies(x, tets, Dm_inv, volumes, kind, mu, lam, out) -> None:
+    """Elastic energy of every tet [J], zero at rest, into out (m,).
+
+    Parameters
+    ----------
+    x : (n, 3) positions [m]; tets : (m, 4) int32; Dm_inv : (m, 3, 3) rest shape inverse [1/m]; volumes : (m,) [m^3];
+    kind, mu, lam : (m,) of `TetMaterial`. All C-contiguous; float64, but int32 for tets and kind.
+    """
+    _KERNELS.element_energies(x, tets, Dm_inv, volumes, kind, mu, lam, out)
+
+
+def element_gradients(x, tets, Dm_inv, volumes, kind, mu, lam, out) -> None:
+    """Gradient of every tet's energy by its four nodes [N] (minus the elastic forces), into out (m, 4, 3).
+
+    Parameters as of `element_energies`.
+    """
+    _KERNELS.element_gradients(x, tets, Dm_inv, volumes, kind, mu, lam, out)
+
+
+def element_hessians(x, tets, Dm_inv, volumes, kind, mu, lam, project, out) -> None:
+    """Hessian of every tet's energy [N/m] into out (m, 12, 12): entry (3 p + i, 3 q + k) for coordinate i of node p and
+    coordinate k of node q. With `project`, of the nearest convex energy: eigenvalues of d^2 psi / dF^2 are clamped at 0.
+
+    Other parameters as of `element_energies`.
+    """
+    _KERNELS.element_hessians(x, tets, Dm_inv, volumes, kind, mu, lam, project, out)
+
+
+def _flat(material: Elastic, F: ArrayLike) -> tuple[NDArray[np.float64], tuple[int, ...], Any]:
+    F = np.asarray(F, dtype=np.float64)
+    if F.shape[-2:] != (3, 3):
+        raise ValueError(f"F has shape {F.shape}; its last two axes must be (3, 3)")
+    flat = np.ascontiguousarray(F.reshape(-1, 3, 3))
+    return flat, F.shape[:-2], material.per_tet(len(flat))
+
+
+def batch_energy_densities(material: Elastic, F: ArrayLike) -> NDArray[np.float64]:
+    """See `Elastic.energy_density`."""
+    flat, shape, tet = _flat(material, F)
+    out = np.empty(len(flat))
+    _KERNELS.densities(flat, tet.kind, tet.mu, tet.lam, out)
+    return out.reshape(shape)
+
+
+def batch_first_piolas(material: Elastic, F: ArrayLike) -> NDArray[np.float64]:
+    """See `Elastic.first_piola`."""
+    flat, shape, tet = _flat(material, F)
+    out = np.empty_like(flat)
+    _KERNELS.piolas(flat, tet.kind, tet.mu, tet.lam, out)
+    return out.reshape(*shape, 3, 3)
+
+
+def batch_hessians(material: Elastic, F: ArrayLike, project: bool) -> NDArray[np.float64]:
+    """See `Elastic.hessian`."""
+    flat, shape, tet = _flat(material, F)
+    out = np.empty((len(flat), 9, 9))
+    _KERNELS.hessians(flat, tet.kind, tet.mu, tet.lam, bool(project), out)
+    return out.reshape(*shape, 9, 9)

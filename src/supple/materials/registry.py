@@ -1,0 +1,23 @@
+"""All elastic materials, and the number by which kernels know each. A new material is one file, and one line here."""
+
+from __future__ import annotations
+
+from supple.materials.arap import ARAP
+from supple.materials.fixed_corotated import FixedCorotated
+from supple.materials.material import Elastic
+from supple.materials.neo_hookean import NeoHookean
+from supple.materials.st_venant_kirchhoff import StVenantKirchhoff
+from supple.materials.stable_neo_hookean import StableNeoHookean
+
+ELASTIC_MATERIALS: tuple[type[Elastic], ...] = (
+    StableNeoHookean,
+    NeoHookean,
+    FixedCorotated,
+    ARAP,
+    StVenantKirchhoff,
+)
+
+
+def kind_of(material: type[Elastic]) -> int:
+    """The number of a material's class in kernels."""
+    return ELASTIC_MATERIALS.index(material)
