@@ -1,0 +1,55 @@
+"""Writing several files that belong together: all of them, or none."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from uuid import uuid4
+
+from supple.errors import MeshError
+
+
+def write_together(texts: Mapping[Path, Iterable[str]]) -> None:
+    """Write each text (in pieces) to its path; where one cannot be written, all files stay as they were.
+
+    Everything is first written under temporary names in the same folder. Only then are old files moved aside and new
+    ones moved in, and moved back if that fails halfway.
+
+    Raises
+    ------
+    MeshError : naming the file and the reason.
+    """
+    tag = uuid4().hex[:8]
+    fresh = {path: path.with_name(f".{path.name}.{tag}.new") for path in texts}
+    saved = {path: path.with_name(f".{path.name}.{tag}.old") for path in texts}
+    moved_aside: list[Path] = []
+    moved_in: list[Path] = []
+    current = Path()
+    try:
+        for current, pieces in texts.items():
+            if current.is_dir():
+                raise IsADirectoryError(None, "is a directory")
+            with fresh[current].open("w", encoding="ascii", newline="\n") as file:
+                file.writelines(pieces)
+        for current in texts:
+            if current.exists():
+                os.replace(current, saved[current])
+                moved_aside.append(current)
+            os.replace(fresh[current], current)
+            moved_in.append(current)
+    except BaseException as error:
+        # A KeyboardInterrupt must not leave half a family either.
+        for path in moved_in:
+            if path not in moved_aside:
+                path.unlink(missing_ok=True)
+        for path in moved_aside:
+            os.replace(saved[path], path)
+        if isinstance(error, OSError):
+            raise MeshError(f"{current}: cannot be written: {error.strerror or error}") from None
+        raise
+    finally:
+        for path in (*fresh.values(), *saved.values()):
+            with contextlib.suppress(OSError):
+                path.unlink(missing_ok=True)
