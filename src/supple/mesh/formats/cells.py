@@ -1,0 +1,110 @@
+"""What a mesh file holds before anything is made of it: points, and cells of any kind."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Cell types by VTK's numbers.
+TRIANGLE, TRIANGLE_STRIP, POLYGON, PIXEL, QUAD, TETRA = 5, 6, 7, 8, 9, 10
+CELL_NAMES = {
+    1: "vertex", 2: "poly-vertex", 3: "line", 4: "poly-line", 5: "triangle", 6: "triangle strip", 7: "polygon",
+    8: "pixel", 9: "quad", 10: "tetrahedron", 11: "voxel", 12: "hexahedron", 13: "wedge", 14: "pyramid",
+    22: "quadratic triangle", 24: "quadratic tetrahedron", 25: "quadratic hexahedron", 42: "polyhedron",
+}  # fmt: skip
+
+
+class FormatError(Exception):
+    """A file breaks its format: why, and in which line (1-based) where lines are known."""
+
+    def __init__(self, reason: str, line: int | None = None) -> None:
+        super().__init__(reason)
+        self.reason = reason
+        self.line = line
+
+
+class CellSoup(NamedTuple):
+    """Points (n, 3), and for cell k its VTK type and the points connectivity[offsets[k] : offsets[k + 1]]."""
+
+    points: NDArray[np.float64]
+    types: NDArray[np.uint8]
+    offsets: NDArray[np.int64]
+    connectivity: NDArray[np.int64]
+
+    @classmethod
+    def of_polygons(cls, points: NDArray[np.float64], polygons: Sequence[Sequence[int]]) -> CellSoup:
+        """Soup of polygons, given as lists of point indices."""
+        sizes = np.fromiter((len(p) for p in polygons), dtype=np.int64, count=len(polygons))
+        flat = np.fromiter((i for p in polygons for i in p), dtype=np.int64, count=int(sizes.sum()))
+        return cls.of_sizes(points, sizes, flat)
+
+    @classmethod
+    def of_sizes(cls, points: NDArray[np.float64], sizes: NDArray[np.int64], flat: NDArray[np.int64]) -> CellSoup:
+        """Soup of polygons, given as the size of each and all their point indices in a row."""
+        offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+        return cls(points, np.full(len(sizes), POLYGON, dtype=np.uint8), offsets, flat.astype(np.int64))
+
+    @classmethod
+    def of_rows(cls, points: NDArray[np.float64], rows: NDArray[np.int64], cell_type: int) -> CellSoup:
+        """Soup of cells of one type (m, corners)."""
+        m, width = rows.shape
+        offsets = np.arange(m + 1, dtype=np.int64) * width
+        return cls(points, np.full(m, cell_type, dtype=np.uint8), offsets, rows.ravel().astype(np.int64))
+
+
+def joined(soups: Sequence[CellSoup]) -> CellSoup:
+    """Several soups as one."""
+    if len(soups) == 1:
+        return soups[0]
+    shifts = np.cumsum([0] + [len(s.points) for s in soups])
+    starts = np.cumsum([0] + [len(s.connectivity) for s in soups])
+    return CellSoup(
+        np.concatenate([s.points for s in soups]),
+        np.concatenate([s.types for s in soups]),
+        np.concatenate([[0], *(s.offsets[1:] + start for s, start in zip(soups, starts[:-1], strict=True))]).astype(
+            np.int64
+        ),
+        np.concatenate([s.connectivity + shift for s, shift in zip(soups, shifts[:-1], strict=True)]),
+    )
+
+
+def checked(soup: CellSoup) -> CellSoup:
+    """The same soup, or a `FormatError` where offsets or indices point outside."""
+    offsets, flat = soup.offsets, soup.connectivity
+    if (
+        len(offsets) != len(soup.types) + 1
+        or offsets[0] != 0
+        or offsets[-1] > len(flat)
+        or (np.diff(offsets) < 0).any()
+    ):
+        raise FormatError("its cell offsets contradict its cells; the file is damaged")
+    outside = (flat < 0) | (flat >= len(soup.points))
+    if outside.any():
+        k = int(np.flatnonzero(outside)[0])
+        cell = int(np.searchsorted(offsets, k, side="right")) - 1
+        raise FormatError(f"cell {cell} names point {flat[k]}, but points run from 0 to {len(soup.points) - 1}")
+    return soup
+
+
+def tets_of(soup: CellSoup) -> NDArray[np.int64]:
+    """The tets (m, 4) of a soup; points, lines and surface cells are passed over, other cells refused."""
+    soup = checked(soup)
+    others = np.unique(soup.types[(soup.types != TETRA) & (soup.types > QUAD)])
+    if len(others):
+        name = CELL_NAMES.get(int(others[0]), f"type {others[0]}")
+        raise FormatError(f"it holds {name} cells; only linear tetrahedra can be used: convert or remesh it")
+    cells = np.flatnonzero(soup.types == TETRA)
+    if len(cells) == 0:
+        raise FormatError(
+            "it holds no tetrahedra; a surface is loaded with SurfaceMesh.load and meshed with tetrahedralize"
+        )
+    starts, sizes = soup.offsets[cells], soup.offsets[cells + 1] - soup.offsets[cells]
+    if (sizes != 4).any():
+        cell = int(cells[np.flatnonzero(sizes != 4)[0]])
+        raise FormatError(
+            f"cell {cell} is a tetrahedron of {soup.offsets[cell + 1] - soup.offsets[cell]} points, not 4"
+        )
+    return soup.connectivity[starts[:, None] + np.arange(4)]
