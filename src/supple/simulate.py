@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Protocol
@@ -139,28 +140,41 @@ def simulate(
         raise SolverError(f"simulate: steps is {steps!r}; give a whole number of zero or more")
     if start is not None and (initial_positions is not None or initial_velocities is not None):
         raise SceneError("simulate: give `start`, or initial positions and velocities, not both")
-    first = first_frame(scene, start if start is not None else initial_state(scene, initial_positions, initial_velocities))
+    if start is None:
+        start = initial_state(scene, initial_positions, initial_velocities)
+    first = first_frame(scene, start)
     workspace = solver.prepare(first.system)
     return _steps(first, solver, float(dt), int(steps), workspace, sinks)
 
 
 def first_frame(scene: Scene, start: Frame | State) -> Frame:
     """The frame at the start: number 0 (or that of `start`), before any step."""
+    if not isinstance(start, (Frame, State)):
+        raise SceneError(f"simulate: start is a {type(start).__name__}; give a Frame, or a State")
     state = start.state if isinstance(start, Frame) else start
     index = start.index if isinstance(start, Frame) else 0
+    if not all(np.isfinite(values).all() for values in (state.time, state.positions, state.velocities)):
+        raise SceneError("simulate: start holds a value that is not finite")
     count = sum(len(body.mesh.vertices) for body in scene.bodies)
-    if state.positions.shape != (count, 3):
-        raise SceneError(f"simulate: start has {len(state.positions)} vertices, the scene has {count}; they must be the same")
-    system = build_system(scene, state)
+    if state.positions.shape != (count, 3) or state.velocities.shape != (count, 3):
+        raise SceneError(
+            f"simulate: start has {len(state.positions)} vertices, the scene has {count}; give one of this scene"
+        )
+    # A frame of this very scene brings the pins' anchors along, which could else be found again only up to round-off.
+    if isinstance(start, Frame) and start.system.scene is scene:
+        system = start.system
+    else:
+        system = build_system(scene, state)
     return Frame(index, state, system, _report(system, state, StepReport(Status.CONVERGED, 0), 0.0))
 
 
-def _steps(first: Frame, solver: Solver, dt: float, steps: int, workspace: Any, sinks: Sequence[Sink]) -> Iterator[Frame]:
+def _steps(
+    first: Frame, solver: Solver, dt: float, steps: int, workspace: Any, sinks: Sequence[Sink]
+) -> Iterator[Frame]:
     system, state = first.system, first.state
-    begun: list[Sink] = []
-    try:
+    with ExitStack() as ends:  # whatever happens, also in the end of another sink, each sink is ended
         for sink in sinks:
-            begun.append(sink)
+            ends.callback(sink.end)
             sink.begin(first, dt, steps)
         for index in range(first.index + 1, first.index + steps + 1):
             began = time.perf_counter()
@@ -172,9 +186,6 @@ def _steps(first: Frame, solver: Solver, dt: float, steps: int, workspace: Any, 
             yield frame
             if not said.status.can_go_on:
                 break
-    finally:
-        for sink in begun:
-            sink.end()
 
 
 def _report(system: System, state: State, said: StepReport, seconds: float) -> Report:

@@ -109,26 +109,21 @@ class System:
 
 
 def build_system(scene: Scene, start: State | None = None) -> System:
-    """Flatten a scene. `start` is the state that the simulation begins from; pins hold its vertices where they are there.
+    """Flatten a scene.
 
-    Raises
-    ------
-    SceneError : where a material does not fit its mesh.
+    Parameters
+    ----------
+    start : the state that the simulation begins from; pins hold its vertices where they are there.
     """
     ranges, rest, masses, tets, Dm_inv, volumes, edges, triangles = [], [], [], [], [], [], [], []
     n = m = e = t = 0
     for body in scene.bodies:
         mesh = body.mesh
         counts = len(mesh.vertices), len(mesh.tets), len(mesh.edges), len(mesh.surface.triangles)
-        ranges.append(
-            BodyRange(body, slice(n, n + counts[0]), slice(m, m + counts[1]), slice(e, e + counts[2]), slice(t, t + counts[3]))
-        )
-        density = np.asarray(body.material.density, dtype=np.float64)
-        if density.ndim and len(density) != counts[1]:
-            raise SceneError(f"body {body.name!r}: density has {len(density)} values for {counts[1]} tets; give one per tet")
-        share = np.broadcast_to(density, counts[1]) * mesh.volumes / 4.0
+        rows = [slice(begin, begin + count) for begin, count in zip((n, m, e, t), counts, strict=True)]
+        ranges.append(BodyRange(body, *rows))
         rest.append(mesh.vertices)
-        masses.append(np.bincount(mesh.tets.ravel(), weights=np.repeat(share, 4), minlength=counts[0]))
+        masses.append(_lumped_masses(body))
         tets.append(mesh.tets + n)
         Dm_inv.append(mesh.rest_shape_inverse)
         volumes.append(mesh.volumes)
@@ -154,6 +149,13 @@ def build_system(scene: Scene, start: State | None = None) -> System:
         components=connected_components(graph, directed=False)[1].astype(np.int32),
         gravity=np.asarray(scene.gravity, dtype=np.float64),
     )
+
+
+def _lumped_masses(body: Body) -> NDArray[np.float64]:
+    """(n,) [kg]: of each tet's mass rho V, a quarter to each of its vertices."""
+    mesh = body.mesh
+    quarters = np.broadcast_to(np.asarray(body.material.density, dtype=np.float64), len(mesh.tets)) * mesh.volumes / 4.0
+    return np.bincount(mesh.tets.ravel(), weights=np.repeat(quarters, 4), minlength=len(mesh.vertices))
 
 
 def _pin_ranges(scene: Scene, ranges: list[BodyRange], start: State | None) -> tuple[PinRange, ...]:
@@ -190,9 +192,9 @@ def initial_state(
     """
     names = {body.name for body in scene.bodies}
     for what, given in (("initial_positions", positions), ("initial_velocities", velocities)):
-        unknown = set(given or ()) - names
-        if unknown:
-            raise SceneError(f"{what}: there is no body {sorted(unknown)[0]!r}; there are {', '.join(map(repr, sorted(names)))}")
+        for name in given or ():
+            if name not in names:
+                raise SceneError(f"{what}: there is no body {name!r}; there are {', '.join(map(repr, sorted(names)))}")
     x, v = [], []
     for body in scene.bodies:
         count = len(body.mesh.vertices)
@@ -223,7 +225,6 @@ def _given(value: ArrayLike, count: int, what: str) -> NDArray[np.float64]:
 
 
 def _rigid_velocity(body: Body, placed: NDArray[np.float64]) -> NDArray[np.float64]:
-    share = np.broadcast_to(np.asarray(body.material.density, dtype=np.float64), len(body.mesh.tets)) * body.mesh.volumes
-    masses = np.bincount(body.mesh.tets.ravel(), weights=np.repeat(share, 4), minlength=len(placed))
+    masses = _lumped_masses(body)
     center = masses @ placed / masses.sum()
     return np.asarray(body.velocity) + np.cross(np.asarray(body.angular_velocity), placed - center)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from supple.errors import SceneError
 from supple.materials.material import Material
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
+from supple.scene.rotation import rotation_matrix
 from supple.scene.values import check_name, finite_vector, non_negative
 
 
@@ -50,7 +50,7 @@ class Body:
         check_name(self.name, "body")
         owner = f"body {self.name!r}"
         if not isinstance(self.mesh, TetMesh):
-            raise SceneError(f"{owner}: mesh is a {type(self.mesh).__name__}; give a TetMesh (see supple.tetrahedralize)")
+            raise SceneError(f"{owner}: mesh is a {type(self.mesh).__name__}; give a TetMesh (see tetrahedralize)")
         if not isinstance(self.material, Material):
             raise SceneError(f"{owner}: material is {self.material!r}; give a material such as StableNeoHookean(...)")
         if self.skin is not None and not isinstance(self.skin, SurfaceMesh):
@@ -58,7 +58,27 @@ class Body:
         for key in ("position", "rotation", "velocity", "angular_velocity"):
             object.__setattr__(self, key, finite_vector(getattr(self, key), f"{owner}: {key}"))
         object.__setattr__(self, "friction", non_negative(self.friction, f"{owner}: friction"))
+        self._require_one_value_per_tet(owner)
+        self._require_fine_enough_coordinates(owner)
+
+    def _require_one_value_per_tet(self, owner: str) -> None:
+        count = len(self.mesh.tets)
+        for item in fields(self.material):
+            values = np.asarray(getattr(self.material, item.name))
+            if values.ndim == 1 and len(values) != count:
+                raise SceneError(f"{owner}: {item.name} has {len(values)} values for {count} tets; give one per tet")
+
+    def _require_fine_enough_coordinates(self, owner: str) -> None:
+        """Far from the origin, neighbouring float64 numbers lie too far apart to tell the vertices from each other."""
+        ends = self.mesh.vertices[self.mesh.edges]
+        shortest = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).min())
+        reach = float(np.abs(np.asarray(self.position)).max())
+        if np.spacing(reach) > 1e-6 * shortest:
+            raise SceneError(
+                f"{owner}: position is {reach:g} m from the origin, too far for edges of {shortest:.3g} m in double "
+                "precision; move the scene nearer to the origin"
+            )
 
     def place(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """World positions (k, 3) [m] at the start of points (k, 3) given in the mesh's coordinates."""
-        return Rotation.from_rotvec(np.asarray(self.rotation)).apply(points) + np.asarray(self.position)
+        return points @ rotation_matrix(self.rotation).T + np.asarray(self.position)

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from supple.errors import SceneError
+from supple.scene.rotation import rotation_matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,14 +50,17 @@ class Keyframes:
             raise SceneError("Keyframes: give displacements, angles, or both")
         object.__setattr__(self, "times", times)
         zeros = np.zeros((k, 3))
-        displacements = zeros if self.displacements is None else self._array("displacements", self.displacements, (k, 3))
-        angles = zeros[:, 0] if self.angles is None else self._array("angles", self.angles, (k,))
+        displacements = angles = None
+        if self.displacements is not None:
+            displacements = self._array("displacements", self.displacements, (k, 3))
+        if self.angles is not None:
+            angles = self._array("angles", self.angles, (k,))
         axis = self._array("axis", self.axis, (3,))
         length = np.linalg.norm(axis)
         if length == 0.0:
             raise SceneError("Keyframes: axis has no length; give a direction such as [0, 0, 1]")
-        object.__setattr__(self, "displacements", displacements)
-        object.__setattr__(self, "angles", angles)
+        object.__setattr__(self, "displacements", zeros if displacements is None else displacements)
+        object.__setattr__(self, "angles", zeros[:, 0] if angles is None else angles)
         object.__setattr__(self, "axis", axis / length)
         object.__setattr__(self, "pivot", self._array("pivot", self.pivot, (3,)))
 
@@ -80,7 +83,7 @@ class Keyframes:
         axis, pivot = np.asarray(self.axis), np.asarray(self.pivot)
         angle = np.interp(time, times, angles)
         shift = np.array([np.interp(time, times, displacements[:, k]) for k in range(3)])
-        R = Rotation.from_rotvec(angle * axis).as_matrix() if angle else np.eye(3)
+        R = rotation_matrix(angle * axis)
         return R, pivot - R @ pivot + shift
 
 
@@ -93,9 +96,15 @@ def check_motion(motion: object, owner: str) -> None:
         raise SceneError(f"{owner}: motion is {motion!r}; give None, Keyframes, or a function t -> displacement")
 
 
-def displacement_at(motion: Callable[[float], ArrayLike], time: float, owner: str, count: int | None) -> NDArray[np.float64]:
+def displacement_at(
+    motion: Callable[[float], ArrayLike], time: float, owner: str, count: int | None
+) -> NDArray[np.float64]:
     """What a scripted function returns at `time`, checked: (3,), or (count, 3) where `count` is given."""
-    value = np.asarray(motion(time), dtype=np.float64)
+    said = motion(time)
+    try:
+        value = np.asarray(said, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise SceneError(f"{owner}: motion({time:g}) is {said!r}; it must be an array of numbers") from None
     if value.shape != (3,) and (count is None or value.shape != (count, 3)):
         want = "(3,)" if count is None else f"(3,) or ({count}, 3)"
         raise SceneError(f"{owner}: motion({time:g}) has shape {value.shape}; it must have shape {want}")

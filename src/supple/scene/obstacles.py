@@ -10,16 +10,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from supple.errors import SceneError
 from supple.mesh.surface import SurfaceMesh
 from supple.scene.motion import Motion, check_motion, rigid_pose
+from supple.scene.rotation import rotation_matrix
 from supple.scene.values import check_name, finite_vector, non_negative, positive
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Obstacle(ABC):
+class Obstacle(ABC):  # noqa: B024 (solvers look at what is inside; nothing is asked of all alike)
     """What all obstacles share.
 
     Parameters
@@ -93,7 +93,7 @@ class Box(Obstacle):
     @property
     def orientation(self) -> NDArray[np.float64]:
         """(3, 3) rotation from the box's own axes to the world's, at time 0."""
-        return Rotation.from_rotvec(np.asarray(self.rotation)).as_matrix()
+        return rotation_matrix(self.rotation)
 
 
 @dataclass(frozen=True, eq=False)

@@ -70,8 +70,10 @@ class Pin:
         unique = np.unique(indices)
         if len(unique) != len(indices):
             raise SceneError(f"{self.label}: vertices names a vertex twice; name each once")
-        if indices.min() < 0 or indices.max() > np.iinfo(np.int32).max:
-            raise SceneError(f"{self.label}: vertex {indices.min()} is negative; indices begin at 0")
+        if indices.min() < 0:
+            raise SceneError(f"{self.label}: vertices holds {indices.min()}, which is negative; indices begin at 0")
+        if indices.max() > np.iinfo(np.int32).max:
+            raise SceneError(f"{self.label}: vertices holds {indices.max()}, which is more than any mesh has")
         object.__setattr__(self, "vertices", indices.astype(np.int32))
 
     @property
@@ -94,5 +96,5 @@ class Pin:
             return indices
         indices = np.asarray(self.vertices, dtype=np.int32)
         if indices.max() >= len(placed):
-            raise SceneError(f"{self.label}: vertex {indices.max()} does not exist; the body has {len(placed)} vertices")
+            raise SceneError(f"{self.label}: vertex {indices.max()} does not exist; the body has {len(placed)}")
         return indices

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -50,6 +50,7 @@ class Scene:
         if not self.bodies:
             raise SceneError("scene: there is no body; give at least one")
         object.__setattr__(self, "gravity", finite_vector(self.gravity, "scene: gravity"))
+        object.__setattr__(self, "obstacles", _all_named(self.obstacles))
         for key in ("bodies", "obstacles"):
             names = Counter(item.name for item in getattr(self, key) if item.name is not None)
             twice = [name for name, count in names.items() if count > 1]
@@ -79,3 +80,17 @@ class Scene:
             if body.name == name:
                 return body
         raise SceneError(f"scene: there is no body {name!r}; there are {', '.join(repr(b.name) for b in self.bodies)}")
+
+
+def _all_named(obstacles: Sequence[Obstacle]) -> tuple[Obstacle, ...]:
+    """The obstacles; those without a name get their kind and number, such as `HalfSpace 1`."""
+    taken = {obstacle.name for obstacle in obstacles}
+    numbers: Counter[str] = Counter()
+    named = []
+    for obstacle in obstacles:
+        kind = type(obstacle).__name__
+        numbers[kind] += 1
+        while obstacle.name is None and f"{kind} {numbers[kind]}" in taken:
+            numbers[kind] += 1
+        named.append(obstacle if obstacle.name else replace(obstacle, name=f"{kind} {numbers[kind]}"))
+    return tuple(named)

@@ -13,7 +13,7 @@ def check_name(name: object, kind: str) -> None:
     if not isinstance(name, str) or not name.strip():
         raise SceneError(f"{kind}: name is {name!r}; give a non-empty text")
     if len(name) > 100 or any(c in name for c in '/\\:*?"<>|\0') or not name.isprintable() or name in (".", ".."):
-        raise SceneError(f"{kind} {name[:100]!r}: a name may hold at most 100 letters, digits, spaces, '-', '_' and '.'")
+        raise SceneError(f"{kind} {name[:100]!r}: a name is at most 100 letters, digits, spaces, '-', '_' and '.'")
 
 
 def finite_vector(value: object, what: str, *, nonzero: bool = False) -> NDArray[np.float64]:

@@ -1,0 +1,193 @@
+"""The one loop: what it yields, what its sinks see, and how it ends and goes on."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.diagnostics import measure
+from supple.simulate import NullSink
+from supple.solver import Solver
+from supple.state import State, Status, StepReport
+from supple.system import build_system, initial_state
+
+CUBE = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+CUBE_TETS = [[0, 4, 6, 7], [0, 6, 2, 7], [0, 2, 3, 7], [0, 3, 1, 7], [0, 1, 5, 7], [0, 5, 4, 7]]
+
+
+@dataclass(frozen=True)
+class FreeFall(Solver):
+    """Symplectic Euler under gravity, pins where they must be; stops at step `stops_at`."""
+
+    stops_at: int | None = None
+
+    def prepare(self, system):
+        return {"calls": 0}
+
+    def step(self, system, state, dt, workspace):
+        workspace["calls"] += 1
+        if workspace["calls"] == self.stops_at:
+            return state, StepReport(Status.NOT_FINITE, 3, "vertex 2 left for infinity")
+        v = state.velocities + dt * system.gravity
+        x = state.positions + dt * v
+        time = state.time + dt
+        if len(system.pinned_vertices):
+            x[system.pinned_vertices] = system.pin_targets(time)
+        return State(time, x, v), StepReport(Status.CONVERGED, 1, details={"calls": workspace["calls"]})
+
+
+class Diary:
+    def __init__(self, log=None, name="", fails_at=None):
+        self.log, self.name, self.fails_at = [] if log is None else log, name, fails_at
+
+    def _note(self, what):
+        self.log.append(self.name + what)
+        if what == self.fails_at:
+            raise sp.OutputError(f"{self.name}: no room for {what}")
+
+    def begin(self, first, dt, steps):
+        self.first, self.dt, self.steps = first, dt, steps
+        self._note("begin")
+
+    def write(self, frame):
+        self._note(f"write {frame.index}")
+
+    def end(self):
+        self._note("end")
+
+
+def scene(**changes):
+    material = sp.StableNeoHookean(youngs=1e5, poisson=0.4)
+    return sp.Scene([sp.Body("cube", sp.TetMesh(CUBE, CUBE_TETS), material, velocity=(1, 0, 0))], **changes)
+
+
+@pytest.mark.parametrize("steps", [0, 1, 7])
+def test_yields_exactly_as_many_frames_as_asked_for(steps):
+    frames = list(sp.simulate(scene(), FreeFall(), 0.1, steps))
+    assert [frame.index for frame in frames] == list(range(1, steps + 1))
+    assert [frame.time for frame in frames] == pytest.approx([0.1 * k for k in range(1, steps + 1)])
+
+
+def test_frames_carry_positions_by_body_and_a_full_report():
+    frame = list(sp.simulate(scene(), FreeFall(), 0.5, 2))[-1]
+    np.testing.assert_allclose(frame.positions["cube"], np.add(CUBE, [1.0, -9.81 * 0.75, 0.0]))
+    np.testing.assert_allclose(frame.velocities["cube"], np.tile([1.0, -9.81, 0.0], (8, 1)))
+    np.testing.assert_allclose(frame.det_F, 1.0)
+    report = frame.report
+    assert report.status == "converged"
+    assert report.min_det_F == pytest.approx(1.0)
+    assert report.elastic_energy == pytest.approx(0.0, abs=1e-8)
+    assert report.kinetic_energy == pytest.approx(0.5 * 1000.0 * (1 + 9.81**2))
+    height = 0.5 * frame.positions["cube"][[0, 7], 1].sum()
+    assert report.potential_energy == pytest.approx(1000.0 * 9.81 * height)
+    np.testing.assert_allclose(report.linear_momentum, [1000.0, -9810.0, 0.0])
+    np.testing.assert_allclose(report.angular_momentum, 0.0, atol=1e-9)
+    assert report.wall_seconds >= 0.0
+    assert report.details == {"calls": 2}
+
+
+def test_sinks_see_the_start_every_frame_and_the_end():
+    diary = Diary()
+    frames = list(sp.simulate(scene(), FreeFall(), 0.1, 3, sinks=[NullSink(), diary]))
+    assert diary.log == ["begin", "write 1", "write 2", "write 3", "end"]
+    assert (diary.dt, diary.steps, diary.first.index, diary.first.time) == (0.1, 3, 0, 0.0)
+    np.testing.assert_array_equal(diary.first.positions["cube"], CUBE)
+    assert len(frames) == 3
+
+
+def test_a_solver_that_cannot_go_on_ends_the_loop_with_the_frame_that_says_why():
+    diary = Diary()
+    frames = list(sp.simulate(scene(), FreeFall(stops_at=3), 0.1, 10, sinks=[diary]))
+    assert [frame.report.status for frame in frames] == ["converged", "converged", "not_finite"]
+    assert frames[-1].report.message == "vertex 2 left for infinity"
+    assert diary.log == ["begin", "write 1", "write 2", "write 3", "end"]
+
+
+def test_sinks_are_ended_when_the_caller_stops_early():
+    diary = Diary()
+    frames = sp.simulate(scene(), FreeFall(), 0.1, 10, sinks=[diary])
+    next(frames)
+    frames.close()
+    assert diary.log == ["begin", "write 1", "end"]
+
+
+@pytest.mark.parametrize("fails_at", ["begin", "write 2", "end"])
+def test_every_sink_is_ended_when_one_of_them_fails(fails_at):
+    log = []
+    sinks = [Diary(log, "a "), Diary(log, "b ", fails_at), Diary(log, "c ")]
+    with pytest.raises(sp.OutputError, match=f"b : no room for {fails_at}"):
+        list(sp.simulate(scene(), FreeFall(), 0.1, 2, sinks=sinks))
+    begun = {line.split()[0] for line in log if line.endswith("begin")}
+    assert {line.split()[0] for line in log if line.endswith("end")} == begun
+
+
+def test_nothing_runs_before_the_first_frame_is_asked_for_but_input_is_checked():
+    diary = Diary()
+    sp.simulate(scene(), FreeFall(), 0.1, 3, sinks=[diary])
+    assert diary.log == []
+
+
+@pytest.mark.parametrize(
+    "motion", [None, sp.Keyframes([0.0, 1.0], angles=[0.0, 3.0], axis=(1, 2, 3), pivot=(0.1, 0, 0))]
+)
+def test_a_restart_from_a_frame_goes_on_bit_for_bit(motion):
+    setting = scene(pins=[sp.Pin("cube", [0, 5], motion)])
+    whole = list(sp.simulate(setting, FreeFall(), 1 / 60, 20))
+    first = list(sp.simulate(setting, FreeFall(), 1 / 60, 9))[-1]
+    rest = list(sp.simulate(setting, FreeFall(), 1 / 60, 11, start=first))
+    assert [frame.index for frame in rest] == list(range(10, 21))
+    for one, other in zip(whole[9:], rest, strict=True):
+        assert one.time == other.time
+        assert np.array_equal(one.state.positions, other.state.positions)
+        assert np.array_equal(one.state.velocities, other.state.velocities)
+
+
+def test_a_start_may_be_a_state():
+    state = State(2.0, CUBE + 1.0, np.zeros((8, 3)))
+    frame = next(sp.simulate(scene(gravity=(0, 0, 0)), FreeFall(), 0.5, 1, start=state))
+    assert (frame.index, frame.time) == (1, 2.5)
+    np.testing.assert_array_equal(frame.positions["cube"], CUBE + 1.0)
+
+
+def test_initial_positions_and_velocities():
+    given = {"initial_positions": {"cube": 2 * CUBE}, "initial_velocities": {"cube": np.zeros((8, 3))}}
+    frame = next(sp.simulate(scene(gravity=(0, 0, 0)), FreeFall(), 0.5, 1, **given))
+    np.testing.assert_array_equal(frame.positions["cube"], 2 * CUBE)
+    assert frame.report.min_det_F == pytest.approx(8.0)
+    # psi at F = 2 I: mu/2 (12 - 3) - 7 mu + lam/2 49
+    mu, lam = sp.StableNeoHookean(youngs=1e5, poisson=0.4).lame_parameters()
+    assert frame.report.elastic_energy == pytest.approx(float(4.5 * mu - 7 * mu + 24.5 * lam))
+
+
+WRONG = [
+    ({"dt": 0.0}, sp.SolverError, "dt is 0.0"),
+    ({"dt": float("nan")}, sp.SolverError, "dt is nan"),
+    ({"dt": "1/60"}, sp.SolverError, "dt is '1/60'"),
+    ({"steps": -1}, sp.SolverError, "steps is -1"),
+    ({"steps": 2.5}, sp.SolverError, "steps is 2.5"),
+    ({"scene": "scene.yaml"}, sp.SceneError, "the scene is a str"),
+    ({"solver": "xpbd"}, sp.SolverError, "the solver is 'xpbd'"),
+    ({"start": 3}, sp.SceneError, "start is a int"),
+    ({"start": State(0.0, CUBE[:4], CUBE[:4])}, sp.SceneError, "start has 4 vertices, the scene has 8"),
+    ({"start": State(0.0, CUBE * np.nan, CUBE)}, sp.SceneError, "not finite"),
+    ({"start": State(0.0, CUBE, CUBE), "initial_positions": {}}, sp.SceneError, "not both"),
+]
+
+
+@pytest.mark.parametrize(("changes", "error", "words"), WRONG)
+def test_what_cannot_be_simulated_is_refused_at_the_call(changes, error, words):
+    call = {"scene": scene(), "solver": FreeFall(), "dt": 0.1, "steps": 3, **changes}
+    with pytest.raises(error, match=words):
+        sp.simulate(call.pop("scene"), call.pop("solver"), call.pop("dt"), call.pop("steps"), **call)
+
+
+def test_energies_of_edges_and_volume_follow_their_compliances():
+    material = sp.EdgesAndVolume(edge_compliance=1e-3, volume_compliance=1e-5)
+    setting = sp.Scene([sp.Body("cube", sp.TetMesh(CUBE, CUBE_TETS), material)], gravity=(0, 0, 0))
+    system = build_system(setting)
+    stretched = initial_state(setting, {"cube": CUBE * [1.1, 1.0, 1.0]})
+    ends = CUBE[system.edges]
+    change = np.linalg.norm((ends[:, 1] - ends[:, 0]) * [1.1, 1, 1], axis=1) - system.rest_lengths
+    expected = 0.5 * (change @ change) / 1e-3 + 0.5 * 6 * (0.1 / 6) ** 2 / 1e-5
+    assert measure(system, stretched).elastic_energy == pytest.approx(expected)
