@@ -1,0 +1,188 @@
+"""XPBD with small steps: n substeps of one Gauss-Seidel sweep each, multipliers starting at 0.
+
+Source: Macklin, Müller, Chentanez, "XPBD" (2016); Macklin et al., "Small Steps in Physics Simulation" (2019).
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.errors import SolverError
+from supple.solver import Solver
+from supple.state import State, Status, StepReport
+from supple.system import System
+from supple.xpbd.constraints import ConstraintSet, build_constraint_sets
+from supple.xpbd.integration import (
+    finish,
+    hold,
+    origins_of_components,
+    predict,
+    predict_parallel,
+    to_world,
+)
+from supple.xpbd.momentum import MomentumRestore
+from supple.xpbd.ordering import Layout, make_layout, reordered
+
+# Below this many constraints a sweep is over before a second thread has woken up.
+PARALLEL_FROM = 20_000
+
+
+@dataclass(eq=False)
+class XPBDWorkspace:
+    """What is computed once for a system, and scratch arrays. All in the solver's own numbering of vertices.
+
+    Attributes
+    ----------
+    points : (n, 4) positions about their component's origin [m] and inverse masses [1/kg]
+    previous, velocities, origins : (n, 3); world, world_previous : (n, 3) positions in the world, for contacts
+    """
+
+    system: System
+    layout: Layout
+    sets: list[ConstraintSet]
+    momentum: MomentumRestore | None
+    parallel: bool
+    points: NDArray[np.float64]
+    previous: NDArray[np.float64] = field(init=False)
+    velocities: NDArray[np.float64] = field(init=False)
+    origins: NDArray[np.float64] = field(init=False)
+    world: NDArray[np.float64] = field(init=False)
+    world_previous: NDArray[np.float64] = field(init=False)
+
+    def __post_init__(self) -> None:
+        for name in ("previous", "velocities", "origins", "world", "world_previous"):
+            setattr(self, name, np.zeros((len(self.points), 3)))
+
+
+@dataclass(frozen=True)
+class XPBD(Solver):
+    """Extended position-based dynamics: fast, robust, approximate; more substeps come closer to the exact solution.
+
+    Parameters
+    ----------
+    substeps : number of substeps of a frame, each with one sweep over all constraints.
+    momentum_restore : give free bodies back the momentum that constraint projection takes (see `supple.xpbd.momentum`).
+        False shows what XPBD does without.
+    threads : number of threads, or None: all of Numba's where the scene is large enough, else one. The result has the
+        same bits for any number.
+
+    Raises
+    ------
+    SolverError : where a value is of the wrong kind or out of range.
+    """
+
+    substeps: int = 20
+    momentum_restore: bool = True
+    threads: int | None = None
+
+    def __post_init__(self) -> None:
+        _check_count("substeps", self.substeps)
+        if not isinstance(self.momentum_restore, bool):
+            raise SolverError(f"XPBD: momentum_restore is {self.momentum_restore!r}; give True or False")
+        if self.threads is not None:
+            _check_count("threads", self.threads)
+            if self.threads > numba.config.NUMBA_NUM_THREADS:  # pyright: ignore[reportAttributeAccessIssue]
+                raise SolverError(
+                    f"XPBD: threads is {self.threads}; this process has {numba.config.NUMBA_NUM_THREADS}"  # pyright: ignore[reportAttributeAccessIssue]
+                    " (set NUMBA_NUM_THREADS before it starts for more)"
+                )
+
+    def prepare(self, system: System) -> XPBDWorkspace:
+        """Number vertices, sort constraints into chunks, precompute their constants.
+
+        Raises
+        ------
+        SolverError : where a body's material has no XPBD constraints; the text names the body.
+        """
+        layout = make_layout(system)
+        inner = reordered(system, layout)
+        sets = build_constraint_sets(inner, layout)
+        points = np.zeros((len(system.masses), 4))
+        points[:, 3] = inner.inverse_masses
+        threads = self.threads or numba.get_num_threads()
+        large = self.threads is not None or sum(made.count for made in sets) >= PARALLEL_FROM
+        return XPBDWorkspace(
+            system=inner,
+            layout=layout,
+            sets=sets,
+            momentum=MomentumRestore(inner) if self.momentum_restore else None,
+            parallel=threads > 1 and large,
+            points=points,
+        )
+
+    def step(self, system: System, state: State, dt: float, workspace: XPBDWorkspace) -> tuple[State, StepReport]:
+        """Advance by `dt` [s] in `substeps` substeps. The state that is returned has arrays of its own."""
+        ws, h = workspace, dt / self.substeps
+        _load(ws, state)
+        targets = _pin_targets(ws.system, state.time, h, self.substeps)
+        held = ws.system.pinned_vertices
+        with _threads(self.threads, ws.parallel):
+            for k in range(self.substeps):
+                (predict_parallel if ws.parallel else predict)(
+                    ws.points, ws.previous, ws.velocities, ws.system.gravity, h, k == 0
+                )
+                if len(held):
+                    hold(ws.points, held, targets, k, ws.origins)
+                for constraints in ws.sets:
+                    constraints.project(ws.points, ws.previous, h, ws.parallel)
+                if ws.momentum is not None:
+                    ws.momentum.apply(ws.points, ws.previous, ws.velocities, h, ws.parallel)
+        broken = finish(ws.points, ws.previous, ws.velocities, h)
+        if broken >= 0:
+            return state, StepReport(Status.NOT_FINITE, self.substeps, message=_what_broke(ws, broken, state.time + dt))
+        return _unload(ws, state.time + dt), StepReport(Status.CONVERGED, self.substeps)
+
+
+def _check_count(name: str, value: object) -> None:
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
+        raise SolverError(f"XPBD: {name} is {value!r}; give a whole number of one or more")
+
+
+@contextlib.contextmanager
+def _threads(wanted: int | None, parallel: bool) -> Iterator[None]:
+    """Numba's number of threads set for a block, and set back after it."""
+    if not parallel or wanted is None:
+        yield
+        return
+    before = numba.get_num_threads()
+    numba.set_num_threads(wanted)
+    try:
+        yield
+    finally:
+        numba.set_num_threads(before)
+
+
+def _load(ws: XPBDWorkspace, state: State) -> None:
+    old = ws.layout.old_from_new
+    np.take(state.positions, old, axis=0, out=ws.world)
+    np.take(state.velocities, old, axis=0, out=ws.velocities)
+    origins_of_components(ws.world, ws.system.components, ws.origins)
+    np.subtract(ws.world, ws.origins, out=ws.points[:, :3])
+
+
+def _unload(ws: XPBDWorkspace, time: float) -> State:
+    to_world(ws.points, ws.origins, ws.world)
+    new = ws.layout.new_from_old
+    return State(time, ws.world[new], ws.velocities[new])
+
+
+def _pin_targets(system: System, time: float, h: float, substeps: int) -> NDArray[np.float64]:
+    """(substeps, k, 3) where pinned vertices must be at the end of each substep [m]."""
+    if all(pin.pin.motion is None for pin in system.pins):
+        return np.repeat(system.pin_targets(time)[None], substeps, axis=0)
+    return np.stack([system.pin_targets(time + (k + 1) * h) for k in range(substeps)])
+
+
+def _what_broke(ws: XPBDWorkspace, vertex: int, time: float) -> str:
+    part = next(p for p in ws.system.bodies if p.vertices.start <= vertex < p.vertices.stop)
+    number = int(ws.layout.old_from_new[vertex]) - part.vertices.start
+    return (
+        f"XPBD: body {part.name!r}, vertex {number}: its position is not finite at t = {time:g} s; "
+        "take more substeps or a shorter dt"
+    )
