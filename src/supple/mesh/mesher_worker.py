@@ -1,0 +1,160 @@
+"""What runs in the child process: TetGen, fTetWild or MeshFix on arrays from a file, within limits.
+
+Started by its path, not imported: it must need nothing but NumPy and the mesher, so that it starts quickly and so
+that nothing of the parent's program runs a second time. Job and answer are `.npz` and `.json` files in a folder.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+# TetGen's smoothing leaves some tets up to half as large again as the bound that its refinement kept.
+VOLUME_ATTEMPTS = 5
+
+
+def main(folder: Path) -> int:
+    """Run the job in `folder`; returns the exit code: 0, or 1 where `answer.json` says what failed."""
+    job: dict[str, Any] = json.loads((folder / "job.json").read_text("utf-8"))
+    answer: dict[str, Any] = {"notes": limit_process(job["cpu_seconds"], job["memory_limit"])}
+    started = time.perf_counter()
+    code = 0
+    try:
+        import numpy as np
+
+        with np.load(folder / "surface.npz") as surface:
+            vertices, triangles = surface["vertices"], surface["triangles"]
+        run = {"tetgen": _run_tetgen, "ftetwild": _run_ftetwild, "meshfix": _run_meshfix}[job["mesher"]]
+        points, elements, labels = run(vertices, triangles, job["options"], answer["notes"])
+        with (folder / "mesh.npz").open("wb") as file:
+            np.savez(file, vertices=points, elements=elements, labels=labels)
+    except MemoryError:
+        answer["error"], code = "out of memory", 1
+    except Exception as error:
+        text = " ".join(str(error).split())
+        answer["error"], code = text if isinstance(error, RuntimeError) else f"{type(error).__name__}: {text}", 1
+    answer["seconds"] = time.perf_counter() - started
+    (folder / "answer.json").write_text(json.dumps(answer), "utf-8")
+    return code
+
+
+def limit_process(cpu_seconds: float, memory_limit: int | None) -> list[str]:
+    """Bound this process's memory and CPU time where the platform can; says where it cannot.
+
+    The CPU bound is there for the day the parent dies without having time to end its child.
+    """
+    try:
+        import resource
+    except ImportError:
+        return ["this platform has no memory limit for processes" if memory_limit is not None else ""]
+    notes = []
+    for kind, limit in ((resource.RLIMIT_CPU, cpu_seconds), (resource.RLIMIT_AS, memory_limit)):
+        if limit is None:
+            continue
+        hard = resource.getrlimit(kind)[1]
+        soft = int(limit) if hard == resource.RLIM_INFINITY else min(int(limit), hard)
+        try:
+            resource.setrlimit(kind, (soft, hard))
+        except (ValueError, OSError) as error:
+            notes.append(f"the system refuses a limit of {soft} for the mesher: {error}")
+    return notes
+
+
+def _run_tetgen(vertices: Any, triangles: Any, options: dict[str, Any], notes: list[str]) -> tuple[Any, Any, Any]:
+    """Tets and the region each belongs to (regions are what the surface separates, cavities among them)."""
+    import tetgen
+
+    def run(bound: float | None) -> tuple[Any, Any, Any]:
+        points, tets, regions, _ = tetgen.TetGen(vertices, triangles).tetrahedralize(
+            quality=options["quality"] is not None,
+            minratio=options["quality"] or 2.0,
+            mindihedral=options["min_dihedral"] or 0.0,
+            # The default, 177, leaves boundary tets of about one degree; 165 flips most of them away at no cost.
+            optmaxdihedral=165.0,
+            nobisect=options["keep_surface"],
+            fixedvolume=bound is not None,
+            maxvolume=-1.0 if bound is None else bound,
+            # Time and memory bound the work. TetGen's own bound of 100 000 points would end it without a word.
+            steinerleft=-1,
+            regionattrib=True,
+            quiet=True,
+        )
+        return points, tets, regions.reshape(-1)
+
+    return _below_volume(run, options["max_volume"], options["max_volume"], notes)
+
+
+def _run_ftetwild(vertices: Any, triangles: Any, options: dict[str, Any], notes: list[str]) -> tuple[Any, Any, Any]:
+    import numpy as np
+    from pytetwild.pytetwild import tetrahedralize
+
+    def run(bound: float | None) -> tuple[Any, Any, Any]:
+        # A regular tet of edge a has the volume a^3 / (6 sqrt 2).
+        edge_length = None if bound is None else (6.0 * np.sqrt(2.0) * bound) ** (1.0 / 3.0)
+        points, tets = tetrahedralize(
+            vertices,
+            triangles,
+            edge_length_abs=edge_length,
+            epsilon=options["envelope"],
+            num_threads=options["threads"],
+            # Without this, tets come out negative.
+            vtk_ordering=True,
+            quiet=True,
+        )
+        return points, tets, np.ones(len(tets))
+
+    # The edge length is an aim for the mean: the largest tets have up to twice the volume.
+    max_volume = options["max_volume"]
+    return _below_volume(run, max_volume, None if max_volume is None else 0.5 * max_volume, notes)
+
+
+def _run_meshfix(vertices: Any, triangles: Any, options: dict[str, Any], notes: list[str]) -> tuple[Any, Any, Any]:
+    """Each component in `options["faulty"]` on its own; nothing comes back of one that MeshFix leaves nothing of."""
+    import numpy as np
+    import pymeshfix
+
+    component = np.asarray(options["components"])
+    points, faces, labels, start = [np.empty((0, 3))], [np.empty((0, 3), np.int32)], [np.empty(0)], 0
+    for k in options["faulty"]:
+        used, local = np.unique(triangles[component == k], return_inverse=True)
+        fixer = pymeshfix.MeshFix(vertices[used], local.reshape(-1, 3).astype(np.int32), verbose=False)
+        # Of one component there is no smaller one to drop, except for what repair itself cuts off.
+        fixer.repair(joincomp=False, remove_smallest_components=False)
+        points.append(np.asarray(fixer.points, dtype=np.float64).reshape(-1, 3))
+        faces.append(np.asarray(fixer.faces, dtype=np.int32).reshape(-1, 3) + start)
+        labels.append(np.full(len(faces[-1]), float(k)))
+        start += len(points[-1])
+    return np.concatenate(points), np.concatenate(faces), np.concatenate(labels)
+
+
+def _below_volume(
+    run: Callable[[float | None], tuple[Any, Any, Any]], max_volume: float | None, bound: float | None, notes: list[str]
+) -> tuple[Any, Any, Any]:
+    """The mesher's answer, asked again with a tighter bound while its largest tet exceeds `max_volume`."""
+    import numpy as np
+
+    answer = run(bound)
+    if max_volume is None or bound is None:
+        return answer
+    for _ in range(VOLUME_ATTEMPTS - 1):
+        corners = answer[0][answer[1]]
+        largest = float(np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).max() / 6.0)
+        if largest <= max_volume * (1.0 + 1e-9):
+            break
+        notes.append(f"the largest tet is {largest / max_volume:.3g} times max_volume; trying a tighter bound")
+        bound *= max(0.25, 0.98 * max_volume / largest)
+        answer = run(bound)
+    return answer
+
+
+if __name__ == "__main__":
+    exit_code = main(Path(sys.argv[1]))
+    sys.stdout.flush()
+    sys.stderr.flush()
+    # Meshers' global destructors have nothing to add, and have been known to crash after the work was done.
+    os._exit(exit_code)
