@@ -1,18 +1,18 @@
 """How far nodes may move in one step before a tetrahedron loses its volume.
 
-Along positions x + t p, six times the volume of a tet is a cubic in t. With T = (x21, x31, x41) and P = (p21, p31, p41):
+Along positions x + t p, six times the volume of a tet is a cubic in t. With edges x21, x31, x41, and p21, p31, p41:
 
     a3 = (p21 x p31) . p41
     a2 = (x21 x p31 + p21 x x31) . p41 + (p21 x p31) . x41
     a1 = (x21 x p31 + p21 x x31) . x41 + (x21 x x31) . p41
     a0 = (x21 x x31) . x41 = 6 V
 
-Divided by a0, and with 1 - keep in place of the constant 1, its smallest positive root is where the volume first falls to
-`keep` of what it was. All coefficients are lowered by what rounding can have added to them, so that the step found is
+Divided by a0, and with 1 - keep in place of the constant 1, its smallest positive root is where the volume first falls
+to `keep` of what it was. All coefficients are lowered by what rounding can have added to them, so that the step found is
 never beyond the true one.
 
-Source: Li, Jiang, Luo, "Physics-Based Simulation", equations 23.3.1 to 23.3.2, whose closed form of the root is replaced
-(see `numerics.cubic`).
+Source: Li, Jiang, Luo, "Physics-Based Simulation", equations 23.3.1 and 23.3.2, whose closed form of the root is
+replaced (see `numerics.cubic`).
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SolverError
+from supple.numerics import double_double as dd
 from supple.numerics.cubic import last_positive_before_root, positive_on_unit_interval
 from supple.numerics.mat3 import cross, det, dot, load_mat, mat_mul, row, subtract
 
@@ -32,6 +33,9 @@ KEEP = 0.2
 
 # Rounding units (2^-53) that the coefficients and the evaluation of their cubic can lose, with room to spare.
 _ROUND_OFF = 32.0 * 2.0**-53
+
+# Where rounding may move the volume by more than this share of it, coefficients are computed with twice the precision.
+_UNSURE = 1e-9
 
 # Tets are handled in runs of fixed length, whatever the number of threads.
 _RUN = 256
@@ -48,55 +52,75 @@ def _size_of_triple(a, b, c):
 
 
 @njit
-def _tet_step(x1, x2, x3, p1, p2, p3, keep):
-    """Largest t in [0, 1] with volume(s) >= keep volume(0) for all s in [0, t].
+def _tet_step(x, p, tets, e, keep):
+    """Largest t in [0, 1] with volume(s) >= keep volume(0) of tet e for all s in [0, t].
 
-    x1, x2, x3 : edges from node 0; p1, p2, p3 : how they change over a full step. 0 where the tet is flat or inverted at
-    the start, or something is not finite.
+    0 where the tet is flat or inverted at the start, or something is not finite.
     """
+    o = tets[e, 0]
+    x0, p0 = row(x, o), row(p, o)
+    x1, x2, x3 = (
+        subtract(row(x, tets[e, 1]), x0),
+        subtract(row(x, tets[e, 2]), x0),
+        subtract(row(x, tets[e, 3]), x0),
+    )
+    p1, p2, p3 = (
+        subtract(row(p, tets[e, 1]), p0),
+        subtract(row(p, tets[e, 2]), p0),
+        subtract(row(p, tets[e, 3]), p0),
+    )
     xx = cross(x1, x2)
     xp = cross(x1, p2)
     px = cross(p1, x2)
     pp = cross(p1, p2)
-    a0 = dot(xx, x3)
-    if not a0 > 0.0:
-        return 0.0
     mixed = (xp[0] + px[0], xp[1] + px[1], xp[2] + px[2])
-    a = dot(pp, p3) / a0
-    b = (dot(mixed, p3) + dot(pp, x3)) / a0
-    c = (dot(mixed, x3) + dot(xx, p3)) / a0
-    if not (abs(a) < np.inf and abs(b) < np.inf and abs(c) < np.inf):
+    a3 = dot(pp, p3)
+    a2 = dot(mixed, p3) + dot(pp, x3)
+    a1 = dot(mixed, x3) + dot(xx, p3)
+    a0 = dot(xx, x3)
+    e3 = _ROUND_OFF * _size_of_triple(p1, p2, p3)
+    e2 = _ROUND_OFF * (_size_of_triple(x1, p2, p3) + _size_of_triple(p1, x2, p3) + _size_of_triple(p1, p2, x3))
+    e1 = _ROUND_OFF * (_size_of_triple(x1, p2, x3) + _size_of_triple(p1, x2, x3) + _size_of_triple(x1, x2, p3))
+    e0 = _ROUND_OFF * _size_of_triple(x1, x2, x3)
+    lost = 1.0 - keep
+    # Divided by a0 and lowered by what rounding may have added: below the true cubic for all t >= 0.
+    if a0 > e0:
+        a, b, c, d = (a3 - e3) / a0, (a2 - e2) / a0, (a1 - e1) / a0, lost * (1.0 - e0 / a0)
+        if positive_on_unit_interval(a, b, c, d):
+            return 1.0
+    if not e3 + e2 + e1 + e0 < _UNSURE * a0:
+        # A sliver, or a direction far longer than the tet: rounding would decide. Rare, so precision may cost time.
+        a3, a2, a1, a0 = _precise_coefficients(x, p, tets, e)
+        if not a0 > 0.0:
+            return 0.0
+        tiny = 0.5 * _ROUND_OFF
+        a = (a3 - (tiny * abs(a3) + e3 * _ROUND_OFF)) / a0
+        b = (a2 - (tiny * abs(a2) + e2 * _ROUND_OFF)) / a0
+        c = (a1 - (tiny * abs(a1) + e1 * _ROUND_OFF)) / a0
+        d = lost * (1.0 - (tiny + e0 * _ROUND_OFF / a0))
+        if positive_on_unit_interval(a, b, c, d):
+            return 1.0
+    if not (abs(a) < np.inf and abs(b) < np.inf and abs(c) < np.inf and 0.0 < d < np.inf):
         return 0.0
-    lost = _ROUND_OFF / a0
-    ea = lost * _size_of_triple(p1, p2, p3)
-    eb = lost * (_size_of_triple(x1, p2, p3) + _size_of_triple(p1, x2, p3) + _size_of_triple(p1, p2, x3))
-    ec = lost * (_size_of_triple(x1, p2, x3) + _size_of_triple(p1, x2, x3) + _size_of_triple(x1, x2, p3))
-    e0 = lost * _size_of_triple(x1, x2, x3)
-    d = 1.0 - keep
-    # Lower than the true cubic for all t >= 0. A tet so flat that the bound on rounding is of the size of its volume is
-    # worked with as it is; the check of the determinants after the step has the last word.
-    if e0 < 0.5:
-        a, b, c, d = a - ea, b - eb, c - ec, d * (1.0 - e0)
-    if positive_on_unit_interval(a, b, c, d):
-        return 1.0
     t = last_positive_before_root(a, b, c, d, 1.0)
     return 1.0 if t < 0.0 else t
 
 
 @njit
-def _tet_step_of(x, p, tets, e, keep):
-    o = tets[e, 0]
-    x0, p0 = row(x, o), row(p, o)
-    i, j, k = tets[e, 1], tets[e, 2], tets[e, 3]
-    return _tet_step(
-        subtract(row(x, i), x0),
-        subtract(row(x, j), x0),
-        subtract(row(x, k), x0),
-        subtract(row(p, i), p0),
-        subtract(row(p, j), p0),
-        subtract(row(p, k), p0),
-        keep,
-    )
+def _precise_coefficients(x, p, tets, e):
+    """a3, a2, a1, a0 of tet e from double-double numbers; each has the precision of one float."""
+    x1, p1 = _precise_edge(x, tets, e, 1), _precise_edge(p, tets, e, 1)
+    x2, p2 = _precise_edge(x, tets, e, 2), _precise_edge(p, tets, e, 2)
+    x3, p3 = _precise_edge(x, tets, e, 3), _precise_edge(p, tets, e, 3)
+    a2 = dd.add(dd.add(dd.triple_product(x1, p2, p3), dd.triple_product(p1, x2, p3)), dd.triple_product(p1, p2, x3))
+    a1 = dd.add(dd.add(dd.triple_product(x1, p2, x3), dd.triple_product(p1, x2, x3)), dd.triple_product(x1, x2, p3))
+    return dd.triple_product(p1, p2, p3)[0], a2[0], a1[0], dd.triple_product(x1, x2, x3)[0]
+
+
+@njit
+def _precise_edge(x, tets, e, k):
+    i, o = tets[e, k], tets[e, 0]
+    return (dd.difference(x[i, 0], x[o, 0]), dd.difference(x[i, 1], x[o, 1]), dd.difference(x[i, 2], x[o, 2]))
 
 
 @njit(parallel=True, cache=True)
@@ -123,7 +147,7 @@ def noninverting_step(x, direction, tets, guarded, keep):
         which = -1
         for e in range(r * _RUN, min(m, (r + 1) * _RUN)):
             if guarded[e]:
-                t = _tet_step_of(x, direction, tets, e, keep)
+                t = _tet_step(x, direction, tets, e, keep)
                 if t < smallest:
                     smallest = t
                     which = e
@@ -158,7 +182,7 @@ def min_det(x, tets, Dm_inv, guarded):
                 w = subtract(row(x, tets[e, 3]), o)
                 Ds = (u[0], v[0], w[0], u[1], v[1], w[1], u[2], v[2], w[2])
                 J = det(mat_mul(Ds, load_mat(Dm_inv, e)))
-                if not J >= smallest:
+                if J < smallest or np.isnan(J):
                     smallest = J
                     which = e
                     if np.isnan(J):
@@ -167,7 +191,7 @@ def min_det(x, tets, Dm_inv, guarded):
         where[r] = which
     J, tet = np.inf, -1
     for r in range(runs):
-        if not lowest[r] >= J:
+        if lowest[r] < J or np.isnan(lowest[r]):
             J = lowest[r]
             tet = where[r]
             if np.isnan(J):
@@ -176,12 +200,12 @@ def min_det(x, tets, Dm_inv, guarded):
 
 
 @njit(cache=True)
-def _volumes(x, tets):
+def _volume_signs(x, tets):
+    """Six times the volumes, precise enough that slivers have the right sign."""
     out = np.empty(len(tets))
     for e in range(len(tets)):
-        o = row(x, tets[e, 0])
-        u, v = subtract(row(x, tets[e, 1]), o), subtract(row(x, tets[e, 2]), o)
-        out[e] = dot(cross(u, v), subtract(row(x, tets[e, 3]), o)) / 6.0
+        u, v, w = _precise_edge(x, tets, e, 1), _precise_edge(x, tets, e, 2), _precise_edge(x, tets, e, 3)
+        out[e] = dd.triple_product(u, v, w)[0]
     return out
 
 
@@ -204,8 +228,8 @@ def largest_noninverting_step(
 
     Returns
     -------
-    step : in (0, 1]; 1 where nothing limits it. At vertices + step * direction, rounded, every tet that is not ignored has
-        a positive volume.
+    step : in (0, 1]; 1 where nothing limits it. At vertices + step * direction, rounded, every tet that is not ignored
+        has a positive volume.
 
     Raises
     ------
@@ -215,19 +239,21 @@ def largest_noninverting_step(
     Source: Li, Jiang, Luo, "Physics-Based Simulation", section 23.3.
     """
     x, p, cells, guarded = _checked(vertices, direction, tets, keep, ignore)
-    volumes = _volumes(x, cells)
+    volumes = _volume_signs(x, cells)
     bad = np.flatnonzero(guarded & ~(volumes > 0.0))
     if len(bad):
         names = ", ".join(str(e) for e in bad[:8]) + (", ..." if len(bad) > 8 else "")
         raise SolverError(
-            f"{len(bad)} of {len(cells)} tets are flat or inverted at the start (tets {names}): no step can be guarded; "
-            "start un-inverted, or pass them as ignore="
+            f"{len(bad)} of {len(cells)} tets are flat or inverted at the start (tets {names}): no step can be "
+            "guarded; start un-inverted, or pass them as ignore="
         )
     step = noninverting_step(x, p, cells, guarded, float(keep))[0]
-    while step > 0.0 and not (_volumes(x + step * p, cells)[guarded] > 0.0).all():
+    while step > 0.0 and not (_volume_signs(x + step * p, cells)[guarded] > 0.0).all():
         step *= 0.5
     if not step > 0.0:
-        raise SolverError("no positive step keeps every tet's volume: the tets are thinner than round-off at this scale")
+        raise SolverError(
+            "no positive step keeps every tet's volume: the tets are thinner than round-off at this scale"
+        )
     return float(step)
 
 
@@ -244,7 +270,9 @@ def _checked(
     if cells.ndim != 2 or cells.shape[1] != 4:
         raise SolverError(f"tets has shape {cells.shape}; give (m, 4)")
     if cells.size and (cells.min() < 0 or cells.max() >= len(x)):
-        raise SolverError(f"tets name vertex {cells.max() if cells.max() >= len(x) else cells.min()}; there are {len(x)}")
+        raise SolverError(
+            f"tets name vertex {cells.max() if cells.max() >= len(x) else cells.min()}; there are {len(x)}"
+        )
     if not (np.isfinite(x).all() and np.isfinite(p).all()):
         raise SolverError("vertices and direction must be finite")
     if not 0.0 < keep < 1.0:

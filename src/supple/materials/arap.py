@@ -1,6 +1,7 @@
 """As-rigid-as-possible elasticity: psi = mu sum (s_i - 1)^2 = mu |F - R|^2.
 
-Source: Sorkine, Alexa, "As-Rigid-As-Possible Surface Modeling" (2007); Kim, Eberle, "Dynamic Deformables" (2022), chapter 5.
+Sources: Sorkine, Alexa, "As-Rigid-As-Possible Surface Modeling" (2007); Kim, Eberle, "Dynamic Deformables" (2022),
+chapter 5.
 """
 
 from __future__ import annotations
@@ -39,8 +40,8 @@ def _quotients(s, mu, lam):
 class ARAP(Elastic):
     """As-rigid-as-possible: distance to the nearest rotation. Only mu = E / (2 (1 + nu)) enters.
 
-    There is no term of volume: small strains behave as if the first Lamé parameter were 0, that is with Poisson's ratio 0
-    and Young's modulus 2 mu.
+    There is no term of volume: small strains behave as if the first Lamé parameter were 0, that is with Poisson's
+    ratio 0 and Young's modulus 2 mu.
     """
 
     stretch_functions = StretchFunctions(_density, _gradient, _curvature, _quotients)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from supple.materials.material import Material
+from supple.materials.per_tet import NOT_ELASTIC, TetMaterial
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -29,3 +30,6 @@ class EdgesAndVolume(Material):
         super().__post_init__()
         self._require_finite("edge_compliance", positive=False, unit="m/N")
         self._require_finite("volume_compliance", positive=False, unit="m^5/N")
+
+    def per_tet(self, n_tets: int) -> TetMaterial:
+        return self._tet_material(n_tets, NOT_ELASTIC, 0.0, 0.0)

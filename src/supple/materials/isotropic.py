@@ -305,7 +305,7 @@ def element_gradients(x, tets, Dm_inv, volumes, kind, mu, lam, out) -> None:
 
 def element_hessians(x, tets, Dm_inv, volumes, kind, mu, lam, project, out) -> None:
     """Hessian of every tet's energy [N/m] into out (m, 12, 12): entry (3 p + i, 3 q + k) for coordinate i of node p and
-    coordinate k of node q. With `project`, of the nearest convex energy: eigenvalues of d^2 psi / dF^2 are clamped at 0.
+    coordinate k of node q. With `project`, of the nearest convex energy: eigenvalues of d^2 psi / dF^2 are clamped.
 
     Other parameters as of `element_energies`.
     """

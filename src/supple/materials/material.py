@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.materials.lame import lame_from_engineering
-from supple.materials.per_tet import NOT_ELASTIC, TetMaterial, one_per_tet
+from supple.materials.per_tet import TetMaterial, one_per_tet
 
 if TYPE_CHECKING:
     from supple.materials.stretches import StretchFunctions
@@ -52,6 +52,7 @@ class Material(ABC):
             must = "above zero" if positive else "zero or more"
             raise SceneError(f"{kind}: {field} is {first:g}{at}; it must be finite and {must} [{unit}]")
 
+    @abstractmethod
     def per_tet(self, n_tets: int) -> TetMaterial:
         """This material as one row per tet of a body.
 
@@ -63,13 +64,15 @@ class Material(ABC):
         ------
         SceneError : where a parameter is given per tet, for another number of tets.
         """
+
+    def _tet_material(self, n_tets: int, kind: int, mu: ArrayLike, lam: ArrayLike) -> TetMaterial:
         name = type(self).__name__
         return TetMaterial(
             density=one_per_tet(self.density, n_tets, f"{name}: density"),
             damping=one_per_tet(self.damping, n_tets, f"{name}: damping"),
-            kind=np.full(n_tets, NOT_ELASTIC, dtype=np.int32),
-            mu=np.zeros(n_tets),
-            lam=np.zeros(n_tets),
+            kind=np.full(n_tets, kind, dtype=np.int32),
+            mu=one_per_tet(mu, n_tets, f"{name}: mu"),
+            lam=one_per_tet(lam, n_tets, f"{name}: lam"),
         )
 
 
@@ -114,18 +117,10 @@ class Elastic(Material):
     def per_tet(self, n_tets: int) -> TetMaterial:
         from supple.materials.registry import kind_of
 
-        base = super().per_tet(n_tets)
         name = type(self).__name__
         one_per_tet(self.youngs, n_tets, f"{name}: youngs")
         one_per_tet(self.poisson, n_tets, f"{name}: poisson")
-        mu, lam = self.lame_parameters()
-        return TetMaterial(
-            density=base.density,
-            damping=base.damping,
-            kind=np.full(n_tets, kind_of(type(self)), dtype=np.int32),
-            mu=one_per_tet(mu, n_tets, f"{name}: mu"),
-            lam=one_per_tet(lam, n_tets, f"{name}: lam"),
-        )
+        return self._tet_material(n_tets, kind_of(type(self)), *self.lame_parameters())
 
     def energy_density(self, F: ArrayLike) -> NDArray[np.float64]:
         """Strain energy per rest volume, zero at rest.

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from supple.materials.arap import ARAP
 from supple.materials.fixed_corotated import FixedCorotated
 from supple.materials.material import Elastic
@@ -16,6 +19,12 @@ ELASTIC_MATERIALS: tuple[type[Elastic], ...] = (
     ARAP,
     StVenantKirchhoff,
 )
+
+
+def needs_positive_volume(kind: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """(m,) whether each tet's material has no energy for J <= 0, from its kind (m,)."""
+    wanted = [k for k, material in enumerate(ELASTIC_MATERIALS) if material.needs_positive_volume]
+    return np.isin(kind, wanted)
 
 
 def kind_of(material: type[Elastic]) -> int:

@@ -1,4 +1,4 @@
-"""What a material tells of itself in terms of the principal stretches, and how kernels pick the right material by number."""
+"""What a material tells of itself in principal stretches, and how kernels pick the right material by its number."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ from numba import njit
 
 
 class StretchFunctions(NamedTuple):
-    """A material as four compiled functions of (s, mu, lam): s the principal stretches (s0, s1, s2), s2 with the sign of J.
+    """A material as four compiled functions of (s, mu, lam).
+
+    s : the principal stretches (s0, s1, s2), s2 with the sign of J.
 
     All results are floats, and all formulas must be free of the division 0/0 that finite differences of gradients have
     where two stretches meet.

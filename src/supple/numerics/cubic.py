@@ -1,7 +1,7 @@
 """The smallest positive root of a cubic, never beyond the true one.
 
-The closed form (Cardano in complex numbers, imaginary parts below a tolerance dropped) loses or misplaces roots when the
-leading coefficient is small beside the others, as it is for directions that move a tetrahedron's nodes almost in a plane.
+The closed form (Cardano in complex numbers, imaginary parts below a tolerance dropped) loses or misplaces roots when
+the leading coefficient is small beside the others, as for directions that move a tetrahedron's nodes almost in a plane.
 Here the cubic is split at its extrema into monotone pieces, and the first piece that changes sign is bisected from the
 side where the cubic still has the sign of its constant term.
 """
@@ -14,28 +14,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from supple.numerics.double_double import product_error, sum_error
+
 # Bounds on what is lost, relative to the sum of the terms' sizes: by Horner's rule, and by its compensated form.
 _ROUND_OFF = 2e-15
 _COMPENSATED_ROUND_OFF = 2e-30
-
-
-@njit
-def _product_error(x, y, product):
-    """x y - product, exactly. Source: Dekker (1971)."""
-    p = 134217729.0 * x
-    x_high = p - (p - x)
-    x_low = x - x_high
-    q = 134217729.0 * y
-    y_high = q - (q - y)
-    y_low = y - y_high
-    return x_low * y_low - (((product - x_high * y_high) - x_low * y_high) - x_high * y_low)
-
-
-@njit
-def _sum_error(x, y, total):
-    """x + y - total, exactly. Source: Knuth, "The Art of Computer Programming", volume 2, section 4.2.2."""
-    z = total - x
-    return (x - (total - z)) + (y - z)
 
 
 @njit
@@ -46,7 +29,7 @@ def _is_positive(a, b, c, d, t):
     """
     size = ((abs(a) * t + abs(b)) * t + abs(c)) * t + abs(d)
     value = ((a * t + b) * t + c) * t + d
-    if abs(value) > _ROUND_OFF * size:
+    if abs(value) > _ROUND_OFF * size or size == math.inf:
         return value > 0.0
     value = a
     error = 0.0
@@ -54,7 +37,7 @@ def _is_positive(a, b, c, d, t):
         coefficient = b if k == 0 else (c if k == 1 else d)
         product = value * t
         total = product + coefficient
-        error = error * t + (_product_error(value, t, product) + _sum_error(product, coefficient, total))
+        error = error * t + (product_error(value, t, product) + sum_error(product, coefficient, total))
         value = total
     return value + error > _COMPENSATED_ROUND_OFF * size
 
@@ -115,8 +98,8 @@ def last_positive_before_root(a, b, c, d, end):
 
     Returns
     -------
-    t : the cubic is above zero on [0, t] and not at the next numbers after t, as far as double precision can tell. Minus
-        one where there is no root in (0, end]. A root that is touched but not crossed counts.
+    t : the cubic is above zero on [0, t] and not at the next numbers after t, as far as double precision can tell.
+        Minus one where there is no root in (0, end]. A root that is touched but not crossed counts.
     """
     p, q = _extrema(a, b, c)
     low = 0.0
@@ -195,8 +178,8 @@ def smallest_positive_cubic_root(
     """The smallest positive root of a t^3 + b t^2 + c t + d; a negative number where there is none.
 
     Scale the coefficients by the constant term first: d = 1 for the first inversion of a tetrahedron, d = 0.8 for the
-    first loss of 80 % of its volume. Beyond t = 1 leading coefficients of at most `tol` count as zero, so that the cubic
-    degenerates to a quadratic, linear or constant one. Up to t = 1, where a step filter looks, every coefficient counts
+    first loss of 80 % of its volume. Beyond t = 1 leading coefficients of at most `tol` count as zero, so that the
+    cubic degenerates to a quadratic, linear or constant one. Up to t = 1, where a step filter looks, every coefficient counts
     as it is.
 
     Parameters
@@ -206,8 +189,8 @@ def smallest_positive_cubic_root(
 
     Returns
     -------
-    t : float, or array of the broadcast shape. Where d is not zero, t is not beyond the true root, and less than it only by
-        round-off: the polynomial has the sign of d on [0, t]. A root that is touched and not crossed counts.
+    t : float, or array of the broadcast shape. Where d is not zero, t is not beyond the true root, and less than it only
+        by round-off: the polynomial has the sign of d on [0, t]. A root that is touched and not crossed counts.
 
     Raises
     ------

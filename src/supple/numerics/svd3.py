@@ -1,11 +1,11 @@
 """Rotation-variant singular value decomposition of 3x3 matrices: F = U diag(s) V^T with det U = det V = +1.
 
 The sign of det F goes into the smallest singular value, so that an inverted element has one negative stretch.
-One-sided Jacobi (Hestenes): columns of F are rotated until they are orthogonal. Unlike the eigenvectors of F^T F this does
-not square the condition number, so that F is reproduced to round-off whatever its rank.
+One-sided Jacobi (Hestenes): columns of F are rotated until they are orthogonal. Unlike the eigenvectors of F^T F this
+does not square the condition number, so that F is reproduced to round-off whatever its rank.
 
-Sources: Golub, Van Loan, "Matrix Computations", section 8.6.3; Irving, Teran, Fedkiw, "Invertible Finite Elements" (2004),
-section 5, for the sign convention.
+Sources: Golub, Van Loan, "Matrix Computations", section 8.6.3; Irving, Teran, Fedkiw, "Invertible Finite Elements"
+(2004), section 5, for the sign convention.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.numerics.mat3 import cross, dot, load_mat, store_mat
 
-# What a sweep mixes into each other is below round-off where its rotations were all below 1e-8 and all cosines of columns
-# below 1e-9. (One alone would not do: nearly equal lengths turn a small cosine into a large angle, very different lengths
-# a large cosine into a small one.)
+# What a sweep mixes into each other is below round-off where its rotations were all below 1e-8 and all cosines of
+# columns below 1e-9. (One alone would not do: nearly equal lengths turn a small cosine into a large angle, very
+# different lengths a large cosine into a small one.)
 _SMALL_ANGLE = 1e-16
 _SMALL_COSINE = 1e-18
 _ORTHOGONAL = 1e-31
@@ -68,7 +68,7 @@ def svd3(F):
 
 @njit
 def _orthogonalize(p, q, vp, vq, done):
-    """Rotate columns p, q of F V (and of V) so that they become orthogonal; `done` turns False where the sweep must repeat."""
+    """Rotate columns p, q of F V (and of V) until orthogonal; `done` turns False where another sweep is needed."""
     app = dot(p, p)
     aqq = dot(q, q)
     apq = dot(p, q)

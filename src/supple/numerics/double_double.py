@@ -1,0 +1,70 @@
+"""Numbers of twice the precision as sums of two floats (high, low), for kernels: about 32 decimal digits.
+
+Sources: Dekker (1971); Knuth, "The Art of Computer Programming", volume 2, section 4.2.2; Hida, Li, Bailey, "Library
+for Double-Double and Quad-Double Arithmetic" (2007).
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+
+@njit
+def sum_error(x, y, total):
+    """x + y - total, exactly, for total = x + y rounded."""
+    z = total - x
+    return (x - (total - z)) + (y - z)
+
+
+@njit
+def product_error(x, y, product):
+    """x y - product, exactly, for product = x y rounded."""
+    p = 134217729.0 * x
+    x_high = p - (p - x)
+    x_low = x - x_high
+    q = 134217729.0 * y
+    y_high = q - (q - y)
+    y_low = y - y_high
+    return x_low * y_low - (((product - x_high * y_high) - x_low * y_high) - x_high * y_low)
+
+
+@njit
+def difference(x, y):
+    """x - y of two floats, exactly."""
+    total = x - y
+    return (total, sum_error(x, -y, total))
+
+
+@njit
+def add(a, b):
+    high = a[0] + b[0]
+    low = sum_error(a[0], b[0], high)
+    tail = a[1] + b[1]
+    tail_low = sum_error(a[1], b[1], tail)
+    low += tail
+    total = high + low
+    low = (low - (total - high)) + tail_low
+    high = total + low
+    return (high, low - (high - total))
+
+
+@njit
+def subtract(a, b):
+    return add(a, (-b[0], -b[1]))
+
+
+@njit
+def multiply(a, b):
+    product = a[0] * b[0]
+    low = product_error(a[0], b[0], product) + (a[0] * b[1] + a[1] * b[0])
+    total = product + low
+    return (total, low - (total - product))
+
+
+@njit
+def triple_product(a, b, c):
+    """(a x b) . c of vectors of double-double numbers."""
+    x = multiply(subtract(multiply(a[1], b[2]), multiply(a[2], b[1])), c[0])
+    y = multiply(subtract(multiply(a[2], b[0]), multiply(a[0], b[2])), c[1])
+    z = multiply(subtract(multiply(a[0], b[1]), multiply(a[1], b[0])), c[2])
+    return add(add(x, y), z)
