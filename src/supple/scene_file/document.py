@@ -1,0 +1,68 @@
+"""The whole of a scene file."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, WithJsonSchema
+
+from supple.scene_file.bodies import BodyModel
+from supple.scene_file.model import Model, Vector
+from supple.scene_file.obstacles import ObstacleModel
+from supple.scene_file.pins import PinModel
+from supple.scene_file.solvers import SolverModel, XPBDModel
+
+MAX_STEPS = 10_000_000
+
+
+def _seconds(value: Any) -> Any:
+    """A time [s], also as a fraction: `1/60`."""
+    if isinstance(value, str) and value.count("/") == 1:
+        above, below = value.split("/")
+        try:
+            return float(above) / float(below)
+        except (ValueError, ZeroDivisionError):
+            return value
+    return value
+
+
+Seconds = Annotated[
+    float,
+    Field(gt=0.0, le=1e6, allow_inf_nan=False),
+    BeforeValidator(_seconds),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "number", "exclusiveMinimum": 0, "maximum": 1e6},
+                {"type": "string", "pattern": r"^\s*[0-9.eE+-]+\s*/\s*[0-9.eE+-]+\s*$"},
+            ]
+        }
+    ),
+]
+
+
+class OutputModel(Model):
+    """What `supple run` writes beside the recording."""
+
+    page: bool = Field(default=True, description="index.html, which plays the recording in a browser")
+    plot: bool = Field(default=True, description="plot.png: energies, momentum, volume ratio and smallest J over time")
+
+
+class SceneFileModel(Model):
+    """Bodies, obstacles and pins under gravity, the solver, and the timing of a run. SI units; y is up."""
+
+    supple: Literal[1] = Field(default=1, description="version of this format")
+    bodies: list[BodyModel] = Field(min_length=1, max_length=10_000)
+    obstacles: list[ObstacleModel] = Field(default=[], max_length=10_000)
+    pins: list[PinModel] = Field(default=[], max_length=10_000)
+    gravity: Vector = Field(default=[0.0, -9.81, 0.0], description="[m/s^2]")
+    solver: SolverModel = Field(default_factory=lambda: XPBDModel(kind="xpbd"))
+    dt: Seconds = Field(default=1.0 / 60.0, description="time from frame to frame [s]; 1/60 may be written as such")
+    steps: int = Field(default=300, ge=0, le=MAX_STEPS, description="number of frames")
+    output: OutputModel = Field(default_factory=OutputModel)
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON Schema (draft 2020-12) of scene files, for editors and other programs."""
+    schema = SceneFileModel.model_json_schema()
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "Supple scene"}

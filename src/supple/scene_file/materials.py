@@ -1,0 +1,65 @@
+"""Materials of a scene file, by `kind`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
+
+from pydantic import Field, create_model
+
+from supple.materials.arap import ARAP
+from supple.materials.edges_and_volume import EdgesAndVolume
+from supple.materials.fixed_corotated import FixedCorotated
+from supple.materials.material import Material
+from supple.materials.neo_hookean import NeoHookean
+from supple.materials.st_venant_kirchhoff import StVenantKirchhoff
+from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.scene_file.model import Model, NonNegative, Positive
+
+ELASTIC_KINDS = {
+    "stable_neo_hookean": StableNeoHookean,
+    "neo_hookean": NeoHookean,
+    "fixed_corotated": FixedCorotated,
+    "arap": ARAP,
+    "st_venant_kirchhoff": StVenantKirchhoff,
+}
+
+
+class _MaterialModel(Model):
+    density: Positive = Field(default=1000.0, description="mass density at rest [kg/m^3]")
+    damping: NonNegative = Field(default=0.0, description="Kelvin-Voigt damping time [s]")
+
+
+class EdgesAndVolumeModel(_MaterialModel):
+    """The classic XPBD body: springs along edges, one volume constraint per tetrahedron (XPBD only)."""
+
+    kind: Literal["edges_and_volume"]
+    edge_compliance: NonNegative = Field(default=0.0, description="of every edge [m/N]; 0 is rigid")
+    volume_compliance: NonNegative = Field(default=0.0, description="of every tetrahedron [m^5/N]; 0 keeps the volume")
+
+    def build(self) -> Material:
+        return EdgesAndVolume(**self.model_dump(exclude={"kind"}))
+
+
+class ElasticModel(_MaterialModel):
+    """A hyperelastic material given by its engineering constants."""
+
+    kind: str
+    youngs: Positive = Field(description="Young's modulus [Pa]")
+    poisson: float = Field(gt=-1.0, lt=0.5, description="Poisson's ratio, above -1 and below 0.5")
+
+    def build(self) -> Material:
+        return ELASTIC_KINDS[self.kind](**self.model_dump(exclude={"kind"}))
+
+
+def _elastic_model(kind: str) -> type[ElasticModel]:
+    name = ELASTIC_KINDS[kind].__name__ + "Model"
+    doc = (ELASTIC_KINDS[kind].__doc__ or "").partition("\n")[0]
+    choice: Any = (Literal[kind], ...)  # pyright: ignore[reportInvalidTypeForm]
+    return create_model(name, __base__=ElasticModel, __doc__=doc, __module__=__name__, kind=choice)
+
+
+if TYPE_CHECKING:
+    MaterialModel = EdgesAndVolumeModel | ElasticModel
+else:
+    _KINDS = (EdgesAndVolumeModel, *(_elastic_model(kind) for kind in ELASTIC_KINDS))
+    MaterialModel = Annotated[Union[_KINDS], Field(discriminator="kind")]  # noqa: UP007 (built from a list of models)

@@ -1,0 +1,35 @@
+"""What all parts of a scene file share: strict values, no unknown keys, and errors that know the known ones."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+UNKNOWN_KEY = "unknown_key"
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Count = Annotated[int, Field(ge=1, le=1_000_000)]
+Name = Annotated[str, Field(min_length=1, max_length=100)]
+FilePath = Annotated[str, Field(min_length=1, max_length=1000)]
+
+
+class Model(BaseModel):
+    """Base of all parts of a scene file."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _refuse_unknown_keys(cls, data: Any) -> Any:
+        """Before pydantic does: here the known keys are at hand, for a suggestion."""
+        if isinstance(data, dict):
+            for key in data:
+                if key not in cls.model_fields:
+                    context = {"key": key, "known": list(cls.model_fields)}
+                    raise PydanticCustomError(UNKNOWN_KEY, "unknown key {key}", context)
+        return data

@@ -1,0 +1,21 @@
+"""Keyframes of a scene file."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from supple.scene.motion import Keyframes
+from supple.scene_file.model import Model, Number, Vector
+
+
+class KeyframesModel(Model):
+    """Piecewise linear motion, constant before the first keyframe and after the last."""
+
+    times: list[Number] = Field(min_length=1, description="strictly increasing [s]")
+    displacements: list[Vector] | None = Field(default=None, description="one per time [m]")
+    angles: list[Number] | None = Field(default=None, description="one per time [rad]")
+    axis: Vector = Field(default=[0.0, 0.0, 1.0], description="what the angles turn about")
+    pivot: Vector = Field(default=[0.0, 0.0, 0.0], description="a point of that axis [m]")
+
+    def build(self) -> Keyframes:
+        return Keyframes(self.times, self.displacements, self.angles, self.axis, self.pivot)

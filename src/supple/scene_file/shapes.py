@@ -1,0 +1,114 @@
+"""Shapes of a scene file, by `kind`: the ones that Supple makes itself."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from supple.mesh import shapes
+from supple.mesh.surface import SurfaceMesh
+from supple.mesh.tetmesh import TetMesh
+from supple.scene_file.model import Count, Model, Positive
+
+Sizes = Annotated[list[Positive], Field(min_length=3, max_length=3)]
+Divisions = Annotated[list[Count], Field(min_length=3, max_length=3)]
+EdgeLength = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+
+
+class BoxShapeModel(Model):
+    """A box about the origin, cut into a grid."""
+
+    kind: Literal["box"]
+    size: Sizes = Field(default=[1.0, 1.0, 1.0], description="full edge lengths [m]")
+    divisions: Divisions = Field(default=[4, 4, 4], description="cells along x, y and z")
+
+    def build(self) -> TetMesh:
+        return shapes.box(self.size, self.divisions)
+
+    def build_surface(self) -> SurfaceMesh:
+        return shapes.box_surface(self.size, self.divisions)
+
+
+class SphereShapeModel(Model):
+    """A ball about the origin."""
+
+    kind: Literal["sphere"]
+    radius: Positive = Field(default=0.5, description="[m]")
+    edge_length: EdgeLength | None = Field(default=None, description="mean edge [m]; a fifth of the radius without it")
+
+    def build(self) -> TetMesh:
+        return shapes.sphere(self.radius, self.edge_length or 0.2 * self.radius)
+
+    def build_surface(self) -> SurfaceMesh:
+        return shapes.sphere_surface(self.radius, self.edge_length or 0.2 * self.radius)
+
+
+class CylinderShapeModel(Model):
+    """A cylinder about the origin, along y."""
+
+    kind: Literal["cylinder"]
+    radius: Positive = Field(default=0.5, description="[m]")
+    height: Positive = Field(default=1.0, description="[m]")
+    edge_length: EdgeLength | None = Field(
+        default=None, description="mean edge [m]; a fifth of the smaller of radius and height without it"
+    )
+
+    def build(self) -> TetMesh:
+        return shapes.cylinder(self.radius, self.height, self.edge_length or 0.2 * min(self.radius, self.height))
+
+    def build_surface(self) -> SurfaceMesh:
+        return shapes.cylinder_surface(
+            self.radius, self.height, self.edge_length or 0.2 * min(self.radius, self.height)
+        )
+
+
+class TorusShapeModel(Model):
+    """A ring about the y axis."""
+
+    kind: Literal["torus"]
+    radius: Positive = Field(default=0.5, description="of the circle in the middle of the tube [m]")
+    tube_radius: Positive = Field(default=0.2, description="of the tube [m]")
+    edge_length: EdgeLength | None = Field(
+        default=None, description="mean edge [m]; 0.4 of the tube's radius without it"
+    )
+
+    def build(self) -> TetMesh:
+        return shapes.torus(self.radius, self.tube_radius, self.edge_length or 0.4 * self.tube_radius)
+
+    def build_surface(self) -> SurfaceMesh:
+        return shapes.torus_surface(self.radius, self.tube_radius, self.edge_length or 0.4 * self.tube_radius)
+
+
+class GummyBearShapeModel(Model):
+    """The gummy bear."""
+
+    kind: Literal["gummy_bear"]
+    height: Positive = Field(default=1.0, description="[m]")
+    edge_length: EdgeLength | None = Field(default=None, description="mean edge [m]; 0.08 of the height without it")
+
+    def build(self) -> TetMesh:
+        return shapes.gummy_bear(self.height, self.edge_length or 0.08 * self.height)
+
+
+ShapeModel = Annotated[
+    BoxShapeModel | SphereShapeModel | CylinderShapeModel | TorusShapeModel | GummyBearShapeModel,
+    Field(discriminator="kind"),
+]
+
+
+class GummyBearSurfaceModel(Model):
+    """The surface of the gummy bear, as fine as wanted."""
+
+    kind: Literal["gummy_bear"]
+    height: Positive = Field(default=1.0, description="[m]")
+    resolution: Count = Field(default=64, description="cells along its height")
+
+    def build_surface(self) -> SurfaceMesh:
+        return shapes.gummy_bear_surface(self.height, self.resolution)
+
+
+SurfaceShapeModel = Annotated[
+    BoxShapeModel | SphereShapeModel | CylinderShapeModel | TorusShapeModel | GummyBearSurfaceModel,
+    Field(discriminator="kind"),
+]
