@@ -1,0 +1,141 @@
+"""Ready-made bodies, all about the origin with y up: tet meshes here, surfaces from `shape_surfaces`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.mesh.gummy_bear import gummy_bear, gummy_bear_surface
+from supple.mesh.isosurface_stuffing import stuff
+from supple.mesh.shape_sizes import check_torus, counts, fits, lengths, not_too_many, positive
+from supple.mesh.shape_surfaces import box_surface, cylinder_surface, sphere_surface, torus_surface
+from supple.mesh.tetmesh import TetMesh
+
+__all__ = [
+    "box",
+    "box_surface",
+    "cylinder",
+    "cylinder_surface",
+    "gummy_bear",
+    "gummy_bear_surface",
+    "sphere",
+    "sphere_surface",
+    "torus",
+    "torus_surface",
+]
+
+
+def box(size: Sequence[float] = (1.0, 1.0, 1.0), divisions: Sequence[int] = (4, 4, 4)) -> TetMesh:
+    """A box cut into a grid of cells, each of six tets around its diagonal (Kuhn 1960).
+
+    Vertices are in the order of `numpy.mgrid`: z runs fastest, then y, then x.
+
+    Parameters
+    ----------
+    size : (3,) full edge lengths [m]
+    divisions : (3,) number of cells along x, y and z
+
+    Raises
+    ------
+    MeshError : where a number is not positive, or there are too many cells.
+    """
+    extent, n = lengths("box", "size", size), counts("box", "divisions", divisions)
+    not_too_many("box", 6.0 * n[0] * n[1] * n[2], "make divisions smaller")
+    points = np.stack(np.meshgrid(*(np.linspace(-0.5, 0.5, k + 1) for k in n), indexing="ij"), axis=-1).reshape(-1, 3)
+    index = np.arange(len(points)).reshape(n[0] + 1, n[1] + 1, n[2] + 1)
+    # Corner 4 i + 2 j + k of each cell.
+    cell = [index[i : n[0] + i, j : n[1] + j, k : n[2] + k].ravel() for i in (0, 1) for j in (0, 1) for k in (0, 1)]
+    # Every path from corner 0 to corner 7 along the axes is one tet; for half of them two corners are swapped.
+    paths = [(0, 4, 6, 7), (0, 6, 2, 7), (0, 2, 3, 7), (0, 3, 1, 7), (0, 1, 5, 7), (0, 5, 4, 7)]
+    tets = np.stack([np.column_stack([cell[c] for c in path]) for path in paths], axis=1).reshape(-1, 4)
+    return TetMesh(points * extent, tets)
+
+
+def sphere(radius: float = 0.5, edge_length: float = 0.1) -> TetMesh:
+    """A ball of well-shaped tets, its surface vertices exactly on the sphere.
+
+    Parameters
+    ----------
+    radius : [m]
+    edge_length : mean edge [m], at most `radius`
+
+    Raises
+    ------
+    MeshError : where a length is not positive, or the edge too long or too short for the radius.
+    """
+    positive("sphere", radius=radius, edge_length=edge_length)
+    fits("sphere", edge_length, "radius", radius)
+    reach = np.full(3, float(radius))
+    return stuff("sphere", lambda x: np.linalg.norm(x, axis=1) - radius, (-reach, reach), edge_length)
+
+
+def torus(radius: float = 0.5, tube_radius: float = 0.2, edge_length: float = 0.1) -> TetMesh:
+    """A ring around the y axis, of well-shaped tets.
+
+    Parameters
+    ----------
+    radius : of the circle in the middle of the tube [m]
+    tube_radius : of the tube [m], less than `radius`
+    edge_length : mean edge [m], at most `tube_radius`
+
+    Raises
+    ------
+    MeshError : where a length is not positive, the tube closes the ring, or the edge does not suit.
+    """
+    check_torus("torus", radius, tube_radius, edge_length)
+    reach = np.array([radius + tube_radius, tube_radius, radius + tube_radius])
+
+    def inside(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.hypot(np.hypot(x[:, 0], x[:, 2]) - radius, x[:, 1]) - tube_radius
+
+    return stuff("torus", inside, (-reach, reach), edge_length)
+
+
+def cylinder(radius: float = 0.5, height: float = 1.0, edge_length: float = 0.1) -> TetMesh:
+    """A cylinder along the y axis: rings of triangles, in layers of prisms, each of three tets.
+
+    Parameters
+    ----------
+    radius, height : [m]
+    edge_length : about the length of edges [m], at most `radius` and `height`
+
+    Raises
+    ------
+    MeshError : where a length is not positive, or the edge too long or too short.
+    """
+    positive("cylinder", radius=radius, height=height, edge_length=edge_length)
+    fits("cylinder", edge_length, "radius", radius)
+    fits("cylinder", edge_length, "height", height)
+    rings, layers = max(2, round(radius / edge_length)), max(1, round(height / edge_length))
+    not_too_many("cylinder", 18.0 * rings**2 * layers, "make edge_length longer")
+    disk, triangles = _disk(rings)
+    n = len(disk)
+    points = np.empty((layers + 1, n, 3))
+    points[:, :, 0], points[:, :, 2] = radius * disk[:, 0], radius * disk[:, 1]
+    points[:, :, 1] = np.linspace(-0.5 * height, 0.5 * height, layers + 1)[:, None]
+    # A quad of two columns is cut from the bottom of the lower-numbered one: neighbours agree on that.
+    a0, a1, a2 = np.sort(triangles, axis=1).T
+    b0, b1, b2 = a0 + n, a1 + n, a2 + n
+    layer = np.concatenate([np.column_stack(t) for t in ((a0, a1, a2, b2), (a0, a1, b1, b2), (a0, b0, b1, b2))])
+    tets = layer[None] + n * np.arange(layers)[:, None, None]
+    return TetMesh(points.reshape(-1, 3), tets.reshape(-1, 4))
+
+
+def _disk(rings: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Unit disk of concentric rings, 6 k points on ring k: points (n, 2) and triangles (m, 3)."""
+    points = [np.zeros((1, 2))]
+    for k in range(1, rings + 1):
+        angle = 2.0 * np.pi * np.arange(6 * k) / (6 * k)
+        points.append(k / rings * np.column_stack([np.cos(angle), np.sin(angle)]))
+    triangles = []
+    for k in range(1, rings + 1):
+        # Ring k begins after 1 + 6 + ... + 6 (k - 1) points; the centre stands for ring 0.
+        outer, inner = 1 + 3 * k * (k - 1), 1 + 3 * (k - 1) * (k - 2)
+        for sector in range(6):
+            out = [outer + (sector * k + j) % (6 * k) for j in range(k + 1)]
+            into = [inner + (sector * (k - 1) + j) % (6 * (k - 1)) for j in range(k)] if k > 1 else [0]
+            triangles += [(into[j], out[j], out[j + 1]) for j in range(k)]
+            triangles += [(into[j], out[j + 1], into[j + 1]) for j in range(k - 1)]
+    return np.concatenate(points), np.array(triangles, dtype=np.int64)
