@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from supple.errors import SolverError
 from supple.numerics.cubic import smallest_positive_cubic_root
 
 
@@ -139,5 +140,5 @@ def test_arrays_broadcast():
 
 
 def test_not_finite_is_an_error():
-    with pytest.raises(ValueError, match="finite"):
+    with pytest.raises(SolverError, match="finite"):
         smallest_positive_cubic_root(1.0, np.nan, 0.0, 1.0)

@@ -8,8 +8,8 @@ Along positions x + t p, six times the volume of a tet is a cubic in t. With edg
     a0 = (x21 x x31) . x41 = 6 V
 
 Divided by a0, and with 1 - keep in place of the constant 1, its smallest positive root is where the volume first falls
-to `keep` of what it was. All coefficients are lowered by what rounding can have added to them, so that the step found is
-never beyond the true one.
+to `keep` of what it was. All coefficients are lowered by what rounding can have added to them, so that the step found
+is never beyond the true one.
 
 Source: Li, Jiang, Luo, "Physics-Based Simulation", equations 23.3.1 and 23.3.2, whose closed form of the root is
 replaced (see `numerics.cubic`).
@@ -41,7 +41,7 @@ _UNSURE = 1e-9
 _RUN = 256
 
 
-@njit
+@njit(error_model="numpy")
 def _size_of_triple(a, b, c):
     """The sum of the absolute values of the terms of (a x b) . c."""
     return (
@@ -51,7 +51,7 @@ def _size_of_triple(a, b, c):
     )
 
 
-@njit
+@njit(error_model="numpy")
 def _tet_step(x, p, tets, e, keep):
     """Largest t in [0, 1] with volume(s) >= keep volume(0) of tet e for all s in [0, t].
 
@@ -106,7 +106,7 @@ def _tet_step(x, p, tets, e, keep):
     return 1.0 if t < 0.0 else t
 
 
-@njit
+@njit(error_model="numpy")
 def _precise_coefficients(x, p, tets, e):
     """a3, a2, a1, a0 of tet e from double-double numbers; each has the precision of one float."""
     x1, p1 = _precise_edge(x, tets, e, 1), _precise_edge(p, tets, e, 1)
@@ -117,13 +117,13 @@ def _precise_coefficients(x, p, tets, e):
     return dd.triple_product(p1, p2, p3)[0], a2[0], a1[0], dd.triple_product(x1, x2, x3)[0]
 
 
-@njit
+@njit(error_model="numpy")
 def _precise_edge(x, tets, e, k):
     i, o = tets[e, k], tets[e, 0]
     return (dd.difference(x[i, 0], x[o, 0]), dd.difference(x[i, 1], x[o, 1]), dd.difference(x[i, 2], x[o, 2]))
 
 
-@njit(parallel=True, cache=True)
+@njit(parallel=True, cache=True, error_model="numpy")
 def noninverting_step(x, direction, tets, guarded, keep):
     """The largest step in [0, 1] over which no guarded tet falls below `keep` of its volume at x; for solvers.
 
@@ -161,7 +161,7 @@ def noninverting_step(x, direction, tets, guarded, keep):
     return step, tet
 
 
-@njit(parallel=True, cache=True)
+@njit(parallel=True, cache=True, error_model="numpy")
 def min_det(x, tets, Dm_inv, guarded):
     """The smallest J = det(Ds Dm^-1) over guarded tets, and the first tet that has it; not-a-number comes first.
 
@@ -182,7 +182,7 @@ def min_det(x, tets, Dm_inv, guarded):
                 w = subtract(row(x, tets[e, 3]), o)
                 Ds = (u[0], v[0], w[0], u[1], v[1], w[1], u[2], v[2], w[2])
                 J = det(mat_mul(Ds, load_mat(Dm_inv, e)))
-                if J < smallest or np.isnan(J):
+                if np.isnan(J) or smallest > J:
                     smallest = J
                     which = e
                     if np.isnan(J):
@@ -199,7 +199,7 @@ def min_det(x, tets, Dm_inv, guarded):
     return J, tet
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _volume_signs(x, tets):
     """Six times the volumes, precise enough that slivers have the right sign."""
     out = np.empty(len(tets))

@@ -14,22 +14,22 @@ from supple.materials.material import Elastic
 from supple.materials.stretches import StretchFunctions, distance_from_rotations, rotation_quotients
 
 
-@njit
+@njit(error_model="numpy")
 def _density(s, mu, lam):
     return mu * distance_from_rotations(s)
 
 
-@njit
+@njit(error_model="numpy")
 def _gradient(s, mu, lam):
     return (2.0 * mu * (s[0] - 1.0), 2.0 * mu * (s[1] - 1.0), 2.0 * mu * (s[2] - 1.0))
 
 
-@njit
+@njit(error_model="numpy")
 def _curvature(s, mu, lam):
     return (2.0 * mu, 2.0 * mu, 2.0 * mu, 0.0, 0.0, 0.0)
 
 
-@njit
+@njit(error_model="numpy")
 def _quotients(s, mu, lam):
     """d_ij = 2 mu;  t_ij = 2 mu (1 - 2 / (s_i + s_j))"""
     q = rotation_quotients(s)

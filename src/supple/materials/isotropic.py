@@ -26,6 +26,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
+from supple.errors import SceneError
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.materials.stretches import UNKNOWN_ONE, UNKNOWN_SIX, UNKNOWN_THREE, dispatch
 from supple.numerics import mat3, svd3
@@ -42,7 +43,7 @@ _curvature = dispatch([kind.stretch_functions.curvature for kind in ELASTIC_MATE
 _quotients = dispatch([kind.stretch_functions.quotients for kind in ELASTIC_MATERIALS], UNKNOWN_SIX)
 
 
-@njit
+@njit(error_model="numpy")
 def deformation_gradient(x, tets, Dm_inv, e):
     """F = Ds Dm^-1 of tet e, nine numbers row after row."""
     a, b, c, d = tets[e, 0], tets[e, 1], tets[e, 2], tets[e, 3]
@@ -60,14 +61,14 @@ def deformation_gradient(x, tets, Dm_inv, e):
     return mat_mul(Ds, load_mat(Dm_inv, e))
 
 
-@njit
+@njit(error_model="numpy")
 def energy_density(F, kind, mu, lam):
     """psi of one F."""
     _, s, _ = decompose(F)
     return _density(kind, s, mu, lam)
 
 
-@njit
+@njit(error_model="numpy")
 def first_piola(F, kind, mu, lam):
     """P = U diag(psi_i) V^T of one F, nine numbers."""
     U, s, V = decompose(F)
@@ -86,7 +87,7 @@ def first_piola(F, kind, mu, lam):
     return mat_mul_transposed(Up, V)
 
 
-@njit
+@njit(error_model="numpy")
 def _nearest_semidefinite(A):
     """A symmetric 3x3 matrix (a00, a11, a22, a12, a02, a01) with its negative eigenvalues set to zero."""
     a00, a11, a22, a12, a02, a01 = A
@@ -108,7 +109,7 @@ def _nearest_semidefinite(A):
     )
 
 
-@njit
+@njit(error_model="numpy")
 def principal_hessian(s, kind, mu, lam, project):
     """The Hessian in the frame of U and V.
 
@@ -127,7 +128,7 @@ def principal_hessian(s, kind, mu, lam, project):
     return A, alpha, beta
 
 
-@njit
+@njit(error_model="numpy")
 def hessian_block(U, A, alpha, beta, g, h):
     """sum_jl (d^2 psi / dF_ij dF_kl) G_j H_l for g = V^T G, h = V^T H: the 3x3 block (i, k) of two nodes with shape
     gradients G and H, per rest volume."""
@@ -146,14 +147,14 @@ def hessian_block(U, A, alpha, beta, g, h):
     return mat_mul_transposed(mat_mul(U, K), U)
 
 
-@njit
+@njit(error_model="numpy")
 def _symmetric(K):
     """A block of one node with itself, made symmetric to the last bit."""
     a, b, c = 0.5 * (K[1] + K[3]), 0.5 * (K[2] + K[6]), 0.5 * (K[5] + K[7])
     return (K[0], a, b, a, K[4], c, b, c, K[8])
 
 
-@njit
+@njit(error_model="numpy")
 def _put_pair(out, e, p, q, K):
     """Write block (p, q) of a 12x12 matrix, and its transpose as block (q, p)."""
     for i in range(3):
@@ -163,7 +164,7 @@ def _put_pair(out, e, p, q, K):
             out[e, 3 * q + j, 3 * p + i] = value
 
 
-@njit
+@njit(error_model="numpy")
 def _minus_sum(A, B, C):
     return (
         -(A[0] + B[0] + C[0]),
@@ -178,7 +179,7 @@ def _minus_sum(A, B, C):
     )
 
 
-@njit
+@njit(error_model="numpy")
 def _tet_hessian(F, B, volume, kind, mu, lam, project, out, e):
     """The 12x12 Hessian of one tet into out[e]; B = Dm^-1, whose rows are the shape gradients of nodes 1, 2, 3."""
     U, s, V = decompose(F)
@@ -223,14 +224,14 @@ class _Kernels(NamedTuple):
 def _build_kernels(version: int) -> _Kernels:
     """The compiled loops. `version` is in their closures, so that no cached kernel outlives a change of a material."""
 
-    @njit(parallel=True, cache=True)
+    @njit(parallel=True, cache=True, error_model="numpy")
     def element_energies(x, tets, Dm_inv, volumes, kind, mu, lam, out):
         _ = version
         for e in prange(len(tets)):
             F = deformation_gradient(x, tets, Dm_inv, e)
             out[e] = volumes[e] * energy_density(F, kind[e], mu[e], lam[e])
 
-    @njit(parallel=True, cache=True)
+    @njit(parallel=True, cache=True, error_model="numpy")
     def element_gradients(x, tets, Dm_inv, volumes, kind, mu, lam, out):
         _ = version
         for e in prange(len(tets)):
@@ -244,26 +245,26 @@ def _build_kernels(version: int) -> _Kernels:
                     total += force
                 out[e, 0, i] = -total
 
-    @njit(parallel=True, cache=True)
+    @njit(parallel=True, cache=True, error_model="numpy")
     def element_hessians(x, tets, Dm_inv, volumes, kind, mu, lam, project, out):
         _ = version
         for e in prange(len(tets)):
             F = deformation_gradient(x, tets, Dm_inv, e)
             _tet_hessian(F, load_mat(Dm_inv, e), volumes[e], kind[e], mu[e], lam[e], project, out, e)
 
-    @njit(parallel=True, cache=True)
+    @njit(parallel=True, cache=True, error_model="numpy")
     def densities(F, kind, mu, lam, out):
         _ = version
         for e in prange(len(F)):
             out[e] = energy_density(load_mat(F, e), kind[e], mu[e], lam[e])
 
-    @njit(cache=True)
+    @njit(cache=True, error_model="numpy")
     def piolas(F, kind, mu, lam, out):
         _ = version
         for e in range(len(F)):
             mat3.store_mat(first_piola(load_mat(F, e), kind[e], mu[e], lam[e]), out, e)
 
-    @njit(cache=True)
+    @njit(cache=True, error_model="numpy")
     def hessians(F, kind, mu, lam, project, out):
         _ = version
         for e in range(len(F)):
@@ -315,7 +316,7 @@ def element_hessians(x, tets, Dm_inv, volumes, kind, mu, lam, project, out) -> N
 def _flat(material: Elastic, F: ArrayLike) -> tuple[NDArray[np.float64], tuple[int, ...], Any]:
     F = np.asarray(F, dtype=np.float64)
     if F.shape[-2:] != (3, 3):
-        raise ValueError(f"F has shape {F.shape}; its last two axes must be (3, 3)")
+        raise SceneError(f"F has shape {F.shape}; its last two axes must be (3, 3)")
     flat = np.ascontiguousarray(F.reshape(-1, 3, 3))
     return flat, F.shape[:-2], material.per_tet(len(flat))
 

@@ -16,14 +16,14 @@ from supple.materials.material import Elastic
 from supple.materials.stretches import StretchFunctions, shape_energy, volume_change
 
 
-@njit
+@njit(error_model="numpy")
 def _log_J(s):
     """ln J, accurate near the rest state and near collapse."""
     j = volume_change(s)
     return math.log1p(j) if j > -0.5 else math.log(s[0] * s[1] * s[2])
 
 
-@njit
+@njit(error_model="numpy")
 def _density(s, mu, lam):
     if s[2] <= 0.0:
         return np.inf
@@ -31,7 +31,7 @@ def _density(s, mu, lam):
     return mu * (shape_energy(s) + (volume_change(s) - log_J)) + 0.5 * lam * log_J * log_J
 
 
-@njit
+@njit(error_model="numpy")
 def _tension(s, mu, lam):
     """c = lam ln J - mu, which stands with 1 / s_i in the stress; not-a-number for J <= 0, where there is no stress."""
     if s[2] <= 0.0:
@@ -39,14 +39,14 @@ def _tension(s, mu, lam):
     return lam * _log_J(s) - mu
 
 
-@njit
+@njit(error_model="numpy")
 def _gradient(s, mu, lam):
     """psi_i = mu s_i + c / s_i"""
     c = _tension(s, mu, lam)
     return (mu * s[0] + c / s[0], mu * s[1] + c / s[1], mu * s[2] + c / s[2])
 
 
-@njit
+@njit(error_model="numpy")
 def _curvature(s, mu, lam):
     """psi_ii = mu + (lam - c) / s_i^2;  psi_ij = lam / (s_i s_j)"""
     c = _tension(s, mu, lam)
@@ -61,7 +61,7 @@ def _curvature(s, mu, lam):
     )
 
 
-@njit
+@njit(error_model="numpy")
 def _quotients(s, mu, lam):
     """d_ij = mu - c / (s_i s_j);  t_ij = mu + c / (s_i s_j)"""
     c = _tension(s, mu, lam)

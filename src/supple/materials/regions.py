@@ -66,8 +66,8 @@ class Regions(Elastic):
             given = np.asarray(value, dtype=np.float64)
             if given.ndim and len(given) != len(index):
                 raise SceneError(
-                    f"Regions: {name} of materials[{k}] has {len(given)} values for {len(index)} tets; give one number, "
-                    "or one per tet of the whole body"
+                    f"Regions: {name} of materials[{k}] has {len(given)} values for {len(index)} tets; give one "
+                    "number, or one per tet of the whole body"
                 )
             here = index == k
             out[here] = np.broadcast_to(given, len(index))[here]

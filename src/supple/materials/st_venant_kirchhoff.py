@@ -13,7 +13,7 @@ from supple.materials.material import Elastic
 from supple.materials.stretches import StretchFunctions
 
 
-@njit
+@njit(error_model="numpy")
 def _green_strains(s):
     return (
         0.5 * (s[0] - 1.0) * (s[0] + 1.0),
@@ -22,14 +22,14 @@ def _green_strains(s):
     )
 
 
-@njit
+@njit(error_model="numpy")
 def _density(s, mu, lam):
     e = _green_strains(s)
     trace = e[0] + e[1] + e[2]
     return mu * (e[0] * e[0] + e[1] * e[1] + e[2] * e[2]) + 0.5 * lam * trace * trace
 
 
-@njit
+@njit(error_model="numpy")
 def _gradient(s, mu, lam):
     """psi_i = s_i (2 mu e_i + lam sum e)"""
     e = _green_strains(s)
@@ -37,7 +37,7 @@ def _gradient(s, mu, lam):
     return (s[0] * (2.0 * mu * e[0] + p), s[1] * (2.0 * mu * e[1] + p), s[2] * (2.0 * mu * e[2] + p))
 
 
-@njit
+@njit(error_model="numpy")
 def _curvature(s, mu, lam):
     """psi_ii = 2 mu e_i + lam sum e + (2 mu + lam) s_i^2;  psi_ij = lam s_i s_j"""
     e = _green_strains(s)
@@ -53,7 +53,7 @@ def _curvature(s, mu, lam):
     )
 
 
-@njit
+@njit(error_model="numpy")
 def _quotients(s, mu, lam):
     """d_ij = mu (s_i^2 + s_i s_j + s_j^2 - 1) + lam sum e;  t_ij = mu (s_i^2 - s_i s_j + s_j^2 - 1) + lam sum e"""
     e = _green_strains(s)

@@ -16,26 +16,26 @@ from supple.materials.material import Elastic
 from supple.materials.stretches import StretchFunctions, shape_energy, volume_change
 
 
-@njit
+@njit(error_model="numpy")
 def _density(s, mu, lam):
     j = volume_change(s)
     return mu * shape_energy(s) + 0.5 * lam * j * j
 
 
-@njit
+@njit(error_model="numpy")
 def _pressure(s, mu, lam):
     """c = d psi / d J at fixed Ic."""
     return lam * volume_change(s) - mu
 
 
-@njit
+@njit(error_model="numpy")
 def _gradient(s, mu, lam):
     """psi_i = mu s_i + c s_j s_k"""
     c = _pressure(s, mu, lam)
     return (mu * s[0] + c * s[1] * s[2], mu * s[1] + c * s[0] * s[2], mu * s[2] + c * s[0] * s[1])
 
 
-@njit
+@njit(error_model="numpy")
 def _curvature(s, mu, lam):
     """psi_ii = mu + lam (s_j s_k)^2;  psi_ij = lam (s_j s_k)(s_i s_k) + c s_k"""
     c = _pressure(s, mu, lam)
@@ -50,7 +50,7 @@ def _curvature(s, mu, lam):
     )
 
 
-@njit
+@njit(error_model="numpy")
 def _quotients(s, mu, lam):
     """d_ij = mu - c s_k;  t_ij = mu + c s_k"""
     c = _pressure(s, mu, lam)

@@ -31,14 +31,14 @@ class StretchFunctions(NamedTuple):
     quotients: Any
 
 
-@njit
+@njit(error_model="numpy")
 def volume_change(s):
     """J - 1, without cancellation where all stretches are near 1."""
     a, b, c = s[0] - 1.0, s[1] - 1.0, s[2] - 1.0
     return a + b + c + (a * b + b * c + c * a) + a * b * c
 
 
-@njit
+@njit(error_model="numpy")
 def shape_energy(s):
     """(Ic - 3) / 2 - (J - 1), without cancellation where all stretches are near 1: the part of the neo-Hookean energies
     that stands with mu."""
@@ -46,14 +46,14 @@ def shape_energy(s):
     return 0.5 * (a * a + b * b + c * c) - (a * b + b * c + c * a) - a * b * c
 
 
-@njit
+@njit(error_model="numpy")
 def distance_from_rotations(s):
     """sum (s_i - 1)^2 = |F - R|^2, R the nearest rotation."""
     a, b, c = s[0] - 1.0, s[1] - 1.0, s[2] - 1.0
     return a * a + b * b + c * c
 
 
-@njit
+@njit(error_model="numpy")
 def rotation_quotients(s):
     """t_ij of sum (s_i - 1)^2 / 2: 1 - 2 / (s_i + s_j).
 
@@ -76,7 +76,7 @@ def dispatch(functions: list[Any], unknown: Any) -> Any:
 
 
 def _otherwise(unknown: Any) -> Any:
-    @njit
+    @njit(error_model="numpy")
     def otherwise(kind, s, mu, lam):
         return unknown
 
@@ -84,7 +84,7 @@ def _otherwise(unknown: Any) -> Any:
 
 
 def _first_or_rest(own_kind: int, first: Any, rest: Any) -> Any:
-    @njit
+    @njit(error_model="numpy")
     def choose(kind, s, mu, lam):
         if kind == own_kind:
             return first(s, mu, lam)

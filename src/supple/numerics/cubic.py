@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from supple.errors import SolverError
 from supple.numerics.double_double import product_error, sum_error
 
 # Bounds on what is lost, relative to the sum of the terms' sizes: by Horner's rule, and by its compensated form.
@@ -21,7 +22,7 @@ _ROUND_OFF = 2e-15
 _COMPENSATED_ROUND_OFF = 2e-30
 
 
-@njit
+@njit(error_model="numpy")
 def _is_positive(a, b, c, d, t):
     """Whether a t^3 + b t^2 + c t + d, t >= 0, is above zero for certain, round-off considered.
 
@@ -42,7 +43,7 @@ def _is_positive(a, b, c, d, t):
     return value + error > _COMPENSATED_ROUND_OFF * size
 
 
-@njit
+@njit(error_model="numpy")
 def positive_on_unit_interval(a, b, c, d):
     """Whether all Bernstein coefficients on [0, 1] are above zero: then the cubic is, on the whole interval.
 
@@ -51,7 +52,7 @@ def positive_on_unit_interval(a, b, c, d):
     return d > 0.0 and d + c / 3.0 > 0.0 and d + (2.0 * c + b) / 3.0 > 0.0 and a + b + c + d > 0.0
 
 
-@njit
+@njit(error_model="numpy")
 def _extrema(a, b, c):
     """Real roots p <= q of the derivative 3 a t^2 + 2 b t + c; infinity for each one that there is not."""
     A, B = 3.0 * a, 2.0 * b
@@ -72,7 +73,7 @@ def _extrema(a, b, c):
     return (p, q) if p <= q else (q, p)
 
 
-@njit
+@njit(error_model="numpy")
 def _bisect(a, b, c, d, low, high):
     """The last number in [low, high] where the cubic is positive for certain, as it is at low and not at high."""
     for _ in range(1100):
@@ -87,7 +88,7 @@ def _bisect(a, b, c, d, low, high):
     return low
 
 
-@njit
+@njit(error_model="numpy")
 def last_positive_before_root(a, b, c, d, end):
     """Where a t^3 + b t^2 + c t + d, positive at 0, has its first root in (0, end]: the last t before it.
 
@@ -116,7 +117,7 @@ def last_positive_before_root(a, b, c, d, end):
     return -1.0
 
 
-@njit
+@njit(error_model="numpy")
 def _root_bound(a, b, c, d):
     """No root is larger than this. Source: Fujiwara (1916)."""
     if a != 0.0:
@@ -130,13 +131,13 @@ def _root_bound(a, b, c, d):
     return min(2.0 * bound, 1e300)
 
 
-@njit
+@njit(error_model="numpy")
 def _first_root_below_bound(a, b, c, d):
     end = _root_bound(a, b, c, d)
     return last_positive_before_root(a, b, c, d, end) if end > 0.0 else -1.0
 
 
-@njit
+@njit(error_model="numpy")
 def _first_root(a, b, c, d, tol):
     if not (abs(a) < math.inf and abs(b) < math.inf and abs(c) < math.inf and abs(d) < math.inf):
         return math.nan
@@ -166,10 +167,10 @@ def _first_root(a, b, c, d, tol):
     return far
 
 
-@njit(cache=True)
-def _first_roots(a, b, c, d, tol, out):
+@njit(cache=True, error_model="numpy")
+def _first_roots(coefficients, tol, out):
     for i in range(len(out)):
-        out[i] = _first_root(a[i], b[i], c[i], d[i], tol)
+        out[i] = _first_root(coefficients[0, i], coefficients[1, i], coefficients[2, i], coefficients[3, i], tol)
 
 
 def smallest_positive_cubic_root(
@@ -179,8 +180,8 @@ def smallest_positive_cubic_root(
 
     Scale the coefficients by the constant term first: d = 1 for the first inversion of a tetrahedron, d = 0.8 for the
     first loss of 80 % of its volume. Beyond t = 1 leading coefficients of at most `tol` count as zero, so that the
-    cubic degenerates to a quadratic, linear or constant one. Up to t = 1, where a step filter looks, every coefficient counts
-    as it is.
+    cubic degenerates to a quadratic, linear or constant one. Up to t = 1, where a step filter looks, every
+    coefficient counts as it is.
 
     Parameters
     ----------
@@ -189,18 +190,18 @@ def smallest_positive_cubic_root(
 
     Returns
     -------
-    t : float, or array of the broadcast shape. Where d is not zero, t is not beyond the true root, and less than it only
-        by round-off: the polynomial has the sign of d on [0, t]. A root that is touched and not crossed counts.
+    t : float, or array of the broadcast shape. Where d is not zero, t is not beyond the true root, and less than it
+        only by round-off: the polynomial has the sign of d on [0, t]. A root that is touched and not crossed counts.
 
     Raises
     ------
-    ValueError : where a coefficient is not finite.
+    SolverError : where a coefficient is not finite.
 
     Source: Li, Jiang, Luo, "Physics-Based Simulation", implementation 23.3.1, for the contract and its scaling.
     """
-    arrays = np.broadcast_arrays(*(np.asarray(value, dtype=np.float64) for value in (a, b, c, d)))
-    if not all(np.isfinite(values).all() for values in arrays):
-        raise ValueError("smallest_positive_cubic_root: every coefficient must be finite")
-    out = np.empty(arrays[0].size)
-    _first_roots(*(np.ascontiguousarray(values).reshape(-1) for values in arrays), float(tol), out)
-    return float(out[0]) if arrays[0].ndim == 0 else out.reshape(arrays[0].shape)
+    rows = np.stack(np.broadcast_arrays(*(np.asarray(value, dtype=np.float64) for value in (a, b, c, d))))
+    if not np.isfinite(rows).all():
+        raise SolverError("smallest_positive_cubic_root: every coefficient must be finite")
+    out = np.empty(rows[0].size)
+    _first_roots(rows.reshape(4, -1), float(tol), out)
+    return float(out[0]) if rows.ndim == 1 else out.reshape(rows.shape[1:])

@@ -9,14 +9,14 @@ from __future__ import annotations
 from numba import njit
 
 
-@njit
+@njit(error_model="numpy")
 def sum_error(x, y, total):
     """x + y - total, exactly, for total = x + y rounded."""
     z = total - x
     return (x - (total - z)) + (y - z)
 
 
-@njit
+@njit(error_model="numpy")
 def product_error(x, y, product):
     """x y - product, exactly, for product = x y rounded."""
     p = 134217729.0 * x
@@ -28,14 +28,14 @@ def product_error(x, y, product):
     return x_low * y_low - (((product - x_high * y_high) - x_low * y_high) - x_high * y_low)
 
 
-@njit
+@njit(error_model="numpy")
 def difference(x, y):
     """x - y of two floats, exactly."""
     total = x - y
     return (total, sum_error(x, -y, total))
 
 
-@njit
+@njit(error_model="numpy")
 def add(a, b):
     high = a[0] + b[0]
     low = sum_error(a[0], b[0], high)
@@ -48,12 +48,12 @@ def add(a, b):
     return (high, low - (high - total))
 
 
-@njit
+@njit(error_model="numpy")
 def subtract(a, b):
     return add(a, (-b[0], -b[1]))
 
 
-@njit
+@njit(error_model="numpy")
 def multiply(a, b):
     product = a[0] * b[0]
     low = product_error(a[0], b[0], product) + (a[0] * b[1] + a[1] * b[0])
@@ -61,7 +61,7 @@ def multiply(a, b):
     return (total, low - (total - product))
 
 
-@njit
+@njit(error_model="numpy")
 def triple_product(a, b, c):
     """(a x b) . c of vectors of double-double numbers."""
     x = multiply(subtract(multiply(a[1], b[2]), multiply(a[2], b[1])), c[0])

@@ -8,33 +8,33 @@ from __future__ import annotations
 from numba import njit
 
 
-@njit
+@njit(error_model="numpy")
 def dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit
+@njit(error_model="numpy")
 def cross(a, b):
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
-@njit
+@njit(error_model="numpy")
 def subtract(a, b):
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
-@njit
+@njit(error_model="numpy")
 def row(x, i):
     """Row i of an (n, 3) array, as a vector."""
     return (x[i, 0], x[i, 1], x[i, 2])
 
 
-@njit
+@njit(error_model="numpy")
 def det(M):
     return M[0] * (M[4] * M[8] - M[5] * M[7]) - M[1] * (M[3] * M[8] - M[5] * M[6]) + M[2] * (M[3] * M[7] - M[4] * M[6])
 
 
-@njit
+@njit(error_model="numpy")
 def mat_vec(M, v):
     return (
         M[0] * v[0] + M[1] * v[1] + M[2] * v[2],
@@ -43,7 +43,7 @@ def mat_vec(M, v):
     )
 
 
-@njit
+@njit(error_model="numpy")
 def mat_mul(A, B):
     """A B"""
     return (
@@ -59,18 +59,18 @@ def mat_mul(A, B):
     )
 
 
-@njit
+@njit(error_model="numpy")
 def transpose(M):
     return (M[0], M[3], M[6], M[1], M[4], M[7], M[2], M[5], M[8])
 
 
-@njit
+@njit(error_model="numpy")
 def mat_mul_transposed(A, B):
     """A B^T"""
     return mat_mul(A, transpose(B))
 
 
-@njit
+@njit(error_model="numpy")
 def load_mat(array, e):
     """Matrix e of an (m, 3, 3) array."""
     return (
@@ -86,7 +86,7 @@ def load_mat(array, e):
     )
 
 
-@njit
+@njit(error_model="numpy")
 def store_mat(M, array, e):
     """Write M as matrix e of an (m, 3, 3) array."""
     array[e, 0, 0] = M[0]
@@ -100,7 +100,7 @@ def store_mat(M, array, e):
     array[e, 2, 2] = M[8]
 
 
-@njit
+@njit(error_model="numpy")
 def symmetric_eigen(a00, a11, a22, a12, a02, a01):
     """Eigenvalues and eigenvectors of a symmetric 3x3 matrix by cyclic Jacobi rotations.
 
@@ -148,7 +148,7 @@ def symmetric_eigen(a00, a11, a22, a12, a02, a01):
     return (a00, a11, a22), (x0, y0, z0, x1, y1, z1, x2, y2, z2)
 
 
-@njit
+@njit(error_model="numpy")
 def jacobi_rotation(app, aqq, apq):
     """Cosine, sine and tangent of the smaller rotation that makes entry (p, q) of a symmetric matrix vanish."""
     d = aqq - app

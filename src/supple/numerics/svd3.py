@@ -16,6 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from supple.errors import SolverError
 from supple.numerics.mat3 import cross, dot, load_mat, store_mat
 
 # What a sweep mixes into each other is below round-off where its rotations were all below 1e-8 and all cosines of
@@ -27,7 +28,7 @@ _ORTHOGONAL = 1e-31
 _MAX_SWEEPS = 20
 
 
-@njit
+@njit(error_model="numpy")
 def svd3(F):
     """Rotation-variant SVD of one matrix, for kernels.
 
@@ -66,7 +67,7 @@ def svd3(F):
     return U, (math.ldexp(s[0], e), math.ldexp(s[1], e), math.ldexp(s[2], e)), V
 
 
-@njit
+@njit(error_model="numpy")
 def _orthogonalize(p, q, vp, vq, done):
     """Rotate columns p, q of F V (and of V) until orthogonal; `done` turns False where another sweep is needed."""
     app = dot(p, p)
@@ -94,12 +95,12 @@ def _orthogonalize(p, q, vp, vq, done):
     return p, q, vp, vq, done
 
 
-@njit
+@njit(error_model="numpy")
 def _negated(a):
     return (-a[0], -a[1], -a[2])
 
 
-@njit
+@njit(error_model="numpy")
 def _svd_of_scaled(F):
     b0 = (F[0], F[3], F[6])
     b1 = (F[1], F[4], F[7])
@@ -135,7 +136,7 @@ def _svd_of_scaled(F):
     return U, (s0, s1, s2), V
 
 
-@njit
+@njit(error_model="numpy")
 def _unit_orthogonal(b, u):
     """The unit vector nearest to the direction of b that is orthogonal to the unit vector u; any, where b has none."""
     along = dot(b, u)
@@ -158,7 +159,7 @@ def _unit_orthogonal(b, u):
     return (r[0] / size, r[1] / size, r[2] / size)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _svd_batch(F, U, s, V):
     for e in range(len(F)):
         u, stretches, v = svd3(load_mat(F, e))
@@ -184,11 +185,11 @@ def rotation_variant_svd(
 
     Raises
     ------
-    ValueError : where the last two axes are not (3, 3).
+    SolverError : where the last two axes are not (3, 3).
     """
     F = np.asarray(F, dtype=np.float64)
     if F.shape[-2:] != (3, 3):
-        raise ValueError(f"F has shape {F.shape}; its last two axes must be (3, 3)")
+        raise SolverError(f"F has shape {F.shape}; its last two axes must be (3, 3)")
     flat = np.ascontiguousarray(F.reshape(-1, 3, 3))
     U, s, V = np.empty_like(flat), np.empty((len(flat), 3)), np.empty_like(flat)
     _svd_batch(flat, U, s, V)
