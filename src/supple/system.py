@@ -17,6 +17,7 @@ from scipy.sparse.csgraph import connected_components
 
 from supple.errors import SceneError
 from supple.scene.body import Body
+from supple.scene.forces import Force, SoftTarget
 from supple.scene.motion import moved_points, points_at_origin
 from supple.scene.obstacles import Obstacle
 from supple.scene.pins import Pin
@@ -53,6 +54,31 @@ class PinRange:
 
 
 @dataclass(frozen=True, eq=False)
+class ForceRange:
+    """The vertices that one force acts on."""
+
+    force: Force
+    vertices: NDArray[np.int32]
+
+    def per_vertex(self, time: float) -> NDArray[np.float64]:
+        """The force (k, 3) on each of the vertices at `time` [N]."""
+        return self.force.per_vertex(time, len(self.vertices))
+
+
+@dataclass(frozen=True, eq=False)
+class SoftTargetRange:
+    """The vertices of one soft target, and where their springs pull them to when its motion is undone (at time 0)."""
+
+    target: SoftTarget
+    vertices: NDArray[np.int32]
+    anchors: NDArray[np.float64]
+
+    def targets(self, time: float) -> NDArray[np.float64]:
+        """Where the springs pull the vertices (k, 3) to at `time` [m]."""
+        return moved_points(self.target.motion, self.anchors, time, self.target.label)
+
+
+@dataclass(frozen=True, eq=False)
 class System:
     """Flat arrays of a whole scene. All arrays are C-contiguous; indices are int32 and global.
 
@@ -80,6 +106,8 @@ class System:
     triangles: NDArray[np.int32]
     components: NDArray[np.int32]
     gravity: NDArray[np.float64]
+    forces: tuple[ForceRange, ...] = ()
+    soft_targets: tuple[SoftTargetRange, ...] = ()
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
@@ -148,6 +176,8 @@ def build_system(scene: Scene, start: State | None = None) -> System:
         triangles=np.ascontiguousarray(np.concatenate(triangles), dtype=np.int32),
         components=connected_components(graph, directed=False)[1].astype(np.int32),
         gravity=np.asarray(scene.gravity, dtype=np.float64),
+        forces=tuple(ForceRange(force, _chosen_vertices(force, ranges)) for force in scene.forces),
+        soft_targets=_soft_target_ranges(scene, ranges, start),
     )
 
 
@@ -173,6 +203,25 @@ def _pin_ranges(scene: Scene, ranges: list[BodyRange], start: State | None) -> t
             anchors = points_at_origin(pin.motion, start.positions[vertices], start.time, pin.label)
         pins.append(PinRange(pin, vertices, np.ascontiguousarray(anchors)))
     return tuple(pins)
+
+
+def _chosen_vertices(item: Force | SoftTarget, ranges: list[BodyRange]) -> NDArray[np.int32]:
+    part = next(r for r in ranges if r.name == item.body)
+    return (item.select(part.body.place(part.body.mesh.vertices)) + part.vertices.start).astype(np.int32)
+
+
+def _soft_target_ranges(scene: Scene, ranges: list[BodyRange], start: State | None) -> tuple[SoftTargetRange, ...]:
+    """Soft targets pull to where their vertices are placed, or were given to be, at time 0."""
+    targets = []
+    for target in scene.soft_targets:
+        part = next(r for r in ranges if r.name == target.body)
+        vertices = _chosen_vertices(target, ranges)
+        if start is not None and start.time == 0.0:
+            anchors = start.positions[vertices]
+        else:
+            anchors = part.body.place(part.body.mesh.vertices)[vertices - part.vertices.start]
+        targets.append(SoftTargetRange(target, vertices, np.ascontiguousarray(anchors)))
+    return tuple(targets)
 
 
 def initial_state(

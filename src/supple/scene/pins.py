@@ -5,36 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from supple.errors import SceneError
 from supple.scene.motion import Motion, check_motion
-from supple.scene.values import check_name, finite_vector
+from supple.scene.selection import InBox, Selection, checked_selection, selected_vertices
+from supple.scene.values import check_name
 
-
-@dataclass(frozen=True, eq=False)
-class InBox:
-    """Selects the vertices inside an axis-aligned box, in world coordinates at the start.
-
-    Parameters
-    ----------
-    low, high : (3,) opposite corners [m]; the faces belong to the box.
-    """
-
-    low: ArrayLike
-    high: ArrayLike
-
-    def __post_init__(self) -> None:
-        low, high = finite_vector(self.low, "InBox: low"), finite_vector(self.high, "InBox: high")
-        if np.any(low > high):
-            raise SceneError(f"InBox: low {low.tolist()} is above high {high.tolist()}; swap them")
-        object.__setattr__(self, "low", low)
-        object.__setattr__(self, "high", high)
-
-    def select(self, points: NDArray[np.float64]) -> NDArray[np.int32]:
-        """Indices of the points (k, 3) inside."""
-        inside = np.all((points >= np.asarray(self.low)) & (points <= np.asarray(self.high)), axis=1)
-        return np.flatnonzero(inside).astype(np.int32)
+__all__ = ["InBox", "Pin"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +27,7 @@ class Pin:
     """
 
     body: str
-    vertices: ArrayLike | InBox
+    vertices: Selection
     motion: Motion = None
     name: str | None = None
 
@@ -59,22 +36,7 @@ class Pin:
         if self.name is not None:
             check_name(self.name, "pin")
         check_motion(self.motion, self.label)
-        if isinstance(self.vertices, InBox):
-            return
-        try:
-            indices = np.atleast_1d(np.asarray(self.vertices))
-        except (TypeError, ValueError):
-            raise SceneError(f"{self.label}: vertices is {self.vertices!r}; give indices or an InBox") from None
-        if indices.ndim != 1 or indices.size == 0 or not np.issubdtype(indices.dtype, np.integer):
-            raise SceneError(f"{self.label}: vertices must be a non-empty list of whole numbers, or an InBox")
-        unique = np.unique(indices)
-        if len(unique) != len(indices):
-            raise SceneError(f"{self.label}: vertices names a vertex twice; name each once")
-        if indices.min() < 0:
-            raise SceneError(f"{self.label}: vertices holds {indices.min()}, which is negative; indices begin at 0")
-        if indices.max() > np.iinfo(np.int32).max:
-            raise SceneError(f"{self.label}: vertices holds {indices.max()}, which is more than any mesh has")
-        object.__setattr__(self, "vertices", indices.astype(np.int32))
+        object.__setattr__(self, "vertices", checked_selection(self.vertices, self.label))
 
     @property
     def label(self) -> str:
@@ -88,13 +50,4 @@ class Pin:
         ------
         SceneError : where an index is out of range, or the box holds no vertex.
         """
-        if isinstance(self.vertices, InBox):
-            indices = self.vertices.select(placed)
-            if len(indices) == 0:
-                low, high = placed.min(axis=0).round(6).tolist(), placed.max(axis=0).round(6).tolist()
-                raise SceneError(f"{self.label}: its box holds no vertex; the body reaches from {low} to {high}")
-            return indices
-        indices = np.asarray(self.vertices, dtype=np.int32)
-        if indices.max() >= len(placed):
-            raise SceneError(f"{self.label}: vertex {indices.max()} does not exist; the body has {len(placed)}")
-        return indices
+        return selected_vertices(self.vertices, placed, self.label)

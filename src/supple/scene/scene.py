@@ -11,14 +11,23 @@ from numpy.typing import ArrayLike
 
 from supple.errors import SceneError
 from supple.scene.body import Body
+from supple.scene.forces import Force, SoftTarget
 from supple.scene.obstacles import Obstacle
 from supple.scene.pins import Pin
 from supple.scene.values import finite_vector
 
+_PARTS = (
+    ("bodies", Body),
+    ("obstacles", Obstacle),
+    ("pins", Pin),
+    ("forces", Force),
+    ("soft_targets", SoftTarget),
+)
+
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Bodies, obstacles and pins under gravity.
+    """Bodies, obstacles, pins, forces and soft targets under gravity.
 
     Parameters
     ----------
@@ -26,6 +35,7 @@ class Scene:
     obstacles : rigid things that bodies collide with.
     pins : vertices held or scripted.
     gravity : (3,) acceleration [m/s^2].
+    forces : loads on vertices; soft_targets : springs to places. Both act in the implicit solver.
 
     Raises
     ------
@@ -36,9 +46,11 @@ class Scene:
     obstacles: Sequence[Obstacle] = ()
     pins: Sequence[Pin] = ()
     gravity: ArrayLike = (0.0, -9.81, 0.0)
+    forces: Sequence[Force] = ()
+    soft_targets: Sequence[SoftTarget] = ()
 
     def __post_init__(self) -> None:
-        for key, kind in (("bodies", Body), ("obstacles", Obstacle), ("pins", Pin)):
+        for key, kind in _PARTS:
             try:
                 items = tuple(getattr(self, key))
             except TypeError:
@@ -68,6 +80,13 @@ class Scene:
                 vertex = chosen[taken[chosen]][0]
                 raise SceneError(f"{pin.label}: vertex {vertex} is held by another pin already; hold it once")
             taken[chosen] = True
+        for item in (*self.forces, *self.soft_targets):
+            if item.body not in known:
+                raise SceneError(f"{item.label}: there is no such body; the scene has {', '.join(map(repr, known))}")
+            body = self.body(item.body)
+            chosen = item.select(body.place(body.mesh.vertices))
+            if isinstance(item, Force) and not callable(item.force):
+                item.per_vertex(0.0, len(chosen))
 
     def body(self, name: str) -> Body:
         """The body of that name.

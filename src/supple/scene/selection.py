@@ -1,0 +1,83 @@
+"""Which vertices of a body are meant: indices into its mesh, or a box in the world."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from supple.errors import SceneError
+from supple.scene.values import finite_vector
+
+
+@dataclass(frozen=True, eq=False)
+class InBox:
+    """Selects the vertices inside an axis-aligned box, in world coordinates at the start.
+
+    Parameters
+    ----------
+    low, high : (3,) opposite corners [m]; the faces belong to the box.
+    """
+
+    low: ArrayLike
+    high: ArrayLike
+
+    def __post_init__(self) -> None:
+        low, high = finite_vector(self.low, "InBox: low"), finite_vector(self.high, "InBox: high")
+        if np.any(low > high):
+            raise SceneError(f"InBox: low {low.tolist()} is above high {high.tolist()}; swap them")
+        object.__setattr__(self, "low", low)
+        object.__setattr__(self, "high", high)
+
+    def select(self, points: NDArray[np.float64]) -> NDArray[np.int32]:
+        """Indices of the points (k, 3) inside."""
+        inside = np.all((points >= np.asarray(self.low)) & (points <= np.asarray(self.high)), axis=1)
+        return np.flatnonzero(inside).astype(np.int32)
+
+
+Selection = ArrayLike | InBox
+
+
+def checked_selection(vertices: Selection, label: str) -> NDArray[np.int32] | InBox:
+    """The selection of `label`, as far as it can be checked without its body.
+
+    Raises
+    ------
+    SceneError : where indices are not whole numbers of zero or more, or name a vertex twice.
+    """
+    if isinstance(vertices, InBox):
+        return vertices
+    try:
+        indices = np.atleast_1d(np.asarray(vertices))
+    except (TypeError, ValueError):
+        raise SceneError(f"{label}: vertices is {vertices!r}; give indices or an InBox") from None
+    if indices.ndim != 1 or indices.size == 0 or not np.issubdtype(indices.dtype, np.integer):
+        raise SceneError(f"{label}: vertices must be a non-empty list of whole numbers, or an InBox")
+    unique = np.unique(indices)
+    if len(unique) != len(indices):
+        raise SceneError(f"{label}: vertices names a vertex twice; name each once")
+    if indices.min() < 0:
+        raise SceneError(f"{label}: vertices holds {indices.min()}, which is negative; indices begin at 0")
+    if indices.max() > np.iinfo(np.int32).max:
+        raise SceneError(f"{label}: vertices holds {indices.max()}, which is more than any mesh has")
+    return indices.astype(np.int32)
+
+
+def selected_vertices(vertices: Selection, placed: NDArray[np.float64], label: str) -> NDArray[np.int32]:
+    """Vertex indices (k,) of a body, given its vertices placed in the world (n, 3).
+
+    Raises
+    ------
+    SceneError : where an index is out of range, or the box holds no vertex.
+    """
+    if isinstance(vertices, InBox):
+        indices = vertices.select(placed)
+        if len(indices) == 0:
+            low, high = placed.min(axis=0).round(6).tolist(), placed.max(axis=0).round(6).tolist()
+            raise SceneError(f"{label}: its box holds no vertex; the body reaches from {low} to {high}")
+        return indices
+    indices = np.asarray(vertices, dtype=np.int32)
+    if indices.max() >= len(placed):
+        raise SceneError(f"{label}: vertex {indices.max()} does not exist; the body has {len(placed)}")
+    return indices
