@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from supple.scene.body import Body
+from supple.scene_file.located import at
 from supple.scene_file.materials import MaterialModel
 from supple.scene_file.mesh_sources import MeshFileModel, MeshStore, SurfaceModel
 from supple.scene_file.model import Count, Model, Name, NonNegative, Positive, Vector
@@ -98,12 +99,16 @@ class BodyModel(Model):
     def build(self, meshes: MeshStore) -> list[BuiltBody]:
         """The body, or all its copies."""
         if self.mesh is not None:
-            mesh = meshes.tets(self.mesh)
+            with at("mesh"):
+                mesh = meshes.tets(self.mesh)
         else:
             assert self.shape is not None
-            mesh = meshes.shape(self.shape)
-        skin = meshes.surface(self.skin) if self.skin is not None else None
-        material = self.material.build()
+            with at("shape"):
+                mesh = meshes.shape(self.shape)
+        with at("skin"):
+            skin = meshes.surface(self.skin) if self.skin is not None else None
+        with at("material"):
+            material = self.material.build()
         copies = list(self.copies.placements()) if self.copies is not None else [(np.zeros(3), None)]
         digits = max(2, len(str(len(copies))))
         built = []

@@ -4,23 +4,24 @@ from __future__ import annotations
 
 import logging
 import re
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from supple.errors import SceneError, SuppleError
+from supple.errors import SceneError
 from supple.scene.body import Body
-from supple.scene.pins import Pin
+from supple.scene.obstacles import Obstacle
+from supple.scene.pins import InBox, Pin
 from supple.scene.scene import Scene
 from supple.scene_file.complaints import complaint, suggestion
 from supple.scene_file.document import OutputModel, SceneFileModel
+from supple.scene_file.located import LocatedError, at
 from supple.scene_file.mesh_sources import MeshStore
-from supple.scene_file.yaml_reader import Key, YamlDocument, read_yaml
+from supple.scene_file.yaml_reader import Key, read_yaml
 from supple.solver import Solver
 
 logger = logging.getLogger(__name__)
@@ -78,58 +79,65 @@ def load_run(path: str | Path) -> Run:
         model = SceneFileModel.model_validate(document.data)
     except ValidationError as error:
         raise complaint(document, error) from None
-    meshes = MeshStore(Path(path).parent)
-    names: dict[str, Body] = {}
+    try:
+        return _built(model, MeshStore(Path(path).parent))
+    except LocatedError as error:
+        raise document.error(_blamed(document.data, error.keys, str(error)), str(error)) from None
+
+
+def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
+    bodies: dict[str, Body] = {}
     starts: dict[str, NDArray[np.float64]] = {}
-    for i, body in enumerate(model.bodies):
-        with _told_where(document, ("bodies", i)):
-            for built in body.build(meshes):
-                if built.body.name in names:
+    for i, described in enumerate(model.bodies):
+        with at("bodies", i):
+            for built in described.build(meshes):
+                if built.body.name in bodies:
                     raise SceneError(f"another body has the name {built.body.name!r}; give each a name of its own")
-                names[built.body.name] = built.body
+                bodies[built.body.name] = built.body
                 if built.initial_positions is not None:
                     starts[built.body.name] = built.initial_positions
-    obstacles, pins = [], []
-    for i, obstacle in enumerate(model.obstacles):
-        with _told_where(document, ("obstacles", i)):
-            obstacles.append(obstacle.build(meshes))
-    for i, pin in enumerate(model.pins):
-        with _told_where(document, ("pins", i)):
-            pins.append(_checked(pin.build(), names))
-    with _told_where(document, ("solver",)):
+    obstacles: list[Obstacle] = []
+    for i, described in enumerate(model.obstacles):
+        with at("obstacles", i):
+            obstacle = described.build(meshes)
+            if obstacle.name is not None and any(obstacle.name == other.name for other in obstacles):
+                raise SceneError(f"another obstacle has the name {obstacle.name!r}; give each a name of its own")
+            obstacles.append(obstacle)
+    pins: list[Pin] = []
+    held: dict[str, set[int]] = {}
+    for i, described in enumerate(model.pins):
+        with at("pins", i):
+            pins.append(_checked(described.build(), bodies, held))
+    with at("solver"):
         solver = model.solver.build()
-    with _told_where(document, ()):
-        scene = Scene(list(names.values()), obstacles, pins, model.gravity)
+    with at():
+        scene = Scene(list(bodies.values()), obstacles, pins, model.gravity)
     return Run(scene, solver, model.dt, model.steps, starts, model.output)
 
 
-def _checked(pin: Pin, bodies: dict[str, Body]) -> Pin:
-    """The pin, if its body and its vertices exist: checked here, where its place in the file is known."""
+def _checked(pin: Pin, bodies: dict[str, Body], held: dict[str, set[int]]) -> Pin:
+    """The pin, if its body and vertices exist and no other pin holds them: here its place in the file is known."""
     if pin.body not in bodies:
-        raise SceneError(f"there is no body {pin.body!r}; {suggestion(pin.body, bodies)}")
+        with at("body"):
+            raise SceneError(f"there is no body {pin.body!r}; {suggestion(pin.body, bodies)}")
     body = bodies[pin.body]
-    pin.select(body.place(body.mesh.vertices))
+    with at("box" if isinstance(pin.vertices, InBox) else "vertices"):
+        chosen = set(pin.select(body.place(body.mesh.vertices)).tolist())
+        twice = chosen & held.setdefault(pin.body, set())
+        if twice:
+            raise SceneError(f"{pin.label}: vertex {min(twice)} is held by another pin already; hold it once")
+    held[pin.body] |= chosen
     return pin
 
 
-@contextmanager
-def _told_where(document: YamlDocument, keys: tuple[Key, ...]) -> Iterator[None]:
-    """Adds file, line and key to an error in building what stands at `keys`."""
-    try:
-        yield
-    except SuppleError as error:
-        raise SceneError(str(document.error(_blamed(document, keys, str(error)), str(error)))) from None
-
-
-def _blamed(document: YamlDocument, keys: tuple[Key, ...], message: str) -> Sequence[Key]:
-    """`keys`, and the keys below that the message names."""
-    data = document.data
+def _blamed(data: Any, keys: tuple[Key, ...], message: str) -> tuple[Key, ...]:
+    """`keys`, and the key below them that the message begins with, after the name of what it speaks of."""
     for key in keys:
-        if not isinstance(data, (dict, list)) or (isinstance(data, dict) and key not in data):
+        if not (isinstance(data, list) and isinstance(key, int)) and not (isinstance(data, dict) and key in data):
             return keys
         data = data[key]  # pyright: ignore[reportCallIssue, reportArgumentType]
     if isinstance(data, dict):
-        for word in re.findall(r"\w+", message):
-            if word in data and word != "kind":
+        for word in re.findall(r"\w+", re.sub(r"^[^:]*: ", "", message)):
+            if word in data:
                 return (*keys, word)
     return keys

@@ -11,6 +11,7 @@ from supple.errors import MeshError
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.scene.rotation import rotation_matrix
+from supple.scene_file.located import at
 from supple.scene_file.model import FilePath, Model, Positive, Vector
 from supple.scene_file.shapes import ShapeModel, SurfaceShapeModel
 
@@ -43,7 +44,8 @@ class MeshFileModel(Model):
         """Whether the file is a surface to be filled: by its extension; where that says nothing, by the options."""
         suffix = Path(self.file).suffix.lower()
         if suffix in TET_FILES and self.meshing:
-            raise MeshError(f"{self.file}: holds tetrahedra already; remove `{next(iter(self.meshing))}`")
+            with at(next(iter(self.meshing))):
+                raise MeshError(f"{self.file} holds tetrahedra already; remove this")
         return suffix in SURFACE_FILES or (suffix not in TET_FILES and bool(self.meshing))
 
 
@@ -98,19 +100,23 @@ class MeshStore:
         if source.is_surface():
             from supple.mesh.tetrahedralize import tetrahedralize
 
-            surface = SurfaceMesh.load(path)
+            with at("file"):
+                surface = SurfaceMesh.load(path)
             if source.scale != 1.0:
                 surface = surface.transformed(source.scale)
             return tetrahedralize(surface, **source.meshing)
-        mesh = TetMesh.load(path)
+        with at("file"):
+            mesh = TetMesh.load(path)
         return mesh if source.scale == 1.0 else mesh.transformed(source.scale)
 
     def _surface(self, source: SurfaceModel) -> SurfaceMesh:
         if source.file is not None:
-            surface = SurfaceMesh.load(self.folder / source.file)
+            with at("file"):
+                surface = SurfaceMesh.load(self.folder / source.file)
         else:
             assert source.shape is not None
-            surface = source.shape.build_surface()
+            with at("shape"):
+                surface = source.shape.build_surface()
         if source.scale == 1.0 and not any(source.rotation) and not any(source.position):
             return surface
         return surface.transformed(source.scale, rotation_matrix(source.rotation), source.position)

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from supple.scene.obstacles import Box, HalfSpace, Obstacle, Sphere, TriangleObstacle
+from supple.scene_file.located import at
 from supple.scene_file.mesh_sources import MeshStore, SurfaceModel
 from supple.scene_file.model import Model, Name, NonNegative, Positive, Vector
 from supple.scene_file.motions import KeyframesModel
@@ -20,7 +21,9 @@ class _ObstacleModel(Model):
     motion: KeyframesModel | None = Field(default=None, description="scripted motion; it stands still without it")
 
     def shared(self) -> dict[str, Any]:
-        return {"name": self.name, "friction": self.friction, "motion": self.motion.build() if self.motion else None}
+        with at("motion"):
+            motion = self.motion.build() if self.motion else None
+        return {"name": self.name, "friction": self.friction, "motion": motion}
 
 
 class HalfSpaceModel(_ObstacleModel):
@@ -66,7 +69,9 @@ class TrianglesModel(_ObstacleModel):
     surface: SurfaceModel = Field(description="where it is at time 0 [m]")
 
     def build(self, meshes: MeshStore) -> Obstacle:
-        return TriangleObstacle(surface=meshes.surface(self.surface), **self.shared())
+        with at("surface"):
+            surface = meshes.surface(self.surface)
+        return TriangleObstacle(surface=surface, **self.shared())
 
 
 ObstacleModel = Annotated[HalfSpaceModel | BoxModel | SphereModel | TrianglesModel, Field(discriminator="kind")]

@@ -7,6 +7,7 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from supple.scene.pins import InBox, Pin
+from supple.scene_file.located import at
 from supple.scene_file.model import Model, Name, Vector
 from supple.scene_file.motions import KeyframesModel
 
@@ -38,6 +39,10 @@ class PinModel(Model):
         return self
 
     def build(self) -> Pin:
-        vertices = self.vertices if self.box is None else InBox(self.box.low, self.box.high)
-        assert vertices is not None
-        return Pin(self.body, vertices, self.motion.build() if self.motion else None, name=self.name)
+        with at("motion"):
+            motion = self.motion.build() if self.motion else None
+        if self.box is not None:
+            with at("box"):
+                return Pin(self.body, InBox(self.box.low, self.box.high), motion, name=self.name)
+        assert self.vertices is not None
+        return Pin(self.body, self.vertices, motion, name=self.name)

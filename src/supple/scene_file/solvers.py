@@ -6,6 +6,8 @@ from typing import Literal
 
 from pydantic import Field
 
+from supple.errors import SolverError
+from supple.scene_file.complaints import suggestion
 from supple.scene_file.model import Model
 from supple.solver import Solver
 from supple.xpbd.solver import XPBD
@@ -26,3 +28,17 @@ class XPBDModel(Model):
 
 
 SolverModel = XPBDModel
+
+SOLVERS = {"xpbd": XPBD}
+
+
+def solver_of_kind(kind: str) -> Solver:
+    """The solver of that kind, with its default parameters.
+
+    Raises
+    ------
+    SolverError : where there is none.
+    """
+    if kind not in SOLVERS:
+        raise SolverError(f"there is no solver {kind!r}; {suggestion(kind, SOLVERS)}")
+    return SOLVERS[kind]()

@@ -1,0 +1,186 @@
+"""From scene file to scene and run."""
+
+import json
+import logging
+
+import numpy as np
+import pytest
+from jsonschema import Draft202012Validator
+
+import supple as sp
+from supple.materials.registry import ELASTIC_MATERIALS
+from supple.scene_file.document import SceneFileModel, json_schema
+from supple.scene_file.loader import load_run, load_scene
+from supple.scene_file.materials import ELASTIC_KINDS
+from supple.scene_file.yaml_reader import read_yaml
+
+RUBBER = "{kind: stable_neo_hookean, youngs: 1e5, poisson: 0.4}"
+BODY = f"{{name: cube, shape: {{kind: box, divisions: [1, 1, 1]}}, material: {RUBBER}}}"
+
+
+@pytest.fixture
+def load(tmp_path):
+    def loader(text, function=load_run):
+        path = tmp_path / "scene.yaml"
+        path.write_text(text, encoding="utf-8")
+        return function(path)
+
+    return loader
+
+
+EVERYTHING = f"""
+supple: 1
+bodies:
+  - name: ball
+    shape: {{kind: sphere, radius: 0.5, edge_length: 0.25}}
+    material: &rubber {{kind: stable_neo_hookean, youngs: 1e5, poisson: 0.4, density: 900, damping: 0.01}}
+    position: [0, 2, 0]
+    rotation: [0, 1.5707963267948966, 0]
+    velocity: [1, 0, 0]
+    angular_velocity: [0, 3, 0]
+    friction: 0.3
+    skin: {{shape: {{kind: sphere, radius: 0.5, edge_length: 0.1}}}}
+  - name: block
+    shape: {{kind: box, size: [1, 0.5, 0.5], divisions: [2, 1, 1]}}
+    material: {{kind: edges_and_volume, edge_compliance: 1e-5}}
+    position: [3, 1, 0]
+    initial: {{scale: [1, 0.5, 1]}}
+  - {{name: pea, shape: {{kind: cylinder, radius: 0.2, height: 0.4}}, material: *rubber,
+     copies: {{grid: [2, 1, 3], spacing: [1, 0, 2]}}}}
+  - {{name: ring, shape: {{kind: torus}}, material: {RUBBER}, copies: {{offsets: [[0, 5, 0], [0, 9, 0]],
+     rotations: [[0, 0, 0], [1, 0, 0]]}}}}
+obstacles:
+  - {{kind: half_space, name: floor, point: [0, -1, 0], normal: [0, 2, 0], friction: 0.5}}
+  - {{kind: box, center: [1, 1, 1], size: [9, 9, 9], rotation: [0, 0, 0.1], inside: true}}
+  - {{kind: sphere, center: [0, 1, 0], radius: 8, inside: true,
+     motion: {{times: [0, 1], displacements: [[0, 0, 0], [0, 1, 0]]}}}}
+  - {{kind: triangles, surface: {{shape: {{kind: torus, radius: 2}}, scale: 2, position: [0, 0, 1]}},
+     motion: {{times: [0, 2], angles: [0, 3], axis: [0, 1, 0], pivot: [1, 0, 0]}}}}
+pins:
+  - {{body: ball, vertices: [0, 3]}}
+  - {{body: block, box: {{low: [2, 0, -1], high: [2.6, 2, 1]}}, name: left,
+     motion: {{times: [0, 1], displacements: [[0, 0, 0], [-1, 0, 0]]}}}}
+gravity: [0, -1.62, 0]
+solver: {{kind: xpbd, substeps: 7, momentum_restore: false, threads: 1}}
+dt: 1/30
+steps: 12
+output: {{page: false}}
+"""
+
+
+def test_a_scene_file_says_all_that_the_api_can(load):
+    run = load(EVERYTHING)
+    scene = run.scene
+    peas = [f"pea{k:02d}" for k in range(1, 7)]
+    assert [body.name for body in scene.bodies] == ["ball", "block", *peas, "ring01", "ring02"]
+    ball = scene.body("ball")
+    assert isinstance(ball.material, sp.StableNeoHookean)
+    assert (ball.material.youngs, ball.material.poisson, ball.material.density) == (1e5, 0.4, 900.0)
+    np.testing.assert_allclose(ball.angular_velocity, [0, 3, 0])
+    assert (ball.friction, ball.skin is not None) == (0.3, True)
+    np.testing.assert_allclose(np.linalg.norm(ball.skin.vertices, axis=1), 0.5)
+    assert isinstance(scene.body("block").material, sp.EdgesAndVolume)
+    corners = [np.asarray(scene.body(name).position).tolist() for name in peas]
+    assert sorted(corners) == [[x, 0, z] for x in (0.0, 1.0) for z in (0.0, 2.0, 4.0)]
+    assert len({id(scene.body(name).mesh) for name in peas}) == 1
+    np.testing.assert_allclose(scene.body("ring02").rotation, [1, 0, 0])
+    np.testing.assert_allclose(scene.body("ring02").position, [0, 9, 0])
+
+    floor, room, bowl, ring = scene.obstacles
+    assert isinstance(floor, sp.HalfSpace)
+    np.testing.assert_allclose(floor.normal, [0, 1, 0])
+    assert isinstance(room, sp.Box)
+    assert room.inside
+    assert isinstance(bowl, sp.Sphere)
+    np.testing.assert_allclose(bowl.pose(0.5)[1], [0, 0.5, 0])
+    assert isinstance(ring, sp.TriangleObstacle)
+    np.testing.assert_allclose(ring.surface.bounds[1], [4.4, 0.4, 5.4], atol=0.05)
+
+    assert scene.pins[1].name == "left"
+    np.testing.assert_allclose(scene.gravity, [0, -1.62, 0])
+    assert (run.dt, run.steps) == (1 / 30, 12)
+    assert (run.solver.substeps, run.solver.momentum_restore, run.solver.threads) == (7, False, 1)
+    assert (run.output.page, run.output.plot) == (False, True)
+
+
+def test_a_squeezed_start_keeps_its_center_and_its_widths(load):
+    run = load(EVERYTHING)
+    placed = run.scene.body("block").place(run.scene.body("block").mesh.vertices)
+    np.testing.assert_allclose(run.start["initial_positions"]["block"] - [3, 1, 0], (placed - [3, 1, 0]) * [1, 0.5, 1])
+    assert sorted(run.initial_positions) == ["block"]
+
+
+def test_defaults(load):
+    run = load(f"bodies: [{BODY}]\n")
+    assert (run.dt, run.steps, run.solver.substeps) == (1 / 60, 300, 20)
+    np.testing.assert_allclose(run.scene.gravity, [0, -9.81, 0])
+    assert run.start == {}
+
+
+def test_load_scene_says_what_it_leaves_out(load, caplog):
+    with caplog.at_level(logging.WARNING):
+        scene = load(EVERYTHING, load_scene)
+    assert isinstance(scene, sp.Scene)
+    assert "the deformed start of 'block' is no part of the scene" in caplog.text
+
+
+def test_mesh_files_are_found_beside_the_scene_file(load, tmp_path, monkeypatch):
+    folder = tmp_path / "meshes"
+    folder.mkdir()
+    box = sp.shapes.box((1, 1, 1), (2, 2, 2))
+    box.save(folder / "box.1.node")
+    box.surface.compact().save(folder / "box.stl")
+    monkeypatch.chdir(tmp_path.parent)
+    run = load(
+        f"""
+bodies:
+  - {{name: read, mesh: {{file: meshes/box.1.node, scale: 0.5}}, material: {RUBBER}}}
+  - {{name: filled, mesh: {{file: meshes/box.stl, max_volume: 0.01, scale: 2}}, material: {RUBBER},
+     skin: {{file: meshes/box.stl, scale: 2}}}}
+obstacles: [{{kind: triangles, surface: {{file: meshes/box.stl, rotation: [0, 0, 1], position: [0, -3, 0]}}}}]
+"""
+    )
+    read, filled = run.scene.bodies
+    assert read.mesh.volume == pytest.approx(1 / 8)
+    assert filled.mesh.volume == pytest.approx(8.0)
+    assert filled.mesh.volumes.max() <= 0.01
+    assert filled.skin.volume == pytest.approx(8.0)
+
+
+def test_every_elastic_material_has_a_kind(load):
+    assert set(ELASTIC_KINDS.values()) == set(ELASTIC_MATERIALS)
+    for kind, material in ELASTIC_KINDS.items():
+        run = load(f"bodies: [{BODY.replace('stable_neo_hookean', kind)}]\n")
+        assert type(run.scene.bodies[0].material) is material
+
+
+def test_the_schema_is_valid_and_accepts_what_the_loader_accepts(load, tmp_path):
+    schema = json_schema()
+    Draft202012Validator.check_schema(schema)
+    validator = Draft202012Validator(json.loads(json.dumps(schema)))
+    load(EVERYTHING)
+    assert list(validator.iter_errors(read_yaml(tmp_path / "scene.yaml").data)) == []
+
+
+@pytest.mark.parametrize("case", ["unknown", "kind", "missing", "type", "range"])
+def test_the_schema_refuses_what_the_loader_refuses(case):
+    data = {
+        "bodies": [{"name": "a", "shape": {"kind": "box"}, "material": {"kind": "arap", "youngs": 1.0, "poisson": 0.1}}]
+    }
+    validator = Draft202012Validator(json_schema())
+    assert validator.is_valid(data)
+    SceneFileModel.model_validate(data)
+    body = data["bodies"][0]
+    if case == "unknown":
+        body["colour"] = "red"
+    elif case == "kind":
+        body["material"]["kind"] = "steel"
+    elif case == "missing":
+        del body["material"]["youngs"]
+    elif case == "type":
+        body["name"] = 3
+    else:
+        body["material"]["poisson"] = 0.7
+    assert not validator.is_valid(data)
+    with pytest.raises(ValueError):
+        SceneFileModel.model_validate(data)
