@@ -1,0 +1,139 @@
+"""Skinning: points of a fine surface that follow the coarse tets they lie in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from supple.errors import MeshError
+from supple.mesh.checked_arrays import frozen, vertex_array
+from supple.mesh.tetmesh import TetMesh
+
+# How many tets, nearest by centre, are tried for every point; in even meshes nearly all lie in one of them.
+NEAREST = 16
+# How far below 0 a barycentric coordinate may be for the point still to count as inside.
+SLACK = 1e-9
+# Pairs of points and tets looked at together; bounds the memory needed.
+BLOCK = 1_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Embedding:
+    """Where points lie in a tet mesh, so that they can be carried along when it deforms.
+
+    A point inside the mesh is tied to the tet that holds it; one outside to the tet whose planes it lies least far out
+    of, among those around, by extrapolation. Affine motions of the mesh are reproduced exactly, up to round-off.
+
+    Attributes
+    ----------
+    tets : (k,) the tet that each point is tied to
+    corners : (k, 4) vertices of that tet
+    weights : (k, 4) barycentric coordinates; they sum to 1, and are all >= 0 for points inside
+    vertex_count : vertices of the mesh
+    """
+
+    tets: NDArray[np.int32]
+    corners: NDArray[np.int32]
+    weights: NDArray[np.float64]
+    vertex_count: int
+
+    @classmethod
+    def of(cls, mesh: TetMesh, points: ArrayLike) -> Embedding:
+        """Find the tet of each point.
+
+        Parameters
+        ----------
+        mesh : the coarse mesh, at rest
+        points : (k, 3) [m], in the same coordinates
+
+        Raises
+        ------
+        MeshError : where points are no (k, 3) array of finite numbers.
+        """
+        places = vertex_array(points, "Embedding")
+        tets = _containing_tets(mesh, places)
+        weights = _barycentric(mesh, places, tets)
+        return cls(frozen(tets.astype(np.int32)), frozen(mesh.tets[tets]), frozen(weights), len(mesh.vertices))
+
+    @property
+    def outside(self) -> NDArray[np.bool_]:
+        """Which points (k,) lie outside the mesh."""
+        return self.weights.min(axis=1) < -SLACK
+
+    def apply(self, positions: ArrayLike) -> NDArray[np.float64]:
+        """Where the points (k, 3) are when the mesh's vertices are at `positions` (n, 3) [m].
+
+        Raises
+        ------
+        MeshError : where `positions` has not one row for each vertex of the mesh.
+        """
+        x = np.asarray(positions, dtype=np.float64)
+        if x.shape != (self.vertex_count, 3):
+            raise MeshError(f"Embedding: positions have shape {x.shape}; they must have shape ({self.vertex_count}, 3)")
+        out = self.weights[:, 0, None] * x[self.corners[:, 0]]
+        for k in range(1, 4):
+            out += self.weights[:, k, None] * x[self.corners[:, k]]
+        return out
+
+
+def _containing_tets(mesh: TetMesh, points: NDArray[np.float64]) -> NDArray[np.int64]:
+    """The tet that holds each point, or else the one that it lies least far out of."""
+    from scipy.spatial import KDTree
+
+    corners = mesh.vertices[mesh.tets]
+    centers = corners.mean(axis=1)
+    search = _Search(mesh, points)
+    count = min(NEAREST, len(centers))
+    near = KDTree(centers).query(points, k=count, workers=-1)[1]
+    search.offer(np.repeat(np.arange(len(points)), count), np.ravel(near))
+
+    # A tet reaches no farther than `reach` from its centre. Where tets differ much in size, the one that holds a point
+    # need not be among the nearest by centre: look through every tet within reach, by classes of size.
+    left = np.flatnonzero(search.distance > search.slack)
+    if len(left) == 0:
+        return search.tet
+    reach = np.linalg.norm(corners - centers[:, None], axis=2).max(axis=1)
+    size = np.floor(np.log2(reach)).astype(np.int64)
+    tree = KDTree(points[left])
+    for k in np.unique(size):
+        members = np.flatnonzero(size == k)
+        pairs = tree.sparse_distance_matrix(
+            KDTree(centers[members]), float(reach[members].max()), output_type="ndarray"
+        )
+        search.offer(left[pairs["i"]], members[pairs["j"]])
+    return search.tet
+
+
+class _Search:
+    """The best tet so far of each point: where the largest distance out of its four planes is smallest."""
+
+    def __init__(self, mesh: TetMesh, points: NDArray[np.float64]) -> None:
+        self.mesh, self.points = mesh, points
+        self.tet = np.zeros(len(points), dtype=np.int64)
+        self.distance = np.full(len(points), np.inf)
+        gradients = mesh.rest_shape_inverse
+        first = -gradients.sum(axis=1, keepdims=True)
+        # A barycentric coordinate times this is the distance from its plane.
+        self.heights = 1.0 / np.linalg.norm(np.concatenate([first, gradients], axis=1), axis=2)
+        self.slack = SLACK * float(self.heights.min())
+
+    def offer(self, rows: NDArray[np.int64], tets: NDArray[np.int64]) -> None:
+        """Try tets[k] for the point rows[k]."""
+        for start in range(0, len(rows), BLOCK):
+            row, tet = rows[start : start + BLOCK], tets[start : start + BLOCK]
+            out = (-_barycentric(self.mesh, self.points[row], tet) * self.heights[tet]).max(axis=1)
+            before = self.distance[row]
+            np.minimum.at(self.distance, row, out)
+            # Of tets that are equally good (the point lies on a shared facet) the lowest is taken.
+            better = (out == self.distance[row]) & (out < before)
+            self.tet[row[better]] = len(self.mesh.tets)
+            np.minimum.at(self.tet, row[better], tet[better])
+
+
+def _barycentric(mesh: TetMesh, points: NDArray[np.float64], tets: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Barycentric coordinates (k, 4) of points (k, 3), each in its tet (k,)."""
+    offset = points - mesh.vertices[mesh.tets[tets, 0]]
+    last = np.einsum("kij,kj->ki", mesh.rest_shape_inverse[tets], offset)
+    return np.column_stack([1.0 - last.sum(axis=1), last])
