@@ -67,9 +67,12 @@ def read_tetgen(path: str | Path) -> TetMesh:
     if family.order == 2:
         logger.warning("%s: ten-node tets: only their four corners are used", ele)
     try:
-        return TetMesh.dropping_unused(family.points, family.tets)
+        mesh = TetMesh.dropping_unused(family.points, family.tets)
     except MeshError as error:
         raise MeshError(f"{ele}: {str(error).removeprefix('TetMesh: ')} (counted from 0)") from None
+    if mesh.turned:
+        logger.info("%s: %d of %d tets had negative winding and were turned", ele, mesh.turned, len(mesh.tets))
+    return mesh
 
 
 def read_tetgen_family(path: str | Path) -> TetgenFamily:

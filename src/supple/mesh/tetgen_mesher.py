@@ -34,7 +34,11 @@ def mesh_with_tetgen(surface: SurfaceMesh, options: dict[str, Any], limits: Limi
         raise _with_mend(failure) from None
     vertices = result.vertices / scale
     inside = _inside(surface, vertices, result)
-    return replace(result, vertices=vertices, elements=result.elements[inside], labels=result.labels[inside])
+    if inside.all():
+        return replace(result, vertices=vertices)
+    used, elements = np.unique(result.elements[inside], return_inverse=True)
+    elements = elements.reshape(-1, 4).astype(np.int32)
+    return replace(result, vertices=vertices[used], elements=elements, labels=result.labels[inside])
 
 
 def _inside(surface: SurfaceMesh, vertices: NDArray[np.float64], result: MesherResult) -> NDArray[np.bool_]:

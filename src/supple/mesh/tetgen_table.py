@@ -72,6 +72,8 @@ def read_text(path: Path) -> bytes:
         data = path.read_bytes()
     except FileNotFoundError:
         raise MeshError(f"{path}: no such file") from None
+    except MemoryError:
+        raise MeshError(f"{path}: is too large for the memory of this machine") from None
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else error
         raise MeshError(f"{path}: cannot be read: {reason}") from None
