@@ -271,3 +271,11 @@ def test_compiled_kernels_come_from_the_cache_in_a_new_process(soup):
         "assert sum(stats.cache_hits.values()) == 1 and not stats.cache_misses, stats\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True, env=os.environ)
+
+
+def test_a_material_that_is_not_registered_is_refused():
+    class Unregistered(ELASTIC_MATERIALS[0]):
+        stretch_functions = ELASTIC_MATERIALS[0].stretch_functions._replace()
+
+    with pytest.raises(SceneError, match="Unregistered is not registered"):
+        Unregistered(youngs=1e5, poisson=0.3).energy_density(np.eye(3))

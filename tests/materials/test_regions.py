@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import supple as sp
 from supple.errors import SceneError
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.neo_hookean import NeoHookean
@@ -12,6 +13,7 @@ from supple.materials.per_tet import NOT_ELASTIC
 from supple.materials.regions import Regions
 from supple.materials.registry import kind_of, needs_positive_volume
 from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.system import build_system
 
 SOFT = StableNeoHookean(youngs=1e4, poisson=0.3, density=900.0, damping=0.01)
 HARD = NeoHookean(youngs=1e7, poisson=0.2, density=2000.0)
@@ -73,3 +75,15 @@ def test_errors(materials, index, text):
 def test_length_must_fit_the_mesh():
     with pytest.raises(SceneError, match="index has 2 values for 5 tets"):
         Regions(materials=[SOFT], index=[0, 0]).per_tet(5)
+
+
+def test_a_body_of_two_materials_moves_in_a_system():
+    mesh = sp.shapes.box(size=(2.0, 1.0, 1.0), divisions=(4, 2, 2))
+    centers = mesh.vertices[mesh.tets].mean(axis=1)
+    index = (centers[:, 0] > centers[:, 0].mean()).astype(int)
+    body = sp.Body("bar", mesh, Regions(materials=[SOFT, HARD], index=index))
+    system = build_system(sp.Scene(bodies=[body]))
+    volume = mesh.volumes.sum()
+    assert system.masses.sum() == pytest.approx(0.5 * volume * (900.0 + 2000.0))
+    with pytest.raises(SceneError, match="body 'bar': Regions: index has 3 values"):
+        sp.Body("bar", mesh, Regions(materials=[SOFT], index=[0, 0, 0]))

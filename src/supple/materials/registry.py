@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.errors import SceneError
 from supple.materials.arap import ARAP
 from supple.materials.fixed_corotated import FixedCorotated
 from supple.materials.material import Elastic
@@ -28,5 +29,13 @@ def needs_positive_volume(kind: NDArray[np.int32]) -> NDArray[np.bool_]:
 
 
 def kind_of(material: type[Elastic]) -> int:
-    """The number of a material's class in kernels."""
-    return ELASTIC_MATERIALS.index(material)
+    """The number by which kernels know a material's class, or the class that it takes its stretch functions from.
+
+    Raises
+    ------
+    SceneError : where the class is not registered.
+    """
+    for kind, registered in enumerate(ELASTIC_MATERIALS):
+        if material.stretch_functions is registered.stretch_functions:
+            return kind
+    raise SceneError(f"{material.__name__} is not registered; add it to ELASTIC_MATERIALS in {__name__}")

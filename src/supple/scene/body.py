@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -62,11 +62,10 @@ class Body:
         self._require_fine_enough_coordinates(owner)
 
     def _require_one_value_per_tet(self, owner: str) -> None:
-        count = len(self.mesh.tets)
-        for item in fields(self.material):
-            values = np.asarray(getattr(self.material, item.name))
-            if values.ndim == 1 and len(values) != count:
-                raise SceneError(f"{owner}: {item.name} has {len(values)} values for {count} tets; give one per tet")
+        try:
+            self.material.per_tet(len(self.mesh.tets))
+        except SceneError as error:
+            raise SceneError(f"{owner}: {error}") from None
 
     def _require_fine_enough_coordinates(self, owner: str) -> None:
         """Far from the origin, neighbouring float64 numbers lie too far apart to tell the vertices from each other."""
