@@ -137,11 +137,26 @@ CASES = [
         "12: pins[0].box: pin of body 'cube': its box holds no vertex",
     ),
     ("vertices: [0]", "box: {low: [5, 5, 5], high: [4, 6, 6]}", "12: pins[0].box.low: InBox: low"),
-    (", vertices: [0]", "", "12: pins[0]: a pin needs either `vertices` or `box`"),
+    (", vertices: [0]", "", "12: pins[0]: give the vertices by either `vertices` or `box`"),
     (
         "vertices: [0]}",
         "vertices: [0]}\n  - {body: cube, vertices: [0]}",
         "13: pins[1].vertices: pin of body 'cube': vertex 0 is held by another pin",
+    ),
+    (
+        "dt: 1/60",
+        "forces: [{body: cube, vertices: [9], force: [0, 1, 0]}]",
+        "13: forces[0].vertices: force on body 'cube': vertex 9",
+    ),
+    (
+        "dt: 1/60",
+        "forces: [{body: cube, vertices: [0], force: 3}]",
+        "13: forces[0].force: is 3; give a list",
+    ),
+    (
+        "dt: 1/60",
+        "soft_targets: [{body: ball, vertices: [0], stiffness: 1}]",
+        "13: soft_targets[0].body: there is no body 'ball'; known here: cube",
     ),
     ("1/60", "1/0", "13: dt: is the text '1/0'; give a number"),
     ("1/60", "-0.1", "13: dt: is -0.1; it must be above 0"),

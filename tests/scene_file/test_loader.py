@@ -60,6 +60,11 @@ pins:
   - {{body: ball, vertices: [0, 3]}}
   - {{body: block, box: {{low: [2, 0, -1], high: [2.6, 2, 1]}}, name: left,
      motion: {{times: [0, 1], displacements: [[0, 0, 0], [-1, 0, 0]]}}}}
+forces:
+  - {{body: ball, vertices: [5, 6], force: [0, 3, 0]}}
+soft_targets:
+  - {{body: ball, box: {{low: [-9, -9, -9], high: [9, 9, 9]}}, stiffness: 40,
+     motion: {{times: [0, 1], displacements: [[0, 0, 0], [0, 0, 1]]}}}}
 gravity: [0, -1.62, 0]
 solver: {{kind: xpbd, substeps: 7, momentum_restore: false, threads: 1}}
 dt: 1/30
@@ -97,6 +102,8 @@ def test_a_scene_file_says_all_that_the_api_can(load):
     np.testing.assert_allclose(ring.surface.bounds[1], [4.4, 0.4, 5.4], atol=0.05)
 
     assert scene.pins[1].name == "left"
+    np.testing.assert_allclose(scene.forces[0].per_vertex(0.0, 2), [[0, 1.5, 0], [0, 1.5, 0]])
+    assert scene.soft_targets[0].stiffness == 40.0
     np.testing.assert_allclose(scene.gravity, [0, -1.62, 0])
     assert (run.dt, run.steps) == (1 / 30, 12)
     assert (run.solver.substeps, run.solver.momentum_restore, run.solver.threads) == (7, False, 1)

@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema
 from supple.scene_file.bodies import BodyModel
 from supple.scene_file.model import Model, Vector
 from supple.scene_file.obstacles import ObstacleModel
-from supple.scene_file.pins import PinModel
+from supple.scene_file.selections import ForceModel, PinModel, SoftTargetModel
 from supple.scene_file.solvers import SolverModel, XPBDModel
 
 MAX_STEPS = 10_000_000
@@ -55,6 +55,8 @@ class SceneFileModel(Model):
     bodies: list[BodyModel] = Field(min_length=1, max_length=10_000)
     obstacles: list[ObstacleModel] = Field(default=[], max_length=10_000)
     pins: list[PinModel] = Field(default=[], max_length=10_000)
+    forces: list[ForceModel] = Field(default=[], max_length=10_000)
+    soft_targets: list[SoftTargetModel] = Field(default=[], max_length=10_000)
     gravity: Vector = Field(default=[0.0, -9.81, 0.0], description="[m/s^2]")
     solver: SolverModel = Field(default_factory=lambda: XPBDModel(kind="xpbd"))
     dt: Seconds = Field(default=1.0 / 60.0, description="time from frame to frame [s]; 1/60 may be written as such")

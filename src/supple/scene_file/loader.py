@@ -6,7 +6,7 @@ import logging
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +14,11 @@ from pydantic import ValidationError
 
 from supple.errors import SceneError
 from supple.scene.body import Body
+from supple.scene.forces import Force, SoftTarget
 from supple.scene.obstacles import Obstacle
-from supple.scene.pins import InBox, Pin
+from supple.scene.pins import Pin
 from supple.scene.scene import Scene
+from supple.scene.selection import InBox
 from supple.scene_file.complaints import complaint, suggestion
 from supple.scene_file.document import OutputModel, SceneFileModel
 from supple.scene_file.located import LocatedError, at
@@ -25,6 +27,8 @@ from supple.scene_file.yaml_reader import Key, read_yaml
 from supple.solver import Solver
 
 logger = logging.getLogger(__name__)
+
+Selecting = TypeVar("Selecting", Pin, Force, SoftTarget)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,24 +111,40 @@ def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
     held: dict[str, set[int]] = {}
     for i, described in enumerate(model.pins):
         with at("pins", i):
-            pins.append(_checked(described.build(), bodies, held))
+            pins.append(_free(_fits(described.build(), bodies), bodies, held))
+    forces: list[Force] = []
+    for i, described in enumerate(model.forces):
+        with at("forces", i):
+            forces.append(_fits(described.build(), bodies))
+    targets: list[SoftTarget] = []
+    for i, described in enumerate(model.soft_targets):
+        with at("soft_targets", i):
+            targets.append(_fits(described.build(), bodies))
     with at("solver"):
         solver = model.solver.build()
     with at():
-        scene = Scene(list(bodies.values()), obstacles, pins, model.gravity)
+        scene = Scene(list(bodies.values()), obstacles, pins, model.gravity, forces, targets)
     return Run(scene, solver, model.dt, model.steps, starts, model.output)
 
 
-def _checked(pin: Pin, bodies: dict[str, Body], held: dict[str, set[int]]) -> Pin:
-    """The pin, if its body and vertices exist and no other pin holds them: here its place in the file is known."""
-    if pin.body not in bodies:
+def _fits(item: Selecting, bodies: dict[str, Body]) -> Selecting:
+    """The item, if its body and vertices exist: checked here, where its place in the file is known."""
+    if item.body not in bodies:
         with at("body"):
-            raise SceneError(f"there is no body {pin.body!r}; {suggestion(pin.body, bodies)}")
+            raise SceneError(f"there is no body {item.body!r}; {suggestion(item.body, bodies)}")
+    body = bodies[item.body]
+    with at("box" if isinstance(item.vertices, InBox) else "vertices"):
+        item.select(body.place(body.mesh.vertices))
+    return item
+
+
+def _free(pin: Pin, bodies: dict[str, Body], held: dict[str, set[int]]) -> Pin:
+    """The pin, if no other pin holds its vertices."""
     body = bodies[pin.body]
-    with at("box" if isinstance(pin.vertices, InBox) else "vertices"):
-        chosen = set(pin.select(body.place(body.mesh.vertices)).tolist())
-        twice = chosen & held.setdefault(pin.body, set())
-        if twice:
+    chosen = set(pin.select(body.place(body.mesh.vertices)).tolist())
+    twice = chosen & held.setdefault(pin.body, set())
+    if twice:
+        with at("box" if isinstance(pin.vertices, InBox) else "vertices"):
             raise SceneError(f"{pin.label}: vertex {min(twice)} is held by another pin already; hold it once")
     held[pin.body] |= chosen
     return pin
