@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import logging
+import mmap
 import os
 import signal
 import subprocess
 import sys
 import tempfile
+import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +24,8 @@ from supple.mesh.surface import SurfaceMesh
 
 logger = logging.getLogger(__name__)
 
+# A crash at more than this part of the allowed address space is taken for lack of memory.
+STARVED = 0.8
 # How TetGen, C++, NumPy and the loader of shared libraries say it, in lower case.
 OUT_OF_MEMORY = (
     "out of memory",
@@ -77,7 +81,7 @@ def run_mesher(mesher: str, surface: SurfaceMesh, options: dict[str, Any], limit
         }
         (folder / "job.json").write_text(json.dumps(job), "utf-8")
         np.savez(folder / "surface.npz", vertices=surface.vertices, triangles=surface.triangles)
-        code = _run_child(mesher, folder, limits)
+        code, peak = _run_child(mesher, folder, limits)
         answer_file = folder / "answer.json"
         answer = json.loads(answer_file.read_text("utf-8")) if answer_file.exists() else {}
         for note in filter(None, answer.get("notes", [])):
@@ -85,11 +89,15 @@ def run_mesher(mesher: str, surface: SurfaceMesh, options: dict[str, Any], limit
         if code == 0 and "error" not in answer:
             with np.load(folder / "mesh.npz") as mesh:
                 return MesherResult(mesh["vertices"], mesh["elements"], mesh["labels"], float(answer["seconds"]))
-        raise _failure(mesher, code, answer.get("error", ""), _last_words(folder), limits)
+        starved = limits.memory is not None and peak > STARVED * limits.memory
+        raise _failure(mesher, code, answer.get("error", ""), _last_words(folder), limits, starved)
 
 
-def _run_child(mesher: str, folder: Path, limits: Limits) -> int:
-    """Exit code of the child. It is ended when time is up, and when this process is interrupted."""
+def _run_child(mesher: str, folder: Path, limits: Limits) -> tuple[int, int]:
+    """Exit code of the child and its largest address space [bytes], 0 where the platform does not tell.
+
+    The child is ended when time is up, and when this process is interrupted.
+    """
     environment = os.environ | {
         # The child finds the same packages as this process, however this one found them.
         "PYTHONPATH": os.pathsep.join(os.path.abspath(entry) for entry in sys.path if entry),
@@ -115,22 +123,37 @@ def _run_child(mesher: str, folder: Path, limits: Limits) -> int:
         except (OSError, ValueError, TypeError) as error:
             raise MesherFailure("crash", f"{mesher}: cannot start Python ({sys.executable!r}): {error}") from None
         try:
-            return child.wait(timeout=limits.time)
-        except subprocess.TimeoutExpired:
-            raise MesherFailure(
-                "time",
-                f"{mesher} was stopped at the time limit of {limits.time:g} s; ask for less (a larger max_volume, a "
-                "larger quality ratio, no min_dihedral) or raise time_limit",
-            ) from None
+            end, peak = time.monotonic() + limits.time, 0
+            while True:
+                try:
+                    return child.wait(timeout=max(0.0, min(0.05, end - time.monotonic()))), peak
+                except subprocess.TimeoutExpired:
+                    peak = max(peak, _address_space(child.pid))
+                if time.monotonic() >= end:
+                    raise MesherFailure(
+                        "time",
+                        f"{mesher} was stopped at the time limit of {limits.time:g} s; ask for less (a larger "
+                        "max_volume, a larger quality ratio, no min_dihedral) or raise time_limit",
+                    )
         finally:
             if child.poll() is None:
                 child.kill()
             child.wait()
 
 
-def _failure(mesher: str, code: int, error: str, words: str, limits: Limits) -> MesherFailure:
-    said = error or words
-    if any(sign in said.lower() for sign in OUT_OF_MEMORY):
+def _address_space(pid: int) -> int:
+    """Address space [bytes] of a running process, 0 where only a platform other than Linux could tell."""
+    try:
+        pages = int(Path(f"/proc/{pid}/statm").read_text().split()[0])
+    except (OSError, ValueError, IndexError):
+        return 0
+    return pages * mmap.PAGESIZE
+
+
+def _failure(mesher: str, code: int, error: str, words: str, limits: Limits, starved: bool) -> MesherFailure:
+    said = (error or words).lower()
+    # A program that was refused memory may well crash over it without a word.
+    if any(sign in said for sign in OUT_OF_MEMORY) or (starved and not error):
         limit = "" if limits.memory is None else f" within the memory limit of {limits.memory / 2**20:.0f} MiB"
         return MesherFailure(
             "memory", f"{mesher} ran out of memory{limit}; ask for less (a larger max_volume) or raise memory_limit"

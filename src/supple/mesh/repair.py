@@ -17,8 +17,8 @@ from supple.mesh.topology import facet_keys
 
 logger = logging.getLogger(__name__)
 
-# MeshFix cuts away what intersects; when less than this part of a component is left, it cut the wrong thing.
-LEAST_REMAINING_AREA = 0.5
+# MeshFix cuts away what intersects; when it takes more than this part of a component's area, it cut the wrong thing.
+LARGEST_LOSS = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,7 +178,7 @@ def _meshfix_components(surface: SurfaceMesh, steps: list[str], allow_lost: bool
         raise MeshingError(f'repair needs MeshFix for this surface ({faults}): pip install "supple[dirty]"')
     count, labels = surface.components
     pieces = [SurfaceMesh(surface.vertices, surface.triangles[labels == k]).compact() for k in range(count)]
-    faults = [[p for p in piece.check().problems if "wrong way" not in p] for piece in pieces]
+    faults = [_own_faults(piece) for piece in pieces]
     faulty = [k for k in range(count) if faults[k]]
     if not faulty:
         return surface
@@ -190,16 +190,17 @@ def _meshfix_components(surface: SurfaceMesh, steps: list[str], allow_lost: bool
             continue
         rows = result.elements[result.labels == k]
         fixed = SurfaceMesh(result.vertices, rows).compact() if len(rows) else None
-        if fixed is None or fixed.area < LEAST_REMAINING_AREA * piece.area:
-            what = "all" if fixed is None else f"{100.0 * (1.0 - fixed.area / piece.area):.0f} % of the area"
-            what += f" of component {k} of {count} ({len(piece.triangles)} triangles)"
-            if not allow_lost:
-                raise MeshingError(
-                    f"repair would drop {what}, faults: {'; '.join(faults[k])}; allow it with repair_surface(surface, "
-                    'allow_lost_components=True), or use mesher="ftetwild"'
-                )
+        loss = 1.0 if fixed is None or _own_faults(fixed) else 1.0 - fixed.area / piece.area
+        what = f"component {k} of {count} ({len(piece.triangles)} triangles; {'; '.join(faults[k])})"
+        if loss > LARGEST_LOSS and not allow_lost:
+            how_much = "all" if loss == 1.0 else f"{100.0 * loss:.0f} % of the area"
+            raise MeshingError(
+                f"repair would drop {how_much} of {what}: remove it yourself, allow it with repair_surface(surface, "
+                'allow_lost_components=True), or use mesher="ftetwild"'
+            )
+        if fixed is None or loss == 1.0:
             steps.append(f"dropped {what}")
-        if fixed is not None:
+        else:
             steps.append(_change(f"MeshFix mended component {k} of {count}", piece, fixed))
             kept.append(fixed)
     if not kept:
@@ -209,6 +210,12 @@ def _meshfix_components(surface: SurfaceMesh, steps: list[str], allow_lost: bool
         np.concatenate([p.vertices for p in kept]),
         np.concatenate([p.triangles + offset for p, offset in zip(kept, offsets, strict=True)]),
     )
+
+
+def _own_faults(piece: SurfaceMesh) -> list[str]:
+    """What is wrong with a component taken by itself; which way a cavity faces cannot be judged so."""
+    report = piece.check()
+    return report.problems[: len(report.problems) - bool(len(report.wrong_facing_components))]
 
 
 def _change(what: str, before: SurfaceMesh, after: SurfaceMesh) -> str:

@@ -1,0 +1,322 @@
+"""From surfaces to tets: real shapes, cavities, wishes kept, and every way in which a mesher can fail."""
+
+from __future__ import annotations
+
+import logging
+import os
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from supple.errors import MeshingError
+from supple.mesh import ftetwild, mesher_worker, tetrahedralize
+from supple.mesh.child_process import Limits, MesherFailure
+from supple.mesh.gummy_bear import gummy_bear_surface
+from supple.mesh.shape_surfaces import box_surface, sphere_surface, torus_surface
+from supple.mesh.surface import SurfaceMesh
+from supple.mesh.tetgen_mesher import mesh_with_tetgen
+from supple.mesh.tetmesh import TetMesh
+from supple.mesh.tetrahedralize import tetrahedralize as fill
+from supple.mesh.tetrahedralize import tetrahedralize_reported
+
+SPHERE = sphere_surface(radius=0.5, edge_length=0.15)
+SMALL = sphere_surface(radius=0.2, edge_length=0.15)
+TINY = sphere_surface(radius=0.08, edge_length=0.08)
+OPTIONS = {"max_volume": None, "quality": 1.4, "min_dihedral": None, "keep_surface": False}
+
+
+def joined(*surfaces: SurfaceMesh) -> SurfaceMesh:
+    starts = np.cumsum([0, *(len(s.vertices) for s in surfaces[:-1])])
+    return SurfaceMesh(
+        np.concatenate([s.vertices for s in surfaces]),
+        np.concatenate([s.triangles + start for s, start in zip(surfaces, starts, strict=True)]),
+    )
+
+
+def moved(surface: SurfaceMesh, *by: float) -> SurfaceMesh:
+    return surface.transformed(translation=by)
+
+
+def assert_fills(mesh: TetMesh, surface: SurfaceMesh, volume: float | None = None) -> None:
+    """Positive tets, a clean outward boundary, the volume of the surface."""
+    assert (mesh.volumes > 0).all()
+    assert mesh.volume == pytest.approx(surface.volume if volume is None else volume, rel=1e-4)
+    report = mesh.surface.check()
+    assert report.watertight
+    assert report.outward
+    assert mesh.surface.volume == pytest.approx(mesh.volume, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("surface", "max_volume"),
+    [
+        (SPHERE, 1e-3),
+        (torus_surface(radius=0.5, tube_radius=0.2, edge_length=0.12), 5e-4),
+        (gummy_bear_surface(height=0.1, resolution=24), 1e-8),
+        (box_surface(size=(1.0, 0.1, 0.1), divisions=(10, 1, 1)), 2e-5),
+    ],
+    ids=["sphere", "torus", "bear", "box"],
+)
+def test_shapes_are_filled_and_no_tet_is_too_large(surface: SurfaceMesh, max_volume: float) -> None:
+    mesh = fill(surface, max_volume=max_volume)
+    assert_fills(mesh, surface)
+    assert mesh.volumes.max() <= max_volume * (1 + 1e-6)
+    assert np.median(mesh.min_dihedrals) > 30
+
+
+def test_scale_does_not_matter() -> None:
+    """The same mesh at nanometres, but for the unit: only powers of two are exact, hence 2^-30."""
+    scale = 2.0**-30
+    mesh = fill(SPHERE, max_volume=2e-3)
+    small = fill(SurfaceMesh(SPHERE.vertices * scale, SPHERE.triangles), max_volume=2e-3 * scale**3)
+    np.testing.assert_array_equal(small.tets, mesh.tets)
+    np.testing.assert_array_equal(small.vertices, mesh.vertices * scale)
+
+
+def test_keep_surface_adds_no_vertex_there() -> None:
+    mesh = fill(SPHERE, max_volume=2e-3, keep_surface=True)
+    assert_fills(mesh, SPHERE)
+    rows = mesh.surface.used_vertices
+    assert sorted(mesh.vertices[rows].tolist()) == sorted(SPHERE.vertices.tolist())
+    assert len(mesh.vertices) > len(rows)
+
+
+def test_quality_and_dihedral_ask_for_more_tets() -> None:
+    counts = [
+        len(fill(SPHERE, quality=quality, min_dihedral=angle).tets)
+        for quality, angle in ((2.0, None), (1.2, None), (1.2, 15.0))
+    ]
+    assert counts == sorted(set(counts))
+    assert (fill(SPHERE, quality=None).min_dihedrals < 10).any()
+
+
+def test_components_are_filled_and_cavities_are_not() -> None:
+    """A ball with a cavity, in it another ball; and a second ball elsewhere."""
+    surface = joined(SPHERE, SMALL.flipped(), TINY, moved(TINY, 2, 0, 0))
+    mesh = fill(surface)
+    assert_fills(mesh, surface, SPHERE.volume - SMALL.volume + 2 * TINY.volume)
+    assert mesh.components.count == 3
+
+
+def test_inward_surfaces_are_turned(caplog: pytest.LogCaptureFixture) -> None:
+    inside_out = joined(SPHERE, SMALL.flipped()).flipped()
+    assert_fills(fill(inside_out), inside_out, SPHERE.volume - SMALL.volume)
+    assert "faced inward" in caplog.text
+    one_of_two = joined(SPHERE, moved(SMALL, 2, 0, 0).flipped())
+    assert_fills(fill(one_of_two), one_of_two, SPHERE.volume + SMALL.volume)
+
+
+def test_unused_vertices_are_left_out() -> None:
+    surface = SurfaceMesh(np.vstack([SPHERE.vertices, [[9.0, 9.0, 9.0]]]), SPHERE.triangles)
+    assert_fills(fill(surface), SPHERE)
+
+
+BROKEN = {
+    "open": (SurfaceMesh(SPHERE.vertices, SPHERE.triangles[3:]), "open boundary edge"),
+    "overlapping": (joined(SPHERE, moved(SPHERE, 0.4, 0.01, 0)), "intersecting triangle"),
+    "aligned": (joined(SPHERE, SPHERE), "duplicate|intersecting|folded|non-manifold"),
+    "solid in solid": (joined(SPHERE, SMALL), "1 component of 2 faces the wrong way"),
+    "inconsistent": (
+        SurfaceMesh(SPHERE.vertices, np.vstack([SPHERE.triangles[:5, ::-1], SPHERE.triangles[5:]])),
+        "inconsistent edge",
+    ),
+    "duplicate": (SurfaceMesh(SPHERE.vertices, np.vstack([SPHERE.triangles, SPHERE.triangles[:1]])), "non-manifold"),
+    "one triangle": (SurfaceMesh(np.eye(3), [[0, 1, 2]]), "open boundary edge"),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_dirty_surfaces_are_refused_with_place_and_mend(case: str) -> None:
+    surface, fault = BROKEN[case]
+    with pytest.raises(MeshingError, match=fault) as error:
+        fill(surface, mesher="tetgen")
+    assert "repair=True" in str(error.value)
+    assert "ftetwild" in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_auto_says_how_to_install_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tetrahedralize, "ftetwild_installed", lambda: False)
+    with pytest.raises(MeshingError, match=r'pip install "supple\[dirty\]"'):
+        fill(BROKEN["open"][0])
+    with pytest.raises(MeshingError, match=r'pip install "supple\[dirty\]"'):
+        fill(SPHERE, mesher="ftetwild")
+
+
+def test_auto_takes_ftetwild_for_dirty_surfaces(caplog: pytest.LogCaptureFixture) -> None:
+    pytest.importorskip("pytetwild")
+    ball = sphere_surface(radius=0.5, edge_length=0.35)
+    surface = joined(ball, moved(ball, 0.5, 0.01, 0.02))
+    with caplog.at_level(logging.INFO):
+        mesh, report = tetrahedralize_reported(surface, max_volume=0.02)
+    assert report.mesher == "ftetwild"
+    assert "fTetWild" in caplog.text
+    assert (mesh.volumes > 0).all()
+    assert mesh.volumes.max() <= 0.02
+    # A union: more than one ball, less than two.
+    assert 1.2 * ball.volume < mesh.volume < 1.9 * ball.volume
+
+
+@pytest.mark.parametrize("wish", [{"min_dihedral": 10.0}, {"keep_surface": True}])
+def test_ftetwild_refuses_what_it_cannot_do(wish: dict) -> None:
+    if not ftetwild.ftetwild_installed():
+        pytest.skip("needs pytetwild")
+    with pytest.raises(MeshingError, match="fTetWild has no"):
+        fill(SPHERE, mesher="ftetwild", **wish)
+
+
+@pytest.mark.parametrize(
+    "wish",
+    [
+        {"max_volume": 0.0},
+        {"max_volume": -1.0},
+        {"max_volume": float("nan")},
+        {"max_volume": "big"},
+        {"quality": 1.0},
+        {"quality": float("inf")},
+        {"min_dihedral": 90.0},
+        {"envelope": 0.0},
+        {"time_limit": 0.0},
+        {"memory_limit": -5},
+        {"mesher": "gmsh"},
+    ],
+    ids=str,
+)
+def test_parameters_out_of_range_are_named(wish: dict) -> None:
+    with pytest.raises(MeshingError, match=next(iter(wish))):
+        fill(SPHERE, **wish)
+
+
+def test_only_surfaces_are_filled() -> None:
+    with pytest.raises(MeshingError, match="needs a SurfaceMesh, not str"):
+        fill("bear.stl")  # type: ignore[arg-type]
+
+
+def test_an_unreachable_max_volume_is_said() -> None:
+    """TetGen finds no place for a vertex inside twelve large triangles that it may not split."""
+    with pytest.raises(MeshingError, match=r"left a tet of .* larger than max_volume=0\.0001; leave keep_surface out"):
+        fill(box_surface(size=(1, 1, 1), divisions=(1, 1, 1)), max_volume=1e-4, keep_surface=True)
+
+
+def test_time_limit_ends_the_mesher() -> None:
+    started = time.monotonic()
+    with pytest.raises(MesherFailure, match=r"time limit of 1 s.*raise time_limit") as error:
+        fill(SPHERE, max_volume=1e-8, time_limit=1.0)
+    assert error.value.kind == "time"
+    assert time.monotonic() - started < 30
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="address space is bounded on Linux only")
+@pytest.mark.parametrize("mebibytes", [40, 200])
+def test_memory_limit_ends_the_mesher(mebibytes: int) -> None:
+    """At 40 MiB not even NumPy can be loaded; at 200 TetGen runs dry."""
+    with pytest.raises(MesherFailure, match=rf"ran out of memory within the memory limit of {mebibytes} MiB") as error:
+        fill(SPHERE, max_volume=1e-8, memory_limit=mebibytes * 2**20)
+    assert error.value.kind == "memory"
+
+
+@pytest.mark.parametrize("shift", [(0.4, 0.01, 0.0), (0.4, 0.0, 0.0), (1e-9, 0.0, 0.0)], ids=str)
+def test_this_process_outlives_what_kills_tetgen(shift: tuple[float, float, float], tmp_path, monkeypatch) -> None:
+    """Overlapping spheres, past the check: TetGen gives up, aborts or segfaults, as it likes."""
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(MesherFailure, match=r"gave up|crashed|stopped at the time limit") as error:
+        mesh_with_tetgen(joined(SPHERE, moved(SPHERE, *shift)), OPTIONS, Limits(4.0, 2**30))
+    assert error.value.kind in ("refused", "crash", "time")
+    assert "\n" not in str(error.value)
+    # TetGen writes `_skipped.node` and others into the current folder, which is not to be this one.
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_this_process_outlives_jittered_soup() -> None:
+    noise = np.random.default_rng(6).normal(size=SPHERE.vertices.shape) * 0.1
+    with pytest.raises(MesherFailure):
+        mesh_with_tetgen(SurfaceMesh(SPHERE.vertices + noise, SPHERE.triangles), OPTIONS, Limits(4.0, 2**30))
+
+
+def worker(monkeypatch: pytest.MonkeyPatch, folder: Path, code: str) -> None:
+    """Put a script in the place of the mesher."""
+    script = folder / "worker.py"
+    script.write_text(code)
+    monkeypatch.setattr(mesher_worker, "__file__", str(script))
+
+
+@pytest.mark.parametrize(
+    ("code", "kind", "text"),
+    [
+        ("import os, sys; print('malloc(): broken', flush=True); os.abort()", "crash", "malloc(): broken"),
+        ("raise SystemExit(7)", "crash", "exit code 7"),
+        ("import sys; print('terminate: std::bad_alloc', file=sys.stderr); raise SystemExit(134)", "memory", "ran out"),
+    ],
+)
+def test_the_end_of_the_child_is_told(tmp_path, monkeypatch, code: str, kind: str, text: str) -> None:
+    worker(monkeypatch, tmp_path, code)
+    with pytest.raises(MesherFailure) as error:
+        fill(SPHERE)
+    assert error.value.kind == kind
+    assert text in str(error.value)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+def test_a_signal_is_named(tmp_path, monkeypatch) -> None:
+    worker(monkeypatch, tmp_path, "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
+    with pytest.raises(MesherFailure, match=r"crashed \(SIGSEGV\).*mesher=\"ftetwild\""):
+        fill(SPHERE)
+
+
+def test_a_python_that_cannot_start_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "executable", "/no/such/python")
+    with pytest.raises(MesherFailure, match="cannot start Python"):
+        fill(SPHERE)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+def test_an_interrupt_ends_the_child(tmp_path: Path) -> None:
+    """Ctrl-C in a program that meshes: no child and no temporary files remain."""
+    program = (
+        "import sys; from supple.mesh import mesher_worker\n"
+        "from supple.mesh.shape_surfaces import sphere_surface\n"
+        "from supple.mesh.tetrahedralize import tetrahedralize\n"
+        f"mesher_worker.__file__ = {str(tmp_path / 'worker.py')!r}\n"
+        "tetrahedralize(sphere_surface(radius=.5, edge_length=.3))\n"
+    )
+    (tmp_path / "worker.py").write_text(
+        f"import os, time; open({str(tmp_path / 'pid')!r}, 'w').write(str(os.getpid())); time.sleep(60)"
+    )
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    parent = subprocess.Popen(
+        [sys.executable, "-c", program], env=os.environ | {"TMPDIR": str(scratch)}, stderr=subprocess.PIPE
+    )
+    pid_file = tmp_path / "pid"
+    deadline = time.monotonic() + 30
+    while not (pid_file.exists() and pid_file.read_text()) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    child = int(pid_file.read_text())
+    import signal
+
+    parent.send_signal(signal.SIGINT)
+    _, said = parent.communicate(timeout=30)
+    assert b"KeyboardInterrupt" in said
+    with pytest.raises(ProcessLookupError):
+        os.kill(child, 0)
+    assert list(scratch.iterdir()) == []
+
+
+def test_a_missing_memory_limit_is_a_log_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "resource", None)  # as on Windows
+    assert "no memory limit" in mesher_worker.limit_process(10.0, 2**30)[0]
+
+
+def test_two_threads_can_mesh_at_once() -> None:
+    meshes: list[TetMesh] = []
+    threads = [threading.Thread(target=lambda: meshes.append(fill(SPHERE))) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    np.testing.assert_array_equal(meshes[0].tets, meshes[1].tets)
