@@ -33,23 +33,20 @@ def origins_of_components(positions, components, origins):
 
 
 @njit(cache=True)
-def _predict_block(points, previous, velocities, gravity, h, first, low, high):
+def _predict_block(points, previous, velocities, gravity, h, low, high):
     gx, gy, gz = h * gravity[0], h * gravity[1], h * gravity[2]
     for i in range(low, high):
-        x, y, z, w = points[i, 0], points[i, 1], points[i, 2], points[i, 3]
-        vx, vy, vz = velocities[i, 0], velocities[i, 1], velocities[i, 2]
-        if not first:
-            vx, vy, vz = (x - previous[i, 0]) / h, (y - previous[i, 1]) / h, (z - previous[i, 2]) / h
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
         previous[i, 0], previous[i, 1], previous[i, 2] = x, y, z
-        if w > 0.0:
-            vx, vy, vz = vx + gx, vy + gy, vz + gz
+        if points[i, 3] > 0.0:
+            vx, vy, vz = velocities[i, 0] + gx, velocities[i, 1] + gy, velocities[i, 2] + gz
+            velocities[i, 0], velocities[i, 1], velocities[i, 2] = vx, vy, vz
             points[i, 0], points[i, 1], points[i, 2] = x + h * vx, y + h * vy, z + h * vz
-        velocities[i, 0], velocities[i, 1], velocities[i, 2] = vx, vy, vz
 
 
 @njit(cache=True)
-def predict(points, previous, velocities, gravity, h, first):
-    """End the last substep and begin the next one: v = (x - x_n) / h, x_n = x, v += h g, x += h v.
+def predict(points, previous, velocities, gravity, h):
+    """Begin a substep: x_n = x, v += h g, x += h v.
 
     Parameters
     ----------
@@ -57,29 +54,34 @@ def predict(points, previous, velocities, gravity, h, first):
     previous, velocities : (n, 3) [m], [m/s]
     gravity : (3,) [m/s^2]
     h : length of the substep [s]
-    first : whether `velocities` holds already, at the beginning of a frame
     """
-    _predict_block(points, previous, velocities, gravity, h, first, 0, len(points))
+    _predict_block(points, previous, velocities, gravity, h, 0, len(points))
 
 
 @njit(cache=True, parallel=True)
-def predict_parallel(points, previous, velocities, gravity, h, first):
+def predict_parallel(points, previous, velocities, gravity, h):
     """The same as `predict`, on several threads."""
     for block in prange((len(points) + BLOCK - 1) // BLOCK):
         low = block * BLOCK
-        _predict_block(points, previous, velocities, gravity, h, first, low, min(low + BLOCK, len(points)))
+        _predict_block(points, previous, velocities, gravity, h, low, min(low + BLOCK, len(points)))
 
 
 @njit(cache=True)
-def finish(points, previous, velocities, h):
-    """v = (x - x_n) / h after the last substep of a frame. Returns the first vertex that is not finite, or -1."""
-    broken = -1
+def update_velocities(points, previous, velocities, h):
+    """v = (x - x_n) / h."""
     for i in range(len(points)):
         for j in range(3):
             velocities[i, j] = (points[i, j] - previous[i, j]) / h
-            if broken < 0 and not (np.isfinite(points[i, j]) and np.isfinite(velocities[i, j])):
-                broken = i
-    return broken
+
+
+@njit(cache=True)
+def first_broken(points, velocities):
+    """The first vertex whose position or velocity is not finite, or -1."""
+    for i in range(len(points)):
+        for j in range(3):
+            if not (np.isfinite(points[i, j]) and np.isfinite(velocities[i, j])):
+                return i
+    return -1
 
 
 @njit(cache=True)
@@ -93,15 +95,24 @@ def hold(points, vertices, targets, row, origins):
 
 @njit(cache=True)
 def to_world(points, origins, world):
-    """World positions (n, 3) of points (n, 3 or 4) kept about their origins (n, 3)."""
+    """World positions (n, 3) of points (n, 3 or 4) kept about their origins (n, 3). Returns whether all are finite."""
+    total = 0.0
     for i in range(len(world)):
         for j in range(3):
             world[i, j] = origins[i, j] + points[i, j]
+            total += 0.0 * world[i, j]
+    return total == 0.0
 
 
 @njit(cache=True)
-def take_changes(points, origins, world):
-    """Take over what was changed in `world` since `to_world`; what was not changed keeps every bit."""
+def take_changes(points, velocities, h, origins, previous, world, world_previous):
+    """Take over what contacts moved since `to_world`; what was not moved keeps every bit.
+
+    Positions at the end of the substep and at its beginning may both have been moved; the velocity gets the difference.
+    """
     for i in range(len(world)):
         for j in range(3):
-            points[i, j] += world[i, j] - (origins[i, j] + points[i, j])
+            change = world[i, j] - (origins[i, j] + points[i, j])
+            change_before = world_previous[i, j] - (origins[i, j] + previous[i, j])
+            points[i, j] += change
+            velocities[i, j] += (change - change_before) / h

@@ -29,31 +29,24 @@ _SUMS = 21
 
 
 class MomentumRestore:
-    """The free components of a system, prepared for `apply`."""
+    """The components of a system, and which of them are free."""
 
     def __init__(self, system: System) -> None:
         labels = system.components
-        held = np.zeros(int(labels.max()) + 1, dtype=bool)
-        held[labels[system.inverse_masses == 0.0]] = True
-        members = np.argsort(labels, kind="stable")
-        members = members[~held[labels[members]]]
-        owner = labels[members]
-        starts = np.flatnonzero(np.diff(owner, prepend=-1))
-        ends = np.append(starts, len(owner))[1:] if len(owner) else starts
-        blocks = [
-            (k, lo, min(lo + BLOCK, b))
-            for k, (a, b) in enumerate(zip(starts, ends, strict=True))
-            for lo in range(a, b, BLOCK)
-        ]
-        self.members = members.astype(np.uint32)
-        self.blocks = np.array(blocks, dtype=np.int64).reshape(-1, 3)
-        self.count = len(starts)
-        self.masses = np.ascontiguousarray(system.masses)
-        self.totals = np.bincount(
-            np.cumsum(np.diff(owner, prepend=-1) != 0) - 1, weights=self.masses[members], minlength=self.count
+        count = int(labels.max()) + 1
+        self.free = np.ones(count, dtype=np.bool_)
+        self.free[labels[system.inverse_masses == 0.0]] = False
+        self.members = np.argsort(labels, kind="stable").astype(np.uint32)
+        ends = np.cumsum(np.bincount(labels, minlength=count))
+        starts = np.append(0, ends[:-1])
+        self.blocks = np.array(
+            [(k, lo, min(lo + BLOCK, ends[k])) for k in range(count) for lo in range(starts[k], ends[k], BLOCK)],
+            dtype=np.int64,
         )
+        self.masses = np.ascontiguousarray(system.masses)
+        self.totals = np.bincount(labels, weights=self.masses, minlength=count)
         self._sums = np.zeros((len(self.blocks), _SUMS))
-        self._motion = np.zeros((self.count, 9))
+        self._motion = np.zeros((count, 9))
 
     def apply(
         self,
@@ -63,19 +56,20 @@ class MomentumRestore:
         h: float,
         parallel: bool,
     ) -> None:
-        """Restore both momenta of every free component, in place.
+        """End the internal part of a substep: v = (x - x_n) / h, and both momenta of every free component restored.
+
+        The correction goes into positions and velocities each for itself. Through the positions, velocities would take
+        over their round-off, divided by h; in 60 s of free motion at 80 substeps that has been seen to add up to 4e-9 rad/s.
 
         Parameters
         ----------
-        points : (n, 4) positions after the internal constraints [m], in the first three columns.
+        points : (n, 4) positions after the internal constraints [m], in the first three columns; changed in place.
         previous : (n, 3) positions at the beginning of the substep [m].
-        velocities : (n, 3) with which the substep's positions were predicted [m/s].
+        velocities : (n, 3) in: with which the substep's positions were predicted; out: at its end [m/s].
         h : length of the substep [s].
         parallel : whether blocks of vertices run on several threads.
         """
-        if self.count == 0:
-            return
-        work = self.members, self.blocks, self.totals, self._sums, self._motion
+        work = self.members, self.blocks, self.totals, self.free, self._sums, self._motion
         restore = _restore_parallel if parallel else _restore
         restore(points, previous, velocities, h, self.masses, *work)
 
@@ -92,9 +86,11 @@ def _sum_block(points, previous, velocities, h, masses, members, low, high, out)
         m = masses[i]
         ox, oy, oz = previous[i, 0], previous[i, 1], previous[i, 2]
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        dx = m * ((x - ox) - h * velocities[i, 0])
-        dy = m * ((y - oy) - h * velocities[i, 1])
-        dz = m * ((z - oz) - h * velocities[i, 2])
+        ux, uy, uz = x - ox, y - oy, z - oz
+        dx = m * (ux - h * velocities[i, 0])
+        dy = m * (uy - h * velocities[i, 1])
+        dz = m * (uz - h * velocities[i, 2])
+        velocities[i, 0], velocities[i, 1], velocities[i, 2] = ux / h, uy / h, uz / h
         px += dx
         py += dy
         pz += dz
@@ -127,6 +123,11 @@ def _sum_block(points, previous, velocities, h, masses, members, low, high, out)
 
 
 @njit(cache=True)
+def _cross(a, b):
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+@njit(cache=True)
 def _rigid_corrections(blocks, totals, sums, motion):
     """The translation, rotation vector and center of rotation of every component, from the sums of its blocks."""
     b = 0
@@ -141,7 +142,7 @@ def _rigid_corrections(blocks, totals, sums, motion):
         c = total[0:3] / M
         s = total[3:6] / M
         P = total[6:9]
-        L = total[9:12] - np.array([c[1] * P[2] - c[2] * P[1], c[2] * P[0] - c[0] * P[2], c[0] * P[1] - c[1] * P[0]])
+        L = total[9:12] - _cross(c, P)
         # sum m r r0^T, and from it A.
         R = total[12:21].copy().reshape(3, 3)
         for i in range(3):
@@ -151,27 +152,8 @@ def _rigid_corrections(blocks, totals, sums, motion):
         A = -R
         for i in range(3):
             A[i, i] += trace
-        c0 = np.array(
-            [
-                A[1, 1] * A[2, 2] - A[1, 2] * A[2, 1],
-                A[1, 2] * A[2, 0] - A[1, 0] * A[2, 2],
-                A[1, 0] * A[2, 1] - A[1, 1] * A[2, 0],
-            ]
-        )
-        c1 = np.array(
-            [
-                A[2, 1] * A[0, 2] - A[2, 2] * A[0, 1],
-                A[2, 2] * A[0, 0] - A[2, 0] * A[0, 2],
-                A[2, 0] * A[0, 1] - A[2, 1] * A[0, 0],
-            ]
-        )
-        c2 = np.array(
-            [
-                A[0, 1] * A[1, 2] - A[0, 2] * A[1, 1],
-                A[0, 2] * A[1, 0] - A[0, 0] * A[1, 2],
-                A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0],
-            ]
-        )
+        # The columns of the adjugate are cross products of the rows.
+        c0, c1, c2 = _cross(A[1], A[2]), _cross(A[2], A[0]), _cross(A[0], A[1])
         det = A[0, 0] * c0[0] + A[0, 1] * c0[1] + A[0, 2] * c0[2]
         motion[component, 0:3] = P / M
         motion[component, 6:9] = s
@@ -184,28 +166,38 @@ def _rigid_corrections(blocks, totals, sums, motion):
 
 
 @njit(cache=True)
-def _move_block(points, members, low, high, motion):
+def _move_block(points, velocities, h, members, low, high, motion):
     for k in range(low, high):
         i = members[k]
         rx, ry, rz = points[i, 0] - motion[6], points[i, 1] - motion[7], points[i, 2] - motion[8]
-        points[i, 0] -= motion[0] + (motion[4] * rz - motion[5] * ry)
-        points[i, 1] -= motion[1] + (motion[5] * rx - motion[3] * rz)
-        points[i, 2] -= motion[2] + (motion[3] * ry - motion[4] * rx)
+        dx = motion[0] + (motion[4] * rz - motion[5] * ry)
+        dy = motion[1] + (motion[5] * rx - motion[3] * rz)
+        dz = motion[2] + (motion[3] * ry - motion[4] * rx)
+        points[i, 0] -= dx
+        points[i, 1] -= dy
+        points[i, 2] -= dz
+        velocities[i, 0] -= dx / h
+        velocities[i, 1] -= dy / h
+        velocities[i, 2] -= dz / h
 
 
 @njit(cache=True)
-def _restore(points, previous, velocities, h, masses, members, blocks, totals, sums, motion):
+def _restore(points, previous, velocities, h, masses, members, blocks, totals, free, sums, motion):
     for b in range(len(blocks)):
         _sum_block(points, previous, velocities, h, masses, members, blocks[b, 1], blocks[b, 2], sums[b])
     _rigid_corrections(blocks, totals, sums, motion)
     for b in range(len(blocks)):
-        _move_block(points, members, blocks[b, 1], blocks[b, 2], motion[blocks[b, 0]])
+        component = blocks[b, 0]
+        if free[component]:
+            _move_block(points, velocities, h, members, blocks[b, 1], blocks[b, 2], motion[component])
 
 
 @njit(cache=True, parallel=True)
-def _restore_parallel(points, previous, velocities, h, masses, members, blocks, totals, sums, motion):
+def _restore_parallel(points, previous, velocities, h, masses, members, blocks, totals, free, sums, motion):
     for b in prange(len(blocks)):
         _sum_block(points, previous, velocities, h, masses, members, blocks[b, 1], blocks[b, 2], sums[b])
     _rigid_corrections(blocks, totals, sums, motion)
     for b in prange(len(blocks)):
-        _move_block(points, members, blocks[b, 1], blocks[b, 2], motion[blocks[b, 0]])
+        component = blocks[b, 0]
+        if free[component]:
+            _move_block(points, velocities, h, members, blocks[b, 1], blocks[b, 2], motion[component])

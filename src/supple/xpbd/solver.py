@@ -11,26 +11,32 @@ from dataclasses import dataclass, field
 
 import numba
 import numpy as np
+from numba.core import config
 from numpy.typing import NDArray
 
 from supple.errors import SolverError
 from supple.solver import Solver
 from supple.state import State, Status, StepReport
 from supple.system import System
+from supple.xpbd.collisions import Collisions
 from supple.xpbd.constraints import ConstraintSet, build_constraint_sets
+from supple.xpbd.contact_settings import ContactSettings
 from supple.xpbd.integration import (
-    finish,
+    first_broken,
     hold,
     origins_of_components,
     predict,
     predict_parallel,
+    take_changes,
     to_world,
+    update_velocities,
 )
 from supple.xpbd.momentum import MomentumRestore
 from supple.xpbd.ordering import Layout, make_layout, reordered
 
 # Below this many constraints a sweep is over before a second thread has woken up.
 PARALLEL_FROM = 20_000
+_MOST_THREADS: int = config.NUMBA_NUM_THREADS  # pyright: ignore[reportAttributeAccessIssue]
 
 
 @dataclass(eq=False)
@@ -47,6 +53,7 @@ class XPBDWorkspace:
     layout: Layout
     sets: list[ConstraintSet]
     momentum: MomentumRestore | None
+    collisions: Collisions
     parallel: bool
     points: NDArray[np.float64]
     previous: NDArray[np.float64] = field(init=False)
@@ -69,6 +76,7 @@ class XPBD(Solver):
     substeps : number of substeps of a frame, each with one sweep over all constraints.
     momentum_restore : give free bodies back the momentum that constraint projection takes (see `supple.xpbd.momentum`).
         False shows what XPBD does without.
+    contact : contact of bodies with each other and with themselves; None turns it off. Obstacles act in any case.
     threads : number of threads, or None: all of Numba's where the scene is large enough, else one. The result has the
         same bits for any number.
 
@@ -79,17 +87,20 @@ class XPBD(Solver):
 
     substeps: int = 20
     momentum_restore: bool = True
+    contact: ContactSettings | None = field(default_factory=ContactSettings)
     threads: int | None = None
 
     def __post_init__(self) -> None:
         _check_count("substeps", self.substeps)
         if not isinstance(self.momentum_restore, bool):
             raise SolverError(f"XPBD: momentum_restore is {self.momentum_restore!r}; give True or False")
+        if self.contact is not None and not isinstance(self.contact, ContactSettings):
+            raise SolverError(f"XPBD: contact is {self.contact!r}; give ContactSettings(...), or None to turn it off")
         if self.threads is not None:
             _check_count("threads", self.threads)
-            if self.threads > numba.config.NUMBA_NUM_THREADS:  # pyright: ignore[reportAttributeAccessIssue]
+            if self.threads > _MOST_THREADS:
                 raise SolverError(
-                    f"XPBD: threads is {self.threads}; this process has {numba.config.NUMBA_NUM_THREADS}"  # pyright: ignore[reportAttributeAccessIssue]
+                    f"XPBD: threads is {self.threads}; this process has {_MOST_THREADS}"
                     " (set NUMBA_NUM_THREADS before it starts for more)"
                 )
 
@@ -112,6 +123,7 @@ class XPBD(Solver):
             layout=layout,
             sets=sets,
             momentum=MomentumRestore(inner) if self.momentum_restore else None,
+            collisions=Collisions(inner, self.contact),
             parallel=threads > 1 and large,
             points=points,
         )
@@ -122,21 +134,32 @@ class XPBD(Solver):
         _load(ws, state)
         targets = _pin_targets(ws.system, state.time, h, self.substeps)
         held = ws.system.pinned_vertices
+        if ws.collisions:
+            ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt)
         with _threads(self.threads, ws.parallel):
             for k in range(self.substeps):
-                (predict_parallel if ws.parallel else predict)(
-                    ws.points, ws.previous, ws.velocities, ws.system.gravity, h, k == 0
-                )
+                begin = predict_parallel if ws.parallel else predict
+                begin(ws.points, ws.previous, ws.velocities, ws.system.gravity, h)
                 if len(held):
                     hold(ws.points, held, targets, k, ws.origins)
                 for constraints in ws.sets:
                     constraints.project(ws.points, ws.previous, h, ws.parallel)
                 if ws.momentum is not None:
                     ws.momentum.apply(ws.points, ws.previous, ws.velocities, h, ws.parallel)
-        broken = finish(ws.points, ws.previous, ws.velocities, h)
+                else:
+                    update_velocities(ws.points, ws.previous, ws.velocities, h)
+                if ws.collisions and not _collide(ws, state.time + (k + 1) * h, h):
+                    break
+        broken = first_broken(ws.points, ws.velocities)
         if broken >= 0:
             return state, StepReport(Status.NOT_FINITE, self.substeps, message=_what_broke(ws, broken, state.time + dt))
-        return _unload(ws, state.time + dt), StepReport(Status.CONVERGED, self.substeps)
+        report = StepReport(
+            Status.CONVERGED,
+            self.substeps,
+            min_distance=ws.collisions.min_distance,
+            details={"contacts": ws.collisions.contacts},
+        )
+        return _unload(ws, state.time + dt), report
 
 
 def _check_count(name: str, value: object) -> None:
@@ -164,6 +187,16 @@ def _load(ws: XPBDWorkspace, state: State) -> None:
     np.take(state.velocities, old, axis=0, out=ws.velocities)
     origins_of_components(ws.world, ws.system.components, ws.origins)
     np.subtract(ws.world, ws.origins, out=ws.points[:, :3])
+
+
+def _collide(ws: XPBDWorkspace, time: float, h: float) -> bool:
+    """Contacts of one substep, in world coordinates. Returns False, with nothing done, where positions are not finite."""
+    if not to_world(ws.points, ws.origins, ws.world):
+        return False
+    to_world(ws.previous, ws.origins, ws.world_previous)
+    ws.collisions.project(ws.world, ws.world_previous, time, h)
+    take_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
+    return True
 
 
 def _unload(ws: XPBDWorkspace, time: float) -> State:
