@@ -1,0 +1,8 @@
+"""`python -m supple` is `supple`."""
+
+import sys
+
+from supple.cli.app import main
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,76 @@
+"""The command `supple`: finds the command, and turns every foreseeable error into one line and an exit code."""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+from collections.abc import Sequence
+
+from cyclopts import App
+from cyclopts.exceptions import CycloptsError
+
+from supple import __version__
+from supple.cli.complain import complain
+from supple.cli.exit_codes import ExitCode
+from supple.errors import SuppleError
+
+app = App(
+    name="supple",
+    help="Tetrahedral soft bodies: a surface mesh goes in, a simulation that can be trusted comes out.",
+    help_epilogue="Exit codes: 0 done, 2 the input or an option cannot be used, 3 the solver could not go on.",
+    version=__version__,
+    suppress_keyboard_interrupt=False,
+    exit_on_error=False,
+    print_error=False,
+    verbose=False,
+    result_action="return_value",
+)
+
+# Import paths: a command's module is loaded when it is called for.
+COMMANDS = {
+    "demo": "supple.cli.demo:demo",
+    "run": "supple.cli.run:run",
+    "mesh": "supple.cli.mesh:mesh",
+    "export": "supple.cli.export:export",
+    "plot": "supple.cli.plot:plot",
+    "schema": "supple.cli.schema:schema",
+    "info": "supple.cli.info:info",
+}
+for _order, (_name, _path) in enumerate(COMMANDS.items()):
+    app.command(_path, name=_name, sort_key=_order)
+
+
+def _log_level() -> int:
+    """Warnings, or what the environment variable SUPPLE_LOG says: DEBUG, INFO, ERROR."""
+    return logging.getLevelNamesMapping().get(os.environ.get("SUPPLE_LOG", "").upper(), logging.WARNING)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run `supple` with the given arguments, or those of the process; returns the exit code."""
+    logging.basicConfig(level=_log_level(), format="%(levelname)s: %(message)s")
+    try:
+        code = app(sys.argv[1:] if arguments is None else list(arguments))
+        sys.stdout.flush()
+    except SuppleError as error:
+        complain(str(error))
+        return ExitCode.INPUT
+    except CycloptsError as error:
+        command = f" {error.command_chain[0]}" if error.command_chain else ""
+        complain(f"{str(error).rstrip(' .')}; see supple{command} --help")
+        return ExitCode.INPUT
+    except KeyboardInterrupt:
+        complain("interrupted")
+        return ExitCode.INTERRUPTED
+    except BrokenPipeError:
+        # Python flushes stdout once more when it exits; let that go nowhere.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return ExitCode.BROKEN_PIPE
+    except MemoryError as error:
+        complain(f"there is not enough memory for this: {error or 'make the meshes coarser'}")
+        return ExitCode.INPUT
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        complain(f"{where}{error.strerror or error}")
+        return ExitCode.INPUT
+    return ExitCode.OK if code is None else int(code)

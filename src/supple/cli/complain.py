@@ -1,0 +1,20 @@
+"""One line on stderr, whatever an error's text holds."""
+
+from __future__ import annotations
+
+import sys
+
+
+def one_line(message: str) -> str:
+    """A text on one line, without characters that a terminal would act upon."""
+    words = " ".join(message.split())
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in words)
+
+
+def complain(message: str) -> None:
+    """Write `supple: message` to stderr, on one line."""
+    text = f"supple: {one_line(message)}\n"
+    try:
+        sys.stderr.write(text)
+    except UnicodeEncodeError:
+        sys.stderr.write(text.encode("ascii", "backslashreplace").decode("ascii"))

@@ -1,0 +1,77 @@
+"""`supple demo`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from supple.cli.exit_codes import ExitCode
+
+
+def demo(
+    name: str | None = None,
+    /,
+    *,
+    list_: Annotated[bool, Parameter(name=["--list", "-l"], negative="")] = False,
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+    steps: int | None = None,
+    solver: str | None = None,
+    page: bool = True,
+    plot: bool = True,
+    quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
+) -> int:
+    """Run a named demo, record it, and measure what it claims.
+
+    Parameters
+    ----------
+    name
+        Which demo; without it, the demos are listed.
+    list_
+        List the demos.
+    output
+        Folder for recording.vtkhdf, index.html and plot.png; without it, out/NAME.
+    steps
+        Number of frames, instead of the demo's own; a shortened demo may not reach what it claims.
+    solver
+        Kind of solver: xpbd or implicit, where the demo has both.
+    page
+        Write index.html, which plays the recording in a browser.
+    plot
+        Write plot.png: energies, momentum, volume ratio and smallest J over time.
+    quiet
+        Print no progress; only what was measured.
+    """
+    from rich.console import Console
+    from rich.markup import escape
+
+    from supple.demos.registry import DEMOS, find_demo
+
+    console = Console(highlight=False, soft_wrap=True)
+    if list_ or name is None:
+        width = max(map(len, DEMOS))
+        for known in DEMOS.values():
+            console.print(f"[bold]{known.name:<{width}}[/]  {escape(known.summary)}")
+        return ExitCode.OK
+
+    from supple.cli.session import Products, run_session
+
+    chosen = find_demo(name)
+    used = chosen.solver(solver)
+    measurement = chosen.measurement()
+    if not quiet:
+        console.print(f"[bold]{chosen.name}[/]: {escape(chosen.explanation)}")
+    outcome = run_session(
+        chosen.scene(),
+        used,
+        chosen.dt,
+        chosen.steps if steps is None else steps,
+        products=Products(Path("out") / chosen.name if output is None else output, page, plot, quiet),
+        sinks=[measurement],
+    )
+    if outcome.frames:
+        for claim in measurement.claims():
+            mark = "[green]holds[/]" if claim.holds else "[red]does not hold[/]"
+            console.print(f"{mark}: {escape(claim.text)} ({escape(claim.measured)})")
+    return outcome.code

@@ -1,0 +1,175 @@
+"""`supple info`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from supple.mesh.surface import SurfaceMesh
+    from supple.mesh.tetmesh import TetMesh
+
+SCENE_FILES = (".yaml", ".yml")
+RECORDINGS = (".vtkhdf", ".hdf", ".h5")
+PACKAGES = ("numpy", "scipy", "numba", "h5py", "tetgen", "ipctk", "viser", "pydantic")
+EXTRAS = ("pytetwild", "pymeshfix", "usd-core", "pyvista")
+
+
+def info(file: Path | None = None, /) -> None:
+    """Say what is in a file: counts, sizes, quality, problems. Without a file: versions, platform and threads.
+
+    Parameters
+    ----------
+    file
+        A scene (.yaml), a surface, a tet mesh or a recording (.vtkhdf).
+    """
+    if file is None:
+        _print_table("Supple", _platform())
+        return
+    suffix = file.suffix.lower()
+    if suffix in SCENE_FILES:
+        _scene(file)
+    elif suffix in RECORDINGS:
+        _recording(file)
+    else:
+        _mesh(file, suffix)
+
+
+def _print_table(title: str, rows: list[tuple[str, str]]) -> None:
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(title=escape(title), title_justify="left", show_header=False, box=None, pad_edge=False)
+    table.add_column(style="bold")
+    table.add_column(overflow="fold")
+    for name, value in rows:
+        table.add_row(escape(name), escape(value))
+    Console().print(table)
+
+
+def _platform() -> list[tuple[str, str]]:
+    import os
+    import platform
+    from importlib.metadata import PackageNotFoundError, version
+
+    import supple
+
+    rows = [
+        ("supple", supple.__version__),
+        ("python", f"{platform.python_version()} ({platform.python_implementation()})"),
+        ("platform", platform.platform()),
+        ("processors", str(os.cpu_count())),
+    ]
+    import numba
+
+    rows.append(("threads", str(numba.get_num_threads())))
+    for name in (*PACKAGES, *EXTRAS):
+        try:
+            rows.append((name, version(name)))
+        except PackageNotFoundError:
+            rows.append((name, "not installed (an extra)" if name in EXTRAS else "missing"))
+    return rows
+
+
+def _extent(low: np.ndarray, high: np.ndarray) -> str:
+    return " x ".join(f"{x:.6g}" for x in high - low) + " m"
+
+
+def _surface_rows(surface: SurfaceMesh) -> list[tuple[str, str]]:
+    report = surface.check()
+    return [
+        ("kind", "surface"),
+        ("vertices", str(len(surface.vertices))),
+        ("triangles", str(len(surface.triangles))),
+        ("components", str(report.component_count)),
+        ("size", _extent(*surface.bounds)),
+        ("area", f"{surface.area:.6g} m^2"),
+        ("volume", f"{surface.volume:.6g} m^3" if report.watertight else "none, the surface is open"),
+        ("problems", "none" if report.ok else "\n".join(report.problems)),
+    ]
+
+
+def _tet_rows(mesh: TetMesh) -> list[tuple[str, str]]:
+    return [
+        ("kind", "tetrahedral mesh"),
+        ("vertices", str(len(mesh.vertices))),
+        ("tets", str(len(mesh.tets))),
+        ("edges", str(len(mesh.edges))),
+        ("surface triangles", str(len(mesh.surface.triangles))),
+        ("components", str(mesh.components.count)),
+        ("size", _extent(mesh.vertices.min(axis=0), mesh.vertices.max(axis=0))),
+        ("volume", f"{mesh.volume:.6g} m^3"),
+        ("tet volumes", f"{mesh.volumes.min():.3g} to {mesh.volumes.max():.3g} m^3"),
+        ("smallest dihedral", f"{mesh.min_dihedrals.min():.2f} degrees (tet {int(mesh.min_dihedrals.argmin())})"),
+        ("radius ratio", f"worst {mesh.radius_ratios.min():.3f}, mean {mesh.radius_ratios.mean():.3f} (1 is regular)"),
+        ("tets turned", str(mesh.turned)),
+    ]
+
+
+def _mesh(file: Path, suffix: str) -> None:
+    from supple.errors import MeshError
+    from supple.mesh.mesh_files import SURFACE_READERS, TET_EXTENSIONS
+    from supple.mesh.surface import SurfaceMesh
+    from supple.mesh.tetmesh import TetMesh
+
+    known = (*SCENE_FILES, *RECORDINGS[:1], *dict.fromkeys((*SURFACE_READERS, *TET_EXTENSIONS)))
+    if suffix not in known:
+        raise MeshError(f"{file}: unknown extension {suffix or '(none)'}; known are {', '.join(known)}")
+    if suffix in TET_EXTENSIONS:
+        try:
+            mesh = TetMesh.load(file)
+        except MeshError as error:
+            surface = _surface_of_same_kind(file, suffix in SURFACE_READERS)
+            if surface is None:
+                raise error from None
+            _print_table(str(file), _surface_rows(surface))
+        else:
+            _print_table(str(file), _tet_rows(mesh))
+        return
+    _print_table(str(file), _surface_rows(SurfaceMesh.load(file)))
+
+
+def _surface_of_same_kind(file: Path, may_hold_one: bool) -> SurfaceMesh | None:
+    """The surface in a file whose format may hold tets or triangles, or None."""
+    from supple.errors import MeshError
+    from supple.mesh.surface import SurfaceMesh
+
+    if not may_hold_one:
+        return None
+    try:
+        return SurfaceMesh.load(file)
+    except MeshError:
+        return None
+
+
+def _scene(file: Path) -> None:
+    from supple.scene_file.loader import load_run
+    from supple.system import build_system
+
+    run = load_run(file)
+    scene, system = run.scene, build_system(run.scene)
+    rows = [
+        ("kind", "scene"),
+        ("bodies", str(len(scene.bodies))),
+        ("vertices", str(len(system.masses))),
+        ("tets", str(len(system.tets))),
+        ("obstacles", ", ".join(f"{o.name} ({type(o).__name__})" for o in scene.obstacles) or "none"),
+        ("pins", ", ".join(f"{p.pin.label}: {len(p.vertices)} vertices" for p in system.pins) or "none"),
+        ("solver", str(run.solver)),
+        ("time", f"{run.steps} steps of {run.dt:.6g} s: {run.steps * run.dt:.6g} s"),
+    ]
+    for part in system.bodies:
+        mass = system.masses[part.vertices].sum()
+        mesh = part.body.mesh
+        text = f"{type(part.body.material).__name__}, {len(mesh.tets)} tets, {mesh.volume:.6g} m^3, {mass:.6g} kg"
+        rows.append((f"body {part.name}", text))
+    _print_table(str(file), rows)
+
+
+def _recording(file: Path) -> None:
+    from supple.output.recording import read_recording
+
+    _print_table(str(file), recording_rows(read_recording(file)))

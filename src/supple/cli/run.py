@@ -1,0 +1,63 @@
+"""`supple run`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+
+def run(
+    scene: Path,
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=["--output", "-o"])] = Path("out"),
+    steps: int | None = None,
+    dt: float | None = None,
+    solver: str | None = None,
+    page: bool | None = None,
+    plot: bool | None = None,
+    quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
+) -> int:
+    """Simulate a scene file and record it.
+
+    The recording is written while the scene runs and is readable up to the last whole frame, whatever happens.
+
+    Parameters
+    ----------
+    scene
+        The scene file (.yaml); `supple schema` describes it.
+    output
+        Folder for recording.vtkhdf, index.html and plot.png; it is made where it is missing.
+    steps
+        Number of frames, instead of the file's.
+    dt
+        Time from frame to frame [s], instead of the file's.
+    solver
+        Kind of solver, instead of the file's, with its default parameters.
+    page
+        Write index.html, which plays the recording in a browser; as the file says without this.
+    plot
+        Write plot.png; as the file says without this.
+    quiet
+        Print neither progress nor summary.
+    """
+    from supple.cli.session import Products, run_session
+    from supple.scene_file.loader import load_run
+    from supple.scene_file.solvers import solver_of_kind
+
+    described = load_run(scene)
+    return run_session(
+        described.scene,
+        described.solver if solver is None else solver_of_kind(solver),
+        described.dt if dt is None else dt,
+        described.steps if steps is None else steps,
+        start=described.start,
+        products=Products(
+            folder=output,
+            page=described.output.page if page is None else page,
+            plot=described.output.plot if plot is None else plot,
+            quiet=quiet,
+        ),
+    ).code

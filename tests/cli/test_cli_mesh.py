@@ -1,0 +1,78 @@
+"""`supple mesh`: files in, files out, and errors as one line with exit code 2."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from supple.cli.app import main
+from supple.mesh.shape_surfaces import sphere_surface
+from supple.mesh.surface import SurfaceMesh
+from supple.mesh.tetmesh import TetMesh
+
+BALL = sphere_surface(radius=0.5, edge_length=0.25)
+
+
+@pytest.fixture
+def ball(tmp_path: Path) -> Path:
+    BALL.save(tmp_path / "ball.stl")
+    return tmp_path / "ball.stl"
+
+
+@pytest.mark.parametrize("name", ["ball.1.node", "ball.1.face", "ball.msh", "ball.vtu", "ball.vtk"])
+def test_every_kind_of_output_reads_back(ball: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    output = ball.with_name(name)
+    assert main(["mesh", str(ball), "-o", str(output), "--max-volume", "5e-3"]) == 0
+    mesh = TetMesh.load(output)
+    assert mesh.volume == pytest.approx(BALL.volume, rel=1e-4)
+    assert mesh.volumes.max() <= 5e-3 * (1 + 1e-6)
+    said = capsys.readouterr().out
+    assert "tetgen" in said
+    assert str(len(mesh.tets)) in said
+    quartet = {f"ball.1.{s}" for s in ("node", "ele", "edge", "face")}
+    assert {p.name for p in ball.parent.iterdir()} == {ball.name} | (quartet if ".1." in name else {name})
+
+
+def test_base_index_and_wishes_reach_the_mesher(ball: Path) -> None:
+    wishes = ["--base-index", "0", "--keep-surface", "--quality", "1.2", "--min-dihedral", "10"]
+    assert main(["mesh", str(ball), "--output", str(ball.with_name("b.node")), *wishes]) == 0
+    assert ball.with_name("b.node").read_text().splitlines()[1].startswith("0 ")
+    mesh = TetMesh.load(ball.with_name("b.ele"))
+    assert len(mesh.surface.used_vertices) == len(BALL.vertices)
+
+
+def test_repair_is_reported(ball: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    turned = np.vstack([BALL.triangles[:9, ::-1], BALL.triangles[9:]])
+    SurfaceMesh(BALL.vertices, turned).save(ball)
+    assert main(["mesh", str(ball), "-o", str(ball.with_name("b.vtu")), "--mesher", "tetgen"]) == 2
+    assert "inconsistent edge" in capsys.readouterr().err
+    assert main(["mesh", str(ball), "-o", str(ball.with_name("b.vtu")), "--repair"]) == 0
+    assert "turned 9 triangles" in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["missing.stl", "-o", "b.node"], "missing.stl: "),
+        (["ball.stl", "-o", "b.step"], "b.step: the extension must be one of .node"),
+        (["ball.stl", "-o", "no/where/b.msh"], "there is no folder"),
+        (["ball.stl", "-o", "taken.1.node"], "taken.1.face: is a folder"),
+        (["ball.stl", "-o", "b.node", "--quality", "0.9"], "ball.stl: quality must be"),
+        (["ball.stl", "-o", "b.node", "--max-volume", "-1"], "max_volume must be"),
+        (["ball.stl", "-o", "b.node", "--memory-limit", "0"], "memory limit must be"),
+        (["ball.stl", "-o", "b.node", "--time-limit", "nan"], "time_limit must be"),
+        (["ball.stl", "-o", "b.node", "--max-volume", "1e-9", "--time-limit", "0.5"], "time limit of 0.5 s"),
+        (["ball.stl"], "output"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_errors_are_one_line_and_leave_no_file(ball: Path, monkeypatch, capsys, arguments, message) -> None:
+    monkeypatch.chdir(ball.parent)
+    Path("taken.1.face").mkdir()
+    assert main(["mesh", *arguments]) == 2
+    said = capsys.readouterr().err
+    assert message in said
+    assert said.count("\n") == 1
+    assert {p.name for p in ball.parent.iterdir()} == {"ball.stl", "taken.1.face"}

@@ -1,0 +1,95 @@
+"""What `import supple` promises: it is quick, every name is there, and nothing needs a POSIX system."""
+
+import json
+import subprocess
+import sys
+import textwrap
+
+import pytest
+
+import supple as sp
+
+HEAVY = [
+    "numba", "scipy", "h5py", "meshio", "viser", "matplotlib", "pyvista", "vtk", "skimage", "tetgen", "ipctk",
+    "pydantic", "yaml", "cyclopts", "rich", "pxr", "trimesh",
+]  # fmt: skip
+
+
+def python(code, *arguments):
+    """What a fresh interpreter prints."""
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(code), *arguments], capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_importing_supple_loads_nothing_heavy():
+    loaded = json.loads(python("import json, sys, supple; print(json.dumps(sorted(sys.modules)))"))
+    assert [name for name in HEAVY if name in loaded] == []
+
+
+def test_the_shell_starts_without_the_numerics():
+    code = """
+        import json, sys
+        from supple.cli.app import app
+        try:
+            app(["--help"])
+        finally:
+            print(json.dumps(sorted(sys.modules)))
+    """
+    loaded = json.loads(python(code).splitlines()[-1])
+    heavy = [name for name in HEAVY if name not in ("cyclopts", "rich")]
+    assert [name for name in heavy if name in loaded] == []
+
+
+@pytest.mark.parametrize("name", sp.__all__)
+def test_every_public_name_is_there(name):
+    assert getattr(sp, name) is not None
+    assert name in dir(sp)
+
+
+def test_unknown_names_are_attribute_errors():
+    with pytest.raises(AttributeError, match="no attribute 'Bodyy'"):
+        sp.Bodyy  # noqa: B018  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_simulate_stays_the_function_when_its_module_is_imported_first():
+    assert python("import supple.simulate, supple; print(callable(supple.simulate))").strip() == "True"
+    assert (
+        python("from supple.simulate import Frame; import supple as sp; print(sp.simulate.__name__)").strip()
+        == "simulate"
+    )
+
+
+# Modules that only POSIX systems have, and names of shared modules that only they have.
+POSIX_ONLY = ["fcntl", "grp", "pty", "pwd", "resource", "syslog", "termios", "tty"]
+POSIX_NAMES = {
+    "os": ["fork", "getuid", "geteuid", "killpg", "mkfifo", "setsid", "sched_getaffinity", "sysconf", "wait4"],
+    "signal": ["SIGKILL", "SIGHUP", "SIGALRM", "SIGUSR1", "alarm", "setitimer"],
+}
+
+
+def test_every_module_imports_without_what_only_posix_has():
+    # What the libraries below us import is loaded first: they have their own ways on other systems.
+    code = """
+        import importlib, json, os, pkgutil, signal, sys
+        import asyncio, multiprocessing, socket, subprocess, tempfile
+        for name in ("numba", "scipy.sparse.csgraph", "scipy.spatial", "h5py", "pydantic", "yaml", "cyclopts",
+                     "rich.console", "rich.progress", "rich.table"):
+            importlib.import_module(name)
+        modules, names = json.loads(sys.argv[1])
+        for name in modules:
+            sys.modules[name] = None
+        for module, hidden in names.items():
+            for name in hidden:
+                if hasattr(sys.modules[module], name):
+                    delattr(sys.modules[module], name)
+        import supple
+        for module in pkgutil.walk_packages(supple.__path__, "supple."):
+            if not module.name.endswith("__main__"):
+                importlib.import_module(module.name)
+                print(module.name)
+    """
+    found = python(code, json.dumps([POSIX_ONLY, POSIX_NAMES])).split()
+    assert {"supple.simulate", "supple.cli.app", "supple.mesh.tetrahedralize", "supple.scene_file.loader"} <= set(found)
