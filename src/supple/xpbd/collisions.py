@@ -9,18 +9,19 @@ from numpy.typing import NDArray
 
 from supple.system import System
 from supple.xpbd.contact_settings import ContactSettings
+from supple.xpbd.contact_surfaces import build_surfaces
 from supple.xpbd.obstacle_contacts import ObstacleContacts
 from supple.xpbd.obstacle_poses import ObstaclePoses
 from supple.xpbd.obstacle_shapes import build_shapes
 from supple.xpbd.reach import outran, reach_from_velocities
+from supple.xpbd.surface_collisions import SurfaceCollisions
 
-# Of the mean surface edge: what a vertex at rest may move before lists are made anew, and what one list covers at most.
-LEAST_REACH, MOST_REACH = 0.1, 1.0
-# Of the mean surface edge: how much of an old overlap is mended in one frame, and up to which gaps distances are reported.
+# Of the mean surface edge: what a vertex at rest may move before lists are made anew.
+LEAST_REACH = 0.1
+# Of the mean surface edge: how much of an old overlap is mended in one frame; up to which gaps distances are reported.
 MENDED_PER_FRAME, NEAR = 1.0, 1.0
+# Of the mean surface edge.
 DEFAULT_THICKNESS = 0.05
-
-_NO_DRIFT = np.zeros(3)
 
 
 class Collisions:
@@ -33,8 +34,8 @@ class Collisions:
 
     Attributes
     ----------
-    min_distance : smallest gap at the beginnings of the frame's substeps [m], below zero where surfaces overlapped; None
-        when nothing was nearer than about one edge length.
+    min_distance : smallest gap at the beginnings of the frame's substeps [m], below zero where surfaces overlapped;
+        None when nothing was nearer than about one edge length.
     contacts : number of contacts in the last substep.
     """
 
@@ -44,6 +45,12 @@ class Collisions:
         self.edge_length = mean_edge_length(system)
         self.poses = ObstaclePoses(system.obstacles)
         self.obstacles = ObstacleContacts(build_shapes(system.obstacles), self.poses, system.inverse_masses)
+        thickness = settings.thickness if settings is not None else None
+        self.thickness = thickness if thickness is not None else DEFAULT_THICKNESS * self.edge_length
+        surfaces = build_surfaces(system, settings, self.thickness, self.edge_length)
+        self.surfaces = (
+            SurfaceCollisions(system, surfaces, self.poses, self.edge_length) if surfaces.is_needed else None
+        )
         self.contacts = 0
         self._smallest = math.inf
         self._dt = 0.0
@@ -53,7 +60,7 @@ class Collisions:
 
     def __bool__(self) -> bool:
         """Whether there is anything to collide with."""
-        return bool(self.obstacles)
+        return bool(self.obstacles) or self.surfaces is not None
 
     @property
     def min_distance(self) -> float | None:
@@ -69,6 +76,8 @@ class Collisions:
         """
         self._smallest = math.inf
         self._dt = dt
+        if self.surfaces is not None:
+            self.surfaces.begin_step(x, v, time, dt)
         if self.obstacles:
             self._gather_obstacles(x, v, time)
 
@@ -86,16 +95,17 @@ class Collisions:
         """
         self.contacts = 0
         limit = MENDED_PER_FRAME * self.edge_length * min(1.0, h / self._dt)
+        if self.surfaces is not None:
+            self._count(self.surfaces.project(x, x_prev, (time - h, time), limit))
         if self.obstacles:
-            if outran(x, self._gathered, self._reach, _NO_DRIFT):
+            if outran(x, self._gathered, self._reach):
                 self._gather_obstacles(x, (x - x_prev) / h, time)
             self._count(self.obstacles.project(x, x_prev, (time - h, time), limit, NEAR * self.edge_length))
         return self.contacts
 
     def _gather_obstacles(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float) -> None:
         falling = 0.5 * float(np.linalg.norm(self.system.gravity)) * self._dt**2
-        least, most = LEAST_REACH * self.edge_length + falling, math.inf
-        reach_from_velocities(v, _NO_DRIFT, self._dt, least, most, self._reach)
+        reach_from_velocities(v, self._dt, LEAST_REACH * self.edge_length + falling, self._reach)
         self._gathered[:] = x
         self.obstacles.gather(x, self._reach, time)
 

@@ -1,9 +1,9 @@
 """Coulomb friction at the level of positions.
 
-Over a substep a contact moves two surfaces apart by `normal` (only the part that takes velocity away counts) and finds
-that they have slipped by the vector s along each other. Friction takes back s wholly where |s| <= mu normal (the contact
-sticks) and mu normal of it otherwise (it slides). Both corrections are divided between the two sides by the same inverse
-masses, so that the impulses obey |f_t| <= mu f_n exactly: one coefficient, static and kinetic.
+Over a substep a contact moves two surfaces apart by `normal` (only the part that takes velocity away counts) and
+finds that they have slipped by the vector s along each other. Friction takes back s wholly where |s| <= mu normal (the
+contact sticks) and mu normal of it otherwise (it slides). Both corrections are divided between the two sides by the
+same inverse masses, so that the impulses obey |f_t| <= mu f_n exactly: one coefficient, static and kinetic.
 
 Source: Macklin, Müller, Chentanez, Kim, "Unified Particle Physics" (2014), section 6.1, with one coefficient.
 """

@@ -1,7 +1,7 @@
 """Vertices against obstacles of simple shape: plane, ball, bowl and block; static or scripted, with friction.
 
-Every vertex of a body is tested, also inner ones. A correction is along the shape's normal only, to the last bit: a floor
-cannot turn what stands on it about the vertical.
+Every vertex of a body is tested, also inner ones. A correction is along the shape's normal only, to the last bit: a
+floor cannot turn what stands on it about the vertical.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from supple.numerics.mat3 import dot, row
 from supple.xpbd.friction import friction_correction
 from supple.xpbd.obstacle_poses import ObstaclePoses
-from supple.xpbd.obstacle_shapes import BALL, BLOCK, BOWL, PLANE, ObstacleShapes
+from supple.xpbd.obstacle_shapes import BALL, BOWL, PLANE, ObstacleShapes
 from supple.xpbd.overlap import split_overlap
 
 
@@ -241,6 +241,3 @@ class ObstacleContacts:
         frames = self.shapes.placed(self.poses, times[1])
         candidates = (self._starts, self._vertices)
         return project_shapes(x, x_prev, candidates, self._arrays, frames, frames_before, limit, near)
-
-
-__all__ = ["BALL", "BLOCK", "BOWL", "PLANE", "ObstacleContacts"]

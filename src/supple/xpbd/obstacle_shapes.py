@@ -44,7 +44,8 @@ class ObstacleShapes:
             return self.frames
         R, t = poses.at(time)
         R, t = R[self.owners], t[self.owners]
-        out = np.einsum("kij,klj->kli", R, self.frames)
+        out = np.zeros_like(self.frames)
+        np.einsum("kij,klj->kli", R, self.frames, out=out)
         out[:, 0] += t
         return out
 

@@ -1,9 +1,9 @@
 """Dividing the correction of an overlap into what velocities must feel and what they must not.
 
-An overlap that was there when the substep began came from no velocity of this substep, so mending it must give none: that
-part moves positions at the beginning and at the end of the substep alike, and no faster than `limit`. The rest is what the
-surfaces approached each other in the substep, and moves the end only: it takes the approach away, and never gives back
-more (unconditionally inelastic).
+An overlap that was there when the substep began came from no velocity of this substep, so mending it must give none:
+that part moves positions at the beginning and at the end of the substep alike, and no faster than `limit`. The rest is
+what the surfaces approached each other in the substep, and moves the end only: it takes the approach away, and never
+gives back more (unconditionally inelastic).
 
 Source: the pre-stabilization of Macklin et al., "Unified Particle Physics" (2014), section 4.4.
 """

@@ -4,25 +4,85 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
 
 
 @njit(cache=True)
-def reach_from_velocities(velocities, drift, dt, least, most, out):
-    """out (n,) [m]: how far each vertex may get, relative to a common drift [m/s], within dt [s]; bounded both ways."""
+def reach_from_velocities(velocities, dt, least, out):
+    """out (n,) [m]: how far each vertex may get within dt [s], at least `least`."""
     for i in range(len(velocities)):
-        a, b, c = velocities[i, 0] - drift[0], velocities[i, 1] - drift[1], velocities[i, 2] - drift[2]
-        out[i] = min(most, least + 1.2 * dt * math.sqrt(a * a + b * b + c * c))
+        a, b, c = velocities[i, 0], velocities[i, 1], velocities[i, 2]
+        out[i] = least + 1.2 * dt * math.sqrt(a * a + b * b + c * c)
 
 
 @njit(cache=True)
-def outran(x, x_gathered, reach, drift):
-    """Whether some vertex is further than its reach (n,) from where it was, carried by a drift (3,) [m]."""
+def outran(x, x_gathered, reach):
+    """Whether some vertex is further than its reach (n,) from where it was."""
     for i in range(len(x)):
-        a = x[i, 0] - x_gathered[i, 0] - drift[0]
-        b = x[i, 1] - x_gathered[i, 1] - drift[1]
-        c = x[i, 2] - x_gathered[i, 2] - drift[2]
+        a, b, c = x[i, 0] - x_gathered[i, 0], x[i, 1] - x_gathered[i, 1], x[i, 2] - x_gathered[i, 2]
         # Written so that a position that is not finite outruns everything.
         if not a * a + b * b + c * c <= reach[i] * reach[i]:
+            return True
+    return False
+
+
+@njit(cache=True)
+def mean_of_pieces(values, pieces, out):
+    """Mean (p, 3) of the values (n, 3) of each piece; zero where a piece has none."""
+    out[:] = 0.0
+    counts = np.zeros(len(out))
+    for i in range(len(values)):
+        counts[pieces[i]] += 1.0
+        for j in range(3):
+            out[pieces[i], j] += values[i, j]
+    for k in range(len(out)):
+        for j in range(3):
+            out[k, j] /= max(1.0, counts[k])
+
+
+@njit(cache=True)
+def looking_out(motions, previous_motions, pieces, drifts, scales, far, near):
+    """How far points may get, from their velocities; the arguments `far` and `near` of `spatial_hash.find_pairs`.
+
+    Parameters
+    ----------
+    motions : (n, 3) velocity times the time ahead [m]; previous_motions : (n, 3) how far they have just come [m]
+    pieces : (n,); drifts : (p, 3) mean of `motions` of each piece: motion that pairs of one piece share
+    scales : least, most [m]
+    far, near : (n, 3): how far a point looks out, without the gap, how far it may carry a triangle, and how far it may
+        move on before this must be done anew; `near` is relative to its piece
+    """
+    least, most = scales
+    for i in range(len(motions)):
+        k = pieces[i]
+        absolute = relative = come = 0.0
+        for j in range(3):
+            absolute += motions[i, j] ** 2
+            relative += (motions[i, j] - drifts[k, j]) ** 2
+            come += previous_motions[i, j] ** 2
+        come = math.sqrt(come)
+        a = min(most, least + 1.2 * math.sqrt(absolute))
+        b = min(most, least + 1.2 * math.sqrt(relative))
+        far[i, 0], far[i, 1], far[i, 2] = a + come, a + come, a
+        near[i, 0], near[i, 1], near[i, 2] = b + come, b + come, b
+
+
+@njit(cache=True)
+def outran_pieces(x, x_gathered, far, near, pieces, drifts):
+    """Whether some point has moved further than `looking_out` allowed, absolutely or relative to its piece.
+
+    drifts : (p, 3) scratch memory, for the mean motion of each piece [m]
+    """
+    moved = x - x_gathered
+    mean_of_pieces(moved, pieces, drifts)
+    for i in range(len(x)):
+        k = pieces[i]
+        absolute = relative = 0.0
+        for j in range(3):
+            absolute += moved[i, j] ** 2
+            relative += (moved[i, j] - drifts[k, j]) ** 2
+        # Written so that a position that is not finite outruns everything.
+        if not (absolute <= far[i, 2] ** 2 and relative <= near[i, 2] ** 2):
             return True
     return False
