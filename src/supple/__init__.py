@@ -11,27 +11,52 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 _HOME = {
+    "ARAP": "supple.materials.arap",
     "Body": "supple.scene.body",
     "Box": "supple.scene.obstacles",
+    "ContactSettings": "supple.xpbd.contact_settings",
     "EdgesAndVolume": "supple.materials.edges_and_volume",
+    "Embedding": "supple.mesh.skin",
+    "FixedCorotated": "supple.materials.fixed_corotated",
+    "Force": "supple.scene.forces",
     "Frame": "supple.simulate",
     "HalfSpace": "supple.scene.obstacles",
-    "InBox": "supple.scene.pins",
+    "Implicit": "supple.implicit.solver",
+    "InBox": "supple.scene.selection",
     "Keyframes": "supple.scene.motion",
     "MeshError": "supple.errors",
     "MeshingError": "supple.errors",
+    "NeoHookean": "supple.materials.neo_hookean",
+    "NullSink": "supple.simulate",
     "OutputError": "supple.errors",
     "Pin": "supple.scene.pins",
+    "Recorder": "supple.output.recording",
+    "Recording": "supple.output.recording_reader",
+    "Regions": "supple.materials.regions",
+    "Report": "supple.simulate",
     "Scene": "supple.scene.scene",
     "SceneError": "supple.errors",
+    "SoftTarget": "supple.scene.forces",
     "SolverError": "supple.errors",
     "Sphere": "supple.scene.obstacles",
+    "StVenantKirchhoff": "supple.materials.st_venant_kirchhoff",
     "StableNeoHookean": "supple.materials.stable_neo_hookean",
+    "State": "supple.state",
+    "Status": "supple.state",
     "SuppleError": "supple.errors",
     "SurfaceMesh": "supple.mesh.surface",
     "TetMesh": "supple.mesh.tetmesh",
     "TriangleObstacle": "supple.scene.obstacles",
+    "XPBD": "supple.xpbd.solver",
+    "largest_noninverting_step": "supple.implicit.step_filter",
+    "load_run": "supple.scene_file.loader",
+    "load_scene": "supple.scene_file.loader",
+    "read_recording": "supple.output.recording_reader",
+    "repair_surface": "supple.mesh.repair",
+    "rotation_variant_svd": "supple.numerics.svd3",
     "simulate": "supple.simulate",
+    "smallest_positive_cubic_root": "supple.numerics.cubic",
+    "tetrahedralize": "supple.mesh.tetrahedralize",
 }
 _MODULES = {"shapes": "supple.mesh.shapes"}
 
@@ -67,14 +92,34 @@ def __dir__() -> list[str]:
 
 if TYPE_CHECKING:
     from supple.errors import MeshError, MeshingError, OutputError, SceneError, SolverError, SuppleError
+    from supple.implicit.solver import Implicit
+    from supple.implicit.step_filter import largest_noninverting_step
+    from supple.materials.arap import ARAP
     from supple.materials.edges_and_volume import EdgesAndVolume
+    from supple.materials.fixed_corotated import FixedCorotated
+    from supple.materials.neo_hookean import NeoHookean
+    from supple.materials.regions import Regions
+    from supple.materials.st_venant_kirchhoff import StVenantKirchhoff
     from supple.materials.stable_neo_hookean import StableNeoHookean
     from supple.mesh import shapes
+    from supple.mesh.repair import repair_surface
+    from supple.mesh.skin import Embedding
     from supple.mesh.surface import SurfaceMesh
     from supple.mesh.tetmesh import TetMesh
+    from supple.mesh.tetrahedralize import tetrahedralize
+    from supple.numerics.cubic import smallest_positive_cubic_root
+    from supple.numerics.svd3 import rotation_variant_svd
+    from supple.output.recording import Recorder
+    from supple.output.recording_reader import Recording, read_recording
     from supple.scene.body import Body
+    from supple.scene.forces import Force, SoftTarget
     from supple.scene.motion import Keyframes
     from supple.scene.obstacles import Box, HalfSpace, Sphere, TriangleObstacle
-    from supple.scene.pins import InBox, Pin
+    from supple.scene.pins import Pin
     from supple.scene.scene import Scene
-    from supple.simulate import Frame, simulate
+    from supple.scene.selection import InBox
+    from supple.scene_file.loader import load_run, load_scene
+    from supple.simulate import Frame, NullSink, Report, simulate
+    from supple.state import State, Status
+    from supple.xpbd.contact_settings import ContactSettings
+    from supple.xpbd.solver import XPBD
