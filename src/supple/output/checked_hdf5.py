@@ -1,0 +1,149 @@
+"""An HDF5 file that may be anything: every array is checked before it is read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.errors import OutputError
+
+# An HDF5 file can promise more than it holds. gzip packs at most 1032 to one; nothing we read is larger than that.
+_MOST_EXPANSION = 1100
+
+
+class CheckedFile:
+    """A file, opened for reading; its errors name it, say what is wrong, and the mend.
+
+    Raises
+    ------
+    OutputError : where it is missing, a folder, cut off or not HDF5.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        if not path.exists():
+            raise OutputError(f"{path}: there is no such file; a simulation writes one with Recorder, or supple run")
+        if path.is_dir():
+            raise OutputError(f"{path}: is a folder; give the recording in it, such as {path / 'recording.vtkhdf'}")
+        try:
+            self._bytes = path.stat().st_size
+            # No lock: the file may be being written, which its layout allows for.
+            self._file = h5py.File(path, "r", locking=False)
+        except PermissionError:
+            raise OutputError(f"{path}: cannot be read: permission denied") from None
+        except (OSError, RuntimeError, ValueError) as error:
+            raise self._not_opened(str(error)) from None
+
+    def _not_opened(self, reason: str) -> OutputError:
+        try:
+            with self.path.open("rb") as file:
+                start = file.read(8)
+        except OSError as error:
+            return OutputError(f"{self.path}: cannot be read: {error.strerror or error}")
+        if not start:
+            return OutputError(f"{self.path}: is empty; record the simulation again")
+        if start != b"\x89HDF\r\n\x1a\n":
+            return OutputError(f"{self.path}: is not a recording: it is no HDF5 file; give a .vtkhdf that Supple wrote")
+        if "truncated" in reason:
+            return OutputError(
+                f"{self.path}: is cut off: only {self._bytes} bytes of it are there; copy it again, whole"
+            )
+        return self.broken(" ".join(reason.split()))
+
+    def broken(self, what: str) -> OutputError:
+        """The error for contents that contradict themselves."""
+        return OutputError(f"{self.path}: is damaged: {what}; copy or record it again")
+
+    def newer(self, what: str) -> OutputError:
+        """The error for contents that this version cannot know."""
+        return OutputError(f"{self.path}: was written by a newer Supple ({what}); update this one")
+
+    def other(self, what: str) -> OutputError:
+        """The error for a file of another kind."""
+        return OutputError(f"{self.path}: is no recording of Supple: {what}; give a .vtkhdf that Supple wrote")
+
+    def __contains__(self, path: str) -> bool:
+        try:
+            return path in self._file
+        except (RuntimeError, KeyError, ValueError):
+            return False
+
+    def attribute(self, path: str, name: str) -> Any:
+        """An attribute, or None where there is no such thing."""
+        try:
+            return self._file[path].attrs.get(name)
+        except (KeyError, OSError, RuntimeError, ValueError):
+            return None
+
+    def dataset(self, path: str) -> h5py.Dataset:
+        """A dataset that is there."""
+        try:
+            item = self._file[path]
+        except (KeyError, OSError, RuntimeError, ValueError):
+            raise self.broken(f"{path} is missing") from None
+        if not isinstance(item, h5py.Dataset):
+            raise self.broken(f"{path} is no dataset")
+        return item
+
+    def text(self, path: str) -> str:
+        """A text."""
+        dataset = self.dataset(path)
+        try:
+            value = dataset[()] if dataset.shape == () else None
+        except (OSError, RuntimeError, ValueError):
+            value = None
+        if not isinstance(value, bytes):
+            raise self.broken(f"{path} is no text")
+        return value.decode("utf-8", errors="replace")
+
+    def array(self, path: str, kind: str, shape: tuple[int | None, ...]) -> NDArray[Any]:
+        """A whole array of `kind` ("f", "i" or "u") and shape, None standing for any length."""
+        dataset = self.dataset(path)
+        got = dataset.shape or ()
+        if len(got) != len(shape) or any(want not in (None, have) for want, have in zip(shape, got, strict=True)):
+            raise self.broken(f"{path} has shape {got}, not {tuple('any' if s is None else s for s in shape)}")
+        return self._load(dataset, path, kind, ())
+
+    def indices(self, path: str, columns: int, count: int) -> NDArray[np.int32]:
+        """(k, columns) int32 below `count`."""
+        values = self.array(path, "i", (None, columns))
+        if values.size and (values.min() < 0 or values.max() >= count):
+            raise self.broken(
+                f"{path} points to row {values.max() if values.max() >= count else values.min()} of {count}"
+            )
+        return np.ascontiguousarray(values, dtype=np.int32)
+
+    def check_series(self, path: str, frames: int, rows: int, row_shape: tuple[int, ...], kind: str) -> h5py.Dataset:
+        """A dataset with `rows` rows for each of `frames` frames, at least."""
+        dataset = self.dataset(path)
+        got = dataset.shape or ()
+        if got[1:] != row_shape or not got[:1] >= (frames * rows,):
+            raise self.broken(f"{path} has shape {got}; {frames} frames need {(frames * rows, *row_shape)}")
+        if dataset.dtype.kind != kind:
+            raise self.broken(f"{path} holds {dataset.dtype}")
+        one = rows * int(np.prod(row_shape, dtype=np.int64)) * dataset.dtype.itemsize
+        if one > _MOST_EXPANSION * self._bytes:
+            raise self.broken(f"{path} promises more than the file can hold")
+        return dataset
+
+    def first_rows(self, path: str, frames: int, row_shape: tuple[int, ...], kind: str) -> NDArray[Any]:
+        """The rows of all frames of a series with one row per frame."""
+        dataset = self.check_series(path, frames, 1, row_shape, kind)
+        return self._load(dataset, path, kind, slice(0, frames), frames * int(np.prod(row_shape, dtype=np.int64)))
+
+    def close(self) -> None:
+        self._file.close()
+
+    def _load(self, dataset: h5py.Dataset, path: str, kind: str, rows: Any, size: int | None = None) -> NDArray[Any]:
+        if dataset.dtype.kind != kind:
+            raise self.broken(f"{path} holds {dataset.dtype}")
+        if (dataset.size if size is None else size) * dataset.dtype.itemsize > _MOST_EXPANSION * self._bytes:
+            raise self.broken(f"{path} promises more than the file can hold")
+        try:
+            return np.asarray(dataset[rows])
+        except (OSError, RuntimeError, ValueError) as error:
+            raise self.broken(f"{path} cannot be read ({' '.join(str(error).split())})") from None

@@ -1,0 +1,251 @@
+"""A VTKHDF file that is whole at every moment, even when its writer is killed.
+
+HDF5 alone does not give that: a writer that dies leaves its caches unwritten. So the HDF5 library lays the whole file
+out first, with room for many frames, and closes it. Every series of frames has then a fixed place ("contiguous"
+layout), and a frame is written there as plain bytes. Last come a few eight-byte numbers: how many frames there are,
+for us, and the same number as the `NSteps` attribute and as the lengths of the series in VTKHDF/Steps, for VTK, which
+allows no more entries than steps. Room that is not used yet takes no disk space where the file system knows holes.
+
+When the room is used up, the file is copied to one with twice the room, which then takes its place.
+
+Sources: VTKHDF file format 2.x (docs.vtk.org); HDF5 file format specification 3.0, sections IV.A.1.a (object header,
+version 1) and IV.A.2.b (dataspace message, version 1).
+"""
+
+from __future__ import annotations
+
+import copy
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+import h5py
+import h5py.h5o
+import numpy as np
+from numpy.typing import ArrayLike
+
+from supple.errors import OutputError
+
+WRITTEN = "supple/frames_written"
+_STEPS_MARK = 0x7375_7070_6C65_2121  # stands for NSteps until its place is known
+_COPY_BYTES = 1 << 24
+
+
+@dataclass(frozen=True)
+class Series:
+    """Something of which every frame has `rows` rows of one shape."""
+
+    path: str
+    rows: int
+    row_shape: tuple[int, ...] = ()
+    dtype: str = "<f8"
+
+    @property
+    def frame_bytes(self) -> int:
+        return self.rows * int(np.prod(self.row_shape, dtype=np.int64)) * np.dtype(self.dtype).itemsize
+
+    def shape(self, frames: int) -> tuple[int, ...]:
+        return (frames * self.rows, *self.row_shape)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What a recording's frames hold, and how many points and tets each has."""
+
+    points: int
+    tets: int
+    series: tuple[Series, ...]
+
+    @property
+    def frame_bytes(self) -> int:
+        return sum(series.frame_bytes for series in self.series)
+
+
+class RecordingFile:
+    """Writes frames to their places in a file that `create` laid out.
+
+    Parameters
+    ----------
+    path : the file; layout : of its frames; capacity : how many frames it has room for; written : how many it has.
+    """
+
+    def __init__(self, path: Path, layout: Layout, capacity: int, written: int = 0) -> None:
+        self.path, self.layout, self.capacity, self.written = path, layout, capacity, written
+        with h5py.File(path, "r") as file:
+            self._places = {s.path: _place(file, s) for s in layout.series}
+            self._counter = _dataset(file, WRITTEN).id.get_offset()
+            header = h5py.h5o.get_info(file["VTKHDF/Steps"].id).addr
+            lengths = {h5py.h5o.get_info(item.id).addr for item in _step_datasets(file)}
+            self._series = {s.path: s for s in layout.series}
+        self._file: BinaryIO = open(path, "r+b", buffering=0)  # noqa: SIM115
+        self._steps = _place_of_mark(self._file, header)
+        self._lengths = sorted(_place_of_length(self._file, address, capacity) for address in lengths)
+
+    def put(self, path: str, values: ArrayLike) -> None:
+        """Write the next frame's rows of one series; nobody sees them before `commit`."""
+        series = self._series[path]
+        data = np.ascontiguousarray(values, dtype=series.dtype)
+        if data.nbytes != series.frame_bytes:
+            raise ValueError(f"{path}: a frame has {series.frame_bytes} bytes, not {data.nbytes}")
+        self._write(self._places[path] + self.written * series.frame_bytes, data.tobytes())
+
+    def put_bytes(self, path: str, offset: int, data: bytes) -> None:
+        """Write bytes somewhere in the room of one series."""
+        self._write(self._places[path] + offset, data)
+
+    def room(self, path: str) -> int:
+        """Bytes of room of one series."""
+        return self.capacity * self._series[path].frame_bytes
+
+    def commit(self) -> None:
+        """Make the frame that was put count."""
+        self.written += 1
+        self.write_count()
+
+    def write_count(self) -> None:
+        """Write how many frames there are to every place that says so."""
+        number = self.written.to_bytes(8, "little")
+        # NSteps before the lengths: VTK survives a series that is shorter than the number of steps, not a longer one.
+        for place in (self._counter, self._steps, *self._lengths):
+            self._write(place, number)
+
+    def close(self) -> None:
+        """Give the file back to the system."""
+        self._file.close()
+
+    def moved(self, path: Path) -> RecordingFile:
+        """The same file, under the name that it has now. It is closed first: some systems rename no open file."""
+        self.close()
+        os.replace(self.path, path)
+        there = copy.copy(self)
+        there.path, there._file = path, open(path, "r+b", buffering=0)  # noqa: SIM115
+        return there
+
+    def _write(self, place: int, data: bytes) -> None:
+        self._file.seek(place)
+        rest = memoryview(data)
+        while rest:
+            rest = rest[self._file.write(rest) :]
+
+
+def create(path: Path, layout: Layout, capacity: int, write_static: Callable[[h5py.File], None]) -> None:
+    """Lay out a file with room for `capacity` frames and none written; `write_static` adds all that does not change."""
+    with h5py.File(path, "w", libver=("earliest", "v110")) as file:
+        write_static(file)
+        file.create_dataset(WRITTEN, data=np.int64(0))
+        for series in layout.series:
+            _reserve(file, series, capacity)
+        _write_steps(file, layout, capacity)
+        file["VTKHDF/Steps"].attrs.create("NSteps", _STEPS_MARK, dtype="<i8")
+
+
+def rewrite(source: Path, target: Path, layout: Layout, capacity: int, *, compress: bool = False) -> None:
+    """Copy a recording's whole frames to a file with another capacity; with exactly that many, a plain VTKHDF file.
+
+    With `compress`, the series are stored in gzip chunks, one per frame; nothing can be added to them then.
+    """
+    with h5py.File(source, "r", locking=False) as old, h5py.File(target, "w", libver=("earliest", "v110")) as new:
+        written = int(_dataset(old, WRITTEN)[()])
+        own = {series.path for series in layout.series}
+        _copy_static(old, new, "", own)
+        new.create_dataset(WRITTEN, data=np.int64(written))
+        for series in layout.series:
+            rows = written * series.rows
+            if compress and series.frame_bytes and rows:
+                shape = series.shape(written)
+                chunk = (series.rows if series.rows > 1 else min(rows, 1024), *series.row_shape)
+                data = new.create_dataset(
+                    series.path, shape, series.dtype, chunks=chunk, compression="gzip", compression_opts=4, shuffle=True
+                )
+            else:
+                data = _reserve(new, series, capacity)
+            step = max(1, _COPY_BYTES // max(1, series.frame_bytes)) * series.rows
+            for row in range(0, rows if series.frame_bytes else 0, step):
+                data[row : min(row + step, rows)] = _dataset(old, series.path)[row : min(row + step, rows)]
+        _write_steps(new, layout, capacity)
+        mark = written if capacity == written else _STEPS_MARK
+        new["VTKHDF/Steps"].attrs.create("NSteps", mark, dtype="<i8")
+
+
+def _copy_static(old: h5py.Group, new: h5py.Group, where: str, series: set[str]) -> None:
+    for key, value in old.attrs.items():
+        new.attrs.create(key, value)
+    for name, item in old.items():
+        path = f"{where}{name}"
+        if path in series or path in ("VTKHDF/Steps", WRITTEN):
+            continue
+        if isinstance(item, h5py.Group):
+            _copy_static(item, new.create_group(name), f"{path}/", series)
+        else:
+            old.copy(item, new, name)
+
+
+def _reserve(file: h5py.File, series: Series, capacity: int) -> h5py.Dataset:
+    parent, _, name = series.path.rpartition("/")
+    shape = series.shape(capacity)
+    if 0 in shape:
+        return file.create_dataset(series.path, shape, series.dtype)
+    properties = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    properties.set_layout(h5py.h5d.CONTIGUOUS)
+    properties.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    properties.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
+    kind = h5py.h5t.py_create(np.dtype(series.dtype))
+    group = file.require_group(parent)
+    made = h5py.h5d.create(group.id, name.encode(), kind, h5py.h5s.create_simple(shape), dcpl=properties)
+    return h5py.Dataset(made)
+
+
+def _write_steps(file: h5py.File, layout: Layout, capacity: int) -> None:
+    """VTKHDF/Steps: where each step's rows begin. Equal columns are one dataset under several names."""
+    steps = file.require_group("VTKHDF/Steps")
+    index = np.arange(capacity, dtype=np.int64)
+    steps["PartOffsets"] = np.zeros(capacity, dtype=np.int64)
+    steps["NumberOfParts"] = np.ones(capacity, dtype=np.int64)
+    steps["PointOffsets"] = index * layout.points
+    for name in ("CellOffsets", "ConnectivityIdOffsets"):
+        steps[name] = steps["PartOffsets"]
+    steps.create_group("PointDataOffsets")
+    steps["PointDataOffsets/velocities"] = steps["PointOffsets"]
+    steps["PointDataOffsets/body"] = steps["PartOffsets"]
+    steps["CellDataOffsets/det_F"] = index * layout.tets
+    steps["CellDataOffsets/body"] = steps["PartOffsets"]
+
+
+def _step_datasets(file: h5py.File) -> list[h5py.Dataset]:
+    found: list[h5py.Dataset] = []
+    file["VTKHDF/Steps"].visititems(lambda _, item: found.append(item) if isinstance(item, h5py.Dataset) else None)  # pyright: ignore[reportAttributeAccessIssue]
+    # Hard links are visited once each object, whatever their number.
+    return found
+
+
+def _dataset(file: h5py.File, path: str) -> h5py.Dataset:
+    item = file[path]
+    assert isinstance(item, h5py.Dataset)
+    return item
+
+
+def _place(file: h5py.File, series: Series) -> int:
+    offset = _dataset(file, series.path).id.get_offset()
+    return 0 if offset is None else int(offset)
+
+
+def _place_of_mark(file: BinaryIO, header: int) -> int:
+    """Where the value of NSteps is: in the object header of the group, or where that goes on, just after it."""
+    file.seek(header)
+    mark = _STEPS_MARK.to_bytes(8, "little")
+    block = file.read(1 << 20)
+    if block.count(mark) != 1:
+        raise OutputError(f"{file.name}: the HDF5 library wrote NSteps in a way that Supple does not know")
+    return header + block.index(mark)
+
+
+def _place_of_length(file: BinaryIO, header: int, length: int) -> int:
+    """Where the length of a one-dimensional dataset is: in the first message of its object header."""
+    file.seek(header)
+    block = file.read(40)
+    known = block[0] == 1 and block[16:18] == b"\x01\x00" and block[24:26] == b"\x01\x01"
+    if not known or int.from_bytes(block[32:40], "little") != length:
+        raise OutputError(f"{file.name}: the HDF5 library wrote a dataspace in a way that Supple does not know")
+    return header + 32

@@ -1,0 +1,31 @@
+"""A finer surface carried by coarse tets: each of its vertices is a fixed mixture of the four corners of one tet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class SkinnedSurface:
+    """Triangles whose vertices follow tets.
+
+    Attributes
+    ----------
+    corners : (k, 4) int32, rows of the body's vertices: the tet that carries each surface vertex
+    weights : (k, 4) barycentric coordinates in it, summing to one; negative where the vertex lies outside
+    triangles : (t, 3) int32, rows of `corners`
+    """
+
+    corners: NDArray[np.int32]
+    weights: NDArray[np.float64]
+    triangles: NDArray[np.int32]
+
+    def positions(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Where the surface's vertices (k, 3) are when the body's are at x (n, 3) [m]."""
+        out = self.weights[:, 0, None] * x[self.corners[:, 0]]
+        for a in range(1, 4):
+            out += self.weights[:, a, None] * x[self.corners[:, a]]
+        return out
