@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -111,7 +111,7 @@ def simulate(
     initial_velocities: Mapping[str, ArrayLike] | None = None,
     start: Frame | State | None = None,
     sinks: Sequence[Sink] = (),
-) -> Iterator[Frame]:
+) -> Generator[Frame]:
     """Advance a scene and yield a frame after each step.
 
     Ends early, after yielding the frame that says why, where the solver cannot go on.
@@ -170,7 +170,7 @@ def first_frame(scene: Scene, start: Frame | State) -> Frame:
 
 def _steps(
     first: Frame, solver: Solver, dt: float, steps: int, workspace: Any, sinks: Sequence[Sink]
-) -> Iterator[Frame]:
+) -> Generator[Frame]:
     system, state = first.system, first.state
     with ExitStack() as ends:  # whatever happens, also in the end of another sink, each sink is ended
         for sink in sinks:

@@ -164,7 +164,7 @@ CASES = [
     ("steps: 5", "steps: 2.5", "14: steps: is 2.5; give a whole number"),
     ("steps: 5", "steps: -1", "14: steps: is -1; it must be at least 0"),
     ("steps: 5", "steps: 99999999999999999999999999", "14: steps: is 99999999999999999999999999; it must be at most"),
-    ("steps: 5", "solver: {kind: xpdb}", "14: solver.kind: is the text 'xpdb'; did you mean `xpbd`?"),
+    ("steps: 5", "solver: {kind: xpdb}", "14: solver.kind: unknown kind 'xpdb'; did you mean `xpbd`?"),
     ("steps: 5", "solver: {kind: xpbd, substeps: 0}", "14: solver.substeps: is 0; it must be at least 1"),
     ("steps: 5", "solver: {kind: xpbd, threads: 1000}", "14: solver.threads: XPBD: threads is 1000"),
     ("steps: 5", "solver: xpbd", "14: solver: is the text 'xpbd'; give keys and values"),

@@ -12,6 +12,7 @@ from supple.materials.registry import ELASTIC_MATERIALS
 from supple.scene_file.document import SceneFileModel, json_schema
 from supple.scene_file.loader import load_run, load_scene
 from supple.scene_file.materials import ELASTIC_KINDS
+from supple.scene_file.solvers import solver_of_kind
 from supple.scene_file.yaml_reader import read_yaml
 
 RUBBER = "{kind: stable_neo_hookean, youngs: 1e5, poisson: 0.4}"
@@ -115,6 +116,21 @@ def test_a_squeezed_start_keeps_its_center_and_its_widths(load):
     placed = run.scene.body("block").place(run.scene.body("block").mesh.vertices)
     np.testing.assert_allclose(run.start["initial_positions"]["block"] - [3, 1, 0], (placed - [3, 1, 0]) * [1, 0.5, 1])
     assert sorted(run.initial_positions) == ["block"]
+
+
+def test_both_solvers_take_their_parameters(load):
+    solver = load(
+        f"bodies: [{BODY}]\nsolver: {{kind: xpbd, contact: {{thickness: 0.01, self_collision: false}}}}\n"
+    ).solver
+    assert (solver.contact.thickness, solver.contact.body_collision, solver.contact.self_collision) == (
+        0.01,
+        True,
+        False,
+    )
+    assert load(f"bodies: [{BODY}]\nsolver: {{kind: xpbd, contact: null}}\n").solver.contact is None
+    solver = load(f"bodies: [{BODY}]\nsolver: {{kind: implicit, integrator: bdf2, max_iterations: 9}}\n").solver
+    assert (type(solver).__name__, solver.integrator, solver.max_iterations) == ("Implicit", "bdf2", 9)
+    assert type(solver_of_kind("implicit")) is type(solver)
 
 
 def test_defaults(load):

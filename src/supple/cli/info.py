@@ -170,6 +170,36 @@ def _scene(file: Path) -> None:
 
 
 def _recording(file: Path) -> None:
-    from supple.output.recording import read_recording
+    import numpy as np
 
-    _print_table(str(file), recording_rows(read_recording(file)))
+    from supple.output.recording_reader import read_recording
+
+    with read_recording(file) as recording:
+        J = recording.series("min_det_F")
+        rows = [
+            ("kind", "recording"),
+            ("frames", f"{len(recording)} to t = {recording.times[-1]:.6g} s, dt = {recording.dt:.6g} s"),
+            ("bodies", ", ".join(f"{body.name} ({body.material})" for body in recording.bodies)),
+            ("obstacles", ", ".join(f"{o.name} ({o.kind})" for o in recording.obstacles) or "none"),
+            ("vertices", str(len(recording.masses))),
+            ("tets", str(len(recording.tets))),
+            ("volume", f"{recording.rest_volumes.sum():.6g} m^3 at rest"),
+            ("mass", f"{recording.masses.sum():.6g} kg"),
+            ("solver", recording.solver or "not said"),
+            ("smallest J", f"{J.min():.6g} at t = {recording.times[int(np.argmin(J))]:.6g} s"),
+            ("ended", str(recording.statuses[-1])),
+            ("scene file", "inside" if recording.scene_text else "none"),
+            ("written by", f"supple {recording.supple_version}"),
+        ]
+        bad = [k for k, status in enumerate(recording.statuses) if not status.can_go_on]
+        rows.append(("problems", _recording_problems(float(J.min()), bad)))
+    _print_table(str(file), rows)
+
+
+def _recording_problems(smallest_J: float, stopped: list[int]) -> str:
+    problems = []
+    if smallest_J <= 0.0:
+        problems.append("a tetrahedron is inverted or flat (J <= 0)")
+    if stopped:
+        problems.append(f"the solver stopped at frame {stopped[0]}")
+    return "; ".join(problems) or "none"

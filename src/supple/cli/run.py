@@ -59,5 +59,7 @@ def run(
             page=described.output.page if page is None else page,
             plot=described.output.plot if plot is None else plot,
             quiet=quiet,
+            compress=described.output.compress,
+            scene_text=described.text,
         ),
     ).code

@@ -45,6 +45,7 @@ class OutputModel(Model):
     """What `supple run` writes beside the recording."""
 
     page: bool = Field(default=True, description="index.html, which plays the recording in a browser")
+    compress: bool = Field(default=False, description="store the recording compressed: smaller, and slower to write")
     plot: bool = Field(default=True, description="plot.png: energies, momentum, volume ratio and smallest J over time")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -41,6 +41,7 @@ class Run:
     dt : time from frame to frame [s]; steps : number of frames
     initial_positions : by body name, (n, 3) [m], of bodies that start deformed
     output : what to write beside the recording
+    text : of the file, for the recording to keep
     """
 
     scene: Scene
@@ -49,6 +50,7 @@ class Run:
     steps: int
     initial_positions: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     output: OutputModel = field(default_factory=OutputModel)
+    text: str | None = None
 
     @property
     def start(self) -> dict[str, dict[str, NDArray[np.float64]]]:
@@ -84,7 +86,7 @@ def load_run(path: str | Path) -> Run:
     except ValidationError as error:
         raise complaint(document, error) from None
     try:
-        return _built(model, MeshStore(Path(path).parent))
+        return replace(_built(model, MeshStore(Path(path).parent)), text=document.text)
     except LocatedError as error:
         raise document.error(_blamed(document.data, error.keys, str(error)), str(error)) from None
 

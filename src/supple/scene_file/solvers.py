@@ -2,34 +2,68 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from supple.errors import SolverError
 from supple.scene_file.complaints import suggestion
-from supple.scene_file.model import Model
+from supple.scene_file.model import Model, Positive
 from supple.solver import Solver
-from supple.xpbd.solver import XPBD
+
+Iterations = Annotated[int, Field(ge=1, le=100_000)]
+
+
+class XPBDContactModel(Model):
+    """Contact of bodies with each other and with themselves. Obstacles act with or without it."""
+
+    thickness: Positive | None = Field(
+        default=None, description="gap between surfaces [m]; a twentieth of the mean surface edge without it"
+    )
+    body_collision: bool = Field(default=True, description="whether bodies collide with each other")
+    self_collision: bool = Field(default=True, description="whether a body collides with itself")
 
 
 class XPBDModel(Model):
-    """Extended position-based dynamics in small steps."""
+    """Extended position-based dynamics in small steps: fast, robust, approximate."""
 
     kind: Literal["xpbd"]
-    substeps: int = Field(
-        default=20, ge=1, le=100_000, description="per frame, each with one sweep over all constraints"
-    )
+    substeps: Iterations = Field(default=20, description="per frame, each with one sweep over all constraints")
     momentum_restore: bool = Field(default=True, description="false shows what XPBD does to momentum without")
+    contact: XPBDContactModel | None = Field(
+        default_factory=XPBDContactModel, description="of bodies with each other and themselves; null turns it off"
+    )
     threads: int | None = Field(default=None, ge=1, le=1024, description="as the scene's size asks for, without it")
 
     def build(self) -> Solver:
-        return XPBD(substeps=self.substeps, momentum_restore=self.momentum_restore, threads=self.threads)
+        from supple.xpbd.contact_settings import ContactSettings
+        from supple.xpbd.solver import XPBD
+
+        contact = None if self.contact is None else ContactSettings(**self.contact.model_dump())
+        return XPBD(self.substeps, self.momentum_restore, contact, self.threads)
 
 
-SolverModel = XPBDModel
+class ImplicitModel(Model):
+    """Implicit finite elements by projected Newton: no tetrahedron inverts."""
 
-SOLVERS = {"xpbd": XPBD}
+    kind: Literal["implicit"]
+    integrator: Literal["backward_euler", "bdf2", "newmark", "static"] = Field(default="backward_euler")
+    tolerance: Positive | None = Field(
+        default=None, description="of Newton's step, relative to the smallest body [1/s]"
+    )
+    max_iterations: Iterations = Field(default=60, description="of Newton in one step")
+    linear_solver: Literal["auto", "pcg", "direct"] = Field(default="auto")
+    max_substeps: Iterations = Field(default=64, description="a step that fails is halved until it would take more")
+
+    def build(self) -> Solver:
+        from supple.implicit.solver import Implicit
+
+        return Implicit(**self.model_dump(exclude={"kind"}))
+
+
+SolverModel = Annotated[XPBDModel | ImplicitModel, Field(discriminator="kind")]
+
+_KINDS: dict[str, type[XPBDModel] | type[ImplicitModel]] = {"xpbd": XPBDModel, "implicit": ImplicitModel}
 
 
 def solver_of_kind(kind: str) -> Solver:
@@ -39,6 +73,6 @@ def solver_of_kind(kind: str) -> Solver:
     ------
     SolverError : where there is none.
     """
-    if kind not in SOLVERS:
-        raise SolverError(f"there is no solver {kind!r}; {suggestion(kind, SOLVERS)}")
-    return SOLVERS[kind]()
+    if kind not in _KINDS:
+        raise SolverError(f"there is no solver {kind!r}; {suggestion(kind, _KINDS)}")
+    return _KINDS[kind](kind=kind).build()  # pyright: ignore[reportArgumentType]

@@ -46,6 +46,7 @@ class YamlDocument:
     """The data of a YAML file, and where in the file each value stands."""
 
     path: Path
+    text: str
     data: Any
     root: yaml.Node
 
@@ -110,7 +111,7 @@ def read_yaml(path: str | Path) -> YamlDocument:
             loader.dispose()
     if root is None:
         raise SceneError(f"{path}: the file is empty; a scene needs at least `bodies:`")
-    return YamlDocument(path, _Builder(path).build(root, 0), root)
+    return YamlDocument(path, text, _Builder(path).build(root, 0), root)
 
 
 def _read_text(path: Path) -> str:
