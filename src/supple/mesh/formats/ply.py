@@ -84,7 +84,7 @@ def _header(data: bytes) -> tuple[str, list[Element], int, int]:
             raise FormatError(f"'{shortened(words)}' does not belong into a PLY header", line)
     if order is None:
         raise FormatError("the format is none of ascii, binary_little_endian, binary_big_endian", 2)
-    return order, elements, stop + 1, len(lines) + 1
+    return order, elements, stop + 1, len(lines)
 
 
 def _property(words: list[str], line: int) -> Property:

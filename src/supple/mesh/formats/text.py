@@ -35,9 +35,12 @@ def numbers(words: Sequence[str], count: int, line: int, what: str) -> list[floa
 def integer(word: str, line: int, what: str) -> int:
     """A word as an integer."""
     try:
-        return int(word)
+        value = int(word)
+        if abs(value) >= 2**62:
+            raise ValueError
+        return value
     except ValueError:
-        raise FormatError(f"{what} is '{shortened([word])}', which is no integer", line) from None
+        raise FormatError(f"{what} is '{shortened([word])}', which is no integer in range", line) from None
 
 
 def shortened(words: Sequence[str]) -> str:
