@@ -52,11 +52,13 @@ _HOME = {
     "load_run": "supple.scene_file.loader",
     "load_scene": "supple.scene_file.loader",
     "read_recording": "supple.output.recording_reader",
+    "read_tetgen": "supple.mesh.tetgen_files",
     "repair_surface": "supple.mesh.repair",
     "rotation_variant_svd": "supple.numerics.svd3",
     "simulate": "supple.simulate",
     "smallest_positive_cubic_root": "supple.numerics.cubic",
     "tetrahedralize": "supple.mesh.tetrahedralize",
+    "write_tetgen": "supple.mesh.tetgen_files",
 }
 _MODULES = {"shapes": "supple.mesh.shapes"}
 
@@ -91,6 +93,7 @@ def __dir__() -> list[str]:
 
 
 if TYPE_CHECKING:
+    from supple.mesh import shapes
     from supple.errors import MeshError, MeshingError, OutputError, SceneError, SolverError, SuppleError
     from supple.implicit.solver import Implicit
     from supple.implicit.step_filter import largest_noninverting_step
@@ -101,10 +104,10 @@ if TYPE_CHECKING:
     from supple.materials.regions import Regions
     from supple.materials.st_venant_kirchhoff import StVenantKirchhoff
     from supple.materials.stable_neo_hookean import StableNeoHookean
-    from supple.mesh import shapes
     from supple.mesh.repair import repair_surface
     from supple.mesh.skin import Embedding
     from supple.mesh.surface import SurfaceMesh
+    from supple.mesh.tetgen_files import read_tetgen, write_tetgen
     from supple.mesh.tetmesh import TetMesh
     from supple.mesh.tetrahedralize import tetrahedralize
     from supple.numerics.cubic import smallest_positive_cubic_root
