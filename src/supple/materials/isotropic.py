@@ -183,6 +183,12 @@ def _minus_sum(A, B, C):
 def _tet_hessian(F, B, volume, kind, mu, lam, project, out, e):
     """The 12x12 Hessian of one tet into out[e]; B = Dm^-1, whose rows are the shape gradients of nodes 1, 2, 3."""
     U, s, V = decompose(F)
+    _tet_hessian_of(U, s, V, B, volume, kind, mu, lam, project, out, e)
+
+
+@njit(error_model="numpy")
+def _tet_hessian_of(U, s, V, B, volume, kind, mu, lam, project, out, e):
+    """The same for F = U diag(s) V^T."""
     A, alpha, beta = principal_hessian(s, kind, mu, lam, project)
     v = volume
     A = (v * A[0], v * A[1], v * A[2], v * A[3], v * A[4], v * A[5])
@@ -212,7 +218,33 @@ def _tet_hessian(F, B, volume, kind, mu, lam, project, out, e):
     _put_pair(out, e, 3, 3, H33)
 
 
+@njit(error_model="numpy")
+def _tet_gradient_of(U, s, V, B, volume, kind, mu, lam, out, e):
+    """The gradient of one tet's energy by its nodes into out[e], for F = U diag(s) V^T."""
+    p = _gradient(kind, s, mu, lam)
+    Up = (
+        U[0] * p[0],
+        U[1] * p[1],
+        U[2] * p[2],
+        U[3] * p[0],
+        U[4] * p[1],
+        U[5] * p[2],
+        U[6] * p[0],
+        U[7] * p[1],
+        U[8] * p[2],
+    )
+    G = mat_mul_transposed(mat_mul_transposed(Up, V), B)
+    for i in range(3):
+        total = 0.0
+        for k in range(3):
+            force = volume * G[3 * i + k]
+            out[e, k + 1, i] = force
+            total += force
+        out[e, 0, i] = -total
+
+
 class _Kernels(NamedTuple):
+    element_models: Any
     element_energies: Any
     element_gradients: Any
     element_hessians: Any
@@ -223,6 +255,17 @@ class _Kernels(NamedTuple):
 
 def _build_kernels(version: int) -> _Kernels:
     """The compiled loops. `version` is in their closures, so that no cached kernel outlives a change of a material."""
+
+    @njit(parallel=True, cache=True, error_model="numpy")
+    def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, energies, gradients, hessians):
+        _ = version
+        for e in prange(len(tets)):
+            U, s, V = decompose(deformation_gradient(x, tets, Dm_inv, e))
+            B = load_mat(Dm_inv, e)
+            energies[e] = volumes[e] * _density(kind[e], s, mu[e], lam[e])
+            _tet_gradient_of(U, s, V, B, volumes[e], kind[e], mu[e], lam[e], gradients, e)
+            if second:
+                _tet_hessian_of(U, s, V, B, volumes[e], kind[e], mu[e], lam[e], True, hessians, e)
 
     @njit(parallel=True, cache=True, error_model="numpy")
     def element_energies(x, tets, Dm_inv, volumes, kind, mu, lam, out):
@@ -279,10 +322,22 @@ def _build_kernels(version: int) -> _Kernels:
                             out[e, 3 * i + j, 3 * n + k] = K[3 * i + n]
                             out[e, 3 * n + k, 3 * i + j] = K[3 * i + n]
 
-    return _Kernels(element_energies, element_gradients, element_hessians, densities, piolas, hessians)
+    return _Kernels(element_models, element_energies, element_gradients, element_hessians, densities, piolas, hessians)
 
 
 _KERNELS = _build_kernels(fingerprint([*Path(__file__).parent.glob("*.py"), Path(mat3.__file__), Path(svd3.__file__)]))
+
+
+def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, energies, gradients, hessians) -> None:
+    """Energies (m,), gradients (m, 4, 3) and, with `second`, projected Hessians (m, 12, 12) of all tets at once: one
+    decomposition of each F serves all three.
+
+    Parameters
+    ----------
+    x, tets, Dm_inv, volumes, kind, mu, lam : as of `element_energies`
+    second : whether Hessians are wanted; if not, `hessians` is left as it is
+    """
+    _KERNELS.element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, energies, gradients, hessians)
 
 
 def element_energies(x, tets, Dm_inv, volumes, kind, mu, lam, out) -> None:

@@ -1,8 +1,8 @@
 """Sparse symmetric matrices of 3x3 blocks, assembled from element matrices without sorting anything twice.
 
-The pattern is built once from the elements. Every block of the upper triangle knows the element entries that add up to it,
-so assembly gathers: each block is written by one thread, in one order, and its transpose is copied to the mirror block.
-Any number of threads gives the same bits.
+The pattern is built once from the elements. Every block of the upper triangle knows the element entries that add up to
+it, so assembly gathers: each block is written by one thread, in one order, and its transpose is copied to the mirror
+block. Any number of threads gives the same bits.
 """
 
 from __future__ import annotations
@@ -14,9 +14,10 @@ from numba import njit, prange
 from numpy.typing import NDArray
 from scipy.sparse import bsr_matrix
 
-# Below this many blocks one thread works alone: a pass takes a fraction of a millisecond, and where another process has the
-# second core, waiting for it costs many times that.
-SERIAL_BLOCKS = 50_000
+from supple.numerics.threads import threads_for
+
+# Fewer blocks than this are worked on by one thread.
+SERIAL_BLOCKS = 15_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,8 +28,8 @@ class BlockPattern:
     ----------
     row_start : (n + 1,) first block of each row; columns : (b,) ascending in each row
     diagonal : (n,) index of each row's diagonal block; mirror : (b,) index of each block's transpose
-    entry_start : (b + 1,) and entries : the element entries of each upper block, as 16 element + 4 a + c for the 3x3 block
-        of the element's nodes a and c
+    entry_start : (b + 1,) and entries : the element entries of each upper block, as 16 element + 4 a + c for the 3x3
+        block of the element's nodes a and c
     """
 
     row_start: NDArray[np.int32]
@@ -57,17 +58,17 @@ class BlockPattern:
         diagonal_blocks : (n, 3, 3) symmetric, added to the diagonal
         data : (b, 3, 3) overwritten
         """
-        kernel = _assemble if self.blocks > SERIAL_BLOCKS else _assemble_serial
-        kernel(
-            self.row_start,
-            self.columns,
-            self.mirror,
-            self.entry_start,
-            self.entries,
-            element_blocks,
-            diagonal_blocks,
-            data,
-        )
+        with threads_for(self.blocks, SERIAL_BLOCKS):
+            _assemble(
+                self.row_start,
+                self.columns,
+                self.mirror,
+                self.entry_start,
+                self.entries,
+                element_blocks,
+                diagonal_blocks,
+                data,
+            )
 
     def to_scipy(self, data: NDArray[np.float64]) -> bsr_matrix:
         """The matrix as SciPy knows it, (3n, 3n); shares memory with `data`."""
@@ -250,10 +251,4 @@ def _assemble_row(i, row_start, columns, mirror, entry_start, entries, element_b
 @njit(cache=True, parallel=True)
 def _assemble(row_start, columns, mirror, entry_start, entries, element_blocks, diagonal_blocks, data):
     for i in prange(len(row_start) - 1):
-        _assemble_row(i, row_start, columns, mirror, entry_start, entries, element_blocks, diagonal_blocks, data)
-
-
-@njit(cache=True)
-def _assemble_serial(row_start, columns, mirror, entry_start, entries, element_blocks, diagonal_blocks, data):
-    for i in range(len(row_start) - 1):
         _assemble_row(i, row_start, columns, mirror, entry_start, entries, element_blocks, diagonal_blocks, data)

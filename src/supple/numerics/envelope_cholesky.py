@@ -10,7 +10,8 @@ from numba import njit, prange
 
 SIZE = 12
 
-# A pivot that lost this much of its diagonal entry to cancellation belongs to a direction that other unknowns span already.
+# A pivot that lost this much of its diagonal entry to cancellation belongs to a direction that other unknowns span
+# already.
 _DEPENDENT = 1e-11
 
 
@@ -57,8 +58,8 @@ def factorize(matrix, first):
 
     Parameters
     ----------
-    matrix : (b, b, 12, 12) blocks of A; on return the lower blocks hold L, the diagonals of diagonal blocks inverted, and
-        the upper blocks (j, i), j < i, hold the transposes of L's blocks (i, j).
+    matrix : (b, b, 12, 12) blocks of A; on return the lower blocks hold L, the diagonals of diagonal blocks inverted,
+        and the upper blocks (j, i), j < i, hold the transposes of L's blocks (i, j).
     first : (b,) int32 the first block column of each row's envelope
     """
     count = len(first)

@@ -1,8 +1,8 @@
 """Preconditioned conjugate gradients on 3x3-block matrices, in few passes over memory.
 
 Sums are taken group by group and then over groups in order: the same bits on any number of threads. The inner product
-r.z needs the coarse part of z only through its coarse coefficients, so that an iteration is three passes: the product with
-the matrix; the update of x and r with the smoother and the restriction; the prolongation with the next direction.
+r.z needs the coarse part of z only through its coarse coefficients, so that an iteration is three passes: the product
+with the matrix; the update of x and r with the smoother and the restriction; the prolongation with the next direction.
 
 Source: Saad, "Iterative Methods for Sparse Linear Systems" (2003), algorithm 9.1.
 """
@@ -15,9 +15,12 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from supple.numerics.block_csr import SERIAL_BLOCKS
 from supple.numerics.envelope_cholesky import solve
 from supple.numerics.preconditioner import TwoLevel
+from supple.numerics.threads import threads_for
+
+# Three short passes in each iteration: fewer blocks than this are worked on by one thread.
+_SERIAL_BLOCKS = 50_000
 
 
 @dataclass(frozen=True)
@@ -54,23 +57,23 @@ def conjugate_gradients(
     max_iterations : stop there, converged or not
     """
     p = preconditioner.pattern
-    iterations, converged, first, last = _solve(
-        p.row_start,
-        p.columns,
-        p.diagonal,
-        data,
-        preconditioner.group_start,
-        preconditioner.inner,
-        preconditioner.fields,
-        preconditioner.first,
-        preconditioner.inverse_diagonal,
-        preconditioner.coarse,
-        b,
-        x,
-        tolerance,
-        max_iterations,
-        p.blocks > SERIAL_BLOCKS,
-    )
+    with threads_for(p.blocks, _SERIAL_BLOCKS):
+        iterations, converged, first, last = _solve(
+            p.row_start,
+            p.columns,
+            p.diagonal,
+            data,
+            preconditioner.group_start,
+            preconditioner.inner,
+            preconditioner.fields,
+            preconditioner.first,
+            preconditioner.inverse_diagonal,
+            preconditioner.coarse,
+            b,
+            x,
+            tolerance,
+            max_iterations,
+        )
     return CGResult(int(iterations), bool(converged), float(first), float(last))
 
 
@@ -182,7 +185,6 @@ def _solve(
     x,
     tolerance,
     max_iterations,
-    parallel,
 ):
     groups = len(group_start) - 1
     sums = np.zeros(groups)
@@ -196,13 +198,7 @@ def _solve(
     first_norm = 0.0
     old = 0.0
     for iteration in range(max_iterations + 1):
-        if parallel:
-            _smooth(alpha, group_start, columns, diagonal, inner, data, inverse, fields, p, Ap, x, r, z, restricted, sums)
-        else:
-            for g in range(groups):
-                _smooth_group(
-                    g, alpha, group_start, columns, diagonal, inner, data, inverse, fields, p, Ap, x, r, z, restricted, sums
-                )
+        _smooth(alpha, group_start, columns, diagonal, inner, data, inverse, fields, p, Ap, x, r, z, restricted, sums)
         coefficients = restricted.copy()
         solve(coarse, first, coefficients)
         rz = 0.0
@@ -219,14 +215,8 @@ def _solve(
             break
         beta = rz / old if iteration > 0 else 0.0
         old = rz
-        if parallel:
-            _direction(beta, group_start, fields, coefficients, z, p)
-            _product(group_start, row_start, columns, data, p, Ap, sums)
-        else:
-            for g in range(groups):
-                _direction_group(g, beta, group_start, fields, coefficients, z, p)
-            for g in range(groups):
-                _product_group(g, group_start, row_start, columns, data, p, Ap, sums)
+        _direction(beta, group_start, fields, coefficients, z, p)
+        _product(group_start, row_start, columns, data, p, Ap, sums)
         curvature = 0.0
         for g in range(groups):
             curvature += sums[g]

@@ -1,0 +1,120 @@
+"""Newton's linear systems in the free vertices: assembled in place, solved by preconditioned CG or directly."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.implicit.direct import solve_directly
+from supple.implicit.potential import HessianBlocks
+from supple.numerics.block_csr import BlockPattern, build_pattern
+from supple.numerics.pcg import conjugate_gradients
+from supple.numerics.preconditioner import RowOrder, TwoLevel, order_rows, two_level
+from supple.system import System
+
+logger = logging.getLogger(__name__)
+
+# Where CG has not converged after so many iterations, factorizing is likely faster.
+_STALLED = 400
+
+
+@dataclass(frozen=True)
+class LinearReport:
+    """How a solve went: its method, its CG iterations, and the residual's preconditioned norm at the start."""
+
+    method: str
+    iterations: int
+    first_norm: float
+
+
+@dataclass(eq=False)
+class LinearSolver:
+    """The matrix of the free vertices and its preconditioner; reused from iteration to iteration and step to step.
+
+    Attributes
+    ----------
+    kind : "auto" (CG, and a factorization where CG stalls), "pcg" or "direct"
+    order : which vertex each row belongs to
+    age, fresh_iterations : how often CG has run on the coarse level as it is, and how many iterations its first run
+        took
+    """
+
+    kind: str
+    order: RowOrder
+    pattern: BlockPattern
+    preconditioner: TwoLevel
+    data: NDArray[np.float64]
+    age: int = -1
+    fresh_iterations: int = 0
+
+    @classmethod
+    def of(cls, system: System, kind: str) -> LinearSolver:
+        """Build the pattern and the groups of a system's free vertices."""
+        free = np.ones(len(system.rest_positions), dtype=bool)
+        free[system.pinned_vertices] = False
+        order = order_rows(system.rest_positions, system.components, system.tets, free)
+        rows = np.full(len(free), -1, dtype=np.int32)
+        rows[order.vertices] = np.arange(len(order.vertices), dtype=np.int32)
+        pattern = build_pattern(rows[system.tets], len(order.vertices))
+        preconditioner = two_level(pattern, system.rest_positions[order.vertices], order.group_start)
+        return cls(kind, order, pattern, preconditioner, np.zeros((pattern.blocks, 3, 3)))
+
+    def assemble(self, hessian: HessianBlocks) -> None:
+        """Take over a new Hessian."""
+        self.pattern.assemble(hessian.tets, hessian.vertices[self.order.vertices], self.data)
+        if self.kind != "direct":
+            self.preconditioner.update(self.data, coarse=self.age < 0)
+
+    def solve(self, force: NDArray[np.float64], tolerance: float) -> tuple[NDArray[np.float64] | None, LinearReport]:
+        """Solve H p = force.
+
+        Parameters
+        ----------
+        force : (n, 3), of which the free rows are read; tolerance : relative, for CG
+
+        Returns
+        -------
+        p : (n, 3), zero where pinned; None where the system could not be solved
+        """
+        b = force[self.order.vertices]
+        x = np.zeros_like(b)
+        p = np.zeros_like(force)
+        if len(b) == 0 or not b.any():
+            return p, LinearReport("none", 0, 0.0)
+        first_norm = 0.0
+        iterations = 0
+        if self.kind != "direct":
+            most = _STALLED if self.kind == "auto" else max(1000, 3 * b.size)
+            result = conjugate_gradients(self.data, self.preconditioner, b, x, tolerance, most)
+            if not result.converged and self.age > 0:
+                # The coarse level belongs to an older matrix.
+                iterations += result.iterations
+                self.preconditioner.update(self.data)
+                self.age = -1
+                result = conjugate_gradients(self.data, self.preconditioner, b, x, tolerance, most)
+            iterations += result.iterations
+            first_norm = result.first_norm
+            self._grow_old(result.iterations)
+            if result.converged or (self.kind == "pcg" and np.isfinite(x).all() and x.any()):
+                p[self.order.vertices] = x
+                return p, LinearReport("pcg", iterations, first_norm)
+            if self.kind == "pcg":
+                return None, LinearReport("pcg", iterations, first_norm)
+            logger.debug("CG stalled after %d iterations; factorizing", iterations)
+        solution = solve_directly(self.pattern, self.data, b)
+        if solution is None:
+            return None, LinearReport("direct", iterations, first_norm)
+        p[self.order.vertices] = solution
+        return p, LinearReport("direct", iterations, first_norm)
+
+    def _grow_old(self, iterations: int) -> None:
+        """Keep the coarse level until CG takes clearly longer than when it was new."""
+        if self.age < 0:
+            self.fresh_iterations = iterations
+            self.age = 0
+        self.age += 1
+        if iterations > 1.5 * self.fresh_iterations + 4:
+            self.age = -1

@@ -1,0 +1,140 @@
+"""Projected Newton: minimizes the objective of a step from a state without inverted tets to one without.
+
+Directions are inexact (Eisenstat, Walker: the tolerance of the linear solver follows the decrease of the gradient),
+their length is limited by the step filter, and a line search makes every iteration descend.
+
+Sources: Li, Jiang, Luo, "Physics-Based Simulation", chapter "Optimization Framework"; Eisenstat, Walker, "Choosing the
+Forcing Terms in an Inexact Newton Method" (1996), choice 2.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.implicit.free_motion import FreeMotion
+from supple.implicit.guard import Guard
+from supple.implicit.line_search import backtrack
+from supple.implicit.linear_solver import LinearSolver
+from supple.implicit.objective import Model, Objective
+from supple.implicit.potential import HessianBlocks
+from supple.implicit.trace import NewtonRow
+from supple.state import Status
+
+logger = logging.getLogger(__name__)
+
+_LOOSEST = 1e-2
+_TIGHTEST = 1e-8
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What is minimized, and when it is done.
+
+    Attributes
+    ----------
+    objective : the sum of potentials
+    scale : s of its inertia term [s^2], or None
+    tolerance : size of the largest vertex's Newton step [m] below which the minimum is reached
+    max_iterations : of Newton
+    """
+
+    objective: Objective
+    scale: float | None
+    tolerance: float
+    max_iterations: int
+
+
+@dataclass(frozen=True, eq=False)
+class Tools:
+    """What is kept from step to step: the linear solver, and the memory for Hessians."""
+
+    linear_solver: LinearSolver
+    hessian: HessianBlocks
+    pinned: NDArray[np.int32]
+    free_motion: FreeMotion
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """Where a minimization ended, and how; `rows` tell of every iteration."""
+
+    status: Status
+    end: Model
+    message: str = ""
+    rows: list[NewtonRow] = field(default_factory=list)
+
+
+def minimize(problem: Problem, x: NDArray[np.float64], guard: Guard, tools: Tools) -> Outcome:
+    """Minimize over the free vertices from x, whose guarded tets all have positive volume."""
+    here = problem.objective.model(x, tools.hessian)
+    rows: list[NewtonRow] = []
+    if not np.isfinite(here.energy):
+        return Outcome(Status.NOT_FINITE, here, "the energy at the start of Newton's method is not finite", rows)
+    forcing = _LOOSEST
+    last_norm = 0.0
+    for iteration in range(problem.max_iterations):
+        gradient = here.gradient.copy()
+        gradient[tools.pinned] = 0.0
+        tools.linear_solver.assemble(tools.hessian)
+        direction, said = tools.linear_solver.solve(-gradient, forcing)
+        if direction is None or not np.isfinite(direction).all():
+            return Outcome(Status.NOT_FINITE, here, "the linear system of a Newton step could not be solved", rows)
+        if problem.scale is not None:
+            tools.free_motion.correct(direction, gradient, problem.scale)
+        length = float(np.abs(direction).max(initial=0.0))
+        slope = float(np.einsum("ij,ij->", gradient, direction))
+        largest, _ = guard.largest_step(here.positions, direction)
+        last = length <= problem.tolerance
+        step, cuts = 0.0, 0
+        if slope < 0.0 and largest > 0.0:
+            hessian = None if last else tools.hessian
+            here, step, cuts = _guarded_search(problem, here, direction, slope, largest, guard, hessian)
+        row = NewtonRow(
+            iteration=iteration,
+            energy=here.energy,
+            force=float(np.abs(gradient).max(initial=0.0)),
+            direction=length,
+            linear_solver=said.method,
+            linear_iterations=said.iterations,
+            linear_tolerance=forcing,
+            filter=largest,
+            step=step,
+            cuts=cuts,
+        )
+        rows.append(row)
+        logger.debug("%s", row)
+        guard.widen(here.positions)
+        if last:
+            return Outcome(Status.CONVERGED, here, "", rows)
+        if step == 0.0:
+            text = f"no step along Newton's direction ({length:.2e} m) lowers the energy, in iteration {iteration}"
+            return Outcome(Status.LINE_SEARCH_FAILED, here, text, rows)
+        if last_norm > 0.0 and said.first_norm > 0.0:
+            forcing = min(_LOOSEST, max(_TIGHTEST, 0.5 * (said.first_norm / last_norm) ** 2))
+        last_norm = said.first_norm
+    text = (
+        f"Newton's method took {problem.max_iterations} iterations; its last step was {rows[-1].direction:.2e} m, "
+        f"the tolerance is {problem.tolerance:.2e} m"
+    )
+    return Outcome(Status.ITERATION_LIMIT, here, text, rows)
+
+
+def _guarded_search(
+    problem: Problem,
+    start: Model,
+    direction: NDArray[np.float64],
+    slope: float,
+    largest: float,
+    guard: Guard,
+    hessian: HessianBlocks | None,
+) -> tuple[Model, float, int]:
+    """A line search that ends where every guarded tet has a positive volume, in rounded numbers too."""
+    end, step, cuts = backtrack(problem.objective, start, direction, slope, largest, hessian)
+    while step > 0.0 and not guard.allows(end.positions):
+        end, step, more = backtrack(problem.objective, start, direction, slope, 0.5 * step, hessian)
+        cuts += more + 1
+    return end, step, cuts

@@ -1,0 +1,53 @@
+"""What an energy must answer to be part of the objective."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class HessianBlocks:
+    """A sum of Hessians, not yet assembled.
+
+    Attributes
+    ----------
+    tets : (m, 12, 12) one matrix for each tet, coordinate i of node p in row 3 p + i [N/m]
+    vertices : (n, 3, 3) one matrix for each vertex with itself [N/m]
+    """
+
+    tets: NDArray[np.float64]
+    vertices: NDArray[np.float64]
+
+    @classmethod
+    def zeros(cls, n_tets: int, n_vertices: int) -> HessianBlocks:
+        return cls(np.zeros((n_tets, 12, 12)), np.zeros((n_vertices, 3, 3)))
+
+
+class Potential(ABC):
+    """An energy of the positions x (n, 3) of all vertices, pinned ones included."""
+
+    @abstractmethod
+    def value(self, x: NDArray[np.float64]) -> float:
+        """The energy [J]; +inf where x is not allowed."""
+
+    @abstractmethod
+    def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+        """Add the gradient (n, 3) [N] to `out`."""
+
+    @abstractmethod
+    def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
+        """Add the Hessian [N/m] to `out`; with `project`, that of a convex model of the energy at x."""
+
+    def add_model(self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None) -> float:
+        """The energy; its gradient and, where asked for, its projected Hessian added to what is given.
+
+        The same as the three methods above, for potentials that save work by doing all at once.
+        """
+        self.add_gradient(x, gradient)
+        if hessian is not None:
+            self.add_hessian(x, hessian, True)
+        return self.value(x)

@@ -1,0 +1,32 @@
+"""What pins do to the bodies that they hold."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.system import System
+
+
+def reaction_forces(system: System, gradient: NDArray[np.float64]) -> tuple[dict[str, NDArray], dict[str, NDArray]]:
+    """The forces that pins exert on their vertices.
+
+    Parameters
+    ----------
+    gradient : (n, 3) of the whole objective at the end of a step, pinned vertices included [N]: mass times acceleration
+        minus all other forces, which is what the pin must add.
+
+    Returns
+    -------
+    totals, by_vertex : by the pin's label, (3,) and (k, 3) [N]; labels that occur again get a number.
+    """
+    totals: dict[str, NDArray] = {}
+    by_vertex: dict[str, NDArray] = {}
+    for pin in system.pins:
+        label, number = pin.pin.label, 2
+        while label in totals:
+            label = f"{pin.pin.label} #{number}"
+            number += 1
+        by_vertex[label] = gradient[pin.vertices]
+        totals[label] = by_vertex[label].sum(axis=0)
+    return totals, by_vertex

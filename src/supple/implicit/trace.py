@@ -1,0 +1,50 @@
+"""What is written down of every Newton iteration."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, fields
+
+
+@dataclass(frozen=True)
+class NewtonRow:
+    """One iteration.
+
+    Attributes
+    ----------
+    iteration : from 0; extension iterations, which bring pins to their places, count separately
+    energy : of the objective after the step [J]; force : largest component of the gradient before it [N]
+    direction : largest component of the Newton direction [m]
+    linear_solver : "pcg", "direct" or "none"; linear_iterations : of CG; linear_tolerance : asked of CG
+    filter : largest step without inversion, at most 1; step : taken, as a share of the direction; cuts : of the line
+        search
+    kind : "newton", or "extension" where pins were moved
+    substep : number of the substep within the step
+    """
+
+    iteration: int
+    energy: float
+    force: float
+    direction: float
+    linear_solver: str
+    linear_iterations: int
+    linear_tolerance: float
+    filter: float
+    step: float
+    cuts: int
+    kind: str = "newton"
+    substep: int = 0
+
+
+def trace_csv(steps: Iterable[tuple[float, Iterable[NewtonRow]]]) -> str:
+    """The rows of several steps, each with the time [s] at its end, as CSV text with one header."""
+    text = io.StringIO()
+    names = [field.name for field in fields(NewtonRow)]
+    writer = csv.DictWriter(text, ["time", *names], lineterminator="\n")
+    writer.writeheader()
+    for time, rows in steps:
+        for row in rows:
+            writer.writerow({"time": repr(float(time)), **asdict(row)})
+    return text.getvalue()

@@ -1,0 +1,26 @@
+"""How many threads a parallel kernel may use: one where the work is too small to share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numba
+
+
+@contextmanager
+def threads_for(work: int, least: int) -> Iterator[None]:
+    """Run Numba's parallel kernels on one thread where `work` is below `least`.
+
+    A small pass takes a fraction of a millisecond; where another process has the second core, waiting for it costs many
+    times that. Kernels here give the same bits on any number of threads.
+    """
+    if work >= least:
+        yield
+        return
+    before = numba.get_num_threads()
+    numba.set_num_threads(1)
+    try:
+        yield
+    finally:
+        numba.set_num_threads(before)
