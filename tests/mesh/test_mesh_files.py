@@ -81,6 +81,26 @@ def test_tets_written_by_meshio(tmp_path, kind, binary):
     assert np.allclose(loaded.vertices, BODY.vertices, atol=1e-15)
 
 
+@pytest.mark.parametrize("binary", [True, False])
+def test_msh_4_0_written_by_meshio(tmp_path, binary):
+    mesh = meshio.Mesh(BODY.vertices, [("tetra", BODY.tets)])
+    meshio.gmsh.write(tmp_path / "a.msh", mesh, fmt_version="4.0", binary=binary)
+    assert np.array_equal(TetMesh.load(tmp_path / "a.msh").tets, BODY.tets)
+
+
+def test_msh_with_scattered_tags_parameters_and_other_elements(tmp_path):
+    text = (
+        "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Entities\n0 0 0 0\n$EndEntities\n"
+        "$Nodes\n2 5 7 4000000000000\n2 1 1 2\n9\n4000000000000\n0 0 0 0.5 0.5\n1 0 0 0.5 0.5\n"
+        "3 1 0 3\n7\n8\n1000\n0 1 0\n0 0 1\n1 1 1\n$EndNodes\n"
+        "$Elements\n3 3 1 9\n0 1 15 1\n1 9\n2 1 2 1\n5 9 7 8\n3 1 4 2\n6 9 4000000000000 7 8\n"
+        "9 4000000000000 8 7 1000\n$EndElements\n"
+    )
+    loaded = TetMesh.load(write(tmp_path / "a.msh", text))
+    assert loaded.vertices.tolist() == [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]]
+    assert loaded.volume == pytest.approx(0.5)
+
+
 @pytest.mark.parametrize("extension", ["stl", "obj", "ply", "off", "vtu", "vtk"])
 def test_surfaces_written_by_meshio(tmp_path, extension):
     path = tmp_path / f"a.{extension}"
@@ -343,10 +363,17 @@ MALFORMED_TET_FILES = {
     "msh head": ("a.msh", "mesh\n", "MeshFormat"),
     "msh nodes": ("a.msh", MSH + MSH_TAIL, r"\$Nodes"),
     "msh cut": ("a.msh", MSH + MSH_NODES[:30], "a.msh"),
-    "msh huge": ("a.msh", MSH + MSH_NODES.replace("\n4\n", "\n4000000000\n") + MSH_TAIL, "a.msh:5: the counts"),
-    "msh negative": ("a.msh", MSH + MSH_NODES.replace("\n4\n", "\n-4\n") + MSH_TAIL, "a.msh:5: the counts"),
-    "msh word": ("a.msh", MSH + MSH_NODES.replace("4 0 0 1", "4 0 zero 1") + MSH_TAIL, "cannot be read"),
-    "msh index": ("a.msh", MSH + MSH_NODES + MSH_TAIL.replace("3 4\n", "3 9\n"), "a.msh: "),
+    "msh huge": ("a.msh", MSH + MSH_NODES.replace("\n4\n", "\n4000000000\n") + MSH_TAIL, "a.msh:5: .*counts"),
+    "msh negative": ("a.msh", MSH + MSH_NODES.replace("\n4\n", "\n-4\n") + MSH_TAIL, "a.msh:5: .*counts"),
+    "msh word": ("a.msh", MSH + MSH_NODES.replace("4 0 0 1", "4 0 zero 1") + MSH_TAIL, "a.msh:9: .*not a number"),
+    "msh index": ("a.msh", MSH + MSH_NODES + MSH_TAIL.replace("3 4\n", "3 9\n"), "names node 9, which does not exist"),
+    "msh twice": ("a.msh", MSH + MSH_NODES.replace("4 0 0 1", "3 0 0 1") + MSH_TAIL, "node 3 is given twice"),
+    "msh version": ("a.msh", MSH.replace("2.2", "1.0") + MSH_NODES + MSH_TAIL, "version '1.0'"),
+    "msh kind": ("a.msh", MSH + MSH_NODES + MSH_TAIL.replace("1 4 2", "1 77 2"), "elements of type 77"),
+    "msh float": ("a.msh", MSH + MSH_NODES + MSH_TAIL.replace("1 4 2", "1 4.5 2"), "whole one"),
+    "msh no end": ("a.msh", MSH + MSH_NODES + MSH_TAIL[:-6], r"no \$EndElements"),
+    "msh elements": ("a.msh", MSH + MSH_NODES + MSH_TAIL.replace("s\n1\n", "s\n7000000000\n"), "a.msh:12: .*counts"),
+    "msh wedge": ("a.msh", MSH + MSH_NODES + MSH_TAIL.replace("4 2 0 1 1 2 3 4", "6 0 1 2 3 4 1 2"), "wedge cells"),
     "msh flat": ("a.msh", MSH + MSH_NODES.replace("4 0 0 1", "4 1 1 0") + MSH_TAIL, "tet 0 .*flat"),
     "msh triangle": (
         "a.msh",

@@ -38,8 +38,13 @@ SURFACE_WRITERS = {
     ".vtu": vtk_xml.written_cells,
     ".vtk": vtk_legacy.written_surface,
 }
+TET_READERS: dict[str, Callable[[bytes], CellSoup]] = {
+    ".msh": msh.read,
+    ".vtu": vtk_xml.read,
+    ".vtk": vtk_legacy.read,
+}
 TETGEN_EXTENSIONS = (".node", ".ele", ".edge", ".face")
-TET_EXTENSIONS = (*TETGEN_EXTENSIONS, ".msh", ".vtu", ".vtk")
+TET_EXTENSIONS = (*TETGEN_EXTENSIONS, *TET_READERS)
 # Two units in the last place of single precision, relative to the bounding box.
 MERGE_TOLERANCE = 2e-7
 
@@ -107,10 +112,7 @@ def load_tetmesh(path: str | Path) -> TetMesh:
         raise _unknown_extension(path, TET_EXTENSIONS, hint)
     data = _contents(path)
     try:
-        if extension == ".msh":
-            soup = msh.read(path, data)
-        else:
-            soup = vtk_xml.read(data) if extension == ".vtu" else vtk_legacy.read(data)
+        soup = TET_READERS[extension](data)
         tets = tets_of(soup)
         mesh = TetMesh.dropping_unused(soup.points, tets)
     except FormatError as error:
