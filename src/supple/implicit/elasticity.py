@@ -56,7 +56,9 @@ class Elasticity(Potential):
         with threads_for(len(s.tets), SERIAL_TETS):
             element_hessians(x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters(), project, out.tets)
 
-    def add_model(self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None) -> float:
+    def add_model(
+        self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
+    ) -> float:
         s = self.system
         energies = np.empty(len(s.tets))
         gradients = np.empty((len(s.tets), 4, 3))
@@ -68,6 +70,7 @@ class Elasticity(Potential):
                 s.rest_volumes,
                 *self._parameters(),
                 hessian is not None,
+                project,
                 energies,
                 gradients,
                 _NOTHING if hessian is None else hessian.tets,

@@ -26,13 +26,15 @@ def backtrack(
     slope: float,
     largest: float,
     hessian: HessianBlocks | None,
+    project: bool,
 ) -> tuple[Model, float, int]:
     """Search along `direction` for a sufficient decrease.
 
     Parameters
     ----------
     start : the objective where the search begins; slope : gradient . direction, negative
-    largest : first length to try; hessian : where the projected Hessian at the end goes, if it is wanted
+    largest : first length to try; hessian, project : where the Hessian at the end goes, if it is
+        wanted, and of what kind
 
     Returns
     -------
@@ -42,11 +44,11 @@ def backtrack(
     for cuts in range(_MOST_CUTS):
         moved = start.positions + step * direction
         # Nearly always the first try is good, and then nothing is left to do.
-        model = objective.model(moved, hessian) if cuts == 0 else None
+        model = objective.model(moved, hessian, project) if cuts == 0 else None
         energy, size = (model.energy, model.size) if model is not None else objective.value_and_size(moved)
         if energy <= start.energy + _SUFFICIENT * step * slope + _ROUND_OFF * max(size, start.size):
-            return model or objective.model(moved, hessian), step, cuts
+            return model or objective.model(moved, hessian, project), step, cuts
         step *= _SHRINK
     if hessian is not None:
-        objective.model(start.positions, hessian)
+        objective.model(start.positions, hessian, project)
     return start, 0.0, _MOST_CUTS

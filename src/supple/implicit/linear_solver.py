@@ -68,12 +68,16 @@ class LinearSolver:
         if self.kind != "direct":
             self.preconditioner.update(self.data, coarse=self.age < 0)
 
-    def solve(self, force: NDArray[np.float64], tolerance: float) -> tuple[NDArray[np.float64] | None, LinearReport]:
+    def solve(
+        self, force: NDArray[np.float64], tolerance: float, convex: bool = True
+    ) -> tuple[NDArray[np.float64] | None, LinearReport]:
         """Solve H p = force.
 
         Parameters
         ----------
         force : (n, 3), of which the free rows are read; tolerance : relative, for CG
+        convex : whether the Hessian is known to be positive semi-definite; where that is not known and CG finds that it
+            is not so, None is returned at once
 
         Returns
         -------
@@ -89,6 +93,8 @@ class LinearSolver:
         if self.kind != "direct":
             most = _STALLED if self.kind == "auto" else max(1000, 3 * b.size)
             result = conjugate_gradients(self.data, self.preconditioner, b, x, tolerance, most)
+            if result.indefinite and not convex:
+                return None, LinearReport("pcg", result.iterations, result.first_norm)
             if not result.converged and self.age > 0:
                 # The coarse level belongs to an older matrix.
                 iterations += result.iterations

@@ -29,6 +29,9 @@ logger = logging.getLogger(__name__)
 _LOOSEST = 1e-2
 _TIGHTEST = 1e-8
 
+# Directions that shrink by less than this from iteration to iteration converge linearly.
+_LINEAR_RATE = 0.2
+
 
 @dataclass(frozen=True, eq=False)
 class Problem:
@@ -75,12 +78,21 @@ def minimize(problem: Problem, x: NDArray[np.float64], guard: Guard, tools: Tool
     if not np.isfinite(here.energy):
         return Outcome(Status.NOT_FINITE, here, "the energy at the start of Newton's method is not finite", rows)
     forcing = _LOOSEST
-    last_norm = 0.0
+    last_norm = last_length = 0.0
+    # Far from the minimum the energy is modelled convex. Near it, the model's convexity can cost the quadratic rate of
+    # convergence: then the true Hessian is tried, until it turns out not to be positive definite.
+    convex, patience, remaining = True, 1, 1
     for iteration in range(problem.max_iterations):
         gradient = here.gradient.copy()
         gradient[tools.pinned] = 0.0
         tools.linear_solver.assemble(tools.hessian)
-        direction, said = tools.linear_solver.solve(-gradient, forcing)
+        direction, said = tools.linear_solver.solve(-gradient, forcing, convex)
+        if direction is None and not convex:
+            convex, patience = True, 2 * patience
+            remaining = patience
+            problem.objective.model(here.positions, tools.hessian, True)
+            tools.linear_solver.assemble(tools.hessian)
+            direction, said = tools.linear_solver.solve(-gradient, forcing)
         if direction is None or not np.isfinite(direction).all():
             return Outcome(Status.NOT_FINITE, here, "the linear system of a Newton step could not be solved", rows)
         if problem.scale is not None:
@@ -90,9 +102,12 @@ def minimize(problem: Problem, x: NDArray[np.float64], guard: Guard, tools: Tool
         largest, _ = guard.largest_step(here.positions, direction)
         last = length <= problem.tolerance
         step, cuts = 0.0, 0
+        slow = last_length > 0.0 and length > _LINEAR_RATE * last_length
+        remaining = remaining - 1 if slow and largest == 1.0 else max(remaining, 1)
+        used, convex = convex, convex and remaining > 0
         if slope < 0.0 and largest > 0.0:
             hessian = None if last else tools.hessian
-            here, step, cuts = _guarded_search(problem, here, direction, slope, largest, guard, hessian)
+            here, step, cuts = _guarded_search(problem, here, direction, slope, largest, guard, hessian, convex)
         row = NewtonRow(
             iteration=iteration,
             energy=here.energy,
@@ -104,6 +119,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], guard: Guard, tools: Tool
             filter=largest,
             step=step,
             cuts=cuts,
+            projected=used,
         )
         rows.append(row)
         logger.debug("%s", row)
@@ -115,7 +131,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], guard: Guard, tools: Tool
             return Outcome(Status.LINE_SEARCH_FAILED, here, text, rows)
         if last_norm > 0.0 and said.first_norm > 0.0:
             forcing = min(_LOOSEST, max(_TIGHTEST, 0.5 * (said.first_norm / last_norm) ** 2))
-        last_norm = said.first_norm
+        last_norm, last_length = said.first_norm, length
     text = (
         f"Newton's method took {problem.max_iterations} iterations; its last step was {rows[-1].direction:.2e} m, "
         f"the tolerance is {problem.tolerance:.2e} m"
@@ -131,10 +147,11 @@ def _guarded_search(
     largest: float,
     guard: Guard,
     hessian: HessianBlocks | None,
+    project: bool,
 ) -> tuple[Model, float, int]:
     """A line search that ends where every guarded tet has a positive volume, in rounded numbers too."""
-    end, step, cuts = backtrack(problem.objective, start, direction, slope, largest, hessian)
+    end, step, cuts = backtrack(problem.objective, start, direction, slope, largest, hessian, project)
     while step > 0.0 and not guard.allows(end.positions):
-        end, step, more = backtrack(problem.objective, start, direction, slope, 0.5 * step, hessian)
+        end, step, more = backtrack(problem.objective, start, direction, slope, 0.5 * step, hessian, project)
         cuts += more + 1
     return end, step, cuts

@@ -51,12 +51,12 @@ class Objective(Potential):
         for term in self.terms:
             term.add_gradient(x, out)
 
-    def model(self, x: NDArray[np.float64], hessian: HessianBlocks | None) -> Model:
-        """Energy and gradient at x; the projected Hessian into `hessian`, where given."""
+    def model(self, x: NDArray[np.float64], hessian: HessianBlocks | None, project: bool = True) -> Model:
+        """Energy and gradient at x; the Hessian into `hessian`, where given, of a convex model with `project`."""
         gradient = np.zeros_like(x)
         if hessian is not None:
             hessian.vertices[:] = 0.0
-        values = [term.add_model(x, gradient, hessian) for term in self.terms]
+        values = [term.add_model(x, gradient, hessian, project) for term in self.terms]
         return Model(x, sum(values), sum(abs(value) for value in values), gradient)
 
     def hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool = True) -> None:

@@ -42,12 +42,14 @@ class Potential(ABC):
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
         """Add the Hessian [N/m] to `out`; with `project`, that of a convex model of the energy at x."""
 
-    def add_model(self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None) -> float:
-        """The energy; its gradient and, where asked for, its projected Hessian added to what is given.
+    def add_model(
+        self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
+    ) -> float:
+        """The energy; its gradient and, where asked for, its Hessian added to what is given.
 
         The same as the three methods above, for potentials that save work by doing all at once.
         """
         self.add_gradient(x, gradient)
         if hessian is not None:
-            self.add_hessian(x, hessian, True)
+            self.add_hessian(x, hessian, project)
         return self.value(x)

@@ -20,6 +20,7 @@ class NewtonRow:
     linear_solver : "pcg", "direct" or "none"; linear_iterations : of CG; linear_tolerance : asked of CG
     filter : largest step without inversion, at most 1; step : taken, as a share of the direction; cuts : of the line
         search
+    projected : whether the Hessian was that of the convex model
     kind : "newton", or "extension" where pins were moved
     substep : number of the substep within the step
     """
@@ -34,6 +35,7 @@ class NewtonRow:
     filter: float
     step: float
     cuts: int
+    projected: bool = True
     kind: str = "newton"
     substep: int = 0
 

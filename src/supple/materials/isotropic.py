@@ -257,7 +257,7 @@ def _build_kernels(version: int) -> _Kernels:
     """The compiled loops. `version` is in their closures, so that no cached kernel outlives a change of a material."""
 
     @njit(parallel=True, cache=True, error_model="numpy")
-    def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, energies, gradients, hessians):
+    def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, energies, gradients, hessians):
         _ = version
         for e in prange(len(tets)):
             U, s, V = decompose(deformation_gradient(x, tets, Dm_inv, e))
@@ -265,7 +265,7 @@ def _build_kernels(version: int) -> _Kernels:
             energies[e] = volumes[e] * _density(kind[e], s, mu[e], lam[e])
             _tet_gradient_of(U, s, V, B, volumes[e], kind[e], mu[e], lam[e], gradients, e)
             if second:
-                _tet_hessian_of(U, s, V, B, volumes[e], kind[e], mu[e], lam[e], True, hessians, e)
+                _tet_hessian_of(U, s, V, B, volumes[e], kind[e], mu[e], lam[e], project, hessians, e)
 
     @njit(parallel=True, cache=True, error_model="numpy")
     def element_energies(x, tets, Dm_inv, volumes, kind, mu, lam, out):
@@ -328,16 +328,17 @@ def _build_kernels(version: int) -> _Kernels:
 _KERNELS = _build_kernels(fingerprint([*Path(__file__).parent.glob("*.py"), Path(mat3.__file__), Path(svd3.__file__)]))
 
 
-def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, energies, gradients, hessians) -> None:
-    """Energies (m,), gradients (m, 4, 3) and, with `second`, projected Hessians (m, 12, 12) of all tets at once: one
+def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, energies, gradients, hessians) -> None:
+    """Energies (m,), gradients (m, 4, 3) and, with `second`, Hessians (m, 12, 12) of all tets at once: one
     decomposition of each F serves all three.
 
     Parameters
     ----------
     x, tets, Dm_inv, volumes, kind, mu, lam : as of `element_energies`
     second : whether Hessians are wanted; if not, `hessians` is left as it is
+    project : see `element_hessians`
     """
-    _KERNELS.element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, energies, gradients, hessians)
+    _KERNELS.element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, energies, gradients, hessians)
 
 
 def element_energies(x, tets, Dm_inv, volumes, kind, mu, lam, out) -> None:
