@@ -1,0 +1,76 @@
+"""`supple info` on files of every kind."""
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.cli.app import main
+from supple.cli.exit_codes import ExitCode
+from supple.output.recording import Recorder
+
+
+@pytest.fixture
+def told(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+
+    def tell(file):
+        assert main(["info", file]) == ExitCode.OK
+        lines = capsys.readouterr().out.splitlines()[1:]
+        rows = {}
+        for line in lines:
+            name, _, value = line.rstrip().partition("  ")
+            rows[name] = value.strip()
+        return rows
+
+    return tell
+
+
+def test_a_surface_with_a_hole(told):
+    box = sp.shapes.box_surface((1, 2, 3), (1, 1, 1))
+    sp.SurfaceMesh(box.vertices, box.triangles[1:]).save("open.stl")
+    rows = told("open.stl")
+    assert (rows["kind"], rows["vertices"], rows["triangles"]) == ("surface", "8", "11")
+    assert rows["size"] == "1 x 2 x 3 m"
+    assert rows["volume"] == "none, the surface is open"
+    assert "hole" in rows["problems"]
+
+
+@pytest.mark.parametrize("name", ["box.1.node", "box.msh", "box.vtu", "box.vtk"])
+def test_a_tet_mesh(told, name):
+    sp.shapes.box((1, 2, 3), (1, 1, 1)).save(name)
+    rows = told(name)
+    assert (rows["kind"], rows["vertices"], rows["tets"]) == ("tetrahedral mesh", "8", "6")
+    assert rows["volume"] == "6 m^3"
+
+
+def test_a_surface_in_a_file_that_may_hold_tets(told):
+    sp.shapes.sphere_surface(0.5, 0.2).save("ball.vtk")
+    assert told("ball.vtk")["kind"] == "surface"
+
+
+def test_a_scene(told, tmp_path):
+    (tmp_path / "s.yaml").write_text(
+        "bodies: [{name: cube, shape: {kind: box, size: [1, 1, 2]}, "
+        "material: {kind: arap, youngs: 1e4, poisson: 0.2, density: 500}}]\n"
+        "obstacles: [{kind: half_space, name: floor}]\npins: [{body: cube, vertices: [0, 1]}]\n"
+        "solver: {kind: xpbd, substeps: 3}\ndt: 0.5\nsteps: 4\n"
+    )
+    rows = told("s.yaml")
+    assert rows["kind"] == "scene"
+    assert rows["body cube"] == "ARAP, 384 tets, 2 m^3, 1000 kg"
+    assert rows["obstacles"] == "floor (HalfSpace)"
+    assert rows["pins"] == "pin of body 'cube': 2 vertices"
+    assert rows["time"] == "4 steps of 0.5 s: 2 s"
+
+
+def test_a_recording(told):
+    cube = sp.Body("cube", sp.shapes.box((1, 1, 1), (1, 1, 1)), sp.StableNeoHookean(youngs=1e5, poisson=0.3))
+    frames = list(sp.simulate(sp.Scene([cube]), sp.XPBD(substeps=2), 0.01, 3, sinks=[Recorder("r.vtkhdf")]))
+    rows = told("r.vtkhdf")
+    assert rows["kind"] == "recording"
+    assert rows["frames"] == "4 to t = 0.03 s, dt = 0.01 s"
+    assert (rows["vertices"], rows["tets"], rows["mass"]) == ("8", "6", "1000 kg")
+    assert (rows["ended"], rows["problems"]) == ("converged", "none")
+    assert float(rows["smallest J"].split()[0]) == pytest.approx(min(1.0, *(f.report.min_det_F for f in frames)), 1e-5)
+    assert np.isfinite(frames[-1].time)

@@ -1,0 +1,116 @@
+"""The command line itself: help, versions, exit codes, pipes and what the system refuses."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+from jsonschema import Draft202012Validator
+
+import supple as sp
+from supple.cli import app as shell
+from supple.cli.app import COMMANDS, main
+from supple.cli.exit_codes import ExitCode
+
+
+def test_version(capsys):
+    assert main(["--version"]) == ExitCode.OK
+    assert capsys.readouterr().out.strip() == sp.__version__
+
+
+def test_help_lists_every_command(capsys):
+    assert main(["--help"]) == ExitCode.OK
+    out = capsys.readouterr().out
+    for command in COMMANDS:
+        assert f" {command} " in out
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_explains_itself(command, capsys):
+    assert main([command, "--help"]) == ExitCode.OK
+    out = capsys.readouterr().out
+    assert f"supple {command}" in out
+    assert len(out.splitlines()) > 5
+
+
+def test_no_arguments_show_the_help(capsys):
+    assert main([]) == ExitCode.OK
+    assert "run" in capsys.readouterr().out
+
+
+def test_info_without_a_file_says_versions(capsys):
+    assert main(["info"]) == ExitCode.OK
+    out = capsys.readouterr().out
+    for word in ("supple", "python", "platform", "threads", "numba"):
+        assert word in out
+
+
+def test_schema_to_the_screen_and_to_a_file(tmp_path, capsys):
+    assert main(["schema"]) == ExitCode.OK
+    schema = json.loads(capsys.readouterr().out)
+    Draft202012Validator.check_schema(schema)
+    assert main(["schema", "-o", str(tmp_path / "new" / "scene.json")]) == ExitCode.OK
+    assert json.loads((tmp_path / "new" / "scene.json").read_text(encoding="utf-8")) == schema
+
+
+def test_a_near_miss_is_met_with_a_suggestion(capsys):
+    assert main(["shema"]) == ExitCode.INPUT
+    assert "schema" in capsys.readouterr().err
+
+
+FORESEEABLE = [
+    (PermissionError(13, "Permission denied", "out/x"), ExitCode.INPUT, "supple: out/x: Permission denied\n"),
+    (OSError(28, "No space left on device"), ExitCode.INPUT, "supple: No space left on device\n"),
+    (MemoryError("Unable to allocate 9 TiB"), ExitCode.INPUT, "not enough memory for this: Unable to allocate 9 TiB"),
+    (KeyboardInterrupt(), ExitCode.INTERRUPTED, "supple: interrupted\n"),
+    (sp.MeshError("two\nlines \x1b[31m"), ExitCode.INPUT, "supple: two lines \\x1b[31m\n"),
+    (BrokenPipeError(), ExitCode.BROKEN_PIPE, ""),
+]
+
+
+@pytest.mark.parametrize(("error", "code", "said"), FORESEEABLE, ids=lambda value: type(value).__name__)
+def test_what_the_system_refuses_is_one_line(error, code, said, monkeypatch, capsys):
+    def fail(*arguments):
+        raise error
+
+    monkeypatch.setattr(shell, "app", fail)
+    assert main([]) == code
+    err = capsys.readouterr().err
+    assert said in err
+    assert err.count("\n") == (1 if said else 0)
+
+
+def test_bugs_are_not_hidden(monkeypatch):
+    def fail(*arguments):
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(shell, "app", fail)
+    with pytest.raises(ZeroDivisionError):
+        main([])
+
+
+def supple(*arguments, **options):
+    return subprocess.run(
+        [sys.executable, "-m", "supple", *arguments], capture_output=True, text=True, timeout=120, **options
+    )
+
+
+def test_as_a_process():
+    done = supple("--version")
+    assert (done.returncode, done.stdout.strip(), done.stderr) == (0, sp.__version__, "")
+    done = supple("info", "absent.stl")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("supple: ")
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes end otherwise elsewhere")
+def test_a_reader_that_leaves_is_no_error():
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run(
+        [sys.executable, "-m", "supple", "schema"], stdout=writing, stderr=subprocess.PIPE, text=True, timeout=120
+    )
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (141, "")

@@ -1,0 +1,48 @@
+"""Every example runs, and gets one physical number right."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+from supple.scene_file.loader import load_run
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+def run_example(name):
+    (path,) = EXAMPLES.glob(f"{name}_*.py")
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.main()
+
+
+def test_01_a_ball_falls_freely_is_squashed_and_springs_back():
+    found = run_example("01")
+    assert found["fall_error"] < 2e-3
+    assert found["lowest"] < 0.7
+    assert found["rebound"] > 0.95
+
+
+def test_02_a_stretched_bar_thins_as_its_material_says():
+    assert run_example("02") == pytest.approx(0.84327, rel=0.01)
+
+
+def test_03_a_free_spin_keeps_its_angular_momentum():
+    assert run_example("03") < 1e-10
+
+
+def test_04_a_block_slides_as_coulomb_says():
+    assert run_example("04") == pytest.approx(1.0, rel=0.02)
+
+
+def test_every_example_is_run_by_a_test_of_this_file():
+    numbers = {path.name[:2] for path in EXAMPLES.glob("[0-9]*.py")}
+    tested = {name[5:7] for name in globals() if name.startswith("test_0")}
+    assert numbers == tested
+
+
+@pytest.mark.parametrize("path", sorted((EXAMPLES / "scenes").glob("*.yaml")), ids=lambda path: path.stem)
+def test_every_scene_file_loads(path):
+    assert load_run(path).steps > 0
