@@ -447,7 +447,7 @@ def test_damaged_files_never_do_worse_than_a_mesh_error(tmp_path, kind, capfd):
     mesh.save(path)
     original = path.read_bytes()
 
-    @settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck), database=None)
+    @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow], database=None)
     @given(
         cut=st.integers(0, len(original)),
         at=st.lists(st.integers(0, len(original) - 1), max_size=4),
