@@ -1,7 +1,8 @@
 """Which constraints may be projected at the same time, and in which order one thread should take them.
 
-Two constraints are independent where they share no vertex. `breadth_first_order` puts the vertices of a mesh in levels such
-that a constraint touches at most two neighbouring ones; `greedy_colors` finds independent constraints near each other.
+Two constraints are independent where they share no vertex. `breadth_first_order` puts the vertices of a mesh in
+levels such that a constraint touches at most two neighbouring ones; `greedy_colors` finds independent constraints
+near each other.
 """
 
 from __future__ import annotations
@@ -95,8 +96,8 @@ def _breadth_first(pointers, neighbours):
 def greedy_colors(constraints, n_vertices, block):
     """Color each run of `block` constraints for itself, such that equal colors share no vertex.
 
-    Every constraint takes the first color that none of its vertices has in its block. Beyond `MAX_COLORS` the last color
-    is shared, which is why these colors order constraints and do not license parallel work.
+    Every constraint takes the first color that none of its vertices has in its block. Beyond `MAX_COLORS` the last
+    color is shared, which is why these colors order constraints and do not license parallel work.
 
     Parameters
     ----------

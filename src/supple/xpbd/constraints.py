@@ -69,8 +69,8 @@ def build_constraint_sets(system: System, layout: Layout) -> list[ConstraintSet]
         if type(part.body.material) not in known:
             names = " or ".join(kind.__name__ for kind in known)
             raise SolverError(
-                f"XPBD: body {part.name!r} is made of {type(part.body.material).__name__}, which XPBD has no constraints "
-                f"for; give it {names}, or simulate with Implicit"
+                f"XPBD: body {part.name!r} is made of {type(part.body.material).__name__}, which XPBD has no "
+                f"constraints for; give it {names}, or simulate with Implicit"
             )
     sets = []
     for entry in CONSTRAINT_SETS:

@@ -4,8 +4,8 @@ One projection with the multiplier starting at 0 and Kelvin-Voigt damping (gamma
 
     dlam = -(C + gamma (C - C_n)) / ((1 + gamma) sum w |grad C|^2 + alpha / h^2),    dx_i = w_i grad_i C dlam
 
-with C_n the constraint at the beginning of the substep. C - C_n, and not grad C . (x - x_n): the two agree to first order,
-but the first is exactly zero in a rigid rotation.
+with C_n the constraint at the beginning of the substep. C - C_n, and not grad C . (x - x_n): the two agree to first
+order, but the first is exactly zero in a rigid rotation.
 
 Source: Macklin, Müller, Chentanez, "XPBD" (2016), equations 18 and 26.
 """
@@ -13,14 +13,16 @@ Source: Macklin, Müller, Chentanez, "XPBD" (2016), equations 18 and 26.
 from __future__ import annotations
 
 import math
+from typing import cast
 
 import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
+from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.system import BodyRange, System
 from supple.xpbd.ordering import Layout
-from supple.xpbd.segments import Segments, kinds_of_bodies, sort_into_segments
+from supple.xpbd.segments import Segments, gather, sort_into_segments
 
 # No flag that assumes finite numbers (NaN must be seen) and none that reorders sums (same bits for any thread count).
 FLAGS = {"contract", "arcp", "nsz"}
@@ -30,13 +32,7 @@ class EdgeConstraints:
     """The edges of all bodies made of `EdgesAndVolume`."""
 
     def __init__(self, system: System, parts: list[BodyRange], layout: Layout) -> None:
-        materials = [part.body.material for part in parts]
-        constants = [(float(m.edge_compliance), float(m.damping)) for m in materials]  # pyright: ignore[reportAttributeAccessIssue]
-        kinds, self.table = kinds_of_bodies(parts, constants)
-        rows = np.concatenate([np.arange(part.edges.start, part.edges.stop) for part in parts])
-        kind = np.concatenate(
-            [np.full(part.edges.stop - part.edges.start, k) for part, k in zip(parts, kinds, strict=True)]
-        )
+        rows, kind, self.table = gather(parts, "edges", [(m.edge_compliance, m.damping) for m in _materials(parts)])
         movable = (system.inverse_masses[system.edges[rows]] > 0.0).any(axis=1)
         rows, kind = rows[movable], kind[movable]
         self.segments = sort_into_segments(layout, system.edges[rows], kind)
@@ -56,13 +52,7 @@ class VolumeConstraints:
     """The tetrahedra of all bodies made of `EdgesAndVolume`. Volumes are kept as determinants, 6 V."""
 
     def __init__(self, system: System, parts: list[BodyRange], layout: Layout) -> None:
-        materials = [part.body.material for part in parts]
-        constants = [(float(m.volume_compliance), float(m.damping)) for m in materials]  # pyright: ignore[reportAttributeAccessIssue]
-        kinds, self.table = kinds_of_bodies(parts, constants)
-        rows = np.concatenate([np.arange(part.tets.start, part.tets.stop) for part in parts])
-        kind = np.concatenate(
-            [np.full(part.tets.stop - part.tets.start, k) for part, k in zip(parts, kinds, strict=True)]
-        )
+        rows, kind, self.table = gather(parts, "tets", [(m.volume_compliance, m.damping) for m in _materials(parts)])
         movable = (system.inverse_masses[system.tets[rows]] > 0.0).any(axis=1)
         rows, kind = rows[movable], kind[movable]
         self.segments = sort_into_segments(layout, system.tets[rows], kind)
@@ -76,6 +66,10 @@ class VolumeConstraints:
         sweep = _sweep_volumes_parallel if parallel else _sweep_volumes
         # The energy C^2 / (2 alpha) of C = V - V0 is that of 6 C with 36 alpha.
         sweep(points, previous, self.corners, self.rest, *_scaled(self.segments, self.table, h, 36.0))
+
+
+def _materials(parts: list[BodyRange]) -> list[EdgesAndVolume]:
+    return [cast(EdgesAndVolume, part.body.material) for part in parts]
 
 
 def _scaled(segments: Segments, table: NDArray, h: float, unit: float) -> tuple[NDArray, NDArray, NDArray]:

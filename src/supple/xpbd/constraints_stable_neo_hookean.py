@@ -1,9 +1,9 @@
 """The stable Neo-Hookean constraint set: C_D = sqrt(tr F^T F), C_H = J - (1 + mu / lam), of each tet together.
 
 With alpha_D = 1 / (mu V), alpha_H = 1 / (lam V) their energy is V (mu/2 Ic + lam/2 (J - 1 - mu/lam)^2): that of
-`StableNeoHookean`, up to a constant. Neither constraint is zero at rest, only the sum of their forces is; taking one after
-the other leaves a residual that depends on the substep and makes the body too soft. Here both are taken in one step, which
-is exactly zero at rest (derivation: docs/xpbd.md, "The block of two").
+`StableNeoHookean`, up to a constant. Neither constraint is zero at rest, only the sum of their forces is; taking one
+after the other leaves a residual that depends on the substep and makes the body too soft. Here both are taken in one
+step, which is exactly zero at rest (derivation: docs/xpbd.md, "The block of two").
 
 Source of the constraints: Macklin and Müller, "A Constraint-based Formulation of Stable Neo-Hookean Materials" (2021).
 """
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from supple.errors import SolverError
 from supple.system import BodyRange, System
 from supple.xpbd.ordering import Layout
-from supple.xpbd.segments import kinds_of_bodies, sort_into_segments
+from supple.xpbd.segments import gather, sort_into_segments
 
 # No flag that assumes finite numbers (NaN must be seen) and none that reorders sums (same bits for any thread count).
 FLAGS = {"contract", "arcp", "nsz"}
@@ -27,11 +27,7 @@ class StableNeoHookeanConstraints:
     """The tetrahedra of all bodies made of `StableNeoHookean`."""
 
     def __init__(self, system: System, parts: list[BodyRange], layout: Layout) -> None:
-        kinds, self.table = kinds_of_bodies(parts, [(float(part.body.material.damping),) for part in parts])
-        rows = np.concatenate([np.arange(part.tets.start, part.tets.stop) for part in parts])
-        kind = np.concatenate(
-            [np.full(part.tets.stop - part.tets.start, k) for part, k in zip(parts, kinds, strict=True)]
-        )
+        rows, kind, self.table = gather(parts, "tets", [(part.body.material.damping,) for part in parts])
         lame = [_lame_of_tets(part) for part in parts]
         mu = np.concatenate([pair[0] for pair in lame])
         lam = np.concatenate([pair[1] for pair in lame])
@@ -45,13 +41,12 @@ class StableNeoHookeanConstraints:
         w = system.inverse_masses[system.tets[rows]]
         gradients, self.curvatures = _principal_axes(system.rest_shape_inverse[rows], w)
         V = system.rest_volumes[rows]
-        # The columns of `data`: 9 shape gradients, mu V, lam V, 1 + mu/lam, step length, 3 entries of N, viscous length.
-        self.data = np.empty((self.count, 17))
+        # The columns of `data`: 9 shape gradients, mu V, lam V, 1 + mu/lam, step length, 3 curvatures: two cache lines.
+        self.data = np.empty((self.count, 16))
         self.data[:, :9] = gradients.reshape(-1, 9)
         self.data[:, 9] = mu * V
         self.data[:, 10] = lam * V
         self.data[:, 11] = 1.0 + mu / lam
-        self._kinds = kind[order]
         self._prepared_for = 0.0
 
     def project(self, points: NDArray[np.float64], previous: NDArray[np.float64], h: float, parallel: bool) -> None:
@@ -60,32 +55,31 @@ class StableNeoHookeanConstraints:
             self._prepare(h)
         sweep = _sweep_parallel if parallel else _sweep
         gammas = self.table[self.segments.kinds, 0] / h
-        sweep(points, previous, self.corners, self.data, self.segments.chunk_pointers, self.segments.bounds, gammas)
+        sweep(points, previous, self.corners, self.data, h, self.segments.chunk_pointers, self.segments.bounds, gammas)
 
     def _prepare(self, h: float) -> None:
         """Step lengths for substeps of h: h^2 phi with phi the largest length at which a tet cannot overshoot."""
-        stiffness = 2.0 * self.data[:, 9] * self.curvatures.max(axis=1) * h**2
+        stiffness = 2.0 * self.data[:, 9] * self.curvatures[:, 2] * h**2
         self.data[:, 12] = h**2 * np.minimum(1.0, 1.0 / stiffness)
         self.data[:, 13:16] = self.curvatures
-        gamma = self.table[self._kinds, 0] / h
-        self.data[:, 16] = h**2 * np.minimum(1.0, 1.0 / np.maximum(gamma * stiffness, 1e-300))
         self._prepared_for = h
 
 
 def _lame_of_tets(part: BodyRange) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     count = part.tets.stop - part.tets.start
     mu, lam = part.body.material.lame_parameters()  # pyright: ignore[reportAttributeAccessIssue]
-    for name, values in (("youngs and poisson", mu), ("youngs and poisson", lam)):
+    for values in (mu, lam):
         if values.ndim and len(values) != count:
             raise SolverError(
-                f"XPBD: body {part.name!r}: {name} have {len(values)} values for {count} tets; give one per tet"
+                f"XPBD: body {part.name!r}: youngs and poisson have {len(values)} values for {count} tets; "
+                "give one number, or one per tet"
             )
     mu, lam = np.broadcast_to(mu, count), np.broadcast_to(lam, count)
     if (lam <= 0.0).any():
         tet = int(np.flatnonzero(lam <= 0.0)[0])
         raise SolverError(
-            f"XPBD: body {part.name!r}, tet {tet}: the stable Neo-Hookean lam is {lam[tet]:g} Pa; XPBD needs it above zero, "
-            "so give a larger poisson"
+            f"XPBD: body {part.name!r}, tet {tet}: the stable Neo-Hookean lam is {lam[tet]:g} Pa; "
+            "XPBD needs it above zero, so give a larger poisson"
         )
     return mu, lam
 
@@ -95,8 +89,8 @@ def _principal_axes(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Shape gradients in the axes in which sum_i w_i b_i b_i^T is diagonal, and that diagonal.
 
-    The energy is isotropic, so each tet may have rest coordinates of its own; these make the matrix that couples the two
-    constraints diagonal, three numbers instead of six.
+    The energy is isotropic, so each tet may have rest coordinates of its own; these make the matrix that couples the
+    two constraints diagonal, three numbers instead of six.
     """
     b = np.concatenate([-Dm_inv.sum(axis=1, keepdims=True), Dm_inv], axis=1)
     curvatures, axes = np.linalg.eigh(np.einsum("tn,tni,tnj->tij", w, b, b))
@@ -105,7 +99,7 @@ def _principal_axes(
 
 
 @njit(cache=True, fastmath=FLAGS, error_model="numpy")
-def _tets_of_chunk(points, previous, corners, data, first, last, bounds, gammas):
+def _tets_of_chunk(points, previous, corners, data, h, first, last, bounds, gammas):
     for s in range(first, last):
         gamma = gammas[s]
         for c in range(bounds[s, 0], bounds[s, 1]):
@@ -164,7 +158,6 @@ def _tets_of_chunk(points, previous, corners, data, first, last, bounds, gammas)
                 f00, f01, f02 = f00 - s00 * n0, f01 - s01 * n1, f02 - s02 * n2
                 f10, f11, f12 = f10 - s10 * n0, f11 - s11 * n1, f12 - s12 * n2
                 f20, f21, f22 = f20 - s20 * n0, f21 - s21 * n1, f22 - s22 * n2
-                viscous = b[16]
                 ux, uy, uz = _between(previous, p0, p1)
                 vx, vy, vz = _between(previous, p0, p2)
                 qx, qy, qz = _between(previous, p0, p3)
@@ -184,12 +177,27 @@ def _tets_of_chunk(points, previous, corners, data, first, last, bounds, gammas)
                     uz * b12 + vz * b22 + qz * b32,
                 )
                 # Growth of Green's strain over the substep, without its trace: zero in any rigid motion.
-                e00 = 0.5 * (f00 * f00 + f10 * f10 + f20 * f20 - g00 * g00 - g10 * g10 - g20 * g20)
-                e11 = 0.5 * (f01 * f01 + f11 * f11 + f21 * f21 - g01 * g01 - g11 * g11 - g21 * g21)
-                e22 = 0.5 * (f02 * f02 + f12 * f12 + f22 * f22 - g02 * g02 - g12 * g12 - g22 * g22)
-                e01 = 0.5 * (f00 * f01 + f10 * f11 + f20 * f21 - g00 * g01 - g10 * g11 - g20 * g21)
-                e02 = 0.5 * (f00 * f02 + f10 * f12 + f20 * f22 - g00 * g02 - g10 * g12 - g20 * g22)
-                e12 = 0.5 * (f01 * f02 + f11 * f12 + f21 * f22 - g01 * g02 - g11 * g12 - g21 * g22)
+                r00 = f00 * f00 + f10 * f10 + f20 * f20
+                r11 = f01 * f01 + f11 * f11 + f21 * f21
+                r22 = f02 * f02 + f12 * f12 + f22 * f22
+                r01 = f00 * f01 + f10 * f11 + f20 * f21
+                r02 = f00 * f02 + f10 * f12 + f20 * f22
+                r12 = f01 * f02 + f11 * f12 + f21 * f22
+                q00 = g00 * g00 + g10 * g10 + g20 * g20
+                q11 = g01 * g01 + g11 * g11 + g21 * g21
+                q22 = g02 * g02 + g12 * g12 + g22 * g22
+                q01 = g00 * g01 + g10 * g11 + g20 * g21
+                q02 = g00 * g02 + g10 * g12 + g20 * g22
+                q12 = g01 * g02 + g11 * g12 + g21 * g22
+                # The length of the viscous step, by the rule for the elastic one (k2 is the largest curvature), less the
+                # square of the largest stretch, before or after: row sums bound it, and are 1 at rest.
+                stretched = max(
+                    max(abs(r00) + abs(r01) + abs(r02), abs(r01) + abs(r11) + abs(r12), abs(r02) + abs(r12) + abs(r22)),
+                    max(abs(q00) + abs(q01) + abs(q02), abs(q01) + abs(q11) + abs(q12), abs(q02) + abs(q12) + abs(q22)),
+                )
+                viscous = min(h * h, 1.0 / (2.0 * mu * gamma * k2 * max(stretched, 1.0)))
+                e00, e11, e22 = 0.5 * (r00 - q00), 0.5 * (r11 - q11), 0.5 * (r22 - q22)
+                e01, e02, e12 = 0.5 * (r01 - q01), 0.5 * (r02 - q02), 0.5 * (r12 - q12)
                 third = (e00 + e11 + e22) / 3.0
                 e00, e11, e22 = e00 - third, e11 - third, e22 - third
                 shear = 2.0 * mu * gamma
@@ -280,17 +288,17 @@ def _between(x, i, j):
 
 
 @njit(cache=True)
-def _sweep(points, previous, corners, data, pointers, bounds, gammas):
+def _sweep(points, previous, corners, data, h, pointers, bounds, gammas):
     n_chunks = len(pointers) - 1
     for parity in range(2):
         for c in range(parity, n_chunks, 2):
-            _tets_of_chunk(points, previous, corners, data, pointers[c], pointers[c + 1], bounds, gammas)
+            _tets_of_chunk(points, previous, corners, data, h, pointers[c], pointers[c + 1], bounds, gammas)
 
 
 @njit(cache=True, parallel=True)
-def _sweep_parallel(points, previous, corners, data, pointers, bounds, gammas):
+def _sweep_parallel(points, previous, corners, data, h, pointers, bounds, gammas):
     n_chunks = len(pointers) - 1
     for parity in range(2):
         for k in prange((n_chunks + 1 - parity) // 2):
             c = 2 * k + parity
-            _tets_of_chunk(points, previous, corners, data, pointers[c], pointers[c + 1], bounds, gammas)
+            _tets_of_chunk(points, previous, corners, data, h, pointers[c], pointers[c + 1], bounds, gammas)

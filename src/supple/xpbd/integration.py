@@ -1,8 +1,8 @@
 """The parts of a substep around the constraints: prediction, velocities, and the exchange of positions with the world.
 
-Inside a frame every connected component is kept in coordinates of its own origin, near its center of mass. Positions far
-from the world's origin have few digits left for the small differences that velocities are made of: at 100 m, a substep of
-0.2 ms turns the round-off of a position into 7e-11 m/s.
+Inside a frame every connected component is kept in coordinates of its own origin, near its center of mass. Positions
+far from the world's origin have few digits left for the small differences that velocities are made of: at 100 m, a
+substep of 0.2 ms turns the round-off of a position into 7e-11 m/s.
 """
 
 from __future__ import annotations

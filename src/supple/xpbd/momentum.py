@@ -1,11 +1,12 @@
 """Giving every free body back the momentum that constraint projection takes from it.
 
 A projection conserves the moment of its corrections about the positions that it sees. The velocity is (x - x_n) / h,
-though, so the arm that counts for angular momentum is x_n. The difference is of second order in the substep, it has a sign,
-and it adds up: a squashed sphere, released, begins to spin. More substeps make it worse.
+though, so the arm that counts for angular momentum is x_n. The difference is of second order in the substep, it has a
+sign, and it adds up: a squashed sphere, released, begins to spin. More substeps make it worse.
 
-The cure, once a substep after the internal constraints and before contacts, for every connected component without a pinned
-vertex: with c and c' the centers of mass of x_n and x, r0 = x_n - c, r = x - c', and x* the predicted positions,
+The cure, once a substep after the internal constraints and before contacts, for every connected component without a
+pinned vertex: with c and c' the centers of mass of x_n and x, r0 = x_n - c, r = x - c', and x* the predicted
+positions,
 
     P_err = sum m (x - x*),   L_err = sum m r0 x (x - x*),   A = sum m ((r0 . r) I - r r0^T),   A th = L_err,
     x  <-  x - P_err / M - th x r.
@@ -59,7 +60,8 @@ class MomentumRestore:
         """End the internal part of a substep: v = (x - x_n) / h, and both momenta of every free component restored.
 
         The correction goes into positions and velocities each for itself. Through the positions, velocities would take
-        over their round-off, divided by h; in 60 s of free motion at 80 substeps that has been seen to add up to 4e-9 rad/s.
+        over their round-off, divided by h; in 60 s of free motion at 80 substeps that has been seen to add up to 4e-9
+        rad/s.
 
         Parameters
         ----------

@@ -1,12 +1,13 @@
 """The solver's own numbering of vertices and its split of the constraints into chunks that can run side by side.
 
-Vertices are numbered along breadth-first levels, body by body: neighbours in space become neighbours in memory. Cutting the
-levels into consecutive chunks gives a chunk graph that is a path, because a constraint spans at most two neighbouring
-levels. Two colors are enough for a path: all even chunks may run at the same time, then all odd ones. One sweep over a
-constraint set takes two parallel regions, whatever the mesh; a colored sweep of single constraints takes about forty.
+Vertices are numbered along breadth-first levels, body by body: neighbours in space become neighbours in memory.
+Cutting the levels into consecutive chunks gives a chunk graph that is a path, because a constraint spans at most two
+neighbouring levels. Two colors are enough for a path: all even chunks may run at the same time, then all odd ones.
+One sweep over a constraint set takes two parallel regions, whatever the mesh; a colored sweep of single constraints
+takes about forty.
 
-The chunks depend on the mesh only, never on the number of threads, and inside a chunk the order is fixed: the result has
-the same bits on any number of threads.
+The chunks depend on the mesh only, never on the number of threads, and inside a chunk the order is fixed: the result
+has the same bits on any number of threads.
 """
 
 from __future__ import annotations
@@ -22,8 +23,9 @@ from supple.system import System
 # A chunk is worth a thread's while from about this many constraints on (some 10 us).
 SMALLEST_CHUNK = 1024
 MOST_CHUNKS = 64
-# Inside a chunk constraints are interleaved over runs of this length: long enough to find some twenty independent ones in a
-# row (a processor works on several at once), short enough for the run's vertices to stay in the first cache.
+# Inside a chunk constraints are interleaved over runs of this length: long enough to find some twenty independent
+# ones in a row (a processor works on several at once), short enough for the run's vertices to stay in the first
+# cache.
 RUN_LENGTH = 1024
 
 
@@ -48,7 +50,8 @@ class Layout:
     def sort(self, constraints: NDArray[np.int32], kind: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
         """The order of constraints (m, k), given in the solver's numbers, and the chunk of each one in that order.
 
-        Sorted by chunk, then `kind` (m,) (constraints of one kind share their constants), then along the levels, interleaved.
+        Sorted by chunk, then `kind` (m,) (constraints of one kind share their constants), then along the levels,
+        interleaved.
         """
         if len(constraints) == 0:
             return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int32)

@@ -45,9 +45,21 @@ def sort_into_segments(layout: Layout, constraints: NDArray[np.int32], kind: NDA
     )
 
 
-def kinds_of_bodies(
-    parts: list[BodyRange], constants: list[tuple[float, ...]]
-) -> tuple[list[int], NDArray[np.float64]]:
-    """Number the different tuples of constants: the kind of each body, and the table (kinds, constants)."""
+def gather(
+    parts: list[BodyRange], which: str, constants: list[tuple[float, ...]]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """The constraints of several bodies, and which constants are whose.
+
+    Parameters
+    ----------
+    parts : the bodies; which : "edges" or "tets"; constants : those of each body.
+
+    Returns
+    -------
+    rows : (m,) of the System's edges or tets; kind : (m,) rows of the table; table : (kinds, constants), each once.
+    """
     table = sorted(set(constants))
-    return [table.index(values) for values in constants], np.array(table, dtype=np.float64).reshape(len(table), -1)
+    ranges = [getattr(part, which) for part in parts]
+    rows = [np.arange(r.start, r.stop) for r in ranges]
+    kinds = [np.full(r.stop - r.start, table.index(values)) for r, values in zip(ranges, constants, strict=True)]
+    return np.concatenate(rows), np.concatenate(kinds), np.array(table, dtype=np.float64).reshape(len(table), -1)

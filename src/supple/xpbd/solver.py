@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from time import perf_counter
 
 import numba
 import numpy as np
@@ -33,6 +34,7 @@ from supple.xpbd.integration import (
 )
 from supple.xpbd.momentum import MomentumRestore
 from supple.xpbd.ordering import Layout, make_layout, reordered
+from supple.xpbd.pace import Pace
 
 # Below this many constraints a sweep is over before a second thread has woken up.
 PARALLEL_FROM = 20_000
@@ -54,7 +56,7 @@ class XPBDWorkspace:
     sets: list[ConstraintSet]
     momentum: MomentumRestore | None
     collisions: Collisions
-    parallel: bool
+    pace: Pace
     points: NDArray[np.float64]
     previous: NDArray[np.float64] = field(init=False)
     velocities: NDArray[np.float64] = field(init=False)
@@ -77,8 +79,8 @@ class XPBD(Solver):
     momentum_restore : give free bodies back the momentum that constraint projection takes (see `supple.xpbd.momentum`).
         False shows what XPBD does without.
     contact : contact of bodies with each other and with themselves; None turns it off. Obstacles act in any case.
-    threads : number of threads, or None: all of Numba's where the scene is large enough, else one. The result has the
-        same bits for any number.
+    threads : number of threads, or None: one, or all of Numba's where the scene is large enough and they turn out to be
+        faster. The result has the same bits for any number.
 
     Raises
     ------
@@ -117,14 +119,15 @@ class XPBD(Solver):
         points = np.zeros((len(system.masses), 4))
         points[:, 3] = inner.inverse_masses
         threads = self.threads or numba.get_num_threads()
-        large = self.threads is not None or sum(made.count for made in sets) >= PARALLEL_FROM
+        large = sum(made.count for made in sets) >= PARALLEL_FROM
+        parallel = threads > 1 and (large or self.threads is not None)
         return XPBDWorkspace(
             system=inner,
             layout=layout,
             sets=sets,
             momentum=MomentumRestore(inner) if self.momentum_restore else None,
             collisions=Collisions(inner, self.contact),
-            parallel=threads > 1 and large,
+            pace=Pace(choice=parallel and self.threads is None, parallel=parallel),
             points=points,
         )
 
@@ -136,20 +139,23 @@ class XPBD(Solver):
         held = ws.system.pinned_vertices
         if ws.collisions:
             ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt)
-        with _threads(self.threads, ws.parallel):
+        parallel = ws.pace.choose()
+        started = perf_counter()
+        with _threads(self.threads, parallel):
             for k in range(self.substeps):
-                begin = predict_parallel if ws.parallel else predict
+                begin = predict_parallel if parallel else predict
                 begin(ws.points, ws.previous, ws.velocities, ws.system.gravity, h)
                 if len(held):
                     hold(ws.points, held, targets, k, ws.origins)
                 for constraints in ws.sets:
-                    constraints.project(ws.points, ws.previous, h, ws.parallel)
+                    constraints.project(ws.points, ws.previous, h, parallel)
                 if ws.momentum is not None:
-                    ws.momentum.apply(ws.points, ws.previous, ws.velocities, h, ws.parallel)
+                    ws.momentum.apply(ws.points, ws.previous, ws.velocities, h, parallel)
                 else:
                     update_velocities(ws.points, ws.previous, ws.velocities, h)
                 if ws.collisions and not _collide(ws, state.time + (k + 1) * h, h):
                     break
+        ws.pace.note(parallel, perf_counter() - started)
         broken = first_broken(ws.points, ws.velocities)
         if broken >= 0:
             return state, StepReport(Status.NOT_FINITE, self.substeps, message=_what_broke(ws, broken, state.time + dt))
@@ -190,7 +196,7 @@ def _load(ws: XPBDWorkspace, state: State) -> None:
 
 
 def _collide(ws: XPBDWorkspace, time: float, h: float) -> bool:
-    """Contacts of one substep, in world coordinates. Returns False, with nothing done, where positions are not finite."""
+    """Contacts of one substep, in world coordinates. Returns False, with nothing done, where a position is broken."""
     if not to_world(ws.points, ws.origins, ws.world):
         return False
     to_world(ws.previous, ws.origins, ws.world_previous)

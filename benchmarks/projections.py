@@ -1,0 +1,160 @@
+"""Constraint projections per second beside plain C Gauss-Seidel: `python -m benchmarks.projections [--busy] [--quick]`.
+
+The contenders take turns on the same mesh and the fastest round counts. C is compiled in the same run. Columns:
+
+    tets         size of the box mesh
+    C            edges + volume in plain C, one thread                       [million projections / s]
+    1, 2         edges + volume in Supple on one and two threads             [million projections / s]
+    /C           the ratio to C
+    ns/tet       of a sweep over edges and volumes on two threads, and how much of it on one
+    snh 1, 2     stable Neo-Hookean tets per second                          [million / s]
+    step 1, 2    edges + volume with all that belongs to a substep           [million projections / s]
+"""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import shutil
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numba
+import numpy as np
+from numba.core import config
+from numpy.ctypeslib import ndpointer
+
+import supple as sp
+from benchmarks.measuring import busy_core
+from supple.system import System, build_system, initial_state
+from supple.xpbd.solver import XPBD
+
+DIVISIONS = {"1k": 6, "10k": 12, "30k": 17, "100k": 26, "180k": 31, "1M": 55}
+GCC_FLAGS = ("-O3", "-march=native", "-ffast-math", "-shared", "-fPIC")
+H = 1.0 / 1200.0
+
+
+def compile_reference(folder: Path) -> ctypes.CDLL | None:
+    """The C kernels, or None where there is no gcc."""
+    gcc = shutil.which("gcc")
+    if gcc is None:
+        return None
+    library = folder / "reference.so"
+    source = Path(__file__).with_name("gauss_seidel_reference.c")
+    subprocess.run([gcc, *GCC_FLAGS, str(source), "-o", str(library), "-lm"], check=True)
+    reference = ctypes.CDLL(str(library))
+    doubles, ints = ndpointer(np.float64, flags="C"), ndpointer(np.int32, flags="C")
+    for function in (reference.project_edges, reference.project_volumes):
+        function.argtypes = [doubles, doubles, ints, doubles, ctypes.c_long]
+        function.restype = None
+    return reference
+
+
+def reference_sweep(reference: ctypes.CDLL, system: System) -> Callable[[], None]:
+    """One sweep of the C kernels over a system, in the mesh's own order."""
+    x = system.rest_positions * 1.001
+    w, rest = system.inverse_masses, 6.0 * system.rest_volumes
+
+    def sweep() -> None:
+        reference.project_edges(x, w, system.edges, system.rest_lengths, len(system.edges))
+        reference.project_volumes(x, w, system.tets, rest, len(system.tets))
+
+    return sweep
+
+
+def our_sweep(system: System, threads: int) -> Callable[[], None]:
+    """One sweep of Supple's constraint sets over the same system."""
+    solver = XPBD(threads=threads, contact=None)
+    ws = solver.prepare(system)
+    ws.points[:, :3] = ws.system.rest_positions * 1.001
+    ws.previous[:] = ws.points[:, :3]
+
+    def sweep() -> None:
+        numba.set_num_threads(threads)
+        for constraints in ws.sets:
+            constraints.project(ws.points, ws.previous, H, threads > 1)
+
+    return sweep
+
+
+def our_substep(system: System, threads: int, substeps: int) -> Callable[[], None]:
+    """`substeps` whole substeps, momentum restore included."""
+    solver = XPBD(threads=threads, contact=None, substeps=substeps)
+    workspace = solver.prepare(system)
+    state = initial_state(system.scene)
+    return lambda: (solver.step(system, state, substeps * H, workspace), None)[1]
+
+
+def fastest(contenders: dict[str, Callable[[], None]], repeats: int, rounds: int) -> dict[str, float]:
+    """Seconds of one call of each contender: they take turns, and the fastest round counts."""
+    for run in contenders.values():
+        run()
+    best = dict.fromkeys(contenders, np.inf)
+    for _ in range(rounds):
+        for name, run in contenders.items():
+            start = time.perf_counter()
+            for _ in range(repeats):
+                run()
+            best[name] = min(best[name], (time.perf_counter() - start) / repeats)
+    return best
+
+
+def measure(divisions: int, reference: ctypes.CDLL | None, rounds: int) -> dict[str, float]:
+    """All columns for a box of `divisions`^3 cells."""
+    mesh = sp.shapes.box((1.0, 1.0, 1.0), (divisions,) * 3)
+    classic = build_system(sp.Scene(bodies=[sp.Body("box", mesh, sp.EdgesAndVolume())]))
+    neo_hookean = build_system(sp.Scene(bodies=[sp.Body("box", mesh, sp.StableNeoHookean(youngs=1e5, poisson=0.45))]))
+    count = len(mesh.edges) + len(mesh.tets)
+    repeats = max(1, round(2e6 / count))
+    substeps = max(2, min(20, repeats))
+    contenders: dict[str, Callable[[], None]] = {}
+    if reference is not None:
+        contenders["C"] = reference_sweep(reference, classic)
+    for threads in thread_counts():
+        contenders[f"{threads}"] = our_sweep(classic, threads)
+        contenders[f"snh {threads}"] = our_sweep(neo_hookean, threads)
+        contenders[f"step {threads}"] = our_substep(classic, threads, substeps)
+    seconds = fastest(contenders, repeats, rounds)
+    rates = {name: count / s / 1e6 for name, s in seconds.items()}
+    for threads in thread_counts():
+        rates[f"snh {threads}"] = len(mesh.tets) / seconds[f"snh {threads}"] / 1e6
+        rates[f"step {threads}"] *= substeps
+        rates[f"ns/tet {threads}"] = 1e9 * seconds[f"{threads}"] / len(mesh.tets)
+    return {"tets": len(mesh.tets), **rates}
+
+
+def thread_counts() -> list[int]:
+    """One thread, and two where there are two."""
+    return [1, 2] if config.NUMBA_NUM_THREADS > 1 else [1]  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def main(busy: bool = False, quick: bool = False) -> None:
+    """Print the table."""
+    sizes = list(DIVISIONS)[:3] if quick else list(DIVISIONS)
+    print(f"\nConstraint projections, float64, Numba {numba.__version__}{', one core busy' if busy else ''}")
+    with tempfile.TemporaryDirectory() as folder, busy_core(busy):
+        reference = compile_reference(Path(folder))
+        if reference is None:
+            print("no gcc: the columns of C are left out")
+        header = ["tets", "C", *(f"{t}" for t in thread_counts()), *(f"{t} /C" for t in thread_counts())]
+        header += [f"{what} {t}" for what in ("ns/tet", "snh", "step") for t in thread_counts()]
+        print("  ".join(f"{name:>8}" for name in header))
+        for size in sizes:
+            row = measure(DIVISIONS[size], reference, rounds=3 if quick else 7)
+            for t in thread_counts():
+                row[f"{t} /C"] = row[f"{t}"] / row["C"] if "C" in row else np.nan
+            row.setdefault("C", np.nan)
+            cells = [f"{size:>8}", f"{row['C']:8.1f}"]
+            cells += [f"{row[name]:8.2f}" if name.endswith("/C") else f"{row[name]:8.1f}" for name in header[2:]]
+            print("  ".join(cells), flush=True)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--busy", action="store_true", help="with another process that spins on one core")
+    parser.add_argument("--quick", action="store_true", help="small meshes only, few rounds")
+    arguments = parser.parse_args()
+    main(arguments.busy, arguments.quick)
