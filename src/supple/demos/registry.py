@@ -1,0 +1,24 @@
+"""All demos by name. A new demo is one file and one line here."""
+
+from __future__ import annotations
+
+from supple.demos.bears import BEARS
+from supple.demos.compliance import COMPLIANCE
+from supple.demos.demo import Demo
+from supple.demos.squash import SQUASH
+from supple.demos.stretch import STRETCH
+from supple.errors import SceneError
+
+DEMOS: dict[str, Demo] = {demo.name: demo for demo in (SQUASH, STRETCH, COMPLIANCE, BEARS)}
+
+
+def find_demo(name: str) -> Demo:
+    """The demo of that name.
+
+    Raises
+    ------
+    SceneError : where there is none.
+    """
+    if name not in DEMOS:
+        raise SceneError(f"there is no demo {name!r}; there are {', '.join(DEMOS)}")
+    return DEMOS[name]
