@@ -109,7 +109,7 @@ class Damping(Potential):
         return volumes, self.viscosity.mu, self.viscosity.lam, self.rate.factor, self.rate.reference
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _edges(x, tets, e):
     a, b, c, d = tets[e, 0], tets[e, 1], tets[e, 2], tets[e, 3]
     return (
@@ -125,18 +125,18 @@ def _edges(x, tets, e):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _symmetric_part(M):
     return (M[0], M[4], M[8], 0.5 * (M[5] + M[7]), 0.5 * (M[2] + M[6]), 0.5 * (M[1] + M[3]))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _strain(F):
     C = mat_mul(transpose(F), F)
     return (0.5 * (C[0] - 1.0), 0.5 * (C[4] - 1.0), 0.5 * (C[8] - 1.0), 0.5 * C[5], 0.5 * C[2], 0.5 * C[1])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _stress(F, reference, e, factor, mu, lam):
     """The viscous second Piola-Kirchhoff stress of tet e, and its strain rate times that, halved and divided by c."""
     E = _strain(F)
@@ -153,12 +153,12 @@ def _stress(F, reference, e, factor, mu, lam):
     return S, 0.5 * power / factor
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _full(S):
     return (S[0], S[5], S[4], S[5], S[1], S[3], S[4], S[3], S[2])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _strains(x, v, tets, Dm_inv, rates, out):
     for e in range(len(tets)):
         B = load_mat(Dm_inv, e)
@@ -171,14 +171,14 @@ def _strains(x, v, tets, Dm_inv, rates, out):
             out[e, k] = E[k]
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True, error_model="numpy")
 def _energies(x, tets, Dm_inv, volumes, mu, lam, factor, reference, out):
     for e in prange(len(tets)):
         F = mat_mul(_edges(x, tets, e), load_mat(Dm_inv, e))
         out[e] = volumes[e] * _stress(F, reference, e, factor, mu[e], lam[e])[1]
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True, error_model="numpy")
 def _gradients(x, tets, Dm_inv, volumes, mu, lam, factor, reference, out):
     for e in prange(len(tets)):
         B = load_mat(Dm_inv, e)
@@ -194,7 +194,7 @@ def _gradients(x, tets, Dm_inv, volumes, mu, lam, factor, reference, out):
             out[e, 0, i] = -total
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True, error_model="numpy")
 def _hessians(x, tets, Dm_inv, volumes, mu, lam, factor, reference, project, out):
     """d^2 D / dx_p dx_q = c V (dE/dx_p) C (dE/dx_q) + V (g_p . S g_q) I, with shape gradients g.
 

@@ -107,7 +107,7 @@ def elasticity_of(system: System) -> Elasticity:
     return Elasticity(system, material, start, incidence)
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True, error_model="numpy")
 def gather_gradients(start, incidence, gradients, out):
     """Add every tet's gradient (m, 4, 3) to its nodes' rows of out (n, 3), in the order of the tets."""
     for i in prange(len(start) - 1):

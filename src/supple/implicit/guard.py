@@ -73,7 +73,7 @@ def refuse_inverted(system: System, material: TetMaterial, x: NDArray[np.float64
             )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _positive(x, tets, Dm_inv):
     """(m,) whether J > 0; Dm has a positive determinant, so the sign is that of the edges' determinant."""
     out = np.empty(len(tets), dtype=np.bool_)

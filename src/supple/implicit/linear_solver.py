@@ -32,7 +32,7 @@ class LinearReport:
 
 @dataclass(eq=False)
 class LinearSolver:
-    """The matrix of the free vertices and its preconditioner; reused from iteration to iteration and step to step.
+    """The matrix of the free vertices and its preconditioner; its coarse level is reused from iteration to iteration.
 
     Attributes
     ----------
@@ -61,6 +61,10 @@ class LinearSolver:
         pattern = build_pattern(rows[system.tets], len(order.vertices))
         preconditioner = two_level(pattern, system.rest_positions[order.vertices], order.group_start)
         return cls(kind, order, pattern, preconditioner, np.zeros((pattern.blocks, 3, 3)))
+
+    def begin_step(self) -> None:
+        """Forget what earlier steps left behind, so that a step depends on its state alone."""
+        self.age = -1
 
     def assemble(self, hessian: HessianBlocks) -> None:
         """Take over a new Hessian."""

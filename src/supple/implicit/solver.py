@@ -159,6 +159,7 @@ class Implicit(Solver):
             self.max_iterations,
         )
         guard = Guard.at(system, state.positions)
+        workspace.tools.linear_solver.begin_step()
         targets = system.pin_targets(end)
         pinned = workspace.tools.pinned
         x = state.positions

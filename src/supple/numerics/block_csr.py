@@ -92,7 +92,7 @@ def build_pattern(elements: NDArray[np.int32], rows: int) -> BlockPattern:
     return BlockPattern(row_start, columns, diagonal, mirror, entry_start, entries)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def incidences(elements, rows):
     """For every row, the (element, node) pairs, coded 4 element + node, that name it."""
     start = np.zeros(rows + 1, dtype=np.int32)
@@ -113,7 +113,7 @@ def incidences(elements, rows):
     return start, incidence
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _count_columns(elements, start, incidence, rows):
     row_start = np.zeros(rows + 1, dtype=np.int32)
     seen = np.full(rows, -1, dtype=np.int32)
@@ -131,7 +131,7 @@ def _count_columns(elements, start, incidence, rows):
     return row_start
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _fill_columns(elements, start, incidence, row_start):
     rows = len(row_start) - 1
     columns = np.empty(row_start[rows], dtype=np.int32)
@@ -157,7 +157,7 @@ def _fill_columns(elements, start, incidence, row_start):
     return columns, diagonal
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _gather_map(elements, start, incidence, row_start, columns):
     rows = len(row_start) - 1
     blocks = len(columns)
@@ -196,7 +196,7 @@ def _gather_map(elements, start, incidence, row_start, columns):
     return mirror, entry_start, entries
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _assemble_row(i, row_start, columns, mirror, entry_start, entries, element_blocks, diagonal_blocks, data):
     for q in range(row_start[i], row_start[i + 1]):
         j = columns[q]
@@ -248,7 +248,7 @@ def _assemble_row(i, row_start, columns, mirror, entry_start, entries, element_b
             data[t, 2, 2] = d22
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True, error_model="numpy")
 def _assemble(row_start, columns, mirror, entry_start, entries, element_blocks, diagonal_blocks, data):
     for i in prange(len(row_start) - 1):
         _assemble_row(i, row_start, columns, mirror, entry_start, entries, element_blocks, diagonal_blocks, data)

@@ -6,6 +6,7 @@ does not promise.
 
 from __future__ import annotations
 
+import numpy as np
 from numba import njit, prange
 
 SIZE = 12
@@ -15,7 +16,7 @@ SIZE = 12
 _DEPENDENT = 1e-11
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _factor_diagonal(block, diagonal):
     """Cholesky factor of a 12x12 block in place, its diagonal inverted; dependent directions get the inverse 0."""
     for c in range(SIZE):
@@ -32,7 +33,7 @@ def _factor_diagonal(block, diagonal):
             block[c, r] = 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _solve_right(block, factor):
     """block <- block L^-T for a factored diagonal block L."""
     for r in range(SIZE):
@@ -43,7 +44,7 @@ def _solve_right(block, factor):
             block[r, c] = value * factor[c, c]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _subtract_product(target, left, right_transposed):
     for r in range(SIZE):
         for k in range(SIZE):
@@ -52,7 +53,7 @@ def _subtract_product(target, left, right_transposed):
                 target[r, c] -= value * right_transposed[k, c]
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True, error_model="numpy")
 def factorize(matrix, first):
     """Factor in place: A = L L^T.
 
@@ -63,25 +64,26 @@ def factorize(matrix, first):
     first : (b,) int32 the first block column of each row's envelope
     """
     count = len(first)
+    original = np.empty(SIZE)
     for k in range(count):
-        diagonal = matrix[k, k].copy()
-        original = diagonal.copy()
+        diagonal = matrix[k, k]
+        for c in range(SIZE):
+            original[c] = diagonal[c, c]
         for j in range(first[k], k):
             _subtract_product(diagonal, matrix[k, j], matrix[j, k])
-        entries = original.ravel()[:: SIZE + 1].copy()
-        _factor_diagonal(diagonal, entries)
-        matrix[k, k] = diagonal
+        _factor_diagonal(diagonal, original)
         for i in prange(k + 1, count):
             if first[i] <= k:
-                block = matrix[i, k].copy()
+                block = matrix[i, k]
                 for j in range(max(first[i], first[k]), k):
                     _subtract_product(block, matrix[i, j], matrix[j, k])
                 _solve_right(block, diagonal)
-                matrix[i, k] = block
-                matrix[k, i] = block.T
+                for r in range(SIZE):
+                    for c in range(SIZE):
+                        matrix[k, i, c, r] = block[r, c]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def solve(factor, first, b):
     """b <- A^-1 b for a factored matrix; b : (12 n,)."""
     count = len(first)

@@ -79,7 +79,7 @@ def conjugate_gradients(
     return CGResult(int(iterations), bool(converged), bool(indefinite), float(first), float(last))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _product_group(g, group_start, row_start, columns, data, p, Ap, sums):
     """Ap <- A p in the rows of a group, and its share of p . Ap."""
     total = 0.0
@@ -96,7 +96,7 @@ def _product_group(g, group_start, row_start, columns, data, p, Ap, sums):
     sums[g] = total
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _smooth_group(
     g, alpha, group_start, columns, diagonal, inner, data, inverse, fields, p, Ap, x, r, z, restricted, sums
 ):
@@ -140,7 +140,7 @@ def _smooth_group(
     sums[g] = total
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _direction_group(g, beta, group_start, fields, coefficients, z, p):
     """p <- z + Z coefficients + beta p in the rows of a group."""
     for i in range(group_start[g], group_start[g + 1]):
@@ -151,13 +151,13 @@ def _direction_group(g, beta, group_start, fields, coefficients, z, p):
             p[i, k] = value + beta * p[i, k]
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True, error_model="numpy")
 def _product(group_start, row_start, columns, data, p, Ap, sums):
     for g in prange(len(group_start) - 1):
         _product_group(g, group_start, row_start, columns, data, p, Ap, sums)
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True, error_model="numpy")
 def _smooth(alpha, group_start, columns, diagonal, inner, data, inverse, fields, p, Ap, x, r, z, restricted, sums):
     for g in prange(len(group_start) - 1):
         _smooth_group(
@@ -165,13 +165,13 @@ def _smooth(alpha, group_start, columns, diagonal, inner, data, inverse, fields,
         )
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True, error_model="numpy")
 def _direction(beta, group_start, fields, coefficients, z, p):
     for g in prange(len(group_start) - 1):
         _direction_group(g, beta, group_start, fields, coefficients, z, p)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _solve(
     row_start,
     columns,
@@ -191,17 +191,22 @@ def _solve(
     groups = len(group_start) - 1
     sums = np.zeros(groups)
     restricted = np.zeros(12 * groups)
-    r = rhs.copy()
+    coefficients = np.zeros(12 * groups)
+    r = np.empty_like(rhs)
+    for i in range(len(rhs)):
+        for k in range(3):
+            r[i, k] = rhs[i, k]
+            x[i, k] = 0.0
     z = np.zeros_like(r)
     p = np.zeros_like(r)
     Ap = np.zeros_like(r)
-    x[:] = 0.0
     alpha = 0.0
     first_norm = 0.0
     old = 0.0
     for iteration in range(max_iterations + 1):
         _smooth(alpha, group_start, columns, diagonal, inner, data, inverse, fields, p, Ap, x, r, z, restricted, sums)
-        coefficients = restricted.copy()
+        for k in range(12 * groups):
+            coefficients[k] = restricted[k]
         solve(coarse, first, coefficients)
         rz = 0.0
         for g in range(groups):

@@ -134,7 +134,7 @@ def two_level(pattern: BlockPattern, points: NDArray[np.float64], group_start: N
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _inner_blocks(row_start, columns, group_start, group_of):
     inner = np.empty((len(row_start) - 1, 2), dtype=np.int32)
     for i in range(len(row_start) - 1):
@@ -150,20 +150,21 @@ def _inner_blocks(row_start, columns, group_start, group_of):
     return inner
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _invert_diagonal(diagonal, data, out):
     for i in range(len(diagonal)):
-        D = data[diagonal[i]]
-        a, b, c, d, e, f = D[0, 0], D[0, 1], D[0, 2], D[1, 1], D[1, 2], D[2, 2]
+        q = diagonal[i]
+        a, b, c = data[q, 0, 0], data[q, 0, 1], data[q, 0, 2]
+        d, e, f = data[q, 1, 1], data[q, 1, 2], data[q, 2, 2]
         A, B, C = d * f - e * e, c * e - b * f, b * e - c * d
         det = a * A + b * B + c * C
         trace = a + d + f
         if not det > 1e-30 * trace * trace * trace:
             # Semi-definite: a vertex that nothing holds in some direction. Any positive matrix of its scale will do.
             scale = 1.0 / trace if trace > 0.0 else 1.0
-            for p in range(3):
-                for q in range(3):
-                    out[i, p, q] = scale if p == q else 0.0
+            for r in range(3):
+                for s in range(3):
+                    out[i, r, s] = scale if r == s else 0.0
             continue
         out[i, 0, 0] = A / det
         out[i, 1, 1] = (a * f - c * c) / det
@@ -173,13 +174,15 @@ def _invert_diagonal(diagonal, data, out):
         out[i, 1, 2] = out[i, 2, 1] = (b * c - a * e) / det
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True, error_model="numpy")
 def _project_matrix(row_start, columns, data, group_start, fields, coarse):
     """coarse <- Z^T A Z, the lower triangle of blocks and the diagonal ones."""
     groups = len(group_start) - 1
     for g in prange(groups):
         for h in range(g + 1):
-            coarse[g, h] = 0.0
+            for r in range(12):
+                for c in range(12):
+                    coarse[g, h, r, c] = 0.0
         for i in range(group_start[g], group_start[g + 1]):
             h = 0
             for q in range(row_start[i], row_start[i + 1]):
