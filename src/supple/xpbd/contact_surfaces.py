@@ -130,16 +130,16 @@ def _body_parts(
 
 def _obstacle_parts(obstacles: Sequence[Obstacle], edge_length: float) -> list[tuple[int, dict[str, Any]]]:
     parts = []
-    for k, obstacle in enumerate(obstacles):
+    for number, obstacle in enumerate(obstacles):
         if isinstance(obstacle, TriangleObstacle):
-            parts.append((k, _triangle_part(k, obstacle)))
+            parts.append((number, _triangle_part(number, obstacle)))
         elif isinstance(obstacle, Box) and not obstacle.inside:
-            signs = np.array([[i, j, l] for i in (-0.5, 0.5) for j in (-0.5, 0.5) for l in (-0.5, 0.5)])
+            signs = np.array([[i, j, k] for i in (-0.5, 0.5) for j in (-0.5, 0.5) for k in (-0.5, 0.5)])
             corners = np.asarray(obstacle.center) + (signs * np.asarray(obstacle.size)) @ obstacle.orientation.T
-            parts.append((k, _points_part(_Piece(k, obstacle.friction, gap=0.0), corners)))
+            parts.append((number, _points_part(_Piece(number, obstacle.friction, gap=0.0), corners)))
         elif isinstance(obstacle, Sphere) and not obstacle.inside and obstacle.radius < 2.0 * edge_length:
             center = np.asarray(obstacle.center)[None]
-            parts.append((k, _points_part(_Piece(k, obstacle.friction, gap=obstacle.radius), center)))
+            parts.append((number, _points_part(_Piece(number, obstacle.friction, gap=obstacle.radius), center)))
     return parts
 
 

@@ -44,8 +44,7 @@ class ObstacleShapes:
             return self.frames
         R, t = poses.at(time)
         R, t = R[self.owners], t[self.owners]
-        out = np.zeros_like(self.frames)
-        np.einsum("kij,klj->kli", R, self.frames, out=out)
+        out = self.frames @ R.transpose(0, 2, 1)
         out[:, 0] += t
         return out
 
@@ -84,4 +83,4 @@ def _plane_frame(point: NDArray[np.float64], normal: NDArray[np.float64]) -> NDA
     helper = np.eye(3)[int(np.abs(normal).argmin())]
     second = np.cross(normal, helper)
     second /= np.linalg.norm(second)
-    return np.vstack([point, normal + 0.0, second, np.cross(normal, second)])
+    return np.array([point, normal, second, np.cross(normal, second)], dtype=np.float64)

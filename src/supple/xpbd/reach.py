@@ -42,12 +42,13 @@ def mean_of_pieces(values, pieces, out):
 
 
 @njit(cache=True)
-def looking_out(motions, previous_motions, pieces, drifts, scales, far, near):
+def looking_out(motions, come, excursions, pieces, drifts, scales, far, near):
     """How far points may get, from their velocities; the arguments `far` and `near` of `spatial_hash.find_pairs`.
 
     Parameters
     ----------
-    motions : (n, 3) velocity times the time ahead [m]; previous_motions : (n, 3) how far they have just come [m]
+    motions : (n, 3) velocity times the time ahead [m]; come : (n, 3) how they have come since the substep began [m]
+    excursions : (n,) how far they went in a substep before contact held them [m]
     pieces : (n,); drifts : (p, 3) mean of `motions` of each piece: motion that pairs of one piece share
     scales : least, most [m]
     far, near : (n, 3): how far a point looks out, without the gap, how far it may carry a triangle, and how far it may
@@ -56,24 +57,34 @@ def looking_out(motions, previous_motions, pieces, drifts, scales, far, near):
     least, most = scales
     for i in range(len(motions)):
         k = pieces[i]
-        absolute = relative = come = 0.0
+        absolute = relative = path = 0.0
         for j in range(3):
             absolute += motions[i, j] ** 2
             relative += (motions[i, j] - drifts[k, j]) ** 2
-            come += previous_motions[i, j] ** 2
-        come = math.sqrt(come)
-        a = min(most, least + 1.2 * math.sqrt(absolute))
-        b = min(most, least + 1.2 * math.sqrt(relative))
-        far[i, 0], far[i, 1], far[i, 2] = a + come, a + come, a
-        near[i, 0], near[i, 1], near[i, 2] = b + come, b + come, b
+            path += come[i, j] ** 2
+        path = math.sqrt(path)
+        a = min(most, least + excursions[i] + 1.2 * math.sqrt(absolute))
+        b = min(most, least + excursions[i] + 1.2 * math.sqrt(relative))
+        far[i, 0], far[i, 1], far[i, 2] = a + path, a + path, a
+        near[i, 0], near[i, 1], near[i, 2] = b + path, b + path, b
 
 
 @njit(cache=True)
-def outran_pieces(x, x_gathered, far, near, pieces, drifts):
+def outran_pieces(x, x_prev, x_gathered, far, near, pieces, drifts, excursions):
     """Whether some point has moved further than `looking_out` allowed, absolutely or relative to its piece.
 
+    Parameters
+    ----------
+    x, x_prev, x_gathered : (n, 3) now, at the beginning of the substep, and when lists were made [m]
+    far, near : from `looking_out`; pieces : (n,)
     drifts : (p, 3) scratch memory, for the mean motion of each piece [m]
+    excursions : (n,) raised to how far each point wanted to go within this substep [m]
     """
+    for i in range(len(x)):
+        square = 0.0
+        for j in range(3):
+            square += (x[i, j] - x_prev[i, j]) ** 2
+        excursions[i] = max(excursions[i], math.sqrt(square))
     moved = x - x_gathered
     mean_of_pieces(moved, pieces, drifts)
     for i in range(len(x)):

@@ -1,6 +1,9 @@
 """Points in a hashed grid, and the triangles that are near them.
 
-The grid is built by a counting sort: the order of everything depends on the input alone.
+A point is entered in every cell that the box around it meets (as wide as the point looks out), a triangle visits the
+cells that its own box meets; so one point that looks far makes nothing dearer for the others. A pair is tested in one
+cell only: the first that both boxes meet. The grid is filled by a counting sort, so the order of everything depends on
+the input alone.
 
 Source: Teschner et al., "Optimized Spatial Hashing for Collision Detection of Deformable Objects" (2003).
 """
@@ -16,8 +19,15 @@ from numpy.typing import NDArray
 from supple.numerics.mat3 import dot, row, subtract
 from supple.xpbd.closest_point import closest_on_triangle, combine
 
-# Cells along the longest side of everything: beyond this, cells grow. Keeps cell numbers far inside 32 bits.
+# Cells along the longest side of everything: beyond this, cells grow. Three cell numbers then fit into 63 bits.
 MOST_CELLS = 1 << 20
+# A point that looks out over more cells than this is kept apart and meets every triangle.
+WIDE = 1000
+
+
+@njit
+def _key(i, j, k):
+    return (np.int64(i) << 42) | (np.int64(j) << 21) | np.int64(k)
 
 
 @njit
@@ -25,32 +35,71 @@ def _bucket(i, j, k, mask):
     return ((i * 73856093) ^ (j * 19349663) ^ (k * 83492791)) & mask
 
 
-@njit(cache=True)
-def hash_points(points, size, low, cells, starts, entries):
-    """Sort points (n, 3) into buckets. Writes cells (n, 3), starts (buckets + 1,) and entries (n,).
+@njit
+def _cell(coordinate, low, size):
+    """Number of a cell along one axis, 0 .. MOST_CELLS."""
+    return math.floor(max(0.0, min((coordinate - low) / size, float(MOST_CELLS))))
 
-    size : edge of a cell [m]; low : (3,) the grid's origin; the number of buckets is a power of two.
+
+@njit(cache=True)
+def hash_points(points, radii, size, low, around, first, last, starts):
+    """Which cells points meet.
+
+    Writes the box around each point into around (n, 6), its cells into first, last (n, 3), and how many entries come
+    before each bucket into starts.
+
+    Parameters
+    ----------
+    points : (n, 3); radii : two (n, 2) arrays, see `find_pairs`
+    size : edge of a cell; low : (3,) the grid's origin [m]
+    starts : (buckets + 1,) with a power of two of buckets
+
+    Returns
+    -------
+    The number of entries.
     """
+    far, near = radii
     mask = len(starts) - 2
     starts[:] = 0
     for p in range(len(points)):
+        r = max(far[p, 0], near[p, 0])
+        count = 1.0
         for j in range(3):
-            cells[p, j] = int(math.floor((points[p, j] - low[j]) / size))
-        starts[_bucket(cells[p, 0], cells[p, 1], cells[p, 2], mask) + 1] += 1
+            around[p, j], around[p, 3 + j] = points[p, j] - r, points[p, j] + r
+            first[p, j] = _cell(around[p, j], low[j], size)
+            last[p, j] = _cell(around[p, 3 + j], low[j], size)
+            count *= last[p, j] - first[p, j] + 1.0
+        if count > WIDE:
+            last[p, 0] = -1
+            continue
+        for i in range(first[p, 0], last[p, 0] + 1):
+            for j in range(first[p, 1], last[p, 1] + 1):
+                for k in range(first[p, 2], last[p, 2] + 1):
+                    starts[_bucket(i, j, k, mask) + 1] += 1
     for b in range(1, len(starts)):
         starts[b] += starts[b - 1]
-    # Filled from the back, so that `starts` ends as the beginnings again.
-    fill = starts[1:].copy()
-    for p in range(len(points) - 1, -1, -1):
-        b = _bucket(cells[p, 0], cells[p, 1], cells[p, 2], mask)
-        fill[b] -= 1
-        entries[fill[b]] = p
+    return starts[len(starts) - 1]
+
+
+@njit(cache=True)
+def fill_buckets(first, last, starts, entries, keys):
+    """Write the points and cell keys of all entries, bucket by bucket, in the order of points."""
+    mask = len(starts) - 2
+    fill = starts[:-1].copy()
+    for p in range(len(first)):
+        for i in range(first[p, 0], last[p, 0] + 1):
+            for j in range(first[p, 1], last[p, 1] + 1):
+                for k in range(first[p, 2], last[p, 2] + 1):
+                    b = _bucket(i, j, k, mask)
+                    entries[fill[b]] = p
+                    keys[fill[b]] = _key(i, j, k)
+                    fill[b] += 1
 
 
 @njit
 def is_excluded(point, triangle, excluded_starts, excluded_points):
     """Whether a pair is masked: the point belongs to the triangle or to its neighbourhood."""
-    for e in range(excluded_starts[triangle], excluded_starts[triangle + 1]):
+    for e in range(excluded_starts[triangle], excluded_starts[triangle + 1]):  # noqa: SIM110
         if excluded_points[e] == point:
             return True
     return False
@@ -84,38 +133,20 @@ def _meets_a_piece(low, high, allowed, piece, piece_low, piece_high):
 
 
 @njit
-def _test(p, t, shapes, radii, rules, out, count):
-    """Append the pair (point p, triangle t) where it may touch. Returns the new count."""
-    points, point_piece, triangles, triangle_piece = shapes
-    far, near = radii
-    allowed, excluded_starts, excluded_points = rules
-    out_points, out_triangles = out
-    mine, its = point_piece[p], triangle_piece[t]
-    if not allowed[mine, its]:
-        return count
-    a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-    if mine == its:
-        r = near[p, 0] + max(near[a, 1], near[b, 1], near[c, 1])
-    else:
-        r = far[p, 0] + max(far[a, 1], far[b, 1], far[c, 1])
-    for j in range(3):
-        u, v, w, x = points[a, j], points[b, j], points[c, j], points[p, j]
-        if x < min(u, v, w) - r or x > max(u, v, w) + r:
-            return count
-    if is_excluded(p, t, excluded_starts, excluded_points):
-        return count
-    x, u, v, w = row(points, p), row(points, a), row(points, b), row(points, c)
-    d = subtract(x, combine(closest_on_triangle(x, u, v, w), u, v, w))
-    if dot(d, d) > r * r:
-        return count
-    if count < len(out_points):
-        out_points[count] = p
-        out_triangles[count] = t
-    return count + 1
+def _meets(around, p, low, high):
+    """Whether the box around point p meets another."""
+    return (
+        around[p, 0] <= high[0]
+        and around[p, 3] >= low[0]
+        and around[p, 1] <= high[1]
+        and around[p, 4] >= low[1]
+        and around[p, 2] <= high[2]
+        and around[p, 5] >= low[2]
+    )
 
 
 @njit(cache=True)
-def find_pairs(shapes, radii, rules, boxes, grid, out):
+def find_pairs(shapes, radii, rules, boxes, grid, wide, out):
     """Pairs (point, triangle) that may touch, triangle by triangle. Returns how many there are; writes what fits.
 
     Parameters
@@ -125,49 +156,75 @@ def find_pairs(shapes, radii, rules, boxes, grid, out):
         (with its own motion), and how far its motion may carry a triangle's corner [m]
     rules : allowed (p, p), and the excluded points of each triangle as starts (t + 1,) and points
     boxes : low, high (p, 3), from `boxes_of_pieces`, widened by how far points look
-    grid : size, low, cells, starts, entries, from `hash_points`
+    grid : size, low, around, first, starts, entries, keys, from `hash_points` and `fill_buckets`
+    wide : points that are not in the grid
     out : two int32 arrays for points and triangles
     """
-    points, _, triangles, triangle_piece = shapes
+    points, point_piece, triangles, triangle_piece = shapes
     far, near = radii
-    allowed = rules[0]
+    allowed, excluded_starts, excluded_points = rules
+    out_points, out_triangles = out
+    found = np.zeros(len(points), dtype=np.int32)
     piece_low, piece_high = boxes
-    size, origin, cells, starts, entries = grid
+    size, origin, around, first, starts, entries, keys = grid
     mask = len(starts) - 2
-    widest = 0.0
-    top = np.zeros(3, dtype=np.int64)
-    for p in range(len(points)):
-        widest = max(widest, far[p, 0], near[p, 0])
-        for j in range(3):
-            top[j] = max(top[j], cells[p, j])
     count = 0
     low, high = np.zeros(3), np.zeros(3)
-    first, last = np.zeros(3, dtype=np.int64), np.zeros(3, dtype=np.int64)
+    begin, end = np.zeros(3, dtype=np.int64), np.zeros(3, dtype=np.int64)
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         moves = max(far[a, 1], far[b, 1], far[c, 1], near[a, 1], near[b, 1], near[c, 1])
+        volume = 1.0
         for j in range(3):
             low[j] = min(points[a, j], points[b, j], points[c, j]) - moves
             high[j] = max(points[a, j], points[b, j], points[c, j]) + moves
+            begin[j], end[j] = _cell(low[j], origin[j], size), _cell(high[j], origin[j], size)
+            volume *= end[j] - begin[j] + 1.0
         if not _meets_a_piece(low, high, allowed, triangle_piece[t], piece_low, piece_high):
             continue
-        volume = 1.0
-        for j in range(3):
-            first[j] = int(math.floor(max(0.0, min((low[j] - widest - origin[j]) / size, float(top[j] + 1)))))
-            last[j] = int(math.floor(max(-1.0, min((high[j] + widest - origin[j]) / size, float(top[j])))))
-            volume *= max(0.0, float(last[j] - first[j] + 1))
+        close = 0  # points whose box meets the triangle's
         if volume > len(points):
             for p in range(len(points)):
-                count = _test(p, t, shapes, radii, rules, out, count)
-            continue
-        for i in range(first[0], last[0] + 1):
-            for j in range(first[1], last[1] + 1):
-                for k in range(first[2], last[2] + 1):
-                    s = _bucket(i, j, k, mask)
-                    for e in range(starts[s], starts[s + 1]):
-                        p = entries[e]
-                        if cells[p, 0] == i and cells[p, 1] == j and cells[p, 2] == k:
-                            count = _test(p, t, shapes, radii, rules, out, count)
+                if _meets(around, p, low, high):
+                    found[close] = p
+                    close += 1
+        else:
+            for p in wide:
+                if _meets(around, p, low, high):
+                    found[close] = p
+                    close += 1
+            for i in range(begin[0], end[0] + 1):
+                for j in range(begin[1], end[1] + 1):
+                    for k in range(begin[2], end[2] + 1):
+                        s, key = _bucket(i, j, k, mask), _key(i, j, k)
+                        for e in range(starts[s], starts[s + 1]):
+                            p = entries[e]
+                            if (
+                                keys[e] == key
+                                and _meets(around, p, low, high)
+                                and max(first[p, 0], begin[0]) == i
+                                and max(first[p, 1], begin[1]) == j
+                                and max(first[p, 2], begin[2]) == k
+                            ):
+                                found[close] = p
+                                close += 1
+        its = triangle_piece[t]
+        u, v, w = row(points, a), row(points, b), row(points, c)
+        moves_far, moves_near = max(far[a, 1], far[b, 1], far[c, 1]), max(near[a, 1], near[b, 1], near[c, 1])
+        for f in range(close):
+            p = found[f]
+            mine = point_piece[p]
+            if p in (a, b, c) or not allowed[mine, its]:
+                continue
+            r = near[p, 0] + moves_near if mine == its else far[p, 0] + moves_far
+            x = row(points, p)
+            d = subtract(x, combine(closest_on_triangle(x, u, v, w), u, v, w))
+            if dot(d, d) > r * r or is_excluded(p, t, excluded_starts, excluded_points):
+                continue
+            if count < len(out_points):
+                out_points[count] = p
+                out_triangles[count] = t
+            count += 1
     return count
 
 
@@ -200,9 +257,12 @@ class PairFinder:
 
     def __init__(self, n_points: int, n_pieces: int, cell_size: float) -> None:
         self.cell_size = cell_size
-        self._cells = np.zeros((n_points, 3), dtype=np.int64)
+        self._around = np.zeros((n_points, 6))
+        self._first = np.zeros((n_points, 3), dtype=np.int32)
+        self._last = np.zeros((n_points, 3), dtype=np.int32)
         self._buckets = np.zeros((1 << max(4, (2 * n_points).bit_length())) + 1, dtype=np.int64)
-        self._entries = np.zeros(n_points, dtype=np.int32)
+        self._entries = np.zeros(8 * n_points, dtype=np.int32)
+        self._keys = np.zeros(8 * n_points, dtype=np.int64)
         self._low, self._high = np.zeros((n_pieces, 3)), np.zeros((n_pieces, 3))
         self._pairs = (np.zeros(4096, dtype=np.int32), np.zeros(4096, dtype=np.int32))
         self.starts = np.zeros(n_points + 1, dtype=np.int64)
@@ -218,12 +278,16 @@ class PairFinder:
             self.n_active = self.count = 0
             return
         low = points.min(axis=0)
-        size = max(self.cell_size, float((points.max(axis=0) - low).max()) / MOST_CELLS)
-        hash_points(points, size, low, self._cells, self._buckets, self._entries)
+        size = max(self.cell_size, 2.0 * float((points.max(axis=0) - low).max()) / MOST_CELLS)
+        entries = hash_points(points, radii, size, low, self._around, self._first, self._last, self._buckets)
+        if entries > len(self._entries):
+            self._entries, self._keys = np.zeros(2 * entries, dtype=np.int32), np.zeros(2 * entries, dtype=np.int64)
+        fill_buckets(self._first, self._last, self._buckets, self._entries, self._keys)
+        wide = np.flatnonzero(self._last[:, 0] < 0)
         boxes_of_pieces(points, shapes[1], np.ascontiguousarray(radii[0][:, 0]), self._low, self._high)
-        grid = (size, low, self._cells, self._buckets, self._entries)
+        grid = (size, low, self._around, self._first, self._buckets, self._entries, self._keys)
         while True:
-            count = find_pairs(shapes, radii, rules, (self._low, self._high), grid, self._pairs)
+            count = find_pairs(shapes, radii, rules, (self._low, self._high), grid, wide, self._pairs)
             if count <= len(self._pairs[0]):
                 break
             self._pairs = (np.zeros(2 * count, dtype=np.int32), np.zeros(2 * count, dtype=np.int32))

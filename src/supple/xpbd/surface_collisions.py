@@ -31,7 +31,7 @@ class SurfaceCollisions:
         widest = float(np.diagonal(s.gaps).max(initial=0.0))
         excluded = excluded_pairs(s, rest, 2.0 * min(widest, 0.5 * edge_length))
         self._rules = (s.allowed, *excluded)
-        self._finder = PairFinder(n, pieces, 1.5 * edge_length)
+        self._finder = PairFinder(n, pieces, edge_length)
         self._x, self._before, self._gathered = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
         self._shapes = (self._x, s.point_piece, s.triangles, s.triangle_piece)
         self._described = (
@@ -45,6 +45,7 @@ class SurfaceCollisions:
         )
         self._far, self._near = np.zeros((n, 3)), np.zeros((n, 3))
         self._drifts = np.zeros((pieces, 3))
+        self._excursions = np.zeros(n)
         # How deep a point is inside a body, and inside an obstacle.
         self._depth = np.zeros((2, n))
         self._entered = np.full(n, -1, dtype=np.int32)
@@ -67,6 +68,7 @@ class SurfaceCollisions:
         if self._known is None or not np.abs(self._x[:bodies] - self._known).max() <= LEAST_REACH * self.edge_length:
             self._look_for_overlaps()
         self._gather(motions)
+        self._excursions[:] = 0.0
 
     def project(
         self, x: NDArray[np.float64], x_prev: NDArray[np.float64], times: tuple[float, float], limit: float
@@ -78,7 +80,8 @@ class SurfaceCollisions:
         np.take(x_prev, s.rows, axis=0, out=self._before[:bodies])
         s.place_obstacles(self.poses, times[1], self._x)
         s.place_obstacles(self.poses, times[0], self._before)
-        if outran_pieces(self._x, self._gathered, self._far, self._near, s.point_piece, self._drifts):
+        allowed = (self._far, self._near, s.point_piece, self._drifts)
+        if outran_pieces(self._x, self._before, self._gathered, *allowed, self._excursions):
             self._gather((self._x - self._before) * (self._dt / (times[1] - times[0])))
         lists = (finder.n_active, finder.active, finder.starts, finder.triangles)
         scales = (limit, NEAR * self.edge_length)
@@ -99,7 +102,9 @@ class SurfaceCollisions:
         s = self.surfaces
         mean_of_pieces(motions, s.point_piece, self._drifts)
         scales = (LEAST_REACH * self.edge_length, MOST_REACH * self.edge_length)
-        looking_out(motions, self._x - self._before, s.point_piece, self._drifts, scales, self._far, self._near)
+        come = self._x - self._before
+        points = (come, self._excursions, s.point_piece)
+        looking_out(motions, *points, self._drifts, scales, self._far, self._near)
         self._complete[:] = self._gap + LEAST_REACH * self.edge_length + self._depth.max(axis=0)
         self._far[:, 0] += self._complete
         self._near[:, 0] += self._complete
