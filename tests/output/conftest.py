@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -65,9 +66,9 @@ def octahedron(radius: float, center) -> sp.SurfaceMesh:
     return sp.SurfaceMesh(vertices, faces)
 
 
-def small_scene(divisions: int = 2) -> sp.Scene:
+def small_scene(divisions: int = 2, material=None) -> sp.Scene:
     """Two boxes, one with a skin, and every kind of obstacle."""
-    material = sp.StableNeoHookean(youngs=1e4, poisson=0.4, density=1000.0)
+    material = material or sp.StableNeoHookean(youngs=1e4, poisson=0.4, density=1000.0)
     skin = octahedron(0.45, (0.5, 0.5, 0.5))
     return sp.Scene(
         bodies=[
@@ -87,10 +88,18 @@ def small_scene(divisions: int = 2) -> sp.Scene:
     )
 
 
-def record(path: Path, steps: int = 8, *, solver: Solver | None = None, divisions: int = 2, **options) -> list:
+def record(path: Path, steps: int = 8, *, moved_by: Solver | None = None, divisions: int = 2, **options) -> list:
     """Record the small scene; the frames that were simulated, the start not among them."""
     sinks = [Recorder(path, **options)]
-    return list(simulate(small_scene(divisions), solver or Prescribed(), 1 / 30, steps, sinks=sinks))
+    return list(simulate(small_scene(divisions), moved_by or Prescribed(), 1 / 30, steps, sinks=sinks))
+
+
+@pytest.fixture(scope="session")
+def tools() -> SimpleNamespace:
+    """The names above, for tests: this file cannot be imported by them."""
+    return SimpleNamespace(
+        Prescribed=Prescribed, box=box, octahedron=octahedron, small_scene=small_scene, record=record
+    )
 
 
 @pytest.fixture(scope="session")

@@ -17,7 +17,7 @@ import numpy as np
 from supple.errors import OutputError
 from supple.output.atomic import output_error, parent_folder, temporary_name
 from supple.output.recorded_scene import write_scene
-from supple.output.recording_file import Layout, RecordingFile, Series, create, rewrite
+from supple.output.recording_file import STEP_TIMES, Layout, RecordingFile, Series, create, rewrite
 from supple.simulate import Frame, Report
 from supple.state import Status
 
@@ -39,7 +39,8 @@ def frame_layout(points: int, tets: int, obstacles: int) -> Layout:
         Series("VTKHDF/Points", points, (3,)),
         Series("VTKHDF/PointData/velocities", points, (3,)),
         Series("VTKHDF/CellData/det_F", tets),
-        Series("VTKHDF/Steps/Values", 1),
+        Series(STEP_TIMES, 1),
+        Series("supple/frames/time", 1),
         Series("supple/frames/index", 1, (), "<i8"),
         Series("supple/frames/status", 1, (), "|u1"),
         Series("supple/frames/iterations", 1, (), "<i8"),
@@ -47,7 +48,7 @@ def frame_layout(points: int, tets: int, obstacles: int) -> Layout:
         *vectors,
         Series("supple/frames/poses", 1, (obstacles, 3, 4)),
         Series("supple/frames/text_end", 1, (), "<i8"),
-        Series("supple/frames/text", 1, (_TEXT_BYTES_PER_FRAME,), "|u1"),
+        Series("supple/frames/text", 1, (_TEXT_BYTES_PER_FRAME,), "|u1", "supple/frames/text_end"),
     )
     return Layout(points, tets, series)
 
@@ -67,7 +68,7 @@ class Recorder:
 
     Raises
     ------
-    OutputError : here for an unusable path; from `begin`, `write` and `end` where the system refuses (no permission, no
+    OutputError : here for an unusable path; from `begin` and `write` where the system refuses (no permission, no
         room). All whole frames stay readable then.
     """
 
@@ -125,17 +126,18 @@ class Recorder:
         file, self._file = self._file, None
         if file is None:
             return
+        file.close()
+        if file.written == file.capacity and not self._compress:
+            return
+        fresh = temporary_name(self.path)
         try:
-            file.close()
-            if file.written < file.capacity or self._compress:
-                fresh = temporary_name(self.path)
-                try:
-                    rewrite(self.path, fresh, file.layout, file.written, compress=self._compress)
-                    os.replace(fresh, self.path)
-                finally:
-                    fresh.unlink(missing_ok=True)
-        except OSError as error:
-            raise output_error(self.path, error) from None
+            rewrite(self.path, fresh, file.layout, None, compress=self._compress)
+            os.replace(fresh, self.path)
+        except (OSError, RuntimeError) as error:
+            # The recording is whole as it is; there is only unused room in it.
+            logger.warning("%s: stays larger than it must be: %s", self.path, " ".join(str(error).split()))
+        finally:
+            fresh.unlink(missing_ok=True)
 
     def _make_room(self, file: RecordingFile) -> RecordingFile:
         """The same frames in a file with more room, which takes the place of this one."""
@@ -165,7 +167,9 @@ class Recorder:
         file.put("VTKHDF/Points", frame.state.positions)
         file.put("VTKHDF/PointData/velocities", frame.state.velocities)
         file.put("VTKHDF/CellData/det_F", frame.det_F)
-        file.put("VTKHDF/Steps/Values", frame.time)
+        file.put(STEP_TIMES, frame.time)
+        # VTK's own copy has its length changed a moment after the frame counts; ours does not.
+        file.put("supple/frames/time", frame.time)
         file.put("supple/frames/index", frame.index)
         file.put("supple/frames/status", list(Status).index(report.status))
         file.put("supple/frames/iterations", report.iterations)

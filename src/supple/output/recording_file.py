@@ -29,18 +29,20 @@ from numpy.typing import ArrayLike
 from supple.errors import OutputError
 
 WRITTEN = "supple/frames_written"
+STEP_TIMES, _TIMES = "VTKHDF/Steps/Values", "supple/frames/time"
 _STEPS_MARK = 0x7375_7070_6C65_2121  # stands for NSteps until its place is known
 _COPY_BYTES = 1 << 24
 
 
 @dataclass(frozen=True)
 class Series:
-    """Something of which every frame has `rows` rows of one shape."""
+    """Something of which every frame has `rows` rows of one shape; or, as a heap, has room for them on average."""
 
     path: str
     rows: int
     row_shape: tuple[int, ...] = ()
     dtype: str = "<f8"
+    heap_end: str | None = None  # the series that says how many values of the heap are used after each frame
 
     @property
     def frame_bytes(self) -> int:
@@ -79,6 +81,7 @@ class RecordingFile:
             header = h5py.h5o.get_info(file["VTKHDF/Steps"].id).addr
             lengths = {h5py.h5o.get_info(item.id).addr for item in _step_datasets(file)}
             self._series = {s.path: s for s in layout.series}
+            self._rooms = {s.path: _dataset(file, s.path).nbytes for s in layout.series}
         self._file: BinaryIO = open(path, "r+b", buffering=0)  # noqa: SIM115
         self._steps = _place_of_mark(self._file, header)
         self._lengths = sorted(_place_of_length(self._file, address, capacity) for address in lengths)
@@ -97,7 +100,7 @@ class RecordingFile:
 
     def room(self, path: str) -> int:
         """Bytes of room of one series."""
-        return self.capacity * self._series[path].frame_bytes
+        return self._rooms[path]
 
     def commit(self) -> None:
         """Make the frame that was put count."""
@@ -134,38 +137,42 @@ def create(path: Path, layout: Layout, capacity: int, write_static: Callable[[h5
     """Lay out a file with room for `capacity` frames and none written; `write_static` adds all that does not change."""
     with h5py.File(path, "w", libver=("earliest", "v110")) as file:
         write_static(file)
+        _write_step_count(file, _STEPS_MARK)
         file.create_dataset(WRITTEN, data=np.int64(0))
         for series in layout.series:
-            _reserve(file, series, capacity)
+            _reserve(file, series, series.shape(capacity))
         _write_steps(file, layout, capacity)
-        file["VTKHDF/Steps"].attrs.create("NSteps", _STEPS_MARK, dtype="<i8")
 
 
-def rewrite(source: Path, target: Path, layout: Layout, capacity: int, *, compress: bool = False) -> None:
-    """Copy a recording's whole frames to a file with another capacity; with exactly that many, a plain VTKHDF file.
+def rewrite(source: Path, target: Path, layout: Layout, capacity: int | None, *, compress: bool = False) -> None:
+    """Copy a recording's whole frames to a file with another capacity; with None, to one that has no room for more.
 
     With `compress`, the series are stored in gzip chunks, one per frame; nothing can be added to them then.
     """
     with h5py.File(source, "r", locking=False) as old, h5py.File(target, "w", libver=("earliest", "v110")) as new:
         written = int(_dataset(old, WRITTEN)[()])
-        own = {series.path for series in layout.series}
-        _copy_static(old, new, "", own)
+        _copy_static(old, new, "", {series.path for series in layout.series})
         new.create_dataset(WRITTEN, data=np.int64(written))
         for series in layout.series:
+            # VTK's copy of the times may be one frame short, where the writer was stopped between two writes.
+            source_data = _dataset(old, _TIMES if series.path == STEP_TIMES else series.path)
             rows = written * series.rows
-            if compress and series.frame_bytes and rows:
-                shape = series.shape(written)
+            if series.heap_end is not None:
+                used = int(_dataset(old, series.heap_end)[written - 1])
+                rows = -(-used // int(np.prod(series.row_shape)))
+            shape = (max(rows, (capacity or 0) * series.rows), *series.row_shape)
+            if compress and 0 not in shape:
                 chunk = (series.rows if series.rows > 1 else min(rows, 1024), *series.row_shape)
                 data = new.create_dataset(
                     series.path, shape, series.dtype, chunks=chunk, compression="gzip", compression_opts=4, shuffle=True
                 )
             else:
-                data = _reserve(new, series, capacity)
+                data = _reserve(new, series, shape)
             step = max(1, _COPY_BYTES // max(1, series.frame_bytes)) * series.rows
-            for row in range(0, rows if series.frame_bytes else 0, step):
-                data[row : min(row + step, rows)] = _dataset(old, series.path)[row : min(row + step, rows)]
-        _write_steps(new, layout, capacity)
-        mark = written if capacity == written else _STEPS_MARK
+            for row in range(0, rows if 0 not in shape else 0, step):
+                data[row : min(row + step, rows)] = source_data[row : min(row + step, rows)]
+        _write_steps(new, layout, capacity or written)
+        mark = _STEPS_MARK if capacity else written
         new["VTKHDF/Steps"].attrs.create("NSteps", mark, dtype="<i8")
 
 
@@ -182,9 +189,8 @@ def _copy_static(old: h5py.Group, new: h5py.Group, where: str, series: set[str])
             old.copy(item, new, name)
 
 
-def _reserve(file: h5py.File, series: Series, capacity: int) -> h5py.Dataset:
+def _reserve(file: h5py.File, series: Series, shape: tuple[int, ...]) -> h5py.Dataset:
     parent, _, name = series.path.rpartition("/")
-    shape = series.shape(capacity)
     if 0 in shape:
         return file.create_dataset(series.path, shape, series.dtype)
     properties = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
@@ -195,6 +201,11 @@ def _reserve(file: h5py.File, series: Series, capacity: int) -> h5py.Dataset:
     group = file.require_group(parent)
     made = h5py.h5d.create(group.id, name.encode(), kind, h5py.h5s.create_simple(shape), dcpl=properties)
     return h5py.Dataset(made)
+
+
+def _write_step_count(file: h5py.File, value: int) -> None:
+    """NSteps, before the large datasets: its message goes where the file ends by then, near the group's header."""
+    file.require_group("VTKHDF/Steps").attrs.create("NSteps", value, dtype="<i8")
 
 
 def _write_steps(file: h5py.File, layout: Layout, capacity: int) -> None:

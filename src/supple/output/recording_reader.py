@@ -137,7 +137,7 @@ class Recording(Sequence[RecordedFrame]):
             ("supple/frames/poses", 1, (len(self.obstacles), 3, 4), "f"),
         ):
             file.check_series(path, self._count, rows, shape, kind)
-        self.times: NDArray[np.float64] = file.first_rows("VTKHDF/Steps/Values", self._count, (), "f")
+        self.times: NDArray[np.float64] = file.first_rows("supple/frames/time", self._count, (), "f")
         if not np.isfinite(self.times).all():
             raise file.broken("a frame's time is not finite")
         codes = self._values("status")

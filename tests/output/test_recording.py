@@ -1,0 +1,324 @@
+"""Recording and reading back: every number returns, and VTK, killed writers and full disks are no surprise."""
+
+from __future__ import annotations
+
+import errno
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.errors import OutputError
+from supple.output import recording as recording_module
+from supple.output.recording import Recorder
+from supple.output.recording_file import RecordingFile
+from supple.output.recording_reader import read_recording
+from supple.simulate import simulate
+from supple.state import Status
+
+_CONFTEST = Path(__file__).with_name("conftest.py")
+
+
+def test_every_number_returns(recorded, recording):
+    _, frames = recorded
+    assert len(recording) == len(recording.frames) == len(frames) + 1
+    np.testing.assert_allclose(recording.times, np.arange(25) / 30, atol=1e-12)
+    for recorded_frame, frame in zip(recording[1:], frames, strict=True):
+        assert recorded_frame.index == frame.index
+        assert recorded_frame.time == frame.time
+        for name in ("cube", "slab"):
+            np.testing.assert_array_equal(recorded_frame.positions[name], frame.positions[name])
+            np.testing.assert_array_equal(recorded_frame.velocities[name], frame.velocities[name])
+        np.testing.assert_array_equal(recorded_frame.det_F, frame.det_F)
+        for key, value in vars(frame.report).items():
+            np.testing.assert_array_equal(getattr(recorded_frame.report, key), value, err_msg=key)
+        for pose, obstacle in zip(recorded_frame.poses, frame.system.obstacles, strict=True):
+            np.testing.assert_array_equal(pose[:, :3], obstacle.pose(frame.time)[0])
+            np.testing.assert_array_equal(pose[:, 3], obstacle.pose(frame.time)[1])
+    start = recording[0]
+    assert start.time == 0.0
+    assert start.report.min_distance is None
+    np.testing.assert_array_equal(start.positions["cube"][0], [0.0, 1.0, 0.0])
+
+
+def test_the_scene_returns(recorded, recording):
+    system = recorded[1][0].system
+    np.testing.assert_array_equal(recording.rest_positions, system.rest_positions)
+    np.testing.assert_array_equal(recording.masses, system.masses)
+    np.testing.assert_array_equal(recording.tets, system.tets)
+    np.testing.assert_array_equal(recording.rest_volumes, system.rest_volumes)
+    np.testing.assert_array_equal(recording.gravity, [0.0, -9.81, 0.0])
+    assert [(b.name, b.vertices, b.tets) for b in recording.bodies] == [
+        (b.name, b.vertices, b.tets) for b in system.bodies
+    ]
+    cube, slab = recording.bodies
+    np.testing.assert_array_equal(slab.triangles, system.bodies[1].body.mesh.surface.triangles)
+    assert "youngs=1e4" in cube.material.replace("10000.0", "1e4")
+    assert slab.skin is None
+    skin = system.bodies[0].body.skin
+    np.testing.assert_allclose(cube.skin.positions(recording.rest_positions[cube.vertices]), skin.vertices, atol=1e-12)
+    assert [o.kind for o in recording.obstacles] == ["HalfSpace", "Sphere", "Box", "TriangleObstacle"]
+    assert recording.scene_text == "bodies: []\n"
+    assert recording.solver == "Prescribed()"
+    assert recording.supple_version == sp.__version__
+    assert recording.dt == pytest.approx(1 / 30)
+
+
+def test_a_recorded_frame_can_be_started_from(recording, tools):
+    state = recording[10].state
+    frame = next(iter(simulate(tools.small_scene(), tools.Prescribed(), 1 / 30, 1, start=state)))
+    np.testing.assert_allclose(frame.positions["cube"], recording[11].positions["cube"], atol=1e-12)
+
+
+def test_vtk_reads_every_step(recorded):
+    path, frames = recorded
+    vtk, to_numpy = _vtk()
+    reader = vtk.vtkHDFReader()
+    assert reader.CanReadFile(str(path))
+    reader.SetFileName(str(path))
+    reader.UpdateInformation()
+    assert reader.GetNumberOfSteps() == 25
+    times = reader.GetOutputInformation(0).Get(vtk.vtkStreamingDemandDrivenPipeline.TIME_STEPS())
+    np.testing.assert_allclose(times, np.arange(25) / 30, atol=1e-12)
+    for frame in (frames[0], frames[7], frames[23]):
+        reader.SetStep(frame.index)
+        reader.Update()
+        grid = reader.GetOutput()
+        assert grid.GetClassName() == "vtkUnstructuredGrid"
+        np.testing.assert_array_equal(to_numpy(grid.GetPoints().GetData()), frame.state.positions)
+        np.testing.assert_array_equal(to_numpy(grid.GetPointData().GetArray("velocities")), frame.state.velocities)
+        np.testing.assert_array_equal(to_numpy(grid.GetCellData().GetArray("det_F")), frame.det_F)
+        cells = to_numpy(grid.GetCells().GetConnectivityArray()).reshape(-1, 4)
+        np.testing.assert_array_equal(cells, frame.system.tets)
+        bodies = to_numpy(grid.GetCellData().GetArray("body"))
+        assert np.count_nonzero(bodies == 1) == len(frame.system.bodies[1].body.mesh.tets)
+        assert grid.GetCellType(0) == vtk.VTK_TETRA
+
+
+def test_a_recording_is_readable_while_it_is_written(tmp_path, tools):
+    path = tmp_path / "live.vtkhdf"
+    vtk, _ = _vtk()
+    for frame in simulate(tools.small_scene(), tools.Prescribed(), 1 / 30, 5, sinks=[Recorder(path)]):
+        with read_recording(path) as live:
+            assert len(live) == frame.index + 1
+            np.testing.assert_array_equal(live[-1].positions["slab"], frame.positions["slab"])
+        reader = vtk.vtkHDFReader()
+        reader.SetFileName(str(path))
+        reader.UpdateInformation()
+        assert reader.GetNumberOfSteps() == frame.index + 1
+        reader.SetStep(frame.index)
+        reader.Update()
+        assert reader.GetOutput().GetPoint(0) == tuple(frame.state.positions[0])
+
+
+def test_a_simulation_that_stops_early_leaves_no_room_behind(tmp_path, tools):
+    path = tmp_path / "blocked.vtkhdf"
+    solver = tools.Prescribed(stop_at=3, message="vertex 7 is held — «wall»")
+    assert len(tools.record(path, 500, moved_by=solver)) == 3
+    with read_recording(path) as recording:
+        assert len(recording) == 4
+        assert recording[-1].report.status == Status.BLOCKED
+        assert recording[-1].report.message == "vertex 7 is held — «wall»"
+    with h5py.File(path) as file:
+        assert file["VTKHDF/Steps"].attrs["NSteps"] == 4
+        assert len(file["VTKHDF/Steps/Values"]) == 4
+        assert len(file["VTKHDF/Points"]) == 4 * len(file["supple/rest_positions"])
+    assert [p.name for p in tmp_path.iterdir()] == ["blocked.vtkhdf"]
+
+
+@pytest.mark.parametrize("message", ["", "x" * 3000])
+def test_room_grows_when_it_is_used_up(tmp_path, tools, monkeypatch, message):
+    monkeypatch.setattr(recording_module, "_FIRST_FRAMES", 2)
+    path = tmp_path / "grown.vtkhdf"
+    frames = tools.record(path, 9, moved_by=tools.Prescribed(message=message))
+    with read_recording(path) as recording:
+        assert len(recording) == 10
+        for recorded, frame in zip(recording[1:], frames, strict=True):
+            np.testing.assert_array_equal(recorded.positions["cube"], frame.positions["cube"])
+            assert recorded.report.message == message
+            assert recorded.report.details == {"residual": 0.5, "n": [frame.index]}
+    assert [p.name for p in tmp_path.iterdir()] == ["grown.vtkhdf"]
+
+
+def test_compressed_recordings_are_smaller_and_the_same(tmp_path, tools, recorded):
+    path = tmp_path / "small.vtkhdf"
+    frames = tools.record(path, 24, compress=True)
+    assert path.stat().st_size < recorded[0].stat().st_size
+    with read_recording(path) as recording:
+        np.testing.assert_array_equal(recording[24].positions["slab"], frames[-1].positions["slab"])
+        np.testing.assert_array_equal(recording[24].det_F, frames[-1].det_F)
+    vtk, to_numpy = _vtk()
+    reader = vtk.vtkHDFReader()
+    reader.SetFileName(str(path))
+    reader.SetStep(24)
+    reader.Update()
+    np.testing.assert_array_equal(to_numpy(reader.GetOutput().GetPoints().GetData()), frames[-1].state.positions)
+
+
+def test_a_recording_of_no_steps_has_the_start(tmp_path, tools):
+    tools.record(tmp_path / "start.vtkhdf", 0)
+    with read_recording(tmp_path / "start.vtkhdf") as recording:
+        assert len(recording) == 1
+
+
+def test_the_same_recorder_replaces_an_older_recording(tmp_path, tools):
+    path = tmp_path / "again.vtkhdf"
+    tools.record(path, 6)
+    tools.record(path, 2)
+    with read_recording(path) as recording:
+        assert len(recording) == 3
+
+
+_RECORDS_WITHOUT_END = """
+import os, random, runpy, sys, time
+from pathlib import Path
+import supple as sp
+import supple.output.recording as module
+from supple.simulate import simulate
+
+tools = runpy.run_path(sys.argv[1])
+folder, children = Path(sys.argv[2]), int(sys.argv[3])
+module._FIRST_FRAMES = 4
+# The energy of this material is measured without threads, which would not survive a fork.
+scene = tools["small_scene"](material=sp.EdgesAndVolume(density=1000.0))
+solver = tools["Prescribed"]()
+
+def record_without_end(path):
+    for frame in simulate(scene, solver, 1 / 30, 1_000_000, sinks=[module.Recorder(path)]):
+        pass
+
+# All that a recording needs is loaded before there are children.
+list(simulate(scene, solver, 1 / 30, 6, sinks=[module.Recorder(folder / "first.vtkhdf")]))
+chance = random.Random(7)
+for attempt in range(children):
+    path = folder / f"killed-{attempt}.vtkhdf"
+    child = os.fork()
+    if child == 0:
+        record_without_end(path)
+        os._exit(1)
+    while attempt % 4 and not path.exists():  # every fourth is killed before it has begun, or soon after
+        time.sleep(0.0002)
+    time.sleep(chance.uniform(0.0, 0.12))
+    os.kill(child, 9)
+    os.waitpid(child, 0)
+"""
+
+
+def _kill(tmp_path: Path, children: int) -> list[Path]:
+    """Recordings of children that were killed at random moments, forked by one process without threads."""
+    command = [sys.executable, "-c", _RECORDS_WITHOUT_END, str(_CONFTEST), str(tmp_path), str(children)]
+    one_thread = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+    subprocess.run(command, check=True, timeout=120, env=os.environ | one_thread)
+    return sorted(tmp_path.glob("killed-*.vtkhdf"))
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="kills many children, which must start in no time")
+def test_a_killed_recording_holds_every_whole_frame(tmp_path, recorded):
+    """Killed at any moment: while frames are written, and while the file is given more room."""
+    vtk, to_numpy = _vtk()
+    rest = recorded[1][0].system.rest_positions[:27]
+    counts = []
+    for path in _kill(tmp_path, 40):
+        with read_recording(path) as recording:
+            counts.append(len(recording))
+            for frame in (recording[0], recording[-1], recording[len(recording) // 2]):
+                stretch = 1.0 + 0.3 * np.sin(4.0 * frame.time)
+                np.testing.assert_allclose(
+                    frame.positions["cube"], (rest + np.array([0, 1, 0])) * (1, stretch, 1), atol=1e-9
+                )
+                np.testing.assert_allclose(frame.det_F, stretch, atol=1e-9)
+                assert frame.report.status == Status.CONVERGED
+            np.testing.assert_allclose(recording.times, np.arange(len(recording)) / 30, atol=1e-9)
+            last = recording[-1].state.positions
+        reader = vtk.vtkHDFReader()
+        reader.SetFileName(str(path))
+        reader.UpdateInformation()
+        # NSteps is the write after our own count: a kill between the two costs VTK that one frame.
+        assert reader.GetNumberOfSteps() in (counts[-1], counts[-1] - 1)
+        if reader.GetNumberOfSteps() == counts[-1]:
+            reader.SetStep(counts[-1] - 1)
+            reader.Update()
+            np.testing.assert_array_equal(to_numpy(reader.GetOutput().GetPoints().GetData()), last)
+    assert len(counts) >= 30
+    assert max(counts) > 8  # some were given more room twice
+
+
+def test_every_write_of_a_frame_may_be_the_last(tmp_path, tools, monkeypatch):
+    """Stop the writer before each single write to the file: what is there is whole, for us and for VTK."""
+    path = tmp_path / "cut.vtkhdf"
+    vtk, _ = _vtk()
+    seen, plain = set(), RecordingFile._write
+
+    def look_before_writing(self, place, data):
+        if self.path == path:
+            with read_recording(path) as recording:
+                frame = recording[-1]
+                np.testing.assert_allclose(frame.det_F, 1.0 + 0.3 * np.sin(4.0 * frame.time), atol=1e-9)
+                seen.add(len(recording))
+            reader = vtk.vtkHDFReader()
+            reader.SetFileName(str(path))
+            reader.UpdateInformation()
+            assert reader.GetNumberOfSteps() in (len(recording), len(recording) - 1)
+            reader.SetStep(len(recording) - 2 if len(recording) > 1 else 0)
+            reader.Update()
+            assert reader.GetOutput().GetNumberOfPoints() == 54
+        plain(self, place, data)
+
+    monkeypatch.setattr(RecordingFile, "_write", look_before_writing)
+    tools.record(path, 3)
+    assert seen == {1, 2, 3, 4}
+
+
+def test_a_full_disk_is_said_and_the_frames_before_it_stay(tmp_path, tools, monkeypatch):
+    path = tmp_path / "full.vtkhdf"
+    plain = RecordingFile._write
+
+    def no_room(self, place, data):
+        if self.written == 4 and place != self._counter:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        plain(self, place, data)
+
+    monkeypatch.setattr(RecordingFile, "_write", no_room)
+    with pytest.raises(OutputError, match=r"full\.vtkhdf: cannot be written: No space left"):
+        tools.record(path, 10)
+    with read_recording(path) as recording:
+        assert len(recording) == 4
+
+
+def test_no_room_at_the_start_leaves_nothing(tmp_path, tools, monkeypatch):
+    def no_room(self, place, data):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(RecordingFile, "_write", no_room)
+    with pytest.raises(OutputError, match="No space left"):
+        tools.record(tmp_path / "full.vtkhdf", 10)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_unusable_places_are_refused(tmp_path, tools):
+    (tmp_path / "file").write_text("x")
+    (tmp_path / "folder.vtkhdf").mkdir()
+    with pytest.raises(OutputError, match="is a folder"):
+        Recorder(tmp_path / "folder.vtkhdf")
+    with pytest.raises(OutputError, match=r"name it recording\.vtkhdf"):
+        Recorder(tmp_path / "recording")
+    with pytest.raises(OutputError, match=r"file: cannot be written"):
+        tools.record(tmp_path / "file" / "recording.vtkhdf", 1)
+    assert (tmp_path / "file").read_text() == "x"
+
+
+def test_write_before_begin_is_refused(tmp_path, recorded):
+    with pytest.raises(OutputError, match="before begin"):
+        Recorder(tmp_path / "r.vtkhdf").write(recorded[1][0])
+
+
+def _vtk():
+    vtk = pytest.importorskip("vtk")
+    from vtk.util.numpy_support import vtk_to_numpy
+
+    return vtk, vtk_to_numpy
