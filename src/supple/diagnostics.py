@@ -34,8 +34,9 @@ class Diagnostics:
     angular_momentum: NDArray[np.float64]
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def measure(system: System, state: State) -> Diagnostics:
-    """Measure a state."""
+    """Measure a state. Where its numbers are too large for double precision, what is measured is not finite."""
     m, x, v = system.masses, state.positions, state.velocities
     center = m @ x / m.sum()
     momentum = m @ v

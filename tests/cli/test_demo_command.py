@@ -1,0 +1,40 @@
+"""`supple demo`: lists, runs, records, and prints what was measured."""
+
+import pytest
+
+from supple.cli.app import main
+from supple.cli.exit_codes import ExitCode
+from supple.demos.registry import DEMOS
+from supple.output.recording_reader import read_recording
+
+
+@pytest.mark.parametrize("arguments", [["demo"], ["demo", "--list"], ["demo", "squash", "-l"]])
+def test_lists_the_demos(arguments, capsys):
+    assert main(arguments) == ExitCode.OK
+    out = capsys.readouterr().out
+    for demo in DEMOS.values():
+        assert f"{demo.name} " in out
+        assert demo.summary in out
+
+
+def test_runs_a_demo_and_judges_its_claims(tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    assert main(["demo", "stretch", "--steps", "3", "--no-page", "--no-plot"]) == ExitCode.OK
+    out, _ = capfd.readouterr()
+    assert DEMOS["stretch"].explanation in out
+    with read_recording("out/stretch/recording.vtkhdf") as recording:
+        assert len(recording) == 4
+    verdicts = [line for line in out.splitlines() if line.startswith(("holds: ", "does not hold: "))]
+    assert len(verdicts) == 3
+    # in three frames nothing inverts, and nothing is stretched to twice its length yet
+    assert any(line.startswith("holds: no tetrahedron inverts") for line in verdicts)
+    assert any(line.startswith("does not hold: stretched to twice its length") for line in verdicts)
+
+
+def test_quiet_prints_only_what_was_measured(tmp_path, capfd):
+    arguments = ["demo", "squash", "-q", "--steps", "2", "--no-page", "--no-plot", "-o", str(tmp_path / "here")]
+    assert main(arguments) == ExitCode.OK
+    out, err = capfd.readouterr()
+    assert all(line.startswith(("holds: ", "does not hold: ")) for line in out.splitlines())
+    assert err == ""
+    assert [path.name for path in (tmp_path / "here").iterdir()] == ["recording.vtkhdf"]

@@ -1,0 +1,153 @@
+"""`supple run`: what it writes, and how it ends."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.cli.app import main
+from supple.cli.exit_codes import ExitCode
+from supple.output.recording import Recorder
+from supple.output.recording_reader import read_recording
+from supple.xpbd.solver import XPBD
+
+SCENE = """
+bodies:
+  - name: cube
+    shape: {kind: box, divisions: [2, 2, 2]}
+    material: {kind: stable_neo_hookean, youngs: 1e5, poisson: 0.3}
+    position: [0, 0.6, 0]
+obstacles: [{kind: half_space, name: floor}]
+solver: {kind: xpbd, substeps: 5}
+dt: 1/60
+steps: 6
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scene.yaml").write_text(SCENE)
+    return tmp_path
+
+
+def listing(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_writes_recording_page_and_plot_and_says_where(folder, capfd):
+    assert main(["run", "scene.yaml", "-o", "out/first"]) == ExitCode.OK
+    assert listing(folder / "out" / "first") == ["index.html", "plot.png", "recording.vtkhdf"]
+    out, err = capfd.readouterr()
+    for name in listing(folder / "out" / "first"):
+        assert os.path.join("out", "first", name) in out
+    assert "6 frames to t = 0.1 s (converged)" in out
+    assert "supple:" not in err
+    with read_recording(folder / "out" / "first" / "recording.vtkhdf") as recording:
+        assert len(recording) == 7
+        assert recording.scene_text == SCENE
+        assert "XPBD(substeps=5" in recording.solver
+        x = recording[-1].positions["cube"]
+    run = sp.load_run("scene.yaml")
+    *_, last = sp.simulate(run.scene, run.solver, run.dt, run.steps)
+    assert np.array_equal(x, last.positions["cube"])
+
+
+def test_quiet_without_page_and_plot(folder, capfd):
+    arguments = ["run", "scene.yaml", "--no-page", "--no-plot", "--quiet", "--steps", "2", "--dt", "0.25"]
+    assert main([*arguments, "--solver", "xpbd"]) == ExitCode.OK
+    assert capfd.readouterr() == ("", "")
+    assert listing(folder / "out") == ["recording.vtkhdf"]
+    with read_recording("out/recording.vtkhdf") as recording:
+        assert recording.times.tolist() == [0.0, 0.25, 0.5]
+        assert "XPBD(substeps=20" in recording.solver
+
+
+def test_the_file_may_turn_page_and_plot_off_and_options_win(folder):
+    (folder / "scene.yaml").write_text(SCENE + "output: {page: false, plot: false, compress: true}\n")
+    assert main(["run", "scene.yaml", "-q", "--steps", "1", "--plot"]) == ExitCode.OK
+    assert listing(folder / "out") == ["plot.png", "recording.vtkhdf"]
+
+
+def test_a_second_run_replaces_the_first(folder):
+    arguments = ["run", "scene.yaml", "-q", "--no-page", "--no-plot", "--steps"]
+    assert main([*arguments, "3"]) == ExitCode.OK
+    assert main([*arguments, "2"]) == ExitCode.OK
+    with read_recording("out/recording.vtkhdf") as recording:
+        assert len(recording) == 3
+
+
+def test_a_deformed_start_is_where_the_recording_begins(folder):
+    (folder / "scene.yaml").write_text(SCENE.replace("    position", "    initial: {scale: [1, 0.5, 1]}\n    position"))
+    assert main(["run", "scene.yaml", "-q", "--no-page", "--no-plot", "--steps", "1"]) == ExitCode.OK
+    with read_recording("out/recording.vtkhdf") as recording:
+        assert np.ptp(recording[0].positions["cube"], axis=0) == pytest.approx([1, 0.5, 1])
+
+
+def test_a_solver_that_cannot_go_on_is_exit_3_with_the_recording_up_to_there(folder, capfd):
+    (folder / "scene.yaml").write_text(SCENE + "gravity: [0, -1.0e+290, 0]\n")
+    assert main(["run", "scene.yaml", "-q", "--no-page", "--no-plot", "--dt", "1e20"]) == ExitCode.SOLVER
+    err = capfd.readouterr().err
+    assert err.startswith("supple: stopped at frame 1 (not_finite): ")
+    assert "body 'cube', vertex" in err
+    assert err.count("\n") == 1
+    with read_recording("out/recording.vtkhdf") as recording:
+        assert len(recording) == 2
+        assert np.isfinite(recording[-1].positions["cube"]).all()
+        assert recording.statuses[-1] == "not_finite"
+
+
+def fails_at(call, error, step):
+    """`step`, raising `error` at that call."""
+    calls = []
+
+    def failing(*arguments, **options):
+        calls.append(None)
+        if len(calls) == call:
+            raise error
+        return step(*arguments, **options)
+
+    return failing
+
+
+def test_ctrl_c_keeps_the_frames_before_it(folder, capfd, monkeypatch):
+    monkeypatch.setattr(XPBD, "step", fails_at(4, KeyboardInterrupt(), XPBD.step))
+    assert main(["run", "scene.yaml", "-q"]) == ExitCode.INTERRUPTED
+    err = capfd.readouterr().err
+    assert "interrupted" in err
+    assert err.count("\n") == 1
+    with read_recording("out/recording.vtkhdf") as recording:
+        assert len(recording) == 4
+    assert listing(folder / "out") == ["recording.vtkhdf"]
+
+
+def test_a_full_disk_keeps_the_frames_before_it(folder, capfd, monkeypatch):
+    full = sp.OutputError("out/recording.vtkhdf: cannot be written: No space left on device")
+    monkeypatch.setattr(Recorder, "write", fails_at(3, full, Recorder.write))
+    assert main(["run", "scene.yaml", "-q"]) == ExitCode.INPUT
+    assert capfd.readouterr().err.count("\n") == 1
+    with read_recording("out/recording.vtkhdf") as recording:
+        assert len(recording) == 3
+    assert listing(folder / "out") == ["recording.vtkhdf"]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="SIGINT is sent otherwise elsewhere")
+def test_a_real_ctrl_c(folder):
+    arguments = [sys.executable, "-m", "supple", "run", "scene.yaml", "--steps", "1000000", "-q"]
+    process = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 120
+    while not (folder / "out" / "recording.vtkhdf").exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    time.sleep(0.2)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (130, "")
+    assert "interrupted" in err
+    assert "Traceback" not in err
+    with read_recording("out/recording.vtkhdf") as recording:
+        assert recording.times[-1] == pytest.approx((len(recording) - 1) / 60)
