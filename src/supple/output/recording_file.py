@@ -15,6 +15,7 @@ version 1) and IV.A.2.b (dataspace message, version 1).
 from __future__ import annotations
 
 import copy
+import mmap
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -243,13 +244,18 @@ def _place(file: h5py.File, series: Series) -> int:
 
 
 def _place_of_mark(file: BinaryIO, header: int) -> int:
-    """Where the value of NSteps is: in the object header of the group, or where that goes on, just after it."""
-    file.seek(header)
+    """Where the value of NSteps is: in or near the object header of the group, or wherever that goes on."""
     mark = _STEPS_MARK.to_bytes(8, "little")
-    block = file.read(1 << 20)
-    if block.count(mark) != 1:
-        raise OutputError(f"{file.name}: the HDF5 library wrote NSteps in a way that Supple does not know")
-    return header + block.index(mark)
+    near = max(0, header - (1 << 20))
+    file.seek(near)
+    block = file.read(1 << 21)
+    if block.count(mark) == 1:
+        return near + block.index(mark)
+    with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as whole:
+        place = whole.find(mark)
+        if place < 0 or whole.find(mark, place + 1) >= 0:
+            raise OutputError(f"{file.name}: the HDF5 library wrote NSteps in a way that Supple does not know")
+    return place
 
 
 def _place_of_length(file: BinaryIO, header: int, length: int) -> int:
