@@ -1,0 +1,220 @@
+"""What a recording looks like: surfaces of bodies and obstacles, their colors, and where to look from.
+
+Pages, videos and exports draw from here, so that they all show the same thing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.output.recorded_scene import RecordedBody, RecordedObstacle
+from supple.output.recording_reader import RecordedFrame, Recording, read_recording
+
+# Gummy colors, told apart also by those who see few colors (after Okabe and Ito, brightened).
+BODY_COLORS = (
+    (230, 92, 60),
+    (64, 156, 225),
+    (245, 179, 36),
+    (52, 172, 120),
+    (206, 112, 178),
+    (120, 200, 235),
+    (160, 120, 80),
+)
+OBSTACLE_COLOR = (176, 180, 188)
+_SPHERE_RINGS, _SPHERE_SEGMENTS = 16, 32
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """Triangles (t, 3) that move: `vertices` of one frame by `at(frame)`, (k, 3) [m]."""
+
+    body: RecordedBody
+    triangles: NDArray[np.int32]
+    color: tuple[int, int, int]
+    used: NDArray[np.int64]
+
+    @property
+    def name(self) -> str:
+        return self.body.name
+
+    def at(self, frame: RecordedFrame) -> NDArray[np.float64]:
+        """Where the vertices of the drawn surface are: the skin's, or the boundary's."""
+        x = frame.state.positions[self.body.vertices]
+        return x[self.used] if self.body.skin is None else self.body.skin.positions(x)
+
+
+def pictures(recording: Recording) -> list[Picture]:
+    """One for each body: its skin where it has one, its boundary where not."""
+    made = []
+    for i, body in enumerate(recording.bodies):
+        color = BODY_COLORS[i % len(BODY_COLORS)]
+        if body.skin is not None:
+            made.append(Picture(body, body.skin.triangles, color, np.zeros(0, dtype=np.int64)))
+        else:
+            used, rows = np.unique(body.triangles, return_inverse=True)
+            made.append(Picture(body, rows.reshape(-1, 3).astype(np.int32), color, used.astype(np.int64)))
+    return made
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """Where everything is, over the whole recording, and where it is seen from.
+
+    Attributes
+    ----------
+    low, high : (3,) bounds of the bodies in all frames [m]
+    up : (3,) unit vector against gravity; y where there is none
+    """
+
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    up: NDArray[np.float64]
+
+    @property
+    def center(self) -> NDArray[np.float64]:
+        return 0.5 * (self.low + self.high)
+
+    @property
+    def radius(self) -> float:
+        """Of the ball about `center` that holds all bodies at all times [m]."""
+        return max(0.5 * float(np.linalg.norm(self.high - self.low)), 1e-6)
+
+    def eye(self, angle: float) -> NDArray[np.float64]:
+        """From where the ball fills a camera that sees `angle` [degrees] upwards, a little from above and aside."""
+        side = np.eye(3)[int(np.argmin(np.abs(self.up)))]
+        ahead = np.cross(side, self.up)
+        side = np.cross(self.up, ahead / np.linalg.norm(ahead))
+        direction = 0.45 * side + 0.3 * self.up + 0.84 * np.cross(side, self.up)
+        distance = 1.05 * self.radius / np.sin(np.radians(0.5 * angle))
+        return self.center + distance * direction / np.linalg.norm(direction)
+
+
+def view_of(recording: Recording) -> View:
+    """Bounds over all frames (at most about 200 of them are looked at)."""
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for frame in recording[:: max(1, len(recording) // 200)]:
+        x = frame.state.positions[np.isfinite(frame.state.positions).all(axis=1)]
+        if len(x):
+            low, high = np.minimum(low, x.min(axis=0)), np.maximum(high, x.max(axis=0))
+    if not np.isfinite(low).all():
+        low, high = np.zeros(3), np.ones(3)
+    g = recording.gravity
+    size = np.linalg.norm(g)
+    up = -g / size if size > 0.0 else np.array([0.0, 1.0, 0.0])
+    return View(low, high, up)
+
+
+@dataclass(frozen=True, eq=False)
+class ObstaclePicture:
+    """An obstacle's triangles where it is at time 0; `RecordedFrame.poses[number]` carries them on."""
+
+    number: int
+    name: str
+    vertices: NDArray[np.float64]
+    triangles: NDArray[np.int32]
+    see_through: bool
+
+    def at(self, frame: RecordedFrame) -> NDArray[np.float64]:
+        """(k, 3) [m] in a frame."""
+        pose = frame.poses[self.number]
+        return self.vertices @ pose[:, :3].T + pose[:, 3]
+
+
+def obstacle_pictures(recording: Recording, view: View) -> list[ObstaclePicture]:
+    """One for each obstacle. A half-space is a square about what happens; a room can be seen through."""
+    made = []
+    for number, obstacle in enumerate(recording.obstacles):
+        surface = _surface(obstacle, view)
+        if surface is not None:
+            inside = bool(obstacle.parameters.get("inside", False))
+            made.append(ObstaclePicture(number, obstacle.name, *surface, inside))
+    return made
+
+
+def _surface(obstacle: RecordedObstacle, view: View) -> tuple[NDArray[np.float64], NDArray[np.int32]] | None:
+    numbers = obstacle.parameters
+    if obstacle.kind == "TriangleObstacle":
+        return obstacle.vertices, obstacle.triangles
+    if obstacle.kind == "HalfSpace":
+        return _square(np.asarray(numbers["point"], dtype=float), np.asarray(numbers["normal"], dtype=float), view)
+    if obstacle.kind == "Box":
+        corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+        placed = corners * numbers["size"] @ np.asarray(numbers["orientation"]).T + numbers["center"]
+        return placed, _BOX
+    if obstacle.kind == "Sphere":
+        points, triangles = _ball()
+        return points * numbers["radius"] + numbers["center"], triangles
+    return None
+
+
+_BOX_QUADS = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+_BOX = np.array([[q[0], q[i], q[i + 1]] for q in _BOX_QUADS for i in (1, 2)], dtype=np.int32)
+
+
+def _square(point: NDArray, normal: NDArray, view: View) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    center = view.center - normal * float((view.center - point) @ normal)
+    a = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
+    a /= np.linalg.norm(a)
+    b = np.cross(normal, a)
+    reach = 2.5 * view.radius
+    corners = center + reach * np.array([-a - b, a - b, a + b, b - a])
+    return corners, np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
+
+
+def _ball() -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """The unit sphere from rings and segments, with its poles on y."""
+    rings, segments = _SPHERE_RINGS, _SPHERE_SEGMENTS
+    theta = np.linspace(0.0, np.pi, rings + 1)[1:-1, None]
+    phi = np.linspace(0.0, 2.0 * np.pi, segments, endpoint=False)[None]
+    body = np.stack([np.sin(theta) * np.cos(phi), np.cos(theta) + 0.0 * phi, np.sin(theta) * np.sin(phi)], axis=-1)
+    points = np.concatenate([[[0.0, 1.0, 0.0]], body.reshape(-1, 3), [[0.0, -1.0, 0.0]]])
+    last, triangles = len(points) - 1, []
+    for s in range(segments):
+        t = (s + 1) % segments
+        triangles.append([0, 1 + t, 1 + s])
+        for r in range(rings - 2):
+            a, b, c, d = (
+                1 + r * segments + s,
+                1 + r * segments + t,
+                1 + (r + 1) * segments + t,
+                1 + (r + 1) * segments + s,
+            )
+            triangles += [[a, b, c], [a, c, d]]
+        base = 1 + (rings - 2) * segments
+        triangles.append([last, base + s, base + t])
+    return points, np.array(triangles, dtype=np.int32)
+
+
+def vertex_normals(x: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float64]:
+    """Unit normals (k, 3) at vertices x (k, 3): of the triangles around each, weighted by area."""
+    a, b, c = (x[triangles[:, i]] for i in range(3))
+    area = np.cross(b - a, c - a)
+    normals = np.stack(
+        [np.bincount(triangles.ravel(), np.repeat(area[:, i], 3), minlength=len(x)) for i in range(3)], axis=1
+    )
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.where(length > 0.0, normals / np.where(length > 0.0, length, 1.0), [0.0, 1.0, 0.0])
+
+
+@contextmanager
+def opened(recording: Recording | str | Path) -> Iterator[Recording]:
+    """A recording that is open already, or one that is opened for this block."""
+    if isinstance(recording, Recording):
+        yield recording
+    else:
+        with read_recording(recording) as made:
+            yield made
+
+
+def evenly(recording: Recording, most: int) -> list[RecordedFrame]:
+    """At most `most` frames, evenly spaced, the first and the last among them."""
+    if len(recording) <= most:
+        return list(recording)
+    chosen = np.unique(np.linspace(0, len(recording) - 1, most).round().astype(int))
+    return [recording[int(i)] for i in chosen]

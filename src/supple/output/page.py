@@ -1,0 +1,137 @@
+"""A page that plays a recording in a browser: one file, nothing to install, nothing from the network.
+
+The player is viser's client (three.js), which its wheel carries; the frames travel inside the page, compressed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import html
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.errors import OutputError
+from supple.output.atomic import whole_file
+from supple.output.drawing import OBSTACLE_COLOR, View, evenly, obstacle_pictures, opened, pictures, view_of
+from supple.output.recording_reader import Recording
+
+# Bytes of moving vertices before compression, which halves them or better; longer recordings are shown with fewer
+# frames.
+_MOST_BYTES = 36_000_000
+_ANGLE = 35.0  # of the camera, upwards [degrees]
+_RESOLUTION = 2.0**-13  # vertices are rounded to this, as a part of the size of the scene: less than a pixel
+
+
+def write_page(recording: Recording | str | Path, output: str | Path) -> Path:
+    """Write `output` (such as index.html), which plays the recording in a loop wherever it is opened.
+
+    Raises
+    ------
+    OutputError : where the recording cannot be read, or the page cannot be written.
+    """
+    output = Path(output)
+    with opened(recording) as source, whole_file(output) as fresh:
+        fresh.write_text(_page(source), encoding="utf-8")
+    return output
+
+
+def _page(recording: Recording) -> str:
+    import viser
+
+    # viser greets on standard output, which belongs to whoever called us.
+    with contextlib.redirect_stdout(io.StringIO()):
+        try:
+            server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        except OSError as error:
+            raise OutputError(f"page: viser needs a local port for a moment and got none: {error}") from None
+        try:
+            text = _serialize(server, recording)
+        finally:
+            server.stop()
+    title = f"<title>{html.escape(', '.join(body.name for body in recording.bodies)[:80])} · Supple</title>"
+    return text.replace("<title>Viser</title>", title, 1)
+
+
+def _serialize(server: Any, recording: Recording) -> str:
+    drawn = pictures(recording)
+    view = view_of(recording)
+    _set_stage(server, view)
+    obstacles = _add_obstacles(server, recording, view)
+    quantum = _quantum(view)
+    first = recording[0]
+    handles = [
+        server.scene.add_mesh_simple(
+            f"/bodies/{i} {picture.name}", _rounded(picture.at(first), quantum), picture.triangles, color=picture.color
+        )
+        for i, picture in enumerate(drawn)
+    ]
+    size = sum(12 * len(picture.at(first)) for picture in drawn)
+    frames = evenly(recording, max(2, _MOST_BYTES // max(1, size)))
+    serializer = server.get_scene_serializer()
+    shown = first.time
+    for frame in frames[1:]:
+        serializer.insert_sleep(max(0.0, frame.time - shown))
+        shown = frame.time
+        for handle, picture in zip(handles, drawn, strict=True):
+            handle.vertices = _rounded(picture.at(frame), quantum)
+        for number, (handle, before) in obstacles.items():
+            pose = frame.poses[number]
+            if not np.array_equal(pose, before):
+                handle.wxyz, handle.position = _quaternion(pose[:, :3]), pose[:, 3]
+                obstacles[number] = handle, pose
+    serializer.insert_sleep(recording.dt)
+    return serializer.as_html()
+
+
+def _set_stage(server: Any, view: View) -> None:
+    eye, up = view.eye(_ANGLE), view.up
+    server.scene.set_up_direction(tuple(up))
+    camera = server.initial_camera
+    camera.position, camera.look_at, camera.up, camera.fov = (
+        tuple(eye),
+        tuple(view.center),
+        tuple(up),
+        np.radians(_ANGLE),
+    )
+    camera.near, camera.far = view.radius * 1e-2, view.radius * 1e3
+
+
+def _add_obstacles(server: Any, recording: Recording, view: View) -> dict[int, tuple[Any, NDArray[np.float64]]]:
+    """Draw the obstacles; their handles by number, and where they stand."""
+    handles = {}
+    for obstacle in obstacle_pictures(recording, view):
+        pose = recording[0].poses[obstacle.number]
+        handle = server.scene.add_mesh_simple(
+            f"/obstacles/{obstacle.number} {obstacle.name}",
+            obstacle.vertices.astype(np.float32),
+            obstacle.triangles,
+            color=OBSTACLE_COLOR,
+            opacity=0.25 if obstacle.see_through else None,
+            flat_shading=recording.obstacles[obstacle.number].kind != "Sphere",
+            side="double",
+            wxyz=_quaternion(pose[:, :3]),
+            position=pose[:, 3],
+            cast_shadow=not obstacle.see_through,
+        )
+        handles[obstacle.number] = handle, pose
+    return handles
+
+
+def _quaternion(R: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(w, x, y, z) of a rotation (3, 3)."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_matrix(R).as_quat()[[3, 0, 1, 2]]
+
+
+def _quantum(view: View) -> float:
+    """The power of two that vertices are rounded to: numbers with few bits compress well."""
+    return float(2.0 ** np.floor(np.log2(_RESOLUTION * 2.0 * view.radius)))
+
+
+def _rounded(x: NDArray[np.float64], quantum: float) -> NDArray[np.float32]:
+    return (np.round(np.nan_to_num(x) / quantum) * quantum).astype(np.float32)
