@@ -10,6 +10,8 @@ Source of the constraints: Macklin and Müller, "A Constraint-based Formulation 
 
 from __future__ import annotations
 
+import logging
+
 import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
@@ -18,6 +20,8 @@ from supple.errors import SolverError
 from supple.system import BodyRange, System
 from supple.xpbd.ordering import Layout
 from supple.xpbd.segments import gather, sort_into_segments
+
+logger = logging.getLogger(__name__)
 
 # No flag that assumes finite numbers (NaN must be seen) and none that reorders sums (same bits for any thread count).
 FLAGS = {"contract", "arcp", "nsz"}
@@ -54,14 +58,15 @@ class StableNeoHookeanConstraints:
         if h != self._prepared_for:
             self._prepare(h)
         pointers, bounds = self.segments.chunk_pointers, self.segments.bounds
-        (_sweep_parallel if parallel else _sweep)(points, self.corners, self.data, pointers, bounds)
         gammas = self.table[self.segments.kinds, 0] / h
         if gammas.any():
-            # After the elastic sweep, not in it: there viscosity would resist displacements that only last until the
-            # next tet's turn, and a damped body would sag more than an undamped one. Forth and back, because only a
-            # symmetric damping operator takes energy from every mode.
+            # Before the elastic sweep: what viscosity takes is the velocity that the substep began with. In or after the
+            # elastic sweep it would undo the elastic displacements of neighbours, and a body with much damping would
+            # never come back to rest. Forth and back, because only a symmetric damping operator takes energy from
+            # every mode.
             damp = _damp_parallel if parallel else _damp
             damp(points, previous, self.corners, self.data, h, pointers, bounds, gammas)
+        (_sweep_parallel if parallel else _sweep)(points, self.corners, self.data, pointers, bounds)
 
     def _prepare(self, h: float) -> None:
         """Step lengths for substeps of h: h^2 phi with phi the largest length at which a tet cannot overshoot."""
@@ -69,6 +74,15 @@ class StableNeoHookeanConstraints:
         self.data[:, 12] = h**2 * np.minimum(1.0, 1.0 / stiffness)
         self.data[:, 13:16] = self.curvatures
         self._prepared_for = h
+        shortened = np.count_nonzero(stiffness > 1.0) / self.count
+        if shortened > 0.5:
+            logger.warning(
+                "XPBD: %.0f %% of the stable Neo-Hookean tets are too stiff, or too light, for substeps of %.3g s and "
+                "act softer than they are; about %.1f times as many substeps give them their stiffness",
+                100.0 * shortened,
+                h,
+                np.sqrt(np.quantile(stiffness, 0.9)),
+            )
 
 
 def _lame_of_tets(part: BodyRange) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -11,6 +11,8 @@ import numpy as np
 from numba import njit, prange
 
 BLOCK = 4096
+# Positions beyond are lost, whether or not they are finite: at this distance [m] round-off is a tenth of a millimetre.
+FARTHEST = 1e12
 
 
 @njit(cache=True)
@@ -75,11 +77,11 @@ def update_velocities(points, previous, velocities, h):
 
 
 @njit(cache=True)
-def first_broken(points, velocities):
-    """The first vertex whose position or velocity is not finite, or -1."""
+def first_lost(points, velocities):
+    """The first vertex whose position or velocity is not finite, or whose position is beyond `FARTHEST`; or -1."""
     for i in range(len(points)):
         for j in range(3):
-            if not (np.isfinite(points[i, j]) and np.isfinite(velocities[i, j])):
+            if not (abs(points[i, j]) <= FARTHEST and np.isfinite(velocities[i, j])):
                 return i
     return -1
 
@@ -95,13 +97,13 @@ def hold(points, vertices, targets, row, origins):
 
 @njit(cache=True)
 def to_world(points, origins, world):
-    """World positions (n, 3) of points (n, 3 or 4) kept about their origins (n, 3). Returns whether all are finite."""
-    total = 0.0
+    """World positions (n, 3) of points (n, 3 or 4) kept about their origins (n, 3). Returns whether all are in reach (`FARTHEST`)."""
+    good = True
     for i in range(len(world)):
         for j in range(3):
             world[i, j] = origins[i, j] + points[i, j]
-            total += 0.0 * world[i, j]
-    return total == 0.0
+            good = good and abs(world[i, j]) <= FARTHEST
+    return good
 
 
 @njit(cache=True)

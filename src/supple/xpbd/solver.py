@@ -23,7 +23,7 @@ from supple.xpbd.collisions import Collisions
 from supple.xpbd.constraints import ConstraintSet, build_constraint_sets
 from supple.xpbd.contact_settings import ContactSettings
 from supple.xpbd.integration import (
-    first_broken,
+    first_lost,
     hold,
     origins_of_components,
     predict,
@@ -156,9 +156,9 @@ class XPBD(Solver):
                 if ws.collisions and not _collide(ws, state.time + (k + 1) * h, h):
                     break
         ws.pace.note(parallel, perf_counter() - started)
-        broken = first_broken(ws.points, ws.velocities)
-        if broken >= 0:
-            return state, StepReport(Status.NOT_FINITE, self.substeps, message=_what_broke(ws, broken, state.time + dt))
+        lost = first_lost(ws.points, ws.velocities)
+        if lost >= 0:
+            return state, StepReport(Status.NOT_FINITE, self.substeps, message=_what_is_lost(ws, lost, state.time + dt))
         report = StepReport(
             Status.CONVERGED,
             self.substeps,
@@ -196,7 +196,7 @@ def _load(ws: XPBDWorkspace, state: State) -> None:
 
 
 def _collide(ws: XPBDWorkspace, time: float, h: float) -> bool:
-    """Contacts of one substep, in world coordinates. Returns False, with nothing done, where a position is broken."""
+    """Contacts of one substep, in world coordinates. Returns False, with nothing done, where a position is lost."""
     if not to_world(ws.points, ws.origins, ws.world):
         return False
     to_world(ws.previous, ws.origins, ws.world_previous)
@@ -218,10 +218,10 @@ def _pin_targets(system: System, time: float, h: float, substeps: int) -> NDArra
     return np.stack([system.pin_targets(time + (k + 1) * h) for k in range(substeps)])
 
 
-def _what_broke(ws: XPBDWorkspace, vertex: int, time: float) -> str:
+def _what_is_lost(ws: XPBDWorkspace, vertex: int, time: float) -> str:
     part = next(p for p in ws.system.bodies if p.vertices.start <= vertex < p.vertices.stop)
     number = int(ws.layout.old_from_new[vertex]) - part.vertices.start
     return (
-        f"XPBD: body {part.name!r}, vertex {number}: its position is not finite at t = {time:g} s; "
+        f"XPBD: body {part.name!r}, vertex {number}: its position is lost (not finite, or beyond 1e12 m) at t = {time:g} s; "
         "take more substeps or a shorter dt"
     )

@@ -1,0 +1,188 @@
+"""The XPBD solver as a whole: parameters, pins, mixed scenes, threads, and states that cannot go on."""
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.errors import SolverError
+from supple.state import State
+from supple.system import build_system, initial_state
+from supple.xpbd import ordering
+from supple.xpbd.contact_settings import ContactSettings
+from supple.xpbd.pace import SHORTEST_REST, Pace
+from supple.xpbd.solver import XPBD
+
+DT = 1.0 / 60.0
+CUBE = sp.shapes.box((1.0, 1.0, 1.0), (3, 3, 3))
+JELLY = sp.StableNeoHookean(youngs=1e5, poisson=0.4)
+CLASSIC = sp.EdgesAndVolume(edge_compliance=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "says"),
+    [
+        ({"substeps": 0}, "substeps is 0"),
+        ({"substeps": 2.5}, "substeps is 2.5"),
+        ({"substeps": True}, "substeps is True"),
+        ({"threads": 0}, "threads is 0"),
+        ({"threads": 100000}, "threads is 100000"),
+        ({"momentum_restore": 1}, "momentum_restore is 1"),
+        ({"contact": True}, "contact is True"),
+    ],
+)
+def test_wrong_parameters_are_refused(parameters, says):
+    with pytest.raises(SolverError, match=says):
+        XPBD(**parameters)
+
+
+def test_a_solver_is_frozen_and_keeps_its_contact_settings():
+    assert XPBD().contact == ContactSettings()
+    assert XPBD(contact=None).contact is None
+    with pytest.raises(AttributeError):
+        XPBD().substeps = 3  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_a_material_without_constraints_names_the_body():
+    scene = sp.Scene(bodies=[sp.Body("pillow", CUBE, sp.ARAP(youngs=1e4, poisson=0.3))])
+    with pytest.raises(SolverError, match=r"body 'pillow' is made of ARAP.*StableNeoHookean"):
+        XPBD().prepare(build_system(scene))
+
+
+def test_free_fall():
+    """Substeps of backward Euler: n of them fall g h^2 n (n + 1) / 2."""
+    scene = sp.Scene(bodies=[sp.Body("cube", CUBE, JELLY, velocity=(1.0, 0.0, 0.0))])
+    frames = list(sp.simulate(scene, XPBD(substeps=10), DT, 6))
+    n, h = 60, DT / 10
+    expected = CUBE.vertices + (1.0 * n * h, -9.81 * h**2 * n * (n + 1) / 2, 0.0)
+    np.testing.assert_allclose(frames[-1].positions["cube"], expected, atol=1e-12)
+    np.testing.assert_allclose(frames[-1].velocities["cube"], np.tile([1.0, -9.81 * n * h, 0.0], (64, 1)), atol=1e-10)
+    assert frames[-1].report.iterations == 10
+
+
+def test_pins_are_exact_and_moved_every_substep():
+    held = np.flatnonzero(CUBE.vertices[:, 1] > CUBE.vertices[:, 1].max() - 1e-9)
+    turn = sp.Keyframes(times=[0.0, 1.0], angles=[0.0, 3.0], axis=(0, 1, 0))
+    body = sp.Body("cube", CUBE, CLASSIC, position=(5.0, 2.0, 1.0))
+    scene = sp.Scene(bodies=[body], pins=[sp.Pin("cube", held, motion=turn)])
+    for frame in sp.simulate(scene, XPBD(substeps=7), DT, 20):
+        targets = frame.system.pin_targets(frame.time)
+        np.testing.assert_allclose(frame.positions["cube"][held], targets, atol=1e-13)
+        before = frame.system.pin_targets(frame.time - DT / 7)
+        np.testing.assert_allclose(frame.velocities["cube"][held], (targets - before) / (DT / 7), atol=1e-8)
+
+
+def test_a_step_leaves_the_given_state_alone_and_starts_from_any():
+    scene = sp.Scene(bodies=[sp.Body("cube", CUBE, JELLY, angular_velocity=(0, 3, 0))])
+    system, solver = build_system(scene), XPBD()
+    state = initial_state(scene)
+    x, v = state.positions.copy(), state.velocities.copy()
+    workspace = solver.prepare(system)
+    first, _ = solver.step(system, state, DT, workspace)
+    solver.step(system, first, DT, workspace)
+    again, _ = solver.step(system, state, DT, workspace)
+    np.testing.assert_array_equal(state.positions, x)
+    np.testing.assert_array_equal(state.velocities, v)
+    np.testing.assert_array_equal(first.positions, again.positions)
+    np.testing.assert_array_equal(first.velocities, again.velocities)
+
+
+def test_mixed_materials_behave_as_each_does_alone():
+    """Bodies that do not touch share kernels, colors and threads, but no motion."""
+    soft = sp.EdgesAndVolume(edge_compliance=1e-2, damping=0.02)
+    damped = sp.StableNeoHookean(youngs=5e4, poisson=0.3, damping=0.01)
+    kinds = {"classic": CLASSIC, "soft": soft, "jelly": JELLY, "damped": damped}
+    bodies = [sp.Body(name, CUBE, kind, position=(3.0 * k, 0, 0)) for k, (name, kind) in enumerate(kinds.items())]
+    held = [sp.Pin(body.name, vertices=[0, 1, 2]) for body in bodies]
+    together = list(sp.simulate(sp.Scene(bodies=bodies, pins=held), XPBD(contact=None), DT, 20))[-1]
+    for body, pin in zip(bodies, held, strict=True):
+        alone = list(sp.simulate(sp.Scene(bodies=[body], pins=[pin]), XPBD(contact=None), DT, 20))[-1]
+        # Equal up to the round-off of the component's origin and the order of the constraints.
+        np.testing.assert_allclose(together.positions[body.name], alone.positions[body.name], atol=1e-3)
+    moved = [
+        np.abs(together.positions[name] - b.place(CUBE.vertices)).max() for name, b in zip(kinds, bodies, strict=True)
+    ]
+    assert moved[1] > 1.05 * moved[0]
+
+
+def test_threads_do_not_change_a_bit(monkeypatch):
+    monkeypatch.setattr(ordering, "SMALLEST_CHUNK", 100)
+    materials = {
+        "jelly": sp.StableNeoHookean(youngs=1e5, poisson=0.4, damping=0.002),
+        "classic": sp.EdgesAndVolume(edge_compliance=1e-4, damping=0.001),
+    }
+    mesh = sp.shapes.box((1.0, 1.0, 3.0), (4, 4, 12))
+    bodies = [
+        sp.Body(name, mesh, material, position=(100.0 + 3.0 * k, 2.0, 0.0), angular_velocity=(3, 2, 1))
+        for k, (name, material) in enumerate(materials.items())
+    ]
+    scene = sp.Scene(bodies=bodies, obstacles=[sp.HalfSpace(friction=0.3)])
+    runs = [list(sp.simulate(scene, XPBD(threads=threads), DT, 40))[-1] for threads in (1, 2)]
+    np.testing.assert_array_equal(runs[0].state.positions, runs[1].state.positions)
+    np.testing.assert_array_equal(runs[0].state.velocities, runs[1].state.velocities)
+    assert runs[0].report.details["contacts"] >= 0
+    assert runs[0].positions["jelly"][:, 1].min() < 0.5
+
+
+@pytest.mark.parametrize("material", [JELLY, CLASSIC], ids=["neo-hookean", "edges+volume"])
+def test_positions_that_blow_up_end_the_simulation_with_the_last_good_state(material):
+    other = sp.Body("other", CUBE, JELLY, position=(5.0, 0.0, 0.0))
+    scene = sp.Scene(bodies=[other, sp.Body("cube", CUBE, material)], obstacles=[sp.HalfSpace(point=(0, -9, 0))])
+    v = np.zeros_like(CUBE.vertices)
+    v[13] = (1e300, 0, 0)
+    frames = list(sp.simulate(scene, XPBD(), DT, 5, initial_velocities={"cube": v}))
+    assert len(frames) == 1
+    assert frames[0].report.status == "not_finite"
+    assert "body 'cube', vertex" in frames[0].report.message
+    assert frames[0].time == 0.0
+    assert np.isfinite(frames[0].state.positions).all()
+
+
+def test_a_broken_state_from_outside_is_reported():
+    scene = sp.Scene(bodies=[sp.Body("cube", CUBE, JELLY)], obstacles=[sp.HalfSpace()])
+    system, solver = build_system(scene), XPBD()
+    state = initial_state(scene)
+    x = state.positions.copy()
+    x[5, 1] = np.nan
+    _, said = solver.step(system, State(0.0, x, state.velocities), DT, solver.prepare(system))
+    assert said.status == "not_finite"
+
+
+def test_edges_and_volume_without_volume_compliance_keep_the_volume():
+    """A ball squeezed to half its height between plates: total volume within 1 % in every frame."""
+    ball = sp.shapes.sphere(radius=0.5, edge_length=0.2)
+
+    def plate(side):
+        squeeze = sp.Keyframes(
+            times=[0.0, 1.0, 1.5], displacements=[[0, 0, 0], [0, -0.25 * side, 0], [0, -0.25 * side, 0]]
+        )
+        return sp.HalfSpace(point=(0, 0.5 * side, 0), normal=(0, -side, 0), motion=squeeze)
+
+    material = sp.EdgesAndVolume(edge_compliance=1e-3)
+    scene = sp.Scene(bodies=[sp.Body("ball", ball, material)], obstacles=[plate(1), plate(-1)], gravity=(0, 0, 0))
+    for frame in sp.simulate(scene, XPBD(contact=None), DT, 90):
+        volume = frame.det_F @ ball.volumes
+        assert volume == pytest.approx(ball.volume, rel=0.01)
+    assert np.ptp(frame.positions["ball"][:, 1]) < 0.55
+
+
+def clocked(pace, seconds):
+    """What a pace chooses over frames that take seconds[way]."""
+    choices = []
+    for k in range(400):
+        way = pace.choose()
+        choices.append(way)
+        pace.note(way, seconds(k, way))
+    return choices
+
+
+def test_the_pace_takes_the_faster_way_and_follows_a_change():
+    assert sum(clocked(Pace(True, True), lambda k, way: 1.0 if way else 2.0)) > 380
+    assert sum(clocked(Pace(True, True), lambda k, way: 9.0 if way else 2.0)) < 20
+    changing = clocked(Pace(True, True), lambda k, way: (9.0 if way else 2.0) if k < 100 else (1.0 if way else 2.0))
+    assert not any(changing[10:SHORTEST_REST])
+    assert sum(changing[200:]) > 180
+
+
+def test_the_pace_has_no_say_where_there_is_no_choice():
+    assert all(clocked(Pace(False, True), lambda k, way: 9.0 if way else 1.0))
+    assert not any(clocked(Pace(False, False), lambda k, way: 9.0 if way else 1.0))
