@@ -18,8 +18,9 @@ from supple.xpbd.surface_collisions import SurfaceCollisions
 
 # Of the mean surface edge: what a vertex at rest may move before lists are made anew.
 LEAST_REACH = 0.1
-# Of the mean surface edge: how much of an old overlap is mended in one frame; up to which gaps distances are reported.
-MENDED_PER_FRAME, NEAR = 1.0, 1.0
+# Of the mean surface edge: how much of an old overlap is mended in one frame (faster, and bodies would jump apart);
+# up to which gaps distances are reported.
+MENDED_PER_FRAME, NEAR = 0.05, 1.0
 # Of the mean surface edge.
 DEFAULT_THICKNESS = 0.05
 
