@@ -179,6 +179,7 @@ import os, random, runpy, sys, time
 from pathlib import Path
 import supple as sp
 import supple.output.recording as module
+from supple.output.recording_reader import read_recording
 from supple.simulate import simulate
 
 tools = runpy.run_path(sys.argv[1])
@@ -201,9 +202,10 @@ for attempt in range(children):
     if child == 0:
         record_without_end(path)
         os._exit(1)
-    while attempt % 4 and not path.exists():  # every fourth is killed before it has begun, or soon after
+    wanted = chance.choice([0, 1, 2, 4, 5, 8, 12])
+    while wanted and not (path.exists() and len(read_recording(path)) >= wanted):
         time.sleep(0.0002)
-    time.sleep(chance.uniform(0.0, 0.12))
+    time.sleep(chance.uniform(0.0, 0.01))
     os.kill(child, 9)
     os.waitpid(child, 0)
 """
@@ -244,7 +246,7 @@ def test_a_killed_recording_holds_every_whole_frame(tmp_path, recorded):
             reader.SetStep(counts[-1] - 1)
             reader.Update()
             np.testing.assert_array_equal(to_numpy(reader.GetOutput().GetPoints().GetData()), last)
-    assert len(counts) >= 30
+    assert len(counts) > 20
     assert max(counts) > 8  # some were given more room twice
 
 

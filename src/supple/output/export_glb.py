@@ -57,10 +57,11 @@ class _Glb:
         self.kinds = pygltflib
         self.frames = frames
         self.blob = bytearray()
+        self.roots: list[int] = []
         self.document = pygltflib.GLTF2(
             asset=pygltflib.Asset(version="2.0", generator="Supple"),
             scene=0,
-            scenes=[pygltflib.Scene(nodes=[])],
+            scenes=[pygltflib.Scene()],
             animations=[],
         )
         times = np.array([frame.time for frame in frames])
@@ -98,6 +99,7 @@ class _Glb:
 
     def to_bytes(self) -> bytes:
         """The whole file."""
+        self.document.scenes[0].nodes = self.roots
         if self.animation.channels:
             self.document.animations = [self.animation]
         self.document.buffers = [self.kinds.Buffer(byteLength=len(self.blob))]
@@ -124,7 +126,7 @@ class _Glb:
         weights = [0.0] * len(targets)
         document.meshes.append(kinds.Mesh(name=name, primitives=[primitive], weights=weights or None))
         document.nodes.append(kinds.Node(name=name, mesh=len(document.meshes) - 1))
-        document.scenes[0].nodes.append(len(document.nodes) - 1)
+        self.roots.append(len(document.nodes) - 1)
         return len(document.nodes) - 1
 
     def _animate(self, node: int, path: str, values: int) -> None:

@@ -1,9 +1,9 @@
 """Universal Scene Description: meshes with a time sample of their points for each frame."""
 
-from __future__ import annotations
-
-# OpenUSD comes without type stubs.
 # pyright: reportAttributeAccessIssue=false
+# (OpenUSD comes without types.)
+
+from __future__ import annotations
 
 from importlib.util import find_spec
 from pathlib import Path

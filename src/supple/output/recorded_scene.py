@@ -64,7 +64,7 @@ def write_scene(file: h5py.File, first: Frame, facts: dict[str, Any], scene_text
     """Write everything that no frame changes; `facts` are added to the header."""
     system = first.system
     n, m = len(system.rest_positions), len(system.tets)
-    _write_grid(file.create_group("VTKHDF"), first, n, m)
+    _write_grid(file.require_group("VTKHDF"), first, n, m)
     own = file.create_group("supple")
     own.attrs["format_version"] = FORMAT_VERSION
     header = facts | {

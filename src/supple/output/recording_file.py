@@ -137,8 +137,8 @@ class RecordingFile:
 def create(path: Path, layout: Layout, capacity: int, write_static: Callable[[h5py.File], None]) -> None:
     """Lay out a file with room for `capacity` frames and none written; `write_static` adds all that does not change."""
     with h5py.File(path, "w", libver=("earliest", "v110")) as file:
-        write_static(file)
         _write_step_count(file, _STEPS_MARK)
+        write_static(file)
         file.create_dataset(WRITTEN, data=np.int64(0))
         for series in layout.series:
             _reserve(file, series, series.shape(capacity))
@@ -152,6 +152,7 @@ def rewrite(source: Path, target: Path, layout: Layout, capacity: int | None, *,
     """
     with h5py.File(source, "r", locking=False) as old, h5py.File(target, "w", libver=("earliest", "v110")) as new:
         written = int(_dataset(old, WRITTEN)[()])
+        _write_step_count(new, _STEPS_MARK if capacity else written)
         _copy_static(old, new, "", {series.path for series in layout.series})
         new.create_dataset(WRITTEN, data=np.int64(written))
         for series in layout.series:
@@ -173,8 +174,6 @@ def rewrite(source: Path, target: Path, layout: Layout, capacity: int | None, *,
             for row in range(0, rows if 0 not in shape else 0, step):
                 data[row : min(row + step, rows)] = source_data[row : min(row + step, rows)]
         _write_steps(new, layout, capacity or written)
-        mark = _STEPS_MARK if capacity else written
-        new["VTKHDF/Steps"].attrs.create("NSteps", mark, dtype="<i8")
 
 
 def _copy_static(old: h5py.Group, new: h5py.Group, where: str, series: set[str]) -> None:
@@ -185,7 +184,7 @@ def _copy_static(old: h5py.Group, new: h5py.Group, where: str, series: set[str])
         if path in series or path in ("VTKHDF/Steps", WRITTEN):
             continue
         if isinstance(item, h5py.Group):
-            _copy_static(item, new.create_group(name), f"{path}/", series)
+            _copy_static(item, new.require_group(name), f"{path}/", series)
         else:
             old.copy(item, new, name)
 
@@ -205,7 +204,7 @@ def _reserve(file: h5py.File, series: Series, shape: tuple[int, ...]) -> h5py.Da
 
 
 def _write_step_count(file: h5py.File, value: int) -> None:
-    """NSteps, before the large datasets: its message goes where the file ends by then, near the group's header."""
+    """NSteps, before all else: its message goes where the file ends by then, near the group's header."""
     file.require_group("VTKHDF/Steps").attrs.create("NSteps", value, dtype="<i8")
 
 

@@ -31,7 +31,8 @@ def draw(recording: Recording, frames: list[RecordedFrame], size: tuple[int, int
     for picture in pictures(recording):
         mesh = _polydata(pyvista, picture.at(frames[0]), picture.triangles)
         color = [c / 255.0 for c in picture.color]
-        plotter.add_mesh(mesh, color=color, smooth_shading=False, specular=0.4, specular_power=25, ambient=0.15)
+        actor = plotter.add_mesh(mesh, color=color, specular=0.4, specular_power=25, ambient=0.15)
+        actor.prop.interpolation = "phong"  # with the normals that are set for each frame below
         moving.append((mesh, picture, True))
     for obstacle in obstacle_pictures(recording, view):
         mesh = _polydata(pyvista, obstacle.at(frames[0]), obstacle.triangles)
