@@ -32,11 +32,9 @@ def test_importing_supple_loads_nothing_heavy():
 def test_the_shell_starts_without_the_numerics():
     code = """
         import json, sys
-        from supple.cli.app import app
-        try:
-            app(["--help"])
-        finally:
-            print(json.dumps(sorted(sys.modules)))
+        from supple.cli.app import main
+        main(["--help"])
+        print(json.dumps(sorted(sys.modules)))
     """
     loaded = json.loads(python(code).splitlines()[-1])
     heavy = [name for name in HEAVY if name not in ("cyclopts", "rich")]

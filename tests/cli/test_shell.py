@@ -23,7 +23,8 @@ def test_help_lists_every_command(capsys):
     assert main(["--help"]) == ExitCode.OK
     out = capsys.readouterr().out
     for command in COMMANDS:
-        assert f" {command} " in out
+        line = next(line for line in out.splitlines() if line.strip("│ ").split(" ")[0] == command)
+        assert len(line.strip("│ ").split()) > 2
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -75,7 +76,7 @@ def test_what_the_system_refuses_is_one_line(error, code, said, monkeypatch, cap
         raise error
 
     monkeypatch.setattr(shell, "app", fail)
-    assert main([]) == code
+    assert main(["run"]) == code
     err = capsys.readouterr().err
     assert said in err
     assert err.count("\n") == (1 if said else 0)
@@ -87,7 +88,7 @@ def test_bugs_are_not_hidden(monkeypatch):
 
     monkeypatch.setattr(shell, "app", fail)
     with pytest.raises(ZeroDivisionError):
-        main([])
+        main(["run"])
 
 
 def supple(*arguments, **options):
@@ -106,11 +107,12 @@ def test_as_a_process():
 
 
 @pytest.mark.skipif(os.name != "posix", reason="pipes end otherwise elsewhere")
-def test_a_reader_that_leaves_is_no_error():
+@pytest.mark.parametrize("arguments", [["--help"], ["schema"]])
+def test_a_reader_that_leaves_is_no_error(arguments):
     reading, writing = os.pipe()
     os.close(reading)
     done = subprocess.run(
-        [sys.executable, "-m", "supple", "schema"], stdout=writing, stderr=subprocess.PIPE, text=True, timeout=120
+        [sys.executable, "-m", "supple", *arguments], stdout=writing, stderr=subprocess.PIPE, text=True, timeout=120
     )
     os.close(writing)
     assert (done.returncode, done.stderr) == (141, "")

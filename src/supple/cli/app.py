@@ -13,6 +13,7 @@ from cyclopts.exceptions import CycloptsError
 
 from supple import __version__
 from supple.cli.complain import complain
+from supple.cli.console import ShellConsole
 from supple.cli.exit_codes import ExitCode
 from supple.errors import SuppleError
 
@@ -21,6 +22,7 @@ app = App(
     help="Tetrahedral soft bodies: a surface mesh goes in, a simulation that can be trusted comes out.",
     help_epilogue="Exit codes: 0 done, 2 the input or an option cannot be used, 3 the solver could not go on.",
     version=__version__,
+    console=ShellConsole(),
     suppress_keyboard_interrupt=False,
     exit_on_error=False,
     print_error=False,
@@ -50,8 +52,12 @@ def _log_level() -> int:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run `supple` with the given arguments, or those of the process; returns the exit code."""
     logging.basicConfig(level=_log_level(), format="%(levelname)s: %(message)s")
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    if not given or given[0] not in COMMANDS:
+        for name in COMMANDS:
+            _ = app[name]  # loads it, so that the list of commands can say what each of them does
     try:
-        code = app(sys.argv[1:] if arguments is None else list(arguments))
+        code = app(given)
         sys.stdout.flush()
     except SuppleError as error:
         complain(str(error))

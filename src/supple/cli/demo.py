@@ -43,12 +43,12 @@ def demo(
     quiet
         Print no progress; only what was measured.
     """
-    from rich.console import Console
     from rich.markup import escape
 
+    from supple.cli.console import shell_console
     from supple.demos.registry import DEMOS, find_demo
 
-    console = Console(highlight=False, soft_wrap=True)
+    console = shell_console()
     if list_ or name is None:
         width = max(map(len, DEMOS))
         for known in DEMOS.values():

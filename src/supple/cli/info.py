@@ -38,16 +38,17 @@ def info(file: Path | None = None, /) -> None:
 
 
 def _print_table(title: str, rows: list[tuple[str, str]]) -> None:
-    from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
+
+    from supple.cli.console import ShellConsole
 
     table = Table(title=escape(title), title_justify="left", show_header=False, box=None, pad_edge=False)
     table.add_column(style="bold")
     table.add_column(overflow="fold")
     for name, value in rows:
         table.add_row(escape(name), escape(value))
-    Console().print(table)
+    ShellConsole().print(table)
 
 
 def _platform() -> list[tuple[str, str]]:

@@ -108,10 +108,11 @@ def _write_products(recording: Path, products: Products) -> None:
 
 
 def _tell(outcome: Outcome, recording: Path, products: Products) -> None:
-    from rich.console import Console
     from rich.markup import escape
 
-    console = Console(highlight=False, soft_wrap=True)
+    from supple.cli.console import shell_console
+
+    console = shell_console()
     if outcome.last is not None:
         report = outcome.last.report
         energy = report.kinetic_energy + report.elastic_energy + report.potential_energy
