@@ -2,6 +2,8 @@
 
 import json
 import logging
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -207,3 +209,36 @@ def test_the_schema_refuses_what_the_loader_refuses(case):
     assert not validator.is_valid(data)
     with pytest.raises(ValueError):
         SceneFileModel.model_validate(data)
+
+
+def test_the_scene_of_the_manual_is_valid(load, tmp_path):
+    manual = (Path(__file__).parents[2] / "docs" / "scene_files.md").read_text(encoding="utf-8")
+    example = manual.split("```yaml\n")[1].split("```")[0]
+    sp.shapes.gummy_bear_surface(100.0, 24).save(tmp_path / "bear.stl")
+    sp.shapes.box_surface((0.2, 0.2, 0.2)).save(tmp_path / "stairs.obj")
+    run = load(example)
+    assert len(run.scene.bodies) == 14
+    assert run.scene.body("bear").mesh.volumes.max() <= 1e-6
+    assert list(Draft202012Validator(json_schema()).iter_errors(read_yaml(tmp_path / "scene.yaml").data)) == []
+
+
+@pytest.mark.parametrize("kinds", ["material", "shape", "obstacle", "solver"])
+def test_the_manual_names_every_kind(kinds):
+    manual = (Path(__file__).parents[2] / "docs" / "scene_files.md").read_text(encoding="utf-8")
+    row = next(line for line in manual.splitlines() if line.startswith(f"| {kinds} |"))
+    known = {
+        definition["properties"]["kind"]["const"]
+        for name, definition in json_schema()["$defs"].items()
+        if "kind" in definition.get("properties", {}) and _family(name) == kinds
+    }
+    assert set(re.findall(r"`(\w+)`", row)) == known
+
+
+def _family(name):
+    if name.endswith("ShapeModel") or name == "GummyBearSurfaceModel":
+        return "shape"
+    if name in ("XPBDModel", "ImplicitModel"):
+        return "solver"
+    if name in ("HalfSpaceModel", "BoxModel", "SphereModel", "TrianglesModel"):
+        return "obstacle"
+    return "material"
