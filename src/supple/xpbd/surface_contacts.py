@@ -10,7 +10,7 @@ Of all triangles of a piece that are near a point, one decides (`_decide`):
    So there only triangles count that the point was outside of when the substep began, or was caught coming through.
 
 The point and the triangle are then moved apart along the line between them, by their inverse masses: linear momentum is
-conserved exactly; the moment too, up to the motion within one substep.
+conserved exactly; the moment too, up to the turning of the contact within one substep.
 """
 
 from __future__ import annotations
@@ -123,7 +123,22 @@ def _decide(x, x_prev, p, triangles, near, same, closed, entered, reach):
 
 
 @njit
-def _direction(x, x_prev, p, triangle, where, passed, side, open_sheet):
+def _start(x_prev, p, corners, where):
+    """The place on a triangle's face that was below the point when the substep began, else `where`.
+
+    Moments of impulses are about those positions, so an impulse there, along the normal, changes no angular momentum;
+    and along a face the gap is the same everywhere.
+    """
+    if min(where[0], where[1], where[2]) <= 0.0:
+        return where
+    before = closest_on_triangle(row(x_prev, p), corners[0], corners[1], corners[2])
+    if min(before[0], before[1], before[2]) <= 0.0:
+        return where
+    return before
+
+
+@njit
+def _direction(x, p, triangle, where, passed, side, open_sheet):
     """The unit vector along which the point is to be away from the triangle, pointing out of the piece."""
     a, b, c = triangle
     n = area_normal(a, b, c)
@@ -225,7 +240,8 @@ def project_surfaces(x, x_prev, lists, surfaces, memory, scales, meant):
                 if distance < near:
                     smallest = min(smallest, distance)
                 continue
-            n = _direction(x, x_prev, p, _corners(x, triangles, t), where, passed, side, not closed[its])
+            n = _direction(x, p, _corners(x, triangles, t), where, passed, side, not closed[its])
+            where = _start(x_prev, p, _corners(x_prev, triangles, t), where)
             if passed and same:
                 entered[p] = t
             before = _resolve(x, x_prev, w, p, t, triangles, where, n, gap, friction[mine, its], limit)
