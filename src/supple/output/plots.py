@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.errors import OutputError
 from supple.output.atomic import whole_file
 from supple.output.drawing import BODY_COLORS, opened
 from supple.output.recording_reader import Recording
 
+_KINDS = ("png", "pdf", "svg")
 _AXES = (("x", "#d1495b"), ("y", "#3a7d44"), ("z", "#30638e"))
 
 
@@ -25,6 +27,9 @@ def plot_recording(recording: Recording | str | Path, output: str | Path) -> Pat
     from matplotlib.figure import Figure
 
     output = Path(output)
+    kind = output.suffix[1:].lower()
+    if kind not in _KINDS and not output.is_dir():
+        raise OutputError(f"{output}: there is no picture format {output.suffix!r} here; take .png, .pdf or .svg")
     with opened(recording) as source:
         figure = Figure(figsize=(12.0, 9.0), layout="constrained", dpi=110)
         FigureCanvasAgg(figure)
@@ -38,7 +43,7 @@ def plot_recording(recording: Recording | str | Path, output: str | Path) -> Pat
         names = ", ".join(body.name for body in source.bodies[:6]) + (", …" if len(source.bodies) > 6 else "")
         figure.suptitle(f"{source.path.name}: {names} ({len(source)} frames)")
         with whole_file(output) as fresh:
-            figure.savefig(fresh, format=output.suffix[1:].lower() or "png")
+            figure.savefig(fresh, format=kind)
     return output
 
 

@@ -1,0 +1,45 @@
+"""The plot shows the numbers of the recording, and is a picture."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from supple.errors import OutputError
+from supple.output.plots import plot_recording, volume_ratios
+
+
+def test_a_plot_is_a_picture_with_lines(tmp_path, recorded):
+    image = pytest.importorskip("PIL.Image")
+    path = plot_recording(recorded[0], tmp_path / "new" / "plot.png")
+    with image.open(path) as opened:
+        assert opened.format == "PNG"
+        pixels = np.asarray(opened.convert("RGB")).astype(int)
+    assert pixels.shape == (990, 1320, 3)
+    colored = np.ptp(pixels, axis=2) > 60
+    for row in range(3):  # each panel has colored lines, but that of the time of a step, which is grey
+        for column in range(2 if row < 2 else 1):
+            panel = colored[row * 320 : (row + 1) * 330, column * 660 : (column + 1) * 660]
+            assert np.count_nonzero(panel) > 100
+
+
+def test_volume_ratios_are_those_of_the_motion(recording):
+    expected = 1.0 + 0.3 * np.sin(4.0 * recording.times)
+    np.testing.assert_allclose(volume_ratios(recording), np.column_stack([expected, expected]), atol=1e-12)
+
+
+def test_plots_that_cannot_be_written(tmp_path, recorded):
+    with pytest.raises(OutputError, match="is a folder"):
+        plot_recording(recorded[0], tmp_path)
+    with pytest.raises(OutputError, match="no picture format"):
+        plot_recording(recorded[0], tmp_path / "plot.docx")
+    with pytest.raises(OutputError, match="no such file"):
+        plot_recording(tmp_path / "none.vtkhdf", tmp_path / "plot.png")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_pyplot_is_left_alone(tmp_path, recorded):
+    import matplotlib.pyplot as plt
+
+    plot_recording(recorded[0], tmp_path / "plot.png")
+    assert plt.get_fignums() == []
