@@ -23,44 +23,9 @@ solver: {kind: xpbd, substeps: 3}
 dt: 1/60
 """
 TOKENS = re.findall(r"\w+|\s+|[^\w\s]", GOOD)
-WORDS = st.sampled_from(
-    [
-        " ",
-        "\n",
-        ":",
-        "- ",
-        "[",
-        "]",
-        "{",
-        "}",
-        "&m ",
-        "*m",
-        "!x ",
-        "null",
-        "-1",
-        "1e999",
-        ".nan",
-        "0x",
-        "'",
-        '"',
-        "#",
-        "%",
-        "?",
-        "kind",
-        "bodies",
-        "\t",
-        "\x00",
-        "\u2028",
-        "true",
-        "[[[",
-        "1/0",
-        "---\n",
-        "<<: *m",
-        "",
-        "|",
-        "9" * 500,
-    ]
-)
+STRUCTURE = [" ", "\n", ":", "- ", "[", "]", "{", "}", "'", '"', "#", "%", "?", "|", "\t", "[[[", "---\n", ""]
+VALUES = ["null", "-1", "1e999", ".nan", "0x", "1/0", "true", "9" * 500, "kind", "bodies", "\x00", "\u2028"]
+WORDS = st.sampled_from([*STRUCTURE, *VALUES, "&m ", "*m", "!x ", "<<: *m"])
 
 
 @pytest.fixture(scope="module")
