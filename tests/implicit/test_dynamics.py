@@ -120,9 +120,7 @@ def test_damping_calms_vibration_and_leaves_spin_alone():
     # The stretch that the spin causes sets in suddenly: without damping it rings.
     assert damped.angular_momentum[1] == pytest.approx(free.angular_momentum[1], rel=2e-3)
     start = squeezed(body)
-    rung = [
-        run(s, Implicit(integrator="newmark"), 1 / 240, 120, initial_positions=start)[-1].report for s in scenes
-    ]
+    rung = [run(s, Implicit(integrator="newmark"), 1 / 240, 120, initial_positions=start)[-1].report for s in scenes]
     assert rung[0].elastic_energy < 0.05 * rung[1].elastic_energy
 
 
@@ -143,9 +141,7 @@ def test_damped_newmark_and_bdf2_agree_with_a_fine_reference():
 def test_halving_the_default_tolerance_hardly_moves_the_result():
     body = cube(youngs=2e4, divisions=(3, 3, 3))
     scene = sp.Scene([body], pins=[sp.Pin("cube", sp.InBox((-1, 0.0999, -1), (1, 0.2, 1)))])
-    usual, tight = (
-        run(scene, Implicit(tolerance=t), 1 / 60, 30)[-1].positions["cube"] for t in (1e-3, 5e-4)
-    )
+    usual, tight = (run(scene, Implicit(tolerance=t), 1 / 60, 30)[-1].positions["cube"] for t in (1e-3, 5e-4))
     assert np.abs(usual - tight).max() < 1e-4 * 0.2 * np.sqrt(3)
 
 
@@ -173,7 +169,12 @@ def test_same_bits_on_one_and_two_threads():
 
     body = cube(divisions=(5, 5, 5), damping=0.001, youngs=5e3)
     scene = sp.Scene([body], pins=[sp.Pin("cube", [0, 1, 2, 3])])
-    thresholds = [(elasticity, "SERIAL_TETS"), (damping, "SERIAL_TETS"), (block_csr, "SERIAL_BLOCKS"), (pcg, "_SERIAL_BLOCKS")]
+    thresholds = [
+        (elasticity, "SERIAL_TETS"),
+        (damping, "SERIAL_TETS"),
+        (block_csr, "SERIAL_BLOCKS"),
+        (pcg, "_SERIAL_BLOCKS"),
+    ]
     from supple.numerics import preconditioner
 
     thresholds.append((preconditioner, "SERIAL_BLOCKS"))

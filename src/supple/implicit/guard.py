@@ -1,8 +1,8 @@
-"""Keeps tetrahedra from inverting: which ones are guarded, how far a step may go, and the check after it."""
+"""Keeps tetrahedra from inverting: which bodies are guarded, how far a step may go, and the check after it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
@@ -17,7 +17,10 @@ from supple.system import System
 
 @dataclass(eq=False)
 class Guard:
-    """The step filter on all tets that have a positive volume; those that start inverted join once they have one.
+    """The step filter on all tets of every body that has no inverted one; others are free to recover first.
+
+    A body is guarded as a whole: guarding only its positive tets would lock it, since on the way back from a tangle some of
+    them have to pass through zero.
 
     Attributes
     ----------
@@ -26,15 +29,14 @@ class Guard:
 
     system: System
     guarded: NDArray[np.bool_]
-    complete: bool = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.complete = bool(self.guarded.all())
+    complete: bool = False
 
     @classmethod
     def at(cls, system: System, x: NDArray[np.float64]) -> Guard:
-        """Guard what has a positive volume at x."""
-        return cls(system, _positive(x, system.tets, system.rest_shape_inverse))
+        """Guard the bodies that have no flat or inverted tet at x."""
+        guard = cls(system, np.zeros(len(system.tets), dtype=np.bool_))
+        guard.widen(x)
+        return guard
 
     def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, int]:
         """How far along `direction`, at most 1, and the tet that allows no more (-1 where nothing limits)."""
@@ -46,10 +48,14 @@ class Guard:
         return bool(min_det(x, self.system.tets, self.system.rest_shape_inverse, self.guarded)[0] > 0.0)
 
     def widen(self, x: NDArray[np.float64]) -> None:
-        """Guard from now on what has a positive volume at x, too."""
-        if not self.complete:
-            self.guarded |= _positive(x, self.system.tets, self.system.rest_shape_inverse)
-            self.complete = bool(self.guarded.all())
+        """Guard from now on the bodies that have no flat or inverted tet at x, too."""
+        if self.complete:
+            return
+        positive = _positive(x, self.system.tets, self.system.rest_shape_inverse)
+        for part in self.system.bodies:
+            if positive[part.tets].all():
+                self.guarded[part.tets] = True
+        self.complete = bool(self.guarded.all())
 
 
 def refuse_inverted(system: System, material: TetMaterial, x: NDArray[np.float64]) -> None:
