@@ -185,7 +185,8 @@ def _lumped_masses(body: Body) -> NDArray[np.float64]:
     """(n,) [kg]: of each tet's mass rho V, a quarter to each of its vertices."""
     mesh = body.mesh
     quarters = np.broadcast_to(np.asarray(body.material.density, dtype=np.float64), len(mesh.tets)) * mesh.volumes / 4.0
-    return np.bincount(mesh.tets.ravel(), weights=np.repeat(quarters, 4), minlength=len(mesh.vertices))
+    masses = np.bincount(mesh.tets.ravel(), weights=np.repeat(quarters, 4), minlength=len(mesh.vertices))
+    return masses.astype(np.float64, copy=False)
 
 
 def _pin_ranges(scene: Scene, ranges: list[BodyRange], start: State | None) -> tuple[PinRange, ...]:
