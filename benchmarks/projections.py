@@ -70,12 +70,11 @@ def our_sweep(system: System, threads: int) -> Callable[[], None]:
     solver = XPBD(threads=threads, contact=None)
     ws = solver.prepare(system)
     ws.points[:, :3] = ws.system.rest_positions * 1.001
-    ws.previous[:] = ws.points[:, :3]
 
     def sweep() -> None:
         numba.set_num_threads(threads)
         for constraints in ws.sets:
-            constraints.project(ws.points, ws.previous, H, threads > 1)
+            constraints.project(ws.points, H, threads > 1)
 
     return sweep
 

@@ -35,7 +35,7 @@ class Scene:
     obstacles : rigid things that bodies collide with.
     pins : vertices held or scripted.
     gravity : (3,) acceleration [m/s^2].
-    forces : loads on vertices; soft_targets : springs to places. Both act in the implicit solver.
+    forces : loads on vertices; soft_targets : springs to places.
 
     Raises
     ------

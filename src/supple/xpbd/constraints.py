@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from supple.errors import SolverError
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.material import Material
+from supple.materials.regions import Regions
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.system import BodyRange, System
 from supple.xpbd.constraints_edges_volume import EdgeConstraints, VolumeConstraints
@@ -26,16 +27,30 @@ class ConstraintSet(Protocol):
     """All constraints of one kind in a scene, sorted for projection."""
 
     count: int
+    damped: bool
 
-    def project(self, points: NDArray[np.float64], previous: NDArray[np.float64], h: float, parallel: bool) -> None:
+    def project(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:
         """Project every constraint once, in place.
 
         Parameters
         ----------
         points : (n, 4) positions [m] and inverse masses [1/kg], solver's numbering.
-        previous : (n, 3) positions at the beginning of the substep [m], for damping.
         h : length of the substep [s].
         parallel : whether independent chunks run on several threads.
+        """
+        ...
+
+    def damp(self, points: NDArray[np.float64], previous: NDArray[np.float64], h: float, parallel: bool) -> None:
+        """Take from a motion previous -> points what Kelvin-Voigt damping takes in a substep, in place.
+
+        Forth and back over all constraints, half of it each time: only a symmetric operator takes energy from every
+        mode.
+
+        Parameters
+        ----------
+        points : (n, 4) as in `project`, moved on with the velocities of the beginning of the substep.
+        previous : (n, 3) positions at the beginning of the substep [m].
+        h, parallel : as in `project`.
         """
         ...
 
@@ -44,6 +59,12 @@ class ConstraintSet(Protocol):
 class _Entry:
     material: type[Material]
     sets: tuple[Callable[[System, list[BodyRange], Layout], ConstraintSet], ...]
+
+    def takes(self, material: Material) -> bool:
+        """Whether a body of this material is handled here: of this kind, or of regions that all are."""
+        if isinstance(material, Regions):
+            return all(type(each) is self.material for each in material.materials)
+        return type(material) is self.material
 
 
 CONSTRAINT_SETS = (
@@ -64,17 +85,21 @@ def build_constraint_sets(system: System, layout: Layout) -> list[ConstraintSet]
     ------
     SolverError : where a body's material has no constraints; the text names the body.
     """
-    known = [entry.material for entry in CONSTRAINT_SETS]
     for part in system.bodies:
-        if type(part.body.material) not in known:
-            names = " or ".join(kind.__name__ for kind in known)
+        material = part.body.material
+        if not any(entry.takes(material) for entry in CONSTRAINT_SETS):
+            known = sorted(entry.material.__name__ for entry in CONSTRAINT_SETS)
+            given = [material, *getattr(material, "materials", [])]
+            unknown = ", ".join(
+                dict.fromkeys(type(each).__name__ for each in given if type(each).__name__ not in known)
+            )
             raise SolverError(
-                f"XPBD: body {part.name!r} is made of {type(part.body.material).__name__}, which XPBD has no "
-                f"constraints for; give it {names}, or simulate with Implicit"
+                f"XPBD: body {part.name!r} is made of {unknown}, and XPBD has no constraints for that; "
+                f"give it {' or '.join(known)}, or simulate with Implicit"
             )
     sets = []
     for entry in CONSTRAINT_SETS:
-        parts = [part for part in system.bodies if type(part.body.material) is entry.material]
+        parts = [part for part in system.bodies if entry.takes(part.body.material)]
         if parts:
             sets += [build(system, parts, layout) for build in entry.sets]
     return [made for made in sets if made.count > 0]

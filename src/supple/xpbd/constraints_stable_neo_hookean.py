@@ -11,12 +11,13 @@ Source of the constraints: Macklin and Müller, "A Constraint-based Formulation 
 from __future__ import annotations
 
 import logging
+from typing import cast
 
 import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from supple.errors import SolverError
+from supple.materials.material import Elastic
 from supple.system import BodyRange, System
 from supple.xpbd.ordering import Layout
 from supple.xpbd.segments import gather, sort_into_segments
@@ -31,10 +32,10 @@ class StableNeoHookeanConstraints:
     """The tetrahedra of all bodies made of `StableNeoHookean`."""
 
     def __init__(self, system: System, parts: list[BodyRange], layout: Layout) -> None:
-        rows, kind, self.table = gather(parts, "tets", [(part.body.material.damping,) for part in parts])
-        lame = [_lame_of_tets(part) for part in parts]
-        mu = np.concatenate([pair[0] for pair in lame])
-        lam = np.concatenate([pair[1] for pair in lame])
+        materials = [cast(Elastic, part.body.material).per_tet(part.tets.stop - part.tets.start) for part in parts]
+        rows, kind, self.table = gather(parts, "tets", [material.damping[:, None] for material in materials])
+        mu = np.concatenate([material.mu for material in materials])
+        lam = np.concatenate([material.lam for material in materials])  # E / (2 (1 + nu) (1 - 2 nu)): above zero
         movable = (system.inverse_masses[system.tets[rows]] > 0.0).any(axis=1)
         rows, kind, mu, lam = rows[movable], kind[movable], mu[movable], lam[movable]
         self.segments = sort_into_segments(layout, system.tets[rows], kind)
@@ -51,28 +52,28 @@ class StableNeoHookeanConstraints:
         self.data[:, 9] = mu * V
         self.data[:, 10] = lam * V
         self.data[:, 11] = 1.0 + mu / lam
+        self.data[:, 13:16] = self.curvatures
+        self.damped = bool(self.table.any())
         self._prepared_for = 0.0
 
-    def project(self, points: NDArray[np.float64], previous: NDArray[np.float64], h: float, parallel: bool) -> None:
+    def project(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:
         """See `ConstraintSet.project`."""
         if h != self._prepared_for:
             self._prepare(h)
         pointers, bounds = self.segments.chunk_pointers, self.segments.bounds
-        gammas = self.table[self.segments.kinds, 0] / h
-        if gammas.any():
-            # Before the elastic sweep: what viscosity takes is the velocity that the substep began with. In or after the
-            # elastic sweep it would undo the elastic displacements of neighbours, and a body with much damping would
-            # never come back to rest. Forth and back, because only a symmetric damping operator takes energy from
-            # every mode.
-            damp = _damp_parallel if parallel else _damp
-            damp(points, previous, self.corners, self.data, h, pointers, bounds, gammas)
         (_sweep_parallel if parallel else _sweep)(points, self.corners, self.data, pointers, bounds)
+
+    def damp(self, points: NDArray[np.float64], previous: NDArray[np.float64], h: float, parallel: bool) -> None:
+        """See `ConstraintSet.damp`."""
+        pointers, bounds = self.segments.chunk_pointers, self.segments.bounds
+        gammas = self.table[self.segments.kinds, 0] / h
+        damp = _damp_parallel if parallel else _damp
+        damp(points, previous, self.corners, self.data, h, pointers, bounds, gammas)
 
     def _prepare(self, h: float) -> None:
         """Step lengths for substeps of h: h^2 phi with phi the largest length at which a tet cannot overshoot."""
         stiffness = 2.0 * self.data[:, 9] * self.curvatures[:, 2] * h**2
         self.data[:, 12] = h**2 * np.minimum(1.0, 1.0 / stiffness)
-        self.data[:, 13:16] = self.curvatures
         self._prepared_for = h
         shortened = np.count_nonzero(stiffness > 1.0) / self.count
         if shortened > 0.5:
@@ -83,25 +84,6 @@ class StableNeoHookeanConstraints:
                 h,
                 np.sqrt(np.quantile(stiffness, 0.9)),
             )
-
-
-def _lame_of_tets(part: BodyRange) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    count = part.tets.stop - part.tets.start
-    mu, lam = part.body.material.lame_parameters()  # pyright: ignore[reportAttributeAccessIssue]
-    for values in (mu, lam):
-        if values.ndim and len(values) != count:
-            raise SolverError(
-                f"XPBD: body {part.name!r}: youngs and poisson have {len(values)} values for {count} tets; "
-                "give one number, or one per tet"
-            )
-    mu, lam = np.broadcast_to(mu, count), np.broadcast_to(lam, count)
-    if (lam <= 0.0).any():
-        tet = int(np.flatnonzero(lam <= 0.0)[0])
-        raise SolverError(
-            f"XPBD: body {part.name!r}, tet {tet}: the stable Neo-Hookean lam is {lam[tet]:g} Pa; "
-            "XPBD needs it above zero, so give a larger poisson"
-        )
-    return mu, lam
 
 
 def _principal_axes(

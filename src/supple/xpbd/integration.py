@@ -69,6 +69,16 @@ def predict_parallel(points, previous, velocities, gravity, h):
 
 
 @njit(cache=True)
+def accelerate(points, velocities, gravity, h):
+    """What `predict` does with gravity, for itself: v += h g, x += h^2 g."""
+    for i in range(len(points)):
+        if points[i, 3] > 0.0:
+            for j in range(3):
+                velocities[i, j] += h * gravity[j]
+                points[i, j] += h * (h * gravity[j])
+
+
+@njit(cache=True)
 def update_velocities(points, previous, velocities, h):
     """v = (x - x_n) / h."""
     for i in range(len(points)):
@@ -87,17 +97,17 @@ def first_lost(points, velocities):
 
 
 @njit(cache=True)
-def hold(points, vertices, targets, row, origins):
-    """Put pinned vertices (k,) where `targets` (substeps, k, 3) wants them at the end of substep `row`."""
+def hold(points, vertices, targets, origins):
+    """Put pinned vertices (k,) where `targets` (k, 3) in the world wants them."""
     for k in range(len(vertices)):
         i = vertices[k]
         for j in range(3):
-            points[i, j] = targets[row, k, j] - origins[i, j]
+            points[i, j] = targets[k, j] - origins[i, j]
 
 
 @njit(cache=True)
 def to_world(points, origins, world):
-    """World positions (n, 3) of points (n, 3 or 4) kept about their origins (n, 3). Returns whether all are in reach (`FARTHEST`)."""
+    """World positions (n, 3) of points (n, 3 or 4) about origins (n, 3). Returns whether none is beyond `FARTHEST`."""
     good = True
     for i in range(len(world)):
         for j in range(3):

@@ -108,6 +108,8 @@ def reordered(system: System, layout: Layout) -> System:
     return replace(
         system,
         pins=tuple(replace(pin, vertices=new[pin.vertices]) for pin in system.pins),
+        forces=tuple(replace(force, vertices=new[force.vertices]) for force in system.forces),
+        soft_targets=tuple(replace(target, vertices=new[target.vertices]) for target in system.soft_targets),
         rest_positions=np.ascontiguousarray(system.rest_positions[old]),
         masses=np.ascontiguousarray(system.masses[old]),
         tets=np.ascontiguousarray(new[system.tets]),

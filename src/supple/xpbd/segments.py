@@ -46,20 +46,22 @@ def sort_into_segments(layout: Layout, constraints: NDArray[np.int32], kind: NDA
 
 
 def gather(
-    parts: list[BodyRange], which: str, constants: list[tuple[float, ...]]
+    parts: list[BodyRange], which: str, constants: list[NDArray[np.float64]]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
     """The constraints of several bodies, and which constants are whose.
 
     Parameters
     ----------
-    parts : the bodies; which : "edges" or "tets"; constants : those of each body.
+    parts : the bodies; which : "edges" or "tets"
+    constants : of each body (c,), or (count, c) of each of its constraints.
 
     Returns
     -------
-    rows : (m,) of the System's edges or tets; kind : (m,) rows of the table; table : (kinds, constants), each once.
+    rows : (m,) of the System's edges or tets; kind : (m,) rows of the table; table : (kinds, c), each once.
     """
-    table = sorted(set(constants))
     ranges = [getattr(part, which) for part in parts]
-    rows = [np.arange(r.start, r.stop) for r in ranges]
-    kinds = [np.full(r.stop - r.start, table.index(values)) for r, values in zip(ranges, constants, strict=True)]
-    return np.concatenate(rows), np.concatenate(kinds), np.array(table, dtype=np.float64).reshape(len(table), -1)
+    rows = np.concatenate([np.arange(r.start, r.stop) for r in ranges])
+    shapes = [(r.stop - r.start, np.shape(given)[-1]) for r, given in zip(ranges, constants, strict=True)]
+    every = np.concatenate([np.broadcast_to(given, shape) for given, shape in zip(constants, shapes, strict=True)])
+    table, kind = np.unique(every, axis=0, return_inverse=True)
+    return rows, kind.reshape(-1), table

@@ -22,7 +22,9 @@ from supple.system import System
 from supple.xpbd.collisions import Collisions
 from supple.xpbd.constraints import ConstraintSet, build_constraint_sets
 from supple.xpbd.contact_settings import ContactSettings
+from supple.xpbd.external import ExternalForces
 from supple.xpbd.integration import (
+    accelerate,
     first_lost,
     hold,
     origins_of_components,
@@ -55,6 +57,7 @@ class XPBDWorkspace:
     layout: Layout
     sets: list[ConstraintSet]
     momentum: MomentumRestore | None
+    external: ExternalForces
     collisions: Collisions
     pace: Pace
     points: NDArray[np.float64]
@@ -126,6 +129,7 @@ class XPBD(Solver):
             layout=layout,
             sets=sets,
             momentum=MomentumRestore(inner) if self.momentum_restore else None,
+            external=ExternalForces(inner),
             collisions=Collisions(inner, self.contact),
             pace=Pace(choice=parallel and self.threads is None, parallel=parallel),
             points=points,
@@ -136,24 +140,23 @@ class XPBD(Solver):
         ws, h = workspace, dt / self.substeps
         _load(ws, state)
         targets = _pin_targets(ws.system, state.time, h, self.substeps)
-        held = ws.system.pinned_vertices
         if ws.collisions:
             ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt)
         parallel = ws.pace.choose()
         started = perf_counter()
         with _threads(self.threads, parallel):
             for k in range(self.substeps):
-                begin = predict_parallel if parallel else predict
-                begin(ws.points, ws.previous, ws.velocities, ws.system.gravity, h)
-                if len(held):
-                    hold(ws.points, held, targets, k, ws.origins)
+                end = state.time + (k + 1) * h
+                _begin_substep(ws, targets[k], h, parallel)
+                ws.external.push(ws.points, ws.velocities, end, h)
                 for constraints in ws.sets:
-                    constraints.project(ws.points, ws.previous, h, parallel)
+                    constraints.project(ws.points, h, parallel)
                 if ws.momentum is not None:
                     ws.momentum.apply(ws.points, ws.previous, ws.velocities, h, parallel)
                 else:
                     update_velocities(ws.points, ws.previous, ws.velocities, h)
-                if ws.collisions and not _collide(ws, state.time + (k + 1) * h, h):
+                ws.external.pull(ws.points, ws.velocities, ws.origins, end, h)
+                if ws.collisions and not _collide(ws, end, h):
                     break
         ws.pace.note(parallel, perf_counter() - started)
         lost = first_lost(ws.points, ws.velocities)
@@ -195,6 +198,24 @@ def _load(ws: XPBDWorkspace, state: State) -> None:
     np.subtract(ws.world, ws.origins, out=ws.points[:, :3])
 
 
+def _begin_substep(ws: XPBDWorkspace, targets: NDArray[np.float64], h: float, parallel: bool) -> None:
+    """Predict positions, with pinned vertices where `targets` (k, 3) wants them, and damping taken from the velocities.
+
+    Damping comes before gravity, forces and constraints, and sees only the velocities that the substep begins with.
+    Later it would take from a resting body part of its load, or undo what constraints have done to their neighbours.
+    """
+    damped = [constraints for constraints in ws.sets if constraints.damped]
+    gravity = ws.system.gravity
+    begin = predict_parallel if parallel else predict
+    begin(ws.points, ws.previous, ws.velocities, np.zeros(3) if damped else gravity, h)
+    if len(targets):
+        hold(ws.points, ws.system.pinned_vertices, targets, ws.origins)
+    for constraints in damped:
+        constraints.damp(ws.points, ws.previous, h, parallel)
+    if damped:
+        accelerate(ws.points, ws.velocities, gravity, h)
+
+
 def _collide(ws: XPBDWorkspace, time: float, h: float) -> bool:
     """Contacts of one substep, in world coordinates. Returns False, with nothing done, where a position is lost."""
     if not to_world(ws.points, ws.origins, ws.world):
@@ -222,6 +243,6 @@ def _what_is_lost(ws: XPBDWorkspace, vertex: int, time: float) -> str:
     part = next(p for p in ws.system.bodies if p.vertices.start <= vertex < p.vertices.stop)
     number = int(ws.layout.old_from_new[vertex]) - part.vertices.start
     return (
-        f"XPBD: body {part.name!r}, vertex {number}: its position is lost (not finite, or beyond 1e12 m) at t = {time:g} s; "
-        "take more substeps or a shorter dt"
+        f"XPBD: body {part.name!r}, vertex {number}: its position is lost (not finite, or beyond 1e12 m) "
+        f"at t = {time:g} s; take more substeps or a shorter dt"
     )

@@ -1,0 +1,62 @@
+"""What acts on a scene from outside beside gravity and contact: forces on vertices, and springs to places."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from supple.system import System
+
+
+class ExternalForces:
+    """The forces and soft targets of a system.
+
+    `points` (n, 4) are positions about `origins` (n, 3) [m] with inverse masses [1/kg], `velocities` (n, 3) [m/s].
+    """
+
+    def __init__(self, system: System) -> None:
+        self.forces = system.forces
+        self.targets = system.soft_targets
+
+    def push(self, points: NDArray[np.float64], velocities: NDArray[np.float64], time: float, h: float) -> None:
+        """Add the forces at `time` to a prediction: v += h w f, x += h^2 w f."""
+        for force in self.forces:
+            _push(points, velocities, force.vertices, np.ascontiguousarray(force.per_vertex(time)), h)
+
+    def pull(
+        self,
+        points: NDArray[np.float64],
+        velocities: NDArray[np.float64],
+        origins: NDArray[np.float64],
+        time: float,
+        h: float,
+    ) -> None:
+        """Project the springs: C = x - target with compliance 1 / k, all three components at once.
+
+        Dlam = -C / (w + 1 / (k h^2)), as for any XPBD constraint. From outside, so after the momentum restore.
+        """
+        for target in self.targets:
+            places = np.ascontiguousarray(target.targets(time))
+            _pull(points, velocities, origins, target.vertices, places, target.target.stiffness, h)
+
+
+@njit(cache=True)
+def _push(points, velocities, vertices, forces, h):
+    for k in range(len(vertices)):
+        i = vertices[k]
+        for j in range(3):
+            change = h * points[i, 3] * forces[k, j]
+            velocities[i, j] += change
+            points[i, j] += h * change
+
+
+@njit(cache=True)
+def _pull(points, velocities, origins, vertices, places, stiffness, h):
+    for k in range(len(vertices)):
+        i = vertices[k]
+        pull = points[i, 3] * stiffness * h * h
+        for j in range(3):
+            change = (places[k, j] - origins[i, j] - points[i, j]) * pull / (1.0 + pull)
+            points[i, j] += change
+            velocities[i, j] += change / h
