@@ -11,9 +11,11 @@ from supple.implicit.elasticity import elasticity_of
 from supple.implicit.external_forces import ExternalForces
 from supple.implicit.gravity import Gravity
 from supple.implicit.inertia import Inertia
+from supple.implicit.inversion_barrier import ONSET, inversion_barrier
 from supple.implicit.objective import Objective
 from supple.implicit.potential import HessianBlocks
 from supple.implicit.soft_targets import SoftTargets
+from supple.materials.neo_hookean import NeoHookean
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.system import build_system
 
@@ -94,9 +96,7 @@ def test_gradients_and_hessians_have_slope_two(material, seed, squeeze):
     d *= 1e-2 * squeeze * 0.1 / np.abs(d).max()
     for potential in potentials(system, x, seed).values():
         slope_along = float((gradient_of(potential, x) * d).sum())
-        check_differences(
-            slope_along, lambda t, p=potential: (p.value(x + t * d) - p.value(x - t * d)) / (2 * t), 0.5
-        )
+        check_differences(slope_along, lambda t, p=potential: (p.value(x + t * d) - p.value(x - t * d)) / (2 * t), 0.5)
         check_differences(
             hessian_times(system, potential, x, d),
             lambda t, p=potential: (gradient_of(p, x + t * d) - gradient_of(p, x - t * d)) / (2 * t),
@@ -130,6 +130,37 @@ def test_projected_hessians_have_no_negative_eigenvalue():
         largest = max(np.abs(blocks.tets).max(), np.abs(blocks.vertices).max())
         assert np.linalg.eigvalsh(blocks.tets).min() >= -1e-9 * largest
         assert np.linalg.eigvalsh(blocks.vertices).min() >= -1e-9 * largest
+
+
+@settings(max_examples=6, deadline=None)
+@given(seed=st.integers(0, 2**31), squeeze=st.floats(0.02, 0.08))
+def test_the_inversion_barrier_has_slope_two(seed, squeeze):
+    system = system_of(sp.StableNeoHookean)
+    barrier = inversion_barrier(elasticity_of(system), np.ones(len(system.tets), dtype=bool))
+    assert barrier is not None
+    x = near_inverted(seed, squeeze)
+    assert barrier.value(x) > 0.0
+    d = np.random.default_rng(seed + 1).normal(size=x.shape)
+    d *= 1e-3 * squeeze * 0.1 / np.abs(d).max()
+    slope_along = float((gradient_of(barrier, x) * d).sum())
+    check_differences(slope_along, lambda t: (barrier.value(x + t * d) - barrier.value(x - t * d)) / (2 * t), 0.5)
+    change = hessian_times(system, barrier, x, d)
+    check_differences(
+        change, lambda t: (gradient_of(barrier, x + t * d) - gradient_of(barrier, x - t * d)) / (2 * t), 0.5
+    )
+
+
+def test_the_inversion_barrier_is_felt_only_near_inversion():
+    system = system_of(sp.StableNeoHookean)
+    barrier = inversion_barrier(elasticity_of(system), np.ones(len(system.tets), dtype=bool))
+    assert barrier is not None
+    for J, felt in ((1.0, False), (1.01 * ONSET, False), (0.9 * ONSET, True)):
+        x = MESH.vertices * np.array([1.0, J, 1.0])
+        assert (barrier.value(x) > 0.0) is felt
+        assert gradient_of(barrier, x).any() == felt
+    assert barrier.value(MESH.vertices * np.array([1.0, -1.0, 1.0])) == np.inf
+    rubber = build_system(sp.Scene([sp.Body("block", MESH, NeoHookean(youngs=1e4, poisson=0.3))]))
+    assert inversion_barrier(elasticity_of(rubber), np.ones(len(MESH.tets), dtype=bool)) is None
 
 
 def rotation(angle, axis):

@@ -19,8 +19,8 @@ from supple.system import System
 class Guard:
     """The step filter on all tets of every body that has no inverted one; others are free to recover first.
 
-    A body is guarded as a whole: guarding only its positive tets would lock it, since on the way back from a tangle some of
-    them have to pass through zero.
+    A body is guarded as a whole: guarding only its positive tets would lock it, since on the way back from a tangle some
+    of them have to pass through zero.
 
     Attributes
     ----------

@@ -18,6 +18,7 @@ from supple.implicit.gravity import Gravity
 from supple.implicit.guard import Guard, refuse_inverted
 from supple.implicit.inertia import Inertia
 from supple.implicit.integrators import Integrator, Plan, Static, integrator_of
+from supple.implicit.inversion_barrier import inversion_barrier
 from supple.implicit.linear_solver import LinearSolver
 from supple.implicit.newton import Outcome, Problem, Tools, minimize
 from supple.implicit.objective import Objective
@@ -152,13 +153,13 @@ class Implicit(Solver):
         method = integrator_of(self.integrator)
         plan = method.plan(system, state, h, lambda start: _acceleration(system, start, workspace))
         forces = total_forces(system, end)
+        guard = Guard.at(system, state.positions)
         problem = Problem(
-            _objective(system, state, end, plan, forces, workspace),
+            _objective(system, state, end, plan, forces, guard, workspace),
             plan.scale,
             self._tolerance(method) * workspace.diagonal * (1.0 if plan.scale is None else h),
             self.max_iterations,
         )
-        guard = Guard.at(system, state.positions)
         workspace.tools.linear_solver.begin_step()
         targets = system.pin_targets(end)
         pinned = workspace.tools.pinned
@@ -212,9 +213,18 @@ def _potentials(
 
 
 def _objective(
-    system: System, state: State, end: float, plan: Plan, forces: NDArray[np.float64], workspace: Workspace
+    system: System,
+    state: State,
+    end: float,
+    plan: Plan,
+    forces: NDArray[np.float64],
+    guard: Guard,
+    workspace: Workspace,
 ) -> Objective:
     terms = _potentials(system, state.positions, end, forces, workspace)
+    barrier = inversion_barrier(workspace.elasticity, guard.guarded)
+    if barrier is not None:
+        terms.append(barrier)
     if plan.scale is not None:
         terms.append(Inertia(system.masses, plan.predicted, plan.scale))
         if workspace.viscosity is not None:
@@ -226,6 +236,9 @@ def _acceleration(system: System, state: State, workspace: Workspace) -> NDArray
     """(n, 3) of a state by all its forces, pins aside [m/s^2]."""
     x, v = state.positions, state.velocities
     terms = _potentials(system, x, state.time, total_forces(system, state.time), workspace)
+    barrier = inversion_barrier(workspace.elasticity, Guard.at(system, x).guarded)
+    if barrier is not None:
+        terms.append(barrier)
     if workspace.viscosity is not None:
         rate = green_strain_rates(system, x, v)
         terms.append(Damping(workspace.viscosity, StrainRate(1.0, green_strains(system, x) - rate)))
