@@ -5,8 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import supple as sp
 from supple.mesh.surface import SurfaceMesh
 from supple.output.drawing import evenly, obstacle_pictures, pictures, vertex_normals, view_of
+from supple.output.recording import Recorder
+from supple.output.recording_reader import read_recording
+from supple.simulate import simulate
 
 
 def test_bodies_are_drawn_by_their_skin_or_boundary(recording):
@@ -59,3 +63,21 @@ def test_normals_of_a_ball_point_outward(tools):
 def test_frames_are_chosen_evenly(recording):
     assert [frame.number for frame in evenly(recording, 4)] == [0, 8, 16, 24]
     assert len(evenly(recording, 100)) == 25
+
+
+def test_what_would_hide_the_bodies_can_be_seen_through(tmp_path, tools):
+    scene = sp.Scene(
+        bodies=[sp.Body("cube", tools.box(), sp.EdgesAndVolume(density=1000.0))],
+        obstacles=[
+            sp.HalfSpace(name="floor"),
+            sp.HalfSpace(name="wall", point=(0, 0, 2), normal=(0, 0, -1)),
+            sp.HalfSpace(name="lid", point=(0, 2, 0), normal=(0, -1, 0)),
+            sp.Box(name="room", center=(0.5, 0.5, 0.5), size=(3, 3, 3), inside=True),
+            sp.Sphere(name="ball", center=(5, 0, 0)),
+        ],
+    )
+    path = tmp_path / "walls.vtkhdf"
+    list(simulate(scene, tools.Prescribed(), 1 / 30, 1, sinks=[Recorder(path)]))
+    with read_recording(path) as recording:
+        drawn = obstacle_pictures(recording, view_of(recording))
+    assert {p.name for p in drawn if p.see_through} == {"wall", "lid", "room"}

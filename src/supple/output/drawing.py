@@ -27,7 +27,8 @@ BODY_COLORS = (
     (160, 120, 80),
 )
 OBSTACLE_COLOR = (176, 180, 188)
-_SPHERE_RINGS, _SPHERE_SEGMENTS = 16, 32
+SEE_THROUGH_OPACITY = 0.13
+_SPHERE_RINGS, _SPHERE_SEGMENTS = 24, 48
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,13 +128,18 @@ class ObstaclePicture:
 
 
 def obstacle_pictures(recording: Recording, view: View) -> list[ObstaclePicture]:
-    """One for each obstacle. A half-space is a square about what happens; a room can be seen through."""
+    """One for each obstacle. A half-space is a square about what happens.
+
+    What would hide the bodies can be seen through: rooms, and half-spaces that are no floor.
+    """
     made = []
     for number, obstacle in enumerate(recording.obstacles):
         surface = _surface(obstacle, view)
         if surface is not None:
-            inside = bool(obstacle.parameters.get("inside", False))
-            made.append(ObstaclePicture(number, obstacle.name, *surface, inside))
+            normal = obstacle.parameters.get("normal")
+            is_wall = normal is not None and float(np.dot(normal, view.up)) < 0.5
+            see_through = is_wall or bool(obstacle.parameters.get("inside", False))
+            made.append(ObstaclePicture(number, obstacle.name, *surface, see_through))
     return made
 
 

@@ -16,7 +16,16 @@ from numpy.typing import NDArray
 
 from supple.errors import OutputError
 from supple.output.atomic import whole_file
-from supple.output.drawing import OBSTACLE_COLOR, View, evenly, obstacle_pictures, opened, pictures, view_of
+from supple.output.drawing import (
+    OBSTACLE_COLOR,
+    SEE_THROUGH_OPACITY,
+    View,
+    evenly,
+    obstacle_pictures,
+    opened,
+    pictures,
+    view_of,
+)
 from supple.output.recording_reader import Recording
 
 # Bytes of moving vertices before compression, which halves them or better; longer recordings are shown with fewer
@@ -110,7 +119,7 @@ def _add_obstacles(server: Any, recording: Recording, view: View) -> dict[int, t
             obstacle.vertices.astype(np.float32),
             obstacle.triangles,
             color=OBSTACLE_COLOR,
-            opacity=0.25 if obstacle.see_through else None,
+            opacity=SEE_THROUGH_OPACITY if obstacle.see_through else None,
             flat_shading=recording.obstacles[obstacle.number].kind != "Sphere",
             side="double",
             wxyz=_quaternion(pose[:, :3]),

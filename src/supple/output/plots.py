@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,14 @@ from supple.output.drawing import BODY_COLORS, opened
 from supple.output.recording_reader import Recording
 
 _KINDS = ("png", "pdf", "svg")
+_LEGEND: dict[str, Any] = {  # above the lines, not on them
+    "loc": "lower left",
+    "bbox_to_anchor": (0.0, 1.0),
+    "borderaxespad": 0.0,
+    "ncols": 8,
+    "frameon": False,
+    "fontsize": "small",
+}
 _AXES = (("x", "#d1495b"), ("y", "#3a7d44"), ("z", "#30638e"))
 
 
@@ -55,7 +64,7 @@ def _draw(recording: Recording, axes) -> None:
         energy.plot(t, values, label=name)
     energy.plot(t, sum(parts.values()), color="0.2", linewidth=1.0, linestyle="--", label="sum")
     energy.set_ylabel("energy [J]")
-    energy.legend(frameon=False, ncols=4, fontsize="small")
+    energy.legend(**_LEGEND)
     _momentum(linear, t, recording.series("linear_momentum"), "linear momentum\n[kg m/s]")
     _momentum(angular, t, recording.series("angular_momentum"), "angular momentum\nabout the center [kg m²/s]")
     ratios = volume_ratios(recording)
@@ -63,26 +72,29 @@ def _draw(recording: Recording, axes) -> None:
         color = np.array(BODY_COLORS[i % len(BODY_COLORS)]) / 255.0
         volume.plot(t, ratios[:, i], color=tuple(color), label=body.name if i < 8 else None)
     volume.set_ylabel("volume / rest volume")
-    volume.legend(frameon=False, ncols=4, fontsize="small")
+    volume.legend(**_LEGEND)
     worst.plot(t, recording.series("min_det_F"), color="#7a3e9d")
     worst.axhline(0.0, color="0.2", linewidth=0.8)
     worst.set_ylabel("smallest J = det F")
-    wall.plot(t[1:], 1e3 * recording.series("wall_seconds")[1:], color="0.3")
-    wall.set_ylim(bottom=0.0)
+    ms = 1e3 * recording.series("wall_seconds")
+    wall.plot(t[1:], ms[1:], color="0.3")
+    # The first step often loads or compiles the kernels; let it not flatten all the others.
+    if len(t) > 1 and ms[1:].min() > 0.0 and ms[1:].max() > 20.0 * np.median(ms[1:]):
+        wall.set_yscale("log")
+    else:
+        wall.set_ylim(bottom=0.0)
     wall.set_ylabel("time of a step [ms]")
     stopped = [i for i, status in enumerate(recording.statuses) if status != "converged"]
     if stopped:
-        wall.plot(
-            t[stopped], 1e3 * recording.series("wall_seconds")[stopped], "x", color="#d1495b", label="not converged"
-        )
-        wall.legend(frameon=False, fontsize="small")
+        wall.plot(t[stopped], ms[stopped], "x", color="#d1495b", label="not converged")
+        wall.legend(**_LEGEND)
 
 
 def _momentum(axis, t: NDArray[np.float64], values: NDArray[np.float64], label: str) -> None:
     for k, (name, color) in enumerate(_AXES):
         axis.plot(t, values[:, k], color=color, label=name)
     axis.set_ylabel(label)
-    axis.legend(frameon=False, ncols=3, fontsize="small")
+    axis.legend(**_LEGEND)
 
 
 def volume_ratios(recording: Recording) -> NDArray[np.float64]:

@@ -11,7 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SuppleError
-from supple.output.drawing import OBSTACLE_COLOR, evenly, obstacle_pictures, pictures, vertex_normals, view_of
+from supple.output.drawing import (
+    OBSTACLE_COLOR,
+    SEE_THROUGH_OPACITY,
+    evenly,
+    obstacle_pictures,
+    pictures,
+    vertex_normals,
+    view_of,
+)
 from supple.output.recording_reader import RecordedFrame, Recording, read_recording
 
 _ANGLE = 30.0  # of the camera, upwards [degrees]
@@ -36,7 +44,7 @@ def draw(recording: Recording, frames: list[RecordedFrame], size: tuple[int, int
         moving.append((mesh, picture, True))
     for obstacle in obstacle_pictures(recording, view):
         mesh = _polydata(pyvista, obstacle.at(frames[0]), obstacle.triangles)
-        opacity = 0.2 if obstacle.see_through else 1.0
+        opacity = SEE_THROUGH_OPACITY if obstacle.see_through else 1.0
         plotter.add_mesh(mesh, color=[c / 255.0 for c in OBSTACLE_COLOR], opacity=opacity, ambient=0.3)
         moving.append((mesh, obstacle, False))
     camera = plotter.camera
