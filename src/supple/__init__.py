@@ -30,6 +30,7 @@ _HOME = {
     "NullSink": "supple.simulate",
     "OutputError": "supple.errors",
     "Pin": "supple.scene.pins",
+    "ProgressBar": "supple.output.progress",
     "Recorder": "supple.output.recording",
     "Recording": "supple.output.recording_reader",
     "Regions": "supple.materials.regions",
@@ -45,12 +46,15 @@ _HOME = {
     "Status": "supple.state",
     "SuppleError": "supple.errors",
     "SurfaceMesh": "supple.mesh.surface",
+    "SurfaceReport": "supple.mesh.surface_checks",
     "TetMesh": "supple.mesh.tetmesh",
     "TriangleObstacle": "supple.scene.obstacles",
     "XPBD": "supple.xpbd.solver",
+    "export": "supple.output.export",
     "largest_noninverting_step": "supple.implicit.step_filter",
     "load_run": "supple.scene_file.loader",
     "load_scene": "supple.scene_file.loader",
+    "plot_recording": "supple.output.plots",
     "read_recording": "supple.output.recording_reader",
     "read_tetgen": "supple.mesh.tetgen_files",
     "repair_surface": "supple.mesh.repair",
@@ -58,6 +62,7 @@ _HOME = {
     "simulate": "supple.simulate",
     "smallest_positive_cubic_root": "supple.numerics.cubic",
     "tetrahedralize": "supple.mesh.tetrahedralize",
+    "write_page": "supple.output.page",
     "write_tetgen": "supple.mesh.tetgen_files",
 }
 _MODULES = {"shapes": "supple.mesh.shapes"}
@@ -107,11 +112,16 @@ if TYPE_CHECKING:
     from supple.mesh.repair import repair_surface
     from supple.mesh.skin import Embedding
     from supple.mesh.surface import SurfaceMesh
+    from supple.mesh.surface_checks import SurfaceReport
     from supple.mesh.tetgen_files import read_tetgen, write_tetgen
     from supple.mesh.tetmesh import TetMesh
     from supple.mesh.tetrahedralize import tetrahedralize
     from supple.numerics.cubic import smallest_positive_cubic_root
     from supple.numerics.svd3 import rotation_variant_svd
+    from supple.output.export import export
+    from supple.output.page import write_page
+    from supple.output.plots import plot_recording
+    from supple.output.progress import ProgressBar
     from supple.output.recording import Recorder
     from supple.output.recording_reader import Recording, read_recording
     from supple.scene.body import Body

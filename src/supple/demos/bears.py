@@ -41,7 +41,9 @@ def scene() -> Scene:
                     skin=skin,
                 )
             )
-    return Scene(bodies=bodies, obstacles=[Sphere(name="bowl", center=(0, BOWL, 0), radius=BOWL, inside=True, friction=0.4)])
+    return Scene(
+        bodies=bodies, obstacles=[Sphere(name="bowl", center=(0, BOWL, 0), radius=BOWL, inside=True, friction=0.4)]
+    )
 
 
 class _Watch(Measurement):

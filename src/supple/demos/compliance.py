@@ -15,8 +15,8 @@ from supple.xpbd.solver import XPBD
 
 RADIUS = 0.4
 KINDS = {
-    "stiff": EdgesAndVolume(edge_compliance=1e-6, volume_compliance=0.0, damping=0.003),
-    "medium": EdgesAndVolume(edge_compliance=1e-4, volume_compliance=0.0, damping=0.003),
+    "stiff": EdgesAndVolume(edge_compliance=2e-5, volume_compliance=0.0, damping=0.01),
+    "medium": EdgesAndVolume(edge_compliance=2e-4, volume_compliance=0.0, damping=0.003),
     "soft": EdgesAndVolume(edge_compliance=8e-4, volume_compliance=0.0, damping=0.0005),
 }
 
@@ -65,11 +65,11 @@ COMPLIANCE = Demo(
     name="compliance",
     summary="three compliances on one floor: one collapses and springs back, one comes to rest",
     explanation=(
-        "Three balls of the same mesh and mass fall on a floor. Only the compliance of their edges differs (1e-6, 1e-4 and "
+        "Three balls of the same mesh and mass fall on a floor. Only the compliance of their edges differs (2e-5, 2e-4 and "
         "8e-4 m/N); the volume constraints are rigid in all three and push the collapsed ball up again."
     ),
     scene=scene,
-    solvers={"xpbd": lambda: XPBD(substeps=20)},
+    solvers={"xpbd": lambda: XPBD(substeps=40)},
     measurement=_Watch,
     dt=1 / 60,
     steps=300,

@@ -74,5 +74,7 @@ class Demo:
         """
         kind = next(iter(self.solvers)) if kind is None else kind
         if kind not in self.solvers:
-            raise SolverError(f"demo {self.name!r}: there is no solver {kind!r} for it; it has {', '.join(self.solvers)}")
+            raise SolverError(
+                f"demo {self.name!r}: there is no solver {kind!r} for it; it has {', '.join(self.solvers)}"
+            )
         return self.solvers[kind]()

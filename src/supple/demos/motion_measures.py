@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from supple.simulate import Frame
 from supple.system import BodyRange
@@ -20,13 +19,12 @@ def volume(frame: Frame, name: str) -> float:
     return float(frame.det_F[part.tets] @ frame.system.rest_volumes[part.tets])
 
 
-def spin(frame: Frame, name: str) -> NDArray[np.float64]:
-    """Angular velocity (3,) [rad/s] of the rigid body of the same inertia and angular momentum."""
+def spin_about(frame: Frame, name: str, axis: int) -> float:
+    """Angular momentum about a coordinate axis through the center of mass, over the moment of inertia about it [rad/s]."""
     part = body_range(frame, name)
     m = frame.system.masses[part.vertices]
     x, v = frame.positions[name], frame.velocities[name]
     r = x - m @ x / m.sum()
-    u = v - m @ v / m.sum()
-    L = m @ np.cross(r, u)
-    inertia = np.einsum("i,ij,ij->", m, r, r) * np.eye(3) - np.einsum("i,ij,ik->jk", m, r, r)
-    return np.linalg.solve(inertia, L)
+    L = m @ np.cross(r, v - m @ v / m.sum())
+    across = np.delete(r, axis, axis=1)
+    return float(L[axis] / (m @ np.einsum("ij,ij->i", across, across)))
