@@ -9,9 +9,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from supple.errors import SolverError
+from supple.implicit.elasticity import SERIAL_TETS
 from supple.implicit.step_filter import KEEP, min_det, noninverting_step
 from supple.materials.per_tet import TetMaterial
 from supple.materials.registry import needs_positive_volume
+from supple.numerics.threads import threads_for
 from supple.system import System
 
 
@@ -19,8 +21,8 @@ from supple.system import System
 class Guard:
     """The step filter on all tets of every body that has no inverted one; others are free to recover first.
 
-    A body is guarded as a whole: guarding only its positive tets would lock it, since on the way back from a tangle some
-    of them have to pass through zero.
+    A body is guarded as a whole: guarding only its positive tets would lock it, since on the way back from a tangle
+    some of them have to pass through zero.
 
     Attributes
     ----------
@@ -40,12 +42,15 @@ class Guard:
 
     def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, int]:
         """How far along `direction`, at most 1, and the tet that allows no more (-1 where nothing limits)."""
-        step, tet = noninverting_step(x, direction, self.system.tets, self.guarded, KEEP)
+        with threads_for(len(self.system.tets), SERIAL_TETS):
+            step, tet = noninverting_step(x, direction, self.system.tets, self.guarded, KEEP)
         return float(step), int(tet)
 
     def allows(self, x: NDArray[np.float64]) -> bool:
         """Whether every guarded tet has a positive volume at x."""
-        return bool(min_det(x, self.system.tets, self.system.rest_shape_inverse, self.guarded)[0] > 0.0)
+        with threads_for(len(self.system.tets), SERIAL_TETS):
+            smallest, _ = min_det(x, self.system.tets, self.system.rest_shape_inverse, self.guarded)
+        return bool(smallest > 0.0)
 
     def widen(self, x: NDArray[np.float64]) -> None:
         """Guard from now on the bodies that have no flat or inverted tet at x, too."""

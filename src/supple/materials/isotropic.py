@@ -33,6 +33,7 @@ from supple.numerics import mat3, svd3
 from supple.numerics.kernel_cache import fingerprint
 from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed, symmetric_eigen
 from supple.numerics.svd3 import svd3 as decompose
+from supple.numerics.threads import threads_for
 
 if TYPE_CHECKING:
     from supple.materials.material import Elastic
@@ -381,7 +382,8 @@ def batch_energy_densities(material: Elastic, F: ArrayLike) -> NDArray[np.float6
     """See `Elastic.energy_density`."""
     flat, shape, tet = _flat(material, F)
     out = np.empty(len(flat))
-    _KERNELS.densities(flat, tet.kind, tet.mu, tet.lam, out)
+    with threads_for(len(flat), 5_000):
+        _KERNELS.densities(flat, tet.kind, tet.mu, tet.lam, out)
     return out.reshape(shape)
 
 
