@@ -31,8 +31,8 @@ def test_closest_point_agrees_with_the_plane_and_the_edges():
         assert np.linalg.norm(p - u[0] * a - u[1] * b - u[2] * c) == pytest.approx(distance(p, a, b, c), abs=1e-12)
 
 
-def find(points, triangles, far, near, pieces, cell, excluded=None):
-    finder = PairFinder(len(points), int(pieces.max()) + 1, cell)
+def find(points, triangles, far, near, pieces, edge, excluded=None):
+    finder = PairFinder(len(points), int(pieces.max()) + 1, edge)
     starts, masked = excluded if excluded else (np.zeros(len(triangles) + 1, np.int64), np.zeros(0, np.int32))
     shapes = (points, pieces, triangles, pieces[triangles[:, 0]])
     k = int(pieces.max()) + 1
@@ -43,8 +43,8 @@ def find(points, triangles, far, near, pieces, cell, excluded=None):
     return found
 
 
-@pytest.mark.parametrize("cell", [0.05, 0.3, 5.0])
-def test_finds_each_near_pair_once_and_no_other(cell):
+@pytest.mark.parametrize("edge", [0.05, 0.3, 5.0])
+def test_finds_each_near_pair_once_and_no_other(edge):
     rng = np.random.default_rng(2)
     points = rng.uniform(-1, 1, size=(90, 3))
     triangles = np.arange(90, dtype=np.int32).reshape(-1, 3)
@@ -62,7 +62,7 @@ def test_finds_each_near_pair_once_and_no_other(cell):
             look = near if pieces[p] == pieces[corners[0]] else far
             if distance(points[p], *points[corners]) <= look[p, 0] + look[corners, 1].max():
                 expected.append((p, t))
-    assert find(points, triangles, far, near, pieces, cell) == expected
+    assert find(points, triangles, far, near, pieces, edge) == expected
     assert len(expected) > 60
 
 

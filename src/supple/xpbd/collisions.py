@@ -102,6 +102,8 @@ class Collisions:
             if outran(x, self._gathered, self._reach):
                 self._gather_obstacles(x, (x - x_prev) / h, time)
             self._count(self.obstacles.project(x, x_prev, (time - h, time), limit, NEAR * self.edge_length))
+        if self.surfaces is not None:
+            self.surfaces.remember(x)
         return self.contacts
 
     def _gather_obstacles(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float) -> None:

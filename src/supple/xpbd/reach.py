@@ -28,14 +28,19 @@ def outran(x, x_gathered, reach):
 
 
 @njit(cache=True)
-def mean_of_pieces(values, pieces, out):
-    """Mean (p, 3) of the values (n, 3) of each piece; zero where a piece has none."""
+def mean_motions(motions, pieces, all_share, out):
+    """Mean of the motions (n, 3) of each piece; in the last row that of everything, or zero unless `all_share`."""
     out[:] = 0.0
     counts = np.zeros(len(out))
-    for i in range(len(values)):
+    for i in range(len(motions)):
         counts[pieces[i]] += 1.0
         for j in range(3):
-            out[pieces[i], j] += values[i, j]
+            out[pieces[i], j] += motions[i, j]
+    if all_share:
+        for k in range(len(out) - 1):
+            counts[-1] += counts[k]
+            for j in range(3):
+                out[-1, j] += out[k, j]
     for k in range(len(out)):
         for j in range(3):
             out[k, j] /= max(1.0, counts[k])
@@ -49,7 +54,8 @@ def looking_out(motions, come, excursions, pieces, drifts, scales, far, near):
     ----------
     motions : (n, 3) velocity times the time ahead [m]; come : (n, 3) how they have come since the substep began [m]
     excursions : (n,) how far they went in a substep before contact held them [m]
-    pieces : (n,); drifts : (p, 3) mean of `motions` of each piece: motion that pairs of one piece share
+    pieces : (n,)
+    drifts : (p + 1, 3): motion that pairs of one piece share, for each piece, and that all pairs share, in the last row
     scales : least, most [m]
     far, near : (n, 3): how far a point looks out, without the gap, how far it may carry a triangle, and how far it may
         move on before this must be done anew; `near` is relative to its piece
@@ -59,7 +65,7 @@ def looking_out(motions, come, excursions, pieces, drifts, scales, far, near):
         k = pieces[i]
         absolute = relative = path = 0.0
         for j in range(3):
-            absolute += motions[i, j] ** 2
+            absolute += (motions[i, j] - drifts[-1, j]) ** 2
             relative += (motions[i, j] - drifts[k, j]) ** 2
             path += come[i, j] ** 2
         path = math.sqrt(path)
@@ -70,14 +76,14 @@ def looking_out(motions, come, excursions, pieces, drifts, scales, far, near):
 
 
 @njit(cache=True)
-def outran_pieces(x, x_prev, x_gathered, far, near, pieces, drifts, excursions):
+def outran_pieces(x, x_prev, x_gathered, far, near, pieces, all_share, drifts, excursions):
     """Whether some point has moved further than `looking_out` allowed, absolutely or relative to its piece.
 
     Parameters
     ----------
     x, x_prev, x_gathered : (n, 3) now, at the beginning of the substep, and when lists were made [m]
-    far, near : from `looking_out`; pieces : (n,)
-    drifts : (p, 3) scratch memory, for the mean motion of each piece [m]
+    far, near : from `looking_out`; pieces : (n,); all_share : see `mean_motions`
+    drifts : (p + 1, 3) scratch memory, see `mean_motions`
     excursions : (n,) raised to how far each point wanted to go within this substep [m]
     """
     for i in range(len(x)):
@@ -86,12 +92,12 @@ def outran_pieces(x, x_prev, x_gathered, far, near, pieces, drifts, excursions):
             square += (x[i, j] - x_prev[i, j]) ** 2
         excursions[i] = max(excursions[i], math.sqrt(square))
     moved = x - x_gathered
-    mean_of_pieces(moved, pieces, drifts)
+    mean_motions(moved, pieces, all_share, drifts)
     for i in range(len(x)):
         k = pieces[i]
         absolute = relative = 0.0
         for j in range(3):
-            absolute += moved[i, j] ** 2
+            absolute += (moved[i, j] - drifts[-1, j]) ** 2
             relative += (moved[i, j] - drifts[k, j]) ** 2
         # Written so that a position that is not finite outruns everything.
         if not (absolute <= far[i, 2] ** 2 and relative <= near[i, 2] ** 2):

@@ -1,9 +1,9 @@
 """Points in a hashed grid, and the triangles that are near them.
 
-A point is entered in every cell that the box around it meets (as wide as the point looks out), a triangle visits the
-cells that its own box meets; so one point that looks far makes nothing dearer for the others. A pair is tested in one
-cell only: the first that both boxes meet. The grid is filled by a counting sort, so the order of everything depends on
-the input alone.
+A triangle visits the cells that its box meets, widened by as much as most points look out; a point is entered in its
+own cell, and where it looks further than most, in all that the rest of its box meets. So one point that looks far makes
+nothing dearer for the others. A pair is tested in one cell only: the first that both boxes meet. The grid is filled by
+a counting sort, so the order of everything depends on the input alone.
 
 Source: Teschner et al., "Optimized Spatial Hashing for Collision Detection of Deformable Objects" (2003).
 """
@@ -23,6 +23,8 @@ from supple.xpbd.closest_point import closest_on_triangle, combine
 MOST_CELLS = 1 << 20
 # A point that looks out over more cells than this is kept apart and meets every triangle.
 WIDE = 1000
+# How many of a hundred points look no further than what triangles are widened by.
+MOST = 90.0
 
 
 @njit
@@ -42,7 +44,38 @@ def _cell(coordinate, low, size):
 
 
 @njit(cache=True)
-def hash_points(points, radii, size, low, around, first, last, starts):
+def boxes_of_pieces(points, point_piece, pad, low, high):
+    """Bounds low, high (p, 3) of each piece's points, each widened by its first entry in pad (n, 3)."""
+    low[:] = np.inf
+    high[:] = -np.inf
+    for i in range(len(points)):
+        k = point_piece[i]
+        for j in range(3):
+            low[k, j] = min(low[k, j], points[i, j] - pad[i, 0])
+            high[k, j] = max(high[k, j], points[i, j] + pad[i, 0])
+
+
+@njit
+def _meets_another(low, high, piece, partners, boxes):
+    """Whether a box of one piece overlaps that of another piece that it may touch."""
+    piece_low, piece_high = boxes
+    for k in range(len(piece_low)):
+        if (
+            k != piece
+            and partners[piece, k]
+            and low[0] <= piece_high[k, 0]
+            and high[0] >= piece_low[k, 0]
+            and low[1] <= piece_high[k, 1]
+            and high[1] >= piece_low[k, 1]
+            and low[2] <= piece_high[k, 2]
+            and high[2] >= piece_low[k, 2]
+        ):
+            return True
+    return False
+
+
+@njit(cache=True)
+def hash_points(shapes, radii, rules, boxes, lattice, around, first, last, starts):
     """Which cells points meet.
 
     Writes the box around each point into around (n, 6), its cells into first, last (n, 3), and how many entries come
@@ -50,24 +83,31 @@ def hash_points(points, radii, size, low, around, first, last, starts):
 
     Parameters
     ----------
-    points : (n, 3); radii : two (n, 2) arrays, see `find_pairs`
-    size : edge of a cell; low : (3,) the grid's origin [m]
+    shapes, radii, rules, boxes : see `find_pairs`
+    lattice : edge of a cell [m]; how far most points look [m]; the grid's origin (3,) [m]
     starts : (buckets + 1,) with a power of two of buckets
 
     Returns
     -------
     The number of entries.
     """
+    points, point_piece, _, _ = shapes
     far, near = radii
+    size, common, low = lattice
     mask = len(starts) - 2
     starts[:] = 0
+    box_low, box_high = np.zeros(3), np.zeros(3)
     for p in range(len(points)):
-        r = max(far[p, 0], near[p, 0])
+        for j in range(3):
+            box_low[j], box_high[j] = points[p, j] - far[p, 0], points[p, j] + far[p, 0]
+        r = near[p, 0]
+        if _meets_another(box_low, box_high, point_piece[p], rules[0], boxes):
+            r = max(r, far[p, 0])
         count = 1.0
         for j in range(3):
             around[p, j], around[p, 3 + j] = points[p, j] - r, points[p, j] + r
-            first[p, j] = _cell(around[p, j], low[j], size)
-            last[p, j] = _cell(around[p, 3 + j], low[j], size)
+            first[p, j] = _cell(points[p, j] - max(0.0, r - common), low[j], size)
+            last[p, j] = _cell(points[p, j] + max(0.0, r - common), low[j], size)
             count *= last[p, j] - first[p, j] + 1.0
         if count > WIDE:
             last[p, 0] = -1
@@ -105,33 +145,6 @@ def is_excluded(point, triangle, excluded_starts, excluded_points):
     return False
 
 
-@njit(cache=True)
-def boxes_of_pieces(points, point_piece, pad, low, high):
-    """Bounds low, high (p, 3) of each piece's points, each widened by pad (n,)."""
-    low[:] = np.inf
-    high[:] = -np.inf
-    for i in range(len(points)):
-        k = point_piece[i]
-        for j in range(3):
-            low[k, j] = min(low[k, j], points[i, j] - pad[i])
-            high[k, j] = max(high[k, j], points[i, j] + pad[i])
-
-
-@njit
-def _meets_a_piece(low, high, allowed, piece, piece_low, piece_high):
-    """Whether a box overlaps that of some piece whose points may touch triangles of `piece`."""
-    if allowed[piece, piece]:
-        return True
-    for k in range(len(piece_low)):
-        if allowed[k, piece]:
-            meets = True
-            for j in range(3):
-                meets = meets and low[j] <= piece_high[k, j] and high[j] >= piece_low[k, j]
-            if meets:
-                return True
-    return False
-
-
 @njit
 def _meets(around, p, low, high):
     """Whether the box around point p meets another."""
@@ -154,34 +167,43 @@ def find_pairs(shapes, radii, rules, boxes, grid, wide, out):
     shapes : points (n, 3), point_piece (n,), triangles (t, 3), triangle_piece (t,)
     radii : two (n, 2) arrays, for pairs of different pieces and of one piece: how far a point looks out for triangles
         (with its own motion), and how far its motion may carry a triangle's corner [m]
-    rules : allowed (p, p), and the excluded points of each triangle as starts (t + 1,) and points
+    rules : partners (p, p), whether two pieces may touch either way; allowed (p, p), whether points of the first may
+        touch triangles of the second; and the excluded points of each triangle as starts (t + 1,) and points
     boxes : low, high (p, 3), from `boxes_of_pieces`, widened by how far points look
-    grid : size, low, around, first, starts, entries, keys, from `hash_points` and `fill_buckets`
+    grid : size, common, low, around, first, starts, entries, keys, from `hash_points` and `fill_buckets`
     wide : points that are not in the grid
     out : two int32 arrays for points and triangles
     """
     points, point_piece, triangles, triangle_piece = shapes
     far, near = radii
-    allowed, excluded_starts, excluded_points = rules
+    partners, allowed, excluded_starts, excluded_points = rules
     out_points, out_triangles = out
     found = np.zeros(len(points), dtype=np.int32)
-    piece_low, piece_high = boxes
-    size, origin, around, first, starts, entries, keys = grid
+    size, common, origin, around, first, starts, entries, keys = grid
     mask = len(starts) - 2
     count = 0
     low, high = np.zeros(3), np.zeros(3)
     begin, end = np.zeros(3, dtype=np.int64), np.zeros(3, dtype=np.int64)
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        moves = max(far[a, 1], far[b, 1], far[c, 1], near[a, 1], near[b, 1], near[c, 1])
+        its = triangle_piece[t]
+        moves_far, moves_near = max(far[a, 1], far[b, 1], far[c, 1]), max(near[a, 1], near[b, 1], near[c, 1])
+        for j in range(3):
+            low[j] = min(points[a, j], points[b, j], points[c, j]) - moves_far
+            high[j] = max(points[a, j], points[b, j], points[c, j]) + moves_far
+        if _meets_another(low, high, its, partners, boxes):
+            more = max(0.0, moves_near - moves_far)
+        elif allowed[its, its]:
+            more = moves_near - moves_far
+        else:
+            continue
         volume = 1.0
         for j in range(3):
-            low[j] = min(points[a, j], points[b, j], points[c, j]) - moves
-            high[j] = max(points[a, j], points[b, j], points[c, j]) + moves
-            begin[j], end[j] = _cell(low[j], origin[j], size), _cell(high[j], origin[j], size)
+            low[j] -= more
+            high[j] += more
+            begin[j] = _cell(low[j] - common, origin[j], size)
+            end[j] = _cell(high[j] + common, origin[j], size)
             volume *= end[j] - begin[j] + 1.0
-        if not _meets_a_piece(low, high, allowed, triangle_piece[t], piece_low, piece_high):
-            continue
         close = 0  # points whose box meets the triangle's
         if volume > len(points):
             for p in range(len(points)):
@@ -208,9 +230,7 @@ def find_pairs(shapes, radii, rules, boxes, grid, wide, out):
                             ):
                                 found[close] = p
                                 close += 1
-        its = triangle_piece[t]
         u, v, w = row(points, a), row(points, b), row(points, c)
-        moves_far, moves_near = max(far[a, 1], far[b, 1], far[c, 1]), max(near[a, 1], near[b, 1], near[c, 1])
         for f in range(close):
             p = found[f]
             mine = point_piece[p]
@@ -255,8 +275,8 @@ class PairFinder:
     `active[:n_active]` are the points that have any.
     """
 
-    def __init__(self, n_points: int, n_pieces: int, cell_size: float) -> None:
-        self.cell_size = cell_size
+    def __init__(self, n_points: int, n_pieces: int, edge_length: float) -> None:
+        self.edge_length = edge_length
         self._around = np.zeros((n_points, 6))
         self._first = np.zeros((n_points, 3), dtype=np.int32)
         self._last = np.zeros((n_points, 3), dtype=np.int32)
@@ -272,22 +292,25 @@ class PairFinder:
         self.count = 0
 
     def gather(self, shapes: tuple, radii: tuple, rules: tuple) -> None:
-        """Find all pairs; for the arguments see `find_pairs`."""
+        """Find all pairs; for the arguments see `find_pairs` (`rules` without partners)."""
         points: NDArray[np.float64] = shapes[0]
         if not np.isfinite(points).all():
             self.n_active = self.count = 0
             return
         low = points.min(axis=0)
-        size = max(self.cell_size, 2.0 * float((points.max(axis=0) - low).max()) / MOST_CELLS)
-        entries = hash_points(points, radii, size, low, self._around, self._first, self._last, self._buckets)
+        common = float(np.percentile(radii[0][:, 0], MOST))
+        size = max(0.8 * (self.edge_length + 2.0 * common), 2.0 * float((points.max(axis=0) - low).max()) / MOST_CELLS)
+        boxes, rules = (self._low, self._high), (rules[0] | rules[0].T, *rules)
+        boxes_of_pieces(points, shapes[1], radii[0], *boxes)
+        cells = (self._around, self._first, self._last, self._buckets)
+        entries = hash_points(shapes, radii, rules, boxes, (size, common, low), *cells)
         if entries > len(self._entries):
             self._entries, self._keys = np.zeros(2 * entries, dtype=np.int32), np.zeros(2 * entries, dtype=np.int64)
         fill_buckets(self._first, self._last, self._buckets, self._entries, self._keys)
         wide = np.flatnonzero(self._last[:, 0] < 0)
-        boxes_of_pieces(points, shapes[1], np.ascontiguousarray(radii[0][:, 0]), self._low, self._high)
-        grid = (size, low, self._around, self._first, self._buckets, self._entries, self._keys)
+        grid = (size, common, low, self._around, self._first, self._buckets, self._entries, self._keys)
         while True:
-            count = find_pairs(shapes, radii, rules, (self._low, self._high), grid, wide, self._pairs)
+            count = find_pairs(shapes, radii, rules, boxes, grid, wide, self._pairs)
             if count <= len(self._pairs[0]):
                 break
             self._pairs = (np.zeros(2 * count, dtype=np.int32), np.zeros(2 * count, dtype=np.int32))

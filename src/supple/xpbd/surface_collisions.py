@@ -10,13 +10,13 @@ from supple.xpbd.contact_surfaces import ContactSurfaces
 from supple.xpbd.neighbourhoods import excluded_pairs
 from supple.xpbd.obstacle_poses import ObstaclePoses
 from supple.xpbd.point_inside import bounds_of_pieces, depths_inside
-from supple.xpbd.reach import looking_out, mean_of_pieces, outran_pieces
+from supple.xpbd.reach import looking_out, mean_motions, outran_pieces
 from supple.xpbd.spatial_hash import PairFinder
 from supple.xpbd.surface_contacts import project_surfaces
 
 # Of the mean surface edge: what a point may move at least, and at most, before lists are made anew, and up to which
 # gaps distances are reported.
-LEAST_REACH, MOST_REACH, NEAR = 0.1, 1.0, 1.0
+LEAST_REACH, MOST_REACH, NEAR = 0.1, 0.5, 1.0
 
 
 class SurfaceCollisions:
@@ -44,14 +44,17 @@ class SurfaceCollisions:
             s.friction,
         )
         self._far, self._near = np.zeros((n, 3)), np.zeros((n, 3))
-        self._drifts = np.zeros((pieces, 3))
+        self._drifts = np.zeros((pieces + 1, 3))
+        # What stands still keeps everything else from sharing a motion.
+        self._all_share = len(s.fixed_points) == 0
         self._excursions = np.zeros(n)
         # How deep a point is inside a body, and inside an obstacle.
         self._depth = np.zeros((2, n))
         self._entered = np.full(n, -1, dtype=np.int32)
         self._complete = np.zeros(n)
         self._gap = np.where(s.allowed, s.gaps, 0.0).max(axis=1)[s.point_piece]
-        self._known: NDArray[np.float64] | None = None
+        self._known = np.zeros((len(s.rows), 3))
+        self._has_past = False
         self._dt = 0.0
 
     def begin_step(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float, dt: float) -> None:
@@ -65,7 +68,8 @@ class SurfaceCollisions:
         motions[bodies:] -= self._x[bodies:]
         motions[:bodies] = v[self.surfaces.rows] * dt
         self._before[:] = self._x
-        if self._known is None or not np.abs(self._x[:bodies] - self._known).max() <= LEAST_REACH * self.edge_length:
+        moved = np.abs(self._x[:bodies] - self._known).max()
+        if not (self._has_past and moved <= LEAST_REACH * self.edge_length):
             self._look_for_overlaps()
         self._gather(motions)
         self._excursions[:] = 0.0
@@ -80,7 +84,7 @@ class SurfaceCollisions:
         np.take(x_prev, s.rows, axis=0, out=self._before[:bodies])
         s.place_obstacles(self.poses, times[1], self._x)
         s.place_obstacles(self.poses, times[0], self._before)
-        allowed = (self._far, self._near, s.point_piece, self._drifts)
+        allowed = (self._far, self._near, s.point_piece, self._all_share, self._drifts)
         if outran_pieces(self._x, self._before, self._gathered, *allowed, self._excursions):
             self._gather((self._x - self._before) * (self._dt / (times[1] - times[0])))
         lists = (finder.n_active, finder.active, finder.starts, finder.triangles)
@@ -94,13 +98,17 @@ class SurfaceCollisions:
                 contacts, smallest = contacts + found[0], min(smallest, found[1])
         x[s.rows] = self._x[:bodies]
         x_prev[s.rows] = self._before[:bodies]
-        self._known = self._x[:bodies].copy()
         return contacts, smallest
+
+    def remember(self, x: NDArray[np.float64]) -> None:
+        """Take note of where everything is (n, 3) [m] after all contacts: whoever goes on from there knows its past."""
+        np.take(x, self.surfaces.rows, axis=0, out=self._known)
+        self._has_past = True
 
     def _gather(self, motions: NDArray[np.float64]) -> None:
         """List what may touch while nothing gets further than it would in a frame of these motions (n, 3) [m]."""
         s = self.surfaces
-        mean_of_pieces(motions, s.point_piece, self._drifts)
+        mean_motions(motions, s.point_piece, self._all_share, self._drifts)
         scales = (LEAST_REACH * self.edge_length, MOST_REACH * self.edge_length)
         come = self._x - self._before
         points = (come, self._excursions, s.point_piece)
