@@ -69,8 +69,9 @@ def looking_out(motions, come, excursions, pieces, drifts, scales, far, near):
             relative += (motions[i, j] - drifts[k, j]) ** 2
             path += come[i, j] ** 2
         path = math.sqrt(path)
-        a = min(most, least + excursions[i] + 1.2 * math.sqrt(absolute))
-        b = min(most, least + excursions[i] + 1.2 * math.sqrt(relative))
+        strain = min(2.0 * most, excursions[i])
+        a = strain + min(most, least + 1.2 * math.sqrt(absolute))
+        b = strain + min(most, least + 1.2 * math.sqrt(relative))
         far[i, 0], far[i, 1], far[i, 2] = a + path, a + path, a
         near[i, 0], near[i, 1], near[i, 2] = b + path, b + path, b
 
