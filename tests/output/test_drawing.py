@@ -80,4 +80,4 @@ def test_what_would_hide_the_bodies_can_be_seen_through(tmp_path, tools):
     list(simulate(scene, tools.Prescribed(), 1 / 30, 1, sinks=[Recorder(path)]))
     with read_recording(path) as recording:
         drawn = obstacle_pictures(recording, view_of(recording))
-    assert {p.name for p in drawn if p.see_through} == {"wall", "lid", "room"}
+    assert {p.name for p in drawn if p.opacity < 1.0} == {"wall", "lid", "room"}

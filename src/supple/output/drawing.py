@@ -27,7 +27,8 @@ BODY_COLORS = (
     (160, 120, 80),
 )
 OBSTACLE_COLOR = (176, 180, 188)
-SEE_THROUGH_OPACITY = 0.13
+# A room is one surface between the eye and the bodies; walls stand behind each other, so each must be fainter.
+ROOM_OPACITY, WALL_OPACITY = 0.13, 0.05
 _SPHERE_RINGS, _SPHERE_SEGMENTS = 24, 48
 
 
@@ -119,7 +120,7 @@ class ObstaclePicture:
     name: str
     vertices: NDArray[np.float64]
     triangles: NDArray[np.int32]
-    see_through: bool
+    opacity: float
 
     def at(self, frame: RecordedFrame) -> NDArray[np.float64]:
         """(k, 3) [m] in a frame."""
@@ -138,8 +139,9 @@ def obstacle_pictures(recording: Recording, view: View) -> list[ObstaclePicture]
         if surface is not None:
             normal = obstacle.parameters.get("normal")
             is_wall = normal is not None and float(np.dot(normal, view.up)) < 0.5
-            see_through = is_wall or bool(obstacle.parameters.get("inside", False))
-            made.append(ObstaclePicture(number, obstacle.name, *surface, see_through))
+            is_room = bool(obstacle.parameters.get("inside", False))
+            opacity = WALL_OPACITY if is_wall else ROOM_OPACITY if is_room else 1.0
+            made.append(ObstaclePicture(number, obstacle.name, *surface, opacity))
     return made
 
 

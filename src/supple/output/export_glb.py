@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from supple.output.atomic import whole_file
 from supple.output.drawing import (
     OBSTACLE_COLOR,
-    SEE_THROUGH_OPACITY,
     ObstaclePicture,
     Picture,
     evenly,
@@ -88,7 +87,7 @@ class _Glb:
         # Corners are not shared, so that edges stay sharp.
         x = obstacle.vertices[obstacle.triangles.ravel()]
         triangles = np.arange(len(x), dtype=np.int32).reshape(-1, 3)
-        material = self._material(OBSTACLE_COLOR, SEE_THROUGH_OPACITY if obstacle.see_through else 1.0)
+        material = self._material(OBSTACLE_COLOR, obstacle.opacity)
         node = self._mesh_node(obstacle.name, x, vertex_normals(x, triangles), triangles, material, [])
         poses = np.stack([frame.poses[obstacle.number] for frame in self.frames])
         turns = _quaternions(poses[:, :, :3])

@@ -18,7 +18,6 @@ from supple.errors import OutputError
 from supple.output.atomic import whole_file
 from supple.output.drawing import (
     OBSTACLE_COLOR,
-    SEE_THROUGH_OPACITY,
     View,
     evenly,
     obstacle_pictures,
@@ -119,12 +118,12 @@ def _add_obstacles(server: Any, recording: Recording, view: View) -> dict[int, t
             obstacle.vertices.astype(np.float32),
             obstacle.triangles,
             color=OBSTACLE_COLOR,
-            opacity=SEE_THROUGH_OPACITY if obstacle.see_through else None,
+            opacity=obstacle.opacity if obstacle.opacity < 1.0 else None,
             flat_shading=recording.obstacles[obstacle.number].kind != "Sphere",
             side="double",
             wxyz=_quaternion(pose[:, :3]),
             position=pose[:, 3],
-            cast_shadow=not obstacle.see_through,
+            cast_shadow=obstacle.opacity == 1.0,
         )
         handles[obstacle.number] = handle, pose
     return handles

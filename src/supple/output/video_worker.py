@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from supple.errors import SuppleError
 from supple.output.drawing import (
     OBSTACLE_COLOR,
-    SEE_THROUGH_OPACITY,
     evenly,
     obstacle_pictures,
     pictures,
@@ -44,8 +43,7 @@ def draw(recording: Recording, frames: list[RecordedFrame], size: tuple[int, int
         moving.append((mesh, picture, True))
     for obstacle in obstacle_pictures(recording, view):
         mesh = _polydata(pyvista, obstacle.at(frames[0]), obstacle.triangles)
-        opacity = SEE_THROUGH_OPACITY if obstacle.see_through else 1.0
-        plotter.add_mesh(mesh, color=[c / 255.0 for c in OBSTACLE_COLOR], opacity=opacity, ambient=0.3)
+        plotter.add_mesh(mesh, color=[c / 255.0 for c in OBSTACLE_COLOR], opacity=obstacle.opacity, ambient=0.3)
         moving.append((mesh, obstacle, False))
     camera = plotter.camera
     camera.position, camera.focal_point, camera.up = tuple(view.eye(_ANGLE)), tuple(view.center), tuple(view.up)
