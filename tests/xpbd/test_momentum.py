@@ -52,8 +52,18 @@ def squashed(material, height, position, mesh=SPHERE):
     return sp.Scene(bodies=[body], gravity=(0, 0, 0)), {"ball": x}
 
 
-@pytest.mark.parametrize("material", [JELLY, CLASSIC], ids=["neo-hookean", "edges+volume"])
-@pytest.mark.parametrize(("height", "substeps"), [(0.95, 80), (0.8, 5), (0.5, 20), (0.02, 20)])
+@pytest.mark.parametrize(
+    ("material", "height", "substeps"),
+    [
+        pytest.param(JELLY, 0.95, 80, id="neo-hookean .95"),
+        pytest.param(JELLY, 0.5, 20, id="neo-hookean .5"),
+        pytest.param(JELLY, 0.02, 5, id="neo-hookean pancake"),
+        pytest.param(CLASSIC, 0.95, 5, id="edges+volume .95"),
+        pytest.param(CLASSIC, 0.8, 40, id="edges+volume .8"),
+        pytest.param(CLASSIC, 0.5, 20, id="edges+volume .5"),
+        pytest.param(CLASSIC, 0.02, 20, id="edges+volume pancake"),
+    ],
+)
 def test_a_squashed_and_released_sphere_does_not_spin(material, height, substeps):
     scene, start = squashed(material, height, FAR)
     system, _, state = run(scene, XPBD(substeps=substeps, contact=None), 3600, positions=start)
@@ -69,7 +79,7 @@ def test_without_the_cure_it_spins():
 
 
 @pytest.mark.parametrize(
-    ("substeps", "seed", "seconds"), [(5, None, 60), (20, 1, 60), (80, 2, 5)], ids=["5 substeps", "20", "80"]
+    ("substeps", "seed", "seconds"), [(5, None, 60), (20, 1, 20), (80, 2, 3)], ids=["5 substeps", "20", "80"]
 )
 def test_frictionless_plates_do_not_pump_a_spin(substeps, seed, seconds):
     """With the constraints in the mesh's order and in random ones."""

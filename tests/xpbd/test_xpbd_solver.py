@@ -53,7 +53,7 @@ def test_free_fall():
     scene = sp.Scene(bodies=[sp.Body("cube", CUBE, JELLY, velocity=(1.0, 0.0, 0.0))])
     frames = list(sp.simulate(scene, XPBD(substeps=10), DT, 6))
     n, h = 60, DT / 10
-    expected = CUBE.vertices + (1.0 * n * h, -9.81 * h**2 * n * (n + 1) / 2, 0.0)
+    expected = np.add(CUBE.vertices, (1.0 * n * h, -9.81 * h**2 * n * (n + 1) / 2, 0.0))
     np.testing.assert_allclose(frames[-1].positions["cube"], expected, atol=1e-12)
     np.testing.assert_allclose(frames[-1].velocities["cube"], np.tile([1.0, -9.81 * n * h, 0.0], (64, 1)), atol=1e-10)
     assert frames[-1].report.iterations == 10
@@ -112,15 +112,16 @@ def test_threads_do_not_change_a_bit(monkeypatch):
     }
     mesh = sp.shapes.box((1.0, 1.0, 3.0), (4, 4, 12))
     bodies = [
-        sp.Body(name, mesh, material, position=(100.0 + 3.0 * k, 2.0, 0.0), angular_velocity=(3, 2, 1))
+        sp.Body(
+            name, mesh, material, position=(100.0 + 3.0 * k, 0.6, 0.0), velocity=(0, -2, 0), angular_velocity=(3, 2, 1)
+        )
         for k, (name, material) in enumerate(materials.items())
     ]
     scene = sp.Scene(bodies=bodies, obstacles=[sp.HalfSpace(friction=0.3)])
-    runs = [list(sp.simulate(scene, XPBD(threads=threads), DT, 40))[-1] for threads in (1, 2)]
+    runs = [list(sp.simulate(scene, XPBD(substeps=8, threads=threads), DT, 10))[-1] for threads in (1, 2)]
     np.testing.assert_array_equal(runs[0].state.positions, runs[1].state.positions)
     np.testing.assert_array_equal(runs[0].state.velocities, runs[1].state.velocities)
-    assert runs[0].report.details["contacts"] >= 0
-    assert runs[0].positions["jelly"][:, 1].min() < 0.5
+    assert runs[0].report.details["contacts"] > 0
 
 
 @pytest.mark.parametrize("material", [JELLY, CLASSIC], ids=["neo-hookean", "edges+volume"])
