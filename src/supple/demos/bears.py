@@ -23,7 +23,7 @@ def scene() -> Scene:
     """Twelve bears, 10 cm tall, in three layers above the bottom of a round bowl."""
     mesh = shapes.gummy_bear(height=HEIGHT, edge_length=0.009)
     skin = shapes.gummy_bear_surface(height=HEIGHT, resolution=64)
-    material = StableNeoHookean(youngs=3e4, poisson=0.45, density=1100.0, damping=0.002)
+    material = StableNeoHookean(youngs=3e4, poisson=0.45, density=1100.0, damping=0.01)
     generator = np.random.default_rng(7)
     bodies = []
     for layer in range(LAYERS):
@@ -85,12 +85,12 @@ BEARS = Demo(
     name="bears",
     summary="a heap of gummy bears falling into a bowl",
     explanation=(
-        "Twelve gummy bears (E = 30 kPa, nu = 0.45) fall into a bowl and on each other: body against body, body against bowl, "
-        "with friction. What is drawn is a finer skin, embedded in the coarse tetrahedra that are simulated."
+        "Twelve gummy bears (E = 30 kPa, nu = 0.45) fall into a bowl and on each other: body against body and "
+        "bowl, with friction. What is drawn is a finer skin, embedded in the coarse tetrahedra that are simulated."
     ),
     scene=scene,
-    solvers={"xpbd": lambda: XPBD(substeps=20)},
+    solvers={"xpbd": lambda: XPBD(substeps=40)},
     measurement=_Watch,
     dt=1 / 60,
-    steps=240,
+    steps=180,
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from supple.errors import SolverError
 from supple.scene.scene import Scene
@@ -27,16 +27,25 @@ class Claim:
 
 
 class Measurement(ABC):
-    """A sink that watches a demo and says at the end which of its claims hold."""
+    """A sink that watches a demo and says at the end which of its claims hold.
+
+    Attributes
+    ----------
+    first, last : the frame at the start, and the latest one
+    """
+
+    first: Frame
+    last: Frame
 
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         """Called with the frame at the start."""
+        self.first = self.last = first
 
-    @abstractmethod
     def write(self, frame: Frame) -> None:
         """Called with every frame."""
+        self.last = frame
 
-    def end(self) -> None:
+    def end(self) -> None:  # noqa: B027 - most demos have nothing to close
         """Called when the run is over."""
 
     @abstractmethod
@@ -54,6 +63,7 @@ class Demo:
     scene : builds the scene; measurement : builds the sink that judges the claims
     solvers : by kind ("xpbd", "implicit"), each builds the solver; the first is the default
     dt : time from frame to frame [s]; steps : how many frames
+    variants : by kind of solver, the whole demo for solvers that need a scene of their own
     """
 
     name: str
@@ -64,6 +74,23 @@ class Demo:
     measurement: Callable[[], Measurement]
     dt: float
     steps: int
+    variants: Mapping[str, Demo] = field(default_factory=dict)
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """The kinds of solver this demo runs on; the first is the default."""
+        return (*self.solvers, *self.variants)
+
+    def on(self, kind: str) -> Demo:
+        """The demo for that kind of solver: this one, or the variant that has it.
+
+        Raises
+        ------
+        SolverError : where this demo does not run on it.
+        """
+        if kind not in self.kinds:
+            raise SolverError(f"demo {self.name!r}: there is no solver {kind!r} for it; it has {', '.join(self.kinds)}")
+        return self.variants.get(kind, self)
 
     def solver(self, kind: str | None = None) -> Solver:
         """The solver of that kind, or the default one.
@@ -72,9 +99,5 @@ class Demo:
         ------
         SolverError : where this demo does not run on it.
         """
-        kind = next(iter(self.solvers)) if kind is None else kind
-        if kind not in self.solvers:
-            raise SolverError(
-                f"demo {self.name!r}: there is no solver {kind!r} for it; it has {', '.join(self.solvers)}"
-            )
-        return self.solvers[kind]()
+        kind = self.kinds[0] if kind is None else kind
+        return self.on(kind).solvers[kind]()
