@@ -217,6 +217,19 @@ def test_the_direct_solver_and_cg_find_the_same_equilibrium():
     assert by["direct"].report.details["cg_iterations"] == 0
 
 
+def test_a_body_on_one_nail_finds_its_hanging_place():
+    # Nothing but gravity keeps it from turning about the nail: the Hessian at the start is singular.
+    mesh = sp.shapes.box((0.1, 0.1, 0.1), (2, 2, 2))
+    body = sp.Body("weight", mesh, sp.StableNeoHookean(youngs=1e6, poisson=0.3))
+    corner = int(np.argmax(mesh.vertices.sum(axis=1)))
+    frame = equilibrium(sp.Scene([body], pins=[sp.Pin("weight", [corner])]), steps=2)
+    x = frame.positions["weight"]
+    center = frame.system.masses @ x / frame.system.masses.sum()
+    below = center - x[corner]
+    assert below[1] < 0
+    assert np.abs(below[[0, 2]]).max() < 1e-5
+
+
 def test_static_refuses_what_nothing_holds():
     body = sp.Body("loose", sp.shapes.box(), sp.StableNeoHookean(youngs=1e4, poisson=0.3))
     with pytest.raises(sp.SolverError, match=r"body 'loose': nothing holds it"):

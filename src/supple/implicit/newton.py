@@ -43,12 +43,14 @@ class Problem:
     scale : s of its inertia term [s^2], or None
     tolerance : size of the largest vertex's Newton step [m] below which the minimum is reached
     max_iterations : of Newton
+    longest : largest component [m] that a direction may have where there is no inertia
     """
 
     objective: Objective
     scale: float | None
     tolerance: float
     max_iterations: int
+    longest: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +99,9 @@ def minimize(problem: Problem, x: NDArray[np.float64], guard: Guard, tools: Tool
             return Outcome(Status.NOT_FINITE, here, "the linear system of a Newton step could not be solved", rows)
         if problem.scale is not None:
             tools.free_motion.correct(direction, gradient, problem.scale)
+        else:
+            # Without inertia a turn may cost nothing: the direction is as long as the linear solver's errors make it.
+            direction *= min(1.0, problem.longest / max(float(np.abs(direction).max(initial=0.0)), 1e-300))
         length = float(np.abs(direction).max(initial=0.0))
         slope = float(np.einsum("ij,ij->", gradient, direction))
         largest, _ = guard.largest_step(here.positions, direction)

@@ -26,6 +26,7 @@ from supple.implicit.pin_motion import move_pins
 from supple.implicit.potential import HessianBlocks, Potential
 from supple.implicit.reactions import reaction_forces
 from supple.implicit.soft_targets import soft_targets_at
+from supple.implicit.stabilizer import Stabilizer, stabilizer_of
 from supple.implicit.trace import NewtonRow
 from supple.solver import Solver
 from supple.state import State, Status, StepReport
@@ -106,7 +107,7 @@ class Implicit(Solver):
         diagonal = min(
             float(np.linalg.norm(np.ptp(system.rest_positions[part.vertices], axis=0))) for part in system.bodies
         )
-        return Workspace(elasticity, viscosity_of(elasticity), tools, diagonal)
+        return Workspace(elasticity, viscosity_of(elasticity), tools, diagonal, stabilizer_of(elasticity))
 
     def step(self, system: System, state: State, dt: float, workspace: Workspace) -> tuple[State, StepReport]:
         """Advance by dt, in as many substeps as it takes; see `Solver.step`.
@@ -159,6 +160,7 @@ class Implicit(Solver):
             plan.scale,
             self._tolerance(method) * workspace.diagonal * (1.0 if plan.scale is None else h),
             self.max_iterations,
+            workspace.diagonal,
         )
         workspace.tools.linear_solver.begin_step()
         targets = system.pin_targets(end)
@@ -196,6 +198,7 @@ class Workspace:
     viscosity: Viscosity | None
     tools: Tools
     diagonal: float
+    stabilizer: Stabilizer
 
 
 def _potentials(
@@ -225,7 +228,9 @@ def _objective(
     barrier = inversion_barrier(workspace.elasticity, guard.guarded)
     if barrier is not None:
         terms.append(barrier)
-    if plan.scale is not None:
+    if plan.scale is None:
+        terms.append(workspace.stabilizer)
+    else:
         terms.append(Inertia(system.masses, plan.predicted, plan.scale))
         if workspace.viscosity is not None:
             terms.append(Damping(workspace.viscosity, plan.strain_rate()))
@@ -233,12 +238,13 @@ def _objective(
 
 
 def _acceleration(system: System, state: State, workspace: Workspace) -> NDArray[np.float64]:
-    """(n, 3) of a state by all its forces, pins aside [m/s^2]."""
+    """(n, 3) of a state by its forces, pins aside [m/s^2].
+
+    The inversion barrier is left out: it is a guard at the end of a step, and so stiff that the trapezoidal rule, which
+    does not damp what is stiff, would throw its force back in the next step.
+    """
     x, v = state.positions, state.velocities
     terms = _potentials(system, x, state.time, total_forces(system, state.time), workspace)
-    barrier = inversion_barrier(workspace.elasticity, Guard.at(system, x).guarded)
-    if barrier is not None:
-        terms.append(barrier)
     if workspace.viscosity is not None:
         rate = green_strain_rates(system, x, v)
         terms.append(Damping(workspace.viscosity, StrainRate(1.0, green_strains(system, x) - rate)))
