@@ -18,6 +18,7 @@ def demo(
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
     steps: int | None = None,
     solver: str | None = None,
+    trace: Path | None = None,
     page: bool = True,
     plot: bool = True,
     quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
@@ -36,6 +37,8 @@ def demo(
         Number of frames, instead of the demo's own; a shortened demo may not reach what it claims.
     solver
         Kind of solver: xpbd or implicit, where the demo has both.
+    trace
+        CSV file for every iteration of Newton's method; for the implicit solver.
     page
         Write index.html, which plays the recording in a browser.
     plot
@@ -56,8 +59,11 @@ def demo(
         return ExitCode.OK
 
     from supple.cli.session import Products, run_session
+    from supple.cli.trace import traces
 
     chosen = find_demo(name)
+    if solver is not None:
+        chosen = chosen.on(solver)
     used = chosen.solver(solver)
     measurement = chosen.measurement()
     if not quiet:
@@ -68,7 +74,7 @@ def demo(
         chosen.dt,
         chosen.steps if steps is None else steps,
         products=Products(Path("out") / chosen.name if output is None else output, page, plot, quiet),
-        sinks=[measurement],
+        sinks=[measurement, *traces(trace, used)],
     )
     if outcome.frames:
         for claim in measurement.claims():

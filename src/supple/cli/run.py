@@ -16,6 +16,7 @@ def run(
     steps: int | None = None,
     dt: float | None = None,
     solver: str | None = None,
+    trace: Path | None = None,
     page: bool | None = None,
     plot: bool | None = None,
     quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
@@ -36,6 +37,8 @@ def run(
         Time from frame to frame [s], instead of the file's.
     solver
         Kind of solver, instead of the file's, with its default parameters.
+    trace
+        CSV file for every iteration of Newton's method; for the implicit solver.
     page
         Write index.html, which plays the recording in a browser; as the file says without this.
     plot
@@ -44,16 +47,19 @@ def run(
         Print neither progress nor summary.
     """
     from supple.cli.session import Products, run_session
+    from supple.cli.trace import traces
     from supple.scene_file.loader import load_run
     from supple.scene_file.solvers import solver_of_kind
 
     described = load_run(scene)
+    used = described.solver if solver is None else solver_of_kind(solver)
     return run_session(
         described.scene,
-        described.solver if solver is None else solver_of_kind(solver),
+        used,
         described.dt if dt is None else dt,
         described.steps if steps is None else steps,
         start=described.start,
+        sinks=traces(trace, used),
         products=Products(
             folder=output,
             page=described.output.page if page is None else page,

@@ -20,7 +20,7 @@ def volume(frame: Frame, name: str) -> float:
 
 
 def spin_about(frame: Frame, name: str, axis: int) -> float:
-    """Angular momentum about a coordinate axis through the center of mass, over the moment of inertia about it [rad/s]."""
+    """Angular momentum over moment of inertia, about a coordinate axis through the center of mass [rad/s]."""
     part = body_range(frame, name)
     m = frame.system.masses[part.vertices]
     x, v = frame.positions[name], frame.velocities[name]

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from supple.demos.bears import BEARS
+from supple.demos.cantilever import CANTILEVER
 from supple.demos.compliance import COMPLIANCE
 from supple.demos.demo import Demo
 from supple.demos.squash import SQUASH
 from supple.demos.stretch import STRETCH
+from supple.demos.twist import TWIST
 from supple.errors import SceneError
 
-DEMOS: dict[str, Demo] = {demo.name: demo for demo in (SQUASH, STRETCH, COMPLIANCE, BEARS)}
+DEMOS: dict[str, Demo] = {demo.name: demo for demo in (SQUASH, STRETCH, COMPLIANCE, BEARS, CANTILEVER, TWIST)}
 
 
 def find_demo(name: str) -> Demo:

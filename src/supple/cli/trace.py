@@ -1,0 +1,60 @@
+"""`--trace`: every iteration of Newton's method, as a table in a CSV file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from supple.errors import SolverError
+from supple.implicit.solver import Implicit
+from supple.implicit.trace import NewtonRow, trace_csv
+from supple.output.atomic import parent_folder, whole_file
+from supple.simulate import Frame
+from supple.solver import Solver
+
+
+class NewtonTrace:
+    """A sink that keeps the iterations of every frame, and writes them at the end, also where the run stops early.
+
+    Parameters
+    ----------
+    path : of the CSV file; one row for each iteration, the time at the end of its frame [s], then the columns of `NewtonRow`.
+
+    Raises
+    ------
+    OutputError : at the end, where the file cannot be written; at once, where its folder cannot be made.
+    """
+
+    def __init__(self, path: Path) -> None:
+        parent_folder(path)
+        self.path = path
+        self.frames: list[tuple[float, list[NewtonRow]]] = []
+
+    def begin(self, first: Frame, dt: float, steps: int) -> None:
+        """Nothing has been iterated yet."""
+        self.frames.clear()
+
+    def write(self, frame: Frame) -> None:
+        """Keep the rows of a frame."""
+        self.frames.append((frame.time, frame.report.details["newton"]))
+
+    def end(self) -> None:
+        """Write them all."""
+        with whole_file(self.path) as fresh:
+            fresh.write_text(trace_csv(self.frames), encoding="utf-8", newline="\n")
+
+
+def traces(path: Path | None, solver: Solver) -> list[NewtonTrace]:
+    """The sink that `--trace` asks for, if it does.
+
+    Raises
+    ------
+    SolverError : where the solver has no iterations of Newton's method to tell of.
+    """
+    if path is None:
+        return []
+    if not isinstance(solver, Implicit):
+        raise SolverError(
+            f"--trace {path}: {type(solver).__name__} does not use Newton's method; use --solver implicit, or leave "
+            "--trace out"
+        )
+    return [NewtonTrace(path)]
