@@ -38,10 +38,10 @@ from supple.numerics.threads import threads_for
 if TYPE_CHECKING:
     from supple.materials.material import Elastic
 
-_density = dispatch([kind.stretch_functions.density for kind in ELASTIC_MATERIALS], UNKNOWN_ONE)
-_gradient = dispatch([kind.stretch_functions.gradient for kind in ELASTIC_MATERIALS], UNKNOWN_THREE)
-_curvature = dispatch([kind.stretch_functions.curvature for kind in ELASTIC_MATERIALS], UNKNOWN_SIX)
-_quotients = dispatch([kind.stretch_functions.quotients for kind in ELASTIC_MATERIALS], UNKNOWN_SIX)
+_density = dispatch("density", [kind.stretch_functions.density for kind in ELASTIC_MATERIALS], UNKNOWN_ONE)
+_gradient = dispatch("gradient", [kind.stretch_functions.gradient for kind in ELASTIC_MATERIALS], UNKNOWN_THREE)
+_curvature = dispatch("curvature", [kind.stretch_functions.curvature for kind in ELASTIC_MATERIALS], UNKNOWN_SIX)
+_quotients = dispatch("quotients", [kind.stretch_functions.quotients for kind in ELASTIC_MATERIALS], UNKNOWN_SIX)
 
 
 @njit(error_model="numpy")

@@ -67,30 +67,36 @@ def rotation_quotients(s):
     )
 
 
-def dispatch(functions: list[Any], unknown: Any) -> Any:
-    """One compiled function (kind, s, mu, lam) that calls `functions[kind]`, or `unknown` for any other kind."""
-    chosen = _otherwise(unknown)
+def dispatch(name: str, functions: list[Any], unknown: Any) -> Any:
+    """One compiled function (kind, s, mu, lam) that calls `functions[kind]`, or `unknown` for any other kind.
+
+    Parameters
+    ----------
+    name : unique. Every link of the chain is named after it: the linker takes compiled functions of one name for one
+        function, and would confuse the links of kernels that were cached by different processes.
+    """
+    chosen = _otherwise(name, unknown)
     for kind in reversed(range(len(functions))):
-        chosen = _first_or_rest(kind, functions[kind], chosen)
+        chosen = _first_or_rest(f"{name}_{kind}", kind, functions[kind], chosen)
     return chosen
 
 
-def _otherwise(unknown: Any) -> Any:
-    @njit(error_model="numpy")
+def _otherwise(name: str, unknown: Any) -> Any:
     def otherwise(kind, s, mu, lam):
         return unknown
 
-    return otherwise
+    otherwise.__qualname__ = otherwise.__name__ = f"{name}_of_unknown"
+    return njit(error_model="numpy")(otherwise)
 
 
-def _first_or_rest(own_kind: int, first: Any, rest: Any) -> Any:
-    @njit(error_model="numpy")
+def _first_or_rest(name: str, own_kind: int, first: Any, rest: Any) -> Any:
     def choose(kind, s, mu, lam):
         if kind == own_kind:
             return first(s, mu, lam)
         return rest(kind, s, mu, lam)
 
-    return choose
+    choose.__qualname__ = choose.__name__ = f"{name}_or_rest"
+    return njit(error_model="numpy")(choose)
 
 
 UNKNOWN_ONE = float(np.nan)
