@@ -7,14 +7,17 @@ faster one is used.
 
 from __future__ import annotations
 
-# How many frames the slower way rests before it is tried again; twice as many each time that it loses again.
-SHORTEST_REST, LONGEST_REST = 30, 960
+# How many substeps the slower way rests before it is tried again, for one substep; twice as many each time that it
+# loses.
+SHORTEST_REST, LONGEST_REST = 400, 12_800
 # Weight of a new measurement in the average of its way.
-WEIGHT = 0.3
+WEIGHT = 0.1
+# How much slower than the other way was the present one may become before they change places.
+PATIENCE = 1.2
 
 
 class Pace:
-    """Remembers how long frames took either way.
+    """Remembers how long substeps took either way.
 
     Parameters
     ----------
@@ -31,27 +34,34 @@ class Pace:
         self._rested = 0
 
     def choose(self) -> bool:
-        """Whether the next frame should run on several threads."""
+        """Whether the next substep should run on several threads."""
         if not self.choice or self.parallel not in self._seconds:
             return self.parallel
         other = not self.parallel
         return other if other not in self._seconds or self._rested >= self._rest else self.parallel
 
     def note(self, parallel: bool, seconds: float) -> None:
-        """Learn how long a frame took."""
+        """Learn how long a substep took."""
         if not self.choice:
             return
         if parallel not in self._started:
-            self._started.add(parallel)  # the first frame of a way may have waited for the compiler
+            self._started.add(parallel)  # the first one of a way may have waited for the compiler
             return
-        if parallel == self.parallel:
-            before = self._seconds.get(parallel, seconds)
-            self._seconds[parallel] = (1.0 - WEIGHT) * before + WEIGHT * seconds
-            self._rested += 1
+        other = not self.parallel
+        if parallel == other:
+            self._rested = 0
+            self._seconds[other] = seconds
+            if seconds < self._seconds[self.parallel]:
+                self._change(SHORTEST_REST)
+            else:
+                self._rest = min(2 * self._rest, LONGEST_REST)
             return
-        self._rested = 0
-        self._seconds[parallel] = seconds
-        if seconds < self._seconds[self.parallel]:
-            self.parallel, self._rest = parallel, SHORTEST_REST
-        else:
-            self._rest = min(2 * self._rest, LONGEST_REST)
+        before = self._seconds.get(parallel, seconds)
+        self._seconds[parallel] = (1.0 - WEIGHT) * before + WEIGHT * seconds
+        self._rested += 1
+        if self._seconds[parallel] > PATIENCE * self._seconds.get(other, float("inf")):
+            self._change(self._rest)
+
+    def _change(self, rest: int) -> None:
+        self.parallel = not self.parallel
+        self._rest, self._rested = rest, 0

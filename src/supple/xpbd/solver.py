@@ -142,10 +142,10 @@ class XPBD(Solver):
         targets = _pin_targets(ws.system, state.time, h, self.substeps)
         if ws.collisions:
             ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt)
-        parallel = ws.pace.choose()
-        started = perf_counter()
-        with _threads(self.threads, parallel):
+        with _threads(self.threads):
             for k in range(self.substeps):
+                started = perf_counter()
+                parallel = ws.pace.choose()
                 end = state.time + (k + 1) * h
                 _begin_substep(ws, targets[k], h, parallel)
                 ws.external.push(ws.points, ws.velocities, end, h)
@@ -155,10 +155,10 @@ class XPBD(Solver):
                     ws.momentum.apply(ws.points, ws.previous, ws.velocities, h, parallel)
                 else:
                     update_velocities(ws.points, ws.previous, ws.velocities, h)
+                ws.pace.note(parallel, perf_counter() - started)
                 ws.external.pull(ws.points, ws.velocities, ws.origins, end, h)
                 if ws.collisions and not _collide(ws, end, h):
                     break
-        ws.pace.note(parallel, perf_counter() - started)
         lost = first_lost(ws.points, ws.velocities)
         if lost >= 0:
             return state, StepReport(Status.NOT_FINITE, self.substeps, message=_what_is_lost(ws, lost, state.time + dt))
@@ -177,9 +177,9 @@ def _check_count(name: str, value: object) -> None:
 
 
 @contextlib.contextmanager
-def _threads(wanted: int | None, parallel: bool) -> Iterator[None]:
+def _threads(wanted: int | None) -> Iterator[None]:
     """Numba's number of threads set for a block, and set back after it."""
-    if not parallel or wanted is None:
+    if wanted is None or wanted == 1:
         yield
         return
     before = numba.get_num_threads()
