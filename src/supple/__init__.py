@@ -98,7 +98,6 @@ def __dir__() -> list[str]:
 
 
 if TYPE_CHECKING:
-    from supple.mesh import shapes
     from supple.errors import MeshError, MeshingError, OutputError, SceneError, SolverError, SuppleError
     from supple.implicit.solver import Implicit
     from supple.implicit.step_filter import largest_noninverting_step
@@ -109,6 +108,7 @@ if TYPE_CHECKING:
     from supple.materials.regions import Regions
     from supple.materials.st_venant_kirchhoff import StVenantKirchhoff
     from supple.materials.stable_neo_hookean import StableNeoHookean
+    from supple.mesh import shapes
     from supple.mesh.repair import repair_surface
     from supple.mesh.skin import Embedding
     from supple.mesh.surface import SurfaceMesh

@@ -65,8 +65,8 @@ COMPLIANCE = Demo(
     name="compliance",
     summary="three compliances on one floor: one collapses and springs back, one comes to rest",
     explanation=(
-        "Three balls of the same mesh and mass fall on a floor. Only the compliance of their edges differs (2e-5, 2e-4 and "
-        "8e-4 m/N); the volume constraints are rigid in all three and push the collapsed ball up again."
+        "Three balls of the same mesh and mass fall on a floor. Only the compliance of their edges differs "
+        "(2e-5, 2e-4 and 8e-4 m/N); the volume constraints are rigid in all three and push the collapsed ball up again."
     ),
     scene=scene,
     solvers={"xpbd": lambda: XPBD(substeps=40)},
