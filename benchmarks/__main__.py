@@ -1,9 +1,11 @@
 """All benchmarks after each other: `make bench`, or `python -m benchmarks`."""
 
-from benchmarks import hanging_beam, projections, startup
+from benchmarks import hanging_beam, implicit_scaling, projections, startup, work_precision
 
 if __name__ == "__main__":
     startup.main()
     projections.main()
     hanging_beam.main()
     hanging_beam.main(busy=True)
+    work_precision.main()
+    implicit_scaling.main()

@@ -1,4 +1,4 @@
-"""How benchmarks measure: contenders take turns, several rounds, the fastest round counts; and a busy machine on request."""
+"""How benchmarks measure: contenders take turns, the fastest of several rounds counts; and a busy core on request."""
 
 from __future__ import annotations
 

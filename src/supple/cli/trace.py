@@ -17,7 +17,7 @@ class NewtonTrace:
 
     Parameters
     ----------
-    path : of the CSV file; one row for each iteration, the time at the end of its frame [s], then the columns of `NewtonRow`.
+    path : of the CSV file; one row for each iteration: the time at the end of its frame [s], then what `NewtonRow` has.
 
     Raises
     ------
