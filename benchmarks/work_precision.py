@@ -115,7 +115,7 @@ def families(scale: int, quick: bool, threads: int | None) -> list[Family]:
 
 
 def relative_error(found: NDArray[np.float64], reference: NDArray[np.float64]) -> float:
-    """RMS distance at the end, over the mean displacement of the free end; columns: place at rest (3), at the end (3)."""
+    """RMS distance at the end, over the mean displacement of the free end; columns: rest (3), end (3)."""
     rest, end = reference[:, :3], reference[:, 3:]
     tip = rest[:, 0] > rest[:, 0].max() - 1e-4
     moved = np.linalg.norm((end - rest)[tip].mean(axis=0))

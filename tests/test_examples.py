@@ -37,6 +37,13 @@ def test_04_a_block_slides_as_coulomb_says():
     assert run_example("04") == pytest.approx(1.0, rel=0.02)
 
 
+def test_05_a_cantilever_bends_as_beam_theory_says():
+    found = run_example("05")
+    assert found["theory"] == pytest.approx(4.031e-4, rel=1e-4)
+    assert found["coarse"] < 0.85 * found["theory"] < 0.92 * found["theory"] < found["fine"] < found["theory"]
+    assert found["limit"] == pytest.approx(found["theory"], rel=0.03)
+
+
 def test_every_example_is_run_by_a_test_of_this_file():
     numbers = {path.name[:2] for path in EXAMPLES.glob("[0-9]*.py")}
     tested = {name[5:7] for name in globals() if name.startswith("test_0")}

@@ -1,0 +1,135 @@
+"""Demos: each builds on every solver it has, the quick ones run and keep what they claim, and claims can fail."""
+
+import logging
+
+import numpy as np
+import pytest
+
+from supple.demos import cantilever
+from supple.demos.demo import Claim, Demo, Measurement
+from supple.demos.registry import DEMOS, find_demo
+from supple.errors import SceneError, SolverError
+from supple.implicit.solver import Implicit
+from supple.simulate import simulate
+from supple.solver import Solver
+from supple.state import Status
+from supple.system import build_system, initial_state
+from supple.xpbd.solver import XPBD
+
+EVERY = [(name, kind) for name, demo in DEMOS.items() for kind in demo.kinds]
+SOLVERS = {"xpbd": XPBD, "implicit": Implicit}
+
+
+def run(demo, kind, steps=None):
+    demo = demo.on(kind)
+    measurement = demo.measurement()
+    frames = list(simulate(demo.scene(), demo.solver(kind), demo.dt, steps or demo.steps, sinks=[measurement]))
+    return frames, measurement.claims()
+
+
+def test_there_are_six_and_both_solvers_have_some():
+    assert set(DEMOS) == {"squash", "stretch", "compliance", "bears", "cantilever", "twist"}
+    assert {kind for _, kind in EVERY} == set(SOLVERS)
+    assert {("squash", "implicit"), ("stretch", "implicit"), ("squash", "xpbd"), ("stretch", "xpbd")} <= set(EVERY)
+
+
+@pytest.mark.parametrize(("name", "kind"), EVERY)
+def test_builds_with_a_solver_of_that_kind_that_accepts_it(name, kind):
+    demo = find_demo(name).on(kind)
+    assert demo.name == name
+    solver = demo.solver(kind)
+    assert isinstance(solver, SOLVERS[kind])
+    scene = demo.scene()
+    system = build_system(scene, initial_state(scene))
+    assert np.all(system.rest_volumes > 0.0)
+    solver.prepare(system)
+
+
+@pytest.mark.parametrize(("name", "kind"), [pair for pair in EVERY if pair not in {("cantilever", "implicit")}])
+def test_begins_well_and_judges_every_claim(name, kind):
+    frames, claims = run(DEMOS[name], kind, steps=2)
+    assert [frame.report.status for frame in frames] == [Status.CONVERGED] * 2
+    assert all(frame.report.min_det_F > 0.0 for frame in frames)
+    assert len(claims) >= 3
+    assert all(claim.text and claim.measured for claim in claims)
+    assert not all(claim.holds for claim in claims), "two frames cannot have shown everything"
+
+
+def test_cantilever_on_coarser_meshes_approaches_but_is_not_there_yet(monkeypatch):
+    monkeypatch.setattr(cantilever, "MESHES", {"coarse": (16, 3, 1), "medium": (32, 6, 2), "fine": (64, 12, 4)})
+    assert cantilever.beam_theory() == pytest.approx(4.031e-4, rel=1e-4)
+    frames, (below, finest, _) = run(DEMOS["cantilever"], "implicit")
+    assert frames[-1].report.status is Status.CONVERGED
+    assert below.holds
+    assert not finest.holds, "64 x 12 x 4 cells are 6 % too stiff"
+
+
+def test_a_cantilever_that_bends_otherwise_does_not_pass(monkeypatch):
+    monkeypatch.setattr(cantilever, "MESHES", {"coarse": (8, 2, 1), "medium": (16, 3, 1), "fine": (32, 6, 2)})
+    monkeypatch.setattr(cantilever, "beam_theory", lambda: 1e-4)
+    assert not any(claim.holds for claim in run(DEMOS["cantilever"], "implicit")[1])
+
+
+def test_stretch_draws_the_ball_on_both_solvers_to_the_same_shape():
+    lengths = {}
+    for kind in ("xpbd", "implicit"):
+        frames, _ = run(DEMOS["stretch"], kind, steps=30)
+        lengths[kind] = np.ptp(frames[-1].positions["ball"][:, 1])
+    assert lengths["implicit"] == pytest.approx(lengths["xpbd"], rel=0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "kind"), EVERY)
+def test_every_claim_of_the_whole_demo_holds(name, kind):
+    _, claims = run(DEMOS[name], kind)
+    assert [claim for claim in claims if not claim.holds] == []
+
+
+def test_an_unknown_demo_and_a_solver_it_has_not_are_refused():
+    with pytest.raises(SceneError, match=r"there is no demo 'squish'; there are squash, stretch"):
+        find_demo("squish")
+    with pytest.raises(SolverError, match=r"demo 'bears': there is no solver 'implicit' for it; it has xpbd"):
+        DEMOS["bears"].on("implicit")
+    with pytest.raises(SolverError, match=r"demo 'twist': there is no solver 'xpbd' for it; it has implicit"):
+        DEMOS["twist"].solver("xpbd")
+
+
+def test_a_scene_with_obstacles_is_refused_by_implicit_in_one_line():
+    with pytest.raises(SolverError, match=r"obstacle 'floor'.*no contact") as refused:
+        simulate(DEMOS["squash"].scene(), Implicit(), 1 / 60, 1)
+    assert "\n" not in str(refused.value)
+
+
+class Nothing(Measurement):
+    """Claims two things, of which one is false."""
+
+    def claims(self):
+        moved = self.last.index - self.first.index
+        return [Claim("one frame passes", str(moved), moved == 1), Claim("ten frames pass", str(moved), moved == 10)]
+
+
+def made_up(scene, solver: Solver) -> Demo:
+    return Demo("made up", "for a test", "A test.", scene, {"xpbd": lambda: solver}, Nothing, 1 / 60, 1)
+
+
+def test_a_claim_that_does_not_hold_is_reported_as_such(monkeypatch, capfd, tmp_path):
+    from supple.cli.app import main
+
+    demo = made_up(DEMOS["stretch"].scene, XPBD(substeps=2))
+    assert [claim.holds for claim in run(demo, "xpbd")[1]] == [True, False]
+    monkeypatch.setitem(DEMOS, "made", demo)
+    code = main(["demo", "made", "-q", "--no-page", "--no-plot", "-o", str(tmp_path)])
+    assert code == 0, "the run was good; what it showed is in the text"
+    assert capfd.readouterr().out.splitlines() == [
+        "holds: one frame passes (1)",
+        "does not hold: ten frames pass (1)",
+    ]
+
+
+def test_newton_iterations_go_to_the_log_at_debug(caplog):
+    with caplog.at_level(logging.DEBUG, logger="supple.implicit.newton"):
+        frames, _ = run(DEMOS["twist"], "implicit", steps=1)
+    logged = [record.getMessage() for record in caplog.records if record.name == "supple.implicit.newton"]
+    rows = [row for row in frames[0].report.details["newton"] if row.kind == "newton"]
+    assert len(rows) >= 1
+    assert sum("iteration=" in line for line in logged) == len(rows)
