@@ -20,6 +20,9 @@ from supple.solver import Solver
 from supple.state import State, Status, StepReport
 from supple.system import System, build_system, initial_state
 
+# Beyond these, dt^2 and 1 / dt^2 leave what float64 can hold.
+_DT_RANGE = (1e-30, 1e30)
+
 
 @dataclass(frozen=True, eq=False)
 class Report(Diagnostics):
@@ -136,6 +139,8 @@ def simulate(
         raise SolverError(f"simulate: the solver is {solver!r}; give XPBD(...) or Implicit(...)")
     if isinstance(dt, bool) or not isinstance(dt, (int, float, np.number)) or not math.isfinite(dt) or dt <= 0.0:
         raise SolverError(f"simulate: dt is {dt!r}; it must be finite and above zero [s]")
+    if not _DT_RANGE[0] <= dt <= _DT_RANGE[1]:
+        raise SolverError(f"simulate: dt is {dt!r}; it must be between {_DT_RANGE[0]:g} and {_DT_RANGE[1]:g} s")
     if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 0:
         raise SolverError(f"simulate: steps is {steps!r}; give a whole number of zero or more")
     if start is not None and (initial_positions is not None or initial_velocities is not None):

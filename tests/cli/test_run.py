@@ -136,6 +136,36 @@ def test_a_full_disk_keeps_the_frames_before_it(folder, capfd, monkeypatch):
     assert listing(folder / "out") == ["recording.vtkhdf"]
 
 
+@pytest.mark.parametrize(
+    ("option", "text", "reason"),
+    [
+        ("--steps", "1.5", "not a whole number"),
+        ("--steps", "1e3", "not a whole number"),
+        ("--steps", "many", "not a whole number"),
+        ("--steps", "-1", "zero or more"),
+        ("--dt", "1/0", "neither a number nor a fraction"),
+        ("--dt", "1/2/3", "neither a number nor a fraction"),
+        ("--dt", "1 s", "neither a number nor a fraction"),
+        ("--dt", "-0.5", "above zero"),
+        ("--dt", "inf", "finite"),
+        ("--dt", "1e300", "between"),
+        ("--dt", "5e-324", "between"),
+    ],
+)
+def test_numbers_are_read_strictly(folder, capfd, option, text, reason):
+    assert main(["run", "scene.yaml", "-q", option, text]) == ExitCode.INPUT
+    err = capfd.readouterr().err
+    assert reason in err
+    assert err.count("\n") == 1
+    assert listing(folder) == ["scene.yaml"]
+
+
+def test_dt_may_be_a_fraction(folder):
+    assert main(["run", "scene.yaml", "-q", "--no-page", "--no-plot", "--steps", "2", "--dt", "1/30"]) == ExitCode.OK
+    with read_recording("out/recording.vtkhdf") as recording:
+        assert recording.times.tolist() == [0.0, 1 / 30, 2 / 30]
+
+
 @pytest.mark.skipif(os.name != "posix", reason="SIGINT is sent otherwise elsewhere")
 def test_a_real_ctrl_c(folder):
     arguments = [sys.executable, "-m", "supple", "run", "scene.yaml", "--steps", "1000000", "-q"]

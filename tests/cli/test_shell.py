@@ -106,6 +106,14 @@ def test_as_a_process():
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.parametrize(("arguments", "code"), [(["--version"], ExitCode.OK), (["shema"], ExitCode.INPUT)])
+def test_closed_outputs_are_no_error(monkeypatch, arguments, code):
+    """`supple ... >&- 2>&-`: Python sets both to None then."""
+    monkeypatch.setattr(sys, "stdout", None)
+    monkeypatch.setattr(sys, "stderr", None)
+    assert main(arguments) == code
+
+
 @pytest.mark.skipif(os.name != "posix", reason="pipes end otherwise elsewhere")
 @pytest.mark.parametrize("arguments", [["--help"], ["schema"]])
 def test_a_reader_that_leaves_is_no_error(arguments):

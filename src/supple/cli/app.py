@@ -7,6 +7,7 @@ import logging
 import os
 import sys
 from collections.abc import Sequence
+from typing import TextIO
 
 from cyclopts import App
 from cyclopts.exceptions import CycloptsError
@@ -49,6 +50,11 @@ def _log_level() -> int:
     return logging.getLevelNamesMapping().get(os.environ.get("SUPPLE_LOG", "").upper(), logging.WARNING)
 
 
+def _flush(stream: TextIO | None) -> None:
+    if stream is not None:  # else closed by the caller: there is nobody to tell
+        stream.flush()
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run `supple` with the given arguments, or those of the process; returns the exit code."""
     logging.basicConfig(level=_log_level(), format="%(levelname)s: %(message)s")
@@ -58,7 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             _ = app[name]  # loads it, so that the list of commands can say what each of them does
     try:
         code = app(given)
-        sys.stdout.flush()
+        _flush(sys.stdout)
     except SuppleError as error:
         complain(str(error))
         return ExitCode.INPUT

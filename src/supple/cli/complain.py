@@ -13,6 +13,8 @@ def one_line(message: str) -> str:
 
 def complain(message: str) -> None:
     """Write `supple: message` to stderr, on one line."""
+    if sys.stderr is None:  # closed by the caller
+        return
     text = f"supple: {one_line(message)}\n"
     try:
         sys.stderr.write(text)

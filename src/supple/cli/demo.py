@@ -8,6 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from supple.cli.exit_codes import ExitCode
+from supple.cli.numbers import Steps
 
 
 def demo(
@@ -16,7 +17,7 @@ def demo(
     *,
     list_: Annotated[bool, Parameter(name=["--list", "-l"], negative="")] = False,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
-    steps: int | None = None,
+    steps: Steps = None,
     solver: str | None = None,
     trace: Path | None = None,
     page: bool = True,

@@ -7,14 +7,16 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from supple.cli.numbers import Seconds, Steps
+
 
 def run(
     scene: Path,
     /,
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"])] = Path("out"),
-    steps: int | None = None,
-    dt: float | None = None,
+    steps: Steps = None,
+    dt: Seconds = None,
     solver: str | None = None,
     trace: Path | None = None,
     page: bool | None = None,
@@ -34,7 +36,7 @@ def run(
     steps
         Number of frames, instead of the file's.
     dt
-        Time from frame to frame [s], instead of the file's.
+        Time from frame to frame [s], instead of the file's; 1/60 may be written as such.
     solver
         Kind of solver, instead of the file's, with its default parameters.
     trace

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from supple.scene_file.bodies import BodyModel
+from supple.scene_file.fraction import number_or_fraction
 from supple.scene_file.model import Model, Vector
 from supple.scene_file.obstacles import ObstacleModel
 from supple.scene_file.selections import ForceModel, PinModel, SoftTargetModel
@@ -17,11 +18,10 @@ MAX_STEPS = 10_000_000
 
 def _seconds(value: Any) -> Any:
     """A time [s], also as a fraction: `1/60`."""
-    if isinstance(value, str) and value.count("/") == 1:
-        above, below = value.split("/")
+    if isinstance(value, str) and "/" in value:
         try:
-            return float(above) / float(below)
-        except (ValueError, ZeroDivisionError):
+            return number_or_fraction(value)
+        except ValueError:
             return value
     return value
 

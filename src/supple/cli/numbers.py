@@ -1,0 +1,32 @@
+"""Numbers on the command line, read as strictly as those of a scene file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+from cyclopts import Parameter, Token
+
+
+def whole_number(_: Any, tokens: Sequence[Token]) -> int:
+    """A count. Nothing is rounded: 1.5 is no number of frames."""
+    text = tokens[0].value
+    try:
+        return int(text)
+    except ValueError:
+        raise ValueError(f"{text!r} is not a whole number") from None
+
+
+def seconds(_: Any, tokens: Sequence[Token]) -> float:
+    """A time [s], also as a fraction: 1/60."""
+    from supple.scene_file.fraction import number_or_fraction
+
+    text = tokens[0].value
+    try:
+        return number_or_fraction(text)
+    except ValueError:
+        raise ValueError(f"{text!r} is neither a number nor a fraction such as 1/60") from None
+
+
+Steps = Annotated[int | None, Parameter(converter=whole_number)]
+Seconds = Annotated[float | None, Parameter(converter=seconds)]
