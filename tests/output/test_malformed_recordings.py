@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from supple.errors import OutputError
+from supple.output.export import export
 from supple.output.recording_reader import read_recording
 
 
@@ -178,3 +179,15 @@ def test_files_that_may_not_be_read(tmp_path: Path, recorded):
     path.chmod(0)
     with pytest.raises(OutputError, match="permission denied"):
         read_recording(path)
+
+
+def test_a_recording_whose_names_are_damaged_is_not_copied(tmp_path, recorded):
+    """Nothing that is shown needs this name, so the file opens; HDF5 meets it when all of it is copied."""
+    data = recorded[0].read_bytes()
+    name = b"NumberOfCells\0"
+    assert name in data
+    (tmp_path / "r.vtkhdf").write_bytes(data.replace(name, b"\xff" * 13 + b"\0"))
+    with pytest.raises(OutputError, match=r"^\S*r\.vtkhdf: is damaged: ") as caught:
+        export(tmp_path / "r.vtkhdf", "vtkhdf")
+    assert "\n" not in str(caught.value)
+    assert [path.name for path in tmp_path.iterdir()] == ["r.vtkhdf"]

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -15,6 +16,8 @@ import pytest
 import supple as sp
 from supple.errors import OutputError
 from supple.output import recording as recording_module
+from supple.output import recording_file
+from supple.output.export import export
 from supple.output.recording import Recorder
 from supple.output.recording_file import RecordingFile
 from supple.output.recording_reader import read_recording
@@ -299,6 +302,33 @@ def test_no_room_at_the_start_leaves_nothing(tmp_path, tools, monkeypatch):
     monkeypatch.setattr(RecordingFile, "_write", no_room)
     with pytest.raises(OutputError, match="No space left"):
         tools.record(tmp_path / "full.vtkhdf", 10)
+    assert list(tmp_path.iterdir()) == []
+
+
+class FullDisk:
+    """A disk on which files beside `folder` may take `room` more bytes."""
+
+    def __init__(self, folder, room):
+        self.folder, self.room = folder, room
+
+    def __call__(self, path):
+        used = sum(file.stat().st_blocks * 512 for file in self.folder.iterdir())
+        return SimpleNamespace(free=max(0, self.room - used))
+
+
+@pytest.mark.parametrize("room", [0, 1 << 12, 1 << 16])
+def test_a_disk_too_full_for_the_scene_is_said_before_hdf5_meets_it(tmp_path, tools, monkeypatch, room):
+    monkeypatch.setattr(recording_file.shutil, "disk_usage", FullDisk(tmp_path, room))
+    with pytest.raises(OutputError, match=r"full\.vtkhdf: cannot be written: No space left"):
+        tools.record(tmp_path / "full.vtkhdf", 10)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_disk_too_full_for_a_copy_is_said_before_hdf5_meets_it(tmp_path, monkeypatch, recorded):
+    with read_recording(recorded[0]) as recording:
+        monkeypatch.setattr(recording_file.shutil, "disk_usage", FullDisk(tmp_path, 80_000))
+        with pytest.raises(OutputError, match=r"small\.vtkhdf: cannot be written: No space left"):
+            export(recording, "vtkhdf", tmp_path / "small.vtkhdf")
     assert list(tmp_path.iterdir()) == []
 
 

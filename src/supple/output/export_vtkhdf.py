@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from supple.errors import OutputError
 from supple.output.atomic import whole_file
 from supple.output.recording import frame_layout
 from supple.output.recording_file import rewrite
@@ -11,7 +12,16 @@ from supple.output.recording_reader import Recording
 
 
 def write_vtkhdf(recording: Recording, output: Path) -> None:
-    """Copy every whole frame to a compressed VTKHDF file."""
+    """Copy every whole frame to a compressed VTKHDF file.
+
+    Raises
+    ------
+    OutputError : where the recording is damaged, or the file cannot be written.
+    """
     layout = frame_layout(len(recording.rest_positions), len(recording.tets), len(recording.obstacles))
     with whole_file(output) as fresh:
-        rewrite(recording.path, fresh, layout, None, compress=True)
+        try:
+            rewrite(recording.path, fresh, layout, None, compress=True)
+        except (KeyError, RuntimeError, TypeError, ValueError) as error:
+            said = " ".join(str(error).split())
+            raise OutputError(f"{recording.path}: is damaged: {said}; copy or record it again") from None

@@ -15,8 +15,10 @@ version 1) and IV.A.2.b (dataspace message, version 1).
 from __future__ import annotations
 
 import copy
+import errno
 import mmap
 import os
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,6 +35,8 @@ WRITTEN = "supple/frames_written"
 STEP_TIMES, _TIMES = "VTKHDF/Steps/Values", "supple/frames/time"
 _STEPS_MARK = 0x7375_7070_6C65_2121  # stands for NSteps until its place is known
 _COPY_BYTES = 1 << 24
+_STEP_COLUMNS = 5  # different ones in VTKHDF/Steps
+_SPARE_ROOM = 1 << 16  # for what HDF5 writes beside the numbers
 
 
 @dataclass(frozen=True)
@@ -136,6 +140,12 @@ class RecordingFile:
 
 def create(path: Path, layout: Layout, capacity: int, write_static: Callable[[h5py.File], None]) -> None:
     """Lay out a file with room for `capacity` frames and none written; `write_static` adds all that does not change."""
+    # Drawn up in memory first, for its size.
+    with h5py.File(path, "w", driver="core", backing_store=False) as draft:
+        write_static(draft)
+        draft.flush()
+        static_bytes = len(draft.id.get_file_image())
+    _require_room(path, static_bytes + _STEP_COLUMNS * 8 * capacity + layout.frame_bytes)
     with h5py.File(path, "w", libver=("earliest", "v110")) as file:
         _write_step_count(file, _STEPS_MARK)
         write_static(file)
@@ -149,7 +159,13 @@ def rewrite(source: Path, target: Path, layout: Layout, capacity: int | None, *,
     """Copy a recording's whole frames to a file with another capacity; with None, to one that has no room for more.
 
     With `compress`, the series are stored in gzip chunks, one per frame; nothing can be added to them then.
+
+    Raises
+    ------
+    OSError : where there is no room.
+    RuntimeError, TypeError, ValueError, KeyError : from HDF5, where the source is damaged.
     """
+    _require_room(target, _STEP_COLUMNS * 8 * (capacity or 1))
     with h5py.File(source, "r", locking=False) as old, h5py.File(target, "w", libver=("earliest", "v110")) as new:
         written = int(_dataset(old, WRITTEN)[()])
         _write_step_count(new, _STEPS_MARK if capacity else written)
@@ -172,8 +188,15 @@ def rewrite(source: Path, target: Path, layout: Layout, capacity: int | None, *,
                 data = _reserve(new, series, shape)
             step = max(1, _COPY_BYTES // max(1, series.frame_bytes)) * series.rows
             for row in range(0, rows if 0 not in shape else 0, step):
+                _require_room(target, step * series.frame_bytes // max(1, series.rows))
                 data[row : min(row + step, rows)] = source_data[row : min(row + step, rows)]
         _write_steps(new, layout, capacity or written)
+
+
+def _require_room(path: Path, size: int) -> None:
+    """Raise `OSError` unless `size` more bytes fit beside `path`: HDF5 itself crashes on a full disk."""
+    if shutil.disk_usage(path.parent).free < size + _SPARE_ROOM:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
 def _copy_static(old: h5py.Group, new: h5py.Group, where: str, series: set[str]) -> None:
@@ -186,6 +209,7 @@ def _copy_static(old: h5py.Group, new: h5py.Group, where: str, series: set[str])
         if isinstance(item, h5py.Group):
             _copy_static(item, new.require_group(name), f"{path}/", series)
         else:
+            _require_room(Path(new.file.filename), item.id.get_storage_size())
             old.copy(item, new, name)
 
 
