@@ -130,6 +130,7 @@ def test_the_same_bits_every_time(make):
         (lambda: shapes.sphere(1, "a"), "edge_length is 'a'"),  # pyright: ignore[reportArgumentType]
         (lambda: shapes.sphere(1, 2), "shorter"),
         (lambda: shapes.sphere(1, 1e-5), "longer"),
+        (lambda: shapes.sphere(1e200, 0.1), "makes inf elements"),
         (lambda: shapes.cylinder(1, np.inf), "height is inf"),
         (lambda: shapes.cylinder(1, 0.1, 0.2), "height = 0.1"),
         (lambda: shapes.cylinder(1, 1, 1e-4), "longer"),

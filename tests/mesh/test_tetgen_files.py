@@ -104,6 +104,15 @@ def test_comments_blank_lines_attributes_and_markers(tmp_path: Path) -> None:
     assert family.faces is None
 
 
+def test_a_byte_order_mark_and_dos_line_ends_are_read_over(tmp_path: Path) -> None:
+    """What Windows' editors leave behind."""
+    dos = {"node": b"\xef\xbb\xbf" + NODE.replace("\n", "\r\n").encode(), "ele": b"\xef\xbb\xbf" + ELE.strip().encode()}
+    mesh = read_tetgen(write_family(tmp_path, **dos))
+    np.testing.assert_array_equal(mesh.vertices, POINTS)
+    with pytest.raises(MeshError, match=r"two\.1\.node:2: .* 0xef"):
+        read_tetgen(write_family(tmp_path, node=NODE.encode().replace(b"\n1 ", b"\n\xef\xbb\xbf1 ", 1)))
+
+
 def test_short_headers_and_neighbour_columns_of_tetgen(tmp_path: Path) -> None:
     # TetGen -nn appends the tets on both sides of a face, and one tet of an edge.
     face = "2 1\n1 1 3 2 1 1 -1\n2 2 3 4 0 1 2\n"

@@ -47,7 +47,9 @@ def stuff(
     """
     low, high = bounds
     spacing = edge_length / MEAN_EDGE
-    not_too_many(owner, 12.0 * float(np.prod((high - low) / spacing + 3.0)), "make edge_length longer")
+    with np.errstate(over="ignore"):
+        elements = 12.0 * float(np.prod((high - low) / spacing + 3.0))
+    not_too_many(owner, elements, "make edge_length longer")
     points, tets = _lattice(low, high, spacing)
     values = inside(points)
     # Only tets that reach inside matter.
