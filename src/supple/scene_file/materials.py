@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
 from pydantic import Field, create_model
 
-from supple.materials.arap import ARAP
 from supple.materials.edges_and_volume import EdgesAndVolume
-from supple.materials.fixed_corotated import FixedCorotated
-from supple.materials.material import Material
-from supple.materials.neo_hookean import NeoHookean
-from supple.materials.st_venant_kirchhoff import StVenantKirchhoff
-from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.materials.material import Elastic, Material
+from supple.materials.registry import ELASTIC_MATERIALS
 from supple.scene_file.model import Model, NonNegative, Positive
 
-ELASTIC_KINDS = {
-    "stable_neo_hookean": StableNeoHookean,
-    "neo_hookean": NeoHookean,
-    "fixed_corotated": FixedCorotated,
-    "arap": ARAP,
-    "st_venant_kirchhoff": StVenantKirchhoff,
-}
+
+def _kind(material: type[Elastic]) -> str:
+    """A class's name as scene files write it: StableNeoHookean is stable_neo_hookean."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", material.__name__).lower()
+
+
+ELASTIC_KINDS = {_kind(material): material for material in ELASTIC_MATERIALS}
 
 
 class _MaterialModel(Model):
