@@ -1,6 +1,6 @@
 """Hanging beam in Supple. Prints one JSON line.
 
-usage: our_beam.py xpbd SCALE SUBSTEPS FRAMES [POSITIONS.npy]
+usage: our_beam.py xpbd|xpbd_without_contact SCALE SUBSTEPS FRAMES [POSITIONS.npy]
        our_beam.py implicit SCALE STEP INTEGRATOR TOLERANCE FRAMES [POSITIONS.npy]
 SCALE 1 -> 1,152 tets, 2 -> 9,216; frames are of 1/60 s, STEP in seconds; TOLERANCE 0 is the solver's own.
 """
@@ -39,9 +39,10 @@ def peak_megabytes() -> float | None:
 
 def main() -> None:
     kind, scale = sys.argv[1], int(sys.argv[2])
-    if kind == "xpbd":
+    if kind != "implicit":
         substeps, frames, *rest = sys.argv[3:]
-        solver: sp.XPBD | sp.Implicit = sp.XPBD(substeps=int(substeps))
+        contact = {"xpbd": sp.XPBD().contact, "xpbd_without_contact": None}[kind]
+        solver: sp.XPBD | sp.Implicit = sp.XPBD(substeps=int(substeps), contact=contact)
         dt = 1 / 60
     else:
         step, integrator, tolerance, frames, *rest = sys.argv[3:]
