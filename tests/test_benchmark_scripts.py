@@ -1,0 +1,50 @@
+"""The benchmarks' own beam runs on both solvers, and errors are measured as they say."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture(autouse=True)
+def _benchmarks_can_be_imported(monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT))
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["xpbd", "1", "5", "2"],
+        ["xpbd_without_contact", "1", "5", "2"],
+        ["implicit", "1", repr(1 / 120), "newmark", "0", "2"],
+    ],
+    ids=lambda arguments: arguments[0],
+)
+def test_the_beam_falls_and_its_positions_are_kept(arguments, monkeypatch, capsys, tmp_path):
+    from benchmarks import our_beam
+
+    file = tmp_path / "positions.npy"
+    monkeypatch.setattr(sys, "argv", ["our_beam.py", *arguments, str(file)])
+    our_beam.main()
+    said = json.loads(capsys.readouterr().out)
+    assert said["tets"] == 1152
+    assert said["finite"]
+    assert said["statuses"] == ["converged"]
+    kept = np.load(file)
+    drop = (kept[:, 1] - kept[:, 4])[kept[:, 0] > 0.59].mean()
+    assert drop == pytest.approx(0.5 * 9.81 * (2 / 60) ** 2, rel=0.3)  # as in free fall: the wall is not felt yet
+
+
+def test_errors_are_relative_to_the_tip():
+    from benchmarks.work_precision import relative_error
+
+    rest = np.array([[0.0, 0, 0], [1.0, 0, 0]])
+    end = np.array([[0.0, 0, 0], [1.0, -0.5, 0]])
+    reference = np.hstack([rest, end])
+    assert relative_error(reference, reference) == 0.0
+    off = np.hstack([rest, end + np.array([0, 0.05, 0])])
+    assert relative_error(off, reference) == pytest.approx(0.1)
