@@ -82,6 +82,16 @@ def test_a_second_run_replaces_the_first(folder):
         assert len(recording) == 3
 
 
+def test_a_page_of_an_earlier_run_is_pointed_out(folder, caplog):
+    (folder / "out").mkdir()
+    (folder / "out" / "index.html").write_text("older")
+    assert main(["run", "scene.yaml", "-q", "--no-page", "--no-plot", "--steps", "1"]) == ExitCode.OK
+    assert [record.getMessage() for record in caplog.records] == [
+        f"{os.path.join('out', 'index.html')} shows an earlier run"
+    ]
+    assert (folder / "out" / "index.html").read_text() == "older"
+
+
 def test_a_deformed_start_is_where_the_recording_begins(folder):
     (folder / "scene.yaml").write_text(SCENE.replace("    position", "    initial: {scale: [1, 0.5, 1]}\n    position"))
     assert main(["run", "scene.yaml", "-q", "--no-page", "--no-plot", "--steps", "1"]) == ExitCode.OK

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from supple.errors import OutputError
+from supple.output import plots
 from supple.output.plots import plot_recording, volume_ratios
 
 
@@ -43,3 +44,19 @@ def test_pyplot_is_left_alone(tmp_path, recorded):
 
     plot_recording(recorded[0], tmp_path / "plot.png")
     assert plt.get_fignums() == []
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-7, 1e9])
+def test_the_legend_leaves_the_power_of_ten_alone(size):
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.0, 3.0), layout="constrained")
+    canvas = FigureCanvasAgg(figure)
+    axis = figure.subplots()
+    plots._momentum(axis, np.arange(3.0), size * np.arange(9.0).reshape(3, 3), "momentum")
+    canvas.draw()
+    power = axis.yaxis.get_offset_text()
+    assert bool(power.get_text()) == (size != 1.0)
+    legend = axis.get_legend().get_window_extent()
+    assert not power.get_text() or not legend.overlaps(power.get_window_extent())

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,8 @@ from supple.cli.exit_codes import ExitCode
 from supple.scene.scene import Scene
 from supple.simulate import Frame, Sink, simulate
 from supple.solver import Solver
+
+logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -83,6 +86,7 @@ def run_session(
             outcome.worst_J = min(outcome.worst_J, frame.report.min_det_F)
     except KeyboardInterrupt:
         frames.close()
+        _tell_of_older(replace(products, page=False, plot=False))
         complain(f"interrupted; {recording} holds the {outcome.frames} frames up to here")
         outcome.code = ExitCode.INTERRUPTED
         return outcome
@@ -90,10 +94,19 @@ def run_session(
         report = outcome.last.report
         outcome.code = ExitCode.SOLVER
         complain(f"stopped at frame {outcome.last.index} ({report.status}): {report.message}; {recording} is whole")
+    _tell_of_older(products)
     _write_products(recording, products)
     if not products.quiet:
         _tell(outcome, recording, products)
     return outcome
+
+
+def _tell_of_older(products: Products) -> None:
+    """Say which files beside the new recording show another one."""
+    for wanted, name in ((products.page, "index.html"), (products.plot, "plot.png")):
+        path = products.folder / name
+        if not wanted and path.exists():
+            logger.warning("%s shows an earlier run", path)
 
 
 def _write_products(recording: Path, products: Products) -> None:

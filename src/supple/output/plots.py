@@ -15,8 +15,8 @@ from supple.output.recording_reader import Recording
 
 _KINDS = ("png", "pdf", "svg")
 _LEGEND: dict[str, Any] = {  # above the lines, not on them
-    "loc": "lower left",
-    "bbox_to_anchor": (0.0, 1.0),
+    "loc": "lower right",  # a power of ten may stand on the left
+    "bbox_to_anchor": (1.0, 1.0),
     "borderaxespad": 0.0,
     "ncols": 8,
     "frameon": False,

@@ -55,10 +55,3 @@ def positive(value: object, what: str) -> float:
     if number <= 0.0:
         raise SceneError(f"{what} is {number:g}; it must be above zero")
     return number
-
-
-def positive_integer(value: object, what: str) -> int:
-    """`value` as an int of one or more."""
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or int(value) < 1:
-        raise SceneError(f"{what} is {value!r}; give a whole number of one or more")
-    return int(value)

@@ -35,11 +35,6 @@ class _SelectionModel(Model):
             raise ValueError("give the vertices by either `vertices` or `box`")
         return self
 
-    @property
-    def selection_key(self) -> str:
-        """The key that says which vertices are meant."""
-        return "vertices" if self.box is None else "box"
-
     def selection(self) -> Selection:
         if self.box is not None:
             with at("box"):
