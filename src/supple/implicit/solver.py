@@ -90,7 +90,9 @@ class Implicit(Solver):
         if system.obstacles:
             raise SolverError(f"{system.obstacles[0].label}: Implicit has no contact yet; use XPBD, or take it out")
         if len(system.bodies) > 1:
-            logger.warning("Implicit has no contact yet: the scene's %d bodies pass through each other", len(system.bodies))
+            logger.warning(
+                "Implicit has no contact yet: the scene's %d bodies pass through each other", len(system.bodies)
+            )
         method = integrator_of(self.integrator)
         free_motion = FreeMotion.of(system)
         if isinstance(method, Static) and len(free_motion.totals):
