@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.measuring import PEERS_PYTHON, peers_installed, run_json
+from benchmarks.measuring import PEERS_PYTHON, in_turns, peers_installed, run_json
 
 HERE = Path(__file__).parent
 FRAMES = 20
@@ -145,10 +145,13 @@ def measure(family: Family, rounds: int, folder: Path) -> tuple[list[Row], NDArr
 
 def converged_step(scale: int, threads: int | None) -> None:
     """A converged step of 1/60 s beside MuJoCo's `discrete` one."""
-    ours = run_json(
-        sys.executable, HERE / "our_beam.py", "implicit", scale, 1 / 60, "backward_euler", 0, FRAMES, threads=threads
-    )
-    theirs = run_json(PEERS_PYTHON, HERE / "peers" / "mujoco_beam.py", scale, 1 / 60, "discrete", FRAMES)
+    implicit = ("implicit", scale, 1 / 60, "backward_euler", 0, FRAMES)
+    contenders = {
+        "ours": lambda: run_json(sys.executable, HERE / "our_beam.py", *implicit, threads=threads),
+        "theirs": lambda: run_json(PEERS_PYTHON, HERE / "peers" / "mujoco_beam.py", scale, 1 / 60, "discrete", FRAMES),
+    }
+    best = in_turns(contenders, 3)
+    ours, theirs = best["ours"], best["theirs"]
     a, b = ours["ms_per_step"], theirs["ms_per_frame"]
     print(
         f"\nA step of 1/60 s: Supple Implicit {a:.1f} ms ({ours['tets']} tets, {', '.join(ours['statuses'])}, "
