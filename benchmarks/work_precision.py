@@ -96,7 +96,8 @@ def families(scale: int, quick: bool, threads: int | None) -> list[Family]:
         ),
         Family(
             "Newton VBD",
-            ("40 x 20" if quick else "80 x 20", newton("vbd", 40 if quick else 80, 20)),
+            # With more substeps it leaves its own limit: 80 x 20 ends 4 % away from 40 x 20, which 20 x 20 is near.
+            ("40 x 20", newton("vbd", 40, 20)),
             {f"{n} substeps x {k} iterations": newton("vbd", n, k) for n, k in ((5, 5), (10, 10), (20, 10), (20, 20))},
         ),
         Family(
