@@ -27,6 +27,7 @@ class ConstraintSet(Protocol):
     """All constraints of one kind in a scene, sorted for projection."""
 
     count: int
+    work: int  # what a sweep costs, in edges or volumes
     damped: bool
 
     def project(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:

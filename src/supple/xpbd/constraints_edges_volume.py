@@ -40,7 +40,7 @@ class EdgeConstraints:
         # Unsigned indices spare the kernel the test for Python's negative ones.
         self.ends = np.ascontiguousarray(system.edges[rows], dtype=np.uint32)
         self.rest = np.ascontiguousarray(system.rest_lengths[rows])
-        self.count = len(rows)
+        self.count = self.work = len(rows)
         self.damped = bool(self.table[:, 1].any())
 
     def project(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:
@@ -65,7 +65,7 @@ class VolumeConstraints:
         rows = rows[self.segments.order]
         self.corners = np.ascontiguousarray(system.tets[rows], dtype=np.uint32)
         self.rest = np.ascontiguousarray(6.0 * system.rest_volumes[rows])
-        self.count = len(rows)
+        self.count = self.work = len(rows)
         self.damped = bool(self.table[:, 1].any())
 
     def project(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:

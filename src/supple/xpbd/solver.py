@@ -38,7 +38,7 @@ from supple.xpbd.momentum import MomentumRestore
 from supple.xpbd.ordering import Layout, make_layout, reordered
 from supple.xpbd.pace import Pace
 
-# Below this many constraints a sweep is over before a second thread has woken up.
+# Below this much work, in edges or volumes, a sweep is over before a second thread has woken up.
 PARALLEL_FROM = 20_000
 _MOST_THREADS: int = config.NUMBA_NUM_THREADS  # pyright: ignore[reportAttributeAccessIssue]
 
@@ -122,7 +122,7 @@ class XPBD(Solver):
         points = np.zeros((len(system.masses), 4))
         points[:, 3] = inner.inverse_masses
         threads = self.threads or numba.get_num_threads()
-        large = sum(made.count for made in sets) >= PARALLEL_FROM
+        large = sum(made.work for made in sets) >= PARALLEL_FROM
         parallel = threads > 1 and (large or self.threads is not None)
         return XPBDWorkspace(
             system=inner,
