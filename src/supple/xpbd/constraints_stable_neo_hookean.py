@@ -81,7 +81,7 @@ class StableNeoHookeanConstraints:
         if shortened > 0.5:
             logger.warning(
                 "XPBD: %.0f %% of the stable Neo-Hookean tets are too stiff, or too light, for substeps of %.3g s and "
-                "act softer than they are; about %.1f times as many substeps give them their stiffness",
+                "act softer than they are; about %.3g times as many substeps give them their stiffness",
                 100.0 * shortened,
                 h,
                 np.sqrt(np.quantile(stiffness, 0.9)),
