@@ -179,7 +179,9 @@ def test_dt_may_be_a_fraction(folder):
 @pytest.mark.skipif(os.name != "posix", reason="SIGINT is sent otherwise elsewhere")
 def test_a_real_ctrl_c(folder):
     arguments = [sys.executable, "-m", "supple", "run", "scene.yaml", "--steps", "1000000", "-q"]
-    process = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    # Whoever runs the tests in the background may have had SIGINT ignored; a person at a terminal has not.
+    heard = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731
+    process = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heard)
     deadline = time.monotonic() + 120
     while not (folder / "out" / "recording.vtkhdf").exists() and time.monotonic() < deadline:
         time.sleep(0.05)
