@@ -140,6 +140,7 @@ def test_cantilever_approaches_timoshenko_from_below():
         (sp.StableNeoHookean, 1.001, 99.914386, 0.99960022),
         (sp.StableNeoHookean, 1.5, 36640.21164, 0.843274043),
         (sp.StableNeoHookean, 0.5, -96428.571429, 1.264911064),
+        (sp.StableNeoHookean, 2.0, 61607.142857, 0.741619849),
         (NeoHookean, 0.5, -102511.146197, 1.298135604),
         (NeoHookean, 1.5, 36529.447838, 0.84602789),
     ],
