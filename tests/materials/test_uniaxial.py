@@ -30,7 +30,6 @@ def uniaxial(material, stretch):
         (StableNeoHookean, 1.5, 36640.21164, 0.843274043),
         (StableNeoHookean, 0.5, -96428.571429, 1.264911064),
         (StableNeoHookean, 2.0, 61607.142857, 0.741619849),
-        (StableNeoHookean, 2.0, 61607.142857, 0.741619849),
         (NeoHookean, 0.5, -102511.146197, 1.298135604),
         (NeoHookean, 1.5, 36529.447838, 0.84602789),
     ],
