@@ -33,8 +33,12 @@ def pinned_exactly(frame):
     return np.array_equal(frame.state.positions[system.pinned_vertices], system.pin_targets(frame.time))
 
 
-def test_a_bar_pressed_to_a_tenth_of_its_length():
-    body, left, right = bar(rubber())
+LARGE = pytest.param((36, 10, 10), marks=pytest.mark.slow, id="21600 tets")
+
+
+@pytest.mark.parametrize("divisions", [(8, 2, 2), LARGE])
+def test_a_bar_pressed_to_a_tenth_of_its_length(divisions):
+    body, left, right = bar(rubber(), divisions)
     press = sp.Keyframes(times=[0, 0.5], displacements=[[0, 0, 0], [-0.9, 0, 0]])
     scene = sp.Scene([body], pins=[sp.Pin("bar", left), sp.Pin("bar", right, press)], gravity=(0, 0, 0))
     for frame in follow(scene, Implicit(), 1 / 60, 30):
@@ -42,8 +46,9 @@ def test_a_bar_pressed_to_a_tenth_of_its_length():
     assert np.ptp(frame.positions["bar"][np.concatenate([left, right]), 0]) == pytest.approx(0.1, abs=1e-12)
 
 
-def test_a_bar_twisted_by_four_turns():
-    body, left, right = bar(rubber(), (12, 3, 3))
+@pytest.mark.parametrize("divisions", [(12, 3, 3), LARGE])
+def test_a_bar_twisted_by_four_turns(divisions):
+    body, left, right = bar(rubber(), divisions)
     turns = sp.Keyframes(times=[0, 1.2], angles=[0, 8 * np.pi], axis=(1, 0, 0), pivot=body.mesh.vertices.mean(axis=0))
     scene = sp.Scene([body], pins=[sp.Pin("bar", left), sp.Pin("bar", right, turns)], gravity=(0, 0, 0))
     for frame in follow(scene, Implicit(), 1 / 60, 72):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import struct
 import subprocess
 import sys
@@ -179,7 +180,7 @@ def test_gif_shows_motion(tmp_path, tools):
     try:
         path = export(tmp_path / "short.vtkhdf", "gif")
     except OutputError as error:
-        if "OpenGL" not in str(error):
+        if "OpenGL" not in str(error) or "CI" in os.environ:
             raise
         pytest.skip(str(error))
     with image.open(path) as pages:

@@ -35,15 +35,6 @@ def det(M):
 
 
 @njit(error_model="numpy")
-def mat_vec(M, v):
-    return (
-        M[0] * v[0] + M[1] * v[1] + M[2] * v[2],
-        M[3] * v[0] + M[4] * v[1] + M[5] * v[2],
-        M[6] * v[0] + M[7] * v[1] + M[8] * v[2],
-    )
-
-
-@njit(error_model="numpy")
 def mat_mul(A, B):
     """A B"""
     return (
