@@ -14,6 +14,7 @@ _HOME = {
     "ARAP": "supple.materials.arap",
     "Body": "supple.scene.body",
     "Box": "supple.scene.obstacles",
+    "CommandError": "supple.errors",
     "ContactSettings": "supple.xpbd.contact_settings",
     "EdgesAndVolume": "supple.materials.edges_and_volume",
     "Embedding": "supple.mesh.skin",
@@ -98,7 +99,15 @@ def __dir__() -> list[str]:
 
 
 if TYPE_CHECKING:
-    from supple.errors import MeshError, MeshingError, OutputError, SceneError, SolverError, SuppleError
+    from supple.errors import (
+        CommandError,
+        MeshError,
+        MeshingError,
+        OutputError,
+        SceneError,
+        SolverError,
+        SuppleError,
+    )
     from supple.implicit.solver import Implicit
     from supple.implicit.step_filter import largest_noninverting_step
     from supple.materials.arap import ARAP

@@ -25,3 +25,7 @@ class SolverError(SuppleError):
 
 class OutputError(SuppleError):
     """A recording, export or plot cannot be read or written."""
+
+
+class CommandError(SuppleError):
+    """A command to a running simulation is malformed, or asks for more than a live page allows."""

@@ -1,0 +1,46 @@
+"""What one page may ask of the simulation behind it. Every limit of the viewer stands here, and nowhere else."""
+
+from __future__ import annotations
+
+# Lengths and places that a command may name [m].
+SMALLEST_LENGTH, LARGEST_LENGTH = 1e-4, 1e3
+FARTHEST = 1e4
+FASTEST = 1e3  # velocities [m/s]
+
+# Of one scene while it runs.
+MOST_BODIES = 64
+MOST_TETS = 400_000
+MOST_GRABS = 16
+MOST_PINS = 4_096  # vertices pinned by hand
+
+# Of one new body.
+SHAPES = ("box", "sphere", "cylinder", "torus", "gummy_bear")
+COARSEST, FINEST = 3, 32  # edges across the shape
+
+# Of time.
+SLOWEST_MOTION, FASTEST_MOTION = 0.01, 1.0
+MOST_STEPS = 1_000  # of one Step command
+FRAMES_PER_SECOND = 60.0  # snapshots that leave the simulation
+
+# Squash and stretch, as a factor of the present height.
+FLATTEST, TALLEST = 0.2, 3.0
+
+# A grab's spring, as a factor of the strength that suits its body.
+WEAKEST_GRAB, STRONGEST_GRAB = 0.01, 100.0
+# How far a grab's target may pull away from the body, as a factor of the scene's size.
+LONGEST_GRAB = 3.0
+
+# Commands on their way to the simulation: those beyond are dropped.
+MOST_WAITING = 512
+# Commands of one client: refilled at this rate, and this many at once.
+COMMANDS_PER_SECOND, COMMANDS_AT_ONCE = 240.0, 240
+
+# Of one message of a browser [bytes], and of one that the server keeps for it.
+LARGEST_MESSAGE = 1024 * 1024
+# Browsers with an open page, and pages that may be open from one address at once.
+MOST_CLIENTS = 32
+# Scene files, and meshes that a scene file of the viewer may name [bytes].
+LARGEST_MESH_FILE = 256 * 1024 * 1024
+
+# Points of contact that a snapshot tells of.
+MOST_CONTACT_POINTS = 2_000

@@ -1,0 +1,213 @@
+"""What a page gets from the simulation: a description of the scene, and the newest snapshot at any time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Value = float | int | bool
+
+
+@dataclass(frozen=True, eq=False)
+class BodyDescription:
+    """One body. Its rows in a snapshot's arrays are `vertices` and `tet_rows`.
+
+    Attributes
+    ----------
+    vertices, tet_rows : slices of a snapshot's `positions` and `tet_values`
+    rest_positions : (n, 3) in the mesh's own coordinates [m]
+    triangles : (t, 3) surface, counter-clockwise from outside; tets : (m, 4); both numbered from 0 in the body
+    skin : vertices (s, 3) in the mesh's coordinates [m] and triangles (u, 3) of the finer surface, or None
+    material : its class's name; values : of the parameters that a page can change, by name
+    mass : [kg]
+    added : whether a page added it
+    """
+
+    name: str
+    vertices: slice
+    tet_rows: slice
+    rest_positions: NDArray[np.float64]
+    triangles: NDArray[np.int32]
+    tets: NDArray[np.int32]
+    skin: tuple[NDArray[np.float64], NDArray[np.int32]] | None
+    material: str
+    values: dict[str, Value]
+    mass: float
+    added: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class ObstacleDescription:
+    """One obstacle, where it is at time 0; `Snapshot.obstacle_poses` carries it from there.
+
+    Attributes
+    ----------
+    kind : "HalfSpace", "Box", "Sphere" or "TriangleObstacle"
+    shape : the obstacle's own parameters: point and normal; center, size, rotation; center, radius; inside;
+        vertices and triangles
+    """
+
+    name: str
+    kind: str
+    shape: dict[str, Any]
+    moving: bool
+    friction: float
+
+
+@dataclass(frozen=True, eq=False)
+class SceneDescription:
+    """Everything that does not change from frame to frame.
+
+    Attributes
+    ----------
+    generation : another number where bodies or obstacles came or went: what is drawn has to be made anew
+    revision : another number with every change, also of parameters or of the solver
+    solver : "xpbd" or "implicit"; values : of the parameters that belong to solver and scene, by name
+    up : (3,) unit vector against gravity
+    low, high : (3,) corners of a box about the bodies at the start [m]
+    stitches : (k, 4) global vertices: a vertex and the three of the triangle that it is stitched to
+    n_vertices, n_tets, n_constraints : of the whole scene; constraints are the solver's, 0 where it has none
+    """
+
+    generation: int
+    revision: int
+    bodies: tuple[BodyDescription, ...]
+    obstacles: tuple[ObstacleDescription, ...]
+    solver: str
+    values: dict[str, Value]
+    up: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    stitches: NDArray[np.int32]
+    n_vertices: int
+    n_tets: int
+    n_constraints: int
+
+    def body(self, name: str) -> BodyDescription:
+        """The body of that name; raises `KeyError` where there is none."""
+        for body in self.bodies:
+            if body.name == name:
+                return body
+        raise KeyError(name)
+
+
+@dataclass(frozen=True)
+class GrabState:
+    """A spring to draw: from `point` (3,) on the body to `target` (3,) [m]; `body` is its name."""
+
+    grab: int
+    body: str
+    point: tuple[float, float, float]
+    target: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Notice:
+    """A line for the person at the page; numbers rise, so that each is shown once. `level` is "info" or "error"."""
+
+    number: int
+    level: str
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class Measures:
+    """Numbers of one frame, for the panel.
+
+    Attributes
+    ----------
+    status, message : of the last step, see `supple.state.Status`
+    kinetic_energy, elastic_energy, potential_energy : [J]; min_det_F : smallest J
+    linear_momentum, angular_momentum : (3,) of the scene, the latter about its center of mass
+    spin : (bodies, 3) angular velocity of each body about its own center of mass [rad/s]
+    contacts : how many; min_distance : smallest gap [m] or None
+    iterations : of the last step
+    """
+
+    status: str
+    message: str
+    kinetic_energy: float
+    elastic_energy: float
+    potential_energy: float
+    min_det_F: float
+    linear_momentum: NDArray[np.float64]
+    angular_momentum: NDArray[np.float64]
+    spin: NDArray[np.float64]
+    contacts: int
+    min_distance: float | None
+    iterations: int
+
+
+@dataclass(frozen=True)
+class Timing:
+    """How fast the simulation is, over the last second or so.
+
+    Attributes
+    ----------
+    step_ms : wall-clock time of one step [ms]
+    frames_per_second : steps simulated in a second of wall-clock time
+    real_time_ratio : simulated time over wall-clock time; 1 is real time
+    keeps_up : whether that is what the speed asked for (within a tenth)
+    """
+
+    step_ms: float = 0.0
+    frames_per_second: float = 0.0
+    real_time_ratio: float = 0.0
+    keeps_up: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """The simulation at one time.
+
+    Attributes
+    ----------
+    description : of the scene that this snapshot belongs to
+    frame : steps since the start or the last reset; time : simulated [s]
+    positions : (n, 3) of all bodies [m]
+    obstacle_poses : rotations (k, 3, 3) and translations (k, 3) [m] of the obstacles
+    pinned : (p,) global vertices that are held
+    grabs : springs that pull; pusher : center (3,) and radius of the ball [m], or None
+    paused : whether time stands still; speed : see `SetSpeed`
+    measures, timing : numbers for the panel
+    notices : the newest few; see `Notice`
+    applied : number of the newest command that has been acted upon, see `Engine.send`
+    velocities : (n, 3) [m/s], tet_values : (m,), contact_points : (c, 3) [m], where `SetView` asked for them
+    tet_quantity : what `tet_values` are: "J", "von_mises", "energy" or None
+    """
+
+    description: SceneDescription
+    frame: int
+    time: float
+    positions: NDArray[np.float64]
+    obstacle_poses: tuple[NDArray[np.float64], NDArray[np.float64]]
+    pinned: NDArray[np.int32]
+    grabs: tuple[GrabState, ...]
+    pusher: tuple[tuple[float, float, float], float] | None
+    paused: bool
+    speed: float
+    measures: Measures
+    timing: Timing
+    notices: tuple[Notice, ...] = ()
+    applied: int = 0
+    velocities: NDArray[np.float64] | None = None
+    tet_values: NDArray[np.float64] | None = None
+    tet_quantity: str | None = None
+    contact_points: NDArray[np.float64] | None = field(default=None)
+
+    @property
+    def generation(self) -> int:
+        """See `SceneDescription.generation`."""
+        return self.description.generation
+
+    @property
+    def revision(self) -> int:
+        """See `SceneDescription.revision`."""
+        return self.description.revision
+
+    def body_positions(self, name: str) -> NDArray[np.float64]:
+        """(n, 3) of one body [m]."""
+        return self.positions[self.description.body(name).vertices]
