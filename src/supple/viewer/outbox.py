@@ -1,0 +1,58 @@
+"""Snapshots on their way out of the simulation: the newest only, and never waited for."""
+
+from __future__ import annotations
+
+import threading
+from multiprocessing.connection import Connection
+from multiprocessing.reduction import ForkingPickler
+from typing import Any
+
+# The first byte of a message says what it holds; the rest is pickled.
+DESCRIPTION, SNAPSHOT, ERROR = b"d", b"s", b"e"
+
+
+def packed(kind: bytes, content: Any) -> bytes:
+    """One message."""
+    return kind + bytes(ForkingPickler.dumps(content))
+
+
+class Outbox:
+    """Sends through a pipe from a thread of its own: a reader that is slow, or stands still, holds up only that thread.
+
+    What has not been sent when something newer comes is forgotten.
+    """
+
+    def __init__(self, pipe: Connection) -> None:
+        self._pipe = pipe
+        self._description: bytes | None = None
+        self._snapshot: bytes | None = None
+        self._changed = threading.Condition()
+        threading.Thread(target=self._send_all, name="outbox", daemon=True).start()
+
+    def put_description(self, description: Any) -> None:
+        """Send a description before any snapshot that is put after it."""
+        data = packed(DESCRIPTION, description)
+        with self._changed:
+            self._description, self._snapshot = data, None
+            self._changed.notify()
+
+    def put_snapshot(self, snapshot: Any) -> None:
+        """Send a snapshot, or drop it for the next one."""
+        data = packed(SNAPSHOT, snapshot)
+        with self._changed:
+            self._snapshot = data
+            self._changed.notify()
+
+    def _send_all(self) -> None:
+        while True:
+            with self._changed:
+                while self._description is None and self._snapshot is None:
+                    self._changed.wait()
+                if self._description is not None:
+                    data, self._description = self._description, None
+                else:
+                    data, self._snapshot = self._snapshot, None
+            try:
+                self._pipe.send_bytes(data or b"")
+            except OSError:  # nobody is there any more; the inbox ends the process
+                return
