@@ -39,6 +39,7 @@ _HOME = {
     "Scene": "supple.scene.scene",
     "SceneError": "supple.errors",
     "SoftTarget": "supple.scene.forces",
+    "SoftVertexTriangleStitch": "supple.scene.stitches.vertex_triangle",
     "SolverError": "supple.errors",
     "Sphere": "supple.scene.obstacles",
     "StVenantKirchhoff": "supple.materials.st_venant_kirchhoff",
@@ -50,6 +51,8 @@ _HOME = {
     "SurfaceReport": "supple.mesh.surface_checks",
     "TetMesh": "supple.mesh.tetmesh",
     "TriangleObstacle": "supple.scene.obstacles",
+    "VertexEdgeStitch": "supple.scene.stitches.vertex_edge",
+    "VertexVertexStitch": "supple.scene.stitches.vertex_vertex",
     "XPBD": "supple.xpbd.solver",
     "export": "supple.output.export",
     "largest_noninverting_step": "supple.implicit.step_filter",
@@ -140,6 +143,9 @@ if TYPE_CHECKING:
     from supple.scene.pins import Pin
     from supple.scene.scene import Scene
     from supple.scene.selection import InBox
+    from supple.scene.stitches.vertex_edge import VertexEdgeStitch
+    from supple.scene.stitches.vertex_triangle import SoftVertexTriangleStitch
+    from supple.scene.stitches.vertex_vertex import VertexVertexStitch
     from supple.scene_file.loader import load_run, load_scene
     from supple.simulate import Frame, NullSink, Report, simulate
     from supple.state import State, Status

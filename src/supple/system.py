@@ -7,7 +7,7 @@ knows nothing of solvers, files or viewers.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +22,7 @@ from supple.scene.motion import moved_points, points_at_origin
 from supple.scene.obstacles import Obstacle
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
+from supple.scene.stitches.stitching import Stitching, no_stitching, stitch_together
 from supple.state import State
 
 
@@ -89,8 +90,9 @@ class System:
     tets : (m, 4); rest_shape_inverse : (m, 3, 3) Dm^-1 [1/m]; rest_volumes : (m,) [m^3]
     edges : (e, 2); rest_lengths : (e,) [m]
     triangles : (t, 3) surfaces, counter-clockwise from outside
-    components : (n,) which connected piece a vertex belongs to
+    components : (n,) which connected piece of a mesh a vertex belongs to
     gravity : (3,) [m/s^2]
+    stitching : tets and springs that join bodies to each other, and to obstacles
     """
 
     scene: Scene
@@ -108,6 +110,7 @@ class System:
     gravity: NDArray[np.float64]
     forces: tuple[ForceRange, ...] = ()
     soft_targets: tuple[SoftTargetRange, ...] = ()
+    stitching: Stitching = field(default_factory=lambda: no_stitching(0))
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
@@ -123,6 +126,16 @@ class System:
         """(k, 3) where the pinned vertices must be at `time` [m]."""
         parts = [pin.targets(time) for pin in self.pins]
         return np.concatenate(parts) if parts else np.zeros((0, 3))
+
+    @cached_property
+    def elements(self) -> NDArray[np.int32]:
+        """(m + k, 4) the tets, then the stitches: everything that couples vertices; -1 for a node without a vertex."""
+        return np.concatenate([self.tets, self.stitching.elements()]) if len(self.stitching) else self.tets
+
+    @cached_property
+    def joined_components(self) -> NDArray[np.int32]:
+        """(n,) which piece a vertex belongs to, where what stitches join is one piece."""
+        return self.stitching.joined_components(self.components)
 
     @cached_property
     def inverse_masses(self) -> NDArray[np.float64]:
@@ -178,6 +191,7 @@ def build_system(scene: Scene, start: State | None = None) -> System:
         gravity=np.asarray(scene.gravity, dtype=np.float64),
         forces=tuple(ForceRange(force, _chosen_vertices(force, ranges)) for force in scene.forces),
         soft_targets=_soft_target_ranges(scene, ranges, start),
+        stitching=stitch_together(scene.bodies, scene.obstacles, scene.stitches),
     )
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from supple.xpbd.closest_point import closest_on_triangle
+from supple.numerics.closest_point import closest_on_triangle
 from supple.xpbd.spatial_hash import PairFinder
 
 

@@ -16,7 +16,7 @@ from supple.system import System
 
 @dataclass(frozen=True, eq=False)
 class FreeMotion:
-    """The pieces of a system that hang on no pin and no soft target.
+    """The pieces of a system that hang on no pin, no soft target and no obstacle. What stitches join is one piece.
 
     Attributes
     ----------
@@ -29,12 +29,14 @@ class FreeMotion:
 
     @classmethod
     def of(cls, system: System) -> FreeMotion:
-        held = np.zeros(system.components.max() + 1, dtype=bool)
-        held[system.components[system.pinned_vertices]] = True
+        components = system.joined_components
+        held = np.zeros(components.max() + 1, dtype=bool)
+        held[components[system.pinned_vertices]] = True
+        held[components[system.stitching.anchored_vertices()]] = True
         for part in system.soft_targets:
-            held[system.components[part.vertices]] = True
+            held[components[part.vertices]] = True
         number = np.where(held, -1, np.cumsum(~held) - 1)
-        piece = number[system.components].astype(np.int32)
+        piece = number[components].astype(np.int32)
         inside = piece >= 0
         return cls(piece, system.masses, np.bincount(piece[inside], weights=system.masses[inside]).astype(np.float64))
 

@@ -55,10 +55,10 @@ class LinearSolver:
         """Build the pattern and the groups of a system's free vertices."""
         free = np.ones(len(system.rest_positions), dtype=bool)
         free[system.pinned_vertices] = False
-        order = order_rows(system.rest_positions, system.components, system.tets, free)
-        rows = np.full(len(free), -1, dtype=np.int32)
+        order = order_rows(system.rest_positions, system.components, system.elements, free)
+        rows = np.full(len(free) + 1, -1, dtype=np.int32)  # the last one for nodes without a vertex, number -1
         rows[order.vertices] = np.arange(len(order.vertices), dtype=np.int32)
-        pattern = build_pattern(rows[system.tets], len(order.vertices))
+        pattern = build_pattern(rows[system.elements], len(order.vertices))
         preconditioner = two_level(pattern, system.rest_positions[order.vertices], order.group_start)
         return cls(kind, order, pattern, preconditioner, np.zeros((pattern.blocks, 3, 3)))
 
@@ -68,7 +68,7 @@ class LinearSolver:
 
     def assemble(self, hessian: HessianBlocks) -> None:
         """Take over a new Hessian."""
-        self.pattern.assemble(hessian.tets, hessian.vertices[self.order.vertices], self.data)
+        self.pattern.assemble(hessian.elements, hessian.vertices[self.order.vertices], self.data)
         if self.kind != "direct":
             self.preconditioner.update(self.data, coarse=self.age < 0)
 

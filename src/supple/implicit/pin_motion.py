@@ -34,7 +34,8 @@ def move_pins(
         where the filter lets them go only so far.
     """
     pinned = tools.pinned
-    near = np.flatnonzero(np.isin(system.tets, pinned).any(axis=1))
+    near = np.flatnonzero(np.isin(system.elements, pinned).any(axis=1))
+    nodes = system.elements[near]
     rows: list[NewtonRow] = []
     for iteration in range(_MOST_ITERATIONS):
         way = np.zeros_like(x)
@@ -42,10 +43,11 @@ def move_pins(
         here = problem.objective.model(x, tools.hessian)
         gradient = here.gradient
         tools.linear_solver.assemble(tools.hessian)
-        pull = np.zeros_like(x)
-        moved = np.einsum("eij,ej->ei", tools.hessian.tets[near], way[system.tets[near]].reshape(-1, 12))
-        np.add.at(pull, system.tets[near], moved.reshape(-1, 4, 3))
-        direction, said = tools.linear_solver.solve(-(gradient + pull), _TOLERANCE)
+        # One row more, for the nodes without a vertex, number -1.
+        pull, longer = np.zeros((len(x) + 1, 3)), np.concatenate([way, np.zeros((1, 3))])
+        moved = np.einsum("eij,ej->ei", tools.hessian.elements[near], longer[nodes].reshape(-1, 12))
+        np.add.at(pull, nodes, moved.reshape(-1, 4, 3))
+        direction, said = tools.linear_solver.solve(-(gradient + pull[:-1]), _TOLERANCE)
         if direction is None or not np.isfinite(direction).all():
             text = "the linear system that moves the pins could not be solved"
             return x, Outcome(Status.NOT_FINITE, here, text, rows)

@@ -15,16 +15,29 @@ class HessianBlocks:
 
     Attributes
     ----------
-    tets : (m, 12, 12) one matrix for each tet, coordinate i of node p in row 3 p + i [N/m]
+    elements : (m + k, 12, 12) one matrix for each tet, then one for each stitch, coordinate i of node p in row 3 p + i
+        [N/m]
     vertices : (n, 3, 3) one matrix for each vertex with itself [N/m]
+    tet_count : m
     """
 
-    tets: NDArray[np.float64]
+    elements: NDArray[np.float64]
     vertices: NDArray[np.float64]
+    tet_count: int
+
+    @property
+    def tets(self) -> NDArray[np.float64]:
+        """(m, 12, 12) the tets' part of `elements`."""
+        return self.elements[: self.tet_count]
+
+    @property
+    def stitches(self) -> NDArray[np.float64]:
+        """(k, 12, 12) the stitches' part of `elements`."""
+        return self.elements[self.tet_count :]
 
     @classmethod
-    def zeros(cls, n_tets: int, n_vertices: int) -> HessianBlocks:
-        return cls(np.zeros((n_tets, 12, 12)), np.zeros((n_vertices, 3, 3)))
+    def zeros(cls, n_tets: int, n_vertices: int, n_stitches: int = 0) -> HessianBlocks:
+        return cls(np.zeros((n_tets + n_stitches, 12, 12)), np.zeros((n_vertices, 3, 3)), n_tets)
 
 
 class Potential(ABC):

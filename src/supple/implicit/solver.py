@@ -27,6 +27,7 @@ from supple.implicit.potential import HessianBlocks, Potential
 from supple.implicit.reactions import reaction_forces
 from supple.implicit.soft_targets import soft_targets_at
 from supple.implicit.stabilizer import Stabilizer, stabilizer_of
+from supple.implicit.stitch_energy import StitchEnergy
 from supple.implicit.trace import NewtonRow
 from supple.solver import Solver
 from supple.state import State, Status, StepReport
@@ -104,14 +105,15 @@ class Implicit(Solver):
         elasticity = elasticity_of(system)
         tools = Tools(
             LinearSolver.of(system, self.linear_solver),
-            HessianBlocks.zeros(len(system.tets), len(system.rest_positions)),
+            HessianBlocks.zeros(len(system.tets), len(system.rest_positions), len(system.stitching)),
             system.pinned_vertices,
             free_motion,
         )
         diagonal = min(
             float(np.linalg.norm(np.ptp(system.rest_positions[part.vertices], axis=0))) for part in system.bodies
         )
-        return Workspace(elasticity, viscosity_of(elasticity), tools, diagonal, stabilizer_of(elasticity))
+        stitches = StitchEnergy.of(system.stitching, 0.0) if len(system.stitching) else None
+        return Workspace(elasticity, viscosity_of(elasticity), tools, diagonal, stabilizer_of(elasticity), stitches)
 
     def step(self, system: System, state: State, dt: float, workspace: Workspace) -> tuple[State, StepReport]:
         """Advance by dt, in as many substeps as it takes; see `Solver.step`.
@@ -203,6 +205,7 @@ class Workspace:
     tools: Tools
     diagonal: float
     stabilizer: Stabilizer
+    stitches: StitchEnergy | None
 
 
 def _potentials(
@@ -210,6 +213,8 @@ def _potentials(
 ) -> list[Potential]:
     """Everything but inertia and damping, at `time`; energies of loads are zero at x."""
     terms: list[Potential] = [workspace.elasticity]
+    if workspace.stitches is not None:
+        terms.append(workspace.stitches.at(time))
     if system.gravity.any():
         terms.append(Gravity(system.masses, system.gravity, x))
     if system.forces:

@@ -48,21 +48,22 @@ class RowOrder:
 
 
 def order_rows(
-    points: NDArray[np.float64], components: NDArray[np.int32], tets: NDArray[np.int32], free: NDArray[np.bool_]
+    points: NDArray[np.float64], components: NDArray[np.int32], elements: NDArray[np.int32], free: NDArray[np.bool_]
 ) -> RowOrder:
     """Choose groups for the free ones of the vertices.
 
     Parameters
     ----------
-    points : (n, 3) rest positions; components : (n,); tets : (m, 4); free : (n,) which vertices get a row.
+    points : (n, 3) rest positions; components : (n,); elements : (m, 4), -1 for no vertex; free : (n,) which
+        vertices get a row.
     """
     vertices = np.flatnonzero(free)
     count = min(max(1, len(vertices) // _GROUP_SIZE), _MOST_GROUPS)
     groups = bisected_groups(points[vertices], components[vertices], count)
-    group_of = np.full(len(points), -1, dtype=np.int64)
+    group_of = np.full(len(points) + 1, -1, dtype=np.int64)
     for g, members in enumerate(groups):
         group_of[vertices[members]] = g
-    near = group_of[tets]
+    near = group_of[elements]
     pairs = np.concatenate([near[:, [a, b]] for a in range(4) for b in range(4)])
     pairs = np.unique(pairs[(pairs >= 0).all(axis=1)], axis=0)
     pairs = np.concatenate([pairs, np.repeat(np.arange(len(groups))[:, None], 2, axis=1)])

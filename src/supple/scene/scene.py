@@ -14,6 +14,7 @@ from supple.scene.body import Body
 from supple.scene.forces import Force, SoftTarget
 from supple.scene.obstacles import Obstacle
 from supple.scene.pins import Pin
+from supple.scene.stitches.stitch import Stitch
 from supple.scene.values import finite_vector
 
 _PARTS = (
@@ -22,12 +23,13 @@ _PARTS = (
     ("pins", Pin),
     ("forces", Force),
     ("soft_targets", SoftTarget),
+    ("stitches", Stitch),
 )
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Bodies, obstacles, pins, forces and soft targets under gravity.
+    """Bodies, obstacles, pins, forces, soft targets and stitches under gravity.
 
     Parameters
     ----------
@@ -36,6 +38,7 @@ class Scene:
     pins : vertices held or scripted.
     gravity : (3,) acceleration [m/s^2].
     forces : loads on vertices; soft_targets : springs to places.
+    stitches : what joins bodies to each other, and to triangle obstacles.
 
     Raises
     ------
@@ -48,6 +51,7 @@ class Scene:
     gravity: ArrayLike = (0.0, -9.81, 0.0)
     forces: Sequence[Force] = ()
     soft_targets: Sequence[SoftTarget] = ()
+    stitches: Sequence[Stitch] = ()
 
     def __post_init__(self) -> None:
         for key, kind in _PARTS:

@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numba import njit
 
+from supple.numerics.closest_point import closest_on_triangle, combine
 from supple.numerics.mat3 import dot, row, subtract
-from supple.xpbd.closest_point import closest_on_triangle, combine
 
 
 @njit

@@ -16,8 +16,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from supple.numerics.closest_point import closest_on_triangle, combine
 from supple.numerics.mat3 import dot, row, subtract
-from supple.xpbd.closest_point import closest_on_triangle, combine
 
 # Cells along the longest side of everything: beyond this, cells grow. Three cell numbers then fit into 63 bits.
 MOST_CELLS = 1 << 20

@@ -19,8 +19,8 @@ import math
 
 from numba import njit
 
+from supple.numerics.closest_point import area_normal, between, closest_on_triangle, combine
 from supple.numerics.mat3 import dot, row, subtract
-from supple.xpbd.closest_point import area_normal, between, closest_on_triangle, combine
 from supple.xpbd.friction import friction_correction
 from supple.xpbd.overlap import split_overlap
 

@@ -1,0 +1,96 @@
+"""Stitches as flat arrays: what solvers see."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """What is stitched to what.
+
+    Attributes
+    ----------
+    vertices : (k,) of the first side; rows : (k,) numbers of triangles, edges or vertices of the second
+    distances : (k,) between the two at the start [m]
+    """
+
+    vertices: NDArray[np.int32]
+    rows: NDArray[np.int32]
+    distances: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class _Elements:
+    """Arrays with one row per stitch, whose `vertices` begin with the first side's; the rest are the second's."""
+
+    vertices: NDArray[np.int32]
+
+    def __len__(self) -> int:
+        return len(self.vertices)
+
+    def numbered(self, first: int, second: NDArray[np.int32]) -> Self:
+        """The same with other numbers: the first side's plus `first`, the second side's looked up in `second`."""
+        vertices = second[self.vertices]
+        vertices[:, 0] = self.vertices[:, 0] + first
+        return replace(self, vertices=np.ascontiguousarray(vertices, dtype=np.int32))
+
+    @classmethod
+    def joined(cls, parts: list[Self]) -> Self:
+        """Several as one."""
+        return cls(**{key: np.concatenate([getattr(part, key) for part in parts]) for key in cls.__dataclass_fields__})
+
+
+@dataclass(frozen=True, eq=False)
+class StitchTets(_Elements):
+    """Tetrahedra of stable Neo-Hookean material: a vertex, and the three of a triangle.
+
+    Attributes
+    ----------
+    vertices : (k, 4); rest_shape_inverse : (k, 3, 3) Dm^-1 [1/m]; rest_volumes : (k,) [m^3]
+    mu, lam : (k,) as they stand in the energy density [Pa]; damping : (k,) Kelvin-Voigt time [s]
+    offset : (k,) whether the rest vertex was moved away from its triangle
+    """
+
+    rest_shape_inverse: NDArray[np.float64]
+    rest_volumes: NDArray[np.float64]
+    mu: NDArray[np.float64]
+    lam: NDArray[np.float64]
+    damping: NDArray[np.float64]
+    offset: NDArray[np.bool_]
+
+    @classmethod
+    def none(cls) -> StitchTets:
+        zero = np.zeros(0)
+        return cls(np.zeros((0, 4), np.int32), np.zeros((0, 3, 3)), zero, zero, zero, zero, np.zeros(0, dtype=np.bool_))
+
+
+@dataclass(frozen=True, eq=False)
+class Springs(_Elements):
+    """Springs from a vertex to a point of an edge, k/2 (|d| - l)^2 with d = x_0 - (1 - t) x_1 - t x_2.
+
+    Attributes
+    ----------
+    vertices : (k, 3), the last two the same where the point is a vertex; place : (k,) t
+    stiffness : (k,) [N/m]; rest_lengths : (k,) [m]; damping : (k,) Kelvin-Voigt time [s]
+    """
+
+    place: NDArray[np.float64]
+    stiffness: NDArray[np.float64]
+    rest_lengths: NDArray[np.float64]
+    damping: NDArray[np.float64]
+
+    @classmethod
+    def none(cls) -> Springs:
+        zero = np.zeros(0)
+        return cls(np.zeros((0, 3), np.int32), zero, zero, zero, zero)
+
+    def extensions(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(k, 3) d at positions `points` [m]."""
+        a, b, c = points[self.vertices].transpose(1, 0, 2)
+        t = self.place[:, None]
+        return a - (1.0 - t) * b - t * c

@@ -1,0 +1,14 @@
+"""All kinds of stitches. A new kind is one file, and one line here (and one in `supple.scene_file.stitches`)."""
+
+from __future__ import annotations
+
+from supple.scene.stitches.stitch import Stitch
+from supple.scene.stitches.vertex_edge import VertexEdgeStitch
+from supple.scene.stitches.vertex_triangle import SoftVertexTriangleStitch
+from supple.scene.stitches.vertex_vertex import VertexVertexStitch
+
+STITCHES: dict[str, type[Stitch]] = {
+    "soft_vertex_triangle": SoftVertexTriangleStitch,
+    "vertex_vertex": VertexVertexStitch,
+    "vertex_edge": VertexEdgeStitch,
+}

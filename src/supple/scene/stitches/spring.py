@@ -1,0 +1,55 @@
+"""What stitches made of springs share: a stiffness and a rest length."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.scene.stitches.elements import Pairs, Springs
+from supple.scene.stitches.side import Side
+from supple.scene.stitches.stitch import Stitch
+
+
+@dataclass(frozen=True, eq=False)
+class SpringStitch(Stitch):
+    """Springs, k/2 (distance - rest length)^2. Other parameters: see `Stitch`.
+
+    Parameters
+    ----------
+    stiffness : k [N/m]
+    rest_length : [m]; None for the distance at the start
+
+    Each is one number, or one for each pair.
+    """
+
+    stiffness: float | NDArray[np.float64] = field(kw_only=True)
+    rest_length: float | NDArray[np.float64] | None = field(default=None, kw_only=True)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "stiffness", self.checked_numbers(self.stiffness, "stiffness", "N/m"))
+        if self.rest_length is not None:
+            length = self.checked_numbers(self.rest_length, "rest_length", "m", zero=True)
+            object.__setattr__(self, "rest_length", length)
+
+    def springs(self, pairs: Pairs, ends: NDArray[np.int32], place: NDArray[np.float64]) -> Springs:
+        """From the pairs' vertices to the places (k,) along ends (k, 2)."""
+        count = len(pairs.vertices)
+        lengths = pairs.distances if self.rest_length is None else self.rest_length
+        return Springs(
+            vertices=np.column_stack([pairs.vertices, ends]).astype(np.int32),
+            place=place,
+            stiffness=self.per_pair(self.stiffness, count, "stiffness"),
+            rest_lengths=self.per_pair(lengths, count, "rest_length"),
+            damping=np.full(count, self.damping),
+        )
+
+
+def places_on_edges(first: Side, second: Side, pairs: Pairs, ends: NDArray[np.int32]) -> NDArray[np.float64]:
+    """(k,) where on its edge, from 0 to 1, the point nearest to each vertex is."""
+    a, b = second.points[ends].transpose(1, 0, 2)
+    along, off = b - a, first.points[pairs.vertices] - a
+    squares = np.einsum("ij,ij->i", along, along)
+    return np.clip(np.einsum("ij,ij->i", along, off) / np.where(squares > 0.0, squares, 1.0), 0.0, 1.0)

@@ -1,0 +1,167 @@
+"""What all stitches share: which two things they join, and how the pairs are given or found."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from supple.errors import SceneError
+from supple.numerics.triangle_tree import TriangleTree, pair_distances
+from supple.scene.stitches.elements import Pairs, Springs, StitchTets
+from supple.scene.stitches.side import Side
+from supple.scene.values import check_name, non_negative, positive
+
+PAIRINGS = ("closest", "all")
+
+
+@dataclass(frozen=True, eq=False)
+class Stitch(ABC):
+    """Joins vertices of a body to something of another body, or of a triangle obstacle.
+
+    Give `pairs`, or let them be found within `max_distance`, in the world, where the scene places bodies and obstacles
+    at the start. Initial positions or a start from another frame change neither pairs nor rest shapes.
+
+    Parameters
+    ----------
+    first : name of the body whose vertices are stitched
+    second : name of what they are stitched to: another body, or else a TriangleObstacle, static or scripted
+    pairs : (n, 2) vertex of the first body's mesh, and what of the second (its kind says)
+    max_distance : for each vertex of the first body's surface up to this distance of the second's [m]
+    pairing : "closest", a vertex's nearest one, the lowest number where several are equally near; or "all" in reach
+    damping : Kelvin-Voigt time of the stitches [s]
+    name : stands in messages
+    """
+
+    partner: ClassVar[str]  # what of the second a pair names
+
+    first: str
+    second: str
+    pairs: ArrayLike | None = field(default=None, kw_only=True)
+    max_distance: float | None = field(default=None, kw_only=True)
+    pairing: str = field(default="closest", kw_only=True)
+    damping: float = field(default=0.0, kw_only=True)
+    name: str | None = field(default=None, kw_only=True)
+
+    def __post_init__(self) -> None:
+        check_name(self.first, "stitch: first")
+        check_name(self.second, "stitch: second")
+        if self.name is not None:
+            check_name(self.name, "stitch")
+        if self.first == self.second:
+            raise SceneError(f"{self.label}: it joins a body with itself; give two")
+        if (self.pairs is None) == (self.max_distance is None):
+            raise SceneError(f"{self.label}: give either pairs or max_distance")
+        if self.pairs is not None:
+            object.__setattr__(self, "pairs", self._checked_pairs())
+        else:
+            object.__setattr__(self, "max_distance", positive(self.max_distance, f"{self.label}: max_distance"))
+        if self.pairing not in PAIRINGS:
+            raise SceneError(f"{self.label}: there is no pairing {self.pairing!r}; there are 'closest' and 'all'")
+        object.__setattr__(self, "damping", non_negative(self.damping, f"{self.label}: damping"))
+
+    @property
+    def label(self) -> str:
+        """How messages call this stitch."""
+        return f"stitch {self.name!r}" if self.name else f"stitch of {self.first!r} to {self.second!r}"
+
+    @abstractmethod
+    def partners(self, second: Side) -> NDArray[np.int32]:
+        """(t, 3) everything of the second side that a pair may name, in the order of its numbers, as triangles.
+
+        Of an edge two corners coincide, of a vertex all three.
+        """
+
+    def surface_partners(self, second: Side) -> NDArray[np.int32]:
+        """(r,) those of them that are looked at when pairs have to be found, ascending."""
+        return np.arange(len(self.partners(second)), dtype=np.int32)
+
+    @abstractmethod
+    def join(self, first: Side, second: Side, pairs: Pairs) -> StitchTets | Springs:
+        """The stitches of these pairs; their first column numbers the first side's vertices, the others the second's.
+
+        Raises
+        ------
+        SceneError : where a pair cannot be stitched.
+        """
+
+    def find(self, first: Side, second: Side) -> Pairs:
+        """The pairs: those given, or those within reach.
+
+        Raises
+        ------
+        SceneError : where a number is out of range, or nothing is within reach; the text says the smallest distance.
+        """
+        partners = self.partners(second)
+        if self.pairs is not None:
+            pairs = np.asarray(self.pairs)
+            for column, (side, count, what) in enumerate(
+                ((first, len(first.points), "vertices"), (second, len(partners), self.partner))
+            ):
+                if pairs[:, column].max() >= count:
+                    bad = int(pairs[:, column].max())
+                    raise SceneError(f"{self.label}: pairs names number {bad} of {count} {what} of {side.label}")
+            vertices, rows = pairs[:, 0], pairs[:, 1]
+            distances = pair_distances(first.points[vertices], second.points, partners[rows])
+            return Pairs(vertices.astype(np.int32), rows.astype(np.int32), distances)
+        assert self.max_distance is not None
+        looked_at = self.surface_partners(second)
+        tree = TriangleTree.of(second.points, partners[looked_at])
+        points = first.points[first.surface_vertices]
+        if self.pairing == "all":
+            queries, rows, distances = tree.all_within(points, self.max_distance)
+        else:
+            rows, distances = tree.nearest(points, self.max_distance)
+            queries = np.flatnonzero(rows >= 0)
+            rows, distances = rows[queries], distances[queries]
+        if len(rows) == 0:
+            smallest = float(tree.nearest(points)[1].min())
+            raise SceneError(
+                f"{self.label}: no vertex of {first.label} is within max_distance = {self.max_distance:g} m of "
+                f"{second.label}; the smallest distance there is is {smallest:.6g} m"
+            )
+        return Pairs(first.surface_vertices[queries].astype(np.int32), looked_at[rows].astype(np.int32), distances)
+
+    def _checked_pairs(self) -> NDArray[np.int64]:
+        try:
+            pairs = np.array(self.pairs)
+        except (TypeError, ValueError):
+            raise SceneError(f"{self.label}: pairs is not an array of numbers") from None
+        if pairs.ndim != 2 or pairs.shape[1] != 2 or len(pairs) == 0 or not np.issubdtype(pairs.dtype, np.integer):
+            raise SceneError(
+                f"{self.label}: pairs must be a list of one or more [vertex, {self.partner[:-1]}], in whole numbers"
+            )
+        if pairs.min() < 0 or pairs.max() > np.iinfo(np.int32).max:
+            raise SceneError(f"{self.label}: pairs holds {pairs.min()}; numbers begin at 0 and fit a mesh")
+        if len(np.unique(pairs, axis=0)) != len(pairs):
+            raise SceneError(f"{self.label}: pairs names a pair twice; name each once")
+        return pairs.astype(np.int64)
+
+    def per_pair(self, value: ArrayLike, count: int, what: str) -> NDArray[np.float64]:
+        """A number, or one for each pair, as (count,).
+
+        Raises
+        ------
+        SceneError : where there is another number of them.
+        """
+        values = np.asarray(value, dtype=np.float64)
+        if values.ndim and values.shape != (count,):
+            raise SceneError(f"{self.label}: {what} has {values.size} values for {count} pairs; give one, or one each")
+        return np.ascontiguousarray(np.broadcast_to(values, count))
+
+    def checked_numbers(self, value: object, what: str, unit: str, *, zero: bool = False) -> NDArray[np.float64]:
+        """A number, or a list of them, finite and above zero (or zero, too)."""
+        try:
+            values = np.array(value, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise SceneError(f"{self.label}: {what} is {value!r}; give a number, or one for each pair") from None
+        bad = ~np.isfinite(values) | (values < 0.0) | ((values == 0.0) & (not zero))
+        if values.ndim > 1 or values.size == 0:
+            raise SceneError(f"{self.label}: {what} has shape {values.shape}; give a number, or one for each pair")
+        if bad.any():
+            must = "zero or more" if zero else "above zero"
+            raise SceneError(f"{self.label}: {what} is {values[bad].flat[0]:g}; it must be finite and {must} [{unit}]")
+        return values

@@ -1,0 +1,180 @@
+"""All stitches of a scene: pairs found, rest shapes computed, everything numbered as the whole scene is.
+
+Vertices of bodies come first, in the order of the scene. Obstacles' vertices that something is stitched to follow: the
+anchors. They go where the obstacle goes, whatever pulls at them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from supple.errors import SceneError
+from supple.scene.body import Body
+from supple.scene.obstacles import Obstacle
+from supple.scene.stitches.elements import Pairs, Springs, StitchTets
+from supple.scene.stitches.side import Side, side_of
+from supple.scene.stitches.stitch import Stitch
+
+
+@dataclass(frozen=True, eq=False)
+class StitchRange:
+    """One stitch of the scene, its pairs, and which tets or springs are its own."""
+
+    stitch: Stitch
+    pairs: Pairs
+    tets: slice
+    springs: slice
+
+
+@dataclass(frozen=True, eq=False)
+class Anchors:
+    """Obstacles' vertices that something is stitched to.
+
+    Attributes
+    ----------
+    obstacles : all of the scene; owner : (a,) which of them each belongs to
+    vertices : (a,) rows of its surface's vertices; points : (a, 3) in the obstacle's own coordinates [m]
+    """
+
+    obstacles: tuple[Obstacle, ...]
+    owner: NDArray[np.int32]
+    vertices: NDArray[np.int32]
+    points: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def at(self, time: float) -> NDArray[np.float64]:
+        """(a, 3) where they are at `time` [m]."""
+        out = self.points.copy()
+        for k in np.unique(self.owner):
+            R, t = self.obstacles[k].pose(time)
+            mine = self.owner == k
+            out[mine] = self.points[mine] @ R.T + t
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class Stitching:
+    """See the module.
+
+    Attributes
+    ----------
+    body_vertices : n, how many vertices the bodies have; the anchors' numbers begin there
+    ranges : of each stitch of the scene
+    tets, springs : of all of them
+    """
+
+    body_vertices: int
+    ranges: tuple[StitchRange, ...]
+    tets: StitchTets
+    springs: Springs
+    anchors: Anchors
+
+    def __len__(self) -> int:
+        return len(self.tets) + len(self.springs)
+
+    def points(self, x: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+        """(n + a, 3) the bodies' vertices x (n, 3), and the anchors at `time` [m]."""
+        return np.concatenate([x, self.anchors.at(time)]) if len(self.anchors) else x
+
+    def elements(self) -> NDArray[np.int32]:
+        """(k, 4) tets, then springs, as solvers assemble them; -1 for a node that is no vertex of a body, or none."""
+        springs = np.concatenate([self.springs.vertices, np.full((len(self.springs), 1), -1, np.int32)], axis=1)
+        alone = springs[:, 1] == springs[:, 2]
+        springs[alone, 2] = -1
+        both = np.concatenate([self.tets.vertices, springs])
+        return np.where(both < self.body_vertices, both, -1).astype(np.int32)
+
+    def joins(self) -> NDArray[np.int32]:
+        """(q, 2) each stitch's first vertex with each of the others, anchors included."""
+        parts = [self.tets.vertices[:, [0, k]] for k in (1, 2, 3)] + [self.springs.vertices[:, [0, k]] for k in (1, 2)]
+        return np.concatenate(parts)
+
+    def anchored_vertices(self) -> NDArray[np.int32]:
+        """Vertices of bodies that are stitched to an obstacle."""
+        joins = self.joins()
+        return np.unique(joins[joins[:, 1] >= self.body_vertices, 0])
+
+    def joined_components(self, components: NDArray[np.int32]) -> NDArray[np.int32]:
+        """(n,) pieces of bodies (n,), where those that stitches join, also by one vertex of an obstacle, are one."""
+        if not len(self):
+            return components
+        pieces = int(components.max()) + 1
+        of_point = np.concatenate([components, pieces + np.arange(len(self.anchors))])
+        ends = of_point[self.joins()]
+        count = pieces + len(self.anchors)
+        graph = coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(count, count))
+        labels = connected_components(graph, directed=False)[1]
+        return np.unique(labels[components], return_inverse=True)[1].reshape(-1).astype(np.int32)
+
+
+def no_stitching(body_vertices: int) -> Stitching:
+    """Of a scene without stitches."""
+    return Stitching(body_vertices, (), StitchTets.none(), Springs.none(), _anchors((), {}))
+
+
+def stitch_together(bodies: Sequence[Body], obstacles: Sequence[Obstacle], stitches: Sequence[Stitch]) -> Stitching:
+    """Find the pairs of all stitches, and number them.
+
+    Raises
+    ------
+    SceneError : where there is no such body or obstacle, a pair does not exist, or none is within reach.
+    """
+    starts = np.concatenate([[0], np.cumsum([len(body.mesh.vertices) for body in bodies])])
+    n = int(starts[-1])
+    first_of = {body.name: int(start) for body, start in zip(bodies, starts, strict=False)}
+    things: dict[str, Body | Obstacle] = {
+        **{obstacle.name: obstacle for obstacle in obstacles if obstacle.name},
+        **{body.name: body for body in bodies},
+    }
+    sides: dict[str, Side] = {}
+    numbers: dict[tuple[int, int], int] = {}  # of anchors, by obstacle and vertex
+    ranges: list[StitchRange] = []
+    tets, springs = [StitchTets.none()], [Springs.none()]
+    for stitch in stitches:
+        if stitch.first not in first_of:
+            raise _unknown(stitch, stitch.first, "body", first_of)
+        if stitch.second not in things:
+            raise _unknown(stitch, stitch.second, "body or obstacle", things)
+        for name in (stitch.first, stitch.second):
+            if name not in sides:
+                try:
+                    sides[name] = side_of(things[name])
+                except SceneError as error:
+                    raise SceneError(f"{stitch.label}: {error}") from None
+        first, second = sides[stitch.first], sides[stitch.second]
+        pairs = stitch.find(first, second)
+        part = stitch.join(first, second, pairs)
+        if stitch.second in first_of:
+            numbering = first_of[stitch.second] + np.arange(len(second.points))
+        else:
+            owner = next(k for k, obstacle in enumerate(obstacles) if obstacle.name == stitch.second)
+            numbering = np.zeros(len(second.points), dtype=np.int64)
+            for vertex in np.unique(part.vertices[:, 1:]).tolist():
+                numbering[vertex] = n + numbers.setdefault((owner, vertex), len(numbers))
+        part = part.numbered(first_of[stitch.first], numbering.astype(np.int32))
+        begin = sum(map(len, tets)), sum(map(len, springs))
+        (tets if isinstance(part, StitchTets) else springs).append(part)  # pyright: ignore[reportArgumentType]
+        end = sum(map(len, tets)), sum(map(len, springs))
+        ranges.append(StitchRange(stitch, pairs, slice(begin[0], end[0]), slice(begin[1], end[1])))
+    anchors = _anchors(obstacles, numbers)
+    return Stitching(n, tuple(ranges), StitchTets.joined(tets), Springs.joined(springs), anchors)
+
+
+def _anchors(obstacles: Sequence[Obstacle], numbers: dict[tuple[int, int], int]) -> Anchors:
+    places = np.array(list(numbers), dtype=np.int32).reshape(-1, 2)
+    points = np.zeros((len(places), 3))
+    for k, (owner, vertex) in enumerate(places):
+        points[k] = obstacles[owner].surface.vertices[vertex]  # pyright: ignore[reportAttributeAccessIssue]
+    return Anchors(tuple(obstacles), places[:, 0], places[:, 1], points)
+
+
+def _unknown(stitch: Stitch, name: str, what: str, known: dict) -> SceneError:
+    return SceneError(f"{stitch.label}: there is no {what} {name!r}; there are {', '.join(map(repr, known))}")

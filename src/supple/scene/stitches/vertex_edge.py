@@ -1,0 +1,32 @@
+"""The vertex-edge stitch: a spring between a vertex and the point of an edge that is nearest to it at the start."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.scene.stitches.elements import Pairs, Springs
+from supple.scene.stitches.side import Side
+from supple.scene.stitches.spring import SpringStitch, places_on_edges
+
+
+@dataclass(frozen=True, eq=False)
+class VertexEdgeStitch(SpringStitch):
+    """Springs from vertices to points of edges, which stay at their place along the edge. See `SpringStitch`.
+
+    Pairs are (vertex of the first body, row of the second body's `mesh.surface.edges`, or of an obstacle's
+    `surface.edges`).
+    """
+
+    partner = "edges"
+
+    def partners(self, second: Side) -> NDArray[np.int32]:
+        """See `Stitch`."""
+        return second.edges[:, [0, 1, 1]]
+
+    def join(self, first: Side, second: Side, pairs: Pairs) -> Springs:
+        """See `Stitch`."""
+        ends = second.edges[pairs.rows]
+        return self.springs(pairs, ends, places_on_edges(first, second, pairs, ends))

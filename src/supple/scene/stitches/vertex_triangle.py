@@ -1,0 +1,143 @@
+"""The soft vertex-triangle stitch: a tetrahedron of stable Neo-Hookean material between a vertex and a triangle.
+
+Source: "Soft Vertex Triangle Stitch", the documentation of libuipc's constitution #30.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from supple.errors import SceneError
+from supple.materials.lame import lame_from_engineering
+from supple.scene.stitches.elements import Pairs, StitchTets
+from supple.scene.stitches.side import Side
+from supple.scene.stitches.stitch import Stitch
+
+
+@dataclass(frozen=True, eq=False)
+class SoftVertexTriangleStitch(Stitch):
+    """Joins vertices of one body to triangles of another, each pair by a tetrahedron
+
+        psi = mu/2 (Ic - 3) - mu (J - 1) + lam/2 (J - 1)^2 + mu^2/lam^2,    F = Ds Dm^-1,    E = V0 psi.
+
+    Its rest shape is the pair as the scene places it. Where the vertex is closer than `min_separate_distance` d to the
+    triangle's plane, its rest place is moved along the normal n to the distance d: by (sign(s) d - s) n, with the
+    signed distance s and sign(0) = +1 (up to round-off).
+
+    Pairs are (vertex of the first body's mesh, row of the second body's `mesh.surface.triangles`, or of an obstacle's
+    `surface.triangles`). Other parameters: see `Stitch`.
+
+    Parameters
+    ----------
+    mu, lam : as they stand in psi [Pa]; or
+    youngs, poisson : Young's modulus [Pa] and Poisson's ratio, from which mu and lam are the Lamé parameters.
+    min_separate_distance : d [m]
+
+    Each is one number, or one for each pair.
+
+    Raises
+    ------
+    SceneError : where a value is not finite or out of range. lam must be above zero: psi divides by it.
+    """
+
+    partner = "triangles"
+
+    mu: float | NDArray[np.float64] | None = field(default=None, kw_only=True)
+    lam: float | NDArray[np.float64] | None = field(default=None, kw_only=True)
+    youngs: float | NDArray[np.float64] | None = field(default=None, kw_only=True)
+    poisson: float | NDArray[np.float64] | None = field(default=None, kw_only=True)
+    min_separate_distance: float | NDArray[np.float64] = field(default=1e-3, kw_only=True)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        given = [key for key in ("mu", "lam", "youngs", "poisson") if getattr(self, key) is not None]
+        if given == ["youngs", "poisson"]:
+            youngs = self.checked_numbers(self.youngs, "youngs", "Pa")
+            nu = self.checked_numbers(self.poisson, "poisson", "-")
+            if (nu >= 0.5).any():
+                raise SceneError(f"{self.label}: poisson is {nu.max():g}; it must be above 0 and below 0.5")
+            mu, lam = lame_from_engineering(youngs, nu)
+        elif given == ["mu", "lam"]:
+            mu = self.checked_numbers(self.mu, "mu", "Pa")
+            lam = self.checked_numbers(self.lam, "lam", "Pa")
+        else:
+            said = " and ".join(given) or "neither"
+            raise SceneError(f"{self.label}: give mu and lam, or youngs and poisson (given: {said})")
+        object.__setattr__(self, "mu", mu)
+        object.__setattr__(self, "lam", lam)
+        distance = self.checked_numbers(self.min_separate_distance, "min_separate_distance", "m")
+        object.__setattr__(self, "min_separate_distance", distance)
+
+    def energy_density(self, F: ArrayLike) -> NDArray[np.float64]:
+        """psi as published, mu^2/lam^2 included, which is not zero at rest.
+
+        That constant has the wrong dimension (completing the square gives mu^2/(2 lam)) and no effect on motion.
+        Energies in reports are measured from the rest state.
+
+        Parameters
+        ----------
+        F : (..., 3, 3) deformation gradients; (k, 3, 3) where mu and lam are given for each of k pairs
+
+        Returns
+        -------
+        (...) [Pa]
+        """
+        F = np.asarray(F, dtype=np.float64)
+        if F.shape[-2:] != (3, 3):
+            raise SceneError(f"F has shape {F.shape}; its last two axes must be (3, 3)")
+        mu, lam = np.asarray(self.mu), np.asarray(self.lam)
+        grown = np.linalg.det(F) - 1.0
+        Ic = np.einsum("...ij,...ij->...", F, F)
+        return 0.5 * mu * (Ic - 3.0) - mu * grown + 0.5 * lam * grown * grown + (mu / lam) ** 2
+
+    def partners(self, second: Side) -> NDArray[np.int32]:
+        """See `Stitch`."""
+        return second.triangles
+
+    def join(self, first: Side, second: Side, pairs: Pairs) -> StitchTets:
+        """See `Stitch`. A tet's triangle is turned where its volume would be negative: above it.
+
+        Raises
+        ------
+        SceneError : where a triangle has no area.
+        """
+        count = len(pairs.vertices)
+        corners = second.triangles[pairs.rows]
+        d = self.per_pair(self.min_separate_distance, count, "min_separate_distance")
+        x0, (x1, x2, x3) = first.points[pairs.vertices], second.points[corners].transpose(1, 0, 2)
+        n = np.cross(x2 - x1, x3 - x1)
+        length = np.linalg.norm(n, axis=1)
+        flat = np.flatnonzero(~(length > 1e-12 * _longest_edge(x1, x2, x3) ** 2))
+        if len(flat):
+            raise SceneError(
+                f"{self.label}: triangle {pairs.rows[flat[0]]} of {second.label} has no area, so that nothing can be "
+                "stitched to it; mend the mesh"
+            )
+        n /= length[:, None]
+        s = np.einsum("ij,ij->i", n, x0 - x1)
+        # Faces that touch are at 0, on the side +1, whatever the sign that round-off gives it.
+        round_off = 8.0 * np.finfo(np.float64).eps * np.max(np.abs([x0, x1, x2, x3]), axis=(0, 2))
+        above = s >= -round_off
+        near = np.abs(s) < d - round_off
+        x0 = x0 + np.where(near, np.where(above, d, -d) - s, 0.0)[:, None] * n
+        corners, second_corner, third_corner = corners.copy(), x2, x3
+        corners[above] = corners[above][:, [0, 2, 1]]
+        x2 = np.where(above[:, None], third_corner, second_corner)
+        x3 = np.where(above[:, None], second_corner, third_corner)
+        Dm = np.stack([x1 - x0, x2 - x0, x3 - x0], axis=-1)
+        return StitchTets(
+            vertices=np.column_stack([pairs.vertices, corners]).astype(np.int32),
+            rest_shape_inverse=np.ascontiguousarray(np.linalg.inv(Dm)),
+            rest_volumes=np.abs(np.linalg.det(Dm)) / 6.0,
+            mu=self.per_pair(self.mu, count, "mu"),  # pyright: ignore[reportArgumentType]
+            lam=self.per_pair(self.lam, count, "lam"),  # pyright: ignore[reportArgumentType]
+            damping=np.full(count, self.damping),
+            offset=near,
+        )
+
+
+def _longest_edge(a: NDArray, b: NDArray, c: NDArray) -> NDArray[np.float64]:
+    return np.max([np.linalg.norm(b - a, axis=1), np.linalg.norm(c - b, axis=1), np.linalg.norm(a - c, axis=1)], axis=0)
