@@ -83,8 +83,9 @@ def _with_body_value(live: LiveScene, command: say.SetParameter) -> Scene:
         for body in scene.bodies
     ]
     if not any(bodies):
-        whose = f"body {command.body!r} has" if command.body is not None else "no body here has"
-        raise CommandError(f"{whose} no {command.name} to set")
+        if command.body is None:
+            raise CommandError(f"no body here has {command.name}")
+        raise CommandError(f"body {command.body!r} has no {command.name}")
     obstacles = scene.obstacles
     if command.name == "friction" and command.body is None:
         obstacles = [replace(obstacle, friction=float(command.value)) for obstacle in obstacles]

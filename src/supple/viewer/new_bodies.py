@@ -33,7 +33,7 @@ def make_mesh(shape: str, size: float, resolution: int) -> TetMesh:
         case "torus":
             return shapes.torus(0.35 * size, 0.15 * size, min(edge, 0.12 * size))
         case "gummy_bear":
-            return shapes.gummy_bear(size, min(edge, 0.15 * size))
+            return shapes.gummy_bear(size, min(edge, size / 7.0))
     raise CommandError(f"there is no shape {shape!r}")
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import logging
 import time
 from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 
@@ -14,6 +16,7 @@ from supple.viewer import commands as say
 from supple.viewer import limits
 from supple.viewer.changes import change
 from supple.viewer.command_queue import CommandQueue
+from supple.viewer.contact_points import contact_points
 from supple.viewer.describe import describe, measures, obstacle_poses
 from supple.viewer.live_scene import LiveScene
 from supple.viewer.outbox import Outbox
@@ -51,12 +54,13 @@ class SimulationLoop:
 
     def run(self) -> None:
         """Until the page's process is gone."""
-        while not self.inbox.closed:
-            self.turn(self._time_to_wait())
+        with self.told_of_warnings():
+            while not self.inbox.closed:
+                self.turn(self._time_to_wait())
 
     def turn(self, wait: float) -> None:
         """One round: commands, a step if one is due, a snapshot if there is something to show."""
-        for number, command in self.inbox.take(wait) if wait > 0.0 else self.inbox.take(0.0):
+        for number, command in self.inbox.take(wait):
             self.obey(command)
             self.applied = max(self.applied, number)
             self._fresh = True
@@ -122,6 +126,18 @@ class SimulationLoop:
         number = self.notices[-1].number + 1 if self.notices else 1
         self.notices.append(Notice(number, level, text))
 
+    @contextmanager
+    def told_of_warnings(self) -> Iterator[None]:
+        """Whatever the library warns of within becomes a notice, once."""
+        log, handler = logging.getLogger("supple"), _Notices(self)
+        propagated, log.propagate = log.propagate, False
+        log.addHandler(handler)
+        try:
+            yield
+        finally:
+            log.removeHandler(handler)
+            log.propagate = propagated
+
     def publish(self, now: float) -> None:
         """Put out a snapshot, after a description where that has changed."""
         live = self.live
@@ -156,6 +172,7 @@ class SimulationLoop:
             velocities=state.velocities if view.velocities else None,
             tet_values=None if view.tet_values is None else tet_values(system, state.positions, view.tet_values),
             tet_quantity=view.tet_values,
+            contact_points=contact_points(system, state.positions, state.time) if view.contacts else None,
         )
 
     def _shortest(self) -> float:
@@ -192,6 +209,23 @@ class SimulationLoop:
         if self._fresh or self._in_slow_motion():
             ends.append(self._published + self._shortest())
         return max(0.0, min(ends) - now)
+
+
+class _Notices(logging.Handler):
+    """Tells a loop of warnings. Errors are for the terminal as well: they are mistakes in the code."""
+
+    def __init__(self, loop: SimulationLoop) -> None:
+        super().__init__(logging.WARNING)
+        self.loop = loop
+        self.told: set[str] = set()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        text = " ".join(record.getMessage().split())[:500]
+        if record.levelno >= logging.ERROR:
+            logging.getLogger().handle(record)
+        elif text not in self.told and len(self.told) < 1000:
+            self.told.add(text)
+            self.loop.tell("info", text)
 
 
 def _rows(live: LiveScene, body: str) -> slice:

@@ -1,0 +1,49 @@
+"""Small scenes for the live page."""
+
+import pytest
+
+import supple as sp
+from supple.viewer.live_scene import LiveScene
+from supple.viewer.live_source import LiveSource
+from supple.viewer.simulation_loop import SimulationLoop
+
+
+def small_source(**changes):
+    """A rubber cube that falls on a floor, and a block whose left end is pinned."""
+    rubber = sp.StableNeoHookean(youngs=1e5, poisson=0.4, density=1000.0)
+    cube = sp.Body("cube", sp.shapes.box((0.4, 0.4, 0.4), (3, 3, 3)), rubber, position=(0.0, 0.5, 0.0))
+    block = sp.Body("block", sp.shapes.box((0.6, 0.2, 0.2), (4, 2, 2)), rubber, position=(1.5, 1.0, 0.0))
+    left = sp.InBox((1.0, 0.0, -1.0), (1.21, 2.0, 1.0))
+    parts = {
+        "bodies": [cube, block],
+        "obstacles": [sp.HalfSpace(name="floor")],
+        "pins": [sp.Pin("block", left)],
+        **changes,
+    }
+    return LiveSource("small", sp.Scene(**parts), sp.XPBD(substeps=8), 1 / 60)
+
+
+@pytest.fixture
+def live():
+    return LiveScene(small_source())
+
+
+class Collected:
+    """An outbox that keeps what it is given."""
+
+    def __init__(self):
+        self.descriptions, self.snapshots = [], []
+
+    def put_description(self, description):
+        self.descriptions.append(description)
+
+    def put_snapshot(self, snapshot):
+        self.snapshots.append(snapshot)
+
+
+@pytest.fixture
+def loop(live):
+    """A loop without processes: commands go in with `obey`, snapshots come out of `snapshot`."""
+    from supple.viewer.command_queue import CommandQueue
+
+    return SimulationLoop(live, CommandQueue(), Collected())

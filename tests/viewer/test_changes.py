@@ -1,0 +1,408 @@
+"""What commands do to a running scene: each judged by the simulation's state."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.errors import CommandError, SolverError, SuppleError
+from supple.viewer import limits
+from supple.viewer.changes import change, flattened
+from supple.viewer.describe import describe, measures
+from supple.viewer.live_scene import LiveScene
+from supple.viewer.live_source import LiveSource
+from supple.viewer.messages import (
+    AddBody,
+    CopyBody,
+    Grab,
+    MoveGrab,
+    MovePusher,
+    Pin,
+    ReleaseGrab,
+    RemoveBody,
+    RemovePusher,
+    Reset,
+    SetParameter,
+    SetSolver,
+    Squash,
+    Unpin,
+)
+
+from .conftest import small_source
+
+
+def run(live, steps):
+    for _ in range(steps):
+        assert live.step().status == "converged"
+
+
+def free_source(**changes):
+    """One rubber cube in free space."""
+    rubber = sp.StableNeoHookean(youngs=1e5, poisson=0.4, density=1000.0, damping=0.01)
+    cube = sp.Body("cube", sp.shapes.box((0.4, 0.4, 0.4), (3, 3, 3)), rubber)
+    return LiveSource("free", sp.Scene([cube], gravity=(0, 0, 0), **changes), sp.XPBD(substeps=8), 1 / 60)
+
+
+def corner_grab(target, **more):
+    return Grab(7, "cube", (0,), (1.0,), target, **more)
+
+
+class TestGrabs:
+    def test_a_body_hangs_on_its_spring_as_hookes_law_says(self):
+        live = LiveScene(small_source(obstacles=[]))
+        change(corner_grab((-0.2, 1.5, -0.2)), live)
+        spring = live.setup.grabs[7]
+        for _ in range(600):
+            live.step()
+            live.state = dataclasses.replace(live.state, velocities=0.97 * live.state.velocities)
+        weight = describe(live).body("cube").mass * 9.81
+        stretch = spring.target - spring.point(live.body_positions("cube"))
+        assert spring.stiffness * stretch == pytest.approx([0.0, weight, 0.0], abs=0.02 * weight)
+
+    def test_let_go_a_body_keeps_its_velocity(self):
+        live = LiveScene(free_source())
+        change(corner_grab((-0.2, -0.2, -0.2)), live)
+        for k in range(40):
+            change(MoveGrab(7, (-0.2 + 0.05 * k, -0.2, -0.2)), live)
+            live.step()
+        momentum = live.system.masses @ live.state.velocities
+        speed = momentum[0] / live.system.masses.sum()
+        assert speed > 1.0  # the hand moves at 3 m/s
+        change(ReleaseGrab(7), live)
+        assert live.system.masses @ live.state.velocities == pytest.approx(momentum, rel=1e-12)
+        run(live, 30)
+        assert live.system.masses @ live.state.velocities == pytest.approx(momentum, rel=1e-9)
+
+    def test_a_spring_brings_no_torque_about_its_own_point(self):
+        live = LiveScene(free_source())
+        change(Grab(1, "cube", tuple(live.system.tets[0].tolist()), (0.25,) * 4, (0.0, 0.0, 0.0)), live)
+        spring = live.setup.grabs[1]
+        point = spring.point(live.body_positions("cube"))
+        change(MoveGrab(1, tuple((point + np.array([0, 0.3, 0])).tolist())), live)
+        assert len(spring.patch) >= 4
+        spring.pull(live.body_positions("cube"), live.state.positions[spring.patch])
+        forces = spring._motion(0.0)
+        assert np.ptp(forces, axis=0) == pytest.approx([0, 0, 0], abs=1e-12)
+        assert forces[0] == pytest.approx([0, 0.3, 0])
+
+    @pytest.mark.parametrize("stiffness", [limits.WEAKEST_GRAB, limits.STRONGEST_GRAB])
+    def test_no_hand_is_strong_or_far_enough_to_break_the_simulation(self, live, stiffness):
+        change(corner_grab((9e3, 9e3, 9e3), stiffness=stiffness), live)
+        for k in range(60):
+            change(MoveGrab(7, (9e3 * (-1) ** k, 9e3, 0.0)), live)
+            live.step()
+        assert live.report.status == "converged"
+        assert np.isfinite(live.state.positions).all()
+
+    def test_the_barycentric_point_is_what_moves(self):
+        live = LiveScene(free_source())
+        a, b, c = describe(live).body("cube").triangles[5].tolist()
+        change(Grab(1, "cube", (a, b, c), (0.2, 0.3, 0.5), (1.0, 0.0, 0.0)), live)
+        for _ in range(400):
+            live.step()
+            live.state = dataclasses.replace(live.state, velocities=0.9 * live.state.velocities)
+        point = np.array([0.2, 0.3, 0.5]) @ live.body_positions("cube")[[a, b, c]]
+        assert point == pytest.approx([1.0, 0.0, 0.0], abs=1e-3)
+
+    def test_vertices_that_are_not_there_and_too_many_hands_are_refused(self, live):
+        with pytest.raises(CommandError, match="has no vertex 1000"):
+            change(Grab(1, "cube", (1000,), (1.0,), (0, 0, 0)), live)
+        with pytest.raises(CommandError, match="no body 'ghost'"):
+            change(Grab(1, "ghost", (0,), (1.0,), (0, 0, 0)), live)
+        for number in range(limits.MOST_GRABS):
+            change(Grab(number, "cube", (number,), (1.0,), (0, 1, 0)), live)
+        with pytest.raises(CommandError, match="let one go"):
+            change(Grab(99, "cube", (0,), (1.0,), (0, 1, 0)), live)
+        change(Grab(3, "cube", (0,), (1.0,), (0, 1, 0)), live)
+        assert len(live.setup.grabs) == limits.MOST_GRABS
+
+
+class TestPins:
+    def test_a_pinned_vertex_stays_where_it_is_through_every_other_change(self, live):
+        run(live, 10)
+        place = live.body_positions("cube")[5].copy()
+        change(Pin("cube", 5), live)
+        for k in range(10):
+            change(SetParameter("youngs", 1e5 + k, "cube"), live)
+            run(live, 2)
+        assert live.body_positions("cube")[5] == pytest.approx(place, abs=1e-12)
+        assert live.system.pinned_vertices.tolist().count(5) == 1
+        change(Unpin("cube", 5), live)
+        run(live, 10)
+        assert live.body_positions("cube")[5, 1] < place[1] - 0.01
+
+    def test_a_vertex_of_the_scenes_own_pin_can_be_let_go_and_comes_back_with_a_reset(self, live):
+        before = live.system.pinned_vertices.tolist()
+        start = live.system.bodies[1].vertices.start
+        vertex = before[0] - start
+        anchors = live.system.pins[0].anchors[1:].copy()
+        run(live, 5)
+        change(Unpin("block", vertex), live)
+        assert live.system.pinned_vertices.tolist() == before[1:]
+        assert np.array_equal(live.system.pins[0].anchors, anchors)
+        change(Reset(), live)
+        assert live.system.pinned_vertices.tolist() == before
+
+    def test_unpin_alone_lets_go_of_what_was_pinned_by_hand_only(self, live):
+        before = live.system.pinned_vertices.tolist()
+        change(Pin("cube", 1), live)
+        change(Pin("cube", 2), live)
+        change(Pin("cube", 2), live)
+        assert len(live.system.pinned_vertices) == len(before) + 2
+        change(Unpin(), live)
+        assert live.system.pinned_vertices.tolist() == before
+
+
+class TestPusher:
+    def test_it_pushes_a_body_without_passing_through(self):
+        live = LiveScene(free_source())
+        change(MovePusher((-0.6, 0.0, 0.0), 0.2), live)
+        for k in range(60):
+            change(MovePusher((-0.6 + 0.02 * k, 0.0, 0.0), 0.2), live)
+            run(live, 1)
+        center = live.setup.pusher.center
+        assert center[0] == pytest.approx(0.58, abs=0.05)
+        assert live.system.masses @ live.state.positions[:, 0] > 0.3 * live.system.masses.sum()
+        distance = np.linalg.norm(live.state.positions - center, axis=1)
+        assert distance.min() > 0.2 - 0.02
+
+    def test_it_never_moves_farther_than_a_stride_in_one_step(self):
+        live = LiveScene(free_source())
+        change(MovePusher((-5.0, 0.0, 0.0), 0.2), live)
+        change(MovePusher((5.0, 0.0, 0.0), 0.2), live)
+        run(live, 1)
+        assert live.setup.pusher.center == pytest.approx([-4.95, 0.0, 0.0])
+
+    def test_it_can_be_taken_away(self, live):
+        change(MovePusher((0.0, 2.0, 0.0), 0.2), live)
+        assert [obstacle.name for obstacle in live.system.obstacles] == ["floor", "pusher"]
+        generation = live.generation
+        change(RemovePusher(), live)
+        assert [obstacle.name for obstacle in live.system.obstacles] == ["floor"]
+        assert live.generation == generation + 1
+
+
+class TestParameters:
+    def test_values_take_effect_in_the_system_and_stand_in_the_description(self, live):
+        for name, value in {"youngs": 3e5, "poisson": 0.3, "damping": 0.02, "density": 500.0, "friction": 0.7}.items():
+            change(SetParameter(name, value, "cube"), live)
+            assert describe(live).body("cube").values[name] == value
+            assert describe(live).body("block").values[name] != value
+        assert live.system.masses[live.system.bodies[0].vertices].sum() == pytest.approx(500 * 0.4**3)
+        for name, value in {"substeps": 3, "momentum_restore": False, "contact": False, "dt": 0.01}.items():
+            change(SetParameter(name, value), live)
+            assert describe(live).values[name] == value
+        assert live.setup.solver == sp.XPBD(substeps=3, momentum_restore=False, contact=None)
+        run(live, 1)
+        assert live.state.time == pytest.approx(0.01)
+
+    def test_gravity_keeps_its_direction_and_turns_round_below_zero(self, live):
+        change(SetParameter("gravity", -2.0), live)
+        assert live.system.gravity == pytest.approx([0, 2.0, 0])
+        assert describe(live).values["gravity"] == pytest.approx(-2.0)
+        assert describe(live).up.tolist() == [0.0, 1.0, 0.0]
+        change(SetParameter("gravity", 0.0), live)
+        change(SetParameter("gravity", 9.81), live)
+        assert live.system.gravity == pytest.approx([0, -9.81, 0])
+
+    def test_friction_of_all_goes_to_obstacles_too(self, live):
+        change(SetParameter("friction", 0.4), live)
+        assert [obstacle.friction for obstacle in live.system.obstacles] == [0.4]
+        assert [part.body.friction for part in live.system.bodies] == [0.4, 0.4]
+
+    def test_a_parameter_that_nothing_has_is_refused_and_changes_nothing(self, live):
+        revision = live.revision
+        with pytest.raises(CommandError, match="no body here has edge_compliance"):
+            change(SetParameter("edge_compliance", 1e-3), live)
+        with pytest.raises(CommandError, match="'ghost'"):
+            change(SetParameter("youngs", 1e5, "ghost"), live)
+        assert live.revision == revision
+
+    def test_regions_are_tuned_together(self):
+        mesh = sp.shapes.box((1, 1, 1), (1, 1, 2))
+        soft, hard = (sp.StableNeoHookean(youngs=y, poisson=0.3) for y in (1e4, 1e6))
+        body = sp.Body("bar", mesh, sp.Regions(materials=[soft, hard], index=[0] * 6 + [1] * 6))
+        live = LiveScene(LiveSource("regions", sp.Scene([body]), sp.XPBD(substeps=2), 0.01))
+        assert "youngs" not in describe(live).body("bar").values
+        change(SetParameter("damping", 0.03), live)
+        assert set(np.asarray(live.system.bodies[0].body.material.damping)) == {0.03}
+
+    def test_momentum_restore_can_be_seen_to_matter(self):
+        spins = {}
+        for restore in (True, False):
+            live = LiveScene(free_source())
+            change(SetParameter("momentum_restore", restore), live)
+            change(Squash(0.4), live)
+            run(live, 120)
+            spins[restore] = float(np.linalg.norm(measures(live).spin[0]))
+        assert spins[True] < 1e-9
+        assert spins[False] > 1e3 * spins[True]
+
+
+class TestSolvers:
+    def test_positions_and_velocities_go_over(self):
+        live = LiveScene(free_source())
+        change(Squash(0.8), live)
+        run(live, 3)
+        x, v = live.state.positions, live.state.velocities
+        change(SetSolver("implicit"), live)
+        assert describe(live).solver == "implicit"
+        assert live.state.positions is x
+        assert live.state.velocities is v
+        run(live, 2)
+        change(SetSolver("xpbd"), live)
+        assert live.setup.solver == sp.XPBD(substeps=8)
+        run(live, 2)
+        assert live.frame == 7
+
+    def test_a_switch_that_is_impossible_says_why_and_changes_nothing(self):
+        springs = sp.EdgesAndVolume(edge_compliance=1e-4)
+        body = sp.Body("ball", sp.shapes.box((0.4, 0.4, 0.4), (2, 2, 2)), springs)
+        live = LiveScene(LiveSource("springs", sp.Scene([body]), sp.XPBD(substeps=4), 0.01))
+        run(live, 2)
+        system, revision = live.system, live.revision
+        with pytest.raises(SolverError, match="'ball'"):
+            change(SetSolver("implicit"), live)
+        assert live.system is system
+        assert live.revision == revision
+        run(live, 2)
+
+    def test_inverted_tets_of_a_material_without_energy_there_are_found_before_the_switch(self):
+        mesh = sp.shapes.box((0.4, 0.4, 0.4), (1, 1, 1))
+        body = sp.Body("cube", mesh, sp.NeoHookean(youngs=1e5, poisson=0.3))
+        source = LiveSource("inverted", sp.Scene([body]), sp.Implicit(), 0.01)
+        live = LiveScene(source)
+        live.state = dataclasses.replace(live.state, positions=live.state.positions * [1, -1, 1])
+        live.solvers["xpbd"] = sp.XPBD()
+        with pytest.raises(SuppleError):
+            change(SetSolver("xpbd"), live)
+        assert describe(live).solver == "implicit"
+
+
+class TestSquash:
+    def test_no_tet_changes_its_volume_and_the_lowest_point_stays(self, live):
+        low = live.body_positions("cube")[:, 1].min()
+        pinned = live.body_positions("block").copy()
+        change(Squash(0.5), live)
+        cube = live.body_positions("cube")
+        assert np.ptp(cube[:, 1]) == pytest.approx(0.2)
+        assert np.ptp(cube[:, 0]) == pytest.approx(0.4 * np.sqrt(2))
+        assert cube[:, 1].min() == pytest.approx(low)
+        assert np.array_equal(live.body_positions("block"), pinned)
+        assert measures(live).min_det_F == pytest.approx(1.0)
+
+    @pytest.mark.parametrize("factor", [0.3, 0.5, 2.0])
+    def test_the_body_recovers(self, factor):
+        live = LiveScene(free_source())
+        change(Squash(factor), live)
+        assert measures(live).elastic_energy > 100.0
+        run(live, 60)
+        a, b = live.state.positions[live.system.edges].transpose(1, 0, 2)
+        assert np.linalg.norm(a - b, axis=1) == pytest.approx(live.system.rest_lengths, rel=1e-4)
+        assert measures(live).elastic_energy < 1e-6
+
+    def test_flattened_is_one_linear_map_of_determinant_one(self):
+        up = np.array([0.6, 0.8, 0.0])
+        a, b, c, d = (flattened(np.vstack([np.zeros(3), np.eye(3), [[0.2, 0.3, -1.0]]]), up, 0.4))[:4]
+        assert np.linalg.det(np.array([b - a, c - a, d - a])) == pytest.approx(1.0)
+
+    def test_pinned_bodies_cannot_be_squashed(self):
+        source = small_source()
+        live = LiveScene(dataclasses.replace(source, scene=sp.Scene([source.scene.bodies[1]], pins=source.scene.pins)))
+        with pytest.raises(CommandError, match="unpin"):
+            change(Squash(0.5), live)
+
+
+class TestBodies:
+    @pytest.mark.parametrize("shape", limits.SHAPES)
+    def test_each_shape_lands_above_the_others_in_its_size(self, live, shape):
+        top = live.state.positions[:, 1].max()
+        others = {part.name: live.body_positions(part.name).copy() for part in live.system.bodies}
+        change(AddBody(shape, size=0.3, resolution=4), live)
+        part = live.system.bodies[-1]
+        x = live.body_positions(part.name)
+        assert part.name == f"{shape.replace('_', ' ')} 1"
+        assert np.ptp(x, axis=0).max() == pytest.approx(0.3, rel=0.15)
+        assert x[:, 1].min() > top
+        for name, before in others.items():
+            assert np.array_equal(live.body_positions(name), before)
+        assert describe(live).bodies[-1].added
+        run(live, 2)
+
+    def test_copies_and_removal_leave_everything_else_as_it_was(self, live):
+        run(live, 5)
+        change(Pin("block", 40), live)
+        change(corner_grab((0, 2, 0)), live)
+        block = live.body_positions("block").copy()
+        change(CopyBody("cube", position=(0.0, 3.0, 0.0)), live)
+        assert [part.name for part in live.system.bodies] == ["cube", "block", "cube 1"]
+        assert live.body_positions("cube 1").mean(axis=0) == pytest.approx([0, 3, 0])
+        assert np.ptp(live.body_positions("cube 1"), axis=0) == pytest.approx([0.4] * 3)
+        change(RemoveBody("cube"), live)
+        assert [part.name for part in live.system.bodies] == ["block", "cube 1"]
+        assert np.array_equal(live.body_positions("block"), block)
+        assert not live.setup.grabs
+        run(live, 5)
+        assert live.body_positions("block")[40] == pytest.approx(block[40], abs=1e-12)
+        change(RemoveBody("block"), live)
+        assert len(live.system.pinned_vertices) == 0
+        with pytest.raises(CommandError, match="only one"):
+            change(RemoveBody("cube 1"), live)
+
+    def test_there_is_an_end_to_bodies_and_tets(self, live, monkeypatch):
+        monkeypatch.setattr(limits, "MOST_BODIES", 3)
+        change(CopyBody("cube"), live)
+        with pytest.raises(CommandError, match="remove one"):
+            change(CopyBody("cube"), live)
+        monkeypatch.setattr(limits, "MOST_BODIES", 10)
+        monkeypatch.setattr(limits, "MOST_TETS", 500)
+        with pytest.raises(CommandError, match="resolution"):
+            change(AddBody("box", resolution=8), live)
+
+    def test_a_name_that_is_taken_is_refused(self, live):
+        with pytest.raises(SuppleError, match="cube"):
+            change(AddBody("box", resolution=3, name="cube"), live)
+        assert len(live.system.bodies) == 2
+
+
+def test_reset_goes_back_to_the_start_with_what_was_added_and_tuned(live):
+    start = live.state.positions.copy()
+    change(SetParameter("youngs", 5e4, "cube"), live)
+    change(corner_grab((0, 2, 0)), live)
+    change(MovePusher((3, 3, 3), 0.1), live)
+    change(Pin("cube", 3), live)
+    change(AddBody("sphere", resolution=4, position=(0, 4, 0)), live)
+    added = live.body_positions("sphere 1").copy()
+    run(live, 10)
+    change(Reset(), live)
+    assert live.frame == 0
+    assert live.state.time == 0.0
+    assert np.array_equal(live.state.positions[: len(start)], start)
+    assert np.array_equal(live.body_positions("sphere 1"), added)
+    assert describe(live).body("cube").values["youngs"] == 5e4
+    assert not live.setup.grabs
+    assert live.setup.pusher is None
+    run(live, 2)
+
+
+def test_a_deformed_start_is_what_reset_goes_back_to():
+    source = small_source()
+    flat = source.scene.body("cube").place(source.scene.body("cube").mesh.vertices) * [1.2, 0.7, 1.2]
+    live = LiveScene(dataclasses.replace(source, initial_positions={"cube": flat}))
+    assert np.array_equal(live.body_positions("cube"), flat)
+    run(live, 5)
+    change(RemoveBody("block"), live)
+    change(Reset(), live)
+    assert np.array_equal(live.body_positions("cube"), flat)
+
+
+def test_nothing_is_drawn_anew_for_a_slider(live):
+    generation = live.generation
+    change(SetParameter("youngs", 5e4, "cube"), live)
+    change(SetParameter("friction", 0.5), live)
+    change(Pin("cube", 3), live)
+    change(corner_grab((0, 2, 0)), live)
+    assert live.generation == generation
+    change(CopyBody("cube"), live)
+    assert live.generation == generation + 1

@@ -1,0 +1,65 @@
+"""The queue of commands: bounded, in order, and of a moving hand only the newest place."""
+
+import threading
+import time
+
+from supple.viewer.command_queue import CommandQueue
+from supple.viewer.messages import Grab, MoveGrab, MovePusher, Pause, Play, ReleaseGrab, SetParameter, Step
+
+
+def drained(*commands, capacity=100):
+    queue = CommandQueue(capacity)
+    for number, command in enumerate(commands, 1):
+        queue.put(number, command)
+    return queue.take(0.0)
+
+
+def test_only_the_newest_place_of_a_hand_is_kept_and_hands_do_not_mix():
+    first, second = [MoveGrab(1, (x, 0, 0)) for x in range(50)], [MoveGrab(2, (0, x, 0)) for x in range(50)]
+    mixed = [command for pair in zip(first, second, strict=True) for command in pair]
+    assert drained(*mixed) == [(99, first[-1]), (100, second[-1])]
+
+
+def test_a_move_after_letting_go_is_not_taken_before_it():
+    commands = [MoveGrab(1, (1, 0, 0)), ReleaseGrab(1), Grab(1, "cube", (0,), (1,), (0, 0, 0)), MoveGrab(1, (2, 0, 0))]
+    assert [command for _, command in drained(*commands)] == commands
+
+
+def test_the_last_word_on_a_parameter_of_one_body_and_of_all_stays_the_last():
+    commands = [
+        SetParameter("youngs", 1e4),
+        SetParameter("youngs", 2e4, "cube"),
+        SetParameter("youngs", 3e4),
+        SetParameter("friction", 0.5),
+    ]
+    assert [command for _, command in drained(*commands)] == commands
+    again = [SetParameter("youngs", 1e4 + k, "cube") for k in range(10)]
+    assert [command for _, command in drained(*again)] == again[-1:]
+
+
+def test_each_play_pause_and_step_counts():
+    commands = [Play(), Pause(), Play(), Step(2), Step(2)]
+    assert [command for _, command in drained(*commands)] == commands
+
+
+def test_more_than_its_capacity_is_dropped_and_moves_still_get_through():
+    queue = CommandQueue(capacity=5)
+    assert all(queue.put(k, Step()) for k in range(4))
+    assert queue.put(4, MovePusher((0, 0, 0), 0.1))
+    assert not queue.put(5, Play())
+    assert queue.put(6, MovePusher((1, 0, 0), 0.1))
+    assert queue.dropped == 1
+    taken = queue.take(0.0)
+    assert len(taken) == 5
+    assert taken[-1] == (6, MovePusher((1, 0, 0), 0.1))
+
+
+def test_taking_wakes_up_for_a_command_and_for_the_end():
+    queue = CommandQueue()
+    threading.Timer(0.05, queue.put, (1, Play())).start()
+    assert queue.take(30.0) == [(1, Play())]
+    began = time.monotonic()
+    threading.Timer(0.05, queue.close).start()
+    assert queue.take(30.0) == []
+    assert queue.closed
+    assert time.monotonic() - began < 20.0

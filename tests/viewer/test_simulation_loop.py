@@ -1,0 +1,250 @@
+"""The loop in the simulation's process, without the process: failures, slow motion, views, and a thousand commands."""
+
+import dataclasses
+import logging
+import math
+import random
+
+import numpy as np
+import pytest
+
+from supple.errors import CommandError, SolverError
+from supple.state import Status, StepReport
+from supple.viewer import limits
+from supple.viewer import messages as say
+from supple.viewer.pacing import Pacing
+
+
+def with_solver_that(loop, step):
+    """The loop's scene with a solver that does `step` instead of simulating."""
+
+    class Broken(type(loop.live.setup.solver)):
+        def step(self, system, state, dt, workspace):
+            return step(state)
+
+    loop.live.setup = dataclasses.replace(loop.live.setup, solver=Broken())
+
+
+def not_finite(state):
+    return state, StepReport(Status.NOT_FINITE, 1, "vertex 7 is lost")
+
+
+def silently_not_finite(state):
+    bad = dataclasses.replace(state, positions=state.positions * math.nan)
+    return bad, StepReport(Status.CONVERGED, 1)
+
+
+def refuses(state):
+    raise SolverError("tets are inverted")
+
+
+def crashes(state):
+    raise ValueError("a mistake in a solver")
+
+
+@pytest.mark.parametrize("failure", [not_finite, silently_not_finite, refuses, crashes])
+def test_a_step_that_fails_pauses_at_the_last_good_state_and_says_why(loop, failure):
+    loop.obey(say.Play())
+    loop.step()
+    good = loop.live.state
+    solver = loop.live.setup.solver
+    with_solver_that(loop, failure)
+    loop.step()
+    assert not loop.playing
+    assert loop.live.state is good
+    assert loop.live.frame == 1
+    notice = loop.notices[-1]
+    assert notice.level == "error"
+    assert notice.text.startswith("paused at t = 0.01667 s; ")
+    loop.live.setup = dataclasses.replace(loop.live.setup, solver=solver)
+    loop.obey(say.Play())
+    loop.step()
+    assert loop.live.frame == 2
+
+
+def test_what_cannot_be_done_becomes_a_notice_and_play_goes_on(loop):
+    loop.obey(say.Play())
+    loop.obey(say.RemoveBody("ghost"))
+    loop.obey(say.SetParameter("edge_compliance", 0.1))
+    assert loop.playing
+    assert [notice.number for notice in loop.notices] == [1, 2]
+    assert "'ghost'" in loop.notices[0].text
+    for _ in range(50):
+        loop.obey(say.RemoveBody("ghost"))
+    assert [notice.number for notice in loop.notices] == list(range(45, 53))
+
+
+def test_steps_are_simulated_without_waiting_for_the_clock(loop):
+    loop.obey(say.Step(5))
+    for _ in range(7):
+        loop.turn(0.0)
+    assert loop.live.frame == 5
+    assert loop.steps_left == 0
+
+
+def test_slow_motion_shows_states_between_two_steps(loop):
+    loop.obey(say.SetSpeed(0.1))
+    loop.obey(say.Play())
+    loop.step()
+    loop.step()
+    before, after = loop._before, loop.live.state
+    due = loop.pacing.due
+    half = loop.snapshot(due - 0.5 * loop._interval())
+    assert half.time == pytest.approx(0.5 * (before.time + after.time))
+    assert half.positions == pytest.approx(0.5 * (before.positions + after.positions))
+    assert loop.snapshot(due + 1.0).time == after.time
+    loop.obey(say.Pause())
+    assert loop.snapshot(due - 0.5 * loop._interval()).positions is after.positions
+
+
+def test_a_view_decides_what_a_snapshot_holds(loop):
+    for _ in range(20):
+        loop.live.step()
+    plain = loop.snapshot(0.0)
+    assert plain.velocities is None
+    assert plain.tet_values is None
+    assert plain.contact_points is None
+    loop.obey(say.SetView("von_mises", velocities=True, contacts=True))
+    full = loop.snapshot(0.0)
+    assert full.velocities.shape == full.positions.shape
+    assert full.tet_values.shape == (len(loop.live.system.tets),)
+    assert full.tet_quantity == "von_mises"
+    assert full.contact_points.ndim == 2
+
+
+def test_what_the_library_warns_of_is_told_once(loop):
+    log = logging.getLogger("supple.somewhere")
+    with loop.told_of_warnings():
+        for _ in range(3):
+            log.warning("tets are too stiff for substeps of %g s", 0.002)
+        log.info("not for the page")
+        log.warning("something else")
+    log.warning("after the end")
+    assert [(one.level, one.text) for one in loop.notices] == [
+        ("info", "tets are too stiff for substeps of 0.002 s"),
+        ("info", "something else"),
+    ]
+
+
+class TestPacing:
+    def paced(self, seconds_per_step, dt=1 / 60, speed=1.0, steps=120):
+        pacing, now = Pacing(), 100.0
+        pacing.start(now)
+        for _ in range(steps):
+            now = max(now, pacing.due) + seconds_per_step
+            pacing.stepped(now, seconds_per_step, dt, speed)
+        return pacing.timing(now, speed, True)
+
+    def test_a_quick_simulation_runs_in_real_time(self):
+        timing = self.paced(0.002)
+        assert timing.real_time_ratio == pytest.approx(1.0, abs=0.03)
+        assert timing.frames_per_second == pytest.approx(60.0, abs=2.0)
+        assert timing.step_ms == pytest.approx(2.0)
+        assert timing.keeps_up
+
+    def test_a_slow_one_says_so(self):
+        timing = self.paced(0.05)
+        assert timing.real_time_ratio == pytest.approx(1 / 3, abs=0.02)
+        assert timing.frames_per_second == pytest.approx(20.0, abs=1.0)
+        assert not timing.keeps_up
+
+    def test_slow_motion_is_not_late(self):
+        timing = self.paced(0.05, speed=0.1)
+        assert timing.real_time_ratio == pytest.approx(0.1, abs=0.02)
+        assert timing.keeps_up
+
+    def test_after_a_stall_time_does_not_race(self):
+        pacing = Pacing()
+        pacing.start(0.0)
+        pacing.stepped(0.01, 0.01, 1 / 60, 1.0)
+        pacing.stepped(5.0, 4.9, 1 / 60, 1.0)
+        assert pacing.due >= 5.0 - 1 / 60
+
+
+HOSTILE = [
+    math.nan,
+    math.inf,
+    -math.inf,
+    10**400,
+    -1,
+    1e308,
+    "x" * 10_000,
+    None,
+    [],
+    {},
+    b"\0",
+    True,
+    "../../etc",
+    2**63,
+]
+
+
+def random_command(rng, bodies):
+    """A command of any kind, with sensible or hostile values: None where it could not be made."""
+    body = rng.choice([*bodies, "ghost"])
+    point = tuple(rng.choice([rng.uniform(-2, 2), rng.uniform(-1e4, 1e4)]) for _ in range(3))
+    parameter = rng.choice(list(say.PARAMETERS.values()))
+    value = rng.uniform(parameter.low, min(parameter.high, 1e6))
+    value = {bool: rng.random() < 0.5, int: min(round(value), 12), float: value}[parameter.kind]
+    owner = body if parameter.owner == "body" else None
+    size = rng.uniform(0.05, 1.0)
+    made = rng.choice(
+        [
+            lambda: say.Play(),
+            lambda: say.Pause(),
+            lambda: say.Step(rng.randint(1, 3)),
+            lambda: say.Reset(),
+            lambda: say.SetSpeed(rng.uniform(0.01, 1.0)),
+            lambda: say.SetSolver(rng.choice(["xpbd", "xpbd", "xpbd", "implicit"])),
+            lambda: say.SetParameter(parameter.name, value, rng.choice([None, owner])),
+            lambda: say.SetView(rng.choice([None, "J", "von_mises", "energy"]), rng.random() < 0.5, rng.random() < 0.5),
+            lambda: say.Grab(rng.randint(0, 20), body, (rng.randint(0, 80),), (1.0,), point, 10 ** rng.uniform(-2, 2)),
+            lambda: say.MoveGrab(rng.randint(0, 20), point),
+            lambda: say.ReleaseGrab(rng.randint(0, 20)),
+            lambda: say.Pin(body, rng.randint(0, 80)),
+            lambda: say.Unpin(body, rng.randint(0, 80)),
+            lambda: say.Unpin(),
+            lambda: say.MovePusher(point, size),
+            lambda: say.RemovePusher(),
+            lambda: say.Squash(rng.uniform(limits.FLATTEST, limits.TALLEST)),
+            lambda: say.AddBody(rng.choice(limits.SHAPES), size, rng.randint(3, 4), rng.choice([None, point])),
+            lambda: say.CopyBody(body),
+            lambda: say.RemoveBody(body),
+        ]
+    )
+    if rng.random() < 0.2:  # spoil one value
+        good = made()
+        names = [field.name for field in dataclasses.fields(good)]
+        if not names:
+            return good
+        spoilt = {name: getattr(good, name) for name in names} | {rng.choice(names): rng.choice(HOSTILE)}
+        try:
+            return type(good)(**spoilt)
+        except CommandError:
+            return None
+    return made()
+
+
+def test_a_thousand_random_commands_leave_a_finite_state(loop, monkeypatch, caplog):
+    monkeypatch.setattr(limits, "MOST_BODIES", 5)
+    monkeypatch.setattr(limits, "MOST_TETS", 1500)
+    rng = random.Random(20240229)
+    refused = 0
+    for number in range(1000):
+        bodies = [part.name for part in loop.live.system.bodies]
+        command = random_command(rng, bodies)
+        if command is None:
+            refused += 1
+        else:
+            loop.inbox.put(number, command)
+        loop.pacing.due = 0.0  # never wait for the clock
+        loop.turn(0.0)
+        state = loop.live.state
+        assert np.isfinite(state.positions).all()
+        assert np.isfinite(state.velocities).all()
+        assert 1 <= len(bodies) <= 5
+    assert refused > 50
+    assert loop.live.generation > 20
+    # Nothing went wrong that was not foreseen: unforeseen exceptions are logged.
+    assert [record.message for record in caplog.records if record.levelname == "ERROR"] == []
+    assert loop.snapshot(0.0).measures.status in set(Status)
