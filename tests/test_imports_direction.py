@@ -21,7 +21,7 @@ FLOORS = (
     ("system",),
     ("scene",),
     ("mesh", "materials"),
-    ("numerics", "state", "errors"),
+    ("numerics", "state", "contact_points", "errors"),
 )
 LEVEL = {part: -k for k, floor in enumerate(FLOORS) for part in floor}
 GROUND = FLOORS[-1]

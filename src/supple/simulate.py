@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,6 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from supple.contact_points import ContactPoints
 from supple.diagnostics import Diagnostics, deformation_gradients, determinants, measure
 from supple.errors import SceneError, SolverError
 from supple.scene.scene import Scene
@@ -56,6 +57,7 @@ class Frame:
     state: State
     system: System
     report: Report
+    find_contacts: Callable[[], ContactPoints] | None = None
 
     @property
     def time(self) -> float:
@@ -70,6 +72,11 @@ class Frame:
     def velocities(self) -> dict[str, NDArray[np.float64]]:
         """By body name, (n, 3) [m/s]."""
         return self.system.split(self.state.velocities)
+
+    @cached_property
+    def contacts(self) -> ContactPoints | None:
+        """All contacts, one by one, where the solver knows them (`Implicit`); else None."""
+        return None if self.find_contacts is None else self.find_contacts()
 
     @cached_property
     def det_F(self) -> NDArray[np.float64]:
@@ -185,7 +192,7 @@ def _steps(
             began = time.perf_counter()
             state, said = solver.step(system, state, dt, workspace)
             seconds = time.perf_counter() - began
-            frame = Frame(index, state, system, _report(system, state, said, seconds))
+            frame = Frame(index, state, system, _report(system, state, said, seconds), said.contacts)
             for sink in sinks:
                 sink.write(frame)
             yield frame

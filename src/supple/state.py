@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from supple.contact_points import ContactPoints
 
 
 class Status(StrEnum):
@@ -53,6 +56,7 @@ class StepReport:
     message : for the person, where the status is not `converged`: what stopped the step, and where.
     min_distance : smallest distance between surfaces in contact [m], or None where it is not known.
     details : named numbers of this solver for traces and plots.
+    contacts : makes the list of all contacts, for solvers that know them one by one.
     """
 
     status: Status
@@ -60,3 +64,4 @@ class StepReport:
     message: str = ""
     min_distance: float | None = None
     details: dict[str, Any] = field(default_factory=dict)
+    contacts: Callable[[], ContactPoints] | None = None

@@ -49,6 +49,10 @@ class PinRange:
     vertices: NDArray[np.int32]
     anchors: NDArray[np.float64]
 
+    @property
+    def label(self) -> str:
+        return self.pin.label
+
     def targets(self, time: float) -> NDArray[np.float64]:
         """Where the pinned vertices (k, 3) must be at `time` [m]."""
         return moved_points(self.pin.motion, self.anchors, time, self.pin.label)

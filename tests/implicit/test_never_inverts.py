@@ -41,7 +41,7 @@ def test_a_bar_pressed_to_a_tenth_of_its_length(divisions):
     body, left, right = bar(rubber(), divisions)
     press = sp.Keyframes(times=[0, 0.5], displacements=[[0, 0, 0], [-0.9, 0, 0]])
     scene = sp.Scene([body], pins=[sp.Pin("bar", left), sp.Pin("bar", right, press)], gravity=(0, 0, 0))
-    for frame in follow(scene, Implicit(), 1 / 60, 30):
+    for frame in follow(scene, Implicit(contact=None), 1 / 60, 30):
         assert pinned_exactly(frame)
     assert np.ptp(frame.positions["bar"][np.concatenate([left, right]), 0]) == pytest.approx(0.1, abs=1e-12)
 
@@ -51,7 +51,7 @@ def test_a_bar_twisted_by_four_turns(divisions):
     body, left, right = bar(rubber(), divisions)
     turns = sp.Keyframes(times=[0, 1.2], angles=[0, 8 * np.pi], axis=(1, 0, 0), pivot=body.mesh.vertices.mean(axis=0))
     scene = sp.Scene([body], pins=[sp.Pin("bar", left), sp.Pin("bar", right, turns)], gravity=(0, 0, 0))
-    for frame in follow(scene, Implicit(), 1 / 60, 72):
+    for frame in follow(scene, Implicit(contact=None), 1 / 60, 72):
         assert pinned_exactly(frame)
 
 
@@ -59,7 +59,7 @@ def test_a_jump_of_the_pins_is_made_in_one_frame():
     body, left, right = bar(rubber())
     jump = sp.Keyframes(times=[0, 0.01], displacements=[[0, 0, 0], [-0.6, 0.3, 0]])
     scene = sp.Scene([body], pins=[sp.Pin("bar", left), sp.Pin("bar", right, jump)], gravity=(0, 0, 0))
-    for frame in follow(scene, Implicit(), 1 / 60, 2):
+    for frame in follow(scene, Implicit(contact=None), 1 / 60, 2):
         assert pinned_exactly(frame)
 
 
@@ -67,7 +67,7 @@ def test_a_static_bar_is_pressed_in_few_steps():
     body, left, right = bar(rubber())
     press = sp.Keyframes(times=[0, 4], displacements=[[0, 0, 0], [-0.4, 0, 0]])
     scene = sp.Scene([body], pins=[sp.Pin("bar", left), sp.Pin("bar", right, press)], gravity=(0, 0, 0))
-    for frame in follow(scene, Implicit(integrator="static"), 1.0, 4):
+    for frame in follow(scene, Implicit(contact=None, integrator="static"), 1.0, 4):
         assert pinned_exactly(frame)
         assert np.abs(frame.velocities["bar"]).max() == 0.0
 
@@ -78,7 +78,7 @@ def test_pins_that_cannot_reach_their_place_are_blocked_by_name():
     scene = sp.Scene(
         [body], pins=[sp.Pin("bar", left, name="wall"), sp.Pin("bar", right, through, name="ram")], gravity=(0, 0, 0)
     )
-    frames = list(sp.simulate(scene, Implicit(max_substeps=16), 1 / 60, 30))
+    frames = list(sp.simulate(scene, Implicit(contact=None, max_substeps=16), 1 / 60, 30))
     last = frames[-1]
     assert last.report.status == "blocked"
     assert not last.report.status.can_go_on
@@ -96,7 +96,7 @@ def test_a_pin_that_turns_a_tet_inside_out_is_blocked():
     mirror = np.zeros((4, 3))
     mirror[:, 1] = -2 * (low[:, 1] - low[:, 1].mean())
     scene = sp.Scene([body], pins=[sp.Pin("bar", tet, lambda t: min(t * 30, 1.0) * mirror, name="hand")])
-    last = list(sp.simulate(scene, Implicit(), 1 / 60, 5))[-1]
+    last = list(sp.simulate(scene, Implicit(contact=None), 1 / 60, 5))[-1]
     assert last.report.status == "blocked"
     assert "pin 'hand' of body 'bar' is blocked" in last.report.message
 
@@ -109,7 +109,7 @@ def test_a_body_too_soft_for_its_weight_is_crushed_without_inverting(integrator)
     foot = np.flatnonzero(mesh.vertices[:, 1] == mesh.vertices[:, 1].min())
     soft = sp.Body("jelly", mesh, sp.StableNeoHookean(youngs=500, poisson=0.3))
     scene = sp.Scene([soft], pins=[sp.Pin("jelly", top), sp.Pin("jelly", foot)])
-    frames = list(follow(scene, Implicit(integrator=integrator), 1 / 60, 60))
+    frames = list(follow(scene, Implicit(contact=None, integrator=integrator), 1 / 60, 60))
     assert min(frame.report.min_det_F for frame in frames) < 0.1
 
 
@@ -130,7 +130,9 @@ def test_stable_neo_hookean_recovers_from_random_positions(seed):
     mesh = sp.shapes.box((1, 1, 1), (3, 3, 3))
     body = sp.Body("cube", mesh, sp.StableNeoHookean(youngs=1e5, poisson=0.4))
     scene = sp.Scene([body], gravity=(0, 0, 0))
-    frames = list(sp.simulate(scene, Implicit(), 0.2, 60, initial_positions={"cube": scattered(mesh, seed)}))
+    frames = list(
+        sp.simulate(scene, Implicit(contact=None), 0.2, 60, initial_positions={"cube": scattered(mesh, seed)})
+    )
     assert all(frame.report.status == "converged" for frame in frames)
     assert frames[0].index == 1
     assert frames[-1].report.min_det_F > 0.99
@@ -142,7 +144,7 @@ def test_stable_neo_hookean_recovers_from_a_plane():
     body = sp.Body("cube", mesh, sp.StableNeoHookean(youngs=1e5, poisson=0.4))
     scene = sp.Scene([body], gravity=(0, 0, 0))
     flat = mesh.vertices * np.array([1, 0, 1]) + 1e-9 * scattered(mesh, 0)
-    last = list(sp.simulate(scene, Implicit(), 0.2, 40, initial_positions={"cube": flat}))[-1]
+    last = list(sp.simulate(scene, Implicit(contact=None), 0.2, 40, initial_positions={"cube": flat}))[-1]
     assert last.report.status == "converged"
     assert shape_error(last.positions["cube"], mesh.vertices) < 1e-2
 
@@ -157,7 +159,7 @@ def test_neo_hookean_refuses_inverted_tets_and_lists_them():
     bad = np.flatnonzero(det <= 0)
     assert len(bad)
     with pytest.raises(sp.SolverError, match=r"body 'cube'.*inverted.*tets " + ", ".join(map(str, bad[:10]))):
-        list(sp.simulate(sp.Scene([body]), Implicit(), 1 / 60, 1, initial_positions={"cube": x}))
+        list(sp.simulate(sp.Scene([body]), Implicit(contact=None), 1 / 60, 1, initial_positions={"cube": x}))
 
 
 def test_a_body_that_has_recovered_is_guarded_from_then_on():
@@ -166,7 +168,10 @@ def test_a_body_that_has_recovered_is_guarded_from_then_on():
     scene = sp.Scene([body], gravity=(0, 0, 0))
     start = {"cube": scattered(mesh, 5)}
     whole = np.array(
-        [frame.report.min_det_F > 0 for frame in sp.simulate(scene, Implicit(), 0.02, 60, initial_positions=start)]
+        [
+            frame.report.min_det_F > 0
+            for frame in sp.simulate(scene, Implicit(contact=None), 0.02, 60, initial_positions=start)
+        ]
     )
     assert whole[-1]
     first = int(np.argmax(whole))
@@ -194,7 +199,7 @@ def test_an_iteration_limit_is_named_and_the_run_goes_on():
     body, left, right = bar(rubber())
     pull = sp.Keyframes(times=[0, 0.05], displacements=[[0, 0, 0], [0.5, 0.2, 0]])
     scene = sp.Scene([body], pins=[sp.Pin("bar", left), sp.Pin("bar", right, pull)])
-    frames = list(sp.simulate(scene, Implicit(max_iterations=1, max_substeps=1), 1 / 60, 3))
+    frames = list(sp.simulate(scene, Implicit(contact=None, max_iterations=1, max_substeps=1), 1 / 60, 3))
     assert len(frames) == 3
     assert all(frame.report.status == "iteration_limit" for frame in frames)
     assert "1 iterations" in frames[0].report.message
@@ -207,7 +212,7 @@ def test_the_trace_has_a_row_for_every_iteration():
     body, left, right = bar(rubber())
     pull = sp.Keyframes(times=[0, 1], displacements=[[0, 0, 0], [0.5, 0.2, 0]])
     scene = sp.Scene([body], pins=[sp.Pin("bar", left), sp.Pin("bar", right, pull)])
-    frames = list(follow(scene, Implicit(), 1 / 60, 3))
+    frames = list(follow(scene, Implicit(contact=None), 1 / 60, 3))
     text = trace_csv((frame.time, frame.report.details["newton"]) for frame in frames)
     lines = text.splitlines()
     assert lines[0].startswith("time,iteration,energy")

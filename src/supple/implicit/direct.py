@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.numerics.block_csr import BlockPattern
+from supple.numerics.block_csr import BlockRows
 
 logger = logging.getLogger(__name__)
 
@@ -24,9 +24,7 @@ def _pardiso() -> Any | None:
     return pypardiso
 
 
-def solve_directly(
-    pattern: BlockPattern, data: NDArray[np.float64], b: NDArray[np.float64]
-) -> NDArray[np.float64] | None:
+def solve_directly(pattern: BlockRows, data: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64] | None:
     """Solve A x = b, (n, 3), by factorization; None where the matrix is singular to working precision."""
     matrix = pattern.to_scipy(data)
     pardiso = _pardiso()

@@ -6,10 +6,13 @@ gravity and loads alone, and the shift that minimizes the objective is -s sum(gr
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import bsr_matrix, coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from supple.system import System
 
@@ -39,6 +42,25 @@ class FreeMotion:
         piece = number[components].astype(np.int32)
         inside = piece >= 0
         return cls(piece, system.masses, np.bincount(piece[inside], weights=system.masses[inside]).astype(np.float64))
+
+    def joined(self, couplings: Sequence[bsr_matrix]) -> FreeMotion:
+        """Pieces that touch each other as one, none of those that touch something held."""
+        if not couplings or len(self.totals) == 0:
+            return self
+        held = len(self.totals)
+        ends = [np.repeat(np.arange(len(self.piece)), np.diff(c.indptr)) for c in couplings]
+        pairs = np.stack(
+            [self.piece[np.concatenate(ends)], self.piece[np.concatenate([c.indices for c in couplings])]], axis=1
+        )
+        pairs = np.unique(np.where(pairs < 0, held, pairs), axis=0)
+        graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(held + 1, held + 1))
+        cluster = connected_components(graph, directed=False)[1]
+        number = np.where(np.arange(cluster.max() + 1) == cluster[held], -1, 0)
+        number[number == 0] = np.arange(int((number == 0).sum()))
+        piece = np.where(self.piece >= 0, number[cluster[self.piece]], -1).astype(np.int32)
+        inside = piece >= 0
+        totals = np.bincount(piece[inside], weights=self.masses[inside], minlength=int((number >= 0).sum()))
+        return FreeMotion(piece, self.masses, totals.astype(np.float64))
 
     def correct(self, direction: NDArray[np.float64], gradient: NDArray[np.float64], scale: float) -> None:
         """Replace, in place, the translation of every free piece in a Newton direction by the exact one.

@@ -32,6 +32,8 @@ class Plan:
     predicted : x~ (n, 3) [m]
     velocity : positions at the end (n, 3) -> velocities at the end [m/s]
     strain_rate : -> how the strain rate is written; called only where something is damped
+    contact_weight : factor of the contact energies. The force s a of the trapezoidal rule counts a half at either end;
+        contact acts at the end alone, and twice (Kane et al., "Finite element analysis of nonsmooth contact", 1999)
     memory : what the next step must know of this one
     """
 
@@ -40,6 +42,7 @@ class Plan:
     velocity: Callable[[NDArray[np.float64]], NDArray[np.float64]]
     strain_rate: Callable[[], StrainRate]
     memory: History | None = None
+    contact_weight: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,6 +146,7 @@ class Newmark(Integrator):
             predicted=x + h * v + s * acceleration(state),
             velocity=velocity,
             strain_rate=strain_rate,
+            contact_weight=2.0,
         )
 
 

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import bsr_matrix
 
 from supple.implicit.direct import solve_directly
 from supple.implicit.potential import HessianBlocks
-from supple.numerics.block_csr import BlockPattern, build_pattern
+from supple.numerics.block_csr import BlockPattern, BlockRows, build_pattern
+from supple.numerics.block_sum import JointPattern, join
 from supple.numerics.pcg import conjugate_gradients
 from supple.numerics.preconditioner import RowOrder, TwoLevel, order_rows, two_level
 from supple.system import System
@@ -37,16 +40,21 @@ class LinearSolver:
     Attributes
     ----------
     kind : "auto" (CG, and a factorization where CG stalls), "pcg" or "direct"
-    order : which vertex each row belongs to
+    order : which vertex each row belongs to; row_of : (n,) row of each vertex, -1 where it is pinned
     age, fresh_iterations : how often CG has run on the coarse level as it is, and how many iterations its first run
         took
     """
 
     kind: str
     order: RowOrder
+    row_of: NDArray[np.int32]
     pattern: BlockPattern
-    preconditioner: TwoLevel
-    data: NDArray[np.float64]
+    elements_only: TwoLevel
+    elements: NDArray[np.float64]
+    matrix: NDArray[np.float64] = field(init=False)
+    preconditioner: TwoLevel = field(init=False)
+    joint: JointPattern | None = None
+    joined: tuple[NDArray[np.int32], NDArray[np.int32]] | None = None
     age: int = -1
     fresh_iterations: int = 0
 
@@ -60,7 +68,10 @@ class LinearSolver:
         rows[order.vertices] = np.arange(len(order.vertices), dtype=np.int32)
         pattern = build_pattern(rows[system.elements], len(order.vertices))
         preconditioner = two_level(pattern, system.rest_positions[order.vertices], order.group_start)
-        return cls(kind, order, pattern, preconditioner, np.zeros((pattern.blocks, 3, 3)))
+        return cls(kind, order, rows[:-1], pattern, preconditioner, np.zeros((pattern.blocks, 3, 3)))
+
+    def __post_init__(self) -> None:
+        self.matrix, self.preconditioner = self.elements, self.elements_only
 
     def begin_step(self) -> None:
         """Forget what earlier steps left behind, so that a step depends on its state alone."""
@@ -68,9 +79,37 @@ class LinearSolver:
 
     def assemble(self, hessian: HessianBlocks) -> None:
         """Take over a new Hessian."""
-        self.pattern.assemble(hessian.elements, hessian.vertices[self.order.vertices], self.data)
+        self.pattern.assemble(hessian.elements, hessian.vertices[self.order.vertices], self.elements)
+        self._add_couplings(hessian.couplings)
         if self.kind != "direct":
-            self.preconditioner.update(self.data, coarse=self.age < 0)
+            self.preconditioner.update(self.matrix, coarse=self.age < 0)
+
+    def _add_couplings(self, couplings: list[bsr_matrix]) -> None:
+        """Add what couples vertices that no element joins; the joint pattern is made anew where that has changed."""
+        if not couplings:
+            if self.joint is not None:
+                self.joint, self.joined, self.age = None, None, -1
+            self.matrix, self.preconditioner = self.elements, self.elements_only
+            return
+        extra: Any = couplings[0]
+        for more in couplings[1:]:
+            extra = extra + more
+        same = self.joined is not None and all(
+            np.array_equal(a, b) for a, b in zip(self.joined, (extra.indptr, extra.indices), strict=True)
+        )
+        if self.joint is None or not same:
+            self.joint = join(self.pattern, extra, self.row_of)
+            self.joined = extra.indptr, extra.indices
+            before = self.preconditioner.first
+            self.preconditioner = self.elements_only.on(self.joint.rows)
+            if not np.array_equal(before, self.preconditioner.first):
+                self.age = -1
+        self.matrix = self.joint.add(self.elements, extra.data)
+
+    @property
+    def rows(self) -> BlockRows:
+        """Where the matrix has its blocks now."""
+        return self.preconditioner.pattern
 
     def solve(
         self, force: NDArray[np.float64], tolerance: float, convex: bool = True
@@ -96,15 +135,15 @@ class LinearSolver:
         iterations = 0
         if self.kind != "direct":
             most = _STALLED if self.kind == "auto" else max(1000, 3 * b.size)
-            result = conjugate_gradients(self.data, self.preconditioner, b, x, tolerance, most)
+            result = conjugate_gradients(self.matrix, self.preconditioner, b, x, tolerance, most)
             if result.indefinite and not convex:
                 return None, LinearReport("pcg", result.iterations, result.first_norm)
             if not result.converged and self.age > 0:
                 # The coarse level belongs to an older matrix.
                 iterations += result.iterations
-                self.preconditioner.update(self.data)
+                self.preconditioner.update(self.matrix)
                 self.age = -1
-                result = conjugate_gradients(self.data, self.preconditioner, b, x, tolerance, most)
+                result = conjugate_gradients(self.matrix, self.preconditioner, b, x, tolerance, most)
             iterations += result.iterations
             first_norm = result.first_norm
             self._grow_old(result.iterations)
@@ -114,7 +153,7 @@ class LinearSolver:
             if self.kind == "pcg":
                 return None, LinearReport("pcg", iterations, first_norm)
             logger.debug("CG stalled after %d iterations; factorizing", iterations)
-        solution = solve_directly(self.pattern, self.data, b)
+        solution = solve_directly(self.rows, self.matrix, b)
         if solution is None:
             return None, LinearReport("direct", iterations, first_norm)
         p[self.order.vertices] = solution

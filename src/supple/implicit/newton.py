@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.implicit.free_motion import FreeMotion
-from supple.implicit.guard import Guard
 from supple.implicit.line_search import backtrack
 from supple.implicit.linear_solver import LinearSolver
 from supple.implicit.objective import Model, Objective
 from supple.implicit.potential import HessianBlocks
+from supple.implicit.step_limits import StepLimits
 from supple.implicit.trace import NewtonRow
 from supple.state import Status
 
@@ -73,7 +73,7 @@ class Outcome:
     rows: list[NewtonRow] = field(default_factory=list)
 
 
-def minimize(problem: Problem, x: NDArray[np.float64], guard: Guard, tools: Tools) -> Outcome:
+def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools: Tools) -> Outcome:
     """Minimize over the free vertices from x, whose guarded tets all have positive volume."""
     here = problem.objective.model(x, tools.hessian)
     rows: list[NewtonRow] = []
@@ -98,13 +98,13 @@ def minimize(problem: Problem, x: NDArray[np.float64], guard: Guard, tools: Tool
         if direction is None or not np.isfinite(direction).all():
             return Outcome(Status.NOT_FINITE, here, "the linear system of a Newton step could not be solved", rows)
         if problem.scale is not None:
-            tools.free_motion.correct(direction, gradient, problem.scale)
+            tools.free_motion.joined(tools.hessian.couplings).correct(direction, gradient, problem.scale)
         else:
             # Without inertia a turn may cost nothing: the direction is as long as the linear solver's errors make it.
             direction *= min(1.0, problem.longest / max(float(np.abs(direction).max(initial=0.0)), 1e-300))
         length = float(np.abs(direction).max(initial=0.0))
         slope = float(np.einsum("ij,ij->", gradient, direction))
-        largest, _ = guard.largest_step(here.positions, direction)
+        largest, _ = limits.largest_step(here.positions, direction)
         last = length <= problem.tolerance
         step, cuts = 0.0, 0
         slow = last_length > 0.0 and length > _LINEAR_RATE * last_length
@@ -112,7 +112,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], guard: Guard, tools: Tool
         used, convex = convex, convex and remaining > 0
         if slope < 0.0 and largest > 0.0:
             hessian = None if last else tools.hessian
-            here, step, cuts = _guarded_search(problem, here, direction, slope, largest, guard, hessian, convex)
+            here, step, cuts = _guarded_search(problem, here, direction, slope, largest, limits, hessian, convex)
         row = NewtonRow(
             iteration=iteration,
             energy=here.energy,
@@ -128,7 +128,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], guard: Guard, tools: Tool
         )
         rows.append(row)
         logger.debug("%s", row)
-        guard.widen(here.positions)
+        limits.widen(here.positions)
         if last:
             return Outcome(Status.CONVERGED, here, "", rows)
         if step == 0.0:
@@ -150,13 +150,13 @@ def _guarded_search(
     direction: NDArray[np.float64],
     slope: float,
     largest: float,
-    guard: Guard,
+    limits: StepLimits,
     hessian: HessianBlocks | None,
     project: bool,
 ) -> tuple[Model, float, int]:
     """A line search that ends where every guarded tet has a positive volume, in rounded numbers too."""
     end, step, cuts = backtrack(problem.objective, start, direction, slope, largest, hessian, project)
-    while step > 0.0 and not guard.allows(end.positions):
+    while step > 0.0 and not limits.allows(end.positions):
         end, step, more = backtrack(problem.objective, start, direction, slope, 0.5 * step, hessian, project)
         cuts += more + 1
     return end, step, cuts

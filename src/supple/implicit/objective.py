@@ -55,13 +55,13 @@ class Objective(Potential):
         """Energy and gradient at x; the Hessian into `hessian`, where given, of a convex model with `project`."""
         gradient = np.zeros_like(x)
         if hessian is not None:
-            hessian.vertices[:] = 0.0
+            hessian.clear()
         values = [term.add_model(x, gradient, hessian, project) for term in self.terms]
         return Model(x, sum(values), sum(abs(value) for value in values), gradient)
 
     def hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool = True) -> None:
         """The Hessian [N/m] into `out`, whatever it held."""
-        out.vertices[:] = 0.0
+        out.clear()
         self.add_hessian(x, out, project)
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.guard import Guard
 from supple.implicit.newton import Outcome, Problem, Tools
+from supple.implicit.step_limits import StepLimits
 from supple.implicit.trace import NewtonRow
 from supple.state import Status
 from supple.system import System
@@ -24,7 +24,12 @@ _TOLERANCE = 1e-3
 
 
 def move_pins(
-    system: System, problem: Problem, x: NDArray[np.float64], targets: NDArray[np.float64], guard: Guard, tools: Tools
+    system: System,
+    problem: Problem,
+    x: NDArray[np.float64],
+    targets: NDArray[np.float64],
+    limits: StepLimits,
+    tools: Tools,
 ) -> tuple[NDArray[np.float64], Outcome]:
     """Carry the pinned vertices from where they are in x to `targets` (k, 3).
 
@@ -47,12 +52,15 @@ def move_pins(
         pull, longer = np.zeros((len(x) + 1, 3)), np.concatenate([way, np.zeros((1, 3))])
         moved = np.einsum("eij,ej->ei", tools.hessian.elements[near], longer[nodes].reshape(-1, 12))
         np.add.at(pull, nodes, moved.reshape(-1, 4, 3))
-        direction, said = tools.linear_solver.solve(-(gradient + pull[:-1]), _TOLERANCE)
+        pull = pull[:-1]
+        for coupling in tools.hessian.couplings:
+            pull += (coupling @ way.ravel()).reshape(-1, 3)
+        direction, said = tools.linear_solver.solve(-(gradient + pull), _TOLERANCE)
         if direction is None or not np.isfinite(direction).all():
             text = "the linear system that moves the pins could not be solved"
             return x, Outcome(Status.NOT_FINITE, here, text, rows)
         direction[pinned] = way[pinned]
-        step, tet = guard.largest_step(x, direction)
+        step, tet = limits.largest_step(x, direction)
         rows.append(
             NewtonRow(
                 iteration=iteration,
@@ -71,19 +79,21 @@ def move_pins(
         end = x + step * direction
         if step == 1.0:
             end[pinned] = targets
-        while step > 0.0 and not guard.allows(end):
+        while step > 0.0 and not limits.allows(end):
             step *= 0.5
             end = x + step * direction
         if step < _SMALLEST_SHARE:
-            return x, Outcome(Status.BLOCKED, here, _blocked_message(system, x, targets, tet), rows)
+            return x, Outcome(Status.BLOCKED, here, _blocked_message(system, x, targets, tet, limits), rows)
         x = end
-        guard.widen(x)
+        limits.widen(x)
         if step == 1.0:
             return x, Outcome(Status.CONVERGED, here, "", rows)
-    return x, Outcome(Status.BLOCKED, here, _blocked_message(system, x, targets, tet), rows)
+    return x, Outcome(Status.BLOCKED, here, _blocked_message(system, x, targets, tet, limits), rows)
 
 
-def _blocked_message(system: System, x: NDArray[np.float64], targets: NDArray[np.float64], tet: int) -> str:
+def _blocked_message(
+    system: System, x: NDArray[np.float64], targets: NDArray[np.float64], tet: int, limits: StepLimits
+) -> str:
     """Which pin is blocked: one that holds a node of the limiting tet, or else the one with the longest way to go."""
     remaining = np.linalg.norm(targets - x[system.pinned_vertices], axis=1)
     best, way = None, -1.0
@@ -96,7 +106,9 @@ def _blocked_message(system: System, x: NDArray[np.float64], targets: NDArray[np
         if left > way:
             best, way = pin, left
     assert best is not None
-    return f"{best.pin.label} is blocked: moving it on would invert tet {tet} of {_owner(system, tet)}"
+    if tet < 0 and limits.contact is not None:
+        return f"{best.label} is blocked: moving it on would press {limits.contact.nearest(x)} into each other"
+    return f"{best.label} is blocked: moving it on would invert tet {tet} of {_owner(system, tet)}"
 
 
 def _owner(system: System, tet: int) -> str:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import bsr_matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,11 +20,18 @@ class HessianBlocks:
         [N/m]
     vertices : (n, 3, 3) one matrix for each vertex with itself [N/m]
     tet_count : m
+    couplings : (3 n, 3 n) matrices between vertices that no tet joins, in blocks of 3 x 3 [N/m]
     """
 
     elements: NDArray[np.float64]
     vertices: NDArray[np.float64]
     tet_count: int
+    couplings: list[bsr_matrix] = field(default_factory=list)
+
+    def clear(self) -> None:
+        """Empty all but the tets' matrices, which elasticity overwrites."""
+        self.vertices[:] = 0.0
+        self.couplings.clear()
 
     @property
     def tets(self) -> NDArray[np.float64]:
@@ -41,7 +49,12 @@ class HessianBlocks:
 
 
 class Potential(ABC):
-    """An energy of the positions x (n, 3) of all vertices, pinned ones included."""
+    """An energy of the positions x (n, 3) of all vertices, pinned ones included.
+
+    `label` says under which name the time that it takes is counted.
+    """
+
+    label = "other"
 
     @abstractmethod
     def value(self, x: NDArray[np.float64]) -> float:

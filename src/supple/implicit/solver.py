@@ -3,32 +3,28 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from supple.errors import SolverError
-from supple.implicit.damping import Damping, StrainRate, Viscosity, green_strain_rates, green_strains, viscosity_of
-from supple.implicit.elasticity import Elasticity, elasticity_of
-from supple.implicit.external_forces import ExternalForces, total_forces
+from supple.implicit.contact.build import contact_model
+from supple.implicit.contact.settings import Contact
+from supple.implicit.damping import viscosity_of
+from supple.implicit.elasticity import elasticity_of
 from supple.implicit.free_motion import FreeMotion
-from supple.implicit.gravity import Gravity
-from supple.implicit.guard import Guard, refuse_inverted
-from supple.implicit.inertia import Inertia
-from supple.implicit.integrators import Integrator, Plan, Static, integrator_of
-from supple.implicit.inversion_barrier import inversion_barrier
+from supple.implicit.guard import refuse_inverted
+from supple.implicit.integrators import Integrator, Static, integrator_of
 from supple.implicit.linear_solver import LinearSolver
-from supple.implicit.newton import Outcome, Problem, Tools, minimize
-from supple.implicit.objective import Objective
-from supple.implicit.pin_motion import move_pins
-from supple.implicit.potential import HessianBlocks, Potential
+from supple.implicit.newton import Tools
+from supple.implicit.potential import HessianBlocks
 from supple.implicit.reactions import reaction_forces
-from supple.implicit.soft_targets import soft_targets_at
-from supple.implicit.stabilizer import Stabilizer, stabilizer_of
+from supple.implicit.stabilizer import stabilizer_of
 from supple.implicit.stitch_energy import StitchEnergy
+from supple.implicit.substep import StepSettings, Substep, take_substep
 from supple.implicit.trace import NewtonRow
+from supple.implicit.workspace import Workspace
 from supple.solver import Solver
 from supple.state import State, Status, StepReport
 from supple.system import System
@@ -52,6 +48,7 @@ class Implicit(Solver):
     max_iterations : of Newton in one (sub)step.
     linear_solver : "pcg", "direct", or "auto": CG, and a factorization where CG stalls.
     max_substeps : a step that fails is halved until it would take more substeps than this.
+    contact : of bodies with each other, with themselves and with obstacles; None turns it off.
 
     Raises
     ------
@@ -65,6 +62,7 @@ class Implicit(Solver):
     max_iterations: int = 60
     linear_solver: str = "auto"
     max_substeps: int = 64
+    contact: Contact | None = field(default_factory=Contact)
 
     def __post_init__(self) -> None:
         integrator_of(self.integrator)
@@ -86,13 +84,20 @@ class Implicit(Solver):
 
         Raises
         ------
-        SolverError : for what this solver cannot work with: materials of XPBD, obstacles, unheld bodies where static.
+        SolverError : for what this solver cannot work with: materials of XPBD, obstacles without contact,
+            unheld bodies where static.
         """
-        if system.obstacles:
-            raise SolverError(f"{system.obstacles[0].label}: Implicit has no contact yet; use XPBD, or take it out")
-        if len(system.bodies) > 1:
-            logger.warning(
-                "Implicit has no contact yet: the scene's %d bodies pass through each other", len(system.bodies)
+        elasticity = elasticity_of(system)
+        contact = None
+        if self.contact is not None:
+            contact = contact_model(system, self.contact, elasticity.material.mu)
+            if contact.system is not system:
+                system = contact.system
+                elasticity = elasticity_of(system)
+        elif system.obstacles:
+            raise SolverError(
+                f"{system.obstacles[0].label}: with contact=None obstacles do nothing; give contact=Contact(), or take "
+                "them out"
             )
         method = integrator_of(self.integrator)
         free_motion = FreeMotion.of(system)
@@ -102,7 +107,6 @@ class Implicit(Solver):
                 f"body {body.name!r}: nothing holds it, so that it has no static equilibrium; pin some of its "
                 "vertices, or use another integrator"
             )
-        elasticity = elasticity_of(system)
         tools = Tools(
             LinearSolver.of(system, self.linear_solver),
             HessianBlocks.zeros(len(system.tets), len(system.rest_positions), len(system.stitching)),
@@ -113,7 +117,8 @@ class Implicit(Solver):
             float(np.linalg.norm(np.ptp(system.rest_positions[part.vertices], axis=0))) for part in system.bodies
         )
         stitches = StitchEnergy.of(system.stitching, 0.0) if len(system.stitching) else None
-        return Workspace(elasticity, viscosity_of(elasticity), tools, diagonal, stabilizer_of(elasticity), stitches)
+        viscosity = viscosity_of(elasticity)
+        return Workspace(system, contact, elasticity, viscosity, tools, diagonal, stabilizer_of(elasticity), stitches)
 
     def step(self, system: System, state: State, dt: float, workspace: Workspace) -> tuple[State, StepReport]:
         """Advance by dt, in as many substeps as it takes; see `Solver.step`.
@@ -123,163 +128,44 @@ class Implicit(Solver):
         SolverError : where the state has inverted tets of a material that has no energy there.
         """
         refuse_inverted(system, workspace.elasticity.material, state.positions)
+        n = len(state.positions)
+        state = workspace.with_obstacles(state)
+        workspace.check_start(state)
         finest = 1 << int(np.log2(self.max_substeps))
         done, size = 0, finest
         begin, now = state.time, state
+        settings = StepSettings(integrator_of(self.integrator), self.tolerance, self.max_iterations)
         rows: list[NewtonRow] = []
         substeps = 0
         worst, message = Status.CONVERGED, ""
-        gradient: NDArray[np.float64] | None = None
+        last: Substep | None = None
         while done < finest:
             end = begin + dt * ((done + size) / finest)
-            moved, outcome, at_end = self._substep(system, now, end, dt * (size / finest), workspace)
-            rows += [replace(row, substep=substeps) for row in outcome.rows]
-            good = outcome.status is Status.CONVERGED
+            taken = take_substep(now, end, dt * (size / finest), settings, workspace)
+            rows += [replace(row, substep=substeps) for row in taken.outcome.rows]
+            good = taken.outcome.status is Status.CONVERGED
             if not good and size > 1:
-                logger.debug("step of %g s: %s; halved", dt * size / finest, outcome.status)
+                logger.debug("step of %g s: %s; halved", dt * size / finest, taken.outcome.status)
                 size //= 2
                 continue
             if not good:
-                worst, message = outcome.status, outcome.message
+                worst, message = taken.outcome.status, taken.outcome.message
                 if not worst.can_go_on:
                     break
-            now, gradient = moved, at_end
+            now, last = taken.state, taken
             substeps += 1
             done += size
             while size < finest and done % (2 * size) == 0 and done + 2 * size <= finest:
                 size *= 2
+        now = replace(now, positions=now.positions[:n], velocities=now.velocities[:n])
+        workspace.last = now.positions
         details = _details(rows, substeps)
-        if gradient is not None:
+        report = StepReport(worst, sum(row.kind == "newton" for row in rows), message, details=details)
+        if last is not None:
+            gradient = last.outcome.end.gradient
             details["reaction_forces"], details["reaction_forces_by_vertex"] = reaction_forces(system, gradient)
-        return now, StepReport(worst, sum(row.kind == "newton" for row in rows), message, details=details)
-
-    def _substep(
-        self, system: System, state: State, end: float, h: float, workspace: Workspace
-    ) -> tuple[State, Outcome, NDArray[np.float64]]:
-        """One step of the integrator to the time `end`; the new state, how it went, and the gradient there."""
-        method = integrator_of(self.integrator)
-        plan = method.plan(system, state, h, lambda start: _acceleration(system, start, workspace))
-        forces = total_forces(system, end)
-        guard = Guard.at(system, state.positions)
-        problem = Problem(
-            _objective(system, state, end, plan, forces, guard, workspace),
-            plan.scale,
-            self._tolerance(method) * workspace.diagonal * (1.0 if plan.scale is None else h),
-            self.max_iterations,
-            workspace.diagonal,
-        )
-        workspace.tools.linear_solver.begin_step()
-        targets = system.pin_targets(end)
-        pinned = workspace.tools.pinned
-        x = state.positions
-        rows: list[NewtonRow] = []
-        if np.array_equal(targets, x[pinned]):
-            x = _first_guess(system, problem, x, plan, forces, guard, pinned)
-        else:
-            x, carried = move_pins(system, problem, x, targets, guard, workspace.tools)
-            if carried.status is not Status.CONVERGED:
-                return state, carried, carried.end.gradient
-            rows = carried.rows
-        outcome = minimize(problem, x, guard, workspace.tools)
-        outcome = replace(outcome, rows=rows + outcome.rows)
-        x = outcome.end.positions
-        return State(end, x, plan.velocity(x), plan.memory), outcome, outcome.end.gradient
-
-    def _tolerance(self, method: Integrator) -> float:
-        if self.tolerance is not None:
-            return float(self.tolerance)
-        return _STATIC_TOLERANCE if isinstance(method, Static) else _DYNAMIC_TOLERANCE
-
-
-@dataclass(frozen=True, eq=False)
-class Workspace:
-    """What `Implicit.prepare` computes once.
-
-    Attributes
-    ----------
-    diagonal : of the smallest body's bounding box at rest [m]
-    """
-
-    elasticity: Elasticity
-    viscosity: Viscosity | None
-    tools: Tools
-    diagonal: float
-    stabilizer: Stabilizer
-    stitches: StitchEnergy | None
-
-
-def _potentials(
-    system: System, x: NDArray[np.float64], time: float, forces: NDArray[np.float64], workspace: Workspace
-) -> list[Potential]:
-    """Everything but inertia and damping, at `time`; energies of loads are zero at x."""
-    terms: list[Potential] = [workspace.elasticity]
-    if workspace.stitches is not None:
-        terms.append(workspace.stitches.at(time))
-    if system.gravity.any():
-        terms.append(Gravity(system.masses, system.gravity, x))
-    if system.forces:
-        terms.append(ExternalForces(forces, x))
-    if system.soft_targets:
-        terms.append(soft_targets_at(system, time))
-    return terms
-
-
-def _objective(
-    system: System,
-    state: State,
-    end: float,
-    plan: Plan,
-    forces: NDArray[np.float64],
-    guard: Guard,
-    workspace: Workspace,
-) -> Objective:
-    terms = _potentials(system, state.positions, end, forces, workspace)
-    barrier = inversion_barrier(workspace.elasticity, guard.guarded)
-    if barrier is not None:
-        terms.append(barrier)
-    if plan.scale is None:
-        terms.append(workspace.stabilizer)
-    else:
-        terms.append(Inertia(system.masses, plan.predicted, plan.scale))
-        if workspace.viscosity is not None:
-            terms.append(Damping(workspace.viscosity, plan.strain_rate()))
-    return Objective(terms)
-
-
-def _acceleration(system: System, state: State, workspace: Workspace) -> NDArray[np.float64]:
-    """(n, 3) of a state by its forces, pins aside [m/s^2].
-
-    The inversion barrier is left out: it is a guard at the end of a step, and so stiff that the trapezoidal rule, which
-    does not damp what is stiff, would throw its force back in the next step.
-    """
-    x, v = state.positions, state.velocities
-    terms = _potentials(system, x, state.time, total_forces(system, state.time), workspace)
-    if workspace.viscosity is not None:
-        rate = green_strain_rates(system, x, v)
-        terms.append(Damping(workspace.viscosity, StrainRate(1.0, green_strains(system, x) - rate)))
-    return -Objective(terms).gradient(x) / system.masses[:, None]
-
-
-def _first_guess(
-    system: System,
-    problem: Problem,
-    x: NDArray[np.float64],
-    plan: Plan,
-    forces: NDArray[np.float64],
-    guard: Guard,
-    pinned: NDArray[np.int32],
-) -> NDArray[np.float64]:
-    """Where the vertices would go without elasticity, as far as the filter allows, or x where that has less energy."""
-    if plan.scale is None:
-        return x
-    ahead = plan.predicted + plan.scale * (system.gravity + forces / system.masses[:, None])
-    ahead[pinned] = x[pinned]
-    step, _ = guard.largest_step(x, ahead - x)
-    if step < 1.0:
-        ahead = x + step * (ahead - x)
-    if not guard.allows(ahead):
-        return x
-    return ahead if problem.objective.value(ahead) <= problem.objective.value(x) else x
+            report = last.contact.completed(report, last.state.positions)
+        return now, report
 
 
 def _details(rows: list[NewtonRow], substeps: int) -> dict[str, Any]:

@@ -71,7 +71,7 @@ class StitchEnergy(Potential):
         spring_hessians(self.stitching.springs, points, project, out.stitches[count:])
 
     def _points(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.concatenate([x, self.anchors]) if len(self.anchors) else x
+        return np.concatenate([x[: self.stitching.body_vertices], self.anchors]) if len(self.anchors) else x
 
     @cached_property
     def _tets(self) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray, NDArray]:

@@ -21,23 +21,18 @@ SERIAL_BLOCKS = 15_000
 
 
 @dataclass(frozen=True, eq=False)
-class BlockPattern:
-    """Where a symmetric block matrix has its blocks, and which element entries make each of them.
+class BlockRows:
+    """Where a block matrix has its blocks.
 
     Attributes
     ----------
     row_start : (n + 1,) first block of each row; columns : (b,) ascending in each row
-    diagonal : (n,) index of each row's diagonal block; mirror : (b,) index of each block's transpose
-    entry_start : (b + 1,) and entries : the element entries of each upper block, as 16 element + 4 a + c for the 3x3
-        block of the element's nodes a and c
+    diagonal : (n,) index of each row's diagonal block
     """
 
     row_start: NDArray[np.int32]
     columns: NDArray[np.int32]
     diagonal: NDArray[np.int32]
-    mirror: NDArray[np.int32]
-    entry_start: NDArray[np.int32]
-    entries: NDArray[np.int32]
 
     @property
     def rows(self) -> int:
@@ -46,6 +41,27 @@ class BlockPattern:
     @property
     def blocks(self) -> int:
         return len(self.columns)
+
+    def to_scipy(self, data: NDArray[np.float64]) -> bsr_matrix:
+        """The matrix as SciPy knows it, (3n, 3n); shares memory with `data`."""
+        size = 3 * self.rows
+        return bsr_matrix((data, self.columns, self.row_start), shape=(size, size))
+
+
+@dataclass(frozen=True, eq=False)
+class BlockPattern(BlockRows):
+    """Where a symmetric block matrix has its blocks, and which element entries make each of them.
+
+    Attributes
+    ----------
+    mirror : (b,) index of each block's transpose
+    entry_start : (b + 1,) and entries : the element entries of each upper block, as 16 element + 4 a + c for the 3x3
+        block of the element's nodes a and c
+    """
+
+    mirror: NDArray[np.int32]
+    entry_start: NDArray[np.int32]
+    entries: NDArray[np.int32]
 
     def assemble(
         self, element_blocks: NDArray[np.float64], diagonal_blocks: NDArray[np.float64], data: NDArray[np.float64]
@@ -69,11 +85,6 @@ class BlockPattern:
                 diagonal_blocks,
                 data,
             )
-
-    def to_scipy(self, data: NDArray[np.float64]) -> bsr_matrix:
-        """The matrix as SciPy knows it, (3n, 3n); shares memory with `data`."""
-        size = 3 * self.rows
-        return bsr_matrix((data, self.columns, self.row_start), shape=(size, size))
 
 
 def build_pattern(elements: NDArray[np.int32], rows: int) -> BlockPattern:

@@ -16,7 +16,7 @@ Linear Systems" (2003), section 10.2.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit, prange
@@ -25,7 +25,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from supple.numerics.aggregates import bisected_groups
-from supple.numerics.block_csr import SERIAL_BLOCKS, BlockPattern
+from supple.numerics.block_csr import SERIAL_BLOCKS, BlockRows
 from supple.numerics.envelope_cholesky import factorize
 from supple.numerics.threads import threads_for
 
@@ -82,16 +82,16 @@ class TwoLevel:
     Attributes
     ----------
     group_start : (g + 1,) rows of each group; inner : (n, 2) blocks of each row whose columns are in the row's group
-    fields : (n, 4) 1 and the vertex's position relative to its group, in units of the group's size
     first : (g,) envelope of the coarse matrix
+    fields : (n, 4) 1 and the vertex's position relative to its group, in units of the group's size
     inverse_diagonal : (n, 3, 3); coarse : (g, g, 12, 12) factored
     """
 
-    pattern: BlockPattern
+    pattern: BlockRows
     group_start: NDArray[np.int32]
     inner: NDArray[np.int32]
-    fields: NDArray[np.float64]
     first: NDArray[np.int32]
+    fields: NDArray[np.float64]
     inverse_diagonal: NDArray[np.float64]
     coarse: NDArray[np.float64]
 
@@ -104,8 +104,13 @@ class TwoLevel:
                 _project_matrix(p.row_start, p.columns, data, self.group_start, self.fields, self.coarse)
                 factorize(self.coarse, self.first)
 
+    def on(self, pattern: BlockRows) -> TwoLevel:
+        """The same groups and memory for a matrix with other blocks. Its coarse level has to be updated."""
+        inner, first = _couplings(pattern, self.group_start)
+        return replace(self, pattern=pattern, inner=inner, first=first)
 
-def two_level(pattern: BlockPattern, points: NDArray[np.float64], group_start: NDArray[np.int32]) -> TwoLevel:
+
+def two_level(pattern: BlockRows, points: NDArray[np.float64], group_start: NDArray[np.int32]) -> TwoLevel:
     """Prepare the preconditioner for a pattern whose rows come in groups.
 
     Parameters
@@ -113,32 +118,37 @@ def two_level(pattern: BlockPattern, points: NDArray[np.float64], group_start: N
     points : (n, 3) rest position of each row; group_start : (g + 1,).
     """
     groups = len(group_start) - 1
-    group_of = np.repeat(np.arange(groups), np.diff(group_start)).astype(np.int32)
     fields = np.ones((len(points), 4))
     for g in range(groups):
         rows = slice(group_start[g], group_start[g + 1])
         offset = points[rows] - points[rows].mean(axis=0)
         size = np.sqrt((offset**2).sum(axis=1).mean())
         fields[rows, 1:] = offset / size if size > 0.0 else 0.0
-    inner = _inner_blocks(pattern.row_start, pattern.columns, group_start, group_of)
-    first = np.arange(groups, dtype=np.int32)
-    row_of = np.repeat(np.arange(pattern.rows), np.diff(pattern.row_start))
-    np.minimum.at(first, group_of[row_of], group_of[pattern.columns])
+    start = np.ascontiguousarray(group_start)
     return TwoLevel(
         pattern,
-        np.ascontiguousarray(group_start),
-        inner,
+        start,
+        *_couplings(pattern, start),
         fields,
-        first,
         np.zeros((pattern.rows, 3, 3)),
         np.zeros((groups, groups, 12, 12)),
     )
 
 
+def _couplings(pattern: BlockRows, group_start: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """(n, 2) the blocks of each row in its own group, and (g,) the first group that each group is coupled with."""
+    groups = len(group_start) - 1
+    group_of = np.repeat(np.arange(groups), np.diff(group_start)).astype(np.int32)
+    return _inner_blocks(pattern.row_start, pattern.columns, group_start, group_of)
+
+
 @njit(cache=True, error_model="numpy")
 def _inner_blocks(row_start, columns, group_start, group_of):
     inner = np.empty((len(row_start) - 1, 2), dtype=np.int32)
+    first = np.arange(len(group_start) - 1).astype(np.int32)
     for i in range(len(row_start) - 1):
+        if row_start[i + 1] > row_start[i]:
+            first[group_of[i]] = min(first[group_of[i]], group_of[columns[row_start[i]]])
         low, high = group_start[group_of[i]], group_start[group_of[i] + 1]
         begin = row_start[i]
         while columns[begin] < low:
@@ -148,7 +158,7 @@ def _inner_blocks(row_start, columns, group_start, group_of):
             end += 1
         inner[i, 0] = begin
         inner[i, 1] = end
-    return inner
+    return inner, first
 
 
 @njit(cache=True, error_model="numpy")

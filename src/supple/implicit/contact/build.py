@@ -1,0 +1,49 @@
+"""Makes the contact model of a system."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.implicit.contact.collisions import Collisions
+from supple.implicit.contact.kinematic import obstacle_positions, with_obstacles
+from supple.implicit.contact.model import ContactModel
+from supple.implicit.contact.pairs import pair_table
+from supple.implicit.contact.planes import Planes
+from supple.implicit.contact.scales import largest_dhat, scales_of
+from supple.implicit.contact.settings import Contact
+from supple.implicit.contact.surface import contact_surface
+from supple.system import System, initial_state
+
+
+def contact_model(system: System, settings: Contact, shear_moduli: NDArray[np.float64]) -> ContactModel:
+    """The model, whose `system` has the obstacles' vertices.
+
+    Parameters
+    ----------
+    shear_moduli : (m,) of the tets [Pa]
+    """
+    extended, obstacles = with_obstacles(system)
+    table = pair_table(system.scene)
+    surface = contact_surface(extended, obstacles, table.collide, np.zeros((0, 2), dtype=np.int32))
+    start = np.concatenate([initial_state(system.scene).positions, obstacle_positions(obstacles, 0.0)])
+    widest = largest_dhat(system)
+    planes = Planes.of(surface, obstacles, table.collide, widest)
+    gap = min(Collisions(surface, widest).smallest_distance(start), _gap(planes, start))
+    scales = scales_of(settings, system, shear_moduli, gap)
+    return ContactModel(
+        system=extended,
+        obstacles=obstacles,
+        surface=surface,
+        collisions=Collisions(surface, scales.dhat),
+        planes=Planes.of(surface, obstacles, table.collide, scales.dhat),
+        coefficients=table.friction,
+        scales=scales,
+        friction_iterations=settings.friction_iterations,
+    )
+
+
+def _gap(planes: Planes, x: NDArray[np.float64]) -> float:
+    """The smallest distance from a plane in front of it [m]; what is behind one is refused later."""
+    distances, _ = planes.distances(x)
+    return float(distances[distances > 0.0].min(initial=np.inf))

@@ -1,0 +1,75 @@
+"""Lagged, smoothed Coulomb friction between triangles.
+
+Normal forces, directions and points of contact are those of a given state; the force on the relative displacement u in
+the tangent plane since the step began is mu lambda f1(|u|), which rises smoothly from zero to mu lambda at the
+displacement eps_v h: below it friction is static.
+
+Source: Li et al., "Incremental Potential Contact" (2020), section 5.
+"""
+
+from __future__ import annotations
+
+import ipctk
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.implicit.contact.barrier import Barrier
+from supple.implicit.potential import HessianBlocks, Potential
+
+
+class Friction(Potential):
+    """Of the contacts that a barrier has at one state.
+
+    Parameters
+    ----------
+    lagged : (n, 3) where normal forces and tangents are taken from
+    start : (n, 3) where the step began; h : its length [s]
+    coefficients : (p, p) between owners of the surface
+    slow : eps_v [m/s]
+    """
+
+    label = "contact"
+
+    def __init__(
+        self,
+        barrier: Barrier,
+        lagged: NDArray[np.float64],
+        start: NDArray[np.float64],
+        h: float,
+        coefficients: NDArray[np.float64],
+        slow: float,
+    ) -> None:
+        self.surface = barrier.collisions.surface
+        self.start = self.surface.points(start)
+        self.h = h
+        self.potential = ipctk.FrictionPotential(slow)
+        self.contacts = ipctk.TangentialCollisions()
+        found = barrier.collisions.at(lagged)
+        if not found.empty() and coefficients.any():
+            owner = self.surface.owner.astype(np.float64)
+
+            def blend(a: float, b: float) -> float:
+                """The library blends one number of each vertex; here they are owners, whose pair is looked up."""
+                return float(coefficients[round(a), round(b)])
+
+            points = barrier.collisions.points(lagged)
+            self.contacts.build(self.surface.mesh, points, found, barrier.potential, owner, owner, blend)
+
+    def value(self, x: NDArray[np.float64]) -> float:
+        if self.contacts.empty():
+            return 0.0
+        return self.h * float(self.potential(self.contacts, self.surface.mesh, self._velocities(x)))
+
+    def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+        if not self.contacts.empty():
+            gradient = self.potential.gradient(self.contacts, self.surface.mesh, self._velocities(x))
+            self.surface.add_gradient(gradient, out)
+
+    def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
+        if not self.contacts.empty():
+            method = ipctk.PSDProjectionMethod.CLAMP if project else ipctk.PSDProjectionMethod.NONE
+            hessian = self.potential.hessian(self.contacts, self.surface.mesh, self._velocities(x), method)
+            out.couplings.append(self.surface.blocks(hessian / self.h, len(x)))
+
+    def _velocities(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asfortranarray((self.surface.points(x) - self.start) / self.h)

@@ -1,0 +1,66 @@
+"""The lengths, pressures and velocities of contact, from the scene where the user gives none.
+
+All defaults are proportional to the bodies' sizes and moduli: the same scene in millimetres gives the same shapes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.implicit.contact.settings import Contact
+from supple.system import System
+
+_DHAT_SHARE = 1e-3  # of the smallest body's diagonal
+_EDGE_SHARE = 0.25  # of the short surface edges: contacts of a surface with itself at rest are none
+_SHORT_EDGES = 2.0  # [%] which edges count as the short ones
+_SMALLEST_SHARE = 1e-5  # of the diagonal: gaps at the start do not push dhat below it
+_STIFFNESS_SHARE = 0.05  # of the softest body's modulus
+_SLOW_SHARE = 1e-3  # of the diagonal, per second
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Parameters of contact in SI units.
+
+    Attributes
+    ----------
+    dhat : [m]; stiffness : [Pa]; friction_velocity : [m/s]
+    adaptive : whether the stiffness may be raised
+    """
+
+    dhat: float
+    stiffness: float
+    friction_velocity: float
+    adaptive: bool
+
+
+def scales_of(settings: Contact, system: System, shear_moduli: NDArray[np.float64], gap: float) -> Scales:
+    """Complete the settings.
+
+    Parameters
+    ----------
+    shear_moduli : (m,) of the tets [Pa]; gap : smallest distance at the start [m], or infinity
+    """
+    diagonals = [float(np.linalg.norm(np.ptp(system.rest_positions[p.vertices], axis=0))) for p in system.bodies]
+    smallest = min(diagonals)
+    moduli = [3.0 * float(np.mean(shear_moduli[p.tets])) for p in system.bodies]
+    dhat = settings.dhat
+    if dhat is None:
+        dhat = min(largest_dhat(system), max(gap, _SMALLEST_SHARE * smallest))
+    adaptive = settings.stiffness == "adaptive"
+    stiffness = _STIFFNESS_SHARE * min(moduli) if adaptive else float(settings.stiffness)
+    slow = settings.friction_velocity
+    return Scales(dhat, stiffness, _SLOW_SHARE * smallest if slow is None else slow, adaptive)
+
+
+def largest_dhat(system: System) -> float:
+    """The default where nothing is near anything at the start [m]."""
+    diagonals = [float(np.linalg.norm(np.ptp(system.rest_positions[p.vertices], axis=0))) for p in system.bodies]
+    a, b, c = system.rest_positions[system.triangles].transpose(1, 0, 2)
+    edges = np.concatenate(
+        [np.linalg.norm(b - a, axis=1), np.linalg.norm(c - b, axis=1), np.linalg.norm(a - c, axis=1)]
+    )
+    return min(_DHAT_SHARE * min(diagonals), _EDGE_SHARE * float(np.percentile(edges, _SHORT_EDGES)))

@@ -1,0 +1,125 @@
+"""The surfaces that may touch, as the contact library sees them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import bsr_matrix, csc_matrix, csr_matrix
+
+from supple.implicit.contact.kinematic import ObstacleRange
+from supple.system import System
+
+if TYPE_CHECKING:
+    import ipctk
+
+
+@dataclass(frozen=True, eq=False)
+class ContactSurface:
+    """Surface triangles of bodies and obstacles (half-spaces aside) as one collision mesh.
+
+    Attributes
+    ----------
+    mesh : the collision mesh, in numbers of its own
+    vertices : (s,) the solver's vertex of each of the mesh's, ascending
+    owner : (s,) which body, or len(bodies) + which obstacle, each belongs to
+    areas : (s,) a third of the adjacent triangles' area at rest [m^2]
+    body_count : how many of the owners are bodies; names : of all owners
+    """
+
+    mesh: ipctk.CollisionMesh
+    vertices: NDArray[np.int32]
+    owner: NDArray[np.int32]
+    areas: NDArray[np.float64]
+    body_count: int
+    names: tuple[str, ...]
+
+    def points(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Rows of x (n, 3) that the mesh has, in the memory layout that the library wants."""
+        return np.asfortranarray(x[self.vertices])
+
+    def add_gradient(self, gradient: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+        """Add (3 s,) to the rows of `out` (n, 3)."""
+        out[self.vertices] += gradient.reshape(-1, 3)
+
+    def blocks(self, hessian: csc_matrix, n: int) -> bsr_matrix:
+        """The symmetric matrix (3 s, 3 s) over all n vertices, in blocks."""
+        size = 3 * len(self.vertices)
+        blocks = bsr_matrix(csr_of_symmetric(hessian), blocksize=(3, 3), shape=(size, size))
+        counts = np.zeros(n, dtype=np.int32)
+        counts[self.vertices] = np.diff(blocks.indptr)
+        start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+        return bsr_matrix((blocks.data, self.vertices[blocks.indices], start), shape=(3 * n, 3 * n))
+
+
+def csr_of_symmetric(matrix: csc_matrix) -> csr_matrix:
+    """A symmetric matrix by rows: its columns, read as rows."""
+    return csr_matrix((matrix.data, matrix.indices, matrix.indptr), shape=matrix.shape)
+
+
+def contact_surface(
+    system: System,
+    obstacles: tuple[ObstacleRange, ...],
+    collide: NDArray[np.bool_],
+    stitched: NDArray[np.int32],
+) -> ContactSurface:
+    """Join the surfaces of a system whose obstacles are vertices (see `kinematic`).
+
+    Parameters
+    ----------
+    collide : (p, p) which owners may touch, bodies before obstacles
+    stitched : (k, 2) pairs of vertices that may not
+    """
+    import ipctk
+
+    parts = [system.triangles] + [part.triangles for part in obstacles if not part.is_plane]
+    triangles = np.concatenate(parts)
+    vertices = np.unique(triangles).astype(np.int32)
+    number = np.full(len(system.rest_positions), -1, dtype=np.int32)
+    number[vertices] = np.arange(len(vertices), dtype=np.int32)
+    owner_of = np.full(len(system.rest_positions), -1, dtype=np.int32)
+    for k, part in enumerate(system.bodies):
+        owner_of[part.vertices] = k
+    for part in obstacles:
+        owner_of[part.vertices] = len(system.bodies) + part.index
+    owner = owner_of[vertices]
+    faces = np.asfortranarray(number[triangles], dtype=np.int32)
+    rest = np.asfortranarray(system.rest_positions[vertices])
+    mesh = ipctk.CollisionMesh(rest, ipctk.edges(faces), faces)
+    mesh.can_collide = _filter(owner, len(system.bodies), collide, number[stitched])
+    corners = rest[faces]
+    doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    areas = np.bincount(faces.ravel(order="C"), weights=np.repeat(doubled / 6.0, 3), minlength=len(vertices))
+    names = tuple(part.name for part in system.bodies) + tuple(str(o.name) for o in system.obstacles)
+    return ContactSurface(mesh, vertices, owner, areas.astype(np.float64), len(system.bodies), names)
+
+
+def _filter(
+    owner: NDArray[np.int32], body_count: int, collide: NDArray[np.bool_], stitched: NDArray[np.int32]
+) -> ipctk.CollisionFilter:
+    """Who may touch whom, built from the library's own filters: it asks them from many threads at once."""
+    import ipctk
+
+    other_owner = ipctk.make_vertex_patches_filter(owner)
+    allowed = _apart(owner >= body_count)
+    present = np.unique(owner)
+    for i, a in enumerate(present[present < body_count]):
+        for b in present[i:]:
+            if not collide[a, b]:
+                apart = _apart((owner == a) | (owner == b))
+                allowed = allowed & (apart if a == b else apart | ~other_owner)
+    if len(stitched):
+        pairs = {(int(min(p)), int(max(p))): False for p in stitched.tolist()}
+        allowed = allowed & ipctk.make_sparse_filter(pairs, True)
+    return allowed
+
+
+def _apart(group: NDArray[np.bool_]) -> ipctk.CollisionFilter:
+    """Rejects pairs of which both are in the group."""
+    import ipctk
+
+    patch = np.arange(len(group), dtype=np.int32) + 1
+    patch[group] = 0
+    return ipctk.make_vertex_patches_filter(patch)
