@@ -22,6 +22,8 @@ _HOME = {
     "Force": "supple.scene.forces",
     "Frame": "supple.simulate",
     "HalfSpace": "supple.scene.obstacles",
+    "Contact": "supple.implicit.contact.settings",
+    "ContactPoints": "supple.contact_points",
     "Implicit": "supple.implicit.solver",
     "InBox": "supple.scene.selection",
     "Keyframes": "supple.scene.motion",
@@ -102,6 +104,7 @@ def __dir__() -> list[str]:
 
 
 if TYPE_CHECKING:
+    from supple.contact_points import ContactPoints
     from supple.errors import (
         CommandError,
         MeshError,
@@ -111,6 +114,7 @@ if TYPE_CHECKING:
         SolverError,
         SuppleError,
     )
+    from supple.implicit.contact.settings import Contact
     from supple.implicit.solver import Implicit
     from supple.implicit.step_filter import largest_noninverting_step
     from supple.materials.arap import ARAP

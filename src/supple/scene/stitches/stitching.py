@@ -107,7 +107,7 @@ class Stitching:
         if not len(self):
             return components
         pieces = int(components.max()) + 1
-        of_point = np.concatenate([components, pieces + np.arange(len(self.anchors))])
+        of_point = np.concatenate([components[: self.body_vertices], pieces + np.arange(len(self.anchors))])
         ends = of_point[self.joins()]
         count = pieces + len(self.anchors)
         graph = coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(count, count))
