@@ -32,12 +32,11 @@ LONGEST_GRAB = 3.0
 
 # Commands on their way to the simulation: those beyond are dropped.
 MOST_WAITING = 512
-# Commands of one client: refilled at this rate, and this many at once.
-COMMANDS_PER_SECOND, COMMANDS_AT_ONCE = 240.0, 240
-
-# Of one message of a browser [bytes], and of one that the server keeps for it.
-LARGEST_MESSAGE = 1024 * 1024
-# Browsers with an open page, and pages that may be open from one address at once.
+# Messages of one browser: refilled at this rate, and this many at once. A pointer moves 60 to 240 times a second.
+MESSAGES_PER_SECOND, MESSAGES_AT_ONCE = 600.0, 1_200.0
+# One message of a browser [bytes], and one that holds a picture which it was asked for.
+LARGEST_MESSAGE, LARGEST_PICTURE = 64 * 1024, 32 * 1024 * 1024
+# Browsers with an open page.
 MOST_CLIENTS = 32
 # Scene files, and meshes that a scene file of the viewer may name [bytes].
 LARGEST_MESH_FILE = 256 * 1024 * 1024
