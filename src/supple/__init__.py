@@ -15,6 +15,7 @@ _HOME = {
     "Body": "supple.scene.body",
     "Box": "supple.scene.obstacles",
     "CommandError": "supple.errors",
+    "ContactPair": "supple.scene.contact_pairs",
     "ContactSettings": "supple.xpbd.contact_settings",
     "EdgesAndVolume": "supple.materials.edges_and_volume",
     "Embedding": "supple.mesh.skin",
@@ -141,6 +142,7 @@ if TYPE_CHECKING:
     from supple.output.recording import Recorder
     from supple.output.recording_reader import Recording, read_recording
     from supple.scene.body import Body
+    from supple.scene.contact_pairs import ContactPair
     from supple.scene.forces import Force, SoftTarget
     from supple.scene.motion import Keyframes
     from supple.scene.obstacles import Box, HalfSpace, Sphere, TriangleObstacle

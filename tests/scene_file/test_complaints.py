@@ -158,6 +158,35 @@ CASES = [
         "soft_targets: [{body: ball, vertices: [0], stiffness: 1}]",
         "13: soft_targets[0].body: there is no body 'ball'; known here: cube",
     ),
+    (
+        "dt: 1/60",
+        "contact_pairs: [{first: cube, second: cube}]",
+        "13: contact_pairs[0]: this rule says nothing; give `friction`, or `collide: false`",
+    ),
+    (
+        "dt: 1/60",
+        "contact_pairs:\n  - {first: cube, second: '*1', friction: 1}\n  - {first: cub, second: cube, friction: 1}",
+        "15: contact_pairs[1].first: contact pair of 'cub' and 'cube': first: there is no body or obstacle 'cub'; "
+        "did you mean 'cube'?",
+    ),
+    (
+        "dt: 1/60",
+        "contact_pairs:\n  - {first: cube, second: cube, collide: false}\n  - {first: cube, second: cube, friction: 1}",
+        "15: contact_pairs[1]: contact pair of 'cube' and 'cube': contact pair 0 (from 0) says otherwise of",
+    ),
+    (
+        "dt: 1/60",
+        "contact_pairs: [{first: HalfSpace 1, second: HalfSpace 1, collide: false}]",
+        "13: contact_pairs[0].first: contact pair of 'HalfSpace 1' and 'HalfSpace 1': 'HalfSpace 1' and",
+    ),
+    ("dt: 1/60", "contact_pairs: [{first: 7, second: cube}]", "13: contact_pairs[0].first: give a name, or a list"),
+    ("dt: 1/60", "contact_pairs: [{first: [a, 7], second: cube}]", "13: contact_pairs[0].first[1]: is 7; give a text"),
+    ("dt: 1/60", "contact_pairs: [{first: [], second: cube}]", "13: contact_pairs[0].first: has 0 values; give at"),
+    (
+        "dt: 1/60",
+        "contact_pairs: [{first: cube, second: cube, collide: false, friction: 1}]",
+        "13: contact_pairs[0].friction: contact pair of 'cube' and 'cube': friction of a pair that does not collide",
+    ),
     ("1/60", "1/0", "13: dt: is the text '1/0'; give a number"),
     ("1/60", "-0.1", "13: dt: is -0.1; it must be above 0"),
     ("1/60", "0", "13: dt: is 0; it must be above 0"),

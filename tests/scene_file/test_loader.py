@@ -11,6 +11,7 @@ from jsonschema import Draft202012Validator
 
 import supple as sp
 from supple.materials.registry import ELASTIC_MATERIALS
+from supple.scene.contact_pairs import pair_table
 from supple.scene_file.document import SceneFileModel, json_schema
 from supple.scene_file.loader import load_run, load_scene
 from supple.scene_file.materials import ELASTIC_KINDS
@@ -249,3 +250,23 @@ def _family(name):
     if name in ("HalfSpaceModel", "BoxModel", "SphereModel", "TrianglesModel"):
         return "obstacle"
     return "material"
+
+
+def test_contact_pairs_of_copies_and_of_unnamed_obstacles(load):
+    text = f"""
+bodies:
+  - {{name: pea, shape: {{kind: box, divisions: [1, 1, 1]}}, material: {RUBBER},
+     copies: {{offsets: [[0, 1, 0], [0, 3, 0]]}}}}
+obstacles: [{{kind: sphere, friction: 0.1}}]
+contact_pairs:
+  - {{first: "pea*", second: "pea*", collide: false}}
+  - {{first: [pea02], second: Sphere 1, friction: 0.6}}
+"""
+    table = pair_table(load(text).scene)
+    assert table.collide.tolist() == [[False, False, True], [False, False, True], [True, True, False]]
+    assert table.friction[:, 2].tolist() == [0.1, 0.6, 0.0]
+    schema = Draft202012Validator(json_schema())
+    data = {"bodies": [], "contact_pairs": [{"first": "a", "second": ["b", "c"], "collide": False}]}
+    assert not [e for e in schema.iter_errors(data) if "contact_pairs" in e.path]
+    data["contact_pairs"][0]["second"] = []
+    assert [e for e in schema.iter_errors(data) if "contact_pairs" in e.path]

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from supple.errors import SceneError
 from supple.scene.body import Body
+from supple.scene.contact_pairs import ContactPair, PairRules
 from supple.scene.forces import Force, SoftTarget
 from supple.scene.obstacles import Obstacle
 from supple.scene.pins import Pin
@@ -24,6 +25,7 @@ _PARTS = (
     ("forces", Force),
     ("soft_targets", SoftTarget),
     ("stitches", Stitch),
+    ("contact_pairs", ContactPair),
 )
 
 
@@ -39,6 +41,7 @@ class Scene:
     gravity : (3,) acceleration [m/s^2].
     forces : loads on vertices; soft_targets : springs to places.
     stitches : what joins bodies to each other, and to triangle obstacles.
+    contact_pairs : friction of some pairs of bodies and obstacles, and which of them pass through each other.
 
     Raises
     ------
@@ -52,6 +55,7 @@ class Scene:
     forces: Sequence[Force] = ()
     soft_targets: Sequence[SoftTarget] = ()
     stitches: Sequence[Stitch] = ()
+    contact_pairs: Sequence[ContactPair] = ()
 
     def __post_init__(self) -> None:
         for key, kind in _PARTS:
@@ -91,6 +95,9 @@ class Scene:
             chosen = item.select(body.place(body.mesh.vertices))
             if isinstance(item, Force) and not callable(item.force):
                 item.per_vertex(0.0, len(chosen))
+        rules = PairRules(self)
+        for pair in self.contact_pairs:
+            rules.add(pair)
 
     def body(self, name: str) -> Body:
         """The body of that name.

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from supple.scene_file.bodies import BodyModel
+from supple.scene_file.contact_pairs import ContactPairModel
 from supple.scene_file.fraction import number_or_fraction
 from supple.scene_file.model import Model, Vector
 from supple.scene_file.obstacles import ObstacleModel
@@ -58,6 +59,7 @@ class SceneFileModel(Model):
     pins: list[PinModel] = Field(default=[], max_length=10_000)
     forces: list[ForceModel] = Field(default=[], max_length=10_000)
     soft_targets: list[SoftTargetModel] = Field(default=[], max_length=10_000)
+    contact_pairs: list[ContactPairModel] = Field(default=[], max_length=10_000)
     gravity: Vector = Field(default=[0.0, -9.81, 0.0], description="[m/s^2]")
     solver: SolverModel = Field(default_factory=lambda: XPBDModel(kind="xpbd"))
     dt: Seconds = Field(default=1.0 / 60.0, description="time from frame to frame [s]; 1/60 may be written as such")

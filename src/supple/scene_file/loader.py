@@ -20,6 +20,7 @@ from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.scene.selection import InBox
 from supple.scene_file.complaints import complaint, suggestion
+from supple.scene_file.contact_pairs import built_pairs
 from supple.scene_file.document import OutputModel, SceneFileModel
 from supple.scene_file.located import LocatedError, at
 from supple.scene_file.mesh_sources import MeshStore
@@ -126,6 +127,8 @@ def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
         solver = model.solver.build()
     with at():
         scene = Scene(list(bodies.values()), obstacles, pins, model.gravity, forces, targets)
+        if model.contact_pairs:
+            scene = replace(scene, contact_pairs=built_pairs(model.contact_pairs, scene))
     return Run(scene, solver, model.dt, model.steps, starts, model.output)
 
 

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.scene.contact_pairs import pair_table
 from supple.system import System
 from supple.xpbd.contact_settings import ContactSettings
 from supple.xpbd.contact_surfaces import build_surfaces
@@ -45,10 +46,11 @@ class Collisions:
         self.settings = settings
         self.edge_length = mean_edge_length(system)
         self.poses = ObstaclePoses(system.obstacles)
-        self.obstacles = ObstacleContacts(build_shapes(system.obstacles), self.poses, system.inverse_masses)
+        table = pair_table(system.scene)
+        self.obstacles = ObstacleContacts(build_shapes(system.obstacles), self.poses, system, table)
         thickness = settings.thickness if settings is not None else None
         self.thickness = thickness if thickness is not None else DEFAULT_THICKNESS * self.edge_length
-        surfaces = build_surfaces(system, settings, self.thickness, self.edge_length)
+        surfaces = build_surfaces(system, table, settings, self.thickness, self.edge_length)
         self.surfaces = (
             SurfaceCollisions(system, surfaces, self.poses, self.edge_length) if surfaces.is_needed else None
         )

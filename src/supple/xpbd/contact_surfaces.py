@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.mesh.topology import connected_components
+from supple.scene.contact_pairs import PairTable
 from supple.scene.obstacles import Box, Obstacle, Sphere, TriangleObstacle
 from supple.system import System
 from supple.xpbd.contact_settings import ContactSettings
@@ -65,19 +66,18 @@ class ContactSurfaces:
 
 @dataclass
 class _Piece:
-    """What decides how a piece meets others: `obstacle` is its number, or -1 for a body."""
+    """What decides how a piece meets others: `owner` is the row of its body or obstacle in the scene's `PairTable`."""
 
-    obstacle: int
-    friction: float
+    owner: int
     closed: bool = True
     gap: float | None = None
 
 
 def build_surfaces(
-    system: System, settings: ContactSettings | None, thickness: float, edge_length: float
+    system: System, table: PairTable, settings: ContactSettings | None, thickness: float, edge_length: float
 ) -> ContactSurfaces:
     """Collect what may touch. `edge_length` [m] is the mean of the bodies' surfaces."""
-    obstacles = _obstacle_parts(system.obstacles, edge_length)
+    obstacles = _obstacle_parts(system.obstacles, len(system.bodies), edge_length)
     pieces, rows, body_piece, triangles = _body_parts(system)
     points, owners, point_piece = [np.zeros((0, 3))], [np.zeros(0, np.int32)], [body_piece]
     triangle_parts, piece_parts = [triangles], [body_piece[triangles[:, 0]]]
@@ -92,7 +92,7 @@ def build_surfaces(
         piece_parts.append(part["triangle_piece"] + offset)
         count += len(part["points"])
     fixed = np.concatenate(points)
-    allowed, gaps, friction = _rules(pieces, settings, thickness)
+    allowed, gaps, friction = _rules(pieces, table, settings, thickness)
     return ContactSurfaces(
         rows=rows,
         fixed_points=fixed,
@@ -122,24 +122,25 @@ def _body_parts(
     pieces = []
     for label in labels:
         vertex = int(np.argmax(system.components == label))
-        pieces.append(_Piece(obstacle=-1, friction=system.bodies[owner[vertex]].body.friction))
+        pieces.append(_Piece(int(owner[vertex])))
     triangles = index[system.triangles]
     order = np.argsort(piece[triangles[:, 0]], kind="stable")
     return pieces, rows, piece.astype(np.int32), triangles[order]
 
 
-def _obstacle_parts(obstacles: Sequence[Obstacle], edge_length: float) -> list[tuple[int, dict[str, Any]]]:
+def _obstacle_parts(obstacles: Sequence[Obstacle], bodies: int, edge_length: float) -> list[tuple[int, dict[str, Any]]]:
     parts = []
     for number, obstacle in enumerate(obstacles):
+        owner = bodies + number
         if isinstance(obstacle, TriangleObstacle):
-            parts.append((number, _triangle_part(number, obstacle)))
+            parts.append((number, _triangle_part(owner, obstacle)))
         elif isinstance(obstacle, Box) and not obstacle.inside:
             signs = np.array([[i, j, k] for i in (-0.5, 0.5) for j in (-0.5, 0.5) for k in (-0.5, 0.5)])
             corners = np.asarray(obstacle.center) + (signs * np.asarray(obstacle.size)) @ obstacle.orientation.T
-            parts.append((number, _points_part(_Piece(number, obstacle.friction, gap=0.0), corners)))
+            parts.append((number, _points_part(_Piece(owner, gap=0.0), corners)))
         elif isinstance(obstacle, Sphere) and not obstacle.inside and obstacle.radius < 2.0 * edge_length:
             center = np.asarray(obstacle.center)[None]
-            parts.append((number, _points_part(_Piece(number, obstacle.friction, gap=obstacle.radius), center)))
+            parts.append((number, _points_part(_Piece(owner, gap=obstacle.radius), center)))
     return parts
 
 
@@ -154,7 +155,7 @@ def _points_part(piece: _Piece, points: NDArray[np.float64]) -> dict[str, Any]:
     }
 
 
-def _triangle_part(k: int, obstacle: TriangleObstacle) -> dict[str, Any]:
+def _triangle_part(owner: int, obstacle: TriangleObstacle) -> dict[str, Any]:
     assert obstacle.surface is not None  # the obstacle has checked it
     surface = obstacle.surface.compact()
     triangles = surface.triangles
@@ -166,7 +167,7 @@ def _triangle_part(k: int, obstacle: TriangleObstacle) -> dict[str, Any]:
     point_piece = np.zeros(len(surface.vertices), dtype=np.int32)
     point_piece[triangles] = labels[:, None]
     return {
-        "pieces": [_Piece(k, obstacle.friction, closed=bool(c)) for c in closed],
+        "pieces": [_Piece(owner, closed=bool(c)) for c in closed],
         "points": surface.vertices,
         "point_piece": point_piece,
         "triangles": triangles[:, ::-1] if inward else triangles,
@@ -183,11 +184,11 @@ def _is_closed(triangles: NDArray[np.int32]) -> bool:
 
 
 def _rules(
-    pieces: Sequence[_Piece], settings: ContactSettings | None, thickness: float
+    pieces: Sequence[_Piece], table: PairTable, settings: ContactSettings | None, thickness: float
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.float64]]:
-    """(p, p) arrays: may touch, gap, friction. An obstacle's coefficient holds for all bodies; bodies use the mean."""
-    fixed = np.array([piece.obstacle >= 0 for piece in pieces])
-    mu = np.array([piece.friction for piece in pieces])
+    """(p, p) arrays: may touch, gap, friction. What the table lets touch, the settings may still switch off."""
+    owner = np.array([piece.owner for piece in pieces])
+    fixed = owner >= table.bodies
     gap = np.array([thickness if piece.gap is None else piece.gap for piece in pieces])
     same = np.eye(len(pieces), dtype=np.bool_)
     both_bodies = ~fixed[:, None] & ~fixed[None, :]
@@ -195,5 +196,6 @@ def _rules(
     if settings is not None:
         allowed |= both_bodies & ((same & settings.self_collision) | (~same & settings.body_collision))
     gaps = np.where(fixed[:, None], gap[:, None], gap[None, :])
-    friction = np.where(both_bodies, np.sqrt(np.outer(mu, mu)), np.where(fixed[:, None], mu[:, None], mu[None, :]))
-    return np.ascontiguousarray(allowed), np.ascontiguousarray(gaps), np.ascontiguousarray(friction)
+    pairs = np.ix_(owner, owner)
+    allowed &= table.collide[pairs]
+    return allowed, np.ascontiguousarray(gaps), np.ascontiguousarray(table.friction[pairs])

@@ -13,6 +13,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from supple.numerics.mat3 import dot, row
+from supple.scene.contact_pairs import PairTable
+from supple.system import System
 from supple.xpbd.friction import friction_correction
 from supple.xpbd.obstacle_poses import ObstaclePoses
 from supple.xpbd.obstacle_shapes import BALL, BOWL, PLANE, ObstacleShapes
@@ -146,17 +148,21 @@ def _contact(kind, extent, frames, frames_before, k, p, p_before):
 
 
 @njit(cache=True)
-def find_candidates(x, reach, masses_inverse, kinds, extents, frames, moving, starts, vertices):
+def find_candidates(x, reach, masses_inverse, shapes, rules, frames, starts, vertices):
     """Vertices that may touch each shape before they have moved by their reach (n,) [m]; all of them if it moves.
+
+    Vertices whose body does not collide with the shape are left out. `shapes` and `rules`: see `project_shapes`.
 
     Writes `starts` (k + 1,) and as many of `vertices` as fit. Returns how many there are.
     """
+    kinds, extents, moving = shapes
+    owner, collide, _ = rules
     count = 0
     for k in range(len(kinds)):
         starts[k] = count
         extent = row(extents, k)
         for i in range(len(x)):
-            if masses_inverse[i] == 0.0:
+            if masses_inverse[i] == 0.0 or not collide[owner[i], k]:
                 continue
             if not moving[k]:
                 p = row(x, i)
@@ -171,18 +177,20 @@ def find_candidates(x, reach, masses_inverse, kinds, extents, frames, moving, st
 
 
 @njit(cache=True)
-def project_shapes(x, x_prev, candidates, shapes, frames, frames_before, limit, near):
+def project_shapes(x, x_prev, candidates, shapes, rules, frames, frames_before, limit, near):
     """Push vertices out of shapes, in place. Returns the number of contacts and the smallest gap before (or inf).
 
     Parameters
     ----------
     candidates : starts (k + 1,), vertices, as from `find_candidates`
-    shapes : kinds (k,), extents (k, 3), friction (k,), moving (k,)
+    shapes : kinds (k,), extents (k, 3), moving (k,)
+    rules : owner (n,), the body of a vertex; collide (b, k), friction (b, k), of each body with each shape
     frames, frames_before : (k, 4, 3) at the end and at the beginning of the substep
     limit : see `split_overlap`; near : gaps above this are not reported [m]
     """
     starts, vertices = candidates
-    kinds, extents, friction, moving = shapes
+    kinds, extents, moving = shapes
+    owner, _, friction = rules
     contacts, smallest = 0, math.inf
     for k in range(len(kinds)):
         extent = row(extents, k)
@@ -200,7 +208,7 @@ def project_shapes(x, x_prev, candidates, shapes, frames, frames_before, limit, 
             if moving[k]:
                 carried = _world(frames_before, k, _local(frames, k, p))
             slip = (carried[0] - p_before[0], carried[1] - p_before[1], carried[2] - p_before[2])
-            back = friction_correction(slip, n, friction[k], impulse)
+            back = friction_correction(slip, n, friction[owner[i], k], impulse)
             for j in range(3):
                 x[i, j] += n[j] * (impulse + shift) + back[j]
                 x_prev[i, j] += n[j] * shift
@@ -210,11 +218,20 @@ def project_shapes(x, x_prev, candidates, shapes, frames, frames_before, limit, 
 class ObstacleContacts:
     """The simple shapes of a scene and the vertices near them."""
 
-    def __init__(self, shapes: ObstacleShapes, poses: ObstaclePoses, inverse_masses: NDArray[np.float64]) -> None:
+    def __init__(self, shapes: ObstacleShapes, poses: ObstaclePoses, system: System, table: PairTable) -> None:
         self.shapes = shapes
         self.poses = poses
-        self.inverse_masses = np.ascontiguousarray(inverse_masses)
-        self._arrays = (shapes.kinds, shapes.extents, shapes.friction, shapes.moving)
+        self.inverse_masses = np.ascontiguousarray(system.inverse_masses)
+        self._arrays = (shapes.kinds, shapes.extents, shapes.moving)
+        obstacles = table.bodies + shapes.owners
+        owner = np.zeros(len(system.masses), dtype=np.int32)
+        for k, part in enumerate(system.bodies):
+            owner[part.vertices] = k
+        self._rules = (
+            owner,
+            np.ascontiguousarray(table.collide[: table.bodies, obstacles]),
+            np.ascontiguousarray(table.friction[: table.bodies, obstacles]),
+        )
         self._starts = np.zeros(len(shapes.kinds) + 1, dtype=np.int64)
         self._vertices = np.zeros(1024, dtype=np.int32)
 
@@ -224,11 +241,9 @@ class ObstacleContacts:
     def gather(self, x: NDArray[np.float64], reach: NDArray[np.float64], time: float) -> None:
         """List the vertices (of n) that may touch something before they have moved by `reach` (n,) [m]."""
         frames = self.shapes.placed(self.poses, time)
-        s = self.shapes
+        described = (self._arrays, self._rules, frames)
         while True:
-            count = find_candidates(
-                x, reach, self.inverse_masses, s.kinds, s.extents, frames, s.moving, self._starts, self._vertices
-            )
+            count = find_candidates(x, reach, self.inverse_masses, *described, self._starts, self._vertices)
             if count <= len(self._vertices):
                 return
             self._vertices = np.zeros(2 * count, dtype=np.int32)
@@ -240,4 +255,4 @@ class ObstacleContacts:
         frames_before = self.shapes.placed(self.poses, times[0])
         frames = self.shapes.placed(self.poses, times[1])
         candidates = (self._starts, self._vertices)
-        return project_shapes(x, x_prev, candidates, self._arrays, frames, frames_before, limit, near)
+        return project_shapes(x, x_prev, candidates, self._arrays, self._rules, frames, frames_before, limit, near)

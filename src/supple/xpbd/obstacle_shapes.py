@@ -27,7 +27,6 @@ class ObstacleShapes:
     owners : (k,) which obstacle of the scene a shape belongs to
     frames : (k, 4, 3) an anchor point [m], then three axes, row by row; a plane's first axis is its normal
     extents : (k, 3) half edge lengths of a block, radius of a ball or bowl in the first entry [m]
-    friction : (k,) coefficients
     moving : (k,) whether the shape is scripted
     """
 
@@ -35,7 +34,6 @@ class ObstacleShapes:
     owners: NDArray[np.int32]
     frames: NDArray[np.float64]
     extents: NDArray[np.float64]
-    friction: NDArray[np.float64]
     moving: NDArray[np.bool_]
 
     def placed(self, poses: ObstaclePoses, time: float) -> NDArray[np.float64]:
@@ -73,7 +71,6 @@ def build_shapes(obstacles: Sequence[Obstacle]) -> ObstacleShapes:
         owners=np.array([row[1] for row in rows], dtype=np.int32),
         frames=np.array([row[2] for row in rows], dtype=np.float64).reshape(-1, 4, 3),
         extents=np.array([row[3] for row in rows], dtype=np.float64).reshape(-1, 3),
-        friction=np.array([obstacles[row[1]].friction for row in rows], dtype=np.float64),
         moving=np.array([obstacles[row[1]].motion is not None for row in rows], dtype=np.bool_),
     )
 

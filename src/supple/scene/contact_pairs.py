@@ -1,0 +1,205 @@
+"""Which bodies and obstacles touch, and with how much friction: the one place where both solvers look it up."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.errors import SceneError
+from supple.scene.values import non_negative
+
+if TYPE_CHECKING:
+    from supple.scene.scene import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class ContactPair:
+    """A rule for the contact of two bodies, of a body and an obstacle, or of a body with itself.
+
+    Parameters
+    ----------
+    first, second : name of a body or an obstacle, or a list of names: then the rule holds for every pair of one of the
+        first and one of the second. `*` and `?` stand for any letters and any one letter. A body paired with itself is
+        its contact with itself.
+    friction : Coulomb coefficient of these pairs, instead of what the bodies and obstacles say.
+    collide : False, and these pairs pass through each other.
+
+    Raises
+    ------
+    SceneError : where a value is of the wrong kind, or the rule says nothing.
+    """
+
+    first: str | Sequence[str]
+    second: str | Sequence[str]
+    friction: float | None = None
+    collide: bool = True
+
+    def __post_init__(self) -> None:
+        for key in ("first", "second"):
+            object.__setattr__(self, key, _names(getattr(self, key), key))
+        if not isinstance(self.collide, bool):
+            raise SceneError(f"{self.label}: collide is {self.collide!r}; give True or False")
+        if self.friction is not None:
+            object.__setattr__(self, "friction", non_negative(self.friction, f"{self.label}: friction"))
+            if not self.collide:
+                raise SceneError(f"{self.label}: friction of a pair that does not collide; take one of them out")
+        elif self.collide:
+            raise SceneError(f"{self.label}: it says nothing; give friction=..., or collide=False")
+
+    @property
+    def label(self) -> str:
+        """How messages call this rule."""
+        return f"contact pair of {_listed(self.first)} and {_listed(self.second)}"
+
+
+@dataclass(frozen=True, eq=False)
+class PairTable:
+    """What holds for each pair of p things: bodies in the scene's order, then obstacles in the scene's order.
+
+    Attributes
+    ----------
+    collide : (p, p) whether the two touch; the diagonal says whether a body touches itself
+    friction : (p, p) Coulomb coefficients
+    bodies : how many of the p are bodies
+
+    Both arrays are symmetric. Between two obstacles there is no contact: False and 0.
+    """
+
+    collide: NDArray[np.bool_]
+    friction: NDArray[np.float64]
+    bodies: int
+
+
+class PairRules:
+    """The contact pairs of a scene, taken in one by one; each must be about things that exist, and contradict none.
+
+    Parameters
+    ----------
+    scene : its bodies and obstacles; its contact pairs are not looked at.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._bodies = len(scene.bodies)
+        self._names = [body.name for body in scene.bodies] + [str(obstacle.name) for obstacle in scene.obstacles]
+        self._pairs: list[ContactPair] = []
+        self._rule: NDArray[np.int32] | None = None
+
+    def add(self, pair: ContactPair) -> None:
+        """Take in one more rule.
+
+        Raises
+        ------
+        SceneError : where a name is unknown or means two things, two obstacles are paired, or an earlier rule
+            says something else about the same pair.
+        """
+        first, second = self._found(pair, "first"), self._found(pair, "second")
+        if first[-1] >= self._bodies and second[-1] >= self._bodies:
+            a, b = self._names[first[-1]], self._names[second[-1]]
+            raise SceneError(
+                f"{pair.label}: {a!r} and {b!r} are both obstacles, which never touch each other; name a body in "
+                "`first` or in `second`, and no obstacle there"
+            )
+        if self._rule is None:
+            self._rule = np.full((len(self._names), len(self._names)), -1, dtype=np.int32)
+        for rows, columns in ((first, second), (second, first)):
+            block = np.ix_(rows, columns)
+            for earlier in np.unique(self._rule[block]):
+                if earlier >= 0 and _says(self._pairs[earlier]) != _says(pair):
+                    i, j = np.argwhere(self._rule[block] == earlier)[0]
+                    a, b = self._names[rows[i]], self._names[columns[j]]
+                    raise SceneError(
+                        f"{pair.label}: contact pair {earlier} (from 0) says otherwise of {a!r} and {b!r}; keep one"
+                    )
+        for rows, columns in ((first, second), (second, first)):
+            self._rule[np.ix_(rows, columns)] = len(self._pairs)
+        self._pairs.append(pair)
+
+    def apply(self, table: PairTable) -> None:
+        """Write the rules into a table of this scene, in place."""
+        if self._rule is None:
+            return
+        for number, pair in enumerate(self._pairs):
+            meant = self._rule == number
+            if pair.friction is None:
+                table.collide[meant] = False
+            else:
+                table.friction[meant] = pair.friction
+
+    def _found(self, pair: ContactPair, key: str) -> list[int]:
+        """Numbers of the things that one side of a rule names, ascending."""
+        numbers: set[int] = set()
+        for name in getattr(pair, key):
+            found = [i for i, known in enumerate(self._names) if _matches(name, known)]
+            if not found:
+                raise SceneError(f"{pair.label}: {key}: there is no body or obstacle {name!r}; {self._near(name)}")
+            if len({self._names[i] for i in found}) < len(found):
+                twice = next(self._names[i] for i in found if [self._names[j] for j in found].count(self._names[i]) > 1)
+                raise SceneError(f"{pair.label}: {key}: a body and an obstacle are both named {twice!r}; rename one")
+            numbers.update(found)
+        return sorted(numbers)
+
+    def _near(self, name: str) -> str:
+        near = difflib.get_close_matches(name, self._names, n=1, cutoff=0.6)
+        if near:
+            return f"did you mean {near[0]!r}?"
+        shown = ", ".join(map(repr, self._names[:12]))
+        return f"there are {shown}{', ...' if len(self._names) > 12 else ''}"
+
+
+def pair_table(scene: Scene) -> PairTable:
+    """Which of a scene's things touch, and with how much friction.
+
+    Without a rule everything touches; an obstacle's coefficient holds for all bodies, and two bodies, or a body and
+    itself, use the geometric mean of theirs.
+    """
+    bodies, count = len(scene.bodies), len(scene.bodies) + len(scene.obstacles)
+    own = np.array([body.friction for body in scene.bodies], dtype=np.float64)
+    theirs = np.array([obstacle.friction for obstacle in scene.obstacles], dtype=np.float64)
+    collide = np.ones((count, count), dtype=np.bool_)
+    collide[bodies:, bodies:] = False
+    friction = np.zeros((count, count))
+    friction[:bodies, :bodies] = np.sqrt(np.outer(own, own))
+    friction[:bodies, bodies:] = theirs
+    friction[bodies:, :bodies] = theirs[:, None]
+    table = PairTable(collide, friction, bodies)
+    rules = PairRules(scene)
+    for pair in scene.contact_pairs:
+        rules.add(pair)
+    rules.apply(table)
+    return table
+
+
+def _says(pair: ContactPair) -> tuple[float | None, bool]:
+    return pair.friction, pair.collide
+
+
+def _names(value: object, key: str) -> tuple[str, ...]:
+    names = (value,) if isinstance(value, str) else value
+    try:
+        names = tuple(names)  # pyright: ignore[reportArgumentType]
+    except TypeError:
+        raise SceneError(f"contact pair: {key} is {value!r}; give a name or a list of names") from None
+    if not names:
+        raise SceneError(f"contact pair: {key} is empty; give a name or a list of names")
+    for name in names:
+        if not isinstance(name, str) or not name:
+            raise SceneError(f"contact pair: {key} holds {name!r}; give names of bodies and obstacles")
+    return names
+
+
+def _matches(pattern: str, name: str) -> bool:
+    """Whether a name is meant. Names hold neither `*` nor `?`, but may hold `[`, which is no pattern here."""
+    if "*" in pattern or "?" in pattern:
+        return fnmatchcase(name, pattern.replace("[", "[[]"))
+    return pattern == name
+
+
+def _listed(names: str | Sequence[str]) -> str:
+    names = (names,) if isinstance(names, str) else names
+    return ", ".join(map(repr, names[:3])) + (", ..." if len(names) > 3 else "")
