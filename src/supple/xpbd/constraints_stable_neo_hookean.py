@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from supple.materials.material import Elastic
 from supple.system import BodyRange, System
 from supple.xpbd.ordering import Layout
-from supple.xpbd.segments import gather, sort_into_segments
+from supple.xpbd.segments import Segments, gather, sort_into_segments
 
 logger = logging.getLogger(__name__)
 
@@ -28,26 +28,35 @@ logger = logging.getLogger(__name__)
 FLAGS = {"contract", "arcp", "nsz"}
 
 
-class StableNeoHookeanConstraints:
-    """The tetrahedra of all bodies made of `StableNeoHookean`."""
+class BlocksOfTwo:
+    """Both constraints of any tetrahedra, in an order that is given.
 
-    def __init__(self, system: System, parts: list[BodyRange], layout: Layout) -> None:
-        materials = [cast(Elastic, part.body.material).per_tet(part.tets.stop - part.tets.start) for part in parts]
-        rows, kind, self.table = gather(parts, "tets", [material.damping[:, None] for material in materials])
-        mu = np.concatenate([material.mu for material in materials])
-        lam = np.concatenate([material.lam for material in materials])  # E / (2 (1 + nu) (1 - 2 nu)): above zero
-        movable = (system.inverse_masses[system.tets[rows]] > 0.0).any(axis=1)
-        rows, kind, mu, lam = rows[movable], kind[movable], mu[movable], lam[movable]
-        self.segments = sort_into_segments(layout, system.tets[rows], kind)
-        order = self.segments.order
-        rows, mu, lam = rows[order], mu[order], lam[order]
-        self.corners = np.ascontiguousarray(system.tets[rows], dtype=np.uint32)
-        self.count = len(rows)
+    Parameters
+    ----------
+    tets : (m, 4); Dm_inv : (m, 3, 3) [1/m]; volumes : (m,) at rest [m^3]
+    moduli : mu and lam, (m,) each, as they stand in the energy density, above zero [Pa]
+    inverse_masses : of all vertices [1/kg]
+    segments : the order of the tets; damping : Kelvin-Voigt time of each of its kinds [s]
+    """
+
+    called = "stable Neo-Hookean tets"
+
+    def __init__(
+        self,
+        tets: tuple[NDArray, NDArray, NDArray],
+        moduli: tuple[NDArray, NDArray],
+        inverse_masses: NDArray[np.float64],
+        segments: Segments,
+        damping: NDArray[np.float64],
+    ) -> None:
+        order = segments.order
+        (corners, Dm_inv, V), (mu, lam) = (tuple(values[order] for values in some) for some in (tets, moduli))
+        self.segments = segments
+        self.corners = np.ascontiguousarray(corners, dtype=np.uint32)
+        self.count = len(order)
         # A sweep takes about three times as long for one of these tets as for an edge or a volume.
         self.work = 3 * self.count
-        w = system.inverse_masses[system.tets[rows]]
-        gradients, self.curvatures = _principal_axes(system.rest_shape_inverse[rows], w)
-        V = system.rest_volumes[rows]
+        gradients, self.curvatures = _principal_axes(Dm_inv, inverse_masses[corners])
         # The columns of `data`: 9 shape gradients, mu V, lam V, 1 + mu/lam, step length, 3 curvatures: two cache lines.
         self.data = np.empty((self.count, 16))
         self.data[:, :9] = gradients.reshape(-1, 9)
@@ -55,7 +64,8 @@ class StableNeoHookeanConstraints:
         self.data[:, 10] = lam * V
         self.data[:, 11] = 1.0 + mu / lam
         self.data[:, 13:16] = self.curvatures
-        self.damped = bool(self.table.any())
+        self.damping = damping
+        self.damped = bool(damping.any())
         self._prepared_for = 0.0
 
     def project(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:
@@ -68,7 +78,7 @@ class StableNeoHookeanConstraints:
     def damp(self, points: NDArray[np.float64], previous: NDArray[np.float64], h: float, parallel: bool) -> None:
         """See `ConstraintSet.damp`."""
         pointers, bounds = self.segments.chunk_pointers, self.segments.bounds
-        gammas = self.table[self.segments.kinds, 0] / h
+        gammas = self.damping[self.segments.kinds] / h
         damp = _damp_parallel if parallel else _damp
         damp(points, previous, self.corners, self.data, h, pointers, bounds, gammas)
 
@@ -80,12 +90,28 @@ class StableNeoHookeanConstraints:
         shortened = np.count_nonzero(stiffness > 1.0) / self.count
         if shortened > 0.5:
             logger.warning(
-                "XPBD: %.0f %% of the stable Neo-Hookean tets are too stiff, or too light, for substeps of %.3g s and "
+                "XPBD: %.0f %% of the %s are too stiff, or too light, for substeps of %.3g s and "
                 "act softer than they are; about %.3g times as many substeps give them their stiffness",
                 100.0 * shortened,
+                self.called,
                 h,
                 np.sqrt(np.quantile(stiffness, 0.9)),
             )
+
+
+class StableNeoHookeanConstraints(BlocksOfTwo):
+    """The tetrahedra of all bodies made of `StableNeoHookean`."""
+
+    def __init__(self, system: System, parts: list[BodyRange], layout: Layout) -> None:
+        materials = [cast(Elastic, part.body.material).per_tet(part.tets.stop - part.tets.start) for part in parts]
+        rows, kind, table = gather(parts, "tets", [material.damping[:, None] for material in materials])
+        mu = np.concatenate([material.mu for material in materials])
+        lam = np.concatenate([material.lam for material in materials])  # E / (2 (1 + nu) (1 - 2 nu)): above zero
+        movable = (system.inverse_masses[system.tets[rows]] > 0.0).any(axis=1)
+        rows, kind, mu, lam = rows[movable], kind[movable], mu[movable], lam[movable]
+        tets = system.tets[rows], system.rest_shape_inverse[rows], system.rest_volumes[rows]
+        segments = sort_into_segments(layout, system.tets[rows], kind)
+        super().__init__(tets, (mu, lam), system.inverse_masses, segments, table[:, 0])
 
 
 def _principal_axes(

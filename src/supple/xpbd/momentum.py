@@ -4,9 +4,9 @@ A projection conserves the moment of its corrections about the positions that it
 though, so the arm that counts for angular momentum is x_n. The difference is of second order in the substep, it has a
 sign, and it adds up: a squashed sphere, released, begins to spin. More substeps make it worse.
 
-The cure, once a substep after the internal constraints and before contacts, for every connected component without a
-pinned vertex: with c and c' the centers of mass of x_n and x, r0 = x_n - c, r = x - c', and x* the predicted
-positions,
+The cure, once a substep after the internal constraints and before contacts, for every connected component (of bodies
+and stitches) that has no pinned vertex and is not stitched to an obstacle: with c and c' the centers of mass of x_n and
+x, r0 = x_n - c, r = x - c', and x* the predicted positions,
 
     P_err = sum m (x - x*),   L_err = sum m r0 x (x - x*),   A = sum m ((r0 . r) I - r r0^T),   A th = L_err,
     x  <-  x - P_err / M - th x r.
@@ -30,13 +30,14 @@ _SUMS = 21
 
 
 class MomentumRestore:
-    """The components of a system, and which of them are free."""
+    """The components of a system, and which of them are free. What stitches join is one component."""
 
     def __init__(self, system: System) -> None:
-        labels = system.components
+        labels = system.joined_components
         count = int(labels.max()) + 1
         self.free = np.ones(count, dtype=np.bool_)
         self.free[labels[system.inverse_masses == 0.0]] = False
+        self.free[labels[system.stitching.anchored_vertices()]] = False
         self.members = np.argsort(labels, kind="stable").astype(np.uint32)
         ends = np.cumsum(np.bincount(labels, minlength=count))
         starts = np.append(0, ends[:-1])

@@ -116,4 +116,5 @@ def reordered(system: System, layout: Layout) -> System:
         edges=np.ascontiguousarray(new[system.edges]),
         triangles=np.ascontiguousarray(new[system.triangles]),
         components=np.ascontiguousarray(system.components[old]),
+        stitching=system.stitching.renumbered(new),
     )

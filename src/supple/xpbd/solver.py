@@ -37,6 +37,8 @@ from supple.xpbd.integration import (
 from supple.xpbd.momentum import MomentumRestore
 from supple.xpbd.ordering import Layout, make_layout, reordered
 from supple.xpbd.pace import Pace
+from supple.xpbd.stitch_anchors import StitchAnchors
+from supple.xpbd.stitch_constraints import stitch_constraints
 
 # Below this much work, in edges or volumes, a sweep is over before a second thread has woken up.
 PARALLEL_FROM = 20_000
@@ -49,8 +51,10 @@ class XPBDWorkspace:
 
     Attributes
     ----------
-    points : (n, 4) positions about their component's origin [m] and inverse masses [1/kg]
-    previous, velocities, origins : (n, 3); world, world_previous : (n, 3) positions in the world, for contacts
+    extended : (n + a, 4) positions about their component's origin [m] and inverse masses [1/kg], of the vertices and
+        then of the anchors, zero masses; extended_previous : (n + a, 3) positions when the substep began
+    points, previous : their rows of vertices
+    velocities, origins : (n, 3); world, world_previous : (n, 3) positions in the world, for contacts
     """
 
     system: System
@@ -60,7 +64,10 @@ class XPBDWorkspace:
     external: ExternalForces
     collisions: Collisions
     pace: Pace
-    points: NDArray[np.float64]
+    anchors: StitchAnchors
+    extended: NDArray[np.float64]
+    extended_previous: NDArray[np.float64] = field(init=False)
+    points: NDArray[np.float64] = field(init=False)
     previous: NDArray[np.float64] = field(init=False)
     velocities: NDArray[np.float64] = field(init=False)
     origins: NDArray[np.float64] = field(init=False)
@@ -68,8 +75,11 @@ class XPBDWorkspace:
     world_previous: NDArray[np.float64] = field(init=False)
 
     def __post_init__(self) -> None:
-        for name in ("previous", "velocities", "origins", "world", "world_previous"):
-            setattr(self, name, np.zeros((len(self.points), 3)))
+        n = len(self.system.masses)
+        self.extended_previous = np.zeros((len(self.extended), 3))
+        self.points, self.previous = self.extended[:n], self.extended_previous[:n]
+        for name in ("velocities", "origins", "world", "world_previous"):
+            setattr(self, name, np.zeros((n, 3)))
 
 
 @dataclass(frozen=True)
@@ -118,9 +128,9 @@ class XPBD(Solver):
         """
         layout = make_layout(system)
         inner = reordered(system, layout)
-        sets = build_constraint_sets(inner, layout)
-        points = np.zeros((len(system.masses), 4))
-        points[:, 3] = inner.inverse_masses
+        extended = np.zeros((len(system.masses) + len(inner.stitching.anchors), 4))
+        extended[: len(system.masses), 3] = inner.inverse_masses
+        sets = [*build_constraint_sets(inner, layout), *stitch_constraints(inner, extended[:, 3])]
         threads = self.threads or numba.get_num_threads()
         large = sum(made.work for made in sets) >= PARALLEL_FROM
         parallel = threads > 1 and (large or self.threads is not None)
@@ -132,7 +142,8 @@ class XPBD(Solver):
             external=ExternalForces(inner),
             collisions=Collisions(inner, self.contact),
             pace=Pace(choice=parallel and self.threads is None, parallel=parallel),
-            points=points,
+            anchors=StitchAnchors(inner),
+            extended=extended,
         )
 
     def step(self, system: System, state: State, dt: float, workspace: XPBDWorkspace) -> tuple[State, StepReport]:
@@ -147,10 +158,10 @@ class XPBD(Solver):
                 started = perf_counter()
                 parallel = ws.pace.choose()
                 end = state.time + (k + 1) * h
-                _begin_substep(ws, targets[k], h, parallel)
+                _begin_substep(ws, targets[k], end, h, parallel)
                 ws.external.push(ws.points, ws.velocities, end, h)
                 for constraints in ws.sets:
-                    constraints.project(ws.points, h, parallel)
+                    constraints.project(ws.extended, h, parallel)
                 if ws.momentum is not None:
                     ws.momentum.apply(ws.points, ws.previous, ws.velocities, h, parallel)
                 else:
@@ -194,11 +205,12 @@ def _load(ws: XPBDWorkspace, state: State) -> None:
     old = ws.layout.old_from_new
     np.take(state.positions, old, axis=0, out=ws.world)
     np.take(state.velocities, old, axis=0, out=ws.velocities)
-    origins_of_components(ws.world, ws.system.components, ws.origins)
+    origins_of_components(ws.world, ws.system.joined_components, ws.origins)
     np.subtract(ws.world, ws.origins, out=ws.points[:, :3])
+    ws.anchors.place(ws.extended, ws.origins, state.time)
 
 
-def _begin_substep(ws: XPBDWorkspace, targets: NDArray[np.float64], h: float, parallel: bool) -> None:
+def _begin_substep(ws: XPBDWorkspace, targets: NDArray[np.float64], end: float, h: float, parallel: bool) -> None:
     """Predict positions, with pinned vertices where `targets` (k, 3) wants them, and damping taken from the velocities.
 
     Damping comes before gravity, forces and constraints, and sees only the velocities that the substep begins with.
@@ -210,8 +222,10 @@ def _begin_substep(ws: XPBDWorkspace, targets: NDArray[np.float64], h: float, pa
     begin(ws.points, ws.previous, ws.velocities, np.zeros(3) if damped else gravity, h)
     if len(targets):
         hold(ws.points, ws.system.pinned_vertices, targets, ws.origins)
+    ws.extended_previous[len(ws.points) :] = ws.extended[len(ws.points) :, :3]
+    ws.anchors.place(ws.extended, ws.origins, end)
     for constraints in damped:
-        constraints.damp(ws.points, ws.previous, h, parallel)
+        constraints.damp(ws.extended, ws.extended_previous, h, parallel)
     if damped:
         accelerate(ws.points, ws.velocities, gravity, h)
 

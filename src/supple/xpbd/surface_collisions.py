@@ -12,6 +12,7 @@ from supple.xpbd.obstacle_poses import ObstaclePoses
 from supple.xpbd.point_inside import bounds_of_pieces, depths_inside
 from supple.xpbd.reach import looking_out, mean_motions, outran_pieces
 from supple.xpbd.spatial_hash import PairFinder
+from supple.xpbd.stitch_masks import stitched_contacts
 from supple.xpbd.surface_contacts import project_surfaces
 
 # Of the mean surface edge: what a point may move at least, and at most, before lists are made anew, and up to which
@@ -29,7 +30,7 @@ class SurfaceCollisions:
         n, pieces = len(s.point_piece), len(s.closed)
         rest = np.concatenate([system.rest_positions[s.rows], s.fixed_points])
         widest = float(np.diagonal(s.gaps).max(initial=0.0))
-        excluded = excluded_pairs(s, rest, 2.0 * min(widest, 0.5 * edge_length))
+        excluded = excluded_pairs(s, rest, 2.0 * min(widest, 0.5 * edge_length), stitched_contacts(system, s))
         self._rules = (s.allowed, *excluded)
         self._finder = PairFinder(n, pieces, edge_length)
         self._x, self._before, self._gathered = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))

@@ -35,9 +35,8 @@ class _Elements:
 
     def numbered(self, first: int, second: NDArray[np.int32]) -> Self:
         """The same with other numbers: the first side's plus `first`, the second side's looked up in `second`."""
-        vertices = second[self.vertices]
-        vertices[:, 0] = self.vertices[:, 0] + first
-        return replace(self, vertices=np.ascontiguousarray(vertices, dtype=np.int32))
+        vertices = np.column_stack([self.vertices[:, 0] + first, second[self.vertices[:, 1:]]])
+        return replace(self, vertices=vertices.astype(np.int32))
 
     @classmethod
     def joined(cls, parts: list[Self]) -> Self:

@@ -7,7 +7,7 @@ anchors. They go where the obstacle goes, whatever pulls at them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,6 +91,13 @@ class Stitching:
         springs[alone, 2] = -1
         both = np.concatenate([self.tets.vertices, springs])
         return np.where(both < self.body_vertices, both, -1).astype(np.int32)
+
+    def renumbered(self, new: NDArray[np.int32]) -> Stitching:
+        """The same stitches of bodies whose vertices have new numbers (n,)."""
+        numbers = np.concatenate([new, self.body_vertices + np.arange(len(self.anchors), dtype=new.dtype)])
+        tets = replace(self.tets, vertices=np.ascontiguousarray(numbers[self.tets.vertices]))
+        springs = replace(self.springs, vertices=np.ascontiguousarray(numbers[self.springs.vertices]))
+        return replace(self, tets=tets, springs=springs)
 
     def joins(self) -> NDArray[np.int32]:
         """(q, 2) each stitch's first vertex with each of the others, anchors included."""

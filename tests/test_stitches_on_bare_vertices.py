@@ -1,0 +1,135 @@
+"""Stitches of single vertices to a triangle that stands still: where they come to rest, in both solvers."""
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.implicit.free_motion import FreeMotion
+from supple.implicit.inertia import Inertia
+from supple.implicit.linear_solver import LinearSolver
+from supple.implicit.newton import Problem, Tools, minimize
+from supple.implicit.objective import Objective
+from supple.implicit.potential import HessianBlocks
+from supple.implicit.stitch_energy import StitchEnergy
+from supple.scene.stitches.elements import Springs
+from supple.scene.stitches.side import Side
+from supple.scene.stitches.stitching import Anchors, Stitching
+from supple.state import Status
+from supple.system import PinRange, System
+from supple.xpbd.stitch_constraints import stitch_constraints
+
+NO_ANCHORS = Anchors((), np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros((0, 3)))
+
+
+def side(points, triangles=()):
+    points, triangles = np.asarray(points, dtype=float), np.array(triangles, dtype=np.int32).reshape(-1, 3)
+    edges = np.zeros((0, 2), dtype=np.int32)
+    return Side("side", points, triangles, edges, np.arange(len(points), dtype=np.int32))
+
+
+def sewn(vertices, triangle, **stitch):
+    """A System of the vertices [1 kg], then the triangle's, which are pinned; and where everything is."""
+    described = sp.SoftVertexTriangleStitch("vertices", "triangle", youngs=1.2e5, poisson=0.49, **stitch)
+    first, second = side(vertices), side(triangle, [[0, 1, 2]])
+    pairs = described.find(first, second)
+    count = len(vertices)
+    tets = described.join(first, second, pairs).numbered(0, np.arange(count, count + 3, dtype=np.int32))
+    x = np.concatenate([first.points, second.points])
+    n = len(x)
+    held = np.arange(count, n, dtype=np.int32)
+    system = System(
+        scene=None,  # pyright: ignore[reportArgumentType]
+        bodies=(),
+        pins=(PinRange(sp.Pin("triangle", held - count), held, second.points),),
+        rest_positions=x,
+        masses=np.ones(n),
+        tets=np.zeros((0, 4), np.int32),
+        rest_shape_inverse=np.zeros((0, 3, 3)),
+        rest_volumes=np.zeros(0),
+        edges=np.zeros((0, 2), np.int32),
+        rest_lengths=np.zeros(0),
+        triangles=np.zeros((0, 3), np.int32),
+        components=np.arange(n, dtype=np.int32),
+        gravity=np.zeros(3),
+        stitching=Stitching(n, (), tets, Springs.none(), NO_ANCHORS),
+    )
+    return system, x, pairs
+
+
+class Unlimited:
+    """Stitch tets are not guarded: every step is allowed."""
+
+    def largest_step(self, x, direction):
+        return 1.0, -1
+
+    def allows(self, x):
+        return True
+
+    def widen(self, x):
+        pass
+
+
+def by_newton(system, x, h=0.05, steps=200):
+    """Backward Euler, which loses energy; every position on the way."""
+    linear = LinearSolver.of(system, "direct")
+    hessian = HessianBlocks.zeros(0, len(x), len(system.stitching))
+    tools = Tools(linear, hessian, system.pinned_vertices, FreeMotion.of(system))
+    stitches = StitchEnergy.of(system.stitching, 0.0)
+    v = np.zeros_like(x)
+    way = [x]
+    for _ in range(steps):
+        objective = Objective([stitches, Inertia(system.masses, x + h * v, h * h)])
+        outcome = minimize(Problem(objective, h * h, 1e-10, 60, 1.0), x, Unlimited(), tools)
+        assert outcome.status is Status.CONVERGED, outcome.message
+        v = (outcome.end.positions - x) / h
+        x = outcome.end.positions
+        way.append(x)
+    return np.array(way)
+
+
+def by_xpbd(system, x, h=1 / 1200, steps=12_000):
+    w = system.inverse_masses
+    (constraints,) = stitch_constraints(system, w)
+    assert constraints.damped
+    points, v = np.column_stack([x, w]), np.zeros_like(x)
+    way = [x]
+    for _ in range(steps):
+        before = points[:, :3].copy()
+        points[:, :3] += h * v
+        constraints.damp(points, before, h, False)
+        constraints.project(points, h, False)
+        v = (points[:, :3] - before) / h
+        way.append(points[:, :3].copy())
+    return np.array(way)
+
+
+SOLVERS = pytest.mark.parametrize(("solve", "damping"), [(by_newton, 0.0), (by_xpbd, 0.02)], ids=["implicit", "xpbd"])
+
+
+@SOLVERS
+def test_a_vertex_in_the_plane_settles_at_the_separate_distance_along_the_normal(solve, damping):
+    triangle = [(-0.5, 1, -0.5), (0.5, 1, -0.5), (-0.5, 1, 0.5)]  # its normal is -y
+    system, x, _ = sewn(
+        [(0, 1, 0)], triangle, pairs=[[0, 0]], min_separate_distance=0.05, damping=damping, name="in plane"
+    )
+    assert system.stitching.tets.offset.all()
+    way = solve(system, x)
+    assert np.array_equal(way[:, 1:], np.broadcast_to(x[1:], way[:, 1:].shape))
+    assert np.abs(way[:, 0, [0, 2]]).max() < 1e-3
+    assert way[-1, 0, 1] == pytest.approx(0.95, abs=1e-3)
+    assert np.abs(way[-1] - way[-2]).max() < 1e-6, "it has settled"
+
+
+@SOLVERS
+def test_three_of_four_stay_and_the_one_in_the_plane_settles_at_the_distance(solve, damping):
+    triangle = [(0, 1, 0), (1, 1, 0), (0, 1, 1)]
+    vertices = np.array([(0.25, 0.5, 0.25), (0.5, 0.7, 0.1), (0.1, 0.6, 0.5), (0.3, 1, 0.3)])
+    system, x, pairs = sewn(vertices, triangle, max_distance=1.0, min_separate_distance=0.1, damping=damping)
+    assert pairs.vertices.tolist() == [0, 1, 2, 3]
+    assert pairs.rows.tolist() == [0, 0, 0, 0]
+    assert pairs.distances == pytest.approx([0.5, 0.3, 0.4, 0.0])
+    assert system.stitching.tets.offset.tolist() == [False, False, False, True]
+    way = solve(system, x)
+    assert np.abs(way[:, :3] - vertices[:3]).max() < 1e-9
+    assert way[-1, 3] == pytest.approx([0.3, 0.9, 0.3], abs=1e-3)
+    assert np.abs(way[:, 3, [0, 2]] - 0.3).max() < 1e-3
