@@ -92,7 +92,7 @@ def test_vertices_are_rounded_by_less_than_a_pixel(recording):
     from supple.output.drawing import view_of
 
     view = view_of(recording)
-    quantum = page_module._quantum(view)
+    quantum = page_module.quantum_of(view)
     assert quantum < 2.0 * view.radius / 4000.0
     x = recording[5].state.positions
     np.testing.assert_allclose(page_module._rounded(x, quantum), x, atol=0.51 * quantum)

@@ -5,10 +5,11 @@ Pages, videos and exports draw from here, so that they all show the same thing.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -128,13 +129,22 @@ class ObstaclePicture:
         return self.vertices @ pose[:, :3].T + pose[:, 3]
 
 
-def obstacle_pictures(recording: Recording, view: View) -> list[ObstaclePicture]:
+class HasObstacles(Protocol):
+    """Something with obstacles: a recording, or a scene that is on show."""
+
+    @property
+    def obstacles(self) -> Sequence[RecordedObstacle]:
+        """Where they are at time 0."""
+        ...
+
+
+def obstacle_pictures(source: HasObstacles, view: View) -> list[ObstaclePicture]:
     """One for each obstacle. A half-space is a square about what happens.
 
     What would hide the bodies can be seen through: rooms, and half-spaces that are no floor.
     """
     made = []
-    for number, obstacle in enumerate(recording.obstacles):
+    for number, obstacle in enumerate(source.obstacles):
         surface = _surface(obstacle, view)
         if surface is not None:
             normal = obstacle.parameters.get("normal")

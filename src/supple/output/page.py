@@ -5,16 +5,13 @@ The player is viser's client (three.js), which its wheel carries; the frames tra
 
 from __future__ import annotations
 
-import contextlib
 import html
-import io
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.errors import OutputError
 from supple.output.atomic import whole_file
 from supple.output.drawing import (
     OBSTACLE_COLOR,
@@ -26,6 +23,7 @@ from supple.output.drawing import (
     view_of,
 )
 from supple.output.recording_reader import Recording
+from supple.output.viser_server import server_for_a_moment
 
 # Bytes of moving vertices before compression, which halves them or better; longer recordings are shown with fewer
 # frames.
@@ -48,20 +46,14 @@ def write_page(recording: Recording | str | Path, output: str | Path) -> Path:
 
 
 def _page(recording: Recording) -> str:
-    import viser
+    with server_for_a_moment() as server:
+        text = _serialize(server, recording)
+    return titled(text, ", ".join(body.name for body in recording.bodies))
 
-    # viser greets on standard output, which belongs to whoever called us.
-    with contextlib.redirect_stdout(io.StringIO()):
-        try:
-            server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-        except OSError as error:
-            raise OutputError(f"page: viser needs a local port for a moment and got none: {error}") from None
-        try:
-            text = _serialize(server, recording)
-        finally:
-            server.stop()
-    title = f"<title>{html.escape(', '.join(body.name for body in recording.bodies)[:80])} · Supple</title>"
-    return text.replace("<title>Viser</title>", title, 1)
+
+def titled(page: str, title: str) -> str:
+    """A page of viser's with a title of our own."""
+    return page.replace("<title>Viser</title>", f"<title>{html.escape(title[:80])} · Supple</title>", 1)
 
 
 def _serialize(server: Any, recording: Recording) -> str:
@@ -69,7 +61,7 @@ def _serialize(server: Any, recording: Recording) -> str:
     view = view_of(recording)
     _set_stage(server, view)
     obstacles = _add_obstacles(server, recording, view)
-    quantum = _quantum(view)
+    quantum = quantum_of(view)
     first = recording[0]
     handles = [
         server.scene.add_mesh_simple(
@@ -136,7 +128,7 @@ def _quaternion(R: NDArray[np.float64]) -> NDArray[np.float64]:
     return Rotation.from_matrix(R).as_quat()[[3, 0, 1, 2]]
 
 
-def _quantum(view: View) -> float:
+def quantum_of(view: View) -> float:
     """The power of two that vertices are rounded to: numbers with few bits compress well."""
     return float(2.0 ** np.floor(np.log2(_RESOLUTION * 2.0 * view.radius)))
 

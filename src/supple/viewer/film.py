@@ -1,0 +1,130 @@
+"""Pictures as one visitor sees them, and films of them."""
+
+from __future__ import annotations
+
+import io
+import tempfile
+import threading
+import time
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.errors import OutputError
+
+_MOST_SECONDS, _MOST_FRAMES = 60.0, 900
+_SMALLEST_PAUSE = 0.05  # between pictures [s]
+_TALLEST = 720  # [pixels]
+_PATIENCE = 20.0  # for one picture [s]; software OpenGL takes seconds
+
+
+def picture_of(client: Any, tallest: int = 2160, kind: str = "png") -> NDArray[np.uint8]:
+    """What a visitor sees in 3D (height, width, 3 or 4).
+
+    Raises
+    ------
+    OutputError : where the browser sends none.
+    """
+    height, width = client.camera.image_height, client.camera.image_width
+    scale = min(1.0, tallest / max(1, height))
+    # Even numbers of pixels: what encoders of video ask for.
+    size = [max(2, int(n * scale) // 2 * 2) for n in (height, width)]
+    try:
+        return client.get_render(*size, transport_format=kind, timeout=_PATIENCE)
+    except (RuntimeError, TimeoutError, ConnectionError) as error:
+        raise OutputError(f"the browser sent no picture: {error}") from None
+
+
+def png_of(client: Any) -> bytes:
+    """What a visitor sees in 3D, on white, as a PNG file."""
+    from PIL import Image
+
+    shot = Image.fromarray(picture_of(client))
+    if shot.mode == "RGBA":
+        ground = Image.new("RGBA", shot.size, (255, 255, 255, 255))
+        ground.alpha_composite(shot)
+        shot = ground.convert("RGB")
+    out = io.BytesIO()
+    shot.save(out, "PNG")
+    return out.getvalue()
+
+
+def kinds_of_films() -> dict[str, str]:
+    """Kinds of films that can be made here, and what is missing for those that cannot ("" where nothing is)."""
+    missing = "" if find_spec("imageio_ffmpeg") else "needs imageio-ffmpeg: pip install 'supple[video]'"
+    return {"gif": "", "mp4": missing}
+
+
+class Film:
+    """Takes pictures from one visitor's browser until it is stopped."""
+
+    def __init__(self, client: Any) -> None:
+        self._client = client
+        self._frames: list[NDArray[np.uint8]] = []
+        self._times: list[float] = []
+        self._error: OutputError | None = None
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="supple film", daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        began = time.monotonic()
+        while not self._stop.is_set() and len(self._frames) < _MOST_FRAMES:
+            now = time.monotonic() - began
+            if now > _MOST_SECONDS:
+                break
+            try:
+                self._frames.append(picture_of(self._client, _TALLEST, "jpeg")[..., :3])
+            except OutputError as error:
+                self._error = error
+                break
+            self._times.append(now)
+            self._stop.wait(_SMALLEST_PAUSE)
+
+    def end(self, kind: str) -> bytes:
+        """Stop, and give the film as a file.
+
+        Raises
+        ------
+        OutputError : where there is no picture, or what makes films of that kind is not installed.
+        """
+        self._stop.set()
+        self._thread.join()
+        missing = kinds_of_films()[kind]
+        if missing:
+            raise OutputError(f"{kind.upper()} {missing}")
+        if not self._frames:
+            raise self._error or OutputError("there is no picture yet; record for longer")
+        size = self._frames[0].shape  # a window that is resized ends the film
+        frames = [frame for frame in self._frames if frame.shape == size]
+        lasted = self._times[-1] - self._times[0] if len(self._times) > 1 else 0.1
+        rate = max(1.0, (len(frames) - 1) / lasted) if len(frames) > 1 else 10.0
+        return gif_of(frames, rate) if kind == "gif" else mp4_of(frames, rate)
+
+
+def gif_of(frames: list[NDArray[np.uint8]], rate: float) -> bytes:
+    """Frames (h, w, 3) as an animated GIF of `rate` frames per second."""
+    from PIL import Image
+
+    pictures = [Image.fromarray(frame) for frame in frames]
+    out = io.BytesIO()
+    pictures[0].save(out, "GIF", save_all=True, append_images=pictures[1:], duration=round(1000.0 / rate), loop=0)
+    return out.getvalue()
+
+
+def mp4_of(frames: list[NDArray[np.uint8]], rate: float) -> bytes:
+    """Frames (h, w, 3) as H.264 video of `rate` frames per second."""
+    import imageio_ffmpeg
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "film.mp4"
+        height, width = frames[0].shape[:2]
+        writer = imageio_ffmpeg.write_frames(str(path), (width, height), fps=rate, macro_block_size=2)
+        writer.send(None)
+        for frame in frames:
+            writer.send(np.ascontiguousarray(frame))
+        writer.close()
+        return path.read_bytes()

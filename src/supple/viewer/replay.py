@@ -1,0 +1,149 @@
+"""A recording on the page: a slider over time, and the views of a running simulation."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import OrderedDict
+from typing import Any
+
+import numpy as np
+
+from supple.output.recording_reader import Recording
+from supple.viewer.from_recording import model_of_recording, moment_of_frame
+from supple.viewer.model import Moment
+from supple.viewer.options import ViewOptions
+from supple.viewer.pace import Pace
+from supple.viewer.page_of_moments import evenly, most_moments, page_of_moments
+from supple.viewer.record_controls import RecordControls
+from supple.viewer.stage import Stage
+from supple.viewer.values import number
+from supple.viewer.view_controls import ViewControls
+
+_SLOWEST, _FASTEST = 0.05, 4.0
+_KEPT = 64  # frames
+
+
+class Replay:
+    """Plays a recording on a server of viser's.
+
+    Parameters
+    ----------
+    server : see `supple.output.viser_server`; recording : open as long as this is
+    """
+
+    def __init__(self, server: Any, recording: Recording, options: ViewOptions | None = None) -> None:
+        self._recording = recording
+        self._model = model_of_recording(recording)
+        self._moments: OrderedDict[int, Moment] = OrderedDict()
+        # HDF5 is read by one thread at a time.
+        self._reading = threading.Lock()
+        self._end = threading.Event()
+        self.stage = Stage(server, self.moment(0), options or ViewOptions())
+        times = recording.times
+        first, last = float(times[0]), float(times[-1])
+        gui = server.gui
+        with gui.add_folder("Replay"):
+            self.play = gui.add_button("Pause")
+            step = (last - first) / max(1, len(times) - 1)
+            self.slider = gui.add_slider(
+                "Time [s]", first, last, step if step > 0.0 else 1.0, initial_value=first, disabled=last == first
+            )
+            self.speed = gui.add_slider("Speed", _SLOWEST, _FASTEST, 0.05, initial_value=1.0)
+            self.said = gui.add_markdown(self._facts(0))
+            self.export = gui.add_button("Export as page (HTML)")
+        self.controls = ViewControls(server, self.stage)
+        self.record = RecordControls(server, self.stage)
+        self.playing = last > first
+        if not self.playing:
+            self.play.label = "Play"
+        self._time = first
+        self.slider.on_update(self._seek)
+        self.play.on_click(lambda _: self._toggle())
+        self.export.on_click(self._send_page)
+        self._pace = Pace(server)
+        self._thread = threading.Thread(target=self._run, name="supple replay", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread that plays."""
+        self._end.set()
+        self._thread.join()
+
+    def moment(self, number_of_frame: int) -> Moment:
+        """One frame; the latest ones that were asked for are kept."""
+        with self._reading:
+            known = self._moments.get(number_of_frame)
+            if known is None:
+                known = moment_of_frame(self._model, self._recording[number_of_frame])
+                self._moments[number_of_frame] = known
+                if len(self._moments) > _KEPT:
+                    self._moments.popitem(last=False)
+            return known
+
+    def page(self) -> str:
+        """The whole recording as a page, drawn as it is shown now."""
+        options = self.stage.options
+        chosen = evenly(len(self._recording), most_moments(self._model, options))
+        return page_of_moments([(float(self._recording.times[i]), self.moment(i)) for i in chosen], options)
+
+    def frame_at(self, seconds: float) -> int:
+        """The frame that is shown at a time [s]: the last one that is not later."""
+        times = self._recording.times
+        step = 0.5 * float(np.diff(times).min()) if len(times) > 1 else 0.0
+        return int(np.clip(np.searchsorted(times, seconds + step, side="right") - 1, 0, len(times) - 1))
+
+    def show(self, seconds: float) -> None:
+        """Draw the frame of a time [s]."""
+        times = self._recording.times
+        self._time = float(np.clip(seconds, times[0], times[-1]))
+        shown = self.frame_at(self._time)
+        moment = self.moment(shown)
+        if moment is not self.stage.moment:
+            self.stage.show(moment)
+            self.record.note(moment)
+            self.controls.refresh()
+            self.said.content = self._facts(shown)
+
+    def _toggle(self) -> None:
+        self.playing = not self.playing
+        self.play.label = "Pause" if self.playing else "Play"
+
+    def _seek(self, event: Any) -> None:
+        """A visitor has moved the slider; what moves by itself while playing comes without one."""
+        if event.client is not None:
+            if self.playing:
+                self._toggle()
+            times = self._recording.times
+            self.show(number(self.slider.value, float(times[0]), float(times[-1])))
+
+    def _run(self) -> None:
+        before = time.monotonic()
+        while not self._end.wait(self._pace.pause()):
+            now = time.monotonic()
+            passed, before = now - before, now
+            times = self._recording.times
+            if self.playing and self._pace.may_send():
+                following = self._time + passed * number(self.speed.value, _SLOWEST, _FASTEST)
+                if following > times[-1]:
+                    following = float(times[0])
+                with self._pace.sending():
+                    self.show(following)
+                    self.slider.value = float(self._recording.times[self.frame_at(following)])
+
+    def _facts(self, shown: int) -> str:
+        recording = self._recording
+        report = recording[shown].report
+        return (
+            f"Frame {shown} of {len(recording) - 1}, {len(recording.tets)} tets, "
+            f"{len(recording.rest_positions)} vertices  \n"
+            f"smallest J {report.min_det_F:.3g}, {report.status}"
+        )
+
+    def _send_page(self, event: Any) -> None:
+        if event.client is not None:
+            self.export.disabled = True
+            try:
+                event.client.send_file_download("supple.html", self.page().encode())
+            finally:
+                self.export.disabled = False

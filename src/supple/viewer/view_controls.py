@@ -1,0 +1,84 @@
+"""The part of the panel that chooses how things are drawn; the same for simulations and recordings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from supple.viewer.camera import PRESETS, look_from
+from supple.viewer.options import COLOR_BY_BODY, SURFACES
+from supple.viewer.stage import Stage
+from supple.viewer.values import number, one_of
+from supple.viewer.views.color_scale import bar_html
+from supple.viewer.views.contacts import said_of_contacts
+from supple.viewer.views.fields import FIELDS
+
+
+class ViewControls:
+    """Dropdowns, sliders and check boxes for a stage, and the color bar."""
+
+    def __init__(self, server: Any, stage: Stage) -> None:
+        self._stage = stage
+        gui, options = server.gui, stage.options
+        with gui.add_folder("View"):
+            self.surface = gui.add_dropdown("Surface", SURFACES, initial_value=options.surface)
+            self.color_by = gui.add_dropdown("Color", (COLOR_BY_BODY, *FIELDS), initial_value=options.color_by)
+            self.explode = gui.add_slider("Apart", 0.05, 1.5, 0.05, initial_value=options.explode, visible=False)
+            self.cut_axis = gui.add_dropdown("Cut across", ("x", "y", "z"), initial_value=options.cut_axis, visible=False)
+            self.cut_place = gui.add_slider("Cut at", 0.0, 1.0, 0.01, initial_value=options.cut_place, visible=False)
+            self._bar = gui.add_html("", visible=False)
+            self._shown_bar = ""
+            self.velocities = gui.add_checkbox("Velocities", initial_value=options.velocities)
+            self.contacts = gui.add_checkbox("Contacts", initial_value=options.contacts)
+            self.stitches = gui.add_checkbox("Stitches", initial_value=options.stitches)
+            self._said = gui.add_markdown("", visible=False)
+            self._shown_said = ""
+            self.camera = gui.add_button_group("Camera", PRESETS)
+        inputs = (
+            self.surface,
+            self.color_by,
+            self.explode,
+            self.cut_axis,
+            self.cut_place,
+            self.velocities,
+            self.contacts,
+            self.stitches,
+        )
+        for handle in inputs:
+            handle.on_update(lambda _: self.apply())
+        self.camera.on_click(self._look)
+
+    def apply(self) -> None:
+        """Draw as the panel says."""
+        options = replace(
+            self._stage.options,
+            surface=one_of(self.surface.value, SURFACES),
+            color_by=one_of(self.color_by.value, (COLOR_BY_BODY, *FIELDS)),
+            explode=number(self.explode.value, 0.05, 1.5),
+            cut_axis=one_of(self.cut_axis.value, "xyz"),
+            cut_place=number(self.cut_place.value, 0.0, 1.0),
+            velocities=bool(self.velocities.value),
+            contacts=bool(self.contacts.value),
+            stitches=bool(self.stitches.value),
+        )
+        self.explode.visible = options.surface == "exploded tets"
+        self.cut_axis.visible = self.cut_place.visible = options.surface == "cut"
+        self._stage.apply(options)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Bring the color bar, and what is said of contacts and stitches, up to date."""
+        stage = self._stage
+        field, limits = stage.field, stage.color_range
+        bar = "" if field is None or limits is None else bar_html(field, *limits)
+        if bar != self._shown_bar:
+            self._bar.content, self._bar.visible = bar, bool(bar)
+            self._shown_bar = bar
+        said = said_of_contacts(stage.moment) if stage.options.contacts else ""
+        if said != self._shown_said:
+            self._said.content, self._said.visible = said, bool(said)
+            self._shown_said = said
+
+    def _look(self, event: Any) -> None:
+        if event.client is not None:
+            look_from(event.client, one_of(self.camera.value, PRESETS), self._stage.model.view)

@@ -1,0 +1,42 @@
+"""One browser for all tests of pages: starting it takes seconds."""
+
+from __future__ import annotations
+
+import io
+import os
+import shutil
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+_FLAGS = (
+    "--headless --no-sandbox --disable-gpu --use-angle=swiftshader --enable-unsafe-swiftshader "
+    "--disable-background-networking"
+)
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator:
+    """Chromium, drawing with software WebGL; without it tests are skipped here, and fail in CI."""
+    sync_api = pytest.importorskip("playwright.sync_api")
+    found = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if found is None:
+        if os.environ.get("CI"):
+            pytest.fail("CI needs chromium: apt install chromium")
+        pytest.skip("there is no chromium here; apt install chromium")
+    with sync_api.sync_playwright() as playwright:
+        started = playwright.chromium.launch(executable_path=found, args=_FLAGS.split())
+        yield started
+        started.close()
+
+
+@pytest.fixture(scope="session")
+def pixels() -> Callable:
+    """What a page of Playwright's shows, as (height, width, 3) integers."""
+    image = pytest.importorskip("PIL.Image")
+
+    def shot(page, **options) -> np.ndarray:
+        return np.asarray(image.open(io.BytesIO(page.screenshot(**options))).convert("RGB")).astype(int)
+
+    return shot
