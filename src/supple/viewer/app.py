@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+import threading
+import webbrowser
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+from supple.output.recording_reader import read_recording
+from supple.output.viser_server import start_server, stop_server
+from supple.viewer.engine import Engine
+from supple.viewer.live_page import LivePage
 from supple.viewer.live_source import LiveSource
+from supple.viewer.replay import Replay
 
 
 @dataclass(frozen=True)
@@ -23,6 +33,70 @@ class Address:
     token: str | None = None
 
 
-def serve(source: LiveSource | Path, address: Address, *, open_browser: bool = True) -> None:
-    """Serve a live scene, or the recording at a path, until interrupted."""
-    raise NotImplementedError
+@dataclass(frozen=True, eq=False)
+class OpenPage:
+    """A page that is being served.
+
+    Attributes
+    ----------
+    url : for a browser; server : viser's
+    shown : what draws on it
+    """
+
+    url: str
+    server: Any
+    shown: LivePage | Replay
+
+
+@contextmanager
+def opened_page(source: LiveSource | str | Path, address: Address | None = None) -> Iterator[OpenPage]:
+    """Serve a live scene, or the recording at a path, for a block.
+
+    Raises
+    ------
+    SceneError, SolverError, OutputError : where the source cannot be simulated or read, or the port cannot be had.
+    """
+    address = Address() if address is None else address
+    with ExitStack() as ends:
+        show = _live(source, ends) if isinstance(source, LiveSource) else _replay(source, ends)
+        server = start_server(address.host, address.port)
+        ends.callback(stop_server, server)
+        dress(server)
+        shown = show(server)
+        ends.callback(shown.stop)
+        host = "localhost" if address.host in ("", "0.0.0.0", "::", "127.0.0.1") else address.host
+        query = f"/?token={address.token}" if address.token else ""
+        yield OpenPage(f"http://{host}:{server.get_port()}{query}", server, shown)
+
+
+def _live(source: LiveSource, ends: ExitStack) -> Callable[[Any], LivePage]:
+    engine = ends.enter_context(Engine(source))
+    first = engine.latest()
+    assert first is not None  # the engine waits for it
+    return lambda server: LivePage(server, engine, first)
+
+
+def _replay(path: str | Path, ends: ExitStack) -> Callable[[Any], Replay]:
+    recording = ends.enter_context(read_recording(path))
+    return lambda server: Replay(server, recording)
+
+
+def serve(source: LiveSource | str | Path, address: Address | None = None, *, open_browser: bool = True) -> None:
+    """Serve a live scene, or the recording at a path, until interrupted.
+
+    Raises
+    ------
+    SceneError, SolverError, OutputError : see `opened_page`.
+    """
+    with opened_page(source, address) as page:
+        print(f"{page.url}  (Ctrl+C ends it)", flush=True)
+        if open_browser:
+            webbrowser.open(page.url)
+        with suppress(KeyboardInterrupt):
+            threading.Event().wait()
+
+
+def dress(server: Any) -> None:
+    """Make viser's page ours: the panel stands beside the picture, and nothing is offered that leads elsewhere."""
+    server.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(36, 108, 168))
+    server.gui.main_panel.dock_right()

@@ -122,7 +122,7 @@ def mp4_of(frames: list[NDArray[np.uint8]], rate: float) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "film.mp4"
         height, width = frames[0].shape[:2]
-        writer = imageio_ffmpeg.write_frames(str(path), (width, height), fps=rate, macro_block_size=2)
+        writer = imageio_ffmpeg.write_frames(str(path), (width, height), fps=max(1, round(rate)), macro_block_size=2)
         writer.send(None)
         for frame in frames:
             writer.send(np.ascontiguousarray(frame))

@@ -5,7 +5,7 @@ A `Model` is what no frame changes; a `Moment` is one frame of it. Views know th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -54,7 +54,7 @@ class Model:
     bodies : see `ModelBody`
     obstacles : what bodies collide with, where it is at time 0
     rest_positions : (n, 3) [m]; tets : (m, 4) rows of them
-    gravity : (3,) [m/s^2]; view : bounds of what happens, and which way is up
+    view : bounds of what happens, and which way is up
     stitches : (k, 4) a vertex, and the three of the triangle that it is stitched to
     """
 
@@ -62,7 +62,6 @@ class Model:
     obstacles: Sequence[RecordedObstacle]
     rest_positions: NDArray[np.float64]
     tets: NDArray[np.int32]
-    gravity: NDArray[np.float64]
     view: View
     stitches: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 4), dtype=np.int32))
 
@@ -81,21 +80,16 @@ class Model:
     def rest_shape_inverse(self) -> NDArray[np.float64]:
         """(m, 3, 3) Dm^-1 of every tet [1/m]."""
         corners = self.rest_positions[self.tets]
-        return np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))
+        return np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)).astype(np.float64, copy=False)
 
     @cached_property
     def rest_centers(self) -> NDArray[np.float64]:
         """(m, 3) centres of the tets at rest [m]."""
-        return self.rest_positions[self.tets].mean(axis=1)
+        return self.rest_positions[self.tets].sum(axis=1) / 4.0
 
     def body_of_vertex(self, vertex: int) -> ModelBody:
         """The body that a vertex belongs to."""
         return next(body for body in self.bodies if body.vertices.start <= vertex < body.vertices.stop)
-
-    def nearest_surface_vertex(self, positions: NDArray[np.float64], point: NDArray[np.float64]) -> int:
-        """Which vertex of a boundary is nearest to `point` (3,), where the vertices are at `positions` (n, 3) [m]."""
-        offset = positions[self.surface_vertices] - point
-        return int(self.surface_vertices[np.argmin(np.einsum("ij,ij->i", offset, offset))])
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,20 +129,26 @@ class Moment:
     Attributes
     ----------
     model : what it is a frame of; time : [s]
-    positions : (n, 3) [m]; velocities : (n, 3) [m/s]
+    positions : (n, 3) [m]; velocities : (n, 3) [m/s], or None where they are not known
     poses : (obstacles, 3, 4) rotation and translation from where each obstacle is at time 0
     contact_points, contact_normals : (c, 3) [m], or None where the solver does not tell
     pinned : (p,) vertices that are held
+    springs : from a point of a body to where it is pulled, by number
+    pusher : center (3,) and radius of a ball [m], or None
+    tet_values : numbers of tets (m,) that are known already, by the key of their field
     """
 
     model: Model
     time: float
     positions: NDArray[np.float64]
-    velocities: NDArray[np.float64]
+    velocities: NDArray[np.float64] | None
     poses: NDArray[np.float64]
     contact_points: NDArray[np.float64] | None = None
     contact_normals: NDArray[np.float64] | None = None
     pinned: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    springs: Mapping[int, tuple[NDArray[np.float64], NDArray[np.float64]]] = field(default_factory=dict)
+    pusher: tuple[NDArray[np.float64], float] | None = None
+    tet_values: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
     @cached_property
     def deformation_gradients(self) -> NDArray[np.float64]:

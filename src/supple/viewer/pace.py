@@ -56,5 +56,5 @@ class Pace:
         lag = time.monotonic() - asked - drawn
         # Quick to slow down, slow to speed up.
         cost = drawn + max(0.0, lag)
-        self._cost = cost if cost > self._cost else 0.9 * self._cost + 0.1 * cost
+        self._cost = cost if cost > self._cost else 0.7 * self._cost + 0.3 * cost
         self._answered = asked

@@ -23,6 +23,8 @@ class RecordControls:
     def __init__(self, server: Any, stage: Stage) -> None:
         self._stage = stage
         self._lock = threading.Lock()
+        # Pictures and files are made one at a time: they take long, and the threads that serve visitors are few.
+        self._busy = threading.Lock()
         self._taken: list[tuple[float, Moment]] | None = None
         self._film: Film | None = None
         self._bytes, self._began = 0, 0.0
@@ -45,7 +47,7 @@ class RecordControls:
             seconds = time.monotonic() - self._began
             if seconds > _MOST_SECONDS or self._bytes > _MOST_BYTES:
                 return
-            self._bytes += moment.positions.nbytes + moment.velocities.nbytes
+            self._bytes += 2 * moment.positions.nbytes
             self._taken.append((seconds, moment))
 
     @property
@@ -58,21 +60,26 @@ class RecordControls:
         self._said.content, self._said.visible = text, bool(text)
 
     def _take_picture(self, event: Any) -> None:
-        if event.client is None:
+        if event.client is None or not self._busy.acquire(blocking=False):
             return
         try:
             event.client.send_file_download("supple.png", png_of(event.client), save_immediately=True)
             self.say("")
         except SuppleError as error:
             self.say(str(error))
+        finally:
+            self._busy.release()
 
     def _toggle(self, event: Any) -> None:
-        if event.client is None:
+        if event.client is None or not self._busy.acquire(blocking=False):
             return
-        if self.recording:
-            self._end(event.client)
-        else:
-            self._begin(event.client)
+        try:
+            if self.recording:
+                self._end(event.client)
+            else:
+                self._begin(event.client)
+        finally:
+            self._busy.release()
 
     def _begin(self, client: Any) -> None:
         kind = self.kind.value

@@ -16,6 +16,7 @@ from supple.viewer.views.layer import Layer
 from supple.viewer.views.obstacles import ObstacleView
 from supple.viewer.views.pins import PinView
 from supple.viewer.views.skin import SkinView
+from supple.viewer.views.springs import PusherView, SpringView
 from supple.viewer.views.stitches import StitchView
 from supple.viewer.views.tets import Cut, TetView
 from supple.viewer.views.velocities import VelocityView
@@ -59,6 +60,11 @@ class Stage:
         """(low, high) of the color bar, where there is one."""
         return self._bodies.range if isinstance(self._bodies, TetView) else None
 
+    @property
+    def body_handles(self) -> list[Any]:
+        """The meshes of bodies that are on show."""
+        return self._bodies.handles if self._bodies is not None else []
+
     def show(self, moment: Moment) -> None:
         """Draw a moment. One of another model, with other bodies, is built anew."""
         with self._lock, self._server.atomic():
@@ -83,6 +89,7 @@ class Stage:
         scene, moment, options = self._scene, self.moment, self.options
         self._bodies = self._make_bodies()
         self._layers = [self._bodies, Ground(scene, moment), ObstacleView(scene, moment), PinView(scene, moment)]
+        self._layers += [SpringView(scene, moment), PusherView(scene, moment)]
         if options.velocities:
             self._layers.append(VelocityView(scene, moment))
         if options.contacts:
@@ -101,5 +108,3 @@ class Stage:
         explode = options.explode if options.surface == "exploded tets" else 0.0
         cut = Cut("xyz".index(options.cut_axis), options.cut_place) if options.surface == "cut" else None
         return TetView(self._scene, self.moment, field, explode, cut)
-
-

@@ -2,29 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 from supple.viewer.camera import PRESETS, look_from
-from supple.viewer.options import COLOR_BY_BODY, SURFACES
+from supple.viewer.options import COLOR_BY_BODY, SURFACES, ViewOptions
 from supple.viewer.stage import Stage
 from supple.viewer.values import number, one_of
 from supple.viewer.views.color_scale import bar_html
 from supple.viewer.views.contacts import said_of_contacts
 from supple.viewer.views.fields import FIELDS
 
+_AXES = ("x", "y", "z")
+
 
 class ViewControls:
-    """Dropdowns, sliders and check boxes for a stage, and the color bar."""
+    """Dropdowns, sliders and check boxes for a stage, and the color bar.
 
-    def __init__(self, server: Any, stage: Stage) -> None:
-        self._stage = stage
+    Parameters
+    ----------
+    server : viser's; stage : what they choose for; changed : is told of every choice, before it is drawn
+    """
+
+    def __init__(
+        self, server: Any, stage: Stage, changed: Callable[[ViewOptions], None] = lambda options: None
+    ) -> None:
+        self._stage, self._changed = stage, changed
         gui, options = server.gui, stage.options
         with gui.add_folder("View"):
             self.surface = gui.add_dropdown("Surface", SURFACES, initial_value=options.surface)
             self.color_by = gui.add_dropdown("Color", (COLOR_BY_BODY, *FIELDS), initial_value=options.color_by)
             self.explode = gui.add_slider("Apart", 0.05, 1.5, 0.05, initial_value=options.explode, visible=False)
-            self.cut_axis = gui.add_dropdown("Cut across", ("x", "y", "z"), initial_value=options.cut_axis, visible=False)
+            self.cut_axis = gui.add_dropdown("Cut across", _AXES, initial_value=options.cut_axis, visible=False)
             self.cut_place = gui.add_slider("Cut at", 0.0, 1.0, 0.01, initial_value=options.cut_place, visible=False)
             self._bar = gui.add_html("", visible=False)
             self._shown_bar = ""
@@ -55,7 +65,7 @@ class ViewControls:
             surface=one_of(self.surface.value, SURFACES),
             color_by=one_of(self.color_by.value, (COLOR_BY_BODY, *FIELDS)),
             explode=number(self.explode.value, 0.05, 1.5),
-            cut_axis=one_of(self.cut_axis.value, "xyz"),
+            cut_axis=one_of(self.cut_axis.value, _AXES),
             cut_place=number(self.cut_place.value, 0.0, 1.0),
             velocities=bool(self.velocities.value),
             contacts=bool(self.contacts.value),
@@ -63,6 +73,7 @@ class ViewControls:
         )
         self.explode.visible = options.surface == "exploded tets"
         self.cut_axis.visible = self.cut_place.visible = options.surface == "cut"
+        self._changed(options)
         self._stage.apply(options)
         self.refresh()
 

@@ -14,7 +14,7 @@ _COLOR = (220, 40, 110)
 
 
 class ContactView(Layer):
-    """A dot and an arrow for each contact."""
+    """A dot for each contact, and an arrow where its normal is known."""
 
     def __init__(self, scene: Any, moment: Moment) -> None:
         radius = moment.model.view.radius
@@ -27,13 +27,14 @@ class ContactView(Layer):
 
     def update(self, moment: Moment) -> None:
         points, normals = moment.contact_points, moment.contact_normals
-        if points is None or normals is None:
-            points = normals = np.zeros((0, 3))
+        if points is None:
+            points = np.zeros((0, 3))
         if len(points):
             self._dots.points = single(points)
         if self._dots.visible != bool(len(points)):
             self._dots.visible = bool(len(points))
-        self._arrows.update(points, points + self._length * normals)
+        if normals is not None:
+            self._arrows.update(points, points + self._length * normals)
 
     def remove(self) -> None:
         self._dots.remove()

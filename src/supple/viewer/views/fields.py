@@ -19,14 +19,21 @@ class Field:
 
     Attributes
     ----------
-    name, unit : as they stand at the color bar; center : what the middle color means, or None where 0 is the lowest
-    values : of every tet (m,), NaN where it is not known
+    key : what simulations call it; name, unit : as they stand at the color bar
+    center : what the middle color means, or None where 0 is the lowest
+    measure : of every tet (m,), NaN where it is not known
     """
 
+    key: str
     name: str
     unit: str
     center: float | None
-    values: Callable[[Moment], NDArray[np.float64]]
+    measure: Callable[[Moment], NDArray[np.float64]]
+
+    def values(self, moment: Moment) -> NDArray[np.float64]:
+        """Of every tet (m,), NaN where it is not known: as the simulation says, or else measured here."""
+        known = moment.tet_values.get(self.key)
+        return self.measure(moment) if known is None else known
 
 
 def volume_ratio(moment: Moment) -> NDArray[np.float64]:
@@ -61,8 +68,8 @@ def energy_density(moment: Moment) -> NDArray[np.float64]:
 FIELDS = {
     field.name: field
     for field in (
-        Field("volume ratio J", "", 1.0, volume_ratio),
-        Field("von Mises stress", "Pa", None, von_mises_stress),
-        Field("energy density", "J/m³", None, energy_density),
+        Field("J", "volume ratio J", "", 1.0, volume_ratio),
+        Field("von_mises", "von Mises stress", "Pa", None, von_mises_stress),
+        Field("energy", "energy density", "J/m³", None, energy_density),
     )
 }

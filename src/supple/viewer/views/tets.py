@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.viewer.model import Model, Moment
+from supple.viewer.model import TET_FACETS, Model, Moment
 from supple.viewer.views.color_scale import Limits, bin_of, not_known_color, palette
 from supple.viewer.views.fields import Field
 from supple.viewer.views.layer import Layer
@@ -105,9 +105,5 @@ def outer_facets(model: Model, kept: NDArray[np.bool_]) -> tuple[NDArray[np.int3
 
 def exploded_facets(model: Model, kept: NDArray[np.bool_]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
     """All facets (f, 3) of the tets that are kept, and their tets (f,)."""
-    from supple.viewer.model import TET_FACETS
-
     rows = np.flatnonzero(kept)
     return model.tets[rows][:, TET_FACETS].reshape(-1, 3), np.repeat(rows, 4)
-
-

@@ -11,6 +11,7 @@ from supple.viewer.views.arrows import Arrows
 from supple.viewer.views.layer import Layer
 
 _MOST = 400  # arrows; more cannot be told apart
+_HEAD = 0.04  # of an arrow, as a part of the size of the scene
 _SECONDS = 0.15  # an arrow's length is the way in this time
 
 
@@ -22,15 +23,18 @@ class VelocityView(Layer):
         chosen = np.linspace(0, len(model.surface_vertices) - 1, min(_MOST, len(model.surface_vertices)))
         self._rows = model.surface_vertices[np.unique(chosen.astype(np.int64))]
         self._longest = 0.5 * model.view.radius
-        self._arrows = Arrows(scene, "/velocities", (40, 60, 90), 0.05 * model.view.radius)
+        self._arrows = Arrows(scene, "/velocities", (40, 60, 90), _HEAD * model.view.radius)
         self.update(moment)
 
     def update(self, moment: Moment) -> None:
+        if moment.velocities is None:
+            return
         start = moment.shown_positions[self._rows]
         way = np.nan_to_num(_SECONDS * moment.velocities[self._rows], posinf=0.0, neginf=0.0)
         length = np.linalg.norm(way, axis=1, keepdims=True)
         way *= np.minimum(1.0, self._longest / np.maximum(length, 1e-300))
-        way[length[:, 0] < 1e-3 * self._longest] = 0.0
+        # Shorter than its own head, an arrow says nothing.
+        way[np.linalg.norm(way, axis=1) < _HEAD * moment.model.view.radius] = 0.0
         self._arrows.update(start, start + way)
 
     def remove(self) -> None:

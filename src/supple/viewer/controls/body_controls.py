@@ -1,0 +1,104 @@
+"""Bodies: what they are made of, squashing and stretching them, and adding and removing them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from supple.viewer import limits
+from supple.viewer.controls.desk import Desk
+from supple.viewer.controls.inputs import ParameterInput
+from supple.viewer.messages import AddBody, CopyBody, RemoveBody, Squash
+from supple.viewer.parameters import PARAMETERS
+from supple.viewer.snapshots import SceneDescription, Snapshot, Value
+from supple.viewer.values import number, one_of
+
+ALL = "all bodies"
+_SQUASH, _STRETCH = 0.5, 1.5
+
+
+class BodyControls:
+    """The folders "Bodies" and "Add a body"."""
+
+    def __init__(self, gui: Any, desk: Desk) -> None:
+        self._gui, self._desk = gui, desk
+        self.inputs: dict[str, ParameterInput] = {}
+        self._made_for: tuple[Any, ...] = ()
+        scene = desk.snapshot.description
+        size = float(max(scene.high - scene.low))
+        with gui.add_folder("Bodies") as self._folder:
+            self.squash = gui.add_button_group("All bodies", ("squash", "stretch"))
+            self.which = gui.add_dropdown("Of", (ALL, *(body.name for body in scene.bodies)), initial_value=ALL)
+            self.change = gui.add_button_group("This one", ("copy", "remove"), visible=False)
+        with gui.add_folder("Add a body", expand_by_default=False):
+            self.shape = gui.add_dropdown("Shape", limits.SHAPES, initial_value="sphere")
+            self.size = gui.add_number(
+                "Size [m]", initial_value=round(0.3 * size, 3), min=1e-3, max=100.0, step=round(0.01 * size, 4) or 0.001
+            )
+            self.resolution = gui.add_slider("Edges across", limits.COARSEST, 16, 1, initial_value=6)
+            self.youngs = gui.add_slider("Young's modulus 10^", 3.0, 8.0, 0.1, initial_value=5.0)
+            self.add = gui.add_button("Add")
+        self.squash.on_click(self._squash)
+        self.which.on_update(lambda _: self.show(desk.snapshot))
+        self.change.on_click(self._change)
+        self.add.on_click(self._add)
+        self.show(desk.snapshot)
+
+    def show(self, snapshot: Snapshot) -> None:
+        """Bring the inputs to the simulation's values."""
+        with self._desk.lock:
+            self._show(snapshot)
+
+    def _show(self, snapshot: Snapshot) -> None:
+        scene = snapshot.description
+        names = (ALL, *(body.name for body in scene.bodies))
+        if self.which.options != names:
+            chosen = self.which.value
+            self.which.options = names
+            self.which.value = chosen if chosen in names else ALL
+        values = self._values(scene)
+        made_for = (self.which.value, *values)
+        if made_for != self._made_for:
+            for made in self.inputs.values():
+                made.handle.remove()
+            with self._folder:
+                self.inputs = {
+                    name: ParameterInput(self._gui, self._desk, name, value, self._whose)
+                    for name, value in values.items()
+                }
+            self._made_for = made_for
+            self.change.visible = self.which.value != ALL
+        for name, made in self.inputs.items():
+            made.show(values[name])
+
+    def _whose(self) -> str | None:
+        return None if self.which.value == ALL else str(self.which.value)
+
+    def _values(self, scene: SceneDescription) -> dict[str, Value]:
+        """Of the chosen body; or of the first that has it, where all are chosen."""
+        whose = self._whose()
+        found: dict[str, Value] = {}
+        for body in scene.bodies:
+            if whose in (None, body.name):
+                found = {**body.values, **found}
+        return {name: found[name] for name in PARAMETERS if name in found}
+
+    def _squash(self, event: Any) -> None:
+        factor = _SQUASH if one_of(self.squash.value, ("squash", "stretch")) == "squash" else _STRETCH
+        self._desk.ask(event.client, lambda: Squash(factor))
+
+    def _change(self, event: Any) -> None:
+        whose = self._whose()
+        if whose is not None:
+            kind = CopyBody if one_of(self.change.value, ("copy", "remove")) == "copy" else RemoveBody
+            self._desk.ask(event.client, lambda: kind(whose))
+
+    def _add(self, event: Any) -> None:
+        self._desk.ask(
+            event.client,
+            lambda: AddBody(
+                one_of(self.shape.value, limits.SHAPES),
+                size=number(self.size.value, 1e-3, 100.0),
+                resolution=round(number(self.resolution.value, limits.COARSEST, 16)),
+                youngs=10.0 ** number(self.youngs.value, 3.0, 8.0),
+            ),
+        )

@@ -1,0 +1,117 @@
+"""Inputs of the panel that belong to a number of the simulation."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from typing import Any
+
+from supple.viewer.controls.desk import Desk
+from supple.viewer.messages import SetParameter
+from supple.viewer.parameters import PARAMETERS, Parameter
+from supple.viewer.snapshots import Value
+from supple.viewer.values import number
+
+# How long after a visitor's touch the input shows what the visitor wants, not yet what the simulation has [s].
+_HANDS_OFF = 1.0
+# The smallest power of ten of a slider whose left end is zero.
+_LEAST_POWER = -12.0
+# Ends of sliders, where the allowed range is wider than a slider can be used for.
+_HANDY = {"gravity": (-20.0, 20.0), "friction": (0.0, 2.0), "poisson": (0.0, 0.499), "youngs": (1e2, 1e9)}
+
+
+class ParameterInput:
+    """A slider or check box for one parameter.
+
+    Parameters
+    ----------
+    gui : viser's; name : of the parameter; value : it starts with; whose : the body it is for, asked anew every time
+    """
+
+    def __init__(
+        self, gui: Any, desk: Desk, name: str, value: Value, whose: Callable[[], str | None] = lambda: None
+    ) -> None:
+        self.parameter: Parameter = PARAMETERS[name]
+        self._desk, self._whose = desk, whose
+        self._touched = -math.inf
+        self.value: Value = value
+        low, high = _HANDY.get(name, (self.parameter.low, self.parameter.high))
+        self._low, self._high = min(low, float(value)), max(high, float(value))
+        if self.parameter.kind is bool:
+            self.handle = gui.add_checkbox(self._label(value), initial_value=bool(value))
+        else:
+            place = self._place(value)
+            self.handle = gui.add_slider(
+                self._label(value), *self._ends(), self._step(), initial_value=place, hint=self._hint()
+            )
+        self.handle.on_update(self._moved)
+
+    def show(self, value: Value) -> None:
+        """Bring the input to the simulation's value, unless a visitor is at it."""
+        if time.monotonic() - self._touched > _HANDS_OFF and value != self.value:
+            self.value = value
+            self.handle.value = self._place(value)
+            self.handle.label = self._label(value)
+
+    def forget_touch(self) -> None:
+        """Show the simulation's value at once, next time."""
+        self._touched = -math.inf
+
+    def _moved(self, event: Any) -> None:
+        if event.client is None:
+            return
+        self._touched = time.monotonic()
+        value = self._value_at(self.handle.value)
+        if value == self.value:
+            return
+        self.value = value
+        self.handle.label = self._label(value)
+        self._desk.ask(event.client, lambda: SetParameter(self.parameter.name, value, self._whose()))
+
+    def _ends(self) -> tuple[float, float]:
+        if self.parameter.kind is int:
+            return int(self._low), int(self._high)
+        return self._place(self._low), self._place(self._high)
+
+    def _step(self) -> float:
+        if self.parameter.kind is int:
+            return 1
+        low, high = self._ends()
+        return 0.05 if self.parameter.logarithmic else 10.0 ** round(math.log10((high - low) / 200.0))
+
+    def _place(self, value: Value) -> Any:
+        """Where on the slider a value is."""
+        if self.parameter.kind is bool:
+            return bool(value)
+        if self.parameter.kind is int:
+            return int(value)
+        if not self.parameter.logarithmic:
+            return float(value)
+        return max(_LEAST_POWER, math.log10(value)) if value > 0.0 else _LEAST_POWER
+
+    def _value_at(self, place: object) -> Value:
+        """The value at a place of the slider."""
+        if self.parameter.kind is bool:
+            return bool(place)
+        low, high = self._ends()
+        at = number(place, low, high)
+        if self.parameter.kind is int:
+            return round(at)
+        if not self.parameter.logarithmic:
+            return at
+        if self._low == 0.0 and at <= _LEAST_POWER:
+            return 0.0
+        return min(max(10.0**at, self.parameter.low), self.parameter.high)
+
+    def _label(self, value: Value) -> str:
+        name = self.parameter.label[:1].upper() + self.parameter.label[1:]
+        unit = f" {_pretty(self.parameter.unit)}" if self.parameter.unit else ""
+        return f"{name} {value:.3g}{unit}" if self.parameter.logarithmic else f"{name}{unit and f' [{unit.strip()}]'}"
+
+    def _hint(self) -> str | None:
+        return "In powers of ten" if self.parameter.logarithmic else None
+
+
+def _pretty(unit: str) -> str:
+    return unit.replace("^2", "²").replace("^3", "³").replace("^5", "⁵")

@@ -1,0 +1,87 @@
+"""Numbers of the running simulation, and two small plots over the last seconds."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.viewer.snapshots import Snapshot
+
+_SECONDS = 10.0  # of simulated time in a plot
+_MOST_POINTS = 300
+_GAP = _SECONDS / _MOST_POINTS  # between two points [s]
+
+
+class Measures:
+    """The folder "Measures"."""
+
+    def __init__(self, gui: Any, snapshot: Snapshot) -> None:
+        self._lock = threading.Lock()
+        self._rows: deque[tuple[float, ...]] = deque(maxlen=_MOST_POINTS)
+        self._text = ""
+        with gui.add_folder("Measures"):
+            self._said = gui.add_markdown("")
+            self.energy = self._plot(gui, "Energy [J]", (("kinetic", "#e65c3c"), ("elastic", "#409ce1")))
+            self.spin = self._plot(gui, "Spin [rad/s]", (("fastest body", "#34ac78"),))
+        self.note(snapshot)
+
+    def note(self, snapshot: Snapshot) -> None:
+        """Remember what the plots show."""
+        measures = snapshot.measures
+        fastest = float(np.linalg.norm(measures.spin, axis=1).max()) if len(measures.spin) else 0.0
+        row = (snapshot.time, measures.kinetic_energy, measures.elastic_energy, fastest)
+        with self._lock:
+            if self._rows and snapshot.time < self._rows[-1][0]:
+                self._rows.clear()
+            if not self._rows or snapshot.time - self._rows[-1][0] >= _GAP:
+                self._rows.append(row)
+
+    def show(self, snapshot: Snapshot) -> None:
+        """Bring numbers and plots up to date."""
+        text = said_of(snapshot)
+        if text != self._text:
+            self._said.content = self._text = text
+        with self._lock:
+            rows = np.nan_to_num(np.array(self._rows, dtype=np.float64), posinf=0.0, neginf=0.0)
+        self._draw(self.energy, rows, (1, 2))
+        self._draw(self.spin, rows, (3,))
+
+    @staticmethod
+    def _plot(gui: Any, title: str, series: tuple[tuple[str, str], ...]) -> Any:
+        from viser import uplot
+
+        return gui.add_uplot(
+            tuple(np.zeros(1) for _ in range(len(series) + 1)),
+            (
+                uplot.Series(label="t [s]"),
+                *(uplot.Series(label=name, stroke=color, width=2) for name, color in series),
+            ),
+            title=title,
+            scales={"x": uplot.Scale(time=False, auto=True), "y": uplot.Scale(auto=True)},
+            height=130,
+        )
+
+    @staticmethod
+    def _draw(handle: Any, rows: NDArray[np.float64], columns: tuple[int, ...]) -> None:
+        if len(rows) == len(handle.data[0]) and rows[-1, 0] == handle.data[0][-1]:
+            return
+        handle.data = tuple(np.ascontiguousarray(rows[:, k]) for k in (0, *columns))
+
+
+def said_of(snapshot: Snapshot) -> str:
+    """Counts, energies, the worst tet, and how the last step ended."""
+    scene, measures = snapshot.description, snapshot.measures
+    spin = float(np.linalg.norm(measures.spin, axis=1).max()) if len(measures.spin) else 0.0
+    total = measures.kinetic_energy + measures.elastic_energy + measures.potential_energy
+    lines = [
+        f"{scene.n_tets} tets, {scene.n_vertices} vertices, {scene.n_constraints} constraints",
+        f"energy {total:.3g} J, spin {spin:.3g} rad/s",
+        f"smallest J {measures.min_det_F:.3f}, contacts {measures.contacts}",
+    ]
+    if measures.status != "converged":
+        lines.append(f"**{measures.status}** {measures.message}")
+    return "  \n".join(lines)

@@ -1,0 +1,69 @@
+"""What the mouse does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from supple.viewer import limits
+from supple.viewer.controls.desk import Desk
+from supple.viewer.messages import RemovePusher, Unpin
+from supple.viewer.values import number, one_of
+
+DRAG, PUSH = "drag and pin", "push"
+MODES = (DRAG, PUSH)
+
+
+class MouseControls:
+    """The folder "Mouse".
+
+    Parameters
+    ----------
+    changed : called when another mode is chosen
+    """
+
+    def __init__(self, gui: Any, desk: Desk, changed: Callable[[], None]) -> None:
+        self._changed = changed
+        self._desk = desk
+        scene = desk.snapshot.description
+        size = max(float(max(scene.high - scene.low)), 10.0 * limits.SMALLEST_LENGTH)
+        self._radii = 0.02 * size, 0.5 * size
+        with gui.add_folder("Mouse"):
+            self.mode = gui.add_dropdown("Left button", MODES, initial_value=DRAG)
+            self._hint = gui.add_markdown(_HINTS[DRAG])
+            self.strength = gui.add_slider("Strength 10^", -1.5, 1.5, 0.1, initial_value=0.0)
+            self.radius_input = gui.add_slider(
+                "Ball [m]", *self._radii, 0.01 * size, initial_value=0.15 * size, visible=False
+            )
+            self.unpin = gui.add_button("Unpin all")
+        self.mode.on_update(self._switch)
+        self.unpin.on_click(lambda e: desk.ask(e.client, Unpin))
+
+    @property
+    def pushes(self) -> bool:
+        """Whether the mouse moves the ball."""
+        return one_of(self.mode.value, MODES) == PUSH
+
+    @property
+    def stiffness(self) -> float:
+        """Of springs, as a factor."""
+        return 10.0 ** number(self.strength.value, -1.5, 1.5)
+
+    @property
+    def radius(self) -> float:
+        """Of the ball [m]."""
+        return number(self.radius_input.value, *self._radii)
+
+    def _switch(self, event: Any) -> None:
+        pushes = self.pushes
+        self._hint.content = _HINTS[PUSH if pushes else DRAG]
+        self.strength.visible, self.radius_input.visible = not pushes, pushes
+        if not pushes:
+            self._desk.ask(event.client, RemovePusher)
+        self._changed()
+
+
+_HINTS = {
+    DRAG: "Drag a body to pull it, let go to throw it; click to pin or unpin. Drag beside it to look around.",
+    PUSH: "Hold the button anywhere: a ball follows the pointer. Right button and wheel move the camera.",
+}

@@ -1,0 +1,52 @@
+"""Which solver, and its numbers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from supple.viewer.controls.desk import Desk
+from supple.viewer.controls.inputs import ParameterInput
+from supple.viewer.messages import SetSolver
+from supple.viewer.parameters import PARAMETERS
+from supple.viewer.snapshots import Snapshot
+from supple.viewer.values import one_of
+
+_KINDS = ("xpbd", "implicit")
+
+
+class SolverControls:
+    """The folder "Solver". Its inputs are those that the solver has; another solver may have others."""
+
+    def __init__(self, gui: Any, desk: Desk) -> None:
+        self._gui, self._desk = gui, desk
+        self.inputs: dict[str, ParameterInput] = {}
+        self._shown: tuple[str, ...] = ()
+        self._folder = gui.add_folder("Solver")
+        with self._folder:
+            self.kind = gui.add_dropdown("Solver", _KINDS, initial_value=desk.snapshot.description.solver)
+        self.kind.on_update(self._switch)
+        self.show(desk.snapshot)
+
+    def show(self, snapshot: Snapshot) -> None:
+        """Bring the inputs to the simulation's values."""
+        with self._desk.lock:
+            self._show(snapshot)
+
+    def _show(self, snapshot: Snapshot) -> None:
+        scene = snapshot.description
+        names = tuple(name for name in PARAMETERS if name in scene.values)
+        if names != self._shown:
+            for made in self.inputs.values():
+                made.handle.remove()
+            with self._folder:
+                self.inputs = {n: ParameterInput(self._gui, self._desk, n, scene.values[n]) for n in names}
+            self._shown = names
+        for name, made in self.inputs.items():
+            made.show(scene.values[name])
+        if self.kind.value != scene.solver:
+            self.kind.value = scene.solver
+
+    def _switch(self, event: Any) -> None:
+        if event.client is not None:
+            kind = one_of(self.kind.value, _KINDS)
+            self._desk.ask(event.client, lambda: SetSolver(kind))

@@ -1,0 +1,73 @@
+"""Play, pause, step, reset and slow motion."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from supple.viewer import limits
+from supple.viewer.controls.desk import Desk
+from supple.viewer.messages import Pause, Play, Reset, SetSpeed, Step
+from supple.viewer.snapshots import Snapshot
+from supple.viewer.values import number, one_of
+
+_BACK = ("step", "reset")
+
+
+class TimeControls:
+    """The folder "Time"."""
+
+    def __init__(self, gui: Any, desk: Desk) -> None:
+        self._desk = desk
+        with gui.add_folder("Time"):
+            self._said = gui.add_markdown("")
+            self._text = ""
+            self.play = gui.add_button("Play")
+            self.back = gui.add_button_group("Frames", _BACK)
+            self.speed = gui.add_slider(
+                "Slow motion", limits.SLOWEST_MOTION, limits.FASTEST_MOTION, 0.01, initial_value=1.0
+            )
+        self.play.on_click(lambda e: desk.ask(e.client, Play if desk.snapshot.paused else Pause))
+        self.back.on_click(lambda e: desk.ask(e.client, Step if one_of(self.back.value, _BACK) == "step" else Reset))
+        self.speed.on_update(self._set_speed)
+
+    def show(self, snapshot: Snapshot) -> None:
+        """Say how things stand."""
+        wanted = "Play" if snapshot.paused else "Pause"
+        if self.play.label != wanted:
+            self.play.label = wanted
+        self._say(said_of_time(snapshot))
+
+    def mourn(self, error: str) -> None:
+        """Say that the simulation is gone."""
+        self._say(f"**The simulation is gone:** {error}")
+        for handle in (self.play, self.speed):
+            if not handle.disabled:
+                handle.disabled = True
+
+    def _say(self, text: str) -> None:
+        if text != self._text:
+            self._said.content = self._text = text
+
+    def _set_speed(self, event: Any) -> None:
+        if event.client is not None:
+            factor = number(self.speed.value, limits.SLOWEST_MOTION, limits.FASTEST_MOTION)
+            self._desk.ask(event.client, lambda: SetSpeed(factor))
+
+
+def said_of_time(snapshot: Snapshot) -> str:
+    """A line or two: the time, how fast it goes, and whether that is as fast as it should."""
+    timing = snapshot.timing
+    lines = [f"t = {snapshot.time:.2f} s, frame {snapshot.frame}"]
+    if snapshot.paused:
+        lines.append("paused")
+    else:
+        lines.append(
+            f"{timing.step_ms:.1f} ms per frame, {timing.frames_per_second:.0f} frames/s, "
+            f"{timing.real_time_ratio:.2f} of real time"
+        )
+        if not timing.keeps_up:
+            lines.append(
+                f"**Too slow for {'real time' if snapshot.speed == 1.0 else f'{snapshot.speed:g} of real time'}:** "
+                "fewer substeps or tets would help"
+            )
+    return "  \n".join(lines)

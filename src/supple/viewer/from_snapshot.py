@@ -1,0 +1,90 @@
+"""Snapshots of a running simulation as what the page draws."""
+
+from __future__ import annotations
+
+import zlib
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.mesh.skin import Embedding
+from supple.mesh.tetmesh import TetMesh
+from supple.output.drawing import View
+from supple.output.recorded_scene import RecordedObstacle
+from supple.output.skinned_surface import SkinnedSurface
+from supple.scene.rotation import rotation_matrix
+from supple.viewer.model import Model, ModelBody, Moment, colors_of
+from supple.viewer.snapshots import BodyDescription, ObstacleDescription, SceneDescription, Snapshot
+
+
+class Translator:
+    """Makes moments of snapshots. What does not change between them is made once."""
+
+    def __init__(self) -> None:
+        self._generation: int | None = None
+        self._model: Model | None = None
+        self._skins: dict[tuple[int, int], SkinnedSurface] = {}
+
+    def moment(self, snapshot: Snapshot) -> Moment:
+        """What a snapshot shows."""
+        if self._model is None or snapshot.generation != self._generation:
+            self._model = self._model_of(snapshot.description)
+            self._generation = snapshot.generation
+        rotations, translations = snapshot.obstacle_poses
+        poses = np.concatenate([rotations.reshape(-1, 3, 3), translations.reshape(-1, 3, 1)], axis=2)
+        values = {}
+        if snapshot.tet_values is not None and snapshot.tet_quantity is not None:
+            values[snapshot.tet_quantity] = snapshot.tet_values
+        pusher = snapshot.pusher
+        return Moment(
+            self._model,
+            snapshot.time,
+            snapshot.positions,
+            snapshot.velocities,
+            poses,
+            contact_points=snapshot.contact_points,
+            pinned=snapshot.pinned.astype(np.int64),
+            springs={grab.grab: (np.array(grab.point), np.array(grab.target)) for grab in snapshot.grabs},
+            pusher=None if pusher is None else (np.array(pusher[0]), pusher[1]),
+            tet_values=values,
+        )
+
+    def _model_of(self, scene: SceneDescription) -> Model:
+        colors = colors_of([body.name for body in scene.bodies])
+        bodies = tuple(
+            ModelBody(body.name, body.vertices, body.tet_rows, body.triangles, self._skin_of(body), None, color)
+            for body, color in zip(scene.bodies, colors, strict=True)
+        )
+        tets = np.concatenate([body.tets + body.vertices.start for body in scene.bodies])
+        return Model(
+            bodies,
+            tuple(_obstacle(obstacle) for obstacle in scene.obstacles),
+            np.concatenate([body.rest_positions for body in scene.bodies]),
+            np.ascontiguousarray(tets, dtype=np.int32),
+            View(np.asarray(scene.low), np.asarray(scene.high), np.asarray(scene.up)),
+            np.asarray(scene.stitches).reshape(-1, 4),
+        )
+
+    def _skin_of(self, body: BodyDescription) -> SkinnedSurface | None:
+        """Which tet carries each vertex of a fine surface. A body that comes again is not searched again."""
+        if body.skin is None:
+            return None
+        vertices, triangles = body.skin
+        key = _fingerprint(vertices), _fingerprint(body.rest_positions)
+        if key not in self._skins:
+            held = Embedding.of(TetMesh(body.rest_positions, body.tets), vertices)
+            self._skins[key] = SkinnedSurface(held.corners, held.weights, np.asarray(triangles, dtype=np.int32))
+        return self._skins[key]
+
+
+def _fingerprint(values: NDArray[np.float64]) -> int:
+    return zlib.crc32(np.ascontiguousarray(values).tobytes())
+
+
+def _obstacle(obstacle: ObstacleDescription) -> RecordedObstacle:
+    shape = dict(obstacle.shape)
+    vertices = np.asarray(shape.pop("vertices", np.zeros((0, 3))), dtype=np.float64)
+    triangles = np.asarray(shape.pop("triangles", np.zeros((0, 3))), dtype=np.int32)
+    if "rotation" in shape:
+        shape["orientation"] = rotation_matrix(shape.pop("rotation"))
+    return RecordedObstacle(obstacle.name, obstacle.kind, shape, vertices, triangles)

@@ -1,0 +1,74 @@
+"""A running simulation on a page of viser's."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from typing import Any
+
+from supple.viewer.controls.desk import Desk, Simulation
+from supple.viewer.from_snapshot import Translator
+from supple.viewer.options import ViewOptions
+from supple.viewer.pace import Pace
+from supple.viewer.panel import Panel
+from supple.viewer.snapshots import Snapshot
+from supple.viewer.stage import Stage
+
+logger = logging.getLogger(__name__)
+
+
+class LivePage:
+    """Shows the newest snapshot, as often as browsers can take it, and passes commands on.
+
+    The simulation is never waited for, and never waits for the page.
+
+    Parameters
+    ----------
+    server : see `supple.output.viser_server`; simulation : see `Simulation`; first : its first snapshot
+    """
+
+    def __init__(
+        self, server: Any, simulation: Simulation, first: Snapshot, options: ViewOptions | None = None
+    ) -> None:
+        self._simulation = simulation
+        self._translator = Translator()
+        self._shown = first
+        self.desk = Desk(simulation, first)
+        self.panel = Panel(server, self.desk)
+        moment = self._translator.moment(first)
+        self.stage = Stage(server, moment, options or ViewOptions(), self.panel.mouse.listen)
+        self.panel.attach(self.stage)
+        self._pace = Pace(server)
+        self._end = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="supple page", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread that draws."""
+        self._end.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        while not self._end.wait(self._pace.pause()):
+            if not self._pace.may_send():
+                continue
+            try:
+                self._look()
+                self.panel.refresh()
+            except Exception:
+                # Whatever one snapshot does to the page, the next one is drawn.
+                logger.exception("page: a snapshot could not be drawn")
+
+    def _look(self) -> None:
+        """Draw the newest snapshot, if it is not on show yet."""
+        error = self._simulation.error
+        if error is not None:
+            self.panel.time.mourn(error)
+        snapshot = self._simulation.latest()
+        if snapshot is None or snapshot is self._shown:
+            return
+        with self._pace.sending():
+            self._shown = snapshot
+            self.stage.show(self._translator.moment(snapshot))
+            self.panel.record.note(self.stage.moment)
+            self.panel.show(snapshot)

@@ -1,0 +1,102 @@
+"""The panel beside a running simulation: everything a visitor can see in numbers, and change."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from supple.viewer.controls.body_controls import BodyControls
+from supple.viewer.controls.desk import Desk, tell
+from supple.viewer.controls.measures import Measures
+from supple.viewer.controls.mouse_controls import MouseControls
+from supple.viewer.controls.solver_controls import SolverControls
+from supple.viewer.controls.time_controls import TimeControls
+from supple.viewer.drag import Mouse
+from supple.viewer.messages import SetView
+from supple.viewer.options import ViewOptions
+from supple.viewer.record_controls import RecordControls
+from supple.viewer.snapshots import Snapshot
+from supple.viewer.stage import Stage
+from supple.viewer.view_controls import ViewControls
+from supple.viewer.views.fields import FIELDS
+
+_NUMBERS_EVERY = 0.15  # [s]: numbers that change faster cannot be read
+_PLOTS_EVERY = 0.5  # [s]
+TABS = ("Bodies", "View", "Solver")
+
+
+class Panel:
+    """All folders: time at the top, the others in tabs below.
+
+    Parameters
+    ----------
+    server : viser's; desk : where commands go
+    """
+
+    def __init__(self, server: Any, desk: Desk) -> None:
+        self._server, self._desk = server, desk
+        gui, snapshot = server.gui, desk.snapshot
+        self.time = TimeControls(gui, desk)
+        tabs = gui.add_tab_group()
+        self._bodies_tab, self._view_tab, self._solver_tab = (tabs.add_tab(name) for name in TABS)
+        with self._bodies_tab:
+            self.mouse_controls = MouseControls(gui, desk, self._mouse_changed)
+        self.mouse = Mouse(server, desk, self.mouse_controls)
+        self.stage: Stage | None = None
+        self._numbers_at = self._plots_at = 0.0
+        self._numbers_of: Snapshot | None = None
+        self._plots_of: Snapshot | None = None
+        self._told = max((notice.number for notice in snapshot.notices), default=0)
+
+    def attach(self, stage: Stage) -> None:
+        """Add the folders that need something to be on show."""
+        self.stage = stage
+        gui = self._server.gui
+        with self._bodies_tab:
+            self.bodies = BodyControls(gui, self._desk)
+        with self._view_tab:
+            self.views = ViewControls(self._server, stage, self._view_changed)
+            self.record = RecordControls(self._server, stage)
+        with self._solver_tab:
+            self.solver = SolverControls(gui, self._desk)
+            self.measures = Measures(gui, self._desk.snapshot)
+        self.mouse.attach(stage)
+        self.show(self._desk.snapshot)
+        self.refresh()
+
+    def show(self, snapshot: Snapshot) -> None:
+        """Take notice of a snapshot; `refresh` shows it."""
+        self._desk.snapshot = snapshot
+        self.measures.note(snapshot)
+        self._tell(snapshot)
+
+    def refresh(self) -> None:
+        """Bring everything up to date that is not: numbers and plots less often than the picture."""
+        snapshot, now = self._desk.snapshot, time.monotonic()
+        if snapshot is not self._numbers_of and now - self._numbers_at >= _NUMBERS_EVERY:
+            self._numbers_at, self._numbers_of = now, snapshot
+            self.time.show(snapshot)
+            self.bodies.show(snapshot)
+            self.solver.show(snapshot)
+            self.views.refresh()
+        if snapshot is not self._plots_of and now - self._plots_at >= _PLOTS_EVERY:
+            self._plots_at, self._plots_of = now, snapshot
+            self.measures.show(snapshot)
+
+    def _tell(self, snapshot: Snapshot) -> None:
+        """Show the notices that were not shown yet."""
+        for notice in snapshot.notices:
+            if notice.number > self._told:
+                self._told = notice.number
+                for client in self._server.get_clients().values():
+                    error = notice.level == "error"
+                    tell(client, "Simulation", notice.text, "red" if error else "blue")
+
+    def _mouse_changed(self) -> None:
+        self.mouse.switch()
+
+    def _view_changed(self, options: ViewOptions) -> None:
+        """Ask the simulation for what is to be drawn: it measures nothing that nobody looks at."""
+        field = FIELDS.get(options.color_by)
+        key = field.key if field is not None and options.surface != "wireframe" else None
+        self._desk.ask(None, lambda: SetView(key, options.velocities, options.contacts))

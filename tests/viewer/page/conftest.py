@@ -1,0 +1,227 @@
+"""A simulation that is made up, for tests of the page alone: it notes what it is told, and shows what it is given."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.viewer.messages import (
+    BodyDescription,
+    Measures,
+    ObstacleDescription,
+    SceneDescription,
+    Snapshot,
+    Timing,
+)
+
+
+class MadeUpSimulation:
+    """What the page sees of a simulation. `told` are the commands, `snapshot` is the newest one."""
+
+    def __init__(self, snapshot: Snapshot) -> None:
+        self.snapshot, self.told, self.error = snapshot, [], None
+
+    def send(self, command):
+        self.told.append(command)
+
+    def latest(self):
+        return self.snapshot
+
+    def show(self, **changes) -> Snapshot:
+        self.snapshot = replace(self.snapshot, frame=self.snapshot.frame + 1, **changes)
+        return self.snapshot
+
+
+def describe(*meshes: sp.TetMesh, skin=None, **changes) -> SceneDescription:
+    bodies, n, m = [], 0, 0
+    for i, mesh in enumerate(meshes):
+        rows = slice(n, n + len(mesh.vertices)), slice(m, m + len(mesh.tets))
+        n, m = rows[0].stop, rows[1].stop
+        values = {"youngs": 1e5, "poisson": 0.4, "damping": 0.0, "density": 1000.0, "friction": 0.0}
+        bodies.append(
+            BodyDescription(
+                f"body {i}",
+                *rows,
+                mesh.vertices,
+                mesh.surface.triangles,
+                mesh.tets,
+                skin if i == 0 else None,
+                "StableNeoHookean",
+                values,
+                1.0,
+            )
+        )
+    x = np.concatenate([mesh.vertices for mesh in meshes])
+    floor = ObstacleDescription(
+        "floor", "HalfSpace", {"point": np.zeros(3), "normal": np.array([0.0, 1.0, 0.0])}, False, 0.5
+    )
+    made = SceneDescription(
+        generation=1,
+        revision=1,
+        bodies=tuple(bodies),
+        obstacles=(floor,),
+        solver="xpbd",
+        values={"substeps": 20, "momentum_restore": True, "gravity": -9.81},
+        up=np.array([0.0, 1.0, 0.0]),
+        low=x.min(axis=0),
+        high=x.max(axis=0),
+        stitches=np.zeros((0, 4), dtype=np.int32),
+        n_vertices=n,
+        n_tets=m,
+        n_constraints=3 * m,
+    )
+    return replace(made, **changes)
+
+
+def snapshot_of(description: SceneDescription, **changes) -> Snapshot:
+    still, spins = np.zeros(3), np.zeros((len(description.bodies), 3))
+    measures = Measures("converged", "", 1.0, 2.0, 3.0, 0.9, still, still, spins, 0, None, 1)
+    made = Snapshot(
+        description=description,
+        frame=0,
+        time=0.0,
+        positions=np.concatenate([body.rest_positions for body in description.bodies]),
+        obstacle_poses=(np.eye(3)[None], np.zeros((1, 3))),
+        pinned=np.zeros(0, dtype=np.int32),
+        grabs=(),
+        pusher=None,
+        paused=True,
+        speed=1.0,
+        measures=measures,
+        timing=Timing(1.0, 60.0, 1.0),
+    )
+    return replace(made, **changes)
+
+
+@pytest.fixture
+def made_up():
+    """Two small boxes over a floor, made up."""
+    mesh = sp.shapes.box(size=(1.0, 1.0, 1.0), divisions=(2, 2, 2))
+    other = sp.TetMesh(mesh.vertices + np.array([2.0, 0.0, 0.0]), mesh.tets)
+    return MadeUpSimulation(snapshot_of(describe(mesh, other)))
+
+
+class Visitor:
+    """A browser's side of the line, without a browser: says what a page would say, and reads, or does not."""
+
+    def __init__(self, port: int, query: str = "", reads: bool = True) -> None:
+        import viser
+        from websockets.sync.client import connect
+
+        self.line = connect(
+            f"ws://127.0.0.1:{port}/{query}", subprotocols=[f"viser-v{viser.__version__}"], max_size=None
+        )
+        if reads:
+            threading.Thread(target=self._read, daemon=True).start()
+        # A visitor counts as one once its camera is known.
+        self.say(
+            "ViewerCameraMessage",
+            wxyz=(1.0, 0.0, 0.0, 0.0),
+            position=(0.0, 0.0, -5.0),
+            fov=0.6,
+            near=0.01,
+            far=100.0,
+            image_height=480,
+            image_width=640,
+            look_at=(0.0, 0.0, 0.0),
+            up_direction=(0.0, -1.0, 0.0),
+        )
+
+    def say(self, kind: str, **fields) -> None:
+        import msgspec
+
+        self.line.send(msgspec.msgpack.encode({"type": kind, **fields}))
+
+    def set(self, handle, value) -> None:
+        self.say("GuiUpdateMessage", uuid=handle._impl.uuid, updates={"value": value})
+
+    def press(self, button) -> None:
+        self.say("GuiUpdateMessage", uuid=button._impl.uuid, updates={"value": True})
+
+    def drag(self, handle, phase: str, start, end) -> None:
+        self.say(
+            "SceneNodeDragMessage",
+            phase=phase,
+            name=handle.name,
+            instance_index=None,
+            start_position=_plain(start),
+            start_screen_pos=(0.5, 0.5),
+            end_position=_plain(end),
+            end_screen_pos=(0.5, 0.5),
+            button="left",
+            modifier=None,
+            owner="",
+        )
+
+    def click(self, handle, origin, direction) -> None:
+        self.say(
+            "SceneNodeClickMessage",
+            name=handle.name,
+            instance_index=None,
+            ray_origin=_plain(origin),
+            ray_direction=_plain(direction),
+            screen_pos=(0.5, 0.5),
+            modifier=None,
+            owner="",
+        )
+
+    def leave(self) -> None:
+        self.line.close()
+
+    def _read(self) -> None:
+        from websockets.exceptions import ConnectionClosed
+
+        with contextlib.suppress(ConnectionClosed):
+            for _ in self.line:
+                pass
+
+
+def _plain(point) -> list[float]:
+    return [float(x) for x in point]
+
+
+@pytest.fixture(scope="session")
+def visit():
+    """Makes visitors: `visit(port)`."""
+    return Visitor
+
+
+@pytest.fixture(scope="session")
+def until():
+    """Waits until something holds, and fails where it never does."""
+
+    def wait(holds, seconds: float = 20.0, what: str = "what was waited for"):
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            if found := holds():
+                return found
+            time.sleep(0.01)
+        raise AssertionError(f"{what} did not come within {seconds:g} s")
+
+    return wait
+
+
+@pytest.fixture
+def server():
+    """A server of pages."""
+    from supple.output.viser_server import start_server, stop_server
+
+    made = start_server("127.0.0.1", 0)
+    yield made
+    stop_server(made)
+
+
+@pytest.fixture
+def live(server, made_up):
+    """A page of the made-up simulation."""
+    from supple.viewer.live_page import LivePage
+
+    page = LivePage(server, made_up, made_up.snapshot)
+    yield page
+    page.stop()
