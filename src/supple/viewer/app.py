@@ -13,6 +13,7 @@ from typing import Any
 from supple.output.recording_reader import read_recording
 from supple.output.viser_server import start_server, stop_server
 from supple.viewer.engine import Engine
+from supple.viewer.input_check import guard_inputs
 from supple.viewer.live_page import LivePage
 from supple.viewer.live_source import LiveSource
 from supple.viewer.replay import Replay
@@ -100,3 +101,4 @@ def dress(server: Any) -> None:
     """Make viser's page ours: the panel stands beside the picture, and nothing is offered that leads elsewhere."""
     server.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(36, 108, 168))
     server.gui.main_panel.dock_right()
+    guard_inputs(server)

@@ -44,9 +44,8 @@ class Mouse:
         server.on_client_disconnect(lambda client: self.let_go(client.client_id))
 
     def attach(self, stage: Stage) -> None:
-        """Listen to what is on this stage."""
+        """What is on this stage is dragged; its bodies come to `listen`."""
         self._stage = stage
-        self.listen(stage.body_handles)
         self.switch()
 
     def listen(self, handles: list[Any]) -> None:

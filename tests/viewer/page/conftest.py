@@ -211,8 +211,10 @@ def until():
 def server():
     """A server of pages."""
     from supple.output.viser_server import start_server, stop_server
+    from supple.viewer.app import dress
 
     made = start_server("127.0.0.1", 0)
+    dress(made)
     yield made
     stop_server(made)
 

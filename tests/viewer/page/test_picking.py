@@ -22,9 +22,7 @@ def test_the_nearest_point_of_any_surface(moment):
     point = nearest_surface_point(moment, high - np.array([-0.5, 0.3, 0.4]))
     assert point.body.name == "body 1"
     np.testing.assert_allclose(place_of(moment, point), high - [0.0, 0.3, 0.4], atol=1e-12)
-    np.testing.assert_allclose(
-        place_of(moment, nearest_surface_point(moment, low - 1.0)), point_of(moment, low)
-    )
+    np.testing.assert_allclose(place_of(moment, nearest_surface_point(moment, low - 1.0)), point_of(moment, low))
     assert point.weights.min() >= 0.0
     assert point.weights.sum() == pytest.approx(1.0)
 
