@@ -2,58 +2,33 @@
 
 from __future__ import annotations
 
-import io
-import os
-import shutil
-
 import numpy as np
-import pytest
 
 from supple.output import page as page_module
 from supple.output.page import write_page
 from supple.output.recording_reader import read_recording
 
-_FLAGS = (
-    "--headless --no-sandbox --disable-gpu --use-angle=swiftshader --enable-unsafe-swiftshader "
-    "--disable-background-networking"
-)
 
-
-def _browser() -> str:
-    found = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if found is None:
-        if os.environ.get("CI"):
-            pytest.fail("CI needs chromium: apt install chromium")
-        pytest.skip("there is no chromium here; apt install chromium")
-    return found
-
-
-def test_the_page_plays_in_a_browser(tmp_path, tools):
-    sync_api = pytest.importorskip("playwright.sync_api")
-    image = pytest.importorskip("PIL.Image")
-    executable = _browser()
+def test_the_page_plays_in_a_browser(tmp_path, tools, browser, pixels):
     tools.record(tmp_path / "r.vtkhdf", 30)
     page_file = write_page(tmp_path / "r.vtkhdf", tmp_path / "index.html")
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=executable, args=_FLAGS.split())
-        page = browser.new_page(viewport={"width": 480, "height": 360})
-        errors, asked = [], []
-        page.on("pageerror", lambda error: errors.append(str(error)))
-        page.on("console", lambda said: errors.append(said.text) if said.type == "error" else None)
-        page.on("request", lambda request: asked.append(request.url))
-        page.goto(page_file.as_uri())
-        page.wait_for_selector("canvas", timeout=30_000)
-        shots = []
-        for _ in range(40):  # until bodies are drawn, and have moved
-            page.wait_for_timeout(250)
-            shot = np.asarray(image.open(io.BytesIO(page.screenshot())).convert("RGB")).astype(int)
-            shots.append(shot[:300])  # above the player's bar
-            if _red(shots[0]) <= 100:
-                shots = shots[1:]
-            elif _moved(shots[0], shots[-1]) > 200:
-                break
-        title = page.title()
-        browser.close()
+    page = browser.new_page(viewport={"width": 480, "height": 360})
+    errors, asked = [], []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.on("console", lambda said: errors.append(said.text) if said.type == "error" else None)
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(page_file.as_uri())
+    page.wait_for_selector("canvas", timeout=30_000)
+    shots = []
+    for _ in range(40):  # until bodies are drawn, and have moved
+        page.wait_for_timeout(250)
+        shots.append(pixels(page)[:300])  # above the player's bar
+        if _red(shots[0]) <= 100:
+            shots = shots[1:]
+        elif _moved(shots[0], shots[-1]) > 200:
+            break
+    title = page.title()
+    page.close()
     assert errors == []
     assert asked == [page_file.as_uri()]
     assert title == "cube, slab · Supple"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import threading
 import webbrowser
 from collections.abc import Callable, Iterator
@@ -13,6 +14,7 @@ from typing import Any
 from supple.output.recording_reader import read_recording
 from supple.output.viser_server import start_server, stop_server
 from supple.viewer.engine import Engine
+from supple.viewer.gate import gate, require_free_port
 from supple.viewer.input_check import guard_inputs
 from supple.viewer.live_page import LivePage
 from supple.viewer.live_source import LiveSource
@@ -60,12 +62,14 @@ def opened_page(source: LiveSource | str | Path, address: Address | None = None)
     address = Address() if address is None else address
     with ExitStack() as ends:
         show = _live(source, ends) if isinstance(source, LiveSource) else _replay(source, ends)
-        server = start_server(address.host, address.port)
+        require_free_port(address.host, address.port)  # viser would take the next one, and say nothing
+        with gate(address.host, address.token):
+            server = start_server(address.host, address.port)
         ends.callback(stop_server, server)
         dress(server)
         shown = show(server)
         ends.callback(shown.stop)
-        host = "localhost" if address.host in ("", "0.0.0.0", "::", "127.0.0.1") else address.host
+        host = socket.gethostname() if address.host in ("", "0.0.0.0", "::") else address.host
         query = f"/?token={address.token}" if address.token else ""
         yield OpenPage(f"http://{host}:{server.get_port()}{query}", server, shown)
 

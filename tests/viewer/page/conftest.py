@@ -209,7 +209,7 @@ def until():
 
 @pytest.fixture
 def server():
-    """A server of pages."""
+    """A server of pages. It has no gate: what a visitor says gets through, whatever it is."""
     from supple.output.viser_server import start_server, stop_server
     from supple.viewer.app import dress
 
