@@ -14,6 +14,9 @@ _HOME = {
     "ARAP": "supple.materials.arap",
     "Body": "supple.scene.body",
     "Box": "supple.scene.obstacles",
+    "CheckReport": "supple.output.check.report",
+    "CheckResult": "supple.output.check.report",
+    "CheckSettings": "supple.output.check.settings",
     "CommandError": "supple.errors",
     "ContactPair": "supple.scene.contact_pairs",
     "ContactSettings": "supple.xpbd.contact_settings",
@@ -57,6 +60,7 @@ _HOME = {
     "VertexEdgeStitch": "supple.scene.stitches.vertex_edge",
     "VertexVertexStitch": "supple.scene.stitches.vertex_vertex",
     "XPBD": "supple.xpbd.solver",
+    "check_recording": "supple.output.check.checker",
     "export": "supple.output.export",
     "largest_noninverting_step": "supple.implicit.step_filter",
     "load_run": "supple.scene_file.loader",
@@ -135,6 +139,9 @@ if TYPE_CHECKING:
     from supple.mesh.tetrahedralize import tetrahedralize
     from supple.numerics.cubic import smallest_positive_cubic_root
     from supple.numerics.svd3 import rotation_variant_svd
+    from supple.output.check.checker import check_recording
+    from supple.output.check.report import CheckReport, CheckResult
+    from supple.output.check.settings import CheckSettings
     from supple.output.export import export
     from supple.output.page import write_page
     from supple.output.plots import plot_recording

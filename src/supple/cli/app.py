@@ -21,7 +21,8 @@ from supple.errors import SuppleError
 app = App(
     name="supple",
     help="Tetrahedral soft bodies: a surface mesh goes in, a simulation that can be trusted comes out.",
-    help_epilogue="Exit codes: 0 done, 2 the input or an option cannot be used, 3 the solver could not go on.",
+    help_epilogue="Exit codes: 0 done, 1 a check failed, 2 the input or an option cannot be used, "
+    "3 the solver could not go on.",
     version=__version__,
     console=ShellConsole(),
     suppress_keyboard_interrupt=False,
@@ -37,6 +38,7 @@ COMMANDS = {
     "run": "supple.cli.run:run",
     "mesh": "supple.cli.mesh:mesh",
     "export": "supple.cli.export:export",
+    "check": "supple.cli.check:check",
     "plot": "supple.cli.plot:plot",
     "schema": "supple.cli.schema:schema",
     "info": "supple.cli.info:info",

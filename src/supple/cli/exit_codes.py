@@ -9,6 +9,8 @@ class ExitCode(IntEnum):
     """How a command ended."""
 
     OK = 0
+    FAILED = 1
+    """A check of a recording failed."""
     INPUT = 2
     """The input, the options or the place for the output cannot be used: one line on stderr says why."""
     SOLVER = 3

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from supple.mesh.skin import Embedding
 from supple.output.checked_hdf5 import CheckedFile
+from supple.output.recorded_physics import write_physics
 from supple.output.skinned_surface import SkinnedSurface
 from supple.scene.obstacles import Box, HalfSpace, Obstacle, Sphere, TriangleObstacle
 from supple.simulate import Frame
@@ -71,6 +72,7 @@ def write_scene(file: h5py.File, first: Frame, facts: dict[str, Any], scene_text
         "statuses": [str(status) for status in Status],
         "bodies": [_describe_body(part) for part in system.bodies],
         "obstacles": [_describe_obstacle(obstacle) for obstacle in system.obstacles],
+        "physics": write_physics(own, system),
     }
     own["header"] = json.dumps(header)
     if scene_text is not None:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from supple.errors import OutputError
 from supple.output.checked_hdf5 import CheckedFile
+from supple.output.recorded_physics import RecordedPhysics, read_physics, read_untouching
 from supple.output.recorded_scene import RecordedBody, RecordedObstacle, read_bodies, read_header, read_obstacles
 from supple.output.recording import REPORT_NUMBERS, REPORT_VECTORS
 from supple.output.recording_file import WRITTEN
@@ -94,6 +95,9 @@ class Recording(Sequence[RecordedFrame]):
     bodies, obstacles : what was simulated, and what it met
     rest_positions : (n, 3) [m]; masses : (n,) [kg]; tets : (m, 4); triangles : (t, 3); rest_volumes : (m,) [m^3]
     gravity : (3,) [m/s^2]; dt : time from frame to frame [s]
+    physics : the bodies' laws and what acts on them, or None where an older version wrote the recording
+    untouching : pairs of numbers of bodies, then obstacles, that the scene lets pass through each other
+    untouching_vertices : (k, 2) pairs of a vertex and a row of triangles that may touch
     scene_text : the scene file's text, or None; solver : its description, or None; supple_version : of the writer
     """
 
@@ -123,6 +127,9 @@ class Recording(Sequence[RecordedFrame]):
         self.pinned_vertices = file.array("supple/pinned_vertices", "i", (None,))
         self.bodies: tuple[RecordedBody, ...] = read_bodies(file, header, n, m, self.triangles)
         self.obstacles: tuple[RecordedObstacle, ...] = read_obstacles(file, header)
+        self.physics: RecordedPhysics | None = read_physics(file, header, m)
+        owners = len(self.bodies) + len(self.obstacles)
+        self.untouching, self.untouching_vertices = read_untouching(file, header, owners, n, len(self.triangles))
         self.dt = float(header["dt"])
         self.solver: str | None = header.get("solver")
         self.supple_version = str(header.get("supple_version", ""))

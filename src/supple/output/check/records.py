@@ -1,0 +1,73 @@
+"""Whether what was measured when a frame was recorded is what its positions and velocities give."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from supple.output.check.elastic_energy import elastic_energy, stiffness_scale
+from supple.output.check.frame_check import FrameCheck
+from supple.output.check.report import CheckResult
+from supple.output.check.settings import CheckSettings
+from supple.output.check.snapshot import Scene, Snapshot, edge_vectors
+from supple.output.check.tally import Tally
+
+# Of the natural size of each quantity; both sides are computed in double precision.
+_SAME = 1e-9
+_NOTHING = 1e-300
+
+
+class Records(FrameCheck):
+    """Determinants tet by tet, the smallest of them, energies and momenta."""
+
+    name = "records"
+
+    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
+        super().__init__(scene, settings)
+        self._tally = Tally(self.name)
+        self._inverse_sizes = np.linalg.norm(scene.rest_inverse, axis=(1, 2))
+
+    def see(self, at: Snapshot) -> None:
+        # What is not a number is told by another check.
+        differences = [(value, where) for value, where in self._differences(at) if np.isfinite(value)]
+        value, where = max(differences, default=(0.0, ""))
+        self._tally.see(at, value, value > _SAME, where)
+
+    def _differences(self, at: Snapshot) -> Iterator[tuple[float, str]]:
+        recording, k = self.scene.recording, at.number
+        m, x, v = recording.masses, at.positions, at.velocities
+        sizes = np.linalg.norm(edge_vectors(x, recording.tets), axis=(1, 2)) * self._inverse_sizes
+        sizes = np.maximum(1.0, sizes) ** 3
+        apart = np.abs(at.det_F - at.J) / sizes
+        apart[~np.isfinite(apart)] = 0.0
+        row = int(np.argmax(apart))
+        yield float(apart[row]), f"det F of {self.scene.name_tet(row)}"
+        said = recording.series("min_det_F")[k]
+        yield abs(said - at.J.min()) / sizes[int(np.argmin(at.J))], "smallest det F"
+        kinetic = 0.5 * float(m @ np.einsum("ij,ij->i", v, v))
+        said = recording.series("kinetic_energy")[k]
+        yield abs(said - kinetic) / (kinetic + _NOTHING), "kinetic energy"
+        potential = -float((m @ x) @ recording.gravity)
+        heights = float(m @ np.linalg.norm(x, axis=1)) * float(np.linalg.norm(recording.gravity))
+        said = recording.series("potential_energy")[k]
+        yield abs(said - potential) / (heights + _NOTHING), "potential energy"
+        if recording.physics is None or recording.physics.has_known_energy:
+            elastic = elastic_energy(at)
+            if elastic is not None:
+                said = recording.series("elastic_energy")[k]
+                yield abs(said - elastic) / (abs(elastic) + stiffness_scale(at) + _NOTHING), "elastic energy"
+        momentum = m @ v
+        said = recording.series("linear_momentum")[k]
+        speeds = np.linalg.norm(v, axis=1)
+        yield float(np.linalg.norm(said - momentum)) / (float(m @ speeds) + _NOTHING), "linear momentum"
+        r = x - m @ x / m.sum()
+        spin = m @ np.cross(r, v - momentum / m.sum())
+        said = recording.series("angular_momentum")[k]
+        turning = float(m @ (np.linalg.norm(r, axis=1) * speeds))
+        yield float(np.linalg.norm(said - spin)) / (turning + _NOTHING), "angular momentum"
+
+    def result(self) -> CheckResult:
+        if self._tally.failed_frames == 0:
+            self._tally.where = ""
+        return self._tally.result("agree within {worst}", "differ by {worst} from what the positions give")

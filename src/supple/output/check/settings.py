@@ -1,0 +1,72 @@
+"""What `check_recording` is asked to do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from supple.errors import OutputError
+
+NAMES = {
+    "finite": "every recorded number is finite",
+    "sequence": "times and numbers of frames go up by one step, and no frame repeats another",
+    "status": "every step converged",
+    "rest shape": "no tet is inverted or flat at rest; volumes and masses are above zero",
+    "inversion": "no tet is inverted or flat, by the exact sign of its determinant",
+    "intersection": "no two surfaces meet, by exact tests of their triangles",
+    "obstacles": "no body is in a half-space, in a ball, or out of its room",
+    "containment": "nothing is swallowed whole",
+    "distance": "surfaces keep a distance above zero",
+    "volume": "nearly incompressible bodies keep most of their volume",
+    "momentum": "without loads, momentum changes by gravity alone",
+    "spin": "without loads, angular momentum about the center of mass does not grow",
+    "energy": "where nothing does work, energy does not grow",
+    "records": "recorded determinants, energies and momenta are those of the recorded positions and velocities",
+}
+
+
+@dataclass(frozen=True)
+class CheckSettings:
+    """Which checks are made, on which frames, and what they allow.
+
+    Parameters
+    ----------
+    only, skip : names of checks; see `NAMES`. Without `only`, all but those in `skip`.
+    every : check each k-th frame, and the last.
+    max_volume_change : how far a body's volume may go from the one at rest, as a share of it. None: 0.5 for bodies
+        with a Poisson's ratio of 0.45 or more, any for others.
+    max_energy_gain : how far the energy may go above that at the start, as a share of what is moved about.
+    max_momentum_change : how far momenta may change without a cause, as a share of what is there.
+
+    Raises
+    ------
+    OutputError : where a name is unknown, or a number out of range.
+    """
+
+    only: Sequence[str] = ()
+    skip: Sequence[str] = ()
+    every: int = 1
+    max_volume_change: float | None = None
+    max_energy_gain: float = 0.05
+    max_momentum_change: float = 1e-6
+
+    def __post_init__(self) -> None:
+        for name in (*self.only, *self.skip):
+            if name not in NAMES:
+                raise OutputError(f"check: there is no check {name!r}; there are {', '.join(NAMES)}")
+        if isinstance(self.every, bool) or not isinstance(self.every, (int, np.integer)) or self.every < 1:
+            raise OutputError(f"check: every is {self.every!r}; give a whole number of one or more")
+        for key in ("max_volume_change", "max_energy_gain", "max_momentum_change"):
+            value = getattr(self, key)
+            if value is not None and not (isinstance(value, (int, float)) and value >= 0.0):
+                raise OutputError(f"check: {key} is {value!r}; give a number of zero or more")
+        if not self.chosen:
+            raise OutputError("check: nothing is left to check; give fewer names to skip")
+
+    @property
+    def chosen(self) -> tuple[str, ...]:
+        """The names of the checks to make."""
+        wanted = self.only or NAMES
+        return tuple(name for name in NAMES if name in wanted and name not in self.skip)

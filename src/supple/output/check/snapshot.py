@@ -1,0 +1,131 @@
+"""One frame of a recording as the checks see it: read once, and measured once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.output.check.box_tree import build_tree, triangle_boxes
+from supple.output.check.orientation import volume_signs
+from supple.output.check.surface_pairs import meeting_pairs
+from supple.output.check.surfaces import Surfaces, surfaces_of
+from supple.output.recording_reader import RecordedFrame, Recording
+
+_MOST_PAIRS = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What does not change from frame to frame.
+
+    Attributes
+    ----------
+    recording : the file; surfaces : see `Surfaces`
+    """
+
+    recording: Recording
+    surfaces: Surfaces
+
+    @classmethod
+    def of(cls, recording: Recording) -> Scene:
+        return cls(recording, surfaces_of(recording))
+
+    @cached_property
+    def rest_inverse(self) -> NDArray[np.float64]:
+        """(m, 3, 3) Dm^-1 [1/m]; not a number where a tet is flat at rest."""
+        return _inverses(edge_vectors(self.recording.rest_positions, self.recording.tets))
+
+    @cached_property
+    def size(self) -> float:
+        """Longest extent of the largest body at rest [m]."""
+        rest = self.recording.rest_positions
+        return max(float(np.ptp(rest[body.vertices], axis=0).max()) for body in self.recording.bodies)
+
+    def name_tet(self, row: int) -> str:
+        """A tet as messages call it: its number within its body."""
+        for body in self.recording.bodies:
+            if body.tets.start <= row < body.tets.stop:
+                return f"tet {row - body.tets.start} of {body.name}"
+        return f"tet {row}"
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """One frame.
+
+    Attributes
+    ----------
+    scene : what it belongs to; number, time : of the frame, [s]
+    positions, velocities : (n, 3) [m], [m/s]; det_F : (m,) as recorded; poses : (obstacles, 3, 4)
+    """
+
+    scene: Scene
+    number: int
+    time: float
+    positions: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    det_F: NDArray[np.float64]
+    poses: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, scene: Scene, frame: RecordedFrame) -> Snapshot:
+        x, v = frame.state.positions, frame.state.velocities
+        return cls(scene, frame.number, frame.time, np.ascontiguousarray(x), v, frame.det_F, frame.poses)
+
+    @cached_property
+    def finite(self) -> bool:
+        """Whether positions, velocities and poses are numbers to compute with."""
+        return all(bool(np.isfinite(values).all()) for values in (self.positions, self.velocities, self.poses))
+
+    @cached_property
+    def signs(self) -> NDArray[np.int8]:
+        """(m,) exact sign of every tet's determinant."""
+        return volume_signs(self.positions, self.scene.recording.tets)
+
+    @cached_property
+    def F(self) -> NDArray[np.float64]:
+        """(m, 3, 3) deformation gradients."""
+        return edge_vectors(self.positions, self.scene.recording.tets) @ self.scene.rest_inverse
+
+    @cached_property
+    def J(self) -> NDArray[np.float64]:
+        """(m,) their determinants, computed here."""
+        a, b, c = self.F[:, :, 0], self.F[:, :, 1], self.F[:, :, 2]
+        return np.einsum("ij,ij->i", a, np.cross(b, c))
+
+    @cached_property
+    def points(self) -> NDArray[np.float64]:
+        """All points of all surfaces; see `Surfaces.place`."""
+        return self.scene.surfaces.place(self.positions, self.poses)
+
+    @cached_property
+    def tree(self) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray, NDArray]:
+        """The boxes around the triangles, and a tree of them: what `meeting_pairs` wants last."""
+        low, high = triangle_boxes(self.points, self.scene.surfaces.triangles)
+        return (low, high, *build_tree(low, high))
+
+    @cached_property
+    def meeting(self) -> tuple[int, NDArray[np.int64]]:
+        """How many pairs of triangles meet, and the first ones (k, 2) of them, at most a thousand."""
+        surfaces = self.scene.surfaces
+        out = np.zeros((_MOST_PAIRS, 2), dtype=np.int64)
+        count = meeting_pairs(
+            self.points, surfaces.triangles, surfaces.owners, surfaces.allowed, surfaces.ignored, *self.tree, out
+        )
+        return count, out[: min(count, _MOST_PAIRS)]
+
+
+def edge_vectors(x: NDArray[np.float64], tets: NDArray[np.int32]) -> NDArray[np.float64]:
+    """(m, 3, 3) whose columns are x1 - x0, x2 - x0, x3 - x0."""
+    corners = x[tets]
+    return np.ascontiguousarray((corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1))
+
+
+def _inverses(D: NDArray[np.float64]) -> NDArray[np.float64]:
+    a, b, c = D[:, :, 0], D[:, :, 1], D[:, :, 2]
+    rows = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return rows / np.einsum("ij,ij->i", a, rows[:, 0])[:, None, None]

@@ -1,0 +1,186 @@
+"""The surfaces of a recording in one array: bodies, and the obstacles that are made of triangles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from supple.output.recorded_scene import RecordedObstacle
+from supple.output.recording_reader import Recording
+
+_BOX_CORNERS = np.array([[i, j, k] for i in (-0.5, 0.5) for j in (-0.5, 0.5) for k in (-0.5, 0.5)])
+_BOX_FACES = (
+    *((0, 1, 3), (0, 3, 2), (4, 7, 5), (4, 6, 7), (0, 5, 1), (0, 4, 5)),
+    *((2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A connected piece of a body, or of an obstacle made of triangles.
+
+    Attributes
+    ----------
+    owner : body, or number of bodies + obstacle; triangles : (k,) rows of the surfaces' triangles
+    closed : whether it has an inside; vertex : one of its points
+    """
+
+    owner: int
+    triangles: NDArray[np.int64]
+    closed: bool
+    vertex: int
+
+
+@dataclass(frozen=True, eq=False)
+class Surfaces:
+    """What may meet what.
+
+    Attributes
+    ----------
+    names : of bodies and obstacles, the owners; bodies : how many owners are bodies
+    triangles : (t, 3) those of bodies first; owners : (t,); first_triangle : (p,) the first one of each owner
+    vertex_owners : (n,) of the bodies' vertices; first_vertex : (p,) the first vertex of each body
+    allowed : (p, p) which owners' surfaces must stay apart; ignored : sorted keys of pairs of triangles that may meet
+    fixed : (obstacle, its points at time 0, its first row) of obstacles made of triangles; points : number of all rows
+    pieces : see `Piece`
+    """
+
+    names: tuple[str, ...]
+    bodies: int
+    triangles: NDArray[np.int64]
+    owners: NDArray[np.int64]
+    first_triangle: NDArray[np.int64]
+    vertex_owners: NDArray[np.int64]
+    first_vertex: NDArray[np.int64]
+    allowed: NDArray[np.bool_]
+    ignored: NDArray[np.int64]
+    fixed: tuple[tuple[int, NDArray[np.float64], int], ...]
+    points: int
+    pieces: tuple[Piece, ...]
+
+    def place(self, positions: NDArray[np.float64], poses: NDArray[np.float64]) -> NDArray[np.float64]:
+        """All points (n + obstacles' + 2, 3) of a frame; the last two rows are room for a ray."""
+        x = np.zeros((self.points + 2, 3))
+        x[: len(positions)] = positions
+        for obstacle, points, row in self.fixed:
+            x[row : row + len(points)] = moved(points, poses[obstacle])
+        return x
+
+    def name_triangle(self, row: int) -> str:
+        """A triangle as messages call it: the row of its own body's surface."""
+        owner = int(self.owners[row])
+        kind = "" if owner < self.bodies else "obstacle "
+        return f"triangle {row - int(self.first_triangle[owner])} of {kind}{self.names[owner]}"
+
+    def name_vertex(self, row: int) -> str:
+        """A body's vertex as messages call it."""
+        owner = int(self.vertex_owners[row])
+        return f"vertex {row - int(self.first_vertex[owner])} of {self.names[owner]}"
+
+
+def moved(points: NDArray[np.float64], pose: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points (k, 3), given at time 0, under a pose (3, 4); untouched, to the last bit, where nothing moves."""
+    R, t = pose[:, :3], pose[:, 3]
+    if np.array_equal(R, np.eye(3)) and not t.any():
+        return points
+    return points @ R.T + t
+
+
+def is_mesh(obstacle: RecordedObstacle) -> bool:
+    """Whether an obstacle is checked as triangles; others, by their formula."""
+    return obstacle.kind == "TriangleObstacle" or (
+        obstacle.kind == "Box" and not obstacle.parameters.get("inside", False)
+    )
+
+
+def surfaces_of(recording: Recording) -> Surfaces:
+    """Collect the surfaces of a recording."""
+    n, nb = len(recording.rest_positions), len(recording.bodies)
+    names = tuple(body.name for body in recording.bodies) + tuple(o.name for o in recording.obstacles)
+    vertex_owners = np.zeros(n, dtype=np.int64)
+    first_vertex = np.zeros(nb, dtype=np.int64)
+    triangles, owners = [], []
+    for i, body in enumerate(recording.bodies):
+        vertex_owners[body.vertices], first_vertex[i] = i, body.vertices.start
+        triangles.append(body.triangles.astype(np.int64) + body.vertices.start)
+        owners.append(np.full(len(body.triangles), i))
+    fixed, row = [], n
+    for j, obstacle in enumerate(recording.obstacles):
+        if is_mesh(obstacle):
+            points, faces = _mesh_of(obstacle)
+            fixed.append((j, points, row))
+            triangles.append(faces + row)
+            owners.append(np.full(len(faces), nb + j))
+            row += len(points)
+    owner = np.concatenate(owners).astype(np.int64)
+    all_triangles = np.ascontiguousarray(np.concatenate(triangles).reshape(-1, 3))
+    # Owners are in order, so the first triangle of each is where it would be inserted.
+    first = np.searchsorted(owner, np.arange(len(names)))
+    return Surfaces(
+        names=names,
+        bodies=nb,
+        triangles=all_triangles,
+        owners=owner,
+        first_triangle=first,
+        vertex_owners=vertex_owners,
+        first_vertex=first_vertex,
+        allowed=_allowed(recording, nb, len(names)),
+        ignored=_ignored_keys(recording, all_triangles),
+        fixed=tuple(fixed),
+        points=row,
+        pieces=_pieces(recording, all_triangles, owner, row),
+    )
+
+
+def _mesh_of(obstacle: RecordedObstacle) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    if obstacle.kind == "TriangleObstacle":
+        return obstacle.vertices, obstacle.triangles.astype(np.int64)
+    said = obstacle.parameters
+    points = (_BOX_CORNERS * np.asarray(said["size"])) @ np.asarray(said["orientation"]).T + np.asarray(said["center"])
+    return points, np.array(_BOX_FACES, dtype=np.int64)
+
+
+def _allowed(recording: Recording, bodies: int, owners: int) -> NDArray[np.bool_]:
+    """(p, p): what must stay apart: not obstacles from each other, nor what the scene excludes."""
+    is_body = np.arange(owners) < bodies
+    allowed = is_body[:, None] | is_body[None, :]
+    for i, j in recording.untouching:
+        allowed[i, j] = allowed[j, i] = False
+    return allowed
+
+
+def _ignored_keys(recording: Recording, triangles: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Pairs of a vertex and a triangle that may touch, as pairs of triangles: all around the vertex, and that one."""
+    keys = [np.zeros(0, dtype=np.int64)]
+    for vertex, triangle in recording.untouching_vertices:
+        around = np.flatnonzero((triangles == vertex).any(axis=1))
+        keys.append(np.minimum(around, triangle) * len(triangles) + np.maximum(around, triangle))
+    return np.unique(np.concatenate(keys))
+
+
+def _pieces(
+    recording: Recording, triangles: NDArray[np.int64], owners: NDArray[np.int64], points: int
+) -> tuple[Piece, ...]:
+    """Bodies fall apart along their tets, so that a cavity belongs to its piece; obstacles along triangles."""
+    tets = recording.tets.astype(np.int64)
+    parts = [tets[:, [0, k]] for k in (1, 2, 3)] + [triangles[:, [0, 1]], triangles[:, [1, 2]]]
+    ends = np.concatenate(parts)
+    graph = coo_matrix((np.ones(len(ends), dtype=np.int8), (ends[:, 0], ends[:, 1])), shape=(points, points))
+    labels = connected_components(graph, directed=False)[1][triangles[:, 0]]
+    order = np.argsort(labels, kind="stable")
+    starts = np.flatnonzero(np.diff(labels[order], prepend=-1))
+    pieces = []
+    for rows in np.split(order, starts[1:]) if len(order) else []:
+        own = triangles[rows]
+        pieces.append(Piece(int(owners[rows[0]]), rows, _is_closed(own), int(own[0, 0])))
+    return tuple(pieces)
+
+
+def _is_closed(triangles: NDArray[np.int64]) -> bool:
+    """Whether every side belongs to an even number of triangles: a ray's crossings tell the inside then."""
+    sides = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    return bool((np.unique(sides, axis=0, return_counts=True)[1] % 2 == 0).all())

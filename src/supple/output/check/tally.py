@@ -1,0 +1,80 @@
+"""The worst number of a check, where it was, and in how many frames the check failed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from supple.output.check.report import CheckResult, Verdict
+
+
+class InTime(Protocol):
+    """A frame: its number and time [s]."""
+
+    @property
+    def number(self) -> int: ...
+
+    @property
+    def time(self) -> float: ...
+
+
+class Tally:
+    """Collects one number per frame.
+
+    Parameters
+    ----------
+    name : of the check; unit : of its number; lowest : whether small numbers are the bad ones.
+    """
+
+    def __init__(self, name: str, unit: str = "", *, lowest: bool = False) -> None:
+        self.name, self.unit, self._lowest = name, unit, lowest
+        self.worst: float | None = None
+        self.frame: int | None = None
+        self.time: float | None = None
+        self.where = ""
+        self.failed_frames = 0
+        self.first_failure: int | None = None
+
+    def see(self, at: InTime | None, value: float, failed: bool, where: str | Callable[[], str] = "") -> None:
+        """Add what one frame gave; `at` is None for what belongs to no frame. Failures count as worse than others."""
+        worse = self.worst is None or (value < self.worst if self._lowest else value > self.worst)
+        if failed and self.failed_frames == 0:
+            worse = True
+        if failed:
+            self.failed_frames += 1
+            if self.first_failure is None and at is not None:
+                self.first_failure = at.number
+        elif self.failed_frames:
+            worse = False
+        if worse:
+            self.worst = float(value)
+            self.frame, self.time = (None, None) if at is None else (at.number, at.time)
+            self.where = where() if callable(where) else where
+
+    def result(self, good: str, bad: str) -> CheckResult:
+        """The result: `good` or `bad` says what the worst number means; `{worst}` stands for it."""
+        failed = self.failed_frames > 0
+        number = "none" if self.worst is None else f"{self.worst:.6g}{' ' + self.unit if self.unit else ''}"
+        text = (bad if failed else good).replace("{worst}", number)
+        if self.where:
+            text += f" ({self.where})"
+        if failed and self.first_failure is not None:
+            frames = "1 frame" if self.failed_frames == 1 else f"{self.failed_frames} frames"
+            text += f"; in {frames}, first {self.first_failure}"
+        return CheckResult(
+            self.name,
+            Verdict.FAIL if failed else Verdict.PASS,
+            text,
+            self.worst,
+            self.unit,
+            self.frame,
+            self.time,
+            self.where,
+            self.failed_frames,
+            self.first_failure,
+        )
+
+
+def skipped(name: str, why: str) -> CheckResult:
+    """The result of a check that could not be made."""
+    return CheckResult(name, Verdict.SKIPPED, why)

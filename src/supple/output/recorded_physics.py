@@ -1,0 +1,141 @@
+"""What a recording keeps of its scene for whoever checks it: the bodies' laws, what acts on them, what may touch.
+
+Written since 0.1; recordings without it stay readable, and some checks say that they cannot be made.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.materials.edges_and_volume import EdgesAndVolume
+from supple.materials.material import Elastic
+from supple.materials.registry import ELASTIC_MATERIALS
+from supple.output.checked_hdf5 import CheckedFile
+from supple.system import System
+
+NOT_KNOWN = 255
+_GROUP = "supple/physics"
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedPhysics:
+    """The laws of a recorded scene.
+
+    Attributes
+    ----------
+    kind : (m,) row of `registry.ELASTIC_MATERIALS` of each tet, or `NOT_KNOWN`; mu, lam : (m,) [Pa]
+    compliances : for each body those of its edges [m/N] and volumes [m^5/N], or None for a body of another law
+    forces, soft_targets, scripted_pins, stitches : how many the scene has
+    """
+
+    kind: NDArray[np.uint8]
+    mu: NDArray[np.float64]
+    lam: NDArray[np.float64]
+    compliances: tuple[tuple[float, float] | None, ...]
+    forces: int
+    soft_targets: int
+    scripted_pins: int
+    stitches: int
+
+    @property
+    def has_known_energy(self) -> bool:
+        """Whether all that stores energy, but contact, is known here."""
+        return self.stitches == 0 and self.soft_targets == 0
+
+    def knows_law(self, body: int, tets: slice) -> bool:
+        """Whether the elastic energy of a body can be computed."""
+        return self.compliances[body] is not None or bool((self.kind[tets] != NOT_KNOWN).all())
+
+
+def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
+    """Write the arrays to the recording's own group; returns what belongs into its header."""
+    m = len(system.tets)
+    kind, mu, lam = np.full(m, NOT_KNOWN, dtype=np.uint8), np.zeros(m), np.zeros(m)
+    compliances: list[list[float] | None] = []
+    for part in system.bodies:
+        material = part.body.material
+        compliances.append(None)
+        if isinstance(material, EdgesAndVolume):
+            compliances[-1] = [float(material.edge_compliance), float(material.volume_compliance)]
+        elif isinstance(material, Elastic):
+            rows = material.per_tet(part.tets.stop - part.tets.start)
+            kind[part.tets], mu[part.tets], lam[part.tets] = rows.kind, rows.mu, rows.lam
+    group = own.create_group("physics")
+    group["kind"], group["mu"], group["lam"] = kind, mu, lam
+    group["untouching_vertices"] = _untouching_vertices(system)
+    return {
+        "laws": [law.__name__ for law in ELASTIC_MATERIALS],
+        "compliances": compliances,
+        "forces": len(system.forces),
+        "soft_targets": len(system.soft_targets),
+        "scripted_pins": sum(part.pin.motion is not None for part in system.pins),
+        "stitches": len(getattr(system.scene, "stitches", ())),
+        "untouching": _untouching(system),
+    }
+
+
+def _untouching(system: System) -> list[list[int]]:
+    """Pairs that the scene lets pass through each other: numbers of bodies, then obstacles."""
+    _ = system
+    return []
+
+
+def _untouching_vertices(system: System) -> NDArray[np.int64]:
+    """(k, 2) a vertex and a row of `system.triangles` that may touch, with all triangles of the vertex."""
+    _ = system
+    return np.zeros((0, 2), dtype=np.int64)
+
+
+def read_physics(file: CheckedFile, header: dict[str, Any], m: int) -> RecordedPhysics | None:
+    """The laws of a recording with m tets, or None where it does not tell.
+
+    Raises
+    ------
+    OutputError : where it contradicts itself.
+    """
+    said = header.get("physics")
+    if said is None:
+        return None
+    try:
+        counts = [int(said[key]) for key in ("forces", "soft_targets", "scripted_pins", "stitches")]
+        laws = [str(law) for law in said["laws"]]
+        compliances = tuple(None if pair is None else (float(pair[0]), float(pair[1])) for pair in said["compliances"])
+    except (KeyError, TypeError, ValueError, IndexError):
+        raise file.broken("the physics in its header is not described as it should be") from None
+    if len(compliances) != len(header["bodies"]):
+        raise file.broken("its header describes the physics of another number of bodies")
+    here = [law.__name__ for law in ELASTIC_MATERIALS]
+    number = np.full(256, NOT_KNOWN, dtype=np.uint8)
+    for k, law in enumerate(laws[:NOT_KNOWN]):
+        number[k] = here.index(law) if law in here else NOT_KNOWN
+    kind = number[file.array(f"{_GROUP}/kind", "u", (m,)).astype(np.uint8)]
+    mu, lam = file.array(f"{_GROUP}/mu", "f", (m,)), file.array(f"{_GROUP}/lam", "f", (m,))
+    return RecordedPhysics(kind, mu, lam, compliances, *counts)
+
+
+def read_untouching(
+    file: CheckedFile, header: dict[str, Any], owners: int, vertices: int, triangles: int
+) -> tuple[tuple[tuple[int, int], ...], NDArray[np.int64]]:
+    """Pairs of owners (bodies, then obstacles), and pairs of a vertex and a triangle (k, 2), that may touch.
+
+    Raises
+    ------
+    OutputError : where they name something that is not there.
+    """
+    said = header.get("physics")
+    if said is None:
+        return (), np.zeros((0, 2), dtype=np.int64)
+    try:
+        pairs = tuple((int(i), int(j)) for i, j in said["untouching"])
+    except (KeyError, TypeError, ValueError):
+        raise file.broken("the pairs that may touch are not described as they should be") from None
+    stitched = file.array(f"{_GROUP}/untouching_vertices", "i", (None, 2)).astype(np.int64)
+    numbers = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+    if ((numbers < 0) | (numbers >= owners)).any() or ((stitched < 0) | (stitched >= [vertices, triangles])).any():
+        raise file.broken("pairs that may touch name a body, vertex or triangle that is not there")
+    return pairs, stitched
