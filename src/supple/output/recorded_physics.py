@@ -16,6 +16,7 @@ from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.material import Elastic
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.output.checked_hdf5 import CheckedFile
+from supple.scene.contact_pairs import pair_table
 from supple.system import System
 
 NOT_KNOWN = 255
@@ -44,8 +45,8 @@ class RecordedPhysics:
 
     @property
     def has_known_energy(self) -> bool:
-        """Whether all that stores energy, but contact, is known here."""
-        return self.stitches == 0 and self.soft_targets == 0
+        """Whether tets and edges store all elastic energy."""
+        return self.stitches == 0
 
     def knows_law(self, body: int, tets: slice) -> bool:
         """Whether the elastic energy of a body can be computed."""
@@ -67,28 +68,58 @@ def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
             kind[part.tets], mu[part.tets], lam[part.tets] = rows.kind, rows.mu, rows.lam
     group = own.create_group("physics")
     group["kind"], group["mu"], group["lam"] = kind, mu, lam
-    group["untouching_vertices"] = _untouching_vertices(system)
+    group["stitched"], group["anchors"] = _stitched(system), _anchors(system)
     return {
         "laws": [law.__name__ for law in ELASTIC_MATERIALS],
         "compliances": compliances,
         "forces": len(system.forces),
         "soft_targets": len(system.soft_targets),
         "scripted_pins": sum(part.pin.motion is not None for part in system.pins),
-        "stitches": len(getattr(system.scene, "stitches", ())),
+        "stitches": len(system.stitching),
         "untouching": _untouching(system),
     }
 
 
 def _untouching(system: System) -> list[list[int]]:
     """Pairs that the scene lets pass through each other: numbers of bodies, then obstacles."""
-    _ = system
-    return []
+    collide = pair_table(system.scene).collide
+    obstacle = np.arange(len(collide)) >= len(system.bodies)
+    passing = np.argwhere(np.triu(~collide & ~(obstacle[:, None] & obstacle[None, :])))
+    return passing.tolist()
 
 
-def _untouching_vertices(system: System) -> NDArray[np.int64]:
-    """(k, 2) a vertex and a row of `system.triangles` that may touch, with all triangles of the vertex."""
-    _ = system
-    return np.zeros((0, 2), dtype=np.int64)
+def _stitched(system: System) -> NDArray[np.int64]:
+    """(k, 4) the vertices of each stitch, some of them twice where it has fewer; anchors count on from the bodies'."""
+    stitching = system.stitching
+    springs = stitching.springs.vertices
+    return np.concatenate([stitching.tets.vertices, springs[:, [0, 1, 2, 2]]]).astype(np.int64)
+
+
+def _anchors(system: System) -> NDArray[np.int64]:
+    """(a, 2) obstacle, and row of its recorded vertices, of what is stitched to obstacles."""
+    anchors = system.stitching.anchors
+    out = np.zeros((len(anchors), 2), dtype=np.int64)
+    for k, (owner, point) in enumerate(zip(anchors.owner, anchors.points, strict=True)):
+        surface = getattr(anchors.obstacles[owner], "surface")  # noqa: B009 (a TriangleObstacle: others have no vertices)
+        out[k] = owner, np.flatnonzero((surface.compact().vertices == point).all(axis=1))[0]
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Untouching:
+    """What the scene lets touch, or pass through each other.
+
+    Attributes
+    ----------
+    pairs : numbers of bodies, then obstacles
+    stitched : (k, 4) vertices of stitches: the first may touch the triangles that have all of the others. Numbers from
+        n on, n being that of all bodies' vertices, are anchors
+    anchors : (a, 2) obstacle, and row of its vertices
+    """
+
+    pairs: tuple[tuple[int, int], ...]
+    stitched: NDArray[np.int64]
+    anchors: NDArray[np.int64]
 
 
 def read_physics(file: CheckedFile, header: dict[str, Any], m: int) -> RecordedPhysics | None:
@@ -119,23 +150,28 @@ def read_physics(file: CheckedFile, header: dict[str, Any], m: int) -> RecordedP
 
 
 def read_untouching(
-    file: CheckedFile, header: dict[str, Any], owners: int, vertices: int, triangles: int
-) -> tuple[tuple[tuple[int, int], ...], NDArray[np.int64]]:
-    """Pairs of owners (bodies, then obstacles), and pairs of a vertex and a triangle (k, 2), that may touch.
+    file: CheckedFile, header: dict[str, Any], vertices: int, obstacle_vertices: list[int]
+) -> Untouching:
+    """What may touch, in a recording with so many vertices of bodies, and of each obstacle.
 
     Raises
     ------
-    OutputError : where they name something that is not there.
+    OutputError : where it names something that is not there.
     """
     said = header.get("physics")
     if said is None:
-        return (), np.zeros((0, 2), dtype=np.int64)
+        return Untouching((), np.zeros((0, 4), dtype=np.int64), np.zeros((0, 2), dtype=np.int64))
     try:
         pairs = tuple((int(i), int(j)) for i, j in said["untouching"])
     except (KeyError, TypeError, ValueError):
         raise file.broken("the pairs that may touch are not described as they should be") from None
-    stitched = file.array(f"{_GROUP}/untouching_vertices", "i", (None, 2)).astype(np.int64)
+    stitched = file.array(f"{_GROUP}/stitched", "i", (None, 4)).astype(np.int64)
+    anchors = file.array(f"{_GROUP}/anchors", "i", (None, 2)).astype(np.int64)
+    owners = len(header["bodies"]) + len(obstacle_vertices)
     numbers = np.array(pairs, dtype=np.int64).reshape(-1, 2)
-    if ((numbers < 0) | (numbers >= owners)).any() or ((stitched < 0) | (stitched >= [vertices, triangles])).any():
-        raise file.broken("pairs that may touch name a body, vertex or triangle that is not there")
-    return pairs, stitched
+    wrong = ((numbers < 0) | (numbers >= owners)).any()
+    wrong |= ((stitched < 0) | (stitched >= vertices + len(anchors))).any()
+    wrong |= any(not (0 <= i < len(obstacle_vertices) and 0 <= k < obstacle_vertices[i]) for i, k in anchors.tolist())
+    if wrong:
+        raise file.broken("what may touch names a body, obstacle or vertex that is not there")
+    return Untouching(pairs, stitched, anchors)

@@ -96,8 +96,7 @@ class Recording(Sequence[RecordedFrame]):
     rest_positions : (n, 3) [m]; masses : (n,) [kg]; tets : (m, 4); triangles : (t, 3); rest_volumes : (m,) [m^3]
     gravity : (3,) [m/s^2]; dt : time from frame to frame [s]
     physics : the bodies' laws and what acts on them, or None where an older version wrote the recording
-    untouching : pairs of numbers of bodies, then obstacles, that the scene lets pass through each other
-    untouching_vertices : (k, 2) pairs of a vertex and a row of triangles that may touch
+    untouching : what the scene lets touch, or pass through each other
     scene_text : the scene file's text, or None; solver : its description, or None; supple_version : of the writer
     """
 
@@ -128,8 +127,7 @@ class Recording(Sequence[RecordedFrame]):
         self.bodies: tuple[RecordedBody, ...] = read_bodies(file, header, n, m, self.triangles)
         self.obstacles: tuple[RecordedObstacle, ...] = read_obstacles(file, header)
         self.physics: RecordedPhysics | None = read_physics(file, header, m)
-        owners = len(self.bodies) + len(self.obstacles)
-        self.untouching, self.untouching_vertices = read_untouching(file, header, owners, n, len(self.triangles))
+        self.untouching = read_untouching(file, header, n, [len(obstacle.vertices) for obstacle in self.obstacles])
         self.dt = float(header["dt"])
         self.solver: str | None = header.get("solver")
         self.supple_version = str(header.get("supple_version", ""))

@@ -358,8 +358,8 @@ def test_vertices_that_may_touch_a_triangle_are_left_out(free, spoilt):
         x[vertex] = x[triangles[facing[0]]].mean(axis=0) - [1e-6, 0, 0]
         file[X][2 * n : 3 * n] = x
         if exempt:
-            del file["supple/physics/untouching_vertices"]
-            file["supple/physics/untouching_vertices"] = np.array([[vertex, facing[0]]])
+            del file["supple/physics/stitched"]
+            file["supple/physics/stitched"] = np.array([[vertex, *triangles[facing[0]]]])
 
     assert failures(spoilt(free, lambda file, n: touch(file, n, False)), only=["intersection"]) == {"intersection": 2}
     assert failures(spoilt(free, lambda file, n: touch(file, n, True)), only=["intersection"]) == {}
@@ -584,3 +584,35 @@ def test_the_checker_shares_no_code_with_the_solvers():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=100)
     assert done.stdout.strip() == "[]", done
+
+
+def test_what_the_scene_lets_touch_is_recorded(tmp_path):
+    cube = sp.shapes.box((1, 1, 1), (1, 1, 1))
+    rock = octahedron((0.5, 0.5, 2.5), 1.0)
+    scene = sp.Scene(
+        [
+            sp.Body("a", cube, JELLY),
+            sp.Body("b", cube, JELLY, position=(0.9, 0, 0)),
+            sp.Body("c", cube, JELLY, position=(0, 3, 0)),
+        ],
+        [sp.HalfSpace(name="floor", point=(0, -1, 0)), sp.TriangleObstacle(name="rock", surface=rock)],
+        contact_pairs=[sp.ContactPair("a", "b", collide=False), sp.ContactPair("c", "*", collide=False)],
+        stitches=[
+            sp.SoftVertexTriangleStitch("c", "a", pairs=[(0, 3)], youngs=1e3, poisson=0.3),
+            sp.VertexVertexStitch("b", "rock", pairs=[(1, 4)], stiffness=10.0),
+        ],
+        gravity=(0, 0, 0),
+    )
+    path = tmp_path / "r.vtkhdf"
+    with sp.read_recording(recorded(path, scene, sp.XPBD(substeps=2))) as recording:
+        said = recording.untouching
+        n = len(recording.rest_positions)
+        assert {(0, 1), (0, 2), (1, 2), (2, 2)} <= set(said.pairs)
+        assert not {(0, 0), (1, 1), (0, 3), (3, 4)} & set(said.pairs)
+        a = scene.bodies[0].mesh.surface.triangles[3]
+        assert [row.tolist() for row in np.sort(said.stitched)] == [[*sorted(a), 2 * n // 3], [n // 3 + 1, n, n, n]]
+        assert said.stitched[:, 0].tolist() == [2 * n // 3, n // 3 + 1]
+        np.testing.assert_array_equal(said.anchors, [[1, 4]])
+        assert recording.physics.stitches == 2
+    # a and b overlap, and may.
+    assert failures(path, only=CONTACT) == {}

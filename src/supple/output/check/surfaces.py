@@ -129,7 +129,7 @@ def surfaces_of(recording: Recording) -> Surfaces:
         vertex_owners=vertex_owners,
         first_vertex=first_vertex,
         allowed=_allowed(recording, nb, len(names)),
-        ignored=_ignored_keys(recording, all_triangles),
+        ignored=_ignored_keys(recording, all_triangles, {obstacle: row for obstacle, _, row in fixed}),
         fixed=tuple(fixed),
         points=row,
         pieces=_pieces(recording, all_triangles, owner, row),
@@ -148,17 +148,34 @@ def _allowed(recording: Recording, bodies: int, owners: int) -> NDArray[np.bool_
     """(p, p): what must stay apart: not obstacles from each other, nor what the scene excludes."""
     is_body = np.arange(owners) < bodies
     allowed = is_body[:, None] | is_body[None, :]
-    for i, j in recording.untouching:
+    for i, j in recording.untouching.pairs:
         allowed[i, j] = allowed[j, i] = False
     return allowed
 
 
-def _ignored_keys(recording: Recording, triangles: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Pairs of a vertex and a triangle that may touch, as pairs of triangles: all around the vertex, and that one."""
+def _ignored_keys(recording: Recording, triangles: NDArray[np.int64], first_rows: dict[int, int]) -> NDArray[np.int64]:
+    """Stitches as pairs of triangles that may meet: all around the stitched vertex, with those it is stitched to."""
+    said = recording.untouching
+    if len(said.stitched) == 0:
+        return np.zeros(0, dtype=np.int64)
+    number = np.concatenate(
+        [np.arange(len(recording.rest_positions)), [first_rows.get(int(i), 0) + int(k) for i, k in said.anchors]]
+    ).astype(np.int64)
+    order = np.argsort(triangles.ravel(), kind="stable")
+    corners = triangles.ravel()[order]
+
+    def around(vertex: np.int64) -> NDArray[np.int64]:
+        begin, end = np.searchsorted(corners, [vertex, vertex + 1])
+        return order[begin:end] // 3
+
     keys = [np.zeros(0, dtype=np.int64)]
-    for vertex, triangle in recording.untouching_vertices:
-        around = np.flatnonzero((triangles == vertex).any(axis=1))
-        keys.append(np.minimum(around, triangle) * len(triangles) + np.maximum(around, triangle))
+    for vertex, *others in number[said.stitched]:
+        second = around(others[0])
+        for other in others[1:]:
+            second = np.intersect1d(second, around(other))
+        first = around(vertex)
+        low, high = np.minimum(first[:, None], second), np.maximum(first[:, None], second)
+        keys.append((low * len(triangles) + high).ravel())
     return np.unique(np.concatenate(keys))
 
 
