@@ -36,6 +36,7 @@ app = App(
 COMMANDS = {
     "demo": "supple.cli.demo:demo",
     "run": "supple.cli.run:run",
+    "view": "supple.cli.view:view",
     "mesh": "supple.cli.mesh:mesh",
     "export": "supple.cli.export:export",
     "check": "supple.cli.check:check",

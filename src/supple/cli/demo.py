@@ -8,6 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from supple.cli.exit_codes import ExitCode
+from supple.cli.live import Host, Open, Port
 from supple.cli.numbers import Steps
 
 
@@ -23,6 +24,10 @@ def demo(
     page: bool = True,
     plot: bool = True,
     quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
+    live: Annotated[bool, Parameter(name="--live", negative="")] = False,
+    host: Host = "127.0.0.1",
+    port: Port = None,
+    open_: Open = True,
 ) -> int:
     """Run a named demo, record it, and measure what it claims.
 
@@ -46,6 +51,14 @@ def demo(
         Write plot.png: energies, momentum, volume ratio and smallest J over time.
     quiet
         Print no progress; only what was measured.
+    live
+        Nothing is recorded: show the scene in a browser while it runs, to be dragged and tuned, until Ctrl-C.
+    host
+        With --live: address to serve at; 0.0.0.0 is all of this machine's.
+    port
+        With --live: port to serve at; without it, 8080 or the next free one.
+    open_
+        With --live: open the page in a browser.
     """
     from rich.markup import escape
 
@@ -59,12 +72,19 @@ def demo(
             console.print(f"[bold]{known.name:<{width}}[/]  {escape(known.summary)}")
         return ExitCode.OK
 
-    from supple.cli.session import Products, run_session
-    from supple.cli.trace import traces
-
     chosen = find_demo(name)
     if solver is not None:
         chosen = chosen.on(solver)
+    if live:
+        from supple.cli.live import serve_page
+        from supple.viewer.live_source import LiveSource
+
+        serve_page(LiveSource(chosen.name, chosen.scene(), chosen.solver(solver), chosen.dt), host, port, open_)
+        return ExitCode.OK
+
+    from supple.cli.session import Products, run_session
+    from supple.cli.trace import traces
+
     used = chosen.solver(solver)
     measurement = chosen.measurement()
     if not quiet:

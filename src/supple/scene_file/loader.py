@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -74,8 +75,12 @@ def load_scene(path: str | Path) -> Scene:
     return run.scene
 
 
-def load_run(path: str | Path) -> Run:
+def load_run(path: str | Path, meshes: Callable[[Path], MeshStore] = MeshStore) -> Run:
     """The scene of a scene file, with its solver, timing and start.
+
+    Parameters
+    ----------
+    meshes : makes the store that reads the meshes, from the file's folder; `ConfinedMeshStore` reads nothing outside.
 
     Raises
     ------
@@ -87,7 +92,7 @@ def load_run(path: str | Path) -> Run:
     except ValidationError as error:
         raise complaint(document, error) from None
     try:
-        return replace(_built(model, MeshStore(Path(path).parent)), text=document.text)
+        return replace(_built(model, meshes(Path(path).parent)), text=document.text)
     except LocatedError as error:
         raise document.error(_blamed(document.data, error.keys, str(error)), str(error)) from None
 

@@ -95,24 +95,32 @@ class MeshStore:
         """The surface of a file or a shape, placed."""
         return self._once(source, lambda: self._surface(source))
 
+    def located(self, file: str) -> Path:
+        """The path of a mesh file that a scene names.
+
+        Raises
+        ------
+        SceneError : where it may not be read.
+        """
+        return self.folder / file
+
     def _read(self, source: MeshFileModel) -> TetMesh:
-        path = self.folder / source.file
         if source.is_surface():
             from supple.mesh.tetrahedralize import tetrahedralize
 
             with at("file"):
-                surface = SurfaceMesh.load(path)
+                surface = SurfaceMesh.load(self.located(source.file))
             if source.scale != 1.0:
                 surface = surface.transformed(source.scale)
             return tetrahedralize(surface, **source.meshing)
         with at("file"):
-            mesh = TetMesh.load(path)
+            mesh = TetMesh.load(self.located(source.file))
         return mesh if source.scale == 1.0 else mesh.transformed(source.scale)
 
     def _surface(self, source: SurfaceModel) -> SurfaceMesh:
         if source.file is not None:
             with at("file"):
-                surface = SurfaceMesh.load(self.folder / source.file)
+                surface = SurfaceMesh.load(self.located(source.file))
         else:
             assert source.shape is not None
             with at("shape"):

@@ -49,17 +49,18 @@ def is_loopback(host: str) -> bool:
 
 
 def require_free_port(host: str, port: int) -> None:
-    """Raise `OutputError` where nothing can listen at that port."""
-    if port == 0:
-        return
+    """Raise `OutputError` where nothing can listen at that host and port; port 0 is any that is free."""
     try:
         family, kind, protocol, _, place = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         with socket.socket(family, kind, protocol) as probe:
             if os.name == "posix":
                 probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # a port that was just given up is free
             probe.bind(place)
-    except OSError as error:
-        raise OutputError(f"cannot serve at {host}:{port} ({error.strerror or error}); choose another --port") from None
+    except (OSError, UnicodeError) as error:
+        mend = "choose another --port" if port else "choose another --host"
+        raise OutputError(
+            f"cannot serve at {host}, port {port} ({getattr(error, 'strerror', None) or error}); {mend}"
+        ) from None
 
 
 @dataclass(frozen=True)

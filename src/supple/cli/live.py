@@ -1,0 +1,38 @@
+"""A live page from the shell: where it is served, and to whom."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from supple.cli.numbers import whole_number
+from supple.viewer.live_source import LiveSource
+
+DEFAULT_PORT = 8080
+
+Host = Annotated[str, Parameter(name="--host")]
+Port = Annotated[int | None, Parameter(name="--port", converter=whole_number)]
+Open = Annotated[bool, Parameter(name="--open")]
+
+
+def serve_page(source: LiveSource | Path, host: str, port: int | None, open_browser: bool) -> None:
+    """Serve a live scene, or the recording at a path, until Ctrl-C.
+
+    Beyond this machine, the page's address holds a secret. A port that was asked for must be free; without one, 8080 or
+    the next free one above it is used.
+
+    Raises
+    ------
+    SuppleError : where the source cannot be shown, or nothing can be served there.
+    """
+    from supple.errors import OutputError
+    from supple.viewer.app import Address, serve
+    from supple.viewer.gate import is_loopback, new_token, require_free_port
+
+    if port is not None and not 0 <= port <= 65535:
+        raise OutputError(f"--port is {port}; give a number from 1 to 65535, or 0 for any free one")
+    require_free_port(host, port or 0)
+    token = None if is_loopback(host) else new_token()
+    serve(source, Address(host, DEFAULT_PORT if port is None else port, token), open_browser=open_browser)

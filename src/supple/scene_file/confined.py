@@ -1,0 +1,43 @@
+"""Meshes of scene files from elsewhere: nothing outside the file's own folder is read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from supple.errors import SceneError
+from supple.scene_file.mesh_sources import MeshStore
+from supple.scene_file.yaml_reader import shown
+
+LARGEST_FILE = 256 * 1024 * 1024
+
+
+class ConfinedMeshStore(MeshStore):
+    """Reads mesh files from one folder and those below it: no absolute path, no `..`, no link that leads out of it.
+
+    No file may be larger than `LARGEST_FILE` bytes, or be anything but a plain file.
+    """
+
+    def located(self, file: str) -> Path:
+        path = self.folder / file
+        self._require_inside(path, file)
+        # A TetGen mesh is several files of one stem, of which the scene names one.
+        for sibling in path.parent.glob(f"{_literal(path.stem)}.*") if path.parent.is_dir() else ():
+            self._require_inside(sibling, file)
+        return path
+
+    def _require_inside(self, path: Path, file: str) -> None:
+        try:
+            folder, real = self.folder.resolve(), path.resolve()
+            inside = real.is_relative_to(folder)
+            exists = real.exists()
+            plain = real.is_file() and real.stat().st_size <= LARGEST_FILE
+        except (OSError, ValueError, RuntimeError):
+            raise SceneError(f"{shown(file)} cannot be read") from None
+        if not inside or Path(file).is_absolute():
+            raise SceneError(f"{shown(file)} is outside the scene file's folder, where a live page reads nothing")
+        if exists and not plain:
+            raise SceneError(f"{shown(file)} is no plain file of at most {LARGEST_FILE // 2**20} MiB")
+
+
+def _literal(stem: str) -> str:
+    return "".join(f"[{c}]" if c in "*?[" else c for c in stem)

@@ -1,0 +1,112 @@
+"""`supple view` and `supple demo --live`: what is shown, where, and to whom."""
+
+import socket
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.cli.app import main
+from supple.cli.exit_codes import ExitCode
+from supple.viewer.live_source import LiveSource
+
+SCENE = """
+bodies:
+  - name: cube
+    shape: {kind: box, divisions: [1, 1, 1]}
+    material: {kind: stable_neo_hookean, youngs: 1e5, poisson: 0.4}
+    initial: {scale: [1, 0.5, 1]}
+solver: {kind: xpbd, substeps: 3}
+dt: 0.01
+"""
+
+
+@pytest.fixture
+def served(monkeypatch):
+    """What the page would have been asked to serve."""
+    calls = []
+
+    def serve(source, address, *, open_browser):
+        calls.append((source, address, open_browser))
+
+    monkeypatch.setattr("supple.viewer.app.serve", serve)
+    return calls
+
+
+@pytest.fixture
+def scene(tmp_path):
+    path = tmp_path / "cube.yaml"
+    path.write_text(SCENE)
+    return path
+
+
+def test_a_scene_file_is_shown_with_its_solver_time_step_and_deformed_start(scene, served):
+    assert main(["view", str(scene), "--no-open"]) == ExitCode.OK
+    [(source, address, open_browser)] = served
+    assert isinstance(source, LiveSource)
+    assert (source.title, source.dt, source.solver) == ("cube", 0.01, sp.XPBD(substeps=3))
+    assert np.ptp(source.initial_positions["cube"], axis=0) == pytest.approx([1, 0.5, 1])
+    assert (address.host, address.port, address.token) == ("127.0.0.1", 8080, None)
+    assert not open_browser
+
+
+def test_another_solver_can_be_chosen(scene, served):
+    assert main(["view", str(scene), "--solver", "implicit"]) == ExitCode.OK
+    assert isinstance(served[0][0].solver, sp.Implicit)
+    assert served[0][2]
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "::"])
+def test_beyond_this_machine_the_address_holds_a_secret_each_time_another(scene, served, host):
+    if host == "::" and not socket.has_ipv6:
+        pytest.skip("no IPv6")
+    for _ in range(2):
+        assert main(["view", str(scene), "--host", host, "--port", "0"]) == ExitCode.OK
+    tokens = {address.token for _, address, _ in served}
+    assert len(tokens) == 2
+    assert all(token is not None and len(token) >= 24 for token in tokens)
+
+
+def test_recordings_are_found_by_file_or_folder(tmp_path, served):
+    (tmp_path / "recording.vtkhdf").write_bytes(b"")
+    for path in (tmp_path, tmp_path / "recording.vtkhdf"):
+        assert main(["view", str(path)]) == ExitCode.OK
+        assert served[-1][0] == tmp_path / "recording.vtkhdf"
+    assert main(["view", str(tmp_path), "--solver", "xpbd"]) == ExitCode.INPUT
+
+
+def test_a_demo_is_shown_live_and_nothing_is_recorded(tmp_path, monkeypatch, served):
+    monkeypatch.chdir(tmp_path)
+    assert main(["demo", "squash", "--live", "--port", "0"]) == ExitCode.OK
+    assert main(["demo", "squash", "--live", "--solver", "implicit", "--no-open"]) == ExitCode.OK
+    (xpbd, address, opened), (implicit, _, closed) = served
+    assert (xpbd.title, address.port, opened, closed) == ("squash", 0, True, False)
+    assert isinstance(xpbd.solver, sp.XPBD)
+    assert isinstance(implicit.solver, sp.Implicit)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_cannot_be_shown_or_served_is_one_line(tmp_path, scene, served, capfd):
+    (tmp_path / "mesh.stl").write_text("solid")
+    outside = tmp_path / "inner" / "outside.yaml"
+    outside.parent.mkdir()
+    outside.write_text(SCENE.replace("shape: {kind: box, divisions: [1, 1, 1]}", "mesh: {file: ../mesh.stl}"))
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        taken = str(other.getsockname()[1])
+        for arguments in (
+            ["view", str(tmp_path / "missing.yaml")],
+            ["view", str(tmp_path / "mesh.stl")],
+            ["view", str(outside.parent)],
+            ["view", str(outside)],
+            ["view", str(scene), "--port", taken],
+            ["view", str(scene), "--port", "70000"],
+            ["view", str(scene), "--port", "http"],
+            ["view", str(scene), "--host", "192.0.2.1"],
+            ["view", str(scene), "--host", "no such host"],
+            ["demo", "teapot", "--live"],
+        ):
+            assert main(arguments) == ExitCode.INPUT, arguments
+            assert len(capfd.readouterr().err.splitlines()) == 1, arguments
+    assert served == []
