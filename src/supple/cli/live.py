@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from supple.cli.numbers import whole_number
-from supple.viewer.live_source import LiveSource
+
+if TYPE_CHECKING:
+    from supple.viewer.live_source import LiveSource
 
 DEFAULT_PORT = 8080
 
