@@ -48,3 +48,15 @@ def test_errors_are_relative_to_the_tip():
     assert relative_error(reference, reference) == 0.0
     off = np.hstack([rest, end + np.array([0, 0.05, 0])])
     assert relative_error(off, reference) == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("way", ["headless", "page"])
+def test_the_live_ball_is_simulated_with_and_without_its_page(way, monkeypatch, capsys):
+    from benchmarks import live_scene
+
+    monkeypatch.setattr(sys, "argv", ["live_scene.py", way, "12", "0.25"])
+    live_scene.main()
+    said = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert said["tets"] > 300
+    assert said["ms_per_frame"] > 0.0
+    assert ("real_time_ratio" in said) == (way == "page")

@@ -46,7 +46,8 @@ def test_a_scene_file_is_shown_with_its_solver_time_step_and_deformed_start(scen
     assert isinstance(source, LiveSource)
     assert (source.title, source.dt, source.solver) == ("cube", 0.01, sp.XPBD(substeps=3))
     assert np.ptp(source.initial_positions["cube"], axis=0) == pytest.approx([1, 0.5, 1])
-    assert (address.host, address.port, address.token) == ("127.0.0.1", 8080, None)
+    assert (address.host, address.token) == ("127.0.0.1", None)
+    assert address.port >= 8080
     assert not open_browser
 
 

@@ -16,7 +16,7 @@ from websockets.sync.client import connect
 
 from supple.errors import OutputError
 from supple.viewer import limits
-from supple.viewer.gate import Allowance, gate, is_loopback, new_token, require_free_port
+from supple.viewer.gate import Allowance, first_free_port, gate, is_loopback, new_token, require_free_port
 from supple.viewer.message_check import Malformed, is_wanted
 
 PROTOCOL = f"viser-v{viser.__version__}"
@@ -265,6 +265,13 @@ class TestPort:
             other.listen()
             with pytest.raises(OutputError, match="--port"):
                 require_free_port("127.0.0.1", other.getsockname()[1])
+
+    def test_without_one_asked_for_the_next_free_one_is_taken(self):
+        with socket.socket() as other:
+            other.bind(("127.0.0.1", 0))
+            other.listen()
+            taken = other.getsockname()[1]
+            assert taken < first_free_port("127.0.0.1", taken) <= taken + 19
 
     def test_a_host_that_is_not_this_machines_is_said(self):
         with pytest.raises(OutputError, match=r"192\.0\.2\.1"):

@@ -31,10 +31,11 @@ def serve_page(source: LiveSource | Path, host: str, port: int | None, open_brow
     """
     from supple.errors import OutputError
     from supple.viewer.app import Address, serve
-    from supple.viewer.gate import is_loopback, new_token, require_free_port
+    from supple.viewer.gate import first_free_port, is_loopback, new_token, require_free_port
 
     if port is not None and not 0 <= port <= 65535:
         raise OutputError(f"--port is {port}; give a number from 1 to 65535, or 0 for any free one")
     require_free_port(host, port or 0)
+    chosen = first_free_port(host, DEFAULT_PORT) if port is None else port
     token = None if is_loopback(host) else new_token()
-    serve(source, Address(host, DEFAULT_PORT if port is None else port, token), open_browser=open_browser)
+    serve(source, Address(host, chosen, token), open_browser=open_browser)

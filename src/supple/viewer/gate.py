@@ -7,6 +7,7 @@ is taken over here, and gets limits and a doorkeeper. A viser that starts its se
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import hmac
 import http
 import ipaddress
@@ -61,6 +62,21 @@ def require_free_port(host: str, port: int) -> None:
         raise OutputError(
             f"cannot serve at {host}, port {port} ({getattr(error, 'strerror', None) or error}); {mend}"
         ) from None
+
+
+def first_free_port(host: str, start: int, tries: int = 20) -> int:
+    """The first port from `start` on that can be listened at.
+
+    Raises
+    ------
+    OutputError : where none of `tries` can.
+    """
+    for port in range(start, start + tries - 1):
+        with contextlib.suppress(OutputError):
+            require_free_port(host, port)
+            return port
+    require_free_port(host, start + tries - 1)
+    return start + tries - 1
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,103 @@
+"""A served page with a live simulation behind it, and browsers that send anything: the simulation does not notice."""
+
+import contextlib
+import random
+import time
+
+import msgspec
+import numpy as np
+import pytest
+import viser
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+
+from supple.viewer.app import Address, opened_page
+from supple.viewer.engine import Engine
+from supple.viewer.messages import Pause, Play, Reset
+
+from .conftest import small_source
+from .test_gate import MALFORMED, camera
+
+PATIENCE = 60.0
+
+
+@pytest.fixture(scope="module")
+def page():
+    with opened_page(small_source(), Address(port=0)) as page:
+        yield page
+
+
+@pytest.fixture
+def engine(page):
+    engine = page.shown.desk.simulation
+    assert isinstance(engine, Engine)
+    engine.wait_for(engine.send(Reset()), PATIENCE)
+    return engine
+
+
+def dial(page):
+    url = f"ws://127.0.0.1:{page.server.get_port()}"
+    return connect(url, subprotocols=[f"viser-v{viser.__version__}"], max_size=None, open_timeout=PATIENCE)
+
+
+def until_frame(engine, frame):
+    end = time.monotonic() + PATIENCE
+    while (snapshot := engine.latest()).frame < frame:
+        assert engine.alive
+        assert time.monotonic() < end, "time stands still"
+        time.sleep(0.01)
+    return snapshot
+
+
+def test_malformed_messages_change_nothing_of_the_simulation(page, engine):
+    engine.send(Play())
+    until_frame(engine, 2)
+    for raw in MALFORMED.values():
+        with contextlib.suppress(ConnectionClosed), dial(page) as bad:
+            bad.send(raw)
+    played = until_frame(engine, engine.latest().frame + 5)
+    engine.wait_for(engine.send(Pause()), PATIENCE)
+    assert played.notices == ()
+    # It is the same simulation as without any browser: bit for bit.
+    import supple as sp
+
+    source = small_source()
+    *_, last = sp.simulate(source.scene, source.solver, source.dt, engine.latest().frame)
+    assert np.array_equal(engine.latest().positions, last.state.positions)
+
+
+def test_ten_tabs_that_never_read_and_vanish_hold_up_nothing(page, engine):
+    engine.send(Play())
+    tabs = [dial(page) for _ in range(10)]
+    for tab in tabs:
+        tab.send(camera())
+    until_frame(engine, 30)
+    for tab in tabs:
+        tab.socket.close()  # without a farewell
+    until_frame(engine, engine.latest().frame + 10)
+
+
+def test_well_formed_nonsense_for_every_input_of_the_panel_leaves_a_finite_state(page, engine):
+    engine.send(Play())
+    rng = random.Random(3)
+    nonsense = [-1, 0, 1, 7, 1e300, -1e300, 2**60, True, False, None, "", "x" * 2000, [], [1, 2], {}, {"a": [1]}, "1e5"]
+    uuids = list(page.server.gui._gui_input_handle_from_uuid)
+    assert len(uuids) > 10
+    with dial(page) as tab:
+        tab.send(camera())
+        for k in range(1000):
+            uuid = rng.choice([*uuids, "no such input"])
+            update = {"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": rng.choice(nonsense)}}
+            with contextlib.suppress(ConnectionClosed):
+                tab.send(msgspec.msgpack.encode(update))
+            if k % 100 == 0:
+                assert np.isfinite(engine.latest().positions).all()
+        tab.ping().wait(PATIENCE)
+    snapshot = engine.wait_for(engine.send(Pause()), PATIENCE)
+    assert engine.alive
+    assert np.isfinite(snapshot.positions).all()
+    frame = snapshot.frame
+    with dial(page) as tab:  # and the next visitor gets the page
+        assert tab.recv(timeout=PATIENCE)
+    engine.send(Play())
+    until_frame(engine, frame + 3)
