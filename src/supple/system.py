@@ -142,15 +142,6 @@ class System:
         return self.stitching.joined_components(self.components)
 
     @cached_property
-    def stitched_pairs(self) -> NDArray[np.int32]:
-        """(q, 2) pairs of vertices that are stitched to each other: contact between them is no contact.
-
-        A vertex stitched to a triangle makes three pairs, one with each corner. Numbers beyond the bodies' vertices are
-        vertices of obstacles, in the order of `stitching.anchors`.
-        """
-        return np.unique(self.stitching.joins(), axis=0)
-
-    @cached_property
     def inverse_masses(self) -> NDArray[np.float64]:
         """(n,) 1/m [1/kg], zero where a vertex is pinned."""
         w = 1.0 / self.masses

@@ -25,7 +25,7 @@ def contact_model(system: System, settings: Contact, shear_moduli: NDArray[np.fl
     """
     extended, obstacles = with_obstacles(system)
     table = pair_table(system.scene)
-    surface = contact_surface(extended, obstacles, table.collide, np.zeros((0, 2), dtype=np.int32))
+    surface = contact_surface(extended, obstacles, table.collide)
     start = np.concatenate([initial_state(system.scene).positions, obstacle_positions(obstacles, 0.0)])
     widest = largest_dhat(system)
     planes = Planes.of(surface, obstacles, table.collide, widest)

@@ -96,13 +96,17 @@ class Collisions:
         """Whether any two triangles cross at x."""
         import ipctk
 
-        return bool(ipctk.has_intersections(self.surface.mesh, self.points(x)))
+        stitched = self.surface.stitched
+        mesh = self.surface.mesh if stitched is None else stitched.without_neighbours
+        return bool(ipctk.has_intersections(mesh, self.points(x)))
 
     def _look(self, begin: NDArray[np.float64], end: NDArray[np.float64]) -> None:
         import ipctk
 
         candidates = ipctk.Candidates()
         candidates.build(self.surface.mesh, begin, end, self.dhat)
+        if self.surface.stitched is not None:
+            self.surface.stitched.drop_from(candidates)
         self._candidates = candidates
         self._box = np.minimum(begin, end), np.maximum(begin, end)
 

@@ -75,6 +75,7 @@ def with_obstacles(system: System) -> tuple[System, tuple[ObstacleRange, ...]]:
         rest_positions=np.ascontiguousarray(np.concatenate([system.rest_positions, added])),
         masses=np.concatenate([system.masses, light]),
         components=np.concatenate([system.components, pieces + np.arange(len(added), dtype=np.int32)]),
+        stitching=system.stitching.on_vertices({part.index: part.vertices for part in ranges}, n),
         pins=system.pins + tuple(ranges),  # pyright: ignore[reportArgumentType] - of a pin, vertices and targets are used
     )
     return extended, tuple(ranges)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_matrix, csc_matrix, csr_matrix
 
 from supple.implicit.contact.kinematic import ObstacleRange
+from supple.implicit.contact.stitched import StitchedContacts
 from supple.system import System
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ class ContactSurface:
     owner : (s,) which body, or len(bodies) + which obstacle, each belongs to
     areas : (s,) a third of the adjacent triangles' area at rest [m^2]
     body_count : how many of the owners are bodies; names : of all owners
+    stitched : what of the mesh does not collide because it is stitched together
     """
 
     mesh: ipctk.CollisionMesh
@@ -35,6 +37,7 @@ class ContactSurface:
     areas: NDArray[np.float64]
     body_count: int
     names: tuple[str, ...]
+    stitched: StitchedContacts | None
 
     def points(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Rows of x (n, 3) that the mesh has, in the memory layout that the library wants."""
@@ -63,14 +66,12 @@ def contact_surface(
     system: System,
     obstacles: tuple[ObstacleRange, ...],
     collide: NDArray[np.bool_],
-    stitched: NDArray[np.int32],
 ) -> ContactSurface:
     """Join the surfaces of a system whose obstacles are vertices (see `kinematic`).
 
     Parameters
     ----------
     collide : (p, p) which owners may touch, bodies before obstacles
-    stitched : (k, 2) pairs of vertices that may not
     """
     import ipctk
 
@@ -88,17 +89,16 @@ def contact_surface(
     faces = np.asfortranarray(number[triangles], dtype=np.int32)
     rest = np.asfortranarray(system.rest_positions[vertices])
     mesh = ipctk.CollisionMesh(rest, ipctk.edges(faces), faces)
-    mesh.can_collide = _filter(owner, len(system.bodies), collide, number[stitched])
+    mesh.can_collide = _filter(owner, len(system.bodies), collide)
+    stitched = StitchedContacts.of(mesh, np.append(number, -1)[system.stitching.nodes()])
     corners = rest[faces]
     doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     areas = np.bincount(faces.ravel(order="C"), weights=np.repeat(doubled / 6.0, 3), minlength=len(vertices))
     names = tuple(part.name for part in system.bodies) + tuple(str(o.name) for o in system.obstacles)
-    return ContactSurface(mesh, vertices, owner, areas.astype(np.float64), len(system.bodies), names)
+    return ContactSurface(mesh, vertices, owner, areas.astype(np.float64), len(system.bodies), names, stitched)
 
 
-def _filter(
-    owner: NDArray[np.int32], body_count: int, collide: NDArray[np.bool_], stitched: NDArray[np.int32]
-) -> ipctk.CollisionFilter:
+def _filter(owner: NDArray[np.int32], body_count: int, collide: NDArray[np.bool_]) -> ipctk.CollisionFilter:
     """Who may touch whom, built from the library's own filters: it asks them from many threads at once."""
     import ipctk
 
@@ -110,9 +110,6 @@ def _filter(
             if not collide[a, b]:
                 apart = _apart((owner == a) | (owner == b))
                 allowed = allowed & (apart if a == b else apart | ~other_owner)
-    if len(stitched):
-        pairs = {(int(min(p)), int(max(p))): False for p in stitched.tolist()}
-        allowed = allowed & ipctk.make_sparse_filter(pairs, True)
     return allowed
 
 

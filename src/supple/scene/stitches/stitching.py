@@ -6,7 +6,7 @@ anchors. They go where the obstacle goes, whatever pulls at them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -84,17 +84,36 @@ class Stitching:
         """(n + a, 3) the bodies' vertices x (n, 3), and the anchors at `time` [m]."""
         return np.concatenate([x, self.anchors.at(time)]) if len(self.anchors) else x
 
-    def elements(self) -> NDArray[np.int32]:
-        """(k, 4) tets, then springs, as solvers assemble them; -1 for a node that is no vertex of a body, or none."""
+    def nodes(self) -> NDArray[np.int32]:
+        """(k, 4) of tets, then springs: the vertex, and what it is stitched to; -1 where that has fewer corners."""
         springs = np.concatenate([self.springs.vertices, np.full((len(self.springs), 1), -1, np.int32)], axis=1)
         alone = springs[:, 1] == springs[:, 2]
         springs[alone, 2] = -1
-        both = np.concatenate([self.tets.vertices, springs])
-        return np.where(both < self.body_vertices, both, -1).astype(np.int32)
+        return np.concatenate([self.tets.vertices, springs]).astype(np.int32)
+
+    def elements(self) -> NDArray[np.int32]:
+        """(k, 4) the nodes as solvers assemble them; -1 for one that is no vertex of a body, too."""
+        nodes = self.nodes()
+        return np.where(nodes < self.body_vertices, nodes, -1).astype(np.int32)
+
+    def on_vertices(self, obstacle_vertices: Mapping[int, NDArray[np.int32]], count: int) -> Stitching:
+        """The same stitches where obstacles' vertices are among `count` vertices, those of bodies first.
+
+        Parameters
+        ----------
+        obstacle_vertices : by an obstacle's number, the number of each of its vertices
+        """
+        owned = zip(self.anchors.owner.tolist(), self.anchors.vertices.tolist(), strict=True)
+        numbers = [obstacle_vertices[owner][vertex] for owner, vertex in owned]
+        new = np.concatenate([np.arange(self.body_vertices, dtype=np.int32), np.array(numbers, dtype=np.int32)])
+        return replace(self._with_numbers(new), body_vertices=count, anchors=_anchors((), {}))
 
     def renumbered(self, new: NDArray[np.int32]) -> Stitching:
         """The same stitches of bodies whose vertices have new numbers (n,)."""
-        numbers = np.concatenate([new, self.body_vertices + np.arange(len(self.anchors), dtype=new.dtype)])
+        own = self.body_vertices + np.arange(len(self.anchors), dtype=new.dtype)
+        return self._with_numbers(np.concatenate([new, own]))
+
+    def _with_numbers(self, numbers: NDArray[np.int32]) -> Stitching:
         tets = replace(self.tets, vertices=np.ascontiguousarray(numbers[self.tets.vertices]))
         springs = replace(self.springs, vertices=np.ascontiguousarray(numbers[self.springs.vertices]))
         return replace(self, tets=tets, springs=springs)
