@@ -110,6 +110,7 @@ def test_a_good_recording_passes_everything_that_can_be_checked(free, around):
     report = sp.check_recording(around)
     assert (report.frames, report.frames_checked) == (FRAMES, FRAMES)
     assert report["energy"].said == "obstacles move, which does work"
+    assert (report["intersection"].worst, report["intersection"].frame) == (0.0, None)
     # The cube falls a few centimetres; the ball is nearest to it at the start, or the floor later.
     assert 0.0 < report["distance"].worst < 1.0
     assert report["inversion"].worst == pytest.approx(1.0, abs=1e-6)
@@ -193,7 +194,7 @@ def test_no_frame_that_can_be_computed_with(free, spoilt):
 
 def test_names_say_where(free, spoilt):
     report = sp.check_recording(spoilt(free, nan_position))
-    assert report["finite"].said == "numbers that are not finite: 1 (position of vertex 4 of left); in 1 frame, first 3"
+    assert report["finite"].said == "not finite: 1 number (position of vertex 4 of left); in 1 frame, first 3"
     assert (report["finite"].frame, report["finite"].time) == (3, pytest.approx(3 / 60))
 
 

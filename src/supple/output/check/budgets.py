@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.output.check.elastic_energy import elastic_energy
 from supple.output.check.frame_check import FrameCheck, Moment
 from supple.output.check.report import CheckResult
 from supple.output.check.settings import CheckSettings
@@ -150,7 +149,7 @@ class Energy(FrameCheck):
             self._why_not = "obstacles move, which does work"
         else:
             m, v = recording.masses, at.velocities
-            elastic = elastic_energy(at)
+            elastic = at.elastic_energy
             if elastic is None:
                 elastic = float(recording.series("elastic_energy")[at.number])
             moved = 0.5 * float(m @ np.einsum("ij,ij->i", v, v)) + elastic

@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from supple.materials.isotropic import element_energies
 from supple.numerics.threads import threads_for
-from supple.output.check.snapshot import Snapshot
+from supple.output.recording_reader import Recording
 
 _TETS_PER_THREAD = 5_000
 _EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 
 
-def elastic_energy(at: Snapshot) -> float | None:
-    """[J], zero at rest; None where the recording does not tell the law of a body."""
-    recording = at.scene.recording
+def elastic_energy(
+    recording: Recording,
+    x: NDArray[np.float64],
+    J: NDArray[np.float64],
+    rest_inverse: NDArray[np.float64],
+) -> float | None:
+    """[J], zero at rest; None where the recording does not tell the law of a body.
+
+    Parameters
+    ----------
+    x : (n, 3) positions [m]; J : (m,) determinants of F; rest_inverse : (m, 3, 3) Dm^-1 [1/m]
+    """
     physics = recording.physics
     if physics is None:
         return None
@@ -29,23 +39,22 @@ def elastic_energy(at: Snapshot) -> float | None:
             out = np.empty(len(tets))
             laws = physics.kind[body.tets].astype(np.int32), physics.mu[body.tets], physics.lam[body.tets]
             with threads_for(len(tets), _TETS_PER_THREAD):
-                element_energies(at.positions, tets, at.scene.rest_inverse[body.tets], volumes, *laws, out)
+                element_energies(x, tets, rest_inverse[body.tets], volumes, *laws, out)
             total += float(out.sum())
             continue
         if pair[0] > 0.0:
             edges = np.unique(np.sort(tets[:, _EDGES].reshape(-1, 2), axis=1), axis=0)
-            ends, rest = at.positions[edges], recording.rest_positions[edges]
+            ends, rest = x[edges], recording.rest_positions[edges]
             stretch = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1) - np.linalg.norm(rest[:, 0] - rest[:, 1], axis=1)
             total += 0.5 * float(stretch @ stretch) / pair[0]
         if pair[1] > 0.0:
-            change = (at.J[body.tets] - 1.0) * volumes
+            change = (J[body.tets] - 1.0) * volumes
             total += 0.5 * float(change @ change) / pair[1]
     return total
 
 
-def stiffness_scale(at: Snapshot) -> float:
+def stiffness_scale(recording: Recording) -> float:
     """An energy [J] that tells round-off of the elastic energy: of strains of a few percent everywhere."""
-    recording = at.scene.recording
     physics = recording.physics
     if physics is None:
         return 0.0

@@ -32,7 +32,7 @@ class Finite(FrameCheck):
 
     def __init__(self, scene: Scene, settings: CheckSettings) -> None:
         super().__init__(scene, settings)
-        self._tally = Tally(self.name)
+        self._tally = Tally(self.name, "numbers")
         recording = scene.recording
         for what in CONSTANTS:
             count = _bad_count(getattr(recording, what))
@@ -58,7 +58,7 @@ class Finite(FrameCheck):
             yield _bad_count(series[at.number]), f"recorded {name}"
 
     def result(self) -> CheckResult:
-        return self._tally.result("all numbers are finite", "numbers that are not finite: {worst}")
+        return self._tally.result("all numbers are finite", "not finite: {worst}")
 
 
 def _bad_count(values: NDArray[np.float64]) -> int:

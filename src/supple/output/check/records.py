@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from supple.output.check.elastic_energy import elastic_energy, stiffness_scale
 from supple.output.check.frame_check import FrameCheck
 from supple.output.check.report import CheckResult
 from supple.output.check.settings import CheckSettings
@@ -53,10 +52,10 @@ class Records(FrameCheck):
         said = recording.series("potential_energy")[k]
         yield abs(said - potential) / (heights + _NOTHING), "potential energy"
         if recording.physics is None or recording.physics.has_known_energy:
-            elastic = elastic_energy(at)
+            elastic = at.elastic_energy
             if elastic is not None:
                 said = recording.series("elastic_energy")[k]
-                yield abs(said - elastic) / (abs(elastic) + stiffness_scale(at) + _NOTHING), "elastic energy"
+                yield abs(said - elastic) / (abs(elastic) + self.scene.stiffness_scale + _NOTHING), "elastic energy"
         momentum = m @ v
         said = recording.series("linear_momentum")[k]
         speeds = np.linalg.norm(v, axis=1)

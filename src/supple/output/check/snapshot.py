@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.output.check.box_tree import build_tree, triangle_boxes
+from supple.output.check.elastic_energy import elastic_energy, stiffness_scale
 from supple.output.check.orientation import volume_signs
 from supple.output.check.surface_pairs import meeting_pairs
 from supple.output.check.surfaces import Surfaces, surfaces_of
@@ -43,6 +44,11 @@ class Scene:
         """Longest extent of the largest body at rest [m]."""
         rest = self.recording.rest_positions
         return max(float(np.ptp(rest[body.vertices], axis=0).max()) for body in self.recording.bodies)
+
+    @cached_property
+    def stiffness_scale(self) -> float:
+        """An energy [J] that round-off of the elastic energy is told by."""
+        return stiffness_scale(self.recording)
 
     def name_tet(self, row: int) -> str:
         """A tet as messages call it: its number within its body."""
@@ -95,6 +101,11 @@ class Snapshot:
         """(m,) their determinants, computed here."""
         a, b, c = self.F[:, :, 0], self.F[:, :, 1], self.F[:, :, 2]
         return np.einsum("ij,ij->i", a, np.cross(b, c))
+
+    @cached_property
+    def elastic_energy(self) -> float | None:
+        """[J], zero at rest; None where the recording does not tell the law of a body."""
+        return elastic_energy(self.scene.recording, self.positions, self.J, self.scene.rest_inverse)
 
     @cached_property
     def points(self) -> NDArray[np.float64]:

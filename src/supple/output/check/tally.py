@@ -7,6 +7,9 @@ from typing import Protocol
 
 from supple.output.check.report import CheckResult, Verdict
 
+# Units of numbers that count what is wrong.
+COUNTED = ("numbers", "pairs", "pieces")
+
 
 class InTime(Protocol):
     """A frame: its number and time [s]."""
@@ -34,17 +37,21 @@ class Tally:
         self.where = ""
         self.failed_frames = 0
         self.first_failure: int | None = None
+        self._last_failure: int | None = None
 
     def see(self, at: InTime | None, value: float, failed: bool, where: str | Callable[[], str] = "") -> None:
-        """Add what one frame gave; `at` is None for what belongs to no frame. Failures count as worse than others."""
+        """Add a number of a frame, None for what belongs to no frame; frames may come several times, one after the
+        other. Failures count as worse than others."""
         worse = self.worst is None or (value < self.worst if self._lowest else value > self.worst)
         if failed and self.failed_frames == 0:
             worse = True
-        if failed:
+        number = None if at is None else at.number
+        if failed and not (self.failed_frames and number == self._last_failure):
             self.failed_frames += 1
-            if self.first_failure is None and at is not None:
-                self.first_failure = at.number
-        elif self.failed_frames:
+            self._last_failure = number
+            if self.first_failure is None:
+                self.first_failure = number
+        if self.failed_frames and not failed:
             worse = False
         if worse:
             self.worst = float(value)
@@ -54,7 +61,11 @@ class Tally:
     def result(self, good: str, bad: str) -> CheckResult:
         """The result: `good` or `bad` says what the worst number means; `{worst}` stands for it."""
         failed = self.failed_frames > 0
-        number = "none" if self.worst is None else f"{self.worst:.6g}{' ' + self.unit if self.unit else ''}"
+        if self.worst == 0.0 and self.unit in COUNTED:
+            # Nothing was found in any frame: no frame is worse than another.
+            self.frame = self.time = None
+        unit = self.unit[:-1] if self.unit in COUNTED and self.worst == 1.0 else self.unit
+        number = "none" if self.worst is None else f"{self.worst:.6g} {unit}".rstrip()
         text = (bad if failed else good).replace("{worst}", number)
         if self.where:
             text += f" ({self.where})"
