@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -14,6 +16,7 @@ import pytest
 import supple as sp
 from supple.cli.app import main
 from supple.errors import OutputError
+from supple.output import check as check_package
 from supple.output.check.settings import NAMES
 from supple.output.recording import REPORT_NUMBERS, REPORT_VECTORS
 
@@ -580,11 +583,31 @@ def test_files_that_cannot_be_checked(free, tmp_path, capsys):
 def test_the_checker_shares_no_code_with_the_solvers():
     code = (
         "import sys, supple.output.check.checker\n"
-        "print([n for n in sys.modules if n.startswith(('supple.implicit', 'supple.xpbd', 'ipctk'))"
-        " or n in ('supple.numerics.cubic', 'supple.solver.step_filter')])"
+        "print([n for n in sys.modules if n.startswith(('supple.implicit', 'supple.xpbd', 'supple.numerics.cubic',"
+        " 'supple.mesh.surface_checks', 'ipctk'))])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=100)
     assert done.stdout.strip() == "[]", done
+    mine = Path(check_package.__file__).parent
+    known = re.compile(r"supple\.(output|errors|state|materials|numerics\.threads)\b")
+    for path in mine.glob("*.py"):
+        for name in re.findall(r"^\s*(?:from|import) (supple[\w.]*)", path.read_text(encoding="utf-8"), flags=re.M):
+            assert known.match(name), f"{path.name} imports {name}"
+
+
+def test_contact_that_never_intersects_passes(tmp_path):
+    cube = sp.shapes.box((1, 1, 1), (1, 1, 1))
+    scene = sp.Scene(
+        [
+            sp.Body("left", cube, JELLY, friction=0.3),
+            sp.Body("right", cube, JELLY, position=(1.05, 0.1, 0.2), velocity=(-4, 0, 0), friction=0.3),
+        ]
+    )
+    report = sp.check_recording(recorded(tmp_path / "r.vtkhdf", scene, sp.Implicit()))
+    assert {result.verdict for result in report.results if result.name != "obstacles"} == {"pass"}
+    # They did touch.
+    assert 0.0 < report["distance"].worst < 5e-3
+    assert report["distance"].frame > 0
 
 
 def test_what_the_scene_lets_touch_is_recorded(tmp_path):
