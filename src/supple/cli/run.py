@@ -19,6 +19,7 @@ def run(
     dt: Seconds = None,
     solver: str | None = None,
     trace: Path | None = None,
+    separate: Annotated[bool, Parameter(negative="")] = False,
     page: bool | None = None,
     plot: bool | None = None,
     quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
@@ -41,6 +42,8 @@ def run(
         Kind of solver, instead of the file's, with its default parameters.
     trace
         CSV file for every iteration of Newton's method; for the implicit solver.
+    separate
+        Move bodies apart that intersect at the start, where a small translation does it, and say which and how far.
     page
         Write index.html, which plays the recording in a browser; as the file says without this.
     plot
@@ -54,6 +57,10 @@ def run(
     from supple.scene_file.solvers import solver_of_kind
 
     described = load_run(scene)
+    if separate:
+        from supple.cli.separation import moved_apart
+
+        described = moved_apart(described)
     used = described.solver if solver is None else solver_of_kind(solver)
     return run_session(
         described.scene,

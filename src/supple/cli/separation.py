@@ -1,0 +1,33 @@
+"""`--separate`: bodies that intersect at the start are moved apart, and it is said which, and how far."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from supple.scene_file.loader import Run
+
+
+def moved_apart(described: Run) -> Run:
+    """The run with its bodies apart; prints each move, also where the shell is told to be quiet.
+
+    Raises
+    ------
+    SceneError : where a small translation does not separate them.
+    """
+    from rich.markup import escape
+
+    from supple.cli.console import shell_console
+    from supple.implicit.contact.separation import separate
+
+    console = shell_console()
+    separation = separate(described.scene, initial_positions=described.initial_positions)
+    said = [
+        "moved body {!r} by ({:.6g}, {:.6g}, {:.6g}) m".format(move.body, *(move.shift + 0.0))
+        for move in separation.moves
+    ]
+    for line in said or ["nothing was moved: no surfaces intersect"]:
+        console.print(escape(line))
+    text = described.text
+    if said and text is not None:
+        text = text.rstrip("\n") + "\n" + "".join(f"# supple run --separate {line}\n" for line in said)
+    return replace(described, scene=separation.scene, initial_positions=separation.initial_positions, text=text)

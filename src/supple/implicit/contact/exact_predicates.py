@@ -1,0 +1,106 @@
+"""On which side a point lies, without a wrong answer: a rounded determinant, and the exact one where that is in doubt.
+
+Source: Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates" (1997): the error
+bound of the first stage, then the whole determinant as a sum of numbers that do not overlap. Coordinates must be such
+that products of three of them neither overflow nor underflow.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+# (7 + 56 u) u with u = 2^-53: bound of the rounding error, relative to the sum of the products' magnitudes.
+_ERROR = (7.0 + 56.0 * 2.0**-53) * 2.0**-53
+# 6 permutations x 8 choices of a difference's two parts x 4 parts of a product of three.
+_PARTS = 192
+
+
+@njit
+def _two_sum(a, b):
+    s = a + b
+    t = s - a
+    return s, (a - (s - t)) + (b - t)
+
+
+@njit
+def _halves(a):
+    c = 134217729.0 * a
+    high = c - (c - a)
+    return high, a - high
+
+
+@njit
+def _two_product(a, b):
+    p = a * b
+    ah, al = _halves(a)
+    bh, bl = _halves(b)
+    return p, al * bl - (((p - ah * bh) - al * bh) - ah * bl)
+
+
+@njit
+def _add(parts, n, value):
+    """Add a number to a sum of n numbers that do not overlap, exactly; returns how many there are now."""
+    kept = 0
+    for i in range(n):
+        value, low = _two_sum(value, parts[i])
+        if low != 0.0:
+            parts[kept] = low
+            kept += 1
+    if value != 0.0:
+        parts[kept] = value
+        kept += 1
+    return kept
+
+
+@njit
+def _exact_sign(a, b, c, d):
+    """Sign of det[b - a, c - a, d - a]."""
+    high, low = np.empty((3, 3)), np.empty((3, 3))
+    for j in range(3):
+        for i, p in enumerate((b, c, d)):
+            high[i, j], low[i, j] = _two_sum(p[j], -a[j])
+    parts = np.empty(_PARTS)
+    n = 0
+    for k in range(3):
+        for turn in (1, 2):
+            sign = 1.0 if turn == 1 else -1.0
+            first, second, third = k, (k + turn) % 3, (k + 2 * turn) % 3
+            for u in (high[0, first], low[0, first]):
+                for v in (high[1, second], low[1, second]):
+                    p, q = _two_product(sign * u, v)
+                    for w in (high[2, third], low[2, third]):
+                        if w != 0.0:
+                            s, t = _two_product(p, w)
+                            n = _add(parts, _add(parts, n, t), s)
+                            s, t = _two_product(q, w)
+                            n = _add(parts, _add(parts, n, t), s)
+    if n == 0:
+        return 0
+    return 1 if parts[n - 1] > 0.0 else -1
+
+
+@njit
+def side_of_plane(a, b, c, d):
+    """Sign of det[b - a, c - a, d - a]: 1 where d is where a, b, c are counter-clockwise seen from, 0 in the plane."""
+    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+    wx, wy, wz = d[0] - a[0], d[1] - a[1], d[2] - a[2]
+    xy, yx, yz, zy, zx, xz = ux * vy, uy * vx, uy * vz, uz * vy, uz * vx, ux * vz
+    det = wx * (yz - zy) + wy * (zx - xz) + wz * (xy - yx)
+    size = abs(wx) * (abs(yz) + abs(zy)) + abs(wy) * (abs(zx) + abs(xz)) + abs(wz) * (abs(xy) + abs(yx))
+    if det > _ERROR * size:
+        return 1
+    if det < -_ERROR * size:
+        return -1
+    if size == 0.0:
+        # Every product is zero by itself: differences of float64 that are zero are so exactly.
+        return 0
+    return _exact_sign(a, b, c, d)
+
+
+@njit
+def side_of_line(a, b, c):
+    """Sign of det[b - a, c - a] in the plane: 1 where a, b, c are counter-clockwise."""
+    flat = (a[0], a[1], 0.0)
+    return side_of_plane(flat, (b[0], b[1], 0.0), (c[0], c[1], 0.0), (a[0], a[1], 1.0))
