@@ -82,7 +82,8 @@ class Collisions:
             share = self._candidates.compute_collision_free_stepsize(self.surface.mesh, begin, end, 0.0, self._ccd)
             if share < 1.0:
                 return (k + share) * length
-        return pieces * length
+        # A whole way must count as one: pieces * (1 / pieces) can be a little less.
+        return 1.0 if longest <= pieces * self._piece else pieces * length
 
     def smallest_distance(self, x: NDArray[np.float64]) -> float:
         """Between surfaces [m]; infinite where nothing is nearer than dhat."""
