@@ -4,15 +4,26 @@ import dataclasses
 import logging
 import math
 import random
+import signal
+import threading
+import time
+from collections import deque
 
 import numpy as np
 import pytest
 
+import supple as sp
 from supple.errors import CommandError, SolverError
 from supple.state import Status, StepReport
 from supple.viewer import limits
 from supple.viewer import messages as say
+from supple.viewer.command_queue import CommandQueue
+from supple.viewer.live_scene import LiveScene
+from supple.viewer.live_source import LiveSource
 from supple.viewer.pacing import Pacing
+from supple.viewer.simulation_loop import SimulationLoop
+
+from .conftest import Collected
 
 
 def with_solver_that(loop, step):
@@ -60,6 +71,49 @@ def test_a_step_that_fails_pauses_at_the_last_good_state_and_says_why(loop, fail
     loop.obey(say.Play())
     loop.step()
     assert loop.live.frame == 2
+
+
+def endless(state):
+    while True:
+        time.sleep(0.01)
+
+
+def test_a_step_that_does_not_end_is_given_up(loop):
+    loop.watch.longest = 0.2
+    loop.obey(say.Play())
+    good, solver = loop.live.state, loop.live.setup.solver
+    with_solver_that(loop, endless)
+    loop.step()
+    assert not loop.playing
+    assert loop.live.state is good
+    assert "given up after" in loop.notices[-1].text
+    loop.live.setup = dataclasses.replace(loop.live.setup, solver=solver)
+    loop.live.renew()
+    loop.step()
+    assert loop.live.frame == 1
+
+
+def test_who_asks_for_a_pause_does_not_wait_for_a_long_step(loop):
+    loop.watch.patience = 0.1
+    loop.obey(say.Play())
+    with_solver_that(loop, endless)
+    threading.Timer(0.2, loop.inbox.put, (1, say.Pause())).start()
+    loop.step()
+    assert "given up after" in loop.notices[-1].text
+    loop.turn(0.0)
+    assert loop.applied == 1
+    assert not loop.playing
+
+
+def test_ctrl_c_in_the_terminal_does_not_end_a_step(loop):
+    def interrupted(state):
+        signal.raise_signal(signal.SIGINT)
+        return state, StepReport(Status.CONVERGED, 1)
+
+    with_solver_that(loop, interrupted)
+    loop.step()
+    assert loop.notices == deque()
+    assert loop.live.frame == 1
 
 
 def test_what_cannot_be_done_becomes_a_notice_and_play_goes_on(loop):
@@ -179,7 +233,7 @@ HOSTILE = [
 ]
 
 
-def random_command(rng, bodies):
+def random_command(rng, bodies, solvers=("xpbd",)):
     """A command of any kind, with sensible or hostile values: None where it could not be made."""
     body = rng.choice([*bodies, "ghost"])
     point = tuple(rng.choice([rng.uniform(-2, 2), rng.uniform(-1e4, 1e4)]) for _ in range(3))
@@ -195,7 +249,7 @@ def random_command(rng, bodies):
             lambda: say.Step(rng.randint(1, 3)),
             lambda: say.Reset(),
             lambda: say.SetSpeed(rng.uniform(0.01, 1.0)),
-            lambda: say.SetSolver(rng.choice(["xpbd", "xpbd", "xpbd", "implicit"])),
+            lambda: say.SetSolver(rng.choice(solvers)),
             lambda: say.SetParameter(parameter.name, value, rng.choice([None, owner])),
             lambda: say.SetView(rng.choice([None, "J", "von_mises", "energy"]), rng.random() < 0.5, rng.random() < 0.5),
             lambda: say.Grab(rng.randint(0, 20), body, (rng.randint(0, 80),), (1.0,), point, 10 ** rng.uniform(-2, 2)),
@@ -229,10 +283,30 @@ def test_a_thousand_random_commands_leave_a_finite_state(loop, monkeypatch, capl
     monkeypatch.setattr(limits, "MOST_BODIES", 5)
     monkeypatch.setattr(limits, "MOST_TETS", 1500)
     rng = random.Random(20240229)
+    refused = play_with(loop, rng, 1000, ["xpbd"])
+    assert refused > 50
+    assert loop.live.generation > 20
+    # Nothing went wrong that was not foreseen: unforeseen exceptions are logged.
+    assert [record.message for record in caplog.records if record.levelname == "ERROR"] == []
+    assert loop.snapshot(0.0).measures.status in set(Status)
+
+
+def test_random_commands_to_the_implicit_solver_leave_a_finite_state(caplog):
+    rubber = sp.StableNeoHookean(youngs=1e5, poisson=0.3)
+    cube = sp.Body("cube", sp.shapes.box((0.4, 0.4, 0.4), (2, 2, 2)), rubber, position=(0, 0.3, 0))
+    source = LiveSource("cube", sp.Scene([cube], [sp.HalfSpace()]), sp.Implicit(max_substeps=4), 1 / 60)
+    loop = SimulationLoop(LiveScene(source), CommandQueue(), Collected())
+    loop.watch.longest = 0.2
+    play_with(loop, random.Random(5), 80, ["xpbd", "implicit"])
+    assert [record.message for record in caplog.records if record.levelname == "ERROR"] == []
+
+
+def play_with(loop, rng, count, solvers):
+    """Give random commands to a loop, one a turn. Returns how many could not even be made."""
     refused = 0
-    for number in range(1000):
+    for number in range(count):
         bodies = [part.name for part in loop.live.system.bodies]
-        command = random_command(rng, bodies)
+        command = random_command(rng, bodies, solvers)
         if command is None:
             refused += 1
         else:
@@ -243,8 +317,4 @@ def test_a_thousand_random_commands_leave_a_finite_state(loop, monkeypatch, capl
         assert np.isfinite(state.positions).all()
         assert np.isfinite(state.velocities).all()
         assert 1 <= len(bodies) <= 5
-    assert refused > 50
-    assert loop.live.generation > 20
-    # Nothing went wrong that was not foreseen: unforeseen exceptions are logged.
-    assert [record.message for record in caplog.records if record.levelname == "ERROR"] == []
-    assert loop.snapshot(0.0).measures.status in set(Status)
+    return refused

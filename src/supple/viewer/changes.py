@@ -22,10 +22,14 @@ from supple.viewer import limits
 from supple.viewer.grab_spring import make_spring
 from supple.viewer.live_scene import LiveScene
 from supple.viewer.new_bodies import check_room, free_name, new_body, place_for
+from supple.viewer.obstacle_distance import moved_out
 from supple.viewer.parameters import find_parameter
 from supple.viewer.pusher import Pusher
 from supple.viewer.snapshots import Value
 from supple.viewer.solvers import SOLVERS, kind_of, with_value
+
+# Of the mean edge: how far from obstacles vertices are when the implicit solver takes over.
+CLEARANCE = 1e-3
 
 
 @singledispatch
@@ -48,16 +52,26 @@ def _(command: say.Reset, live: LiveScene) -> None:
 def _(command: say.SetSolver, live: LiveScene) -> None:
     if kind_of(live.setup.solver) == command.kind:
         return
-    solver = live.solvers.get(command.kind) or SOLVERS[command.kind]()
-    before = live.setup
-    live.adopt(replace(before, solver=solver))
-    # Some things show only in the first step, such as tets that are inverted where the material has no energy.
-    try:
-        solver.step(live.system, live.state, live.setup.dt, live.workspace)
-    except Exception:
-        live.adopt(before)
-        raise
-    live.adopt(live.setup)  # the step that was tried has left its traces in the workspace
+    setup = replace(live.setup, solver=live.solvers.get(command.kind) or SOLVERS[command.kind]())
+    if command.kind == "xpbd":
+        live.adopt(setup)
+    else:
+        live.adopt_tried(setup, clear_of_obstacles(live))
+
+
+def clear_of_obstacles(live: LiveScene) -> State | None:
+    """The state with all vertices a little off the obstacles, for a solver that knows no touching; None: as it is.
+
+    XPBD leaves vertices right on an obstacle, or a little inside. A thousandth of an edge is enough to begin with.
+    """
+    system, state = live.system, live.state
+    gap = CLEARANCE * float(system.rest_lengths.mean())
+    x = state.positions
+    free = np.setdiff1d(np.arange(len(x)), system.pinned_vertices)
+    moved = x.copy()
+    for obstacle in system.obstacles:
+        moved[free] = moved_out(obstacle, moved[free], state.time, gap)
+    return None if np.array_equal(moved, x) else replace(state, positions=moved, memory=None)
 
 
 @change.register
@@ -65,7 +79,7 @@ def _(command: say.SetParameter, live: LiveScene) -> None:
     setup, scene = live.setup, live.setup.scene
     match find_parameter(command.name).owner:
         case "solver":
-            live.adopt(replace(setup, solver=with_value(setup.solver, command.name, command.value)))
+            live.adopt_tried(replace(setup, solver=with_value(setup.solver, command.name, command.value)))
         case "scene" if command.name == "dt":
             live.adopt(replace(setup, dt=float(command.value)))
         case "scene":
@@ -188,7 +202,7 @@ def _(command: say.MovePusher, live: LiveScene) -> None:
     if pusher is not None and pusher.radius == command.radius:
         pusher.wanted[:] = command.center
         return
-    live.adopt(replace(live.setup, pusher=Pusher(np.array(command.center), command.radius)))
+    live.adopt_tried(replace(live.setup, pusher=Pusher(np.array(command.center), command.radius)))
 
 
 @change.register
@@ -211,7 +225,7 @@ def _(command: say.Squash, live: LiveScene) -> None:
     x, v = live.state.positions.copy(), live.state.velocities.copy()
     x[rows] = flattened(x[rows], live.up, command.factor)
     v[rows] = 0.0
-    live.adopt(live.setup, State(live.state.time, x, v))
+    live.adopt_tried(live.setup, State(live.state.time, x, v))
 
 
 def flattened(points: NDArray[np.float64], up: NDArray[np.float64], factor: float) -> NDArray[np.float64]:
@@ -258,7 +272,7 @@ def _add(live: LiveScene, body: Body) -> None:
         np.concatenate([live.state.positions, alone.positions]),
         np.concatenate([live.state.velocities, alone.velocities]),
     )
-    live.adopt(replace(live.setup, scene=grown, added=live.setup.added | {body.name}), state)
+    live.adopt_tried(replace(live.setup, scene=grown, added=live.setup.added | {body.name}), state)
 
 
 @change.register

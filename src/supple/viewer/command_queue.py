@@ -73,6 +73,11 @@ class CommandQueue:
             self._places.clear()
             return taken
 
+    def holds(self, *kinds: type[Command]) -> bool:
+        """Whether a command of one of those kinds waits."""
+        with self._changed:
+            return any(isinstance(command, kinds) for _, command in self._waiting)
+
     def close(self) -> None:
         """Wake whoever waits; nothing will come any more."""
         with self._changed:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.scene.obstacles import Box, HalfSpace, Obstacle, Sphere, TriangleObstacle
+from supple.scene.obstacles import TriangleObstacle
 from supple.system import System
 from supple.viewer import limits
+from supple.viewer.obstacle_distance import signed_distance
 
 # Of the mean edge of the surfaces: what counts as touching.
 NEAR = 0.1
@@ -21,7 +22,7 @@ def contact_points(system: System, positions: NDArray[np.float64], time: float) 
     """
     near = NEAR * _mean_edge(system)
     skin = np.unique(system.triangles)
-    points = [positions[skin][_distance(obstacle, positions[skin], time) < near] for obstacle in system.obstacles]
+    points = [positions[skin][signed_distance(obstacle, positions[skin], time) < near] for obstacle in system.obstacles]
     points.append(_between_surfaces(system, positions, time, near))
     found = np.concatenate([np.zeros((0, 3)), *points])
     stride = -(-len(found) // limits.MOST_CONTACT_POINTS)
@@ -31,26 +32,6 @@ def contact_points(system: System, positions: NDArray[np.float64], time: float) 
 def _mean_edge(system: System) -> float:
     a, b = system.rest_positions[system.triangles[:, :2]].transpose(1, 0, 2)
     return float(np.linalg.norm(a - b, axis=1).mean())
-
-
-def _distance(obstacle: Obstacle, points: NDArray[np.float64], time: float) -> NDArray[np.float64]:
-    """(k,) signed distance of points (k, 3) from an obstacle's surface [m]; infinite from triangle obstacles."""
-    R, t = obstacle.pose(time)
-    local = (points - t) @ R
-    match obstacle:
-        case HalfSpace():
-            normal = np.asarray(obstacle.normal)
-            return (local - np.asarray(obstacle.point)) @ (normal / np.linalg.norm(normal))
-        case Sphere():
-            distance = np.linalg.norm(local - np.asarray(obstacle.center), axis=1) - obstacle.radius
-        case Box():
-            beyond = np.abs((local - np.asarray(obstacle.center)) @ obstacle.orientation) - 0.5 * np.asarray(
-                obstacle.size
-            )
-            distance = np.linalg.norm(np.maximum(beyond, 0.0), axis=1) + np.minimum(beyond.max(axis=1), 0.0)
-        case _:
-            return np.full(len(points), np.inf)
-    return -distance if obstacle.inside else distance
 
 
 def _between_surfaces(system: System, positions: NDArray[np.float64], time: float, near: float) -> NDArray[np.float64]:

@@ -20,6 +20,8 @@ COARSEST, FINEST = 3, 24  # edges across the shape
 # Of time.
 SLOWEST_MOTION, FASTEST_MOTION = 0.01, 1.0
 MOST_STEPS = 1_000  # of one Step command
+# A step that takes longer is given up; where somebody asks to pause or reset meanwhile, after the second time [s].
+LONGEST_STEP, LONGEST_STEP_WHEN_ASKED = 20.0, 1.0
 FRAMES_PER_SECOND = 60.0  # snapshots that leave the simulation
 
 # Squash and stretch, as a factor of the present height.

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.errors import SolverError
 from supple.scene.forces import SoftTarget
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
@@ -19,6 +20,7 @@ from supple.state import State, Status, StepReport
 from supple.system import System, initial_state
 from supple.viewer.grab_spring import GrabSpring
 from supple.viewer.live_source import LiveSource
+from supple.viewer.new_bodies import with_room
 from supple.viewer.pusher import Pusher
 from supple.viewer.solvers import kind_of
 
@@ -117,6 +119,32 @@ class LiveScene:
         }
         self.solvers[kind_of(setup.solver)] = setup.solver
 
+    def adopt_tried(self, setup: Setup, state: State | None = None, anchors: Anchors | None = None) -> None:
+        """The same, for changes after which a solver that never lets surfaces meet might not be able to take a step.
+
+        Raises
+        ------
+        SuppleError : where the first step would fail; nothing is changed then.
+        """
+        before = dict(vars(self))
+        self.adopt(setup, state, anchors)
+        if kind_of(setup.solver) == "xpbd":  # goes on from anywhere
+            return
+        try:
+            _, report = setup.solver.step(self.system, self.state, setup.dt, self.workspace)
+            if not report.status.can_go_on:
+                raise SolverError(
+                    f"the solver {kind_of(setup.solver)} cannot go on from there: {report.message or report.status}"
+                )
+        except BaseException:
+            vars(self).update(before)
+            raise
+        self.renew()  # the step that was tried has left its traces
+
+    def renew(self) -> None:
+        """Prepare the workspace anew, after a step that was tried, or given up."""
+        self.workspace = self.setup.solver.prepare(self.system)
+
     def step(self) -> StepReport:
         """Simulate one frame. Where that fails, the state stays as it was, and the report says why."""
         setup = self.setup
@@ -124,9 +152,10 @@ class LiveScene:
             setup.pusher.begin_step(self.state.time, setup.dt)
         for spring in setup.grabs.values():
             spring.pull(self.body_positions(spring.command.body), self._anchors[spring.soft_target])
-        state, report = setup.solver.step(self.system, self.state, setup.dt, self.workspace)
-        if report.status.can_go_on and not _is_finite(state):
-            report = StepReport(Status.NOT_FINITE, report.iterations, "a position or velocity is not finite")
+        state, report = self._stepped()
+        if not report.status.can_go_on and setup.pusher is not None and setup.pusher.moves:
+            setup.pusher.stay()  # where it cannot press any further
+            state, report = self._stepped()
         self.report = report
         if report.status.can_go_on:
             self.state = state
@@ -135,12 +164,22 @@ class LiveScene:
                 setup.pusher.end_step()
         return report
 
+    def _stepped(self) -> tuple[State, StepReport]:
+        state, report = self.setup.solver.step(self.system, self.state, self.setup.dt, self.workspace)
+        if report.status.can_go_on and not _is_finite(state):
+            report = StepReport(Status.NOT_FINITE, report.iterations, "a position or velocity is not finite")
+        return state, report
+
     def reset(self) -> None:
-        """Back to the start, with the bodies that are there now, and the parameters and solver as they are."""
+        """Back to the start, with the bodies that are there now, and the parameters and solver as they are.
+
+        Bodies that were added stay where they were added; where another one has its start there, they move above all.
+        """
         names = {body.name for body in self.setup.scene.bodies}
         scene = replace(self.setup.scene, pins=tuple(pin for pin in self.pins if pin.body in names))
         starts = {name: start for name, start in self.starts.items() if name in names}
-        self.adopt(
+        scene = with_room(scene, self.setup.added, starts, self.up)
+        self.adopt_tried(
             Setup(scene, self.setup.solver, self.setup.dt, added=self.setup.added),
             initial_state(scene, starts),
             anchors={},

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,3 +77,29 @@ def check_room(scene: Scene, mesh: TetMesh) -> None:
         raise CommandError(
             f"that would make {total} tets; a live page has at most {limits.MOST_TETS}: lower the resolution"
         )
+
+
+def with_room(
+    scene: Scene, added: frozenset[str], starts: Mapping[str, NDArray[np.float64]], up: NDArray[np.float64]
+) -> Scene:
+    """The scene with those of its `added` bodies that would start inside another one's box placed above everything.
+
+    Parameters
+    ----------
+    starts : by body name, (n, 3) of bodies that do not start as they are placed [m]
+    """
+    places = [starts.get(body.name, body.place(body.mesh.vertices)) for body in scene.bodies if body.name not in added]
+    bodies = []
+    for body in scene.bodies:
+        if body.name in added:
+            place = body.place(body.mesh.vertices)
+            if any(_boxes_meet(place, other) for other in places):
+                body = replace(body, position=place_for(body.mesh, None, np.concatenate(places), up))
+                place = body.place(body.mesh.vertices)
+            places.append(place)
+        bodies.append(body)
+    return replace(scene, bodies=bodies)
+
+
+def _boxes_meet(a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
+    return bool(np.all(a.min(axis=0) <= b.max(axis=0)) and np.all(b.min(axis=0) <= a.max(axis=0)))

@@ -45,6 +45,15 @@ class Pusher:
         self._times = time, time + dt
         self._ends = self.center, self.center + way
 
+    @property
+    def moves(self) -> bool:
+        """Whether it moves in the step that was begun."""
+        return not np.array_equal(*self._ends)
+
+    def stay(self) -> None:
+        """Not to move in the step that was begun."""
+        self._ends = self.center, self.center
+
     def end_step(self) -> None:
         """Stand where the step has led to."""
         self.center = self._ends[1]

@@ -22,6 +22,7 @@ from supple.viewer.live_scene import LiveScene
 from supple.viewer.outbox import Outbox
 from supple.viewer.pacing import Pacing
 from supple.viewer.snapshots import Notice, Snapshot
+from supple.viewer.step_watch import StepWatch
 from supple.viewer.tet_values import tet_values
 
 logger = logging.getLogger(__name__)
@@ -45,6 +46,9 @@ class SimulationLoop:
         self.speed = 1.0
         self.view = say.SetView()
         self.pacing = Pacing()
+        self.watch = StepWatch(
+            limits.LONGEST_STEP, lambda: inbox.holds(say.Pause, say.Reset), limits.LONGEST_STEP_WHEN_ASKED
+        )
         self.applied = 0
         self.notices: deque[Notice] = deque(maxlen=NOTICES_KEPT)
         self._before: State = live.state
@@ -91,7 +95,8 @@ class SimulationLoop:
                 case say.SetView():
                     self.view = command
                 case _:
-                    change(command, self.live)
+                    with self.watch.limited():
+                        change(command, self.live)
                     self._before = self.live.state
         except (SuppleError, MemoryError) as error:
             self.tell("error", _one_line(error))
@@ -104,13 +109,16 @@ class SimulationLoop:
         began = time.perf_counter()
         before = self.live.state
         try:
-            report = self.live.step()
+            with self.watch.limited():
+                report = self.live.step()
             failed = "" if report.status.can_go_on else f"{report.status}: {report.message}"
         except (SuppleError, ArithmeticError, MemoryError) as error:
             failed = _one_line(error)
         except Exception as error:
             logger.exception("a step failed")
             failed = f"{type(error).__name__}: {_one_line(error)}"
+        if failed:
+            self.live.renew()
         now = time.perf_counter()
         self.steps_left = max(0, self.steps_left - 1)
         self._fresh = True

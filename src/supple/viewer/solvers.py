@@ -20,7 +20,8 @@ def _xpbd() -> Solver:
 def _implicit() -> Solver:
     from supple.implicit.solver import Implicit
 
-    return Implicit()
+    # A step that would take hundreds of iterations is one that nobody at a page waits for.
+    return Implicit(max_substeps=8)
 
 
 SOLVERS: dict[str, Callable[[], Solver]] = {"xpbd": _xpbd, "implicit": _implicit}
