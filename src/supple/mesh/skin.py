@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import MeshError
@@ -72,10 +73,20 @@ class Embedding:
         x = np.asarray(positions, dtype=np.float64)
         if x.shape != (self.vertex_count, 3):
             raise MeshError(f"Embedding: positions have shape {x.shape}; they must have shape ({self.vertex_count}, 3)")
-        out = self.weights[:, 0, None] * x[self.corners[:, 0]]
-        for k in range(1, 4):
-            out += self.weights[:, k, None] * x[self.corners[:, k]]
-        return out
+        return mixed(self.corners, self.weights, np.ascontiguousarray(x))
+
+
+@njit(cache=True, error_model="numpy")
+def mixed(corners, weights, x):
+    """Points (k, 3), each the mixture by `weights` (k, 4) of the rows `corners` (k, 4) of x (n, 3)."""
+    out = np.empty((len(corners), 3))
+    for i in range(len(corners)):
+        a, b, c, d = corners[i]
+        for k in range(3):
+            out[i, k] = (
+                weights[i, 0] * x[a, k] + weights[i, 1] * x[b, k] + weights[i, 2] * x[c, k] + weights[i, 3] * x[d, k]
+            )
+    return out
 
 
 def _containing_tets(mesh: TetMesh, points: NDArray[np.float64]) -> NDArray[np.int64]:

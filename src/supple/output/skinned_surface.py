@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.mesh.skin import mixed
+
 
 @dataclass(frozen=True, eq=False)
 class SkinnedSurface:
@@ -25,7 +27,4 @@ class SkinnedSurface:
 
     def positions(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Where the surface's vertices (k, 3) are when the body's are at x (n, 3) [m]."""
-        out = self.weights[:, 0, None] * x[self.corners[:, 0]]
-        for a in range(1, 4):
-            out += self.weights[:, a, None] * x[self.corners[:, a]]
-        return out
+        return mixed(self.corners, self.weights, np.ascontiguousarray(x, dtype=np.float64))

@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 from supple.output.drawing import View
 
 ANGLE = 35.0  # of the camera, upwards [degrees]
+_ROOM = 1.2
 PRESETS = ("corner", "front", "side", "top")
 
 
 def eye_of(preset: str, view: View) -> NDArray[np.float64]:
     """Where the camera stands (3,) [m] so that everything is seen."""
-    corner = view.eye(ANGLE)
+    # A little farther away than everything fills the picture: things are thrown about.
+    corner = view.center + _ROOM * (view.eye(ANGLE) - view.center)
     if preset == "corner":
         return corner
     offset = corner - view.center

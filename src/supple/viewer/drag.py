@@ -65,6 +65,7 @@ class Mouse:
                 _BACKDROP,
                 radius=60.0 * view.radius,
                 opacity=0.0,
+                wireframe=True,  # lines that nobody sees cost less than faces that nobody sees
                 side="double",
                 position=tuple(view.center),
                 cast_shadow=False,

@@ -61,7 +61,7 @@ class Translator:
             tuple(_obstacle(obstacle) for obstacle in scene.obstacles),
             np.concatenate([body.rest_positions for body in scene.bodies]),
             np.ascontiguousarray(tets, dtype=np.int32),
-            View(np.asarray(scene.low), np.asarray(scene.high), np.asarray(scene.up)),
+            _view_of(scene),
             np.asarray(scene.stitches).reshape(-1, 4),
         )
 
@@ -75,6 +75,19 @@ class Translator:
             held = Embedding.of(TetMesh(body.rest_positions, body.tets), vertices)
             self._skins[key] = SkinnedSurface(held.corners, held.weights, np.asarray(triangles, dtype=np.int32))
         return self._skins[key]
+
+
+def _view_of(scene: SceneDescription) -> View:
+    """About the bodies as they start, and down to the floor if it is not far below them."""
+    low, high, up = np.asarray(scene.low), np.asarray(scene.high), np.asarray(scene.up)
+    bodies = View(low, high, up)
+    for obstacle in scene.obstacles:
+        if obstacle.kind == "HalfSpace" and float(np.dot(obstacle.shape["normal"], up)) > 0.99:
+            below = float((bodies.center - np.asarray(obstacle.shape["point"])) @ up)
+            if 0.0 < below < 4.0 * bodies.radius:
+                floor = bodies.center - below * up
+                low, high = np.minimum(low, floor), np.maximum(high, floor)
+    return View(low, high, up)
 
 
 def _fingerprint(values: NDArray[np.float64]) -> int:

@@ -38,6 +38,8 @@ class Replay:
         self._moments: OrderedDict[int, Moment] = OrderedDict()
         # HDF5 is read by one thread at a time.
         self._reading = threading.Lock()
+        # Time runs by itself, or a visitor moves it.
+        self._turn = threading.RLock()
         self._end = threading.Event()
         self.stage = Stage(server, self.moment(0), options or ViewOptions())
         times = recording.times
@@ -112,10 +114,11 @@ class Replay:
     def _seek(self, event: Any) -> None:
         """A visitor has moved the slider; what moves by itself while playing comes without one."""
         if event.client is not None:
-            if self.playing:
-                self._toggle()
-            times = self._recording.times
-            self.show(number(self.slider.value, float(times[0]), float(times[-1])))
+            with self._turn:
+                if self.playing:
+                    self._toggle()
+                times = self._recording.times
+                self.show(number(self.slider.value, float(times[0]), float(times[-1])))
 
     def _run(self) -> None:
         before = time.monotonic()
@@ -123,13 +126,14 @@ class Replay:
             now = time.monotonic()
             passed, before = now - before, now
             times = self._recording.times
-            if self.playing and self._pace.may_send():
-                following = self._time + passed * number(self.speed.value, _SLOWEST, _FASTEST)
-                if following > times[-1]:
-                    following = float(times[0])
-                with self._pace.sending():
-                    self.show(following)
-                    self.slider.value = float(self._recording.times[self.frame_at(following)])
+            with self._turn:
+                if self.playing and self._pace.may_send():
+                    following = self._time + passed * number(self.speed.value, _SLOWEST, _FASTEST)
+                    if following > times[-1]:
+                        following = float(times[0])
+                    with self._pace.sending():
+                        self.show(following)
+                        self.slider.value = float(times[self.frame_at(following)])
 
     def _facts(self, shown: int) -> str:
         recording = self._recording

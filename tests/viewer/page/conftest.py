@@ -114,8 +114,13 @@ class Visitor:
         import viser
         from websockets.sync.client import connect
 
+        self.taken = 0  # messages
+
         self.line = connect(
-            f"ws://127.0.0.1:{port}/{query}", subprotocols=[f"viser-v{viser.__version__}"], max_size=None
+            f"ws://127.0.0.1:{port}/{query}",
+            subprotocols=[f"viser-v{viser.__version__}"],
+            max_size=None,
+            close_timeout=0.5,
         )
         if reads:
             threading.Thread(target=self._read, daemon=True).start()
@@ -179,7 +184,7 @@ class Visitor:
 
         with contextlib.suppress(ConnectionClosed):
             for _ in self.line:
-                pass
+                self.taken += 1
 
 
 def _plain(point) -> list[float]:
@@ -227,3 +232,104 @@ def live(server, made_up):
     page = LivePage(server, made_up, made_up.snapshot)
     yield page
     page.stop()
+
+
+class Screen:
+    """A browser that looks at a page, and what a person does there.
+
+    Attributes
+    ----------
+    tab : Playwright's page; server : viser's
+    """
+
+    def __init__(self, browser, pixels, url: str, server) -> None:
+        self._pixels, self.server = pixels, server
+        self.errors: list[str] = []
+        self.tab = browser.new_page(viewport={"width": 720, "height": 420})
+        self.tab.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.tab.on("console", self._hear)
+        self.tab.goto(url)
+        self.tab.wait_for_selector("canvas", timeout=30_000)
+        # Software OpenGL is told of in a corner, in the color of a body.
+        self.tab.locator(".mantine-Notification-closeButton").first.click()
+        self.wait(lambda: server.get_clients(), "the browser as a visitor")
+
+    def wait(self, holds, what: str, seconds: float = 90.0):
+        """Wait until something holds, while the browser goes on."""
+        end = time.monotonic() + seconds
+        while not (found := holds()):
+            if time.monotonic() > end:
+                self.tab.screenshot(path="screenshot-of-failure.png")
+                raise AssertionError(f"{what} did not come within {seconds:g} s")
+            self.tab.wait_for_timeout(50)
+        return found
+
+    def _hear(self, said) -> None:
+        # A slider's own complaint about its keys, in React's event listeners.
+        if said.type == "error" and "passive event listener" not in said.text:
+            self.errors.append(said.text)
+
+    @property
+    def client(self):
+        return list(self.server.get_clients().values())[-1]
+
+    def shot(self) -> np.ndarray:
+        """(h, w, 3): the picture without the panel."""
+        box = self.tab.locator("canvas").first.bounding_box()
+        return self._pixels(self.tab, clip=box)
+
+    def place(self, point) -> tuple[float, float]:
+        """Where a point in space is on the screen [pixels]."""
+        camera = self.client.camera
+        eye, ahead = np.asarray(camera.position), np.asarray(camera.look_at) - np.asarray(camera.position)
+        ahead /= np.linalg.norm(ahead)
+        right = np.cross(ahead, np.asarray(camera.up_direction))
+        right /= np.linalg.norm(right)
+        away = np.asarray(point) - eye
+        scale = 0.5 * camera.image_height / np.tan(0.5 * camera.fov) / (away @ ahead)
+        x, y = scale * (away @ right), scale * (away @ np.cross(right, ahead))
+        return 0.5 * camera.image_width + float(x), 0.5 * camera.image_height - float(y)
+
+    def press(self, name: str) -> None:
+        self.tab.get_by_role("button", name=name, exact=True).click()
+
+    def show_tab(self, name: str) -> None:
+        self.tab.get_by_role("tab", name=name).click()
+
+    def choose(self, handle, option: str) -> None:
+        self.tab.locator(f'[id="{handle._impl.uuid}"]').click()
+        self.tab.get_by_role("option", name=option, exact=True).click()
+
+    def slide(self, handle, key: str, times: int = 1) -> None:
+        thumb = self.tab.locator(f'[id="{handle._impl.uuid}"] [role=slider]')
+        for _ in range(times):
+            thumb.press(key)
+
+
+@pytest.fixture(scope="session")
+def look(browser, pixels):
+    """Opens pages in the browser: `look(url, server)`."""
+    opened = []
+
+    def open_page(url: str, server) -> Screen:
+        opened.append(Screen(browser, pixels, url, server))
+        return opened[-1]
+
+    yield open_page
+    for screen in opened:
+        screen.tab.close()
+
+
+@pytest.fixture(scope="session")
+def spot():
+    """Where a body of some color is in a picture: how many pixels, their middle (x, y), and their height."""
+
+    def find(shot: np.ndarray, color: str) -> tuple[int, np.ndarray, int]:
+        r, g, b = (shot[..., k] for k in range(3))
+        mask = (r - b > 70) & (r - g > 60) if color == "red" else (b - r > 60) & (b - r > g - r)
+        y, x = np.nonzero(mask)
+        if len(y) == 0:
+            return 0, np.zeros(2), 0
+        return len(y), np.array([x.mean(), y.mean()]), int(np.percentile(y, 99) - np.percentile(y, 1))
+
+    return find

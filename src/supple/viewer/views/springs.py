@@ -9,7 +9,7 @@ import numpy as np
 from supple.viewer.model import Moment
 from supple.viewer.views.layer import Layer, single
 
-_SPRING_COLOR, _PUSHER_COLOR = (250, 150, 20), (120, 90, 200)
+_SPRING_COLOR, _PUSHER_COLOR = (20, 150, 70), (120, 90, 200)
 
 
 class SpringView(Layer):

@@ -1,0 +1,209 @@
+"""The live page in a real browser, with a real simulation behind it: state and picture tell the same story."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.viewer.app import Address, opened_page
+from supple.viewer.live_source import LiveSource
+
+RADIUS, START = 0.3, 0.5
+
+
+@pytest.fixture(scope="module")
+def live(look, spot):
+    """A page with a soft ball above a floor."""
+    rubber = sp.StableNeoHookean(youngs=1e5, poisson=0.4, density=1000.0, damping=0.02)
+    ball = sp.Body("ball", sp.shapes.sphere(radius=RADIUS, edge_length=0.2), rubber, position=(0.0, START, 0.0))
+    scene = sp.Scene([ball], obstacles=[sp.HalfSpace(friction=0.5)])
+    source = LiveSource("ball", scene, sp.XPBD(substeps=8), 1 / 60)
+    with opened_page(source, Address(port=0)) as page:
+        screen = look(page.url, page.server)
+        desk = page.shown.desk
+        made = SimpleNamespace(screen=screen, page=page.shown, panel=page.shown.panel)
+        made.snapshot = lambda: desk.snapshot
+        made.middle = lambda: desk.snapshot.positions.mean(axis=0)
+        made.height = lambda: float(np.ptp(desk.snapshot.positions[:, 1]))
+        made.red = lambda: spot(screen.shot(), "red")
+        made.seen = lambda: made.red()[1]
+
+        def drawn(holds, what):
+            """Wait until the picture shows something: it comes later than the state."""
+            return screen.wait(lambda: holds(made.red()), what)
+
+        made.drawn = drawn
+        yield made
+
+
+@pytest.fixture
+def still(live):
+    """The page at the start of time, paused."""
+    if not live.snapshot().paused:
+        live.screen.press("Pause")
+        live.screen.wait(lambda: live.snapshot().paused, "the pause")
+    live.screen.press("reset")
+    live.screen.wait(lambda: live.snapshot().frame == 0 and abs(live.middle()[1] - START) < 1e-3, "the start")
+    where = live.screen.place(live.middle())
+    live.drawn(lambda red: red[0] > 300 and np.abs(red[1] - where).max() < 25, "the ball at its start")
+    return live
+
+
+@pytest.fixture
+def resting(still):
+    """The ball at rest on the floor, while time runs."""
+    still.screen.press("Play")
+    still.screen.wait(lambda: still.snapshot().time > 0.6 and still.middle()[1] < 0.32, "the ball on the floor")
+    still.drawn(lambda red: abs(red[1][1] - still.screen.place(still.middle())[1]) < 25, "the ball on the floor")
+    return still
+
+
+def test_time_runs_pauses_steps_and_begins_anew(still):
+    screen, before = still.screen, still.seen()
+    screen.press("Play")
+    screen.wait(lambda: still.middle()[1] < 0.35, "the fall")
+    still.drawn(lambda red: red[1][1] > before[1] + 8, "the fall in the picture")
+    screen.press("Pause")
+    screen.wait(lambda: still.snapshot().paused, "the pause")
+    frame = still.snapshot().frame
+    screen.tab.wait_for_timeout(200)
+    assert still.snapshot().frame == frame
+    low = still.seen()
+    screen.press("step")
+    screen.wait(lambda: still.snapshot().frame == frame + 1, "one frame")
+    screen.press("reset")
+    screen.wait(lambda: still.snapshot().frame == 0, "the start")
+    assert still.middle()[1] == pytest.approx(START, abs=1e-3)
+    still.drawn(lambda red: np.abs(red[1] - before).max() < 4, "the picture of the start")
+    assert low[1] > before[1] + 8
+    assert screen.errors == []
+
+
+def test_a_body_follows_the_mouse_and_is_let_go(resting):
+    screen, mouse = resting.screen, resting.screen.tab.mouse
+    low = resting.seen()
+    grip, up = resting.middle() + np.array([0.0, 0.1, 0.0]), np.array([0.0, 0.2, 0.0])
+    mouse.move(*screen.place(grip))
+    mouse.down()
+    mouse.move(*screen.place(grip + up), steps=3)
+    screen.wait(lambda: resting.snapshot().grabs, "the spring")
+    mouse.move(*screen.place(grip + 3.0 * up), steps=3)
+    screen.wait(lambda: resting.middle()[1] > 0.45, "the ball in the air")
+    resting.drawn(lambda red: red[1][1] < low[1] - 12, "the ball in the air in the picture")
+    assert screen.tab.get_by_text(" cm").or_(screen.tab.get_by_text(" mm")).count() >= 1  # how long the spring is
+    mouse.up()
+    screen.wait(lambda: not resting.snapshot().grabs, "the end of the spring")
+    screen.wait(lambda: resting.middle()[1] < 0.35, "the fall")
+    resting.drawn(lambda red: abs(red[1][1] - low[1]) < 12, "the fall in the picture")
+
+
+def test_a_click_pins_a_vertex_and_another_one_lets_it_go(resting):
+    screen, tab = resting.screen, resting.screen.tab
+    top = resting.snapshot().positions[np.argmax(resting.snapshot().positions[:, 1])]
+    x, y = screen.place(top - [0.0, 0.05, 0.0])
+
+    def dark() -> int:
+        shot = screen.shot()[int(y) - 30 : int(y) + 30, int(x) - 40 : int(x) + 40]
+        return int((shot.max(axis=2) < 60).sum())
+
+    assert dark() < 5
+    tab.mouse.click(x, y)
+    screen.wait(lambda: len(resting.snapshot().pinned) == 1, "the pin")
+    screen.wait(lambda: dark() > 10, "the pin in the picture")
+    tab.mouse.click(x, y)
+    screen.wait(lambda: len(resting.snapshot().pinned) == 0, "no pin")
+    screen.wait(lambda: dark() < 5, "no pin in the picture")
+
+
+def test_a_slider_takes_effect(resting):
+    screen = resting.screen
+    screen.show_tab("Solver")
+    gravity, low = resting.panel.solver.inputs["gravity"].handle, resting.seen()
+    value = lambda: resting.snapshot().description.values["gravity"]  # noqa: E731
+    screen.slide(gravity, "Home")  # it points down: below zero is up
+    screen.wait(lambda: value() == -20.0, "gravity upwards")
+    screen.wait(lambda: resting.middle()[1] > 0.6, "the ball to rise")
+    resting.drawn(lambda red: red[0] == 0 or red[1][1] < low[1] - 25, "the ball to rise in the picture")
+    typed = screen.tab.locator(f'[id="{gravity._impl.uuid}"]').locator("xpath=ancestor::*[.//input][1]//input").last
+    typed.fill("9.81")
+    typed.press("Enter")
+    screen.wait(lambda: value() == 9.81, "gravity downwards")
+    screen.show_tab("Bodies")
+
+
+def test_a_squashed_ball_recovers(resting):
+    screen = resting.screen
+    before, seen = resting.height(), resting.red()[2]
+    screen.press("Pause")
+    screen.wait(lambda: resting.snapshot().paused, "the pause")
+    screen.press("squash")
+    screen.wait(lambda: resting.height() < 0.6 * before, "the squash")
+    resting.drawn(lambda red: red[2] < 0.8 * seen, "the squash in the picture")
+    screen.press("Play")
+    screen.wait(lambda: abs(resting.height() - before) < 0.05 * before, "the ball's own shape")
+    resting.drawn(lambda red: abs(red[2] - seen) < 0.1 * seen, "the ball's own shape in the picture")
+
+
+def test_another_solver_goes_on(still):
+    screen, solver = still.screen, still.panel.solver
+    screen.show_tab("Solver")
+    try:
+        before = still.seen()
+        screen.choose(solver.kind, "implicit")
+        screen.wait(lambda: still.snapshot().description.solver == "implicit", "the other solver")
+        assert "substeps" not in still.snapshot().description.values
+        screen.press("Play")
+        screen.wait(lambda: still.middle()[1] < 0.35, "the fall")
+        still.drawn(lambda red: red[1][1] > before[1] + 8, "the fall in the picture")
+        assert np.isfinite(still.snapshot().positions).all()
+    finally:
+        screen.choose(solver.kind, "xpbd")
+        screen.wait(lambda: still.snapshot().description.solver == "xpbd", "the first solver")
+        screen.show_tab("Bodies")
+
+
+def test_a_body_comes_and_goes(still, spot):
+    screen, bodies = still.screen, still.panel.bodies
+    blue = lambda: spot(screen.shot(), "blue")[0]  # noqa: E731
+    assert blue() < 20
+    screen.tab.get_by_text("Add a body").click()
+    screen.press("Add")
+    screen.wait(lambda: len(still.snapshot().description.bodies) == 2, "a second body")
+    screen.wait(lambda: blue() > 60, "the second body in the picture")
+    name = still.snapshot().description.bodies[1].name
+    screen.wait(lambda: name in bodies.which.options, "its name")
+    screen.choose(bodies.which, name)
+    screen.press("remove")
+    screen.wait(lambda: len(still.snapshot().description.bodies) == 1, "no second body")
+    screen.wait(lambda: blue() < 20, "no second body in the picture")
+    screen.tab.get_by_text("Add a body").click()
+
+
+def test_the_ball_of_the_mouse_pushes(resting):
+    screen, controls = resting.screen, resting.panel.mouse_controls
+    screen.choose(controls.mode, "push")
+    screen.wait(lambda: controls.radius_input.visible, "the ball's size")
+    middle = resting.middle()
+    x, y = screen.place(middle)
+    mouse = screen.tab.mouse
+    mouse.move(x + 130, y)
+    mouse.down()
+    mouse.move(x + 120, y, steps=2)
+    screen.wait(lambda: resting.snapshot().pusher is not None, "the ball of the mouse")
+    for k in range(10):
+        mouse.move(x + 120 - 12 * k, y)
+        screen.tab.wait_for_timeout(60)
+    screen.wait(lambda: np.linalg.norm(resting.middle() - middle) > 0.05, "the push")
+    violet = lambda: np.count_nonzero(  # noqa: E731
+        (screen.shot()[..., 2] - screen.shot()[..., 1] > 50) & (screen.shot()[..., 0] > screen.shot()[..., 1])
+    )
+    screen.wait(lambda: violet() > 60, "the ball of the mouse in the picture")
+    mouse.up()
+    screen.choose(controls.mode, "drag and pin")
+    screen.wait(lambda: resting.snapshot().pusher is None, "no ball of the mouse")
+
+
+def test_nothing_went_wrong_meanwhile(live):
+    assert live.screen.errors == []
+    assert np.isfinite(live.snapshot().positions).all()

@@ -1,0 +1,150 @@
+"""Recordings on the page, and what visitors take home from it."""
+
+import io
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.output.recording import Recorder
+from supple.output.recording_reader import read_recording
+from supple.viewer.app import Address, opened_page
+from supple.viewer.film import gif_of, kinds_of_films
+from supple.viewer.from_recording import model_of_recording, moment_of_frame
+from supple.viewer.options import ViewOptions
+from supple.viewer.page_of_moments import evenly, page_of_moments
+from supple.viewer.replay import Replay
+
+STEPS = 30
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """A ball that flies to the right in half a second."""
+    path = tmp_path_factory.mktemp("replay") / "recording.vtkhdf"
+    rubber = sp.StableNeoHookean(youngs=1e5, poisson=0.4)
+    ball = sp.Body("ball", sp.shapes.sphere(radius=0.3, edge_length=0.25), rubber, velocity=(2.0, 0.0, 0.0))
+    scene = sp.Scene([ball], gravity=(0.0, -1.0, 0.0))
+    for _ in sp.simulate(scene, sp.XPBD(substeps=2), 1 / 60, STEPS, sinks=[Recorder(path)]):
+        pass
+    return path
+
+
+@pytest.fixture
+def replay(server, recorded):
+    with read_recording(recorded) as recording:
+        made = Replay(server, recording)
+        yield made
+        made.stop()
+
+
+def test_it_plays_and_begins_anew(replay, until):
+    seen = set()
+
+    def all_of_it():
+        seen.add(round(replay.stage.moment.time, 6))
+        return len(seen) > 10 and max(seen) > 0.4 and replay.stage.moment.time < 0.2
+
+    until(all_of_it, what="the second round")
+
+
+def test_the_slider_shows_the_frame_of_its_time(replay, server, visit, until):
+    visitor = visit(server.get_port())
+    until(server.get_clients)
+    for number in (0, 7, STEPS):
+        visitor.set(replay.slider, float(replay._recording.times[number]))
+        until(lambda: replay.stage.moment is replay.moment(number))  # noqa: B023
+        assert not replay.playing
+        until(lambda: f"Frame {number} of {STEPS}" in replay.said.content)  # noqa: B023
+    visitor.press(replay.play)
+    until(lambda: replay.playing)
+    visitor.leave()
+
+
+def test_times_between_frames_and_beyond_them(replay):
+    times = replay._recording.times
+    assert replay.frame_at(-1.0) == 0
+    assert replay.frame_at(99.0) == STEPS
+    for number in range(STEPS + 1):
+        assert replay.frame_at(float(times[number])) == number
+
+
+def test_a_page_of_the_recording_stands_alone(replay, browser, pixels, spot, tmp_path):
+    from dataclasses import replace
+
+    replay.playing = False
+    replay.stage.apply(replace(replay.stage.options, surface="tets"))
+    file = tmp_path / "page.html"
+    file.write_text(replay.page(), encoding="utf-8")
+    tab = browser.new_page(viewport={"width": 480, "height": 320})
+    asked = []
+    tab.on("request", lambda request: asked.append(request.url))
+    tab.goto(file.as_uri())
+    places = []
+    for _ in range(100):
+        tab.wait_for_timeout(100)
+        count, middle, _ = spot(pixels(tab)[:260, 160:], "red")
+        if count > 100:
+            places.append(middle[0])
+        if len(places) > 2 and max(places) - min(places) > 40:
+            break
+    tab.close()
+    assert max(places) - min(places) > 40
+    assert asked == [file.as_uri()]
+
+
+def test_pages_keep_the_time_and_thin_out(recorded, monkeypatch):
+    from supple.viewer import page_of_moments as module
+
+    with read_recording(recorded) as recording:
+        model = model_of_recording(recording)
+        taken = [(frame.time, moment_of_frame(model, frame)) for frame in recording]
+        whole = page_of_moments(taken, ViewOptions("tets", "volume ratio J"))
+        monkeypatch.setattr(module, "MOST_BYTES", 1)
+        thin = page_of_moments(taken, ViewOptions("tets", "volume ratio J"))
+    assert len(thin) < len(whole)
+    assert "<title>ball · Supple</title>" in thin
+    assert evenly(10, 4) == [0, 3, 6, 9]
+    assert evenly(3, 9) == [0, 1, 2]
+
+
+def test_films_have_all_pictures():
+    image = pytest.importorskip("PIL.Image")
+    frames = [np.full((20, 30, 3), shade, dtype=np.uint8) for shade in (0, 100, 200)]
+    with image.open(io.BytesIO(gif_of(frames, 10.0))) as film:
+        assert (film.n_frames, film.size, film.info["duration"]) == (3, (30, 20), 100)
+    assert kinds_of_films()["gif"] == ""
+
+
+def test_what_is_missing_for_a_film_is_said(monkeypatch):
+    from supple.viewer import film
+
+    monkeypatch.setattr(film, "find_spec", lambda name: None)
+    assert "pip install 'supple[video]'" in kinds_of_films()["mp4"]
+
+
+def test_a_person_looks_through_a_recording(recorded, look, spot, tmp_path):
+    """In the browser: the slider, another view, a screenshot, and a page to take home."""
+    from dataclasses import replace
+
+    with opened_page(recorded, Address(port=0)) as page:
+        screen, replay = look(page.url, page.server), page.shown
+        where = lambda: spot(screen.shot(), "red")  # noqa: E731
+        screen.slide(replay.slider, "Home")
+        screen.wait(lambda: replay.stage.moment is replay.moment(0), "the first frame")
+        screen.wait(lambda: where()[0] > 100, "the ball")
+        left = where()[1][0]
+        screen.slide(replay.slider, "End")
+        screen.wait(lambda: replay.stage.moment is replay.moment(STEPS), "the last frame")
+        screen.wait(lambda: abs(where()[1][0] - left) > 40, "the last frame in the picture")
+        screen.choose(replay.controls.color_by, "volume ratio J")
+        screen.wait(lambda: where()[0] == 0, "the colors of J in the picture")
+        assert screen.tab.locator(".supple-color-bar").is_visible()
+        screen.choose(replay.controls.color_by, "body")
+        screen.tab.get_by_text("Record", exact=True).first.click()
+        with screen.tab.expect_download(timeout=90_000) as screenshot:
+            screen.press("Screenshot")
+        picture = pytest.importorskip("PIL.Image").open(screenshot.value.path())
+        assert spot(np.asarray(picture.convert("RGB")).astype(int), "red")[0] > 100
+        assert screen.errors == []
+        assert replace(replay.stage.options) == ViewOptions()

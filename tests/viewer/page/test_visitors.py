@@ -1,0 +1,86 @@
+"""Many visitors, slow visitors: nobody holds up the page, nothing piles up."""
+
+import time
+
+import numpy as np
+import pytest
+
+import supple as sp
+
+
+@pytest.fixture
+def busy(server, made_up):
+    """A page of a simulation that has something new all the time."""
+    import threading
+
+    from supple.viewer.live_page import LivePage
+
+    page, end = LivePage(server, made_up, made_up.snapshot), threading.Event()
+    rest = made_up.snapshot.positions
+
+    def run():
+        while not end.wait(0.005):
+            made_up.show(positions=rest + 0.1 * np.sin(made_up.snapshot.frame), time=0.01 * made_up.snapshot.frame)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    yield page
+    end.set()
+    thread.join()
+    page.stop()
+
+
+def test_a_visitor_that_takes_nothing_holds_up_nobody(busy, server, visit, until):
+    stuck = visit(server.get_port(), reads=False)
+    others = [visit(server.get_port()) for _ in range(9)]
+    until(lambda: len(server.get_clients()) == 10)
+    buffer = server._websock_server.get_message_buffer()
+    shown = busy.desk.snapshot.frame
+    kept, taken = [], [other.taken for other in others]
+    for _ in range(8):
+        time.sleep(0.15)
+        kept.append(len(buffer.message_from_id))
+    assert busy.desk.snapshot.frame > shown + 50
+    assert all(other.taken > before for other, before in zip(others, taken, strict=True))
+    # For the one that takes nothing, the newest of everything is kept, and nothing else.
+    assert max(kept) <= min(kept) + 20
+    for visitor in (stuck, *others):
+        visitor.leave()
+
+
+def test_the_page_asks_less_of_a_server_that_lags(server):
+    from supple.viewer.pace import FASTEST, Pace
+
+    pace = Pace(server)
+    assert pace.interval == FASTEST
+    with pace.sending():
+        pass
+    loop = server.get_event_loop()
+    loop.call_soon_threadsafe(time.sleep, 0.3)
+    with pace.sending():
+        pass
+    assert not pace.may_send()
+    end = time.monotonic() + 10.0
+    while not pace.may_send() and time.monotonic() < end:
+        time.sleep(0.01)
+    assert pace.may_send()
+    assert pace.interval > 2.0 * FASTEST
+    for _ in range(60):
+        with pace.sending():
+            pass
+        while not pace.may_send():
+            time.sleep(0.001)
+    assert pace.interval < 0.1
+
+
+def test_fine_skins_are_carried_at_once(made_up):
+    """What is done for every picture: 100k vertices, in bounded work per vertex and without a Python loop."""
+    from supple.mesh.skin import Embedding
+    from supple.output.skinned_surface import SkinnedSurface
+
+    mesh = sp.shapes.box(size=(1.0, 1.0, 1.0), divisions=(8, 8, 8))
+    points = np.random.default_rng(0).uniform(-0.5, 0.5, (100_000, 3))
+    held = Embedding.of(mesh, points)
+    skin = SkinnedSurface(held.corners, held.weights, np.zeros((0, 3), dtype=np.int32))
+    stretch = np.diag([1.0, 2.0, 0.5])
+    np.testing.assert_allclose(skin.positions(mesh.vertices @ stretch), points @ stretch, atol=1e-9)
