@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from supple.output.recorded_scene import RecordedObstacle
 from supple.output.skinned_surface import SkinnedSurface
 from supple.scene.rotation import rotation_matrix
 from supple.viewer.model import Model, ModelBody, Moment, colors_of
+from supple.viewer.pusher import NAME as PUSHER
 from supple.viewer.snapshots import BodyDescription, ObstacleDescription, SceneDescription, Snapshot
 
 
@@ -23,15 +25,20 @@ class Translator:
     def __init__(self) -> None:
         self._generation: int | None = None
         self._model: Model | None = None
+        self._made_of: tuple[Any, ...] = ()
         self._skins: dict[tuple[int, int], SkinnedSurface] = {}
 
     def moment(self, snapshot: Snapshot) -> Moment:
         """What a snapshot shows."""
         if self._model is None or snapshot.generation != self._generation:
-            self._model = self._model_of(snapshot.description)
             self._generation = snapshot.generation
+            # The ball of the mouse comes and goes as well, and must not interrupt a drag.
+            made_of = _made_of(snapshot.description)
+            if self._model is None or made_of != self._made_of:
+                self._model, self._made_of = self._model_of(snapshot.description), made_of
         rotations, translations = snapshot.obstacle_poses
         poses = np.concatenate([rotations.reshape(-1, 3, 3), translations.reshape(-1, 3, 1)], axis=2)
+        poses = poses[: len(self._model.obstacles)]
         values = {}
         if snapshot.tet_values is not None and snapshot.tet_quantity is not None:
             values[snapshot.tet_quantity] = snapshot.tet_values
@@ -58,7 +65,7 @@ class Translator:
         tets = np.concatenate([body.tets + body.vertices.start for body in scene.bodies])
         return Model(
             bodies,
-            tuple(_obstacle(obstacle) for obstacle in scene.obstacles),
+            tuple(_obstacle(obstacle) for obstacle in _lasting(scene)),
             np.concatenate([body.rest_positions for body in scene.bodies]),
             np.ascontiguousarray(tets, dtype=np.int32),
             _view_of(scene),
@@ -77,6 +84,18 @@ class Translator:
         return self._skins[key]
 
 
+def _lasting(scene: SceneDescription) -> tuple[ObstacleDescription, ...]:
+    """The obstacles without the ball of the mouse, which comes last and is drawn on its own."""
+    some = scene.obstacles
+    return some[:-1] if some and some[-1].name == PUSHER else some
+
+
+def _made_of(scene: SceneDescription) -> tuple[Any, ...]:
+    """Something that is equal for scenes that look the same, apart from where everything is."""
+    bodies = ((b.name, _fingerprint(b.rest_positions), _fingerprint(b.tets), b.skin is None) for b in scene.bodies)
+    return (*bodies, *((o.name, o.kind) for o in _lasting(scene)), _fingerprint(scene.stitches))
+
+
 def _view_of(scene: SceneDescription) -> View:
     """About the bodies as they start, and down to the floor if it is not far below them."""
     low, high, up = np.asarray(scene.low), np.asarray(scene.high), np.asarray(scene.up)
@@ -90,7 +109,7 @@ def _view_of(scene: SceneDescription) -> View:
     return View(low, high, up)
 
 
-def _fingerprint(values: NDArray[np.float64]) -> int:
+def _fingerprint(values: NDArray[Any]) -> int:
     return zlib.crc32(np.ascontiguousarray(values).tobytes())
 
 

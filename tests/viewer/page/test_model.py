@@ -38,6 +38,36 @@ def test_a_snapshot_becomes_a_moment(made_up):
     assert translator.moment(made_up.show()).model is moment.model
 
 
+def test_the_ball_of_the_mouse_does_not_make_the_picture_anew(made_up):
+    from dataclasses import replace
+
+    from supple.viewer.messages import ObstacleDescription
+
+    translator = Translator()
+    before = translator.moment(made_up.snapshot)
+    old = made_up.snapshot.description
+    ball = ObstacleDescription("pusher", "Sphere", {"center": np.zeros(3), "radius": 0.1, "inside": False}, True, 0.5)
+    pushed = translator.moment(
+        made_up.show(
+            description=replace(old, generation=2, obstacles=(*old.obstacles, ball)),
+            obstacle_poses=(np.stack([np.eye(3)] * 2), np.zeros((2, 3))),
+            pusher=((1.0, 0.0, 0.0), 0.1),
+        )
+    )
+    assert pushed.model is before.model
+    assert len(pushed.poses) == 1
+    assert pushed.pusher[1] == 0.1
+    # Another body does.
+    assert (
+        translator.moment(
+            made_up.show(
+                description=replace(old, generation=3, bodies=old.bodies[:1]), positions=made_up.snapshot.positions[:27]
+            )
+        ).model
+        is not before.model
+    )
+
+
 def test_a_skin_follows_the_tets_of_its_body(made_up):
     from dataclasses import replace
 
