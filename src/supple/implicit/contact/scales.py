@@ -17,7 +17,7 @@ _DHAT_SHARE = 1e-3  # of the smallest body's diagonal
 _EDGE_SHARE = 0.25  # of the short surface edges: contacts of a surface with itself at rest are none
 _SHORT_EDGES = 2.0  # [%] which edges count as the short ones
 _SMALLEST_SHARE = 1e-5  # of the diagonal: gaps at the start do not push dhat below it
-_STIFFNESS_SHARE = 0.05  # of the softest body's modulus
+_STIFFNESS_SHARE = 1.0  # of the softest body's modulus
 _SLOW_SHARE = 1e-3  # of the diagonal, per second
 
 
