@@ -63,7 +63,7 @@ class ContactStep:
         self.frictions = self.model.frictions(self.barriers, x, self.start, self.times)
         if self.model.coefficients.any():
             self.pressing = Objective(self.barriers.terms).gradient(x)
-        return Objective([*objective.terms, *self.barriers.terms, *self.frictions])
+        return Objective([*objective.terms, *self.barriers.terms, *self.frictions], objective.clock)
 
     def refine(self, x: NDArray[np.float64]) -> bool:
         """Whether the step has to go on from x with a stiffer barrier or newer normal forces of friction."""

@@ -35,6 +35,7 @@ class Elasticity(Potential):
     material: TetMaterial
     start: NDArray[np.int32]
     incidence: NDArray[np.int32]
+    label = "elasticity"
 
     def value(self, x: NDArray[np.float64]) -> float:
         s = self.system

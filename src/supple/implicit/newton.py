@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.implicit.clock import Clock
 from supple.implicit.free_motion import FreeMotion
 from supple.implicit.line_search import backtrack
 from supple.implicit.linear_solver import LinearSolver
@@ -61,6 +62,7 @@ class Tools:
     hessian: HessianBlocks
     pinned: NDArray[np.int32]
     free_motion: FreeMotion
+    clock: Clock = field(default_factory=Clock)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,14 +89,16 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
     for iteration in range(problem.max_iterations):
         gradient = here.gradient.copy()
         gradient[tools.pinned] = 0.0
-        tools.linear_solver.assemble(tools.hessian)
-        direction, said = tools.linear_solver.solve(-gradient, forcing, convex)
+        with tools.clock.of("linear_solve"):
+            tools.linear_solver.assemble(tools.hessian)
+            direction, said = tools.linear_solver.solve(-gradient, forcing, convex)
         if direction is None and not convex:
             convex, patience = True, 2 * patience
             remaining = patience
             problem.objective.model(here.positions, tools.hessian, True)
-            tools.linear_solver.assemble(tools.hessian)
-            direction, said = tools.linear_solver.solve(-gradient, forcing)
+            with tools.clock.of("linear_solve"):
+                tools.linear_solver.assemble(tools.hessian)
+                direction, said = tools.linear_solver.solve(-gradient, forcing)
         if direction is None or not np.isfinite(direction).all():
             return Outcome(Status.NOT_FINITE, here, "the linear system of a Newton step could not be solved", rows)
         if problem.scale is not None:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.implicit.clock import Clock
 from supple.implicit.potential import HessianBlocks, Potential
 
 
@@ -32,13 +33,17 @@ class Objective(Potential):
     """The sum of its terms, each an energy [J]. Elasticity comes first: it overwrites the tets' matrices."""
 
     terms: Sequence[Potential]
+    clock: Clock = field(default_factory=Clock)
 
     def value(self, x: NDArray[np.float64]) -> float:
         return self.value_and_size(x)[0]
 
     def value_and_size(self, x: NDArray[np.float64]) -> tuple[float, float]:
         """The energy, and the sum of the terms' absolute values: round-off in the first is relative to the second."""
-        values = [term.value(x) for term in self.terms]
+        values = []
+        for term in self.terms:
+            with self.clock.of(term.label):
+                values.append(term.value(x))
         return sum(values), sum(abs(value) for value in values)
 
     def gradient(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -56,7 +61,10 @@ class Objective(Potential):
         gradient = np.zeros_like(x)
         if hessian is not None:
             hessian.clear()
-        values = [term.add_model(x, gradient, hessian, project) for term in self.terms]
+        values = []
+        for term in self.terms:
+            with self.clock.of(term.label):
+                values.append(term.add_model(x, gradient, hessian, project))
         return Model(x, sum(values), sum(abs(value) for value in values), gradient)
 
     def hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool = True) -> None:

@@ -47,7 +47,8 @@ def move_pins(
         way[pinned] = targets - x[pinned]
         here = problem.objective.model(x, tools.hessian)
         gradient = here.gradient
-        tools.linear_solver.assemble(tools.hessian)
+        with tools.clock.of("linear_solve"):
+            tools.linear_solver.assemble(tools.hessian)
         # One row more, for the nodes without a vertex, number -1.
         pull, longer = np.zeros((len(x) + 1, 3)), np.concatenate([way, np.zeros((1, 3))])
         moved = np.einsum("eij,ej->ei", tools.hessian.elements[near], longer[nodes].reshape(-1, 12))
@@ -55,7 +56,8 @@ def move_pins(
         pull = pull[:-1]
         for coupling in tools.hessian.couplings:
             pull += (coupling @ way.ravel()).reshape(-1, 3)
-        direction, said = tools.linear_solver.solve(-(gradient + pull), _TOLERANCE)
+        with tools.clock.of("linear_solve"):
+            direction, said = tools.linear_solver.solve(-(gradient + pull), _TOLERANCE)
         if direction is None or not np.isfinite(direction).all():
             text = "the linear system that moves the pins could not be solved"
             return x, Outcome(Status.NOT_FINITE, here, text, rows)

@@ -129,8 +129,8 @@ class Implicit(Solver):
         """
         refuse_inverted(system, workspace.elasticity.material, state.positions)
         n = len(state.positions)
-        state = workspace.with_obstacles(state)
-        workspace.check_start(state)
+        state = workspace.taken_in(state)
+        workspace.tools.clock.restart()
         finest = 1 << int(np.log2(self.max_substeps))
         done, size = 0, finest
         begin, now = state.time, state
@@ -165,6 +165,7 @@ class Implicit(Solver):
             gradient = last.outcome.end.gradient
             details["reaction_forces"], details["reaction_forces_by_vertex"] = reaction_forces(system, gradient)
             report = last.contact.completed(report, last.state.positions)
+        report.details["seconds"] = workspace.tools.clock.shares()
         return now, report
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.implicit.clock import Clock
 from supple.implicit.contact.model import ContactModel
 from supple.implicit.guard import Guard
 
@@ -17,13 +18,15 @@ class StepLimits:
 
     guard: Guard
     contact: ContactModel | None
+    clock: Clock
 
     def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, int]:
         """How far along `direction`, at most 1, and the tet that allows no more; -1 where none or a contact does."""
         step, tet = self.guard.largest_step(x, direction)
         if self.contact is None or step == 0.0:
             return step, tet
-        free = self.contact.largest_step(x, step * direction)
+        with self.clock.of("contact"):
+            free = self.contact.largest_step(x, step * direction)
         return (step, tet) if free == 1.0 else (step * free, -1)
 
     def allows(self, x: NDArray[np.float64]) -> bool:

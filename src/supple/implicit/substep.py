@@ -73,7 +73,7 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     plan = settings.integrator.plan(system, state, h, lambda start: _acceleration(system, start, workspace))
     forces = total_forces(system, end)
     guard = Guard.at(system, state.positions)
-    limits = StepLimits(guard, workspace.contact)
+    limits = StepLimits(guard, workspace.contact, tools.clock)
     base = _objective(system, state, end, plan, forces, guard, workspace)
     contact = ContactStep.of(workspace.contact, state.positions, (state.time, end), plan.contact_weight)
     problem = Problem(
@@ -139,7 +139,7 @@ def _objective(
         terms.append(Inertia(system.masses, plan.predicted, plan.scale))
         if workspace.viscosity is not None:
             terms.append(Damping(workspace.viscosity, plan.strain_rate()))
-    return Objective(terms)
+    return Objective(terms, workspace.tools.clock)
 
 
 def _acceleration(system: System, state: State, workspace: Workspace) -> NDArray[np.float64]:

@@ -43,18 +43,23 @@ class Workspace:
         """The first vertex that is an obstacle's."""
         return max(part.vertices.stop for part in self.system.bodies)
 
-    def with_obstacles(self, state: State) -> State:
-        """A state whose arrays have the obstacles' vertices too."""
-        if self.contact is None or not self.contact.obstacles:
-            return state
-        there = self.contact.obstacle_positions(state.time)
-        return replace(
-            state,
-            positions=np.concatenate([state.positions, there]),
-            velocities=np.concatenate([state.velocities, np.zeros_like(there)]),
-        )
+    def taken_in(self, state: State) -> State:
+        """A state with the obstacles' vertices after the bodies'.
 
-    def check_start(self, state: State) -> None:
-        """Refuse a state from outside that has intersections; what a step ended with has none."""
-        if self.contact is None or (self.last is not None and state.positions is self.last):
-            return
+        Raises
+        ------
+        SolverError : where a state from outside has surfaces that intersect; what a step ended with has none.
+        """
+        if self.contact is None:
+            return state
+        known = state.positions is self.last
+        if self.contact.obstacles:
+            there = self.contact.obstacle_positions(state.time)
+            state = replace(
+                state,
+                positions=np.concatenate([state.positions, there]),
+                velocities=np.concatenate([state.velocities, np.zeros_like(there)]),
+            )
+        if not known:
+            self.contact.refuse_intersecting(state.positions)
+        return state

@@ -15,6 +15,7 @@ import ipctk
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.errors import SolverError
 from supple.implicit.contact.collisions import Collisions
 from supple.implicit.potential import HessianBlocks, Potential
 
@@ -50,5 +51,11 @@ class Barrier(Potential):
         if not found.empty():
             method = ipctk.PSDProjectionMethod.CLAMP if project else ipctk.PSDProjectionMethod.NONE
             surface = self.collisions.surface
-            hessian = self.potential.hessian(found, surface.mesh, self.collisions.points(x), method)
+            try:
+                hessian = self.potential.hessian(found, surface.mesh, self.collisions.points(x), method)
+            except RuntimeError:
+                # The library's words for a distance of zero, or numbers beyond its reach.
+                raise SolverError(
+                    "contact: surfaces touch, or their distances leave what double precision can hold; start with a gap"
+                ) from None
             out.couplings.append(surface.blocks(hessian, len(x)))

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 from supple.implicit.contact.collisions import Collisions
 from supple.implicit.contact.kinematic import obstacle_positions, with_obstacles
 from supple.implicit.contact.model import ContactModel
-from supple.implicit.contact.pairs import pair_table
 from supple.implicit.contact.planes import Planes
 from supple.implicit.contact.scales import largest_dhat, scales_of
 from supple.implicit.contact.settings import Contact
 from supple.implicit.contact.surface import contact_surface
+from supple.scene.contact_pairs import pair_table
 from supple.system import System, initial_state
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.errors import SolverError
 from supple.implicit.contact.barrier import Barrier
 from supple.implicit.contact.collisions import Collisions
 from supple.implicit.contact.friction import Friction
@@ -96,6 +97,16 @@ class ContactModel:
         """Between anything that may touch, where it is below dhat [m]; else infinite."""
         nearest = min(self.planes.smallest_distance(x), self.collisions.smallest_distance(x))
         return nearest if nearest < self.scales.dhat else np.inf
+
+    def refuse_intersecting(self, x: NDArray[np.float64]) -> None:
+        """Raise where surfaces intersect or touch at x (n, 3).
+
+        Raises
+        ------
+        SolverError : says what is where.
+        """
+        if self.collisions.intersect(x) or not self.allows(x) or self.smallest_distance(x) <= 0.0:
+            raise SolverError("the scene starts with surfaces that intersect or touch")
 
     def count(self, x: NDArray[np.float64]) -> int:
         """Number of contacts at x (n, 3): pairs nearer than dhat."""
