@@ -18,7 +18,7 @@ from scipy.sparse.csgraph import connected_components
 from supple.errors import SceneError
 from supple.scene.body import Body
 from supple.scene.forces import Force, SoftTarget
-from supple.scene.motion import moved_points, points_at_origin
+from supple.scene.motion import Motion, moved_points, points_at_origin
 from supple.scene.obstacles import Obstacle
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
@@ -52,6 +52,10 @@ class PinRange:
     @property
     def label(self) -> str:
         return self.pin.label
+
+    @property
+    def motion(self) -> Motion:
+        return self.pin.motion
 
     def targets(self, time: float) -> NDArray[np.float64]:
         """Where the pinned vertices (k, 3) must be at `time` [m]."""

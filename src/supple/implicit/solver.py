@@ -18,6 +18,7 @@ from supple.implicit.guard import refuse_inverted
 from supple.implicit.integrators import Integrator, Static, integrator_of
 from supple.implicit.linear_solver import LinearSolver
 from supple.implicit.newton import Tools
+from supple.implicit.pin_paths import bends
 from supple.implicit.potential import HessianBlocks
 from supple.implicit.reactions import reaction_forces
 from supple.implicit.stabilizer import stabilizer_of
@@ -141,6 +142,9 @@ class Implicit(Solver):
         last: Substep | None = None
         while done < finest:
             end = begin + dt * ((done + size) / finest)
+            if size > 1 and bends(workspace.system, now.time, end, workspace.diagonal):
+                size //= 2
+                continue
             taken = take_substep(now, end, dt * (size / finest), settings, workspace)
             rows += [replace(row, substep=substeps) for row in taken.outcome.rows]
             good = taken.outcome.status is Status.CONVERGED

@@ -32,6 +32,9 @@ _STATIC_TOLERANCE = 1e-9
 # Of the displacement below which friction is static: Newton's method has to see the difference.
 _FRICTION_SHARE = 1e-2
 
+# Of the distance at which contact begins.
+_DHAT_SHARE = 0.1
+
 
 @dataclass(frozen=True)
 class StepSettings:
@@ -48,8 +51,10 @@ class StepSettings:
             return float(self.tolerance) * workspace.diagonal * (1.0 if static else h)
         length = (_STATIC_TOLERANCE if static else _DYNAMIC_TOLERANCE * h) * workspace.diagonal
         contact = workspace.contact
-        if contact is not None and contact.coefficients.any():
-            length = min(length, _FRICTION_SHARE * contact.scales.friction_velocity * h)
+        if contact is not None:
+            length = min(length, _DHAT_SHARE * contact.scales.dhat)
+            if contact.coefficients.any():
+                length = min(length, _FRICTION_SHARE * contact.scales.friction_velocity * h)
         return length
 
 

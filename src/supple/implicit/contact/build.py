@@ -25,8 +25,8 @@ def contact_model(system: System, settings: Contact, shear_moduli: NDArray[np.fl
     """
     extended, obstacles = with_obstacles(system)
     table = pair_table(system.scene)
-    surface = contact_surface(extended, obstacles, table.collide)
     start = np.concatenate([initial_state(system.scene).positions, obstacle_positions(obstacles, 0.0)])
+    surface = contact_surface(extended, obstacles, table.collide, start)
     widest = largest_dhat(system)
     planes = Planes.of(surface, obstacles, table.collide, widest)
     gap = min(Collisions(surface, widest).smallest_distance(start), _gap(planes, start))
@@ -37,7 +37,7 @@ def contact_model(system: System, settings: Contact, shear_moduli: NDArray[np.fl
         surface=surface,
         collisions=Collisions(surface, scales.dhat),
         planes=Planes.of(surface, obstacles, table.collide, scales.dhat),
-        coefficients=table.friction,
+        table=table,
         scales=scales,
         friction_iterations=settings.friction_iterations,
     )

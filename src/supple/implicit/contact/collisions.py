@@ -61,6 +61,8 @@ class Collisions:
                 self._look(points, points)
             found = ipctk.NormalCollisions()
             found.use_area_weighting = True
+            # The plain set counts a vertex above a vertex once for each triangle around it: aligned bodies would slip.
+            found.collision_set_type = ipctk.NormalCollisions.CollisionSetType.IMPROVED_MAX_APPROX
             found.build(self._candidates, self.surface.mesh, points, self.dhat)
             self._found = found
         return self._found
@@ -94,10 +96,12 @@ class Collisions:
         return float(np.sqrt(found.compute_minimum_distance(self.surface.mesh, self.points(x))))
 
     def intersect(self, x: NDArray[np.float64]) -> bool:
-        """Whether any two triangles cross at x."""
+        """Whether any two triangles cross at x; False where that cannot be known, since sewn ones touch anyway."""
         import ipctk
 
         stitched = self.surface.stitched
+        if stitched is not None and stitched.touches:
+            return False
         mesh = self.surface.mesh if stitched is None else stitched.without_neighbours
         return bool(ipctk.has_intersections(mesh, self.points(x)))
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from supple.errors import SolverError
 from supple.mesh import shapes
+from supple.scene.motion import Motion
 from supple.scene.obstacles import Box, HalfSpace, Obstacle, Sphere, TriangleObstacle
 from supple.system import System
 
@@ -40,6 +41,10 @@ class ObstacleRange:
     @property
     def label(self) -> str:
         return self.obstacle.label
+
+    @property
+    def motion(self) -> Motion:
+        return self.obstacle.motion
 
     @property
     def is_plane(self) -> bool:

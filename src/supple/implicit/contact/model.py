@@ -14,8 +14,10 @@ from supple.implicit.contact.collisions import Collisions
 from supple.implicit.contact.friction import Friction
 from supple.implicit.contact.kinematic import ObstacleRange, obstacle_positions
 from supple.implicit.contact.planes import PlaneBarrier, PlaneFriction, Planes, plane_friction
+from supple.implicit.contact.refusal import refuse_intersecting
 from supple.implicit.contact.scales import Scales
 from supple.implicit.contact.surface import ContactSurface
+from supple.scene.contact_pairs import PairTable
 from supple.system import System
 
 logger = logging.getLogger(__name__)
@@ -39,7 +41,7 @@ class ContactModel:
 
     Attributes
     ----------
-    coefficients : (p, p) of friction between owners, bodies before obstacles
+    table : who may touch whom with how much friction, bodies before obstacles
     """
 
     system: System
@@ -47,9 +49,14 @@ class ContactModel:
     surface: ContactSurface
     collisions: Collisions
     planes: Planes
-    coefficients: NDArray[np.float64]
+    table: PairTable
     scales: Scales
     friction_iterations: int | None
+
+    @property
+    def coefficients(self) -> NDArray[np.float64]:
+        """(p, p) of friction."""
+        return self.table.friction
 
     def barriers(self, stiffness: float) -> Barriers:
         """The normal contact with a stiffness [Pa]."""
@@ -98,15 +105,20 @@ class ContactModel:
         nearest = min(self.planes.smallest_distance(x), self.collisions.smallest_distance(x))
         return nearest if nearest < self.scales.dhat else np.inf
 
-    def refuse_intersecting(self, x: NDArray[np.float64]) -> None:
-        """Raise where surfaces intersect or touch at x (n, 3).
+    def refuse_intersecting(self, x: NDArray[np.float64], time: float) -> None:
+        """Raise where surfaces intersect or touch, or bodies are inside of something solid, at x (n, 3).
 
         Raises
         ------
-        SolverError : says what is where.
+        SceneError, SolverError : say what is where.
         """
-        if self.collisions.intersect(x) or not self.allows(x) or self.smallest_distance(x) <= 0.0:
-            raise SolverError("the scene starts with surfaces that intersect or touch")
+        stitching = self.system.stitching
+        apart = self.allows(x) and not self.collisions.intersect(x) and self.smallest_distance(x) > 0.0
+        if len(stitching) and apart:
+            return
+        refuse_intersecting(self.system, x, time, self.table)
+        if not apart:
+            raise SolverError("the scene starts with surfaces that touch; move them apart, or give contact=None")
 
     def count(self, x: NDArray[np.float64]) -> int:
         """Number of contacts at x (n, 3): pairs nearer than dhat."""

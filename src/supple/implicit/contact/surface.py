@@ -66,12 +66,14 @@ def contact_surface(
     system: System,
     obstacles: tuple[ObstacleRange, ...],
     collide: NDArray[np.bool_],
+    start: NDArray[np.float64],
 ) -> ContactSurface:
     """Join the surfaces of a system whose obstacles are vertices (see `kinematic`).
 
     Parameters
     ----------
     collide : (p, p) which owners may touch, bodies before obstacles
+    start : (n, 3) where everything is at the start [m]
     """
     import ipctk
 
@@ -93,7 +95,8 @@ def contact_surface(
     rest = np.asfortranarray(system.rest_positions[vertices])
     mesh = ipctk.CollisionMesh(rest, ipctk.edges(faces), faces)
     mesh.can_collide = _filter(owner, len(system.bodies), collide)
-    stitched = StitchedContacts.of(mesh, np.append(number, -1)[system.stitching.nodes()])
+    nodes = np.append(number, -1)[system.stitching.nodes()]
+    stitched = StitchedContacts.of(mesh, nodes, owner, np.asfortranarray(start[vertices]))
     corners = rest[faces]
     doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     areas = np.bincount(faces.ravel(order="C"), weights=np.repeat(doubled / 6.0, 3), minlength=len(vertices))
