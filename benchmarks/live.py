@@ -1,37 +1,139 @@
 """The live page's cost: the same frames without it, in its own process, and with the page served, in turns.
 
+A ball of 5k tets falls on a floor. Each round simulates the same frames in all three ways, as fast as they can; ratios
+are taken within a round, and their median over the rounds, so that a machine that is busy now and then does not matter
+much. Then the last two play against the clock.
+
 usage: python -m benchmarks.live
 """
 
 from __future__ import annotations
 
+import contextlib
 import os
+import subprocess
 import sys
-from pathlib import Path
+import time
+from collections.abc import Callable, Iterator
+from statistics import median
 
-from benchmarks.measuring import in_turns, run_json
+import supple as sp
+from supple.viewer.app import Address, opened_page
+from supple.viewer.engine import Engine
+from supple.viewer.live_source import LiveSource
+from supple.viewer.messages import Play, Reset, Step
 
-SCRIPT = Path(__file__).with_name("live_scene.py")
 WAYS = {
     "headless": "simulate(), no page",
     "engine": "in the page's process for simulation, snapshots read at 60 Hz",
     "page": "the same with the page served, and a websocket that takes it all",
 }
+LISTEN = """
+import sys, viser
+from websockets.sync.client import connect
+with connect(sys.argv[1], subprotocols=["viser-v" + viser.__version__], max_size=None) as page:
+    print("connected", flush=True)
+    for _ in page:
+        pass
+"""
 
 
-def main(rounds: int = 3, frames: int = 300) -> None:
-    """Run all ways in turns and print them side by side."""
-    load = f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
-    best = in_turns({way: lambda way=way: run_json(sys.executable, SCRIPT, way, frames) for way in WAYS}, rounds)
-    base = best["headless"]["ms_per_frame"]
-    tets = best["headless"]["tets"]
-    print(f"\nXPBD, 20 substeps, {tets} tets, {frames} frames of 1/60 s, best of {rounds}; load at the start {load}")
+def source(edge_length: float) -> LiveSource:
+    """A ball half a metre above the floor."""
+    ball = sp.Body(
+        "ball",
+        sp.shapes.sphere(radius=0.5, edge_length=edge_length),
+        sp.EdgesAndVolume(edge_compliance=1e-4, density=1000.0, damping=0.003),
+        position=(0.0, 1.0, 0.0),
+    )
+    return LiveSource("ball", sp.Scene([ball], [sp.HalfSpace(friction=0.5)]), sp.XPBD(), 1 / 60)
+
+
+def headless(live: LiveSource, frames: int) -> float:
+    """Wall-clock time per frame of `simulate` [ms]."""
+    began = time.perf_counter()
+    for _ in sp.simulate(live.scene, live.solver, live.dt, frames):
+        pass
+    return 1e3 * (time.perf_counter() - began) / frames
+
+
+def behind(engine: Engine, frames: int, look: float) -> float:
+    """The same in the engine's process, from the command to the last frame as this process sees it [ms]."""
+    began = time.perf_counter()
+    engine.send(Reset())
+    number = engine.send(Step(frames))
+    while True:
+        snapshot = engine.latest()
+        if snapshot is not None and snapshot.applied >= number and snapshot.frame >= frames:
+            return 1e3 * (time.perf_counter() - began) / frames
+        time.sleep(look)
+
+
+def played(engine: Engine, seconds: float) -> str:
+    """How a simulation does against the clock."""
+    engine.send(Reset())
+    engine.send(Play())
+    end = time.perf_counter() + seconds
+    while time.perf_counter() < end:
+        engine.latest()
+        time.sleep(1 / 60)
+    snapshot = engine.latest()
+    assert snapshot is not None
+    engine.wait_for(engine.send(Reset()))
+    return f"played: {snapshot.timing.real_time_ratio:.3f} of real time, {snapshot.timing.step_ms:.2f} ms a step"
+
+
+@contextlib.contextmanager
+def listening(url: str) -> Iterator[None]:
+    """A process with a websocket that takes what a browser would get."""
+    listener = subprocess.Popen(
+        [sys.executable, "-c", LISTEN, url.replace("http", "ws", 1)], stdout=subprocess.PIPE, text=True
+    )
+    try:
+        assert listener.stdout is not None
+        assert listener.stdout.readline().strip() == "connected"
+        yield
+    finally:
+        listener.kill()
+        listener.wait()
+
+
+def load() -> str:
+    """How busy the machine was in the last minute."""
+    return f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
+
+
+def main(rounds: int = 15, frames: int = 90, edge_length: float = 0.1, seconds: float = 10.0) -> dict[str, list[float]]:
+    """Run all ways in turns and print them side by side. Returns the times of each, by round [ms/frame]."""
+    live = source(edge_length)
+    at_start = load()
+    with Engine(live) as engine, opened_page(live, Address(port=0)) as page, listening(page.url):
+        behind_page = page.shown.desk.simulation
+        assert isinstance(behind_page, Engine)
+        contenders: dict[str, Callable[[], float]] = {
+            "headless": lambda: headless(live, frames),
+            "engine": lambda: behind(engine, frames, 1 / 60),
+            "page": lambda: behind(behind_page, frames, 0.005),
+        }
+        for warm_up in contenders.values():
+            warm_up()
+        times: dict[str, list[float]] = {way: [] for way in WAYS}
+        for _ in range(rounds):
+            for way, run in contenders.items():
+                times[way].append(run())
+        clocks = {"engine": played(engine, seconds), "page": played(behind_page, seconds)}
+        tets = engine.description.n_tets
+    print(
+        f"\nXPBD, 20 substeps, {tets} tets, {frames} frames of 1/60 s, {rounds} rounds; "
+        f"load {at_start} at the start, {load()} at the end"
+    )
     for way, text in WAYS.items():
-        result = best[way]
-        line = f"{text:<72} {result['ms_per_frame']:6.2f} ms/frame  {result['ms_per_frame'] / base:5.2f}"
-        if "real_time_ratio" in result:
-            line += f"  played: {result['real_time_ratio']:.3f} of real time, {result['played_ms']:.2f} ms a step"
-        print(line)
+        ratio = median(own / base for own, base in zip(times[way], times["headless"], strict=True))
+        print(
+            f"{text:<66} {min(times[way]):6.2f} ms/frame at best, {median(times[way]):6.2f} in the median, "
+            f"ratio {ratio:4.2f}  {clocks.get(way, '')}"
+        )
+    return times
 
 
 if __name__ == "__main__":

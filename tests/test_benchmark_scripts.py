@@ -50,13 +50,10 @@ def test_errors_are_relative_to_the_tip():
     assert relative_error(off, reference) == pytest.approx(0.1)
 
 
-@pytest.mark.parametrize("way", ["headless", "page"])
-def test_the_live_ball_is_simulated_with_and_without_its_page(way, monkeypatch, capsys):
-    from benchmarks import live_scene
+def test_the_live_ball_is_simulated_with_and_without_its_page(capsys):
+    from benchmarks import live
 
-    monkeypatch.setattr(sys, "argv", ["live_scene.py", way, "12", "0.25"])
-    live_scene.main()
-    said = json.loads(capsys.readouterr().out.splitlines()[-1])
-    assert said["tets"] > 300
-    assert said["ms_per_frame"] > 0.0
-    assert ("real_time_ratio" in said) == (way == "page")
+    times = live.main(rounds=1, frames=6, edge_length=0.25, seconds=0.2)
+    assert list(times) == ["headless", "engine", "page"]
+    assert all(len(each) == 1 and each[0] > 0.0 for each in times.values())
+    assert "of real time" in capsys.readouterr().out
