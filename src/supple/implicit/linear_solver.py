@@ -4,24 +4,33 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, field
+from time import perf_counter
 from typing import Any
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_matrix
 
 from supple.implicit.direct import solve_directly
 from supple.implicit.potential import HessianBlocks
-from supple.numerics.block_csr import BlockPattern, BlockRows, build_pattern
+from supple.numerics.block_csr import SERIAL_BLOCKS, BlockPattern, BlockRows, build_pattern
 from supple.numerics.block_sum import JointPattern, join
+from supple.numerics.pace import Pace
 from supple.numerics.pcg import conjugate_gradients
 from supple.numerics.preconditioner import RowOrder, TwoLevel, order_rows, two_level
+from supple.numerics.threads import one_thread
 from supple.system import System
 
 logger = logging.getLogger(__name__)
 
 # Where CG has not converged after so many iterations, factorizing is likely faster.
 _STALLED = 400
+
+# After so many systems the slower number of threads is tried again (see `Pace`); a system is as much work as its
+# iterations, and its assembly as much as so many of them.
+_REST = 40
+_ASSEMBLY = 10
 
 
 @dataclass(frozen=True)
@@ -57,6 +66,9 @@ class LinearSolver:
     joined: tuple[NDArray[np.int32], NDArray[np.int32]] | None = None
     age: int = -1
     fresh_iterations: int = 0
+    pace: Pace = field(init=False)
+    parallel: bool = True
+    spent: float = 0.0
 
     @classmethod
     def of(cls, system: System, kind: str) -> LinearSolver:
@@ -72,6 +84,8 @@ class LinearSolver:
 
     def __post_init__(self) -> None:
         self.matrix, self.preconditioner = self.elements, self.elements_only
+        choice = numba.get_num_threads() > 1 and self.pattern.blocks >= SERIAL_BLOCKS
+        self.pace = Pace(choice, choice, _REST)
 
     def begin_step(self) -> None:
         """Forget what earlier steps left behind, so that a step depends on its state alone."""
@@ -79,6 +93,13 @@ class LinearSolver:
 
     def assemble(self, hessian: HessianBlocks) -> None:
         """Take over a new Hessian."""
+        began = perf_counter()
+        self.parallel = self.pace.choose()
+        with one_thread(not self.parallel):
+            self._assemble(hessian)
+        self.spent = perf_counter() - began
+
+    def _assemble(self, hessian: HessianBlocks) -> None:
         self.pattern.assemble(hessian.elements, hessian.vertices[self.order.vertices], self.elements)
         self._add_couplings(hessian.couplings)
         if self.kind != "direct":
@@ -126,6 +147,16 @@ class LinearSolver:
         -------
         p : (n, 3), zero where pinned; None where the system could not be solved
         """
+        began = perf_counter()
+        with one_thread(not self.parallel):
+            p, said = self._solve(force, tolerance, convex)
+        seconds = self.spent + perf_counter() - began
+        self.pace.note(self.parallel, seconds / (_ASSEMBLY + said.iterations))
+        return p, said
+
+    def _solve(
+        self, force: NDArray[np.float64], tolerance: float, convex: bool
+    ) -> tuple[NDArray[np.float64] | None, LinearReport]:
         b = force[self.order.vertices]
         x = np.zeros_like(b)
         p = np.zeros_like(force)

@@ -15,7 +15,14 @@ def threads_for(work: int, least: int) -> Iterator[None]:
     A small pass takes a fraction of a millisecond; where another process has the second core, waiting for it costs many
     times that. Kernels here give the same bits on any number of threads.
     """
-    if work >= least:
+    with one_thread(work < least):
+        yield
+
+
+@contextmanager
+def one_thread(alone: bool) -> Iterator[None]:
+    """Run Numba's parallel kernels on one thread if `alone`."""
+    if not alone:
         yield
         return
     before = numba.get_num_threads()

@@ -16,6 +16,7 @@ from numba.core import config
 from numpy.typing import NDArray
 
 from supple.errors import SolverError
+from supple.numerics.pace import Pace
 from supple.solver import Solver
 from supple.state import State, Status, StepReport
 from supple.system import System
@@ -36,7 +37,6 @@ from supple.xpbd.integration import (
 )
 from supple.xpbd.momentum import MomentumRestore
 from supple.xpbd.ordering import Layout, make_layout, reordered
-from supple.xpbd.pace import Pace
 from supple.xpbd.stitch_anchors import StitchAnchors
 from supple.xpbd.stitch_constraints import stitch_constraints
 

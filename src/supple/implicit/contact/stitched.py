@@ -68,7 +68,13 @@ class StitchedContacts:
         tolerant.can_collide = mesh.can_collide & apart
         touching = _touching(mesh, nodes, owner, start)
         codes = np.concatenate([one * e + other, other * e + one, touching[1]])
-        return cls(np.unique(np.append(faces * s + vertices, touching[0])), np.unique(codes), (s, e), tolerant, len(touching[0]) + len(touching[1]) > 0)
+        return cls(
+            np.unique(np.append(faces * s + vertices, touching[0])),
+            np.unique(codes),
+            (s, e),
+            tolerant,
+            len(touching[0]) + len(touching[1]) > 0,
+        )
 
     def drop_from(self, candidates: ipctk.Candidates) -> None:
         """Take the stitched ones out of what the broad phase has found."""

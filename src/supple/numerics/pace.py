@@ -2,14 +2,14 @@
 
 Threads that must meet forty times a frame help on a quiet machine, and hurt where another process has one of the
 cores: a frame can then take ten times as long. Nobody can know beforehand; both ways give the same bits, so the
-faster one is used.
+faster one is used. What is timed is called a turn here: a substep of XPBD, a linear system of Newton's method.
 """
 
 from __future__ import annotations
 
-# How many substeps the slower way rests before it is tried again, for one substep; twice as many each time that it
-# loses.
-SHORTEST_REST, LONGEST_REST = 400, 12_800
+# How many turns the slower way rests before it is tried again, for one turn; twice as many each time that it loses, up
+# to so many times the shortest rest.
+SHORTEST_REST, LONGEST = 400, 32
 # Weight of a new measurement in the average of its way.
 WEIGHT = 0.1
 # How much slower than the other way was the present one may become before they change places.
@@ -17,31 +17,31 @@ PATIENCE = 1.2
 
 
 class Pace:
-    """Remembers how long substeps took either way.
+    """Remembers how long turns took either way.
 
     Parameters
     ----------
     choice : whether there is anything to choose; without it, `parallel` is always the answer.
-    parallel : the way to begin with.
+    parallel : the way to begin with; rest : the shortest one of the slower way, in turns
     """
 
-    def __init__(self, choice: bool, parallel: bool) -> None:
+    def __init__(self, choice: bool, parallel: bool, rest: int = SHORTEST_REST) -> None:
         self.choice = choice
         self.parallel = parallel
         self._seconds: dict[bool, float] = {}
         self._started: set[bool] = set()
-        self._rest = SHORTEST_REST
+        self._shortest = self._rest = rest
         self._rested = 0
 
     def choose(self) -> bool:
-        """Whether the next substep should run on several threads."""
+        """Whether the next turn should run on several threads."""
         if not self.choice or self.parallel not in self._seconds:
             return self.parallel
         other = not self.parallel
         return other if other not in self._seconds or self._rested >= self._rest else self.parallel
 
     def note(self, parallel: bool, seconds: float) -> None:
-        """Learn how long a substep took."""
+        """Learn how long a turn took."""
         if not self.choice:
             return
         if parallel not in self._started:
@@ -52,9 +52,9 @@ class Pace:
             self._rested = 0
             self._seconds[other] = seconds
             if seconds < self._seconds[self.parallel]:
-                self._change(SHORTEST_REST)
+                self._change(self._shortest)
             else:
-                self._rest = min(2 * self._rest, LONGEST_REST)
+                self._rest = min(2 * self._rest, LONGEST * self._shortest)
             return
         before = self._seconds.get(parallel, seconds)
         self._seconds[parallel] = (1.0 - WEIGHT) * before + WEIGHT * seconds
