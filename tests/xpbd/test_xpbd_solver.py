@@ -5,11 +5,11 @@ import pytest
 
 import supple as sp
 from supple.errors import SolverError
+from supple.numerics.pace import Pace
 from supple.state import State
 from supple.system import build_system, initial_state
 from supple.xpbd import ordering
 from supple.xpbd.contact_settings import ContactSettings
-from supple.numerics.pace import Pace
 from supple.xpbd.solver import XPBD
 
 DT = 1.0 / 60.0

@@ -77,8 +77,8 @@ def contact_surface(
     """
     import ipctk
 
-    # With several threads the library finds contacts in an order, and rounds its sums in a way, that differs from run to
-    # run; with one, the same scene gives the same bits.
+    # With several threads the library finds contacts in an order, and rounds its sums in a way, that differs from run
+    # to run; with one, the same scene gives the same bits.
     ipctk.set_num_threads(1)
     parts = [system.triangles] + [part.triangles for part in obstacles if not part.is_plane]
     triangles = np.concatenate(parts)
