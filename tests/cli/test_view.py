@@ -1,6 +1,11 @@
 """`supple view` and `supple demo --live`: what is shown, where, and to whom."""
 
+import os
+import signal
 import socket
+import subprocess
+import sys
+import urllib.request
 
 import numpy as np
 import pytest
@@ -85,6 +90,23 @@ def test_a_demo_is_shown_live_and_nothing_is_recorded(tmp_path, monkeypatch, ser
     assert isinstance(xpbd.solver, sp.XPBD)
     assert isinstance(implicit.solver, sp.Implicit)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends an interrupt as a terminal does")
+def test_the_shell_serves_a_page_until_ctrl_c(scene):
+    shell = subprocess.Popen(
+        [sys.executable, "-m", "supple", "view", str(scene), "--port", "0", "--no-open"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    address = shell.stdout.readline().split()[0]
+    with urllib.request.urlopen(address, timeout=60) as response:
+        assert response.status == 200
+    os.killpg(shell.pid, signal.SIGINT)  # both processes hear it, as from a terminal
+    out, err = shell.communicate(timeout=60)
+    assert (shell.returncode, out, err) == (ExitCode.OK, "", "")
 
 
 def test_what_cannot_be_shown_or_served_is_one_line(tmp_path, scene, served, capfd):

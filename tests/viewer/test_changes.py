@@ -351,6 +351,27 @@ class TestBodies:
         with pytest.raises(CommandError, match="only one"):
             change(RemoveBody("cube 1"), live)
 
+    def test_what_names_a_body_goes_with_it(self):
+        rubber = sp.StableNeoHookean(youngs=1e5, poisson=0.4)
+        mesh = sp.shapes.box((0.4, 0.4, 0.4), (2, 2, 2))
+        bodies = [sp.Body(name, mesh, rubber, position=(0, 0.41 * k, 0)) for k, name in enumerate("abc")]
+        joined = {"max_distance": 0.02, "youngs": 1e5, "poisson": 0.4, "min_separate_distance": 1e-3}
+        scene = sp.Scene(
+            bodies,
+            stitches=[sp.SoftVertexTriangleStitch("b", "a", **joined), sp.SoftVertexTriangleStitch("c", "b", **joined)],
+            contact_pairs=[sp.ContactPair(["a", "b"], "c", friction=0.2), sp.ContactPair("a", "b", friction=0.3)],
+            forces=[sp.Force("a", [0], (0, 1, 0)), sp.Force("b", [0], (0, 1, 0))],
+        )
+        live = LiveScene(LiveSource("stack", scene, sp.XPBD(substeps=4), 0.01))
+        assert describe(live).stitches.shape == (18, 4)
+        change(RemoveBody("a"), live)
+        left = live.setup.scene
+        assert describe(live).stitches.shape == (9, 4)
+        assert [force.body for force in left.forces] == ["b"]
+        assert len(left.stitches) == 1
+        assert [tuple(pair.first) for pair in left.contact_pairs] == [("b",)]
+        run(live, 2)
+
     def test_there_is_an_end_to_bodies_and_tets(self, live, monkeypatch):
         monkeypatch.setattr(limits, "MOST_BODIES", 3)
         change(CopyBody("cube"), live)

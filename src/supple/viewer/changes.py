@@ -299,20 +299,25 @@ def without_body(scene: Scene, name: str) -> Scene:
     for field in fields(scene):
         items = getattr(scene, field.name)
         if field.name not in ("bodies", "obstacles", "gravity") and isinstance(items, tuple):
-            changes[field.name] = [item for item in items if not _mentions(item, name)]
+            left = [_without_name(item, name) for item in items]
+            changes[field.name] = [item for item in left if item is not None]
     return replace(scene, **changes)
 
 
-def _mentions(item: Any, body: str) -> bool:
-    """Whether a part of a scene has that body's name in any field but its own name."""
-    return any(
-        field.name != "name" and isinstance(value := getattr(item, field.name), (str, tuple)) and _names(value, body)
-        for field in fields(item)
-    )
-
-
-def _names(value: str | tuple, body: str) -> bool:
-    return value == body or (isinstance(value, tuple) and body in [each for each in value if isinstance(each, str)])
+def _without_name(item: Any, body: str) -> Any | None:
+    """A part of a scene without that body: None where it names it, less that name where it names several."""
+    changes: dict[str, Any] = {}
+    for field in fields(item):
+        value = getattr(item, field.name)
+        if field.name == "name" or not field.init:
+            continue
+        if isinstance(value, str) and value == body:
+            return None
+        if isinstance(value, tuple) and body in [each for each in value if isinstance(each, str)]:
+            changes[field.name] = tuple(each for each in value if each != body)
+            if not changes[field.name]:
+                return None
+    return replace(item, **changes) if changes else item
 
 
 def _part(live: LiveScene, name: str) -> BodyRange:
