@@ -13,7 +13,7 @@ from supple.implicit.contact.start_check import Intersection, intersections_of
 from supple.implicit.contact.start_surfaces import StartSurfaces, start_surfaces
 from supple.scene.contact_pairs import PairTable, pair_table
 from supple.scene.scene import Scene
-from supple.system import System, build_system, initial_state
+from supple.system import PinRange, System, build_system, initial_state
 
 # Of a body's diagonal: how far it may be moved.
 FURTHEST = 0.5
@@ -142,7 +142,8 @@ class Mover:
         self.masses = [float(system.masses[part.vertices].sum()) for part in system.bodies]
         spans = [np.ptp(system.rest_positions[part.vertices], axis=0) for part in system.bodies]
         self.limits = FURTHEST * np.linalg.norm(spans, axis=1)
-        held = {pin.pin.body for pin in system.pins}
+        # Obstacles may be among the pins here: the solver moves their vertices in the same way.
+        held = {pin.pin.body for pin in system.pins if isinstance(pin, PinRange)}
         self.free = [part.name not in held for part in system.bodies]
         size = float(np.linalg.norm(system.gravity))
         self.up = -system.gravity / size if size > 0.0 else np.array([0.0, 1.0, 0.0])
