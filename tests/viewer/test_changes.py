@@ -453,7 +453,7 @@ class TestHandover:
         x = live.state.positions.copy()
         x[block] += x[cube].mean(axis=0) - x[block].mean(axis=0)
         live.state = dataclasses.replace(live.state, positions=x)
-        with pytest.raises(SuppleError, match="'cube'.*'block'|'block'.*'cube'"):
+        with pytest.raises(SuppleError, match=r"'cube'.*'block'|'block'.*'cube'"):
             change(SetSolver("implicit"), live)
         assert describe(live).solver == "xpbd"
         assert np.array_equal(live.state.positions, x)

@@ -1,5 +1,6 @@
 """The loop in the simulation's process, without the process: failures, slow motion, views, and a thousand commands."""
 
+import contextlib
 import dataclasses
 import logging
 import math
@@ -78,7 +79,14 @@ def endless(state):
         time.sleep(0.01)
 
 
-def test_a_step_that_does_not_end_is_given_up(loop):
+def stubborn(state):
+    with contextlib.suppress(SolverError):
+        endless(state)
+    endless(state)
+
+
+@pytest.mark.parametrize("endless", [endless, stubborn])
+def test_a_step_that_does_not_end_is_given_up(loop, endless):
     loop.watch.longest = 0.2
     loop.obey(say.Play())
     good, solver = loop.live.state, loop.live.setup.solver
@@ -280,8 +288,8 @@ def random_command(rng, bodies, solvers=("xpbd",)):
 
 
 def test_a_thousand_random_commands_leave_a_finite_state(loop, monkeypatch, caplog):
-    monkeypatch.setattr(limits, "MOST_BODIES", 5)
-    monkeypatch.setattr(limits, "MOST_TETS", 1500)
+    monkeypatch.setattr(limits, "MOST_BODIES", 4)
+    monkeypatch.setattr(limits, "MOST_TETS", 900)
     rng = random.Random(20240229)
     refused = play_with(loop, rng, 1000, ["xpbd"])
     assert refused > 50
@@ -316,5 +324,5 @@ def play_with(loop, rng, count, solvers):
         state = loop.live.state
         assert np.isfinite(state.positions).all()
         assert np.isfinite(state.velocities).all()
-        assert 1 <= len(bodies) <= 5
+        assert 1 <= len(bodies) <= 4
     return refused

@@ -12,7 +12,8 @@ from typing import Any
 
 from supple.errors import SolverError
 
-_LOOK = 0.05  # how often the watch looks at the clock [s]
+# How often the watch looks at the clock, and after which time it tries again [s].
+_LOOK, _AGAIN = 0.05, 0.5
 
 
 class StepTooLong(SolverError):
@@ -35,6 +36,7 @@ class StepWatch:
         self.longest, self.patience = longest, patience
         self._impatient = impatient
         self._began: float | None = None
+        self._not_before = 0.0
         self._thread: threading.Thread | None = None
 
     @contextmanager
@@ -47,7 +49,7 @@ class StepWatch:
             self._thread = threading.Thread(target=self._watch, name="step watch", daemon=True)
             self._thread.start()
         before = signal.signal(signal.SIGINT, self._give_up)
-        self._began = time.monotonic()
+        self._began, self._not_before = time.monotonic(), 0.0
         try:
             yield
         finally:
@@ -56,14 +58,18 @@ class StepWatch:
 
     def _give_up(self, number: int, frame: Any) -> None:
         # Ctrl-C in a terminal comes here as well, and is left to the page's process.
-        began, self._began = self._began, None
+        began = self._began
         if began is None or not self._is_over(began):
-            self._began = began
             return
+        # It may have been raised where nobody lets it pass, as in a destructor: then once more, a little later.
+        self._not_before = time.monotonic() + _AGAIN
         raise StepTooLong(f"given up after {time.monotonic() - began:.1f} s")
 
     def _is_over(self, began: float) -> bool:
-        taken = time.monotonic() - began
+        now = time.monotonic()
+        taken = now - began
+        if now < self._not_before:
+            return False
         return taken > self.longest or (taken > self.patience and self._impatient())
 
     def _watch(self) -> None:
