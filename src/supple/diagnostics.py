@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.material import Elastic
+from supple.scene.stitches.measures import largest_stitch_stretch, stitch_energy
 from supple.state import State
 from supple.system import BodyRange, System
 
@@ -23,6 +24,8 @@ class Diagnostics:
     min_det_F : smallest J over all tets [-]
     kinetic_energy, elastic_energy : [J], elastic from the rest state
     potential_energy : of gravity [J], zero where all mass is at the origin
+    stitch_energy : of all stitches, from their rest state [J]
+    largest_stitch_stretch : see `supple.scene.stitches.measures`; None without stitches
     linear_momentum : (3,) [kg m/s]; angular_momentum : (3,) about the center of mass [kg m^2/s]
     """
 
@@ -30,6 +33,8 @@ class Diagnostics:
     kinetic_energy: float
     elastic_energy: float
     potential_energy: float
+    stitch_energy: float
+    largest_stitch_stretch: float | None
     linear_momentum: NDArray[np.float64]
     angular_momentum: NDArray[np.float64]
 
@@ -42,11 +47,15 @@ def measure(system: System, state: State) -> Diagnostics:
     momentum = m @ v
     F = deformation_gradients(x, system.tets, system.rest_shape_inverse)
     J = determinants(F)
+    stitching = system.stitching
+    points = stitching.points(x, state.time)
     return Diagnostics(
         min_det_F=float(J.min()),
         kinetic_energy=0.5 * float(m @ np.einsum("ij,ij->i", v, v)),
         elastic_energy=sum(_elastic_energy(system, part, x, F[part.tets], J[part.tets]) for part in system.bodies),
         potential_energy=-float((m @ x) @ system.gravity),
+        stitch_energy=stitch_energy(stitching, points) if len(stitching) else 0.0,
+        largest_stitch_stretch=largest_stitch_stretch(stitching, points) if len(stitching) else None,
         linear_momentum=momentum,
         angular_momentum=m @ np.cross(x - center, v - momentum / m.sum()),
     )

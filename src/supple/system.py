@@ -22,7 +22,7 @@ from supple.scene.motion import Motion, moved_points, points_at_origin
 from supple.scene.obstacles import Obstacle
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
-from supple.scene.stitches.stitching import Stitching, no_stitching, stitch_together
+from supple.scene.stitches.stitching import Stitching, no_stitching
 from supple.state import State
 
 
@@ -199,7 +199,7 @@ def build_system(scene: Scene, start: State | None = None) -> System:
         gravity=np.asarray(scene.gravity, dtype=np.float64),
         forces=tuple(ForceRange(force, _chosen_vertices(force, ranges)) for force in scene.forces),
         soft_targets=_soft_target_ranges(scene, ranges, start),
-        stitching=stitch_together(scene.bodies, scene.obstacles, scene.stitches),
+        stitching=scene.stitching,
     )
 
 

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
 
     from supple.mesh.surface import SurfaceMesh
     from supple.mesh.tetmesh import TetMesh
+    from supple.scene.stitches.stitching import Stitching
 
 SCENE_FILES = (".yaml", ".yml")
 RECORDINGS = (".vtkhdf", ".hdf", ".h5")
@@ -167,7 +168,20 @@ def _scene(file: Path) -> None:
         mesh = part.body.mesh
         text = f"{type(part.body.material).__name__}, {len(mesh.tets)} tets, {mesh.volume:.6g} m^3, {mass:.6g} kg"
         rows.append((f"body {part.name}", text))
+    rows += _stitch_rows(system.stitching)
     _print_table(str(file), rows)
+
+
+def _stitch_rows(stitching: Stitching) -> list[tuple[str, str]]:
+    """How many pairs each stitch has, how far they are apart, and how many rest vertices had to be moved."""
+    rows = []
+    for part in stitching.ranges:
+        near, far = part.pairs.distances.min(), part.pairs.distances.max()
+        text = f"{type(part.stitch).__name__}, {len(part.pairs.vertices)} pairs, {near:.6g} to {far:.6g} m apart"
+        if part.tets.stop > part.tets.start:
+            text += f", {int(stitching.tets.offset[part.tets].sum())} rest vertices offset"
+        rows.append((part.stitch.label, text))
+    return rows
 
 
 def _recording(file: Path) -> None:

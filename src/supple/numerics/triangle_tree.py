@@ -146,6 +146,22 @@ def pair_distances(
     return out
 
 
+def closest_places(
+    queries: NDArray[np.float64], points: NDArray[np.float64], triangles: NDArray[np.int32]
+) -> NDArray[np.float64]:
+    """(k, 3) barycentric coordinates of the place on the k-th triangle that is nearest to the k-th of the queries."""
+    out = np.empty((len(queries), 3))
+    _closest_places(np.ascontiguousarray(queries), np.ascontiguousarray(points), np.ascontiguousarray(triangles), out)
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def _closest_places(queries, points, triangles, out):
+    for k in range(len(queries)):
+        a, b, c = triangles[k, 0], triangles[k, 1], triangles[k, 2]
+        out[k] = closest_on_triangle(row(queries, k), row(points, a), row(points, b), row(points, c))
+
+
 @njit(cache=True, error_model="numpy")
 def _pair_distances(queries, points, triangles, out):
     for k in range(len(queries)):

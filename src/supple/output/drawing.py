@@ -28,6 +28,7 @@ BODY_COLORS = (
     (160, 120, 80),
 )
 OBSTACLE_COLOR = (176, 180, 188)
+STITCH_COLOR = (214, 40, 90)
 # A room is one surface between the eye and the bodies; walls stand behind each other, so each must be fainter.
 ROOM_OPACITY, WALL_OPACITY = 0.13, 0.05
 _SPHERE_RINGS, _SPHERE_SEGMENTS = 24, 48

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from supple.output.atomic import whole_file
 from supple.output.drawing import (
     OBSTACLE_COLOR,
+    STITCH_COLOR,
     View,
     evenly,
     obstacle_pictures,
@@ -69,7 +70,8 @@ def _serialize(server: Any, recording: Recording) -> str:
         )
         for i, picture in enumerate(drawn)
     ]
-    size = sum(12 * len(picture.at(first)) for picture in drawn)
+    stitches = _add_stitches(server, recording, quantum)
+    size = sum(12 * len(picture.at(first)) for picture in drawn) + 24 * len(recording.stitches)
     frames = evenly(recording, max(2, _MOST_BYTES // max(1, size)))
     serializer = server.get_scene_serializer()
     shown = first.time
@@ -78,6 +80,8 @@ def _serialize(server: Any, recording: Recording) -> str:
         shown = frame.time
         for handle, picture in zip(handles, drawn, strict=True):
             handle.vertices = _rounded(picture.at(frame), quantum)
+        if stitches is not None:
+            stitches.points = _rounded(recording.stitches.segments(frame.state.positions, frame.poses), quantum)
         for number, (handle, before) in obstacles.items():
             pose = frame.poses[number]
             if not np.array_equal(pose, before):
@@ -119,6 +123,20 @@ def _add_obstacles(server: Any, recording: Recording, view: View) -> dict[int, t
         )
         handles[obstacle.number] = handle, pose
     return handles
+
+
+def _add_stitches(server: Any, recording: Recording, quantum: float) -> Any:
+    """Draw stitches as segments; their handle, or None where there are none."""
+    if not len(recording.stitches):
+        return None
+    first = recording[0]
+    return server.scene.add_line_segments(
+        "/stitches",
+        _rounded(recording.stitches.segments(first.state.positions, first.poses), quantum),
+        colors=STITCH_COLOR,
+        thickness=2.0,
+        thickness_units="screen",
+    )
 
 
 def _quaternion(R: NDArray[np.float64]) -> NDArray[np.float64]:

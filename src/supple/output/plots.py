@@ -22,6 +22,8 @@ _LEGEND: dict[str, Any] = {  # above the lines, not on them
     "frameon": False,
     "fontsize": "small",
 }
+_ENERGIES = ("kinetic", "elastic", "potential")
+STITCH_LINE = "#c77700"
 _AXES = (("x", "#d1495b"), ("y", "#3a7d44"), ("z", "#30638e"))
 
 
@@ -59,7 +61,8 @@ def plot_recording(recording: Recording | str | Path, output: str | Path) -> Pat
 def _draw(recording: Recording, axes) -> None:
     t = recording.times
     energy, volume, linear, angular, worst, wall = axes.flat
-    parts = {name: recording.series(f"{name}_energy") for name in ("kinetic", "elastic", "potential")}
+    names = ("kinetic", "elastic", "potential", "stitch") if len(recording.stitches) else _ENERGIES
+    parts = {name: recording.series(f"{name}_energy") for name in names}
     for name, values in parts.items():
         energy.plot(t, values, label=name)
     energy.plot(t, sum(parts.values()), color="0.2", linewidth=1.0, linestyle="--", label="sum")
@@ -76,6 +79,12 @@ def _draw(recording: Recording, axes) -> None:
     worst.plot(t, recording.series("min_det_F"), color="#7a3e9d")
     worst.axhline(0.0, color="0.2", linewidth=0.8)
     worst.set_ylabel("smallest J = det F")
+    stretch = recording.series("largest_stitch_stretch")
+    if np.isfinite(stretch).any():
+        beside = worst.twinx()
+        beside.plot(t, stretch, color=STITCH_LINE)
+        beside.set_ylabel("largest stretch of a stitch", color=STITCH_LINE)
+        beside.spines["top"].set_visible(False)
     ms = 1e3 * recording.series("wall_seconds")
     wall.plot(t[1:], ms[1:], color="0.3")
     # The first step often loads or compiles the kernels; let it not flatten all the others.

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from supple.mesh.skin import Embedding
 from supple.output.checked_hdf5 import CheckedFile
 from supple.output.recorded_physics import write_physics
+from supple.output.recorded_stitches import write_stitches
 from supple.output.skinned_surface import SkinnedSurface
 from supple.scene.obstacles import Box, HalfSpace, Obstacle, Sphere, TriangleObstacle
 from supple.simulate import Frame
@@ -84,6 +85,7 @@ def write_scene(file: h5py.File, first: Frame, facts: dict[str, Any], scene_text
     own["tets"] = system.tets
     own["triangles"] = system.triangles
     own["pinned_vertices"] = system.pinned_vertices
+    write_stitches(own, system)
     for i, part in enumerate(system.bodies):
         body = part.body
         if body.skin is not None:

@@ -24,7 +24,16 @@ from supple.state import Status
 logger = logging.getLogger(__name__)
 
 SUFFIXES = (".vtkhdf", ".hdf", ".hdf5", ".h5")
-REPORT_NUMBERS = ("min_det_F", "kinetic_energy", "elastic_energy", "potential_energy", "wall_seconds", "min_distance")
+REPORT_NUMBERS = (
+    "min_det_F",
+    "kinetic_energy",
+    "elastic_energy",
+    "potential_energy",
+    "stitch_energy",
+    "wall_seconds",
+    "min_distance",
+    "largest_stitch_stretch",
+)
 REPORT_VECTORS = ("linear_momentum", "angular_momentum")
 _TEXT_BYTES_PER_FRAME = 512
 # Frames, and bytes of frames, that are given room at first; more when they are needed.

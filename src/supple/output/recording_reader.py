@@ -17,10 +17,14 @@ from supple.errors import OutputError
 from supple.output.checked_hdf5 import CheckedFile
 from supple.output.recorded_physics import RecordedPhysics, read_physics, read_untouching
 from supple.output.recorded_scene import RecordedBody, RecordedObstacle, read_bodies, read_header, read_obstacles
+from supple.output.recorded_stitches import RecordedStitches, read_stitches
 from supple.output.recording import REPORT_NUMBERS, REPORT_VECTORS
 from supple.output.recording_file import WRITTEN
 from supple.simulate import Report
 from supple.state import State, Status
+
+# Recordings of earlier versions do not have these; what they were is known all the same.
+_OF_EARLIER = {"stitch_energy": 0.0, "largest_stitch_stretch": np.nan}
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +74,7 @@ class RecordedFrame:
         """How the step ended, and what was measured on its state."""
         values = {name: float(self.recording.series(name)[self.number]) for name in REPORT_NUMBERS}
         vectors = {name: self.recording.series(name)[self.number] for name in REPORT_VECTORS}
-        distance = values.pop("min_distance")
+        distance, stretch = values.pop("min_distance"), values.pop("largest_stitch_stretch")
         said = self.recording._text(self.number)
         return Report(
             **values,
@@ -78,6 +82,7 @@ class RecordedFrame:
             status=self.recording.statuses[self.number],
             iterations=int(self.recording._values("iterations")[self.number]),
             min_distance=None if np.isnan(distance) else distance,
+            largest_stitch_stretch=None if np.isnan(stretch) else stretch,
             message=str(said.get("message", "")),
             details=dict(said.get("details", {})),
         )
@@ -92,7 +97,7 @@ class Recording(Sequence[RecordedFrame]):
     Attributes
     ----------
     path : of the file; times : (frames,) [s]
-    bodies, obstacles : what was simulated, and what it met
+    bodies, obstacles : what was simulated, and what it met; stitches : what joined them
     rest_positions : (n, 3) [m]; masses : (n,) [kg]; tets : (m, 4); triangles : (t, 3); rest_volumes : (m,) [m^3]
     gravity : (3,) [m/s^2]; dt : time from frame to frame [s]
     physics : the bodies' laws and what acts on them, or None where an older version wrote the recording
@@ -128,6 +133,7 @@ class Recording(Sequence[RecordedFrame]):
         self.obstacles: tuple[RecordedObstacle, ...] = read_obstacles(file, header)
         self.physics: RecordedPhysics | None = read_physics(file, header, m)
         self.untouching = read_untouching(file, header, n, [len(obstacle.vertices) for obstacle in self.obstacles])
+        self.stitches: RecordedStitches = read_stitches(file, n, len(self.obstacles))
         self.dt = float(header["dt"])
         self.solver: str | None = header.get("solver")
         self.supple_version = str(header.get("supple_version", ""))
@@ -215,6 +221,8 @@ class Recording(Sequence[RecordedFrame]):
     def _values(self, name: str, shape: tuple[int, ...] = ()) -> NDArray[Any]:
         kept = self.__dict__.setdefault("_kept", {})
         if name not in kept:
+            if name in _OF_EARLIER and f"supple/frames/{name}" not in self._file:
+                return np.full(self._count, _OF_EARLIER[name])
             kind = {"status": "u", "index": "i", "iterations": "i", "text_end": "i"}.get(name, "f")
             kept[name] = self._file.first_rows(f"supple/frames/{name}", self._count, shape, kind)
         return kept[name]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +17,7 @@ from supple.scene.forces import Force, SoftTarget
 from supple.scene.obstacles import Obstacle
 from supple.scene.pins import Pin
 from supple.scene.stitches.stitch import Stitch
+from supple.scene.stitches.stitching import Stitching, stitch_together
 from supple.scene.values import finite_vector
 
 _PARTS = (
@@ -98,6 +100,27 @@ class Scene:
         rules = PairRules(self)
         for pair in self.contact_pairs:
             rules.add(pair)
+        for stitch in self.stitches:
+            if stitch.first not in known:
+                raise SceneError(
+                    f"{stitch.label}: there is no body {stitch.first!r}; the scene has {', '.join(map(repr, known))}"
+                )
+            things = [*known, *(str(obstacle.name) for obstacle in self.obstacles)]
+            if stitch.second not in things:
+                raise SceneError(
+                    f"{stitch.label}: there is no body or obstacle {stitch.second!r}; the scene has "
+                    f"{', '.join(map(repr, things))}"
+                )
+
+    @cached_property
+    def stitching(self) -> Stitching:
+        """All stitches with their pairs found, where the scene places everything at time 0.
+
+        Raises
+        ------
+        SceneError : where a pair does not exist, or none is within reach.
+        """
+        return stitch_together(self.bodies, self.obstacles, self.stitches)
 
     def body(self, name: str) -> Body:
         """The body of that name.

@@ -13,6 +13,7 @@ from supple.scene_file.model import Model, Vector
 from supple.scene_file.obstacles import ObstacleModel
 from supple.scene_file.selections import ForceModel, PinModel, SoftTargetModel
 from supple.scene_file.solvers import SolverModel, XPBDModel
+from supple.scene_file.stitches import StitchModel
 
 MAX_STEPS = 10_000_000
 
@@ -60,6 +61,7 @@ class SceneFileModel(Model):
     forces: list[ForceModel] = Field(default=[], max_length=10_000)
     soft_targets: list[SoftTargetModel] = Field(default=[], max_length=10_000)
     contact_pairs: list[ContactPairModel] = Field(default=[], max_length=10_000)
+    stitches: list[StitchModel] = Field(default=[], max_length=10_000)
     gravity: Vector = Field(default=[0.0, -9.81, 0.0], description="[m/s^2]")
     solver: SolverModel = Field(default_factory=lambda: XPBDModel(kind="xpbd"))
     dt: Seconds = Field(default=1.0 / 60.0, description="time from frame to frame [s]; 1/60 may be written as such")

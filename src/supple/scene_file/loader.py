@@ -20,6 +20,8 @@ from supple.scene.obstacles import Obstacle
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.scene.selection import InBox
+from supple.scene.stitches.stitch import Stitch
+from supple.scene.stitches.stitching import stitch_together
 from supple.scene_file.complaints import complaint, suggestion
 from supple.scene_file.contact_pairs import built_pairs
 from supple.scene_file.document import OutputModel, SceneFileModel
@@ -128,10 +130,16 @@ def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
     for i, described in enumerate(model.soft_targets):
         with at("soft_targets", i):
             targets.append(_fits(described.build(), bodies))
+    stitches: list[Stitch] = []
+    for i, described in enumerate(model.stitches):
+        with at("stitches", i):
+            stitch = described.build()
+            stitch_together(list(bodies.values()), obstacles, [stitch])
+            stitches.append(stitch)
     with at("solver"):
         solver = model.solver.build()
     with at():
-        scene = Scene(list(bodies.values()), obstacles, pins, model.gravity, forces, targets)
+        scene = Scene(list(bodies.values()), obstacles, pins, model.gravity, forces, targets, stitches)
         if model.contact_pairs:
             scene = replace(scene, contact_pairs=built_pairs(model.contact_pairs, scene))
     return Run(scene, solver, model.dt, model.steps, starts, model.output)

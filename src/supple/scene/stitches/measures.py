@@ -1,0 +1,53 @@
+"""What stitches store and how far they are stretched, and where to draw them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.numerics.triangle_tree import closest_places
+from supple.scene.stitches.stitching import Stitching
+
+
+def stitch_energy(stitching: Stitching, points: NDArray[np.float64]) -> float:
+    """Energy of all stitches, zero at rest [J]; points (n + a, 3) as of `Stitching.points` [m]."""
+    tets, springs = stitching.tets, stitching.springs
+    F = _deformation_gradients(stitching, points)
+    grown = np.linalg.det(F) - 1.0
+    shape = 0.5 * (np.einsum("tij,tij->t", F, F) - 3.0) - grown
+    energy = float((tets.mu * shape + 0.5 * tets.lam * grown * grown) @ tets.rest_volumes)
+    longer = np.linalg.norm(springs.extensions(points), axis=1) - springs.rest_lengths
+    return energy + 0.5 * float(springs.stiffness @ (longer * longer))
+
+
+def largest_stitch_stretch(stitching: Stitching, points: NDArray[np.float64]) -> float | None:
+    """The largest of: principal stretches of stitch tets, and lengths of springs as a share of their rest lengths.
+
+    1 at rest. A tet whose vertex moves off its triangle is stretched in proportion to its rest distance, which is at
+    least `min_separate_distance`. Springs of rest length zero have no stretch. None where nothing has one.
+    """
+    F, springs = _deformation_gradients(stitching, points), stitching.springs
+    long = springs.rest_lengths > 0.0
+    lengths = np.linalg.norm(springs.extensions(points), axis=1)[long] / springs.rest_lengths[long]
+    C = np.einsum("tji,tjk->tik", F, F)
+    squares = np.linalg.eigvalsh(C)[:, -1] if np.isfinite(C).all() else C.max(axis=(1, 2))
+    every = np.concatenate([np.sqrt(np.maximum(squares, 0.0)), lengths])
+    return float(every.max()) if len(every) else None
+
+
+def attachments(stitching: Stitching, points: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """Where each stitch holds on: nodes (k, 4), the vertex first, and weights (k, 3) of the others at the place nearest
+    to it; points (n + a, 3) at the start [m]."""
+    springs = stitching.springs
+    others = np.concatenate([stitching.tets.vertices[:, 1:], springs.vertices[:, [1, 2, 2]]])
+    vertex = np.concatenate([stitching.tets.vertices[:, 0], springs.vertices[:, 0]])
+    weights = closest_places(points[vertex], points, others)
+    weights[len(stitching.tets) :] = np.column_stack([1.0 - springs.place, springs.place, np.zeros(len(springs))])
+    return np.column_stack([vertex, others]).astype(np.int32), weights
+
+
+def _deformation_gradients(stitching: Stitching, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    tets = stitching.tets
+    corners = points[tets.vertices]
+    Ds = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+    return Ds @ tets.rest_shape_inverse

@@ -1,0 +1,76 @@
+"""Stitches of a scene file, by `kind`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from supple.scene.stitches.stitch import Stitch
+from supple.scene.stitches.vertex_edge import VertexEdgeStitch
+from supple.scene.stitches.vertex_triangle import SoftVertexTriangleStitch
+from supple.scene.stitches.vertex_vertex import VertexVertexStitch
+from supple.scene_file.model import Model, Name, NonNegative, Positive
+
+Index = Annotated[int, Field(ge=0, lt=2**31)]
+PairList = Annotated[list[Annotated[list[Index], Field(min_length=2, max_length=2)]], Field(min_length=1)]
+PerPair = Positive | Annotated[list[Positive], Field(min_length=1)]
+Lengths = NonNegative | Annotated[list[NonNegative], Field(min_length=1)]
+
+
+class _StitchModel(Model):
+    first: Name = Field(description="the body whose vertices are stitched")
+    second: Name = Field(description="what they are stitched to: a body, or an obstacle of triangles")
+    max_distance: Positive | None = Field(default=None, description="stitch what is nearer than this at the start [m]")
+    pairing: Literal["closest", "all"] = Field(
+        default="closest", description="what a vertex is stitched to: the nearest one, or all within max_distance"
+    )
+    damping: NonNegative = Field(default=0.0, description="Kelvin-Voigt time [s]")
+    name: Name | None = Field(default=None, description="stands in messages")
+
+    def shared(self) -> dict[str, Any]:
+        return {key: getattr(self, key) for key in type(self).model_fields if key != "kind"}
+
+
+class SoftVertexTriangleModel(_StitchModel):
+    """Soft tetrahedra between vertices and triangles. Give `pairs` or `max_distance`; `youngs` and `poisson`, or `mu`
+    and `lam`."""
+
+    kind: Literal["soft_vertex_triangle"]
+    pairs: PairList | None = Field(default=None, description="[vertex of the first, surface triangle of the second]")
+    youngs: PerPair | None = Field(default=None, description="Young's modulus [Pa]; one, or one per pair")
+    poisson: PerPair | None = Field(default=None, description="Poisson's ratio, below 0.5; one, or one per pair")
+    mu: PerPair | None = Field(default=None, description="instead: as it stands in the energy [Pa]")
+    lam: PerPair | None = Field(default=None, description="as it stands in the energy [Pa]")
+    min_separate_distance: PerPair = Field(default=1e-3, description="least distance at rest [m]; one, or one per pair")
+
+    def build(self) -> Stitch:
+        return SoftVertexTriangleStitch(**self.shared())
+
+
+class _SpringModel(_StitchModel):
+    stiffness: PerPair = Field(description="of each spring [N/m]; one, or one per pair")
+    rest_length: Lengths | None = Field(default=None, description="[m]; the distance at the start without it")
+
+
+class VertexVertexModel(_SpringModel):
+    """Springs between vertices."""
+
+    kind: Literal["vertex_vertex"]
+    pairs: PairList | None = Field(default=None, description="[vertex of the first, vertex of the second]")
+
+    def build(self) -> Stitch:
+        return VertexVertexStitch(**self.shared())
+
+
+class VertexEdgeModel(_SpringModel):
+    """Springs from vertices to points of edges."""
+
+    kind: Literal["vertex_edge"]
+    pairs: PairList | None = Field(default=None, description="[vertex of the first, surface edge of the second]")
+
+    def build(self) -> Stitch:
+        return VertexEdgeStitch(**self.shared())
+
+
+StitchModel = Annotated[SoftVertexTriangleModel | VertexVertexModel | VertexEdgeModel, Field(discriminator="kind")]
