@@ -49,7 +49,7 @@ def test_an_edge_as_a_triangle_has_the_distance_of_an_edge():
 
 
 @pytest.mark.parametrize("shift", [0.0, 1.0, 1000.0])
-def test_equally_near_triangles_the_lowest_number_wins(shift):
+def test_of_equally_near_triangles_that_touch_the_lowest_number_wins(shift):
     rng = np.random.default_rng(2)
     ring = np.array([[np.cos(a), np.sin(a), 0.1 * a] for a in np.linspace(0, 2 * np.pi, 13)[:-1]])
     points = np.concatenate([[[0.1, 0.2, 0.3]], ring]) @ np.linalg.qr(rng.normal(size=(3, 3)))[0] + shift
@@ -61,6 +61,18 @@ def test_equally_near_triangles_the_lowest_number_wins(shift):
         for vertex in range(1, 13):
             assert found[vertex] == min(np.flatnonzero((turned == vertex).any(axis=1)))
         assert distances.max() < 1e-12 * (1.0 + shift)
+
+
+def test_of_equally_near_triangles_the_one_that_faces_the_point_wins():
+    roof = np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 1], [1, 0, 1], [0, -1, 0], [1, -1, 0]])
+    side, top, top_again = [0, 1, 4], [0, 2, 1], [1, 2, 3]
+    triangles = np.array([side, top, top_again], dtype=np.int32)
+    # Above the edge of side and top; above the edge of both tops; beside the edge, in front of the side; beyond it.
+    queries = np.array([[0.5, 0.2, 0.0], [0.5, 0.2, 0.5], [0.5, 0.0, -0.2], [0.5, 0.2, -0.3]])
+    for order in ([0, 1, 2], [2, 1, 0], [1, 0, 2]):
+        found, _ = TriangleTree.of(roof, triangles[order]).nearest(queries)
+        number = {original: place for place, original in enumerate(order)}
+        assert found.tolist() == [number[1], min(number[1], number[2]), number[0], number[0]]
 
 
 def test_a_hundred_thousand_against_a_hundred_thousand():

@@ -6,12 +6,16 @@ from supple.demos.bears import BEARS
 from supple.demos.cantilever import CANTILEVER
 from supple.demos.compliance import COMPLIANCE
 from supple.demos.demo import Demo
+from supple.demos.quilt import QUILT
 from supple.demos.squash import SQUASH
+from supple.demos.stitch import STITCH
 from supple.demos.stretch import STRETCH
 from supple.demos.twist import TWIST
 from supple.errors import SceneError
 
-DEMOS: dict[str, Demo] = {demo.name: demo for demo in (SQUASH, STRETCH, COMPLIANCE, BEARS, CANTILEVER, TWIST)}
+DEMOS: dict[str, Demo] = {
+    demo.name: demo for demo in (SQUASH, STRETCH, COMPLIANCE, BEARS, CANTILEVER, TWIST, STITCH, QUILT)
+}
 
 
 def find_demo(name: str) -> Demo:

@@ -14,7 +14,7 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from supple.numerics.closest_point import closest_on_triangle, combine
-from supple.numerics.mat3 import dot, row, subtract
+from supple.numerics.mat3 import cross, dot, row, subtract
 
 _LEAF = 4
 _DEPTH = 64  # of a tree that halves: more than any memory holds
@@ -53,7 +53,8 @@ class TriangleTree:
     def nearest(self, queries: NDArray[np.float64], within: float = np.inf) -> tuple[NDArray, NDArray]:
         """The nearest triangle of each point, up to a distance.
 
-        Where several are equally near (up to round-off), it is the one of lowest number.
+        Where several are equally near (up to round-off), it is the one that faces the point most squarely, from which
+        the point is furthest in the direction of its normal; and of these the one of lowest number.
 
         Parameters
         ----------
@@ -168,6 +169,25 @@ def _pair_distances(queries, points, triangles, out):
         out[k] = np.sqrt(_square_to_triangle(row(queries, k), points, triangles, k))
 
 
+@njit(error_model="numpy")
+def _square_height(p, points, triangles, t):
+    """Of the distance from the triangle's plane; 0 where it has none."""
+    a, b, c = row(points, triangles[t, 0]), row(points, triangles[t, 1]), row(points, triangles[t, 2])
+    n = cross(subtract(b, a), subtract(c, a))
+    area = dot(n, n)
+    return dot(n, subtract(p, a)) ** 2 / area if area > 0.0 else 0.0
+
+
+@njit(error_model="numpy")
+def _comes_first(p, points, triangles, t, best, slack):
+    """Whether of two triangles that are equally near, t is the one to take."""
+    if best < 0:
+        return True
+    one, other = _square_height(p, points, triangles, t), _square_height(p, points, triangles, best)
+    margin = 1e-6 * (one + other) + slack
+    return one > other + margin or (one >= other - margin and t < best)
+
+
 @njit(cache=True, parallel=True, error_model="numpy")
 def _nearest(queries, within, points, triangles, order, bounds, boxes, found, squares):
     slack = ROUND_OFF * np.abs(boxes[0]).max() ** 2
@@ -194,8 +214,8 @@ def _nearest(queries, within, points, triangles, order, bounds, boxes, found, sq
             for k in range(bounds[node, 0], bounds[node, 1]):
                 t = order[k]
                 square = _square_to_triangle(p, points, triangles, t)
-                tie = square <= least * (1.0 + TIE) + slack and (best < 0 or t < best)
-                if tie or square < least * (1.0 - TIE) - slack:
+                tie = square <= least * (1.0 + TIE) + slack
+                if square < least * (1.0 - TIE) - slack or (tie and _comes_first(p, points, triangles, t, best, slack)):
                     best, least = t, min(square, least)
         if best >= 0:
             found[q] = best

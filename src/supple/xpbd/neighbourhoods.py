@@ -1,4 +1,4 @@
-"""Pairs of points and triangles that may not collide: they belong together, touch at rest, or are stitched."""
+"""Pairs of points and triangles of one body that may not collide: they belong together, or touch at rest."""
 
 from __future__ import annotations
 
@@ -11,33 +11,21 @@ from supple.xpbd.spatial_hash import PairFinder
 
 
 def excluded_pairs(
-    surfaces: ContactSurfaces,
-    rest_positions: NDArray[np.float64],
-    closer_than: float,
-    stitched: tuple[NDArray[np.int64], NDArray[np.int64]],
+    surfaces: ContactSurfaces, rest_positions: NDArray[np.float64], closer_than: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
     """For each triangle, the points that it never collides with: starts (t + 1,) and points.
 
-    These are its own corners, all points that an edge joins to one of them, all points of the same piece that are
-    closer than `closer_than` [m] to it at rest, and those stitched to it.
+    These are its own corners, all points that an edge joins to one of them, and all points of the same piece that are
+    closer than `closer_than` [m] to it at rest.
 
     Parameters
     ----------
-    rest_positions : (n, 3) of all points [m]; stitched : (q,) points, (q,) triangles
+    rest_positions : (n, 3) of all points [m]
     """
-    n, every = len(surfaces.point_piece), len(surfaces.triangles)
-    ones = np.ones(len(stitched[0]), dtype=np.int32)
-    found = csr_array((ones, (stitched[1], stitched[0])), shape=(every, n))
-    if np.diagonal(surfaces.allowed).any():
-        found = csr_array(found + _belonging(surfaces, rest_positions, closer_than))
-    found.sum_duplicates()
-    return found.indptr.astype(np.int64), found.indices.astype(np.int32)
-
-
-def _belonging(surfaces: ContactSurfaces, rest_positions: NDArray[np.float64], closer_than: float) -> csr_array:
-    """(t, n) which points of the same piece a triangle never collides with."""
     n, count, every = len(surfaces.point_piece), surfaces.body_triangles, len(surfaces.triangles)
     triangles = surfaces.triangles[:count]
+    if not np.diagonal(surfaces.allowed).any():
+        return np.zeros(len(surfaces.triangles) + 1, dtype=np.int64), np.zeros(0, dtype=np.int32)
     ones = np.ones(9 * count, dtype=np.int32)
     joined = csr_array((ones, (np.repeat(triangles, 3, axis=1).ravel(), np.tile(triangles, 3).ravel())), shape=(n, n))
     corners = csr_array(
@@ -49,7 +37,9 @@ def _belonging(surfaces: ContactSurfaces, rest_positions: NDArray[np.float64], c
         (np.ones(len(near_points), dtype=np.int32), (near_triangles, near_points)),
         shape=(every, n),
     )
-    return csr_array(corners @ joined + close)
+    found = csr_array(corners @ joined + close)
+    found.sort_indices()
+    return found.indptr.astype(np.int64), found.indices.astype(np.int32)
 
 
 def _close_at_rest(

@@ -19,6 +19,14 @@ def stitched_contacts(system: System, surfaces: ContactSurfaces) -> Pair:
     return stitched_triangles(point[nodes], surfaces.triangles, len(surfaces.point_piece))
 
 
+def stitched_points(system: System, surfaces: ContactSurfaces) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """For each triangle, the points that are stitched to it: starts (t + 1,) and points."""
+    points, triangles = stitched_contacts(system, surfaces)
+    order = np.lexsort((points, triangles))
+    starts = np.searchsorted(triangles[order], np.arange(len(surfaces.triangles) + 1))
+    return starts.astype(np.int64), points[order].astype(np.int32)
+
+
 def _points_of_vertices(system: System, surfaces: ContactSurfaces) -> NDArray[np.int64]:
     """(n + a,) the point of each vertex and anchor; -1 for vertices inside bodies."""
     anchors = system.stitching.anchors

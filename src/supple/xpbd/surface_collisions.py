@@ -12,7 +12,7 @@ from supple.xpbd.obstacle_poses import ObstaclePoses
 from supple.xpbd.point_inside import bounds_of_pieces, depths_inside
 from supple.xpbd.reach import looking_out, mean_motions, outran_pieces
 from supple.xpbd.spatial_hash import PairFinder
-from supple.xpbd.stitch_masks import stitched_contacts
+from supple.xpbd.stitch_masks import stitched_points
 from supple.xpbd.surface_contacts import project_surfaces
 
 # Of the mean surface edge: what a point may move at least, and at most, before lists are made anew, and up to which
@@ -30,7 +30,8 @@ class SurfaceCollisions:
         n, pieces = len(s.point_piece), len(s.closed)
         rest = np.concatenate([system.rest_positions[s.rows], s.fixed_points])
         widest = float(np.diagonal(s.gaps).max(initial=0.0))
-        excluded = excluded_pairs(s, rest, 2.0 * min(widest, 0.5 * edge_length), stitched_contacts(system, s))
+        excluded = excluded_pairs(s, rest, 2.0 * min(widest, 0.5 * edge_length))
+        self._stitched = stitched_points(system, s)
         self._rules = (s.allowed, *excluded)
         self._finder = PairFinder(n, pieces, edge_length)
         self._x, self._before, self._gathered = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
@@ -95,7 +96,9 @@ class SurfaceCollisions:
         for kind, meant in enumerate(((0, s.body_triangles), (s.body_triangles, len(s.triangles)))):
             if meant[0] < meant[1] and finder.n_active:
                 memory = (self._depth[kind], self._entered, self._complete)
-                found = project_surfaces(self._x, self._before, lists, self._described, memory, scales, meant)
+                found = project_surfaces(
+                    self._x, self._before, lists, self._described, memory, scales, meant, self._stitched
+                )
                 contacts, smallest = contacts + found[0], min(smallest, found[1])
         x[s.rows] = self._x[:bodies]
         x_prev[s.rows] = self._before[:bodies]

@@ -23,6 +23,7 @@ from supple.numerics.closest_point import area_normal, between, closest_on_trian
 from supple.numerics.mat3 import dot, row, subtract
 from supple.xpbd.friction import friction_correction
 from supple.xpbd.overlap import split_overlap
+from supple.xpbd.spatial_hash import is_excluded
 
 # Squared distances that agree to this share are equal: the point is nearest to a common edge or corner.
 TIE = 1e-9
@@ -188,7 +189,7 @@ def _resolve(x, x_prev, w, p, t, triangles, where, n, gap, mu, limit):
 
 
 @njit(cache=True)
-def project_surfaces(x, x_prev, lists, surfaces, memory, scales, meant):
+def project_surfaces(x, x_prev, lists, surfaces, memory, scales, meant, stitched):
     """Keep points and triangles apart, in place. Returns the number of contacts and the smallest gap before (or inf).
 
     Parameters
@@ -201,6 +202,8 @@ def project_surfaces(x, x_prev, lists, surfaces, memory, scales, meant):
         piece that it has come through, or -1; complete (n,) [m], up to which distance its list of triangles is complete
     scales : limit, see `split_overlap`; near, gaps above this are not reported [m]
     meant : (first, end) of the triangles that are meant: those of bodies, or those of obstacles
+    stitched : starts (t + 1,) and points: those stitched to each triangle. A triangle that a point is stitched to
+        decides about it as any other does, but does not push.
     """
     n_active, active, starts, listed = lists
     w, point_piece, triangles, triangle_piece, closed, gaps, friction = surfaces
@@ -227,7 +230,7 @@ def project_surfaces(x, x_prev, lists, surfaces, memory, scales, meant):
             )
             if same and held >= 0 and (t < 0 or side > 0.0):
                 entered[p] = -1
-            if t < 0:
+            if t < 0 or is_excluded(p, t, stitched[0], stitched[1]):
                 continue
             passed = distance == math.inf
             inside = closed[its] and side < 0.0 and not passed

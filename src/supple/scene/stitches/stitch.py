@@ -31,7 +31,8 @@ class Stitch(ABC):
     second : name of what they are stitched to: another body, or else a TriangleObstacle, static or scripted
     pairs : (n, 2) vertex of the first body's mesh, and what of the second (its kind says)
     max_distance : for each vertex of the first body's surface up to this distance of the second's [m]
-    pairing : "closest", a vertex's nearest one, the lowest number where several are equally near; or "all" in reach
+    pairing : "closest", a vertex's nearest one; where several are equally near, the one that faces it most squarely,
+        and of these the one of lowest number; or "all" in reach
     damping : Kelvin-Voigt time of the stitches [s]
     name : stands in messages
     """

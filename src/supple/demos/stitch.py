@@ -1,0 +1,138 @@
+"""A hat sewn on a gummy bear, which is then thrown."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.demos.demo import Claim, Demo, Measurement
+from supple.implicit.solver import Implicit
+from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.mesh import shapes
+from supple.numerics.triangle_tree import TriangleTree
+from supple.scene.body import Body
+from supple.scene.obstacles import HalfSpace
+from supple.scene.scene import Scene
+from supple.scene.stitches.vertex_triangle import SoftVertexTriangleStitch
+from supple.simulate import Frame
+from supple.xpbd.solver import XPBD
+
+HEIGHT, GAP = 0.1, 0.0015
+THROW = np.array([0.45, 1.3, 0.1])
+SPIN = np.array([0.0, 1.0, -5.0])
+GRAVITY = np.array([0.0, -9.81, 0.0])
+
+
+def scene() -> Scene:
+    """A bear of 10 cm with a round hat, sewn on between its ears, thrown up and forward over a floor."""
+    bear = Body(
+        "bear",
+        shapes.gummy_bear(height=HEIGHT, edge_length=0.012),
+        StableNeoHookean(youngs=5e4, poisson=0.4, density=1100.0, damping=0.005),
+        position=(0, 0.51 * HEIGHT, 0),
+        velocity=THROW,
+        angular_velocity=SPIN,
+        friction=0.5,
+        skin=shapes.gummy_bear_surface(height=HEIGHT, resolution=40),
+    )
+    mesh = shapes.cylinder(radius=0.006, height=0.014, edge_length=0.004)
+    placed = bear.place(bear.mesh.vertices)
+    center = _just_above(TriangleTree.of(placed, bear.mesh.surface.triangles), mesh.vertices)
+    # The hat moves as a part of the bear would.
+    volumes = bear.mesh.volumes
+    middle = volumes @ placed[bear.mesh.tets].mean(axis=1) / volumes.sum()
+    hat = Body(
+        "hat",
+        mesh,
+        StableNeoHookean(youngs=3e4, poisson=0.4, density=600.0, damping=0.005),
+        position=center,
+        velocity=THROW + np.cross(SPIN, center - middle),
+        angular_velocity=SPIN,
+        friction=0.5,
+    )
+    seam = SoftVertexTriangleStitch(
+        "hat", "bear", max_distance=0.004, youngs=3e3, poisson=0.3, min_separate_distance=1e-3, damping=0.005
+    )
+    return Scene(
+        bodies=[bear, hat],
+        obstacles=[HalfSpace(name="floor", friction=0.5)],
+        stitches=[seam],
+        gravity=GRAVITY,
+    )
+
+
+def _just_above(surface: TriangleTree, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Where a mesh comes to a stop that is let down over the middle of a surface to a distance of `GAP`."""
+    center = np.array([0.0, 3.0 * HEIGHT, 0.0])
+    for _ in range(100):
+        center[1] -= float(surface.nearest(vertices + center)[1].min()) - GAP
+    return center
+
+
+def lengths(frame: Frame) -> NDArray[np.float64]:
+    """(k,) from the hat's vertices to the middles of the triangles that they are sewn to [m]."""
+    x, nodes = frame.state.positions, frame.system.stitching.tets.vertices
+    return np.linalg.norm(x[nodes[:, 0]] - x[nodes[:, 1:]].mean(axis=1), axis=1)
+
+
+def center_of_mass(frame: Frame) -> NDArray[np.float64]:
+    """(3,) of everything [m]."""
+    m = frame.system.masses
+    return m @ frame.state.positions / m.sum()
+
+
+class _Watch(Measurement):
+    def begin(self, first: Frame, dt: float, steps: int) -> None:
+        super().begin(first, dt, steps)
+        self.longer, self.off, self.flight, self.lowest = 0.0, 0.0, 0.0, 0.0
+        self.landed = False
+        self.at_start = lengths(first)
+        self.center = center_of_mass(first)
+        m, v = first.system.masses, first.state.velocities
+        self.throw = m @ v / m.sum()
+
+    def write(self, frame: Frame) -> None:
+        super().write(frame)
+        self.longer = max(self.longer, float(np.abs(lengths(frame) - self.at_start).max()))
+        floor = float(frame.state.positions[:, 1].min())
+        self.lowest = min(self.lowest, floor)
+        self.landed = self.landed or (frame.time > 0.1 and floor < 5e-3)
+        if not self.landed:
+            t = frame.time
+            there = self.center + t * self.throw + 0.5 * t * t * GRAVITY
+            self.flight = t
+            self.off = max(self.off, float(np.linalg.norm(center_of_mass(frame) - there)))
+
+    def claims(self) -> list[Claim]:
+        return [
+            Claim(
+                "the hat stays on: no stitch becomes longer or shorter by more than 3 mm",
+                f"at most {1e3 * self.longer:.2f} mm, over {self.last.time:.2f} s",
+                self.longer <= 3e-3 and self.landed,
+            ),
+            Claim(
+                "until they land, their common center of mass follows the parabola of the throw within 3 mm",
+                f"at most {1e3 * self.off:.2f} mm beside it in {self.flight:.2f} s",
+                self.off <= 3e-3 and self.flight > 0.15,
+            ),
+            Claim(
+                "they land on the floor, and not in it",
+                f"lowest point {1e3 * self.lowest:.3f} mm",
+                self.landed and self.lowest > -1e-3,
+            ),
+        ]
+
+
+STITCH = Demo(
+    name="stitch",
+    summary="a hat sewn on a gummy bear, which is then thrown",
+    explanation=(
+        "Hat and bear are two meshes that share no vertex. Soft tetrahedra between the hat's vertices and the "
+        "triangles of the bear's head keep them together, in the air and when they hit the floor."
+    ),
+    scene=scene,
+    solvers={"xpbd": lambda: XPBD(substeps=60), "implicit": lambda: Implicit(integrator="bdf2")},
+    measurement=_Watch,
+    dt=1 / 60,
+    steps=60,
+)

@@ -1,0 +1,197 @@
+"""What a user says of stitches: pairs given and found, numbers, rest shapes; and what is refused."""
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.scene.stitches.registry import STITCHES
+from supple.scene.stitches.stitch import Stitch
+from supple.system import build_system, initial_state
+
+SOFT = sp.StableNeoHookean(youngs=1e4, poisson=0.3)
+BOX = sp.shapes.box((0.2, 0.2, 0.2), (2, 2, 2))
+SHEET = sp.SurfaceMesh([[9, 9, 9], [-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], [[1, 3, 2], [1, 4, 3]])
+
+
+def scene(*stitches, gap=0.01, turned=(0, 0, 0), shift=(0, 0, 0), obstacles=()):
+    """Two boxes, one `gap` above the other, the whole turned and shifted."""
+    R = rotation(turned)
+    bodies = [
+        sp.Body(name, BOX, SOFT, position=R @ [0, y, 0] + shift, rotation=turned)
+        for name, y in (("low", -0.1), ("high", 0.1 + gap))
+    ]
+    return sp.Scene(bodies, obstacles, stitches=stitches)
+
+
+def rotation(vector):
+    from supple.scene.rotation import rotation_matrix
+
+    return rotation_matrix(vector)
+
+
+def soft(first="high", second="low", **more):
+    return sp.SoftVertexTriangleStitch(first, second, **({"youngs": 1e4, "poisson": 0.3} | more))
+
+
+@pytest.mark.parametrize("turned", [(0, 0, 0), (0.3, -1.0, 2.0)])
+def test_pairs_are_found_in_the_world(turned):
+    found = scene(soft(max_distance=0.0101), turned=turned, shift=(3, -2, 5)).stitching
+    (part,) = found.ranges
+    assert sorted(part.pairs.vertices.tolist()) == np.flatnonzero(BOX.vertices[:, 1] < -0.099).tolist()
+    assert part.pairs.distances == pytest.approx(np.full(9, 0.01), rel=1e-9)
+    top = np.all(BOX.vertices[BOX.surface.triangles][:, :, 1] > 0.099, axis=1)
+    assert top[part.pairs.rows].all()
+    # Each vertex is above a corner of several triangles: the lowest number it is.
+    for vertex, row in zip(part.pairs.vertices, part.pairs.rows, strict=True):
+        above = BOX.vertices[vertex] * [1, -1, 1]
+        corner = int(np.argmin(np.linalg.norm(BOX.vertices - above, axis=1)))
+        assert row == min(t for t in np.flatnonzero(top) if corner in BOX.surface.triangles[t])
+    assert len(found.tets) == 9
+    assert np.all(found.tets.vertices[:, 0] >= len(BOX.vertices))
+    assert np.all(found.tets.vertices[:, 1:] < len(BOX.vertices))
+    assert not found.tets.offset.any()
+
+
+def test_all_in_reach_are_more():
+    pairs = scene(soft(max_distance=0.0101, pairing="all")).stitching.ranges[0].pairs
+    top = np.flatnonzero(np.all(BOX.vertices[BOX.surface.triangles][:, :, 1] > 0.099, axis=1))
+    wanted = set()
+    for vertex in np.flatnonzero(BOX.vertices[:, 1] < -0.099):
+        corner = int(np.argmin(np.linalg.norm(BOX.vertices - BOX.vertices[vertex] * [1, -1, 1], axis=1)))
+        # ... the sides of the lower box, too, whose upper edge is as near.
+        wanted |= {(int(vertex), t) for t, tri in enumerate(BOX.surface.triangles) if corner in tri}
+    assert set(zip(pairs.vertices.tolist(), pairs.rows.tolist(), strict=True)) == wanted
+    assert len(wanted) > len(top)
+
+
+def test_siblings_join_vertices_and_edges():
+    vertex = sp.VertexVertexStitch("high", "low", max_distance=0.0101, stiffness=10.0)
+    edge = sp.VertexEdgeStitch("high", "low", max_distance=0.0101, stiffness=10.0, rest_length=0.02)
+    given = sp.VertexEdgeStitch("high", "low", pairs=[[0, 3], [1, 5]], stiffness=[1.0, 2.0], rest_length=[0.0, 0.1])
+    found = scene(vertex, edge, given).stitching
+    assert [len(part.pairs.rows) for part in found.ranges] == [9, 9, 2]
+    assert found.springs.rest_lengths[:9] == pytest.approx(np.full(9, 0.01))
+    assert found.springs.rest_lengths[9:].tolist() == [0.02] * 9 + [0.0, 0.1]
+    assert found.springs.stiffness[18:].tolist() == [1.0, 2.0]
+    ends = found.springs.vertices[18:, 1:]
+    assert np.array_equal(ends, BOX.surface.edges[[3, 5]])
+    x = initial_state(scene()).positions
+    lengths = np.linalg.norm(found.springs.extensions(x), axis=1)
+    assert lengths[:18] == pytest.approx(np.full(18, 0.01))
+    assert lengths[18:] == pytest.approx(found.ranges[2].pairs.distances)
+
+
+def test_values_may_be_given_for_each_pair():
+    stitch = sp.SoftVertexTriangleStitch(
+        "high", "low", pairs=[[0, 1], [4, 7]], mu=[1.0, 2.0], lam=[3.0, 4.0], min_separate_distance=[0.5, 1e-6]
+    )
+    tets = scene(stitch).stitching.tets
+    assert tets.mu.tolist() == [1.0, 2.0]
+    assert tets.lam.tolist() == [3.0, 4.0]
+    assert tets.offset.tolist() == [True, False]
+    engineering = soft(pairs=[[0, 1], [4, 7]], youngs=[1e5, 2e5], poisson=[0.25, 0.1])
+    assert engineering.mu == pytest.approx([4e4, 2e5 / 2.2])
+    assert engineering.lam == pytest.approx([4e4, 2e5 * 0.1 / (1.1 * 0.8)])
+
+
+def test_rest_shapes_are_those_of_the_scene_whatever_state_a_simulation_begins_with():
+    one = scene(soft(max_distance=0.0101))
+    squashed = initial_state(one, {"low": BOX.vertices * [1, 0.5, 1] + [0, -0.3, 0]})
+    assert np.array_equal(build_system(one, squashed).stitching.tets.vertices, one.stitching.tets.vertices)
+    assert np.array_equal(
+        build_system(one, squashed).stitching.tets.rest_shape_inverse, one.stitching.tets.rest_shape_inverse
+    )
+
+
+def test_obstacles_of_triangles_are_held_on_to_and_move():
+    moving = sp.Keyframes([0, 1], [[0, 0, 0], [0, 0, 2]])
+    sheet = sp.TriangleObstacle(name="sheet", surface=SHEET, motion=moving)
+    one = scene(soft("low", "sheet", max_distance=1e-6), gap=1.0, obstacles=[sp.HalfSpace(point=(0, -9, 0)), sheet])
+    found = one.stitching
+    assert found.anchors.owner.tolist() == [1] * len(found.anchors)
+    assert len(found.anchors) == 4
+    n = found.body_vertices
+    assert found.tets.vertices[:, 1:].min() >= n
+    x = initial_state(one).positions
+    for time, z in ((0.0, 0.0), (0.5, 1.0), (1.0, 2.0)):
+        there = found.points(x, time)[n:]
+        assert np.allclose(there, SHEET.vertices[found.anchors.vertices] + [0, 0, z])
+    assert (found.elements()[:, 1:] == -1).all()
+    assert set(found.anchored_vertices()) == set(found.tets.vertices[:, 0])
+    joined = found.joined_components(np.repeat([0, 1], len(BOX.vertices)).astype(np.int32))
+    assert joined.max() == 1, "the box above is not joined"
+
+
+def test_bodies_hang_together_through_stitches():
+    third = sp.Body("third", BOX, SOFT, position=(5, 0, 0))
+    bodies = [*scene().bodies, third]
+    system = build_system(sp.Scene(bodies, stitches=[soft(max_distance=0.02)]))
+    assert system.components.max() == 2
+    joined = system.joined_components
+    assert [len(np.unique(joined[part.vertices])) for part in system.bodies] == [1, 1, 1]
+    assert joined[system.bodies[0].vertices][0] == joined[system.bodies[1].vertices][0]
+    assert joined[system.bodies[2].vertices][0] != joined[0]
+
+
+def test_nothing_in_reach_is_an_error_that_says_what_would_be():
+    with pytest.raises(sp.SceneError) as refused:
+        build_system(scene(soft(max_distance=0.005, name="seam")))
+    assert "stitch 'seam'" in str(refused.value)
+    assert "smallest distance there is is 0.01 m" in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+FLAT = sp.SurfaceMesh([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]], [[0, 1, 2], [0, 1, 3]])
+REFUSED = {
+    "itself": (lambda: soft("low", "low", max_distance=1), "joins a body with itself"),
+    "neither": (lambda: soft(), "either pairs or max_distance"),
+    "both": (lambda: soft(pairs=[[0, 0]], max_distance=1), "either pairs or max_distance"),
+    "pairing": (lambda: soft(max_distance=1, pairing="some"), "no pairing 'some'"),
+    "far": (lambda: soft(max_distance=-1), "max_distance is -1"),
+    "shape": (lambda: soft(pairs=[0, 1]), "pairs must be a list"),
+    "negative": (lambda: soft(pairs=[[0, -1]]), "pairs holds -1"),
+    "twice": (lambda: soft(pairs=[[0, 1], [0, 1]]), "names a pair twice"),
+    "fractions": (lambda: soft(pairs=[[0.5, 1]]), "whole numbers"),
+    "moduli": (lambda: soft(pairs=[[0, 0]], mu=1.0), "give mu and lam, or youngs and poisson"),
+    "half": (lambda: soft(pairs=[[0, 0]], poisson=0.5), "poisson is 0.5"),
+    "no poisson": (lambda: soft(pairs=[[0, 0]], poisson=0.0), "poisson is 0; it must be finite and above zero"),
+    "youngs": (lambda: soft(pairs=[[0, 0]], youngs=np.nan), "youngs is nan"),
+    "lam": (
+        lambda: sp.SoftVertexTriangleStitch("high", "low", pairs=[[0, 0]], mu=1.0, lam=0.0),
+        "lam is 0; it must be finite and above zero",
+    ),
+    "d": (lambda: soft(pairs=[[0, 0]], min_separate_distance=0.0), "min_separate_distance is 0"),
+    "damping": (lambda: soft(pairs=[[0, 0]], damping=-1.0), "damping is -1"),
+    "stiffness": (lambda: sp.VertexVertexStitch("high", "low", pairs=[[0, 0]], stiffness=0.0), "stiffness is 0"),
+    "rest length": (
+        lambda: sp.VertexEdgeStitch("high", "low", pairs=[[0, 0]], stiffness=1.0, rest_length=-1.0),
+        "rest_length is -1",
+    ),
+    "vertex": (lambda: soft(pairs=[[99, 0]]), "number 99 of 27 vertices"),
+    "triangle": (lambda: soft(pairs=[[0, 99]]), "number 99 of 48 triangles"),
+    "edge": (lambda: sp.VertexEdgeStitch("high", "low", pairs=[[0, 999]], stiffness=1.0), "number 999 of 72 edges"),
+    "count": (lambda: soft(pairs=[[0, 0], [1, 1]], youngs=[1.0, 2.0, 3.0]), "3 values for 2 pairs"),
+    "body": (lambda: soft("top", pairs=[[0, 0]]), "no body 'top'"),
+    "second": (lambda: soft("low", "top", pairs=[[0, 0]]), "no body or obstacle 'top'"),
+    "floor": (lambda: soft("low", "floor", pairs=[[0, 0]]), "hold on to bodies and TriangleObstacles"),
+    "flat": (lambda: soft("low", "flat", pairs=[[0, 0]]), "triangle 0 of obstacle 'flat' has no area"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_refused(case):
+    make, text = REFUSED[case]
+    obstacles = [sp.HalfSpace(name="floor", point=(0, -5, 0)), sp.TriangleObstacle(name="flat", surface=FLAT)]
+    with pytest.raises(sp.SceneError) as refused:
+        build_system(scene(make(), obstacles=obstacles))
+    assert text in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_every_kind_is_registered_and_public():
+    def kinds(base):
+        return {sub for direct in base.__subclasses__() for sub in ({direct} | kinds(direct))}
+
+    concrete = {kind for kind in kinds(Stitch) if not getattr(kind, "__abstractmethods__", None)}
+    assert concrete == set(STITCHES.values())
+    assert all(getattr(sp, kind.__name__) is kind for kind in concrete)
