@@ -5,7 +5,7 @@ import logging
 import numpy as np
 import pytest
 
-from supple.demos import cantilever
+from supple.demos import cantilever, quilt, stitch
 from supple.demos.demo import Claim, Demo, Measurement
 from supple.demos.registry import DEMOS, find_demo
 from supple.errors import SceneError, SolverError
@@ -27,8 +27,8 @@ def run(demo, kind, steps=None):
     return frames, measurement.claims()
 
 
-def test_there_are_six_and_both_solvers_have_some():
-    assert set(DEMOS) == {"squash", "stretch", "compliance", "bears", "cantilever", "twist"}
+def test_there_are_eight_and_both_solvers_have_some():
+    assert set(DEMOS) == {"squash", "stretch", "compliance", "bears", "cantilever", "twist", "stitch", "quilt"}
     assert {kind for _, kind in EVERY} == set(SOLVERS)
     assert {("squash", "implicit"), ("stretch", "implicit"), ("squash", "xpbd"), ("stretch", "xpbd")} <= set(EVERY)
 
@@ -76,6 +76,27 @@ def test_stretch_draws_the_ball_on_both_solvers_to_the_same_shape():
         frames, _ = run(DEMOS["stretch"], kind, steps=30)
         lengths[kind] = np.ptp(frames[-1].positions["ball"][:, 1])
     assert lengths["implicit"] == pytest.approx(lengths["xpbd"], rel=0.02)
+
+
+def test_the_hat_is_sewn_on_and_flies_with_the_bear_on_both_solvers():
+    for kind in ("xpbd", "implicit"):
+        frames, _ = run(DEMOS["stitch"], kind, steps=6)
+        stitching = frames[-1].system.stitching
+        assert len(stitching.tets) >= 8
+        assert len(np.unique(frames[-1].system.joined_components)) == 1
+        longer = np.abs(stitch.lengths(frames[-1]) - stitch.lengths(frames[0])).max()
+        assert longer < 1e-3
+        assert frames[-1].positions["hat"][:, 1].min() > 0.12
+
+
+def test_both_solvers_bend_the_quilt_into_the_static_shape(monkeypatch):
+    """The whole demo in a shorter time, on a coarser patch and bar."""
+    monkeypatch.setattr(quilt, "RAMP", 1.0)
+    monkeypatch.setattr(quilt, "BAR_DIVISIONS", (8, 1, 2))
+    monkeypatch.setattr(quilt, "PATCH_DIVISIONS", (6, 1, 2))
+    for kind in ("xpbd", "implicit"):
+        _, claims = run(DEMOS["quilt"], kind, steps=80)
+        assert [claim.measured for claim in claims if not claim.holds] == []
 
 
 @pytest.mark.slow

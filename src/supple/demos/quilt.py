@@ -18,6 +18,7 @@ from supple.simulate import simulate
 from supple.xpbd.solver import XPBD
 
 LENGTH, LOAD, RAMP = 0.6, 16.0, 2.0
+BAR_DIVISIONS, PATCH_DIVISIONS = (12, 2, 3), (9, 1, 4)
 GAP = 0.005  # between bar and patch
 
 
@@ -31,12 +32,12 @@ def scene() -> Scene:
     """A bar of 2 MPa, held at one end, drawn down at the other; on top of it, a patch of 0.2 MPa."""
     bar = Body(
         "bar",
-        shapes.box((LENGTH, 0.06, 0.12), (12, 2, 3)),
+        shapes.box((LENGTH, 0.06, 0.12), BAR_DIVISIONS),
         StableNeoHookean(youngs=2e6, poisson=0.3, damping=0.02),
     )
     patch = Body(
         "patch",
-        shapes.box((0.3, 0.03, 0.12), (9, 1, 4)),
+        shapes.box((0.3, 0.03, 0.12), PATCH_DIVISIONS),
         StableNeoHookean(youngs=2e5, poisson=0.4, damping=0.02),
         position=(0, 0.03 + GAP + 0.015, 0),
     )
