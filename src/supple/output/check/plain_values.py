@@ -18,7 +18,7 @@ from supple.state import Status
 # What all frames share.
 CONSTANTS = ("rest_positions", "rest_volumes", "masses", "gravity")
 # Not a number stands for "not known" there.
-_MAY_BE_UNKNOWN = ("min_distance",)
+_MAY_BE_UNKNOWN = ("min_distance", "largest_stitch_stretch")
 _SAME_TIME = 1e-9
 _MOVING = 1e-9
 
