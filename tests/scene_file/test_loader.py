@@ -230,7 +230,7 @@ def test_the_scene_of_the_manual_is_valid(load, tmp_path):
     assert list(Draft202012Validator(json_schema()).iter_errors(read_yaml(tmp_path / "scene.yaml").data)) == []
 
 
-@pytest.mark.parametrize("kinds", ["material", "shape", "obstacle", "solver"])
+@pytest.mark.parametrize("kinds", ["material", "shape", "obstacle", "solver", "stitch"])
 def test_the_manual_names_every_kind(kinds):
     manual = (Path(__file__).parents[2] / "docs" / "scene_files.md").read_text(encoding="utf-8")
     row = next(line for line in manual.splitlines() if line.startswith(f"| {kinds} |"))
@@ -249,7 +249,52 @@ def _family(name):
         return "solver"
     if name in ("HalfSpaceModel", "BoxModel", "SphereModel", "TrianglesModel"):
         return "obstacle"
+    if name in ("SoftVertexTriangleModel", "VertexVertexModel", "VertexEdgeModel"):
+        return "stitch"
     return "material"
+
+
+STITCHED = f"""
+bodies:
+  - {{name: low, shape: {{kind: box, divisions: [1, 1, 1]}}, material: {RUBBER}}}
+  - {{name: high, shape: {{kind: box, divisions: [1, 1, 1]}}, material: {RUBBER}, position: [0, 1.25, 0]}}
+obstacles:
+  - {{kind: triangles, name: roof, surface: {{file: roof.obj, position: [0, 2, 0]}}}}
+stitches:
+"""
+STITCH_LINES = {
+    "kind: soft_vertex_triangle, first: high, second: low, max_distance: 0.3, youngs: 1e5, poisson: 0.3": 4,
+    "kind: soft_vertex_triangle, first: high, second: low, pairs: [[0, 1], [2, 3]], mu: [1, 2], lam: 3": 2,
+    "kind: soft_vertex_triangle, first: high, second: roof, max_distance: 0.3, youngs: 1e5, poisson: 0.3": 4,
+    "kind: vertex_vertex, first: high, second: low, max_distance: 0.3, pairing: all, stiffness: 10": 4,
+    "kind: vertex_edge, name: seam, first: high, second: low, pairs: [[0, 1]], stiffness: 10, rest_length: 0": 1,
+}
+
+
+@pytest.mark.parametrize("line", STITCH_LINES)
+def test_stitches(load, tmp_path, line):
+    sp.shapes.box_surface((4, 1, 4), (1, 1, 1)).save(tmp_path / "roof.obj")
+    scene = load(STITCHED + f"  - {{{line}}}\n", load_scene)
+    assert len(scene.stitching) == STITCH_LINES[line]
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("kind: vertex_edge, first: high, second: low, max_distance: 0.1, stiffness: 1", "smallest distance"),
+        ("kind: vertex_edge, first: high, second: law, max_distance: 0.1, stiffness: 1", "no body or obstacle 'law'"),
+        ("kind: vertex_edge, first: high, second: low, max_distance: 0.1, stiffness: 0", "stiffness"),
+        ("kind: vertex_face, first: high, second: low, max_distance: 0.1", "vertex_face"),
+        ("kind: soft_vertex_triangle, first: high, second: low, max_distance: 1, youngs: 1", "youngs and poisson"),
+    ],
+)
+def test_stitches_that_are_refused_are_refused_in_their_line(load, tmp_path, line, says):
+    sp.shapes.box_surface((4, 1, 4), (1, 1, 1)).save(tmp_path / "roof.obj")
+    with pytest.raises(sp.SceneError) as refused:
+        load(STITCHED + f"  - {{{line}}}\n")
+    assert re.search(r"scene.yaml:8:", str(refused.value))
+    assert says in str(refused.value)
+    assert "\n" not in str(refused.value)
 
 
 def test_contact_pairs_of_copies_and_of_unnamed_obstacles(load):
