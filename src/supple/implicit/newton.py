@@ -10,7 +10,7 @@ Forcing Terms in an Inexact Newton Method" (1996), choice 2.
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,10 @@ logger = logging.getLogger(__name__)
 
 _LOOSEST = 1e-2
 _TIGHTEST = 1e-8
+
+# The tolerance of the last linear system where there is contact, and of the forces that are left, relative to contact's.
+_LAST = 1e-5
+_BALANCE = 1e-4
 
 # Directions that shrink by less than this from iteration to iteration converge linearly.
 _LINEAR_RATE = 0.2
@@ -101,6 +105,14 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
                 direction, said = tools.linear_solver.solve(-gradient, forcing)
         if direction is None or not np.isfinite(direction).all():
             return Outcome(Status.NOT_FINITE, here, "the linear system of a Newton step could not be solved", rows)
+        ends = float(np.abs(direction).max(initial=0.0)) <= problem.tolerance
+        if ends and tools.hessian.couplings and forcing > _LAST:
+            # Contact is stiff: what a loose solution leaves over is little in length, and much in force.
+            with tools.clock.of("linear_solve"):
+                better, more = tools.linear_solver.solve(-gradient, _LAST, convex)
+            if better is not None and np.isfinite(better).all():
+                direction = better
+                said = replace(said, iterations=said.iterations + more.iterations)
         if problem.scale is not None:
             tools.free_motion.joined(tools.hessian.couplings).correct(direction, gradient, problem.scale)
         else:
@@ -133,8 +145,10 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
         rows.append(row)
         logger.debug("%s", row)
         limits.widen(here.positions)
-        if last:
+        if last and (step == 0.0 or _in_balance(problem, here, tools)):
             return Outcome(Status.CONVERGED, here, "", rows)
+        if last:
+            here = problem.objective.model(here.positions, tools.hessian, convex)
         if step == 0.0:
             text = f"no step along Newton's direction ({length:.2e} m) lowers the energy, in iteration {iteration}"
             return Outcome(Status.LINE_SEARCH_FAILED, here, text, rows)
@@ -146,6 +160,17 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
         f"the tolerance is {problem.tolerance:.2e} m"
     )
     return Outcome(Status.ITERATION_LIMIT, here, text, rows)
+
+
+def _in_balance(problem: Problem, here: Model, tools: Tools) -> bool:
+    """Whether what is left of the forces is small beside those of contact, which a short way changes a lot."""
+    if not tools.hessian.couplings:
+        return True
+    left = here.gradient.copy()
+    left[tools.pinned] = 0.0
+    pressing = problem.objective.contact_gradient(here.positions)
+    pressing[tools.pinned] = 0.0
+    return bool(np.linalg.norm(left) <= _BALANCE * np.linalg.norm(pressing))
 
 
 def _guarded_search(

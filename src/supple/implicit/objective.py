@@ -46,6 +46,14 @@ class Objective(Potential):
                 values.append(term.value(x))
         return sum(values), sum(abs(value) for value in values)
 
+    def contact_gradient(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n, 3) of the contact terms alone [N]."""
+        out = np.zeros_like(x)
+        for term in self.terms:
+            if term.label == "contact":
+                term.add_gradient(x, out)
+        return out
+
     def gradient(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(n, 3) [N]."""
         out = np.zeros_like(x)

@@ -60,7 +60,7 @@ class Implicit(Solver):
 
     integrator: str | Integrator = "backward_euler"
     tolerance: float | None = None
-    max_iterations: int = 60
+    max_iterations: int = 120
     linear_solver: str = "auto"
     max_substeps: int = 64
     contact: Contact | None = field(default_factory=Contact)

@@ -51,7 +51,7 @@ class ImplicitModel(Model):
     tolerance: Positive | None = Field(
         default=None, description="of Newton's step, relative to the smallest body [1/s]"
     )
-    max_iterations: Iterations = Field(default=60, description="of Newton in one step")
+    max_iterations: Iterations = Field(default=120, description="of Newton in one step")
     linear_solver: Literal["auto", "pcg", "direct"] = Field(default="auto")
     max_substeps: Iterations = Field(default=64, description="a step that fails is halved until it would take more")
 

@@ -180,12 +180,14 @@ class PlaneFriction(Potential):
 
     Attributes
     ----------
-    vertices : (k,); forces : (k,) mu lambda [N]; normals : (k, 3)
+    vertices : (k,); base : (k,) a point of each one's plane, as a vertex
+    forces : (k,) mu lambda [N]; normals : (k, 3)
     start : (k, 3) where the vertices would be if they stuck to their planes over the step [m]
     reach : eps_v h [m], the displacement below which friction is static
     """
 
     vertices: NDArray[np.int32]
+    base: NDArray[np.int32]
     forces: NDArray[np.float64]
     normals: NDArray[np.float64]
     start: NDArray[np.float64]
@@ -199,7 +201,9 @@ class PlaneFriction(Potential):
 
     def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
         u, y = self._slip(x)
-        np.add.at(out, self.vertices, (self.forces * self._over_slip(y))[:, None] * u)
+        force = (self.forces * self._over_slip(y))[:, None] * u
+        np.add.at(out, self.vertices, force)
+        np.add.at(out, self.base, -force)
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
         """Positive semi-definite as it is."""
@@ -211,7 +215,9 @@ class PlaneFriction(Potential):
         n = self.normals
         tangent = np.eye(3) - n[:, :, None] * n[:, None, :]
         blocks = across[:, None, None] * tangent + (along - across)[:, None, None] * unit[:, :, None] * unit[:, None, :]
-        np.add.at(out.vertices, self.vertices, self.forces[:, None, None] * blocks)
+        blocks *= self.forces[:, None, None]
+        np.add.at(out.vertices, self.vertices, blocks)
+        out.couplings.append(_block_matrix(self.vertices, self.base, -blocks, len(x)))
 
     def _slip(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         moved = x[self.vertices] - self.start
@@ -252,7 +258,7 @@ def plane_friction(
         if part.obstacle.motion is not None and rows.any():
             (turn0, shift0), (turn1, shift1) = (part.obstacle.pose(time) for time in times)
             carried[rows] = (carried[rows] - shift0) @ turn0 @ turn1.T + shift1
-    return PlaneFriction(p.vertices[near], forces, normals[near], carried, reach)
+    return PlaneFriction(p.vertices[near], p.base[near], forces, normals[near], carried, reach)
 
 
 def _block_matrix(

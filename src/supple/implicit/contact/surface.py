@@ -80,6 +80,8 @@ def contact_surface(
     # With several threads the library finds contacts in an order, and rounds its sums in a way, that differs from run
     # to run; with one, the same scene gives the same bits.
     ipctk.set_num_threads(1)
+    # It writes warnings to standard output, where they say nothing to a user.
+    ipctk.set_logger_level(ipctk.LoggerLevel.error)
     parts = [system.triangles] + [part.triangles for part in obstacles if not part.is_plane]
     triangles = np.concatenate(parts)
     vertices = np.unique(triangles).astype(np.int32)
