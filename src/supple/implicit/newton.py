@@ -30,7 +30,7 @@ logger = logging.getLogger(__name__)
 _LOOSEST = 1e-2
 _TIGHTEST = 1e-8
 
-# The tolerance of the last linear system where there is contact, and of the forces that are left, relative to contact's.
+# Where there is contact: the tolerance of the last linear system, and of the forces left over, relative to contact's.
 _LAST = 1e-5
 _BALANCE = 1e-4
 

@@ -182,7 +182,7 @@ class PlaneFriction(Potential):
     ----------
     vertices : (k,); base : (k,) a point of each one's plane, as a vertex
     forces : (k,) mu lambda [N]; normals : (k, 3)
-    start : (k, 3) where the vertices would be if they stuck to their planes over the step [m]
+    start : (k, 3) where the vertices would be, relative to `base`, if they stuck to their planes over the step [m]
     reach : eps_v h [m], the displacement below which friction is static
     """
 
@@ -217,10 +217,12 @@ class PlaneFriction(Potential):
         blocks = across[:, None, None] * tangent + (along - across)[:, None, None] * unit[:, :, None] * unit[:, None, :]
         blocks *= self.forces[:, None, None]
         np.add.at(out.vertices, self.vertices, blocks)
-        out.couplings.append(_block_matrix(self.vertices, self.base, -blocks, len(x)))
+        np.add.at(out.vertices, self.base, blocks)
+        ends = np.concatenate([self.vertices, self.base]), np.concatenate([self.base, self.vertices])
+        out.couplings.append(_block_matrix(*ends, np.concatenate([-blocks, -blocks]), len(x)))
 
     def _slip(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        moved = x[self.vertices] - self.start
+        moved = x[self.vertices] - x[self.base] - self.start
         u = moved - np.einsum("ij,ij->i", moved, self.normals)[:, None] * self.normals
         return u, np.linalg.norm(u, axis=1)
 
@@ -258,6 +260,8 @@ def plane_friction(
         if part.obstacle.motion is not None and rows.any():
             (turn0, shift0), (turn1, shift1) = (part.obstacle.pose(time) for time in times)
             carried[rows] = (carried[rows] - shift0) @ turn0 @ turn1.T + shift1
+        if rows.any():
+            carried[rows] -= part.targets(times[1])[0]
     return PlaneFriction(p.vertices[near], p.base[near], forces, normals[near], carried, reach)
 
 
