@@ -31,8 +31,9 @@ def contact_points(model: ContactModel, barriers: Barriers, x: NDArray[np.float6
         coefficients = np.asarray(coefficients)
         distance = float(np.linalg.norm(gap))
         gradient = barriers.triangles.potential.gradient(contact, flat).reshape(-1, 3) / weight
-        # Coefficients are positive on the first primitive and negative on the second.
-        one = coefficients > 0.0
+        # Coefficients are positive on the first primitive and negative on the second; an end of an edge that is not the
+        # nearest point has zero, of either sign.
+        one = np.arange(len(ids)) < (2 if found.is_edge_edge(k) else 1)
         near_first = coefficients[one] @ stencil[one]
         near_second = -coefficients[~one] @ stencil[~one]
         first, second = (int(surface.owner[np.asarray(ids)[side][0]]) for side in (one, ~one))
