@@ -10,11 +10,13 @@ from supple.demos.quilt import QUILT
 from supple.demos.squash import SQUASH
 from supple.demos.stitch import STITCH
 from supple.demos.stretch import STRETCH
+from supple.demos.torture.registry import TORTURE
 from supple.demos.twist import TWIST
 from supple.errors import SceneError
 
+_TORTURE = [torture.full for torture in TORTURE.values()]
 DEMOS: dict[str, Demo] = {
-    demo.name: demo for demo in (SQUASH, STRETCH, COMPLIANCE, BEARS, CANTILEVER, TWIST, STITCH, QUILT)
+    demo.name: demo for demo in (SQUASH, STRETCH, COMPLIANCE, BEARS, CANTILEVER, TWIST, STITCH, QUILT, *_TORTURE)
 }
 
 

@@ -1,0 +1,98 @@
+"""A gummy bear that is pulled through a funnel much narrower than itself."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from supple.demos.demo import Claim, Demo
+from supple.demos.motion_measures import volume
+from supple.demos.torture.watch import ContactWatch, Torture
+from supple.implicit.solver import Implicit
+from supple.materials.neo_hookean import NeoHookean
+from supple.mesh import shapes
+from supple.mesh.surface import SurfaceMesh
+from supple.mesh.tetmesh import TetMesh
+from supple.scene.body import Body
+from supple.scene.motion import Keyframes
+from supple.scene.obstacles import TriangleObstacle
+from supple.scene.pins import Pin
+from supple.scene.scene import Scene
+
+HEIGHT = 0.1
+RIM, TOP, THROAT, BOTTOM = 0.07, 0.05, -0.03, -0.06  # radius of the rim, and heights of rim, throat and lower end [m]
+SIDES = 32
+START, WAY, SECONDS = 0.065, 0.30, 2.0
+
+
+def funnel(neck: float) -> SurfaceMesh:
+    """An open sheet around the y axis, with a neck of this radius [m]."""
+    profile = ((RIM, TOP), (neck, THROAT), (neck, BOTTOM))
+    angles = 2 * np.pi * np.arange(SIDES) / SIDES
+    rings = [np.column_stack([r * np.cos(angles), np.full(SIDES, y), r * np.sin(angles)]) for r, y in profile]
+    triangles = []
+    k = np.arange(SIDES)
+    after = (k + 1) % SIDES
+    for i in range(len(profile) - 1):
+        a, b = i * SIDES, (i + 1) * SIDES
+        triangles += [np.column_stack([a + k, a + after, b + after]), np.column_stack([a + k, b + after, b + k])]
+    return SurfaceMesh(np.concatenate(rings), np.concatenate(triangles))
+
+
+def grip(mesh: TetMesh) -> np.ndarray:
+    """The vertices at the bottom of the belly."""
+    x = mesh.vertices
+    middle = np.hypot(x[:, 0], x[:, 2]) < 0.1 * HEIGHT
+    return np.flatnonzero(middle & (x[:, 1] < x[middle, 1].min() + 0.08 * HEIGHT))
+
+
+def scene(edge_length: float, neck: float) -> Scene:
+    """A bear above the funnel; a grip under its belly pulls it down the axis."""
+    mesh = shapes.gummy_bear(height=HEIGHT, edge_length=edge_length)
+    bear = Body("bear", mesh, NeoHookean(youngs=3e4, poisson=0.4, density=1100.0, damping=0.01), position=(0, START, 0))
+    pull = Keyframes([0.0, SECONDS], displacements=[(0, 0, 0), (0, -WAY, 0)])
+    return Scene(
+        bodies=[bear],
+        obstacles=[TriangleObstacle(name="funnel", surface=funnel(neck), friction=0.1)],
+        pins=[Pin("bear", grip(mesh), pull, name="grip")],
+    )
+
+
+class _Watch(ContactWatch):
+    def own_claims(self) -> list[Claim]:
+        ratio = volume(self.last, "bear") / volume(self.first, "bear")
+        highest = float(self.last.positions["bear"][:, 1].max()) - BOTTOM
+        x = self.first.positions["bear"]
+        surface = self.first.system.scene.obstacles[0].surface  # pyright: ignore[reportAttributeAccessIssue]
+        neck = float(np.hypot(surface.vertices[:, 0], surface.vertices[:, 2]).min())
+        width = max(float(np.ptp(x[:, 0])), float(np.ptp(x[:, 2])))
+        return [
+            Claim(
+                f"the bear, {1e3 * width:.0f} mm wide, is through the neck, {2e3 * neck:.0f} mm wide",
+                f"highest vertex {1e3 * highest:+.1f} mm from its end",
+                highest < 0.0,
+            ),
+            Claim("its volume is what it was, within 5 %", f"{100 * ratio:.2f} %", abs(ratio - 1) <= 0.05),
+        ]
+
+
+def _demo(edge_length: float, neck: float, dt: float, steps: int | None = None) -> Demo:
+    return Demo(
+        name="torture-funnel",
+        summary="a gummy bear is pulled through a funnel narrower than itself",
+        explanation=(
+            "A grip under the belly of a gummy bear (E = 30 kPa), 10 cm tall and 5 cm wide, pulls it through a funnel, "
+            "an open sheet of triangles, whose neck is 36 mm wide."
+        ),
+        scene=partial(scene, edge_length, neck),
+        solvers={"implicit": Implicit},
+        measurement=_Watch,
+        dt=dt,
+        steps=round(SECONDS / dt) if steps is None else steps,
+    )
+
+
+FUNNEL = Torture(
+    small=_demo(0.014, 0.022, 1 / 10), full=_demo(0.0095, 0.018, 1 / 50), large=_demo(0.0034, 0.018, 1 / 50, 40)
+)

@@ -1,0 +1,78 @@
+"""A soft mat that falls on knives: triangles without thickness, edge up."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from supple.demos.demo import Claim, Demo
+from supple.demos.torture.watch import ContactWatch, Torture, mass, mechanical_energy
+from supple.implicit.solver import Implicit
+from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.mesh import shapes
+from supple.mesh.surface import SurfaceMesh
+from supple.scene.body import Body
+from supple.scene.obstacles import TriangleObstacle
+from supple.scene.scene import Scene
+
+SIZE = (0.6, 0.03, 0.3)
+PLACES = (-0.2, 0.0, 0.2)  # x [m]
+BLADE = 0.2  # height of a blade [m]
+GRAVITY = 9.81
+
+
+def blade(x: float) -> SurfaceMesh:
+    """An upright sheet along z, two triangles, its edge at y = 0."""
+    points = [[x, 0, -0.25], [x, 0, 0.25], [x, -BLADE, -0.25], [x, -BLADE, 0.25]]
+    return SurfaceMesh(np.array(points), np.array([[0, 1, 2], [2, 1, 3]]))
+
+
+def scene(cells: int) -> Scene:
+    """A mat 5 cm above three blades."""
+    mesh = shapes.box(SIZE, (10 * cells, cells, 5 * cells))
+    mat = StableNeoHookean(youngs=2e5, poisson=0.4, density=1000.0, damping=0.02)
+    return Scene(
+        bodies=[Body("mat", mesh, mat, position=(0, SIZE[1] / 2 + 0.05, 0))],
+        obstacles=[TriangleObstacle(name=f"knife{k}", surface=blade(x), friction=0.5) for k, x in enumerate(PLACES, 1)],
+        gravity=(0, -GRAVITY, 0),
+    )
+
+
+class _Watch(ContactWatch):
+    def own_claims(self) -> list[Claim]:
+        contacts, weight = self.last.contacts, GRAVITY * mass(self.last, "mat")
+        forces = [
+            contacts.force_between("mat", f"knife{k}")[1] if contacts is not None else 0.0
+            for k in range(1, len(PLACES) + 1)
+        ]
+        friction = self.last.report.details.get("friction_forces", {}).get("mat", np.zeros(3))
+        carried = (sum(forces) + float(friction[1])) / weight
+        before, after = mechanical_energy(self.first), mechanical_energy(self.last)
+        return [
+            Claim(
+                "at the end the three blades carry the mat within 2 %",
+                ", ".join(f"{force:.2f} N" for force in forces) + f"; {100 * carried:.2f} % of its weight",
+                abs(carried - 1) <= 0.02 and min(forces) > 0,
+            ),
+            Claim("no energy is won", f"{before:.4g} J before, {after:.4g} J after", after <= before),
+        ]
+
+
+def _demo(cells: int, steps: int) -> Demo:
+    return Demo(
+        name="torture-knives",
+        summary="a soft mat falls on three blades without thickness",
+        explanation=(
+            "A mat (E = 200 kPa) of 60 x 30 x 3 cm falls by 5 cm on three upright sheets of two triangles each, that "
+            "have an edge but no thickness, and hangs over them."
+        ),
+        scene=partial(scene, cells),
+        solvers={"implicit": Implicit},
+        measurement=_Watch,
+        dt=1 / 100,
+        steps=steps,
+    )
+
+
+KNIVES = Torture(small=_demo(1, 60), full=_demo(2, 150))

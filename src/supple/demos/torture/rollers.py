@@ -1,0 +1,104 @@
+"""A soft ball that two turning rollers pull through a gap narrower than itself."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from supple.demos.demo import Claim, Demo
+from supple.demos.motion_measures import volume
+from supple.demos.torture.watch import ContactWatch, Torture
+from supple.implicit.solver import Implicit
+from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.mesh import shapes
+from supple.mesh.surface import SurfaceMesh
+from supple.scene.body import Body
+from supple.scene.motion import Keyframes
+from supple.scene.obstacles import TriangleObstacle
+from supple.scene.scene import Scene
+from supple.simulate import Frame
+
+RADIUS = 0.1  # of the ball [m]
+ROLLER, GAP = 0.15, 0.1  # radius of the rollers, and the distance of their surfaces [m]
+SPIN = 2 * np.pi  # [rad/s]
+
+
+def roller(x: float) -> SurfaceMesh:
+    """A closed cylinder along z at x, of 48 sides."""
+    angles = 2 * np.pi * np.arange(48) / 48
+    ring = np.column_stack([x + ROLLER * np.cos(angles), ROLLER * np.sin(angles)])
+    n = len(ring)
+    points = np.concatenate(
+        [np.column_stack([ring, np.full(n, z)]) for z in (-0.2, 0.2)] + [np.array([[x, 0, -0.2], [x, 0, 0.2]])]
+    )
+    k = np.arange(n)
+    after = (k + 1) % n
+    triangles = np.concatenate(
+        [
+            np.column_stack([k, after, after + n]),
+            np.column_stack([k, after + n, k + n]),
+            np.column_stack([after, k, np.full(n, 2 * n)]),
+            np.column_stack([k + n, after + n, np.full(n, 2 * n + 1)]),
+        ]
+    )
+    return SurfaceMesh(points, triangles)
+
+
+def scene(edge_length: float) -> Scene:
+    """A ball on two rollers that turn towards each other."""
+    ball = StableNeoHookean(youngs=5e4, poisson=0.4, density=1000.0, damping=0.01)
+    away = ROLLER + GAP / 2
+    height = np.sqrt((ROLLER + RADIUS) ** 2 - away**2) + 0.005
+    obstacles = [
+        TriangleObstacle(
+            name=name,
+            surface=roller(sign * away),
+            friction=1.0,
+            motion=Keyframes([0.0, 10.0], angles=[0.0, 10.0 * sign * SPIN], axis=(0, 0, 1), pivot=(sign * away, 0, 0)),
+        )
+        for name, sign in (("left", -1.0), ("right", 1.0))
+    ]
+    mesh = shapes.sphere(RADIUS, edge_length)
+    return Scene(bodies=[Body("ball", mesh, ball, position=(0, height, 0))], obstacles=obstacles)
+
+
+class _Watch(ContactWatch):
+    def begin(self, first: Frame, dt: float, steps: int) -> None:
+        super().begin(first, dt, steps)
+        self.narrowest = np.inf
+
+    def write(self, frame: Frame) -> None:
+        super().write(frame)
+        self.narrowest = min(self.narrowest, float(np.ptp(frame.positions["ball"][:, 0])))
+
+    def own_claims(self) -> list[Claim]:
+        highest = float(self.last.positions["ball"][:, 1].max())
+        ratio = volume(self.last, "ball") / volume(self.first, "ball")
+        return [
+            Claim(
+                "the ball is through: all of it is below the axes of the rollers",
+                f"highest vertex at {1e3 * highest:+.0f} mm",
+                highest < 0.0,
+            ),
+            Claim("its volume is what it was, within 1 %", f"{100 * ratio:.2f} %", abs(ratio - 1) <= 0.01),
+        ]
+
+
+def _demo(edge_length: float, dt: float, seconds: float) -> Demo:
+    return Demo(
+        name="torture-rollers",
+        summary="two turning rollers pull a ball through a gap of half its width",
+        explanation=(
+            "A soft ball (E = 50 kPa) of 20 cm lies on two rollers that turn towards each other, one turn a second, "
+            "10 cm apart. Friction alone (mu = 1) pulls it through."
+        ),
+        scene=partial(scene, edge_length),
+        solvers={"implicit": Implicit},
+        measurement=_Watch,
+        dt=dt,
+        steps=round(seconds / dt),
+    )
+
+
+ROLLERS = Torture(small=_demo(0.05, 1 / 50, 0.5), full=_demo(0.025, 1 / 100, 0.5))

@@ -1,0 +1,105 @@
+"""A block on a slope: it stays, or slides as far as Coulomb's law says."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from scipy.optimize import brentq
+
+from supple.demos.demo import Claim, Demo
+from supple.demos.torture.watch import ContactWatch, Torture, center
+from supple.implicit.contact.settings import Contact
+from supple.implicit.solver import Implicit
+from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.mesh import shapes
+from supple.scene.body import Body
+from supple.scene.contact_pairs import ContactPair
+from supple.scene.obstacles import HalfSpace
+from supple.scene.scene import Scene
+
+ANGLE = float(np.radians(26.565))
+SIZE = (0.2, 0.1, 0.2)
+GRAVITY = 9.81
+SECONDS = 2.5
+DENSITY = 1000.0
+# Where contact begins [m], the stiffness of its barrier [Pa], and the velocity below which friction is static [m/s].
+DHAT, STIFFNESS, SLOW = 1e-5, 1e7, 1e-4
+TOLERANCE = 1e-8
+COEFFICIENTS = {"sticks": 0.5, "slides": 0.49}
+DOWN = np.array([1.0, 0.0, 0.0])
+
+
+def resting_gap() -> float:
+    """The distance [m] from which the barrier's pressure carries a block.
+
+    At exactly the friction that it takes, nothing would stop a block that has landed with the slightest speed.
+    """
+    pressure = DENSITY * GRAVITY * np.cos(ANGLE) * SIZE[1]
+
+    def surplus(share: float) -> float:
+        """-b'(d) of b = -(s - 1)^2 ln s, s = (d / dhat)^2, less the pressure over the stiffness."""
+        s = share**2
+        return 2 * share * (2 * (s - 1) * np.log(s) + (s - 1) ** 2 / s) - pressure / STIFFNESS
+
+    return DHAT * brentq(surplus, 0.5, 1.0, xtol=1e-15)  # pyright: ignore[reportReturnType, reportOperatorIssue]
+
+
+def scene(cells: int) -> Scene:
+    """Two blocks side by side at rest on the slope; the slope is level, and gravity tilted by 26.565 degrees."""
+    mesh = shapes.box(SIZE, (2 * cells, cells, 2 * cells))
+    material = StableNeoHookean(youngs=1e9, poisson=0.3, density=DENSITY)
+    bodies = [
+        Body(name, mesh, material, position=(0, SIZE[1] / 2 + resting_gap(), 0.4 * k))
+        for k, name in enumerate(COEFFICIENTS)
+    ]
+    return Scene(
+        bodies=bodies,
+        obstacles=[HalfSpace(name="slope")],
+        contact_pairs=[ContactPair(name, "slope", friction=mu) for name, mu in COEFFICIENTS.items()],
+        gravity=GRAVITY * np.array([np.sin(ANGLE), -np.cos(ANGLE), 0.0]),
+    )
+
+
+class _Watch(ContactWatch):
+    def own_claims(self) -> list[Claim]:
+        time = self.last.time
+        ways = {name: center(self.last, name) - center(self.first, name) for name in COEFFICIENTS}
+        slack = np.sin(ANGLE) - COEFFICIENTS["slides"] * np.cos(ANGLE)
+        expected = 0.5 * GRAVITY * slack * SECONDS**2
+        stuck, slid = float(abs(ways["sticks"] @ DOWN)), float(ways["slides"] @ DOWN)
+        return [
+            Claim(
+                f"with mu = 0.5 the block creeps by less than eps_v t, eps_v = {SLOW:g} m/s",
+                f"{1e6 * stuck:.3g} um in {time:.3g} s, eps_v t is {1e6 * SLOW * time:.3g} um",
+                stuck <= SLOW * time,
+            ),
+            Claim(
+                f"with mu = 0.49 it slides {expected:.4f} m in {SECONDS:g} s within 2 %",
+                f"{slid:.4f} m in {time:.4g} s, {100 * (slid / expected - 1):+.2g} %",
+                abs(time - SECONDS) < 1e-9 and abs(slid / expected - 1) <= 0.02,
+            ),
+        ]
+
+
+def _solver() -> Implicit:
+    return Implicit(contact=Contact(dhat=DHAT, stiffness=STIFFNESS, friction_velocity=SLOW), tolerance=TOLERANCE)
+
+
+def _demo(cells: int, dt: float) -> Demo:
+    return Demo(
+        name="torture-slope",
+        summary="a block sticks to a slope at mu = 0.5, and slides at 0.49 as far as Coulomb says",
+        explanation=(
+            "Two stiff blocks (E = 1 GPa) on a slope of 26.565 degrees, whose tangent is 0.5. One has the friction "
+            "coefficient 0.5, the other 0.49."
+        ),
+        scene=partial(scene, cells),
+        solvers={"implicit": _solver},
+        measurement=_Watch,
+        dt=dt,
+        steps=round(SECONDS / dt),
+    )
+
+
+SLOPE = Torture(small=_demo(1, 1 / 40), full=_demo(4, 1 / 100))

@@ -1,0 +1,109 @@
+"""Spike on spike, edge on edge, point on point, with a friction coefficient of one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from supple.demos.demo import Claim, Demo
+from supple.demos.torture.watch import ContactWatch, Torture, mechanical_energy
+from supple.implicit.solver import Implicit
+from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.mesh.tetmesh import TetMesh
+from supple.scene.body import Body
+from supple.scene.obstacles import HalfSpace
+from supple.scene.pins import InBox, Pin
+from supple.scene.scene import Scene
+from supple.simulate import Frame
+
+GAP = 2e-3
+FALL = 0.01
+
+
+def pyramid(height: float, half: float) -> TetMesh:
+    """Square pyramid, its tip up at the origin, on a base of side 2 `half`: four tets around its axis."""
+    h, b = -height, half
+    points = [[0, 0, 0], [0, h, 0], [-b, h, -b], [b, h, -b], [b, h, b], [-b, h, b]]
+    return TetMesh(np.array(points), np.array([[0, 1, 2, 3], [0, 1, 3, 4], [0, 1, 4, 5], [0, 1, 5, 2]]))
+
+
+def wedge(height: float, half: float, length: float) -> TetMesh:
+    """A roof: its ridge along z through the origin."""
+    h, b, z = -height, half, length / 2
+    points = [[0, 0, -z], [0, 0, z], [-b, h, -z], [b, h, -z], [-b, h, z], [b, h, z]]
+    return TetMesh(np.array(points), np.array([[0, 2, 3, 4], [0, 3, 5, 4], [0, 5, 1, 4]]))
+
+
+PAIRS = {
+    "spikes": (pyramid(0.2, 0.02), (0, 0, 0)),
+    "points": (pyramid(0.05, 0.05), (0, 0, 0)),
+    "edges": (wedge(0.1, 0.05, 0.15), (0, 0, 0)),
+    "crossed": (wedge(0.1, 0.05, 0.15), (0, np.pi / 2, 0)),
+}
+
+
+def scene() -> Scene:
+    """Four pairs in a row: the lower one stands on its base, the upper one falls on it upside down."""
+    material = StableNeoHookean(youngs=1e6, poisson=0.3, density=1000.0, damping=0.005)
+    bodies, pins = [], []
+    for k, (name, (mesh, turn)) in enumerate(PAIRS.items()):
+        x = 0.3 * (k - 1.5)
+        low = float(mesh.vertices[:, 1].min())
+        bodies.append(Body(f"{name} below", mesh, material, position=(x, -low + GAP, 0), friction=1.0))
+        # Upside down: half a turn about an axis in the plane, which is then turned about y.
+        upside = np.pi * np.array([np.cos(turn[1] / 2), 0.0, np.sin(turn[1] / 2)])
+        bodies.append(
+            Body(f"{name} above", mesh, material, position=(x, -low + GAP + FALL, 0), rotation=upside, friction=1.0)
+        )
+        pins.append(Pin(f"{name} below", InBox((-9, -9, -9), (9, GAP + 1e-9, 9)), name=f"{name} base"))
+    return Scene(bodies=bodies, pins=pins, obstacles=[HalfSpace(name="floor", friction=1.0)], gravity=(0, -9.81, 0))
+
+
+class _Watch(ContactWatch):
+    def begin(self, first: Frame, dt: float, steps: int) -> None:
+        super().begin(first, dt, steps)
+        self.most = self.start = mechanical_energy(first)
+        self.caught = dict.fromkeys(PAIRS, 0.0)
+
+    def write(self, frame: Frame) -> None:
+        super().write(frame)
+        self.most = max(self.most, mechanical_energy(frame))
+        contacts = frame.contacts
+        assert contacts is not None
+        for name in PAIRS:
+            push = float(contacts.force_between(f"{name} above", f"{name} below")[1])
+            self.caught[name] = max(self.caught[name], push)
+
+    def own_claims(self) -> list[Claim]:
+        lowest = float(self.last.state.positions[:, 1].min())
+        return [
+            Claim(
+                "each catches its like, and nothing leaves the floor below itself",
+                ", ".join(f"{name} {force:.3g} N" for name, force in self.caught.items())
+                + f"; lowest vertex {1e3 * lowest:.3g} mm above the floor",
+                min(self.caught.values()) > 0.0 and lowest > 0.0,
+            ),
+            Claim(
+                "at no time is there more energy than at the start",
+                f"{self.start:.5g} J at the start, at most {self.most:.5g} J",
+                self.most <= self.start * (1 + 1e-9),
+            ),
+        ]
+
+
+def _demo(dt: float, steps: int) -> Demo:
+    return Demo(
+        name="torture-spikes",
+        summary="spike on spike, point on point, edge on edge, with friction 1",
+        explanation=(
+            "Pyramids and roofs fall upside down on their like, tip exactly on tip, ridge along ridge and ridge across "
+            "ridge, with a friction coefficient of 1. They balance, or topple and slide to the floor."
+        ),
+        scene=scene,
+        solvers={"implicit": Implicit},
+        measurement=_Watch,
+        dt=dt,
+        steps=steps,
+    )
+
+
+SPIKES = Torture(small=_demo(1 / 50, 40), full=_demo(1 / 100, 200))

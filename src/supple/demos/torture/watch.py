@@ -1,0 +1,91 @@
+"""What all torture scenes claim, and what a torture scene is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from supple.demos.demo import Claim, Demo, Measurement
+from supple.simulate import Frame
+from supple.state import Status
+
+
+@dataclass(frozen=True)
+class Torture:
+    """A scene in several sizes.
+
+    Attributes
+    ----------
+    small : for tests that run always; full : the demo
+    large : about 20,000 tets, for benchmarks; None where size is not the point
+    """
+
+    small: Demo
+    full: Demo
+    large: Demo | None = None
+
+
+class ContactWatch(Measurement):
+    """Every step converges, nothing inverts, nothing touches; and what the scene itself claims.
+
+    Attributes
+    ----------
+    min_J, nearest : smallest det F and distance [m] of all frames
+    """
+
+    def begin(self, first: Frame, dt: float, steps: int) -> None:
+        super().begin(first, dt, steps)
+        self.dt, self.steps, self.frames = dt, steps, 0
+        self.min_J = self.nearest = np.inf
+        self.statuses: dict[Status, int] = {}
+        self.iterations = 0
+        self.complaint = ""
+
+    def write(self, frame: Frame) -> None:
+        super().write(frame)
+        self.frames += 1
+        report = frame.report
+        self.statuses[report.status] = self.statuses.get(report.status, 0) + 1
+        self.iterations += report.iterations
+        self.min_J = min(self.min_J, report.min_det_F)
+        if report.min_distance is not None:
+            self.nearest = min(self.nearest, report.min_distance)
+        if report.status is not Status.CONVERGED:
+            self.complaint = f"; at {frame.time:.4g} s: {report.message}"
+
+    def claims(self) -> list[Claim]:
+        ends = ", ".join(f"{count} {status}" for status, count in self.statuses.items())
+        return [
+            Claim(
+                f"all {self.steps} steps converge",
+                f"{ends}, {self.iterations / max(self.frames, 1):.1f} iterations each{self.complaint}",
+                self.frames == self.steps and set(self.statuses) == {Status.CONVERGED},
+            ),
+            Claim("no tetrahedron inverts", f"smallest det F {self.min_J:.3g}", self.min_J > 0.0),
+            Claim("no surfaces touch", f"smallest distance {1e3 * self.nearest:.3g} mm", self.nearest > 0.0),
+            *self.own_claims(),
+        ]
+
+    def own_claims(self) -> list[Claim]:
+        """What only this scene claims."""
+        return []
+
+
+def mechanical_energy(frame: Frame) -> float:
+    """Kinetic, elastic and potential energy [J]; that of barriers, which is never negative, is left out."""
+    report = frame.report
+    return report.kinetic_energy + report.elastic_energy + report.potential_energy
+
+
+def center(frame: Frame, name: str) -> np.ndarray:
+    """(3,) the center of mass of a body [m]."""
+    part = next(part for part in frame.system.bodies if part.name == name)
+    m = frame.system.masses[part.vertices]
+    return m @ frame.positions[name] / m.sum()
+
+
+def mass(frame: Frame, name: str) -> float:
+    """[kg]"""
+    part = next(part for part in frame.system.bodies if part.name == name)
+    return float(frame.system.masses[part.vertices].sum())

@@ -1,0 +1,76 @@
+"""Torture scenes: all their claims hold, and the independent checker finds nothing in their recordings."""
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.demos.registry import DEMOS
+from supple.demos.torture import stack, twist8
+from supple.demos.torture.registry import TORTURE
+from supple.output.check.report import Verdict
+from supple.state import Status
+
+
+def run(demo, path=None, steps=None):
+    measurement, solver = demo.measurement(), demo.solver()
+    sinks = [measurement] if path is None else [measurement, sp.Recorder(path, solver=solver)]
+    frames = list(sp.simulate(demo.scene(), solver, demo.dt, steps or demo.steps, sinks=sinks))
+    return frames, measurement.claims()
+
+
+def assert_holds(demo, path):
+    frames, claims = run(demo, path)
+    assert [claim for claim in claims if not claim.holds] == []
+    assert len(frames) == demo.steps
+    for frame in frames:
+        assert frame.report.status is Status.CONVERGED
+        assert frame.report.min_det_F > 0.0
+        assert frame.report.min_distance is None or frame.report.min_distance > 0.0
+    checked = sp.check_recording(path)
+    assert [f"{result.name}: {result.said}" for result in checked.results if result.verdict is Verdict.FAIL] == []
+    assert checked.ok
+    assert checked["intersection"].verdict is Verdict.PASS
+    assert checked["inversion"].verdict is Verdict.PASS
+
+
+def test_all_are_demos():
+    assert len(TORTURE) == 11
+    assert {f"torture-{name}" for name in TORTURE} <= set(DEMOS)
+
+
+@pytest.mark.parametrize("name", TORTURE)
+def test_the_small_scene_keeps_what_it_claims_and_passes_the_check(name, tmp_path):
+    assert_holds(TORTURE[name].small, tmp_path / "recording.vtkhdf")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TORTURE)
+def test_the_whole_scene_keeps_what_it_claims_and_passes_the_check(name, tmp_path):
+    assert_holds(TORTURE[name].full, tmp_path / "recording.vtkhdf")
+
+
+@pytest.mark.parametrize("name", TORTURE)
+def test_one_step_does_not_show_all_that_is_claimed(name):
+    frames, claims = run(TORTURE[name].small, steps=1)
+    assert len(frames) == 1
+    assert all(claim.text and claim.measured for claim in claims)
+    assert not all(claim.holds for claim in claims)
+
+
+def test_a_scene_in_millimetres_takes_the_same_shapes():
+    """Lengths, gravity and moduli are scaled; times and densities stay: every formula is the same but for a factor."""
+    solver = sp.Implicit(tolerance=stack.TOLERANCE)
+    steps = 8
+    metres = list(sp.simulate(stack.scene(2), solver, 1 / 50, steps))
+    millimetres = list(sp.simulate(stack.scene(2, scale=1e-3), solver, 1 / 50, steps))
+    assert metres[-1].report.details["contact_count"] > 0
+    for large, small in zip(metres, millimetres, strict=True):
+        assert small.report.status is large.report.status is Status.CONVERGED
+        off = np.abs(1e3 * small.state.positions - large.state.positions).max()
+        assert off <= 1e-6 * stack.SIDE
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("dt", [2e-3, 2e-2, 0.2, 2.0])
+def test_the_twist_completes_in_steps_of_any_length(dt, tmp_path):
+    assert_holds(twist8.demo((24, 1), dt), tmp_path / "recording.vtkhdf")
