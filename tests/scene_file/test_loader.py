@@ -297,6 +297,33 @@ def test_stitches_that_are_refused_are_refused_in_their_line(load, tmp_path, lin
     assert "\n" not in str(refused.value)
 
 
+def test_contact_of_the_implicit_solver(load):
+    solver = load(
+        f"bodies: [{BODY}]\n"
+        "solver: {kind: implicit, contact: {dhat: 1e-3, stiffness: 1e5, "
+        "friction_velocity: 0.01, friction_iterations: 3}}\n"
+    ).solver
+    assert solver.contact == sp.Contact(1e-3, 1e5, 0.01, 3)
+    for words in ("", ", contact: {}", ", contact: {stiffness: adaptive}"):
+        assert load(f"bodies: [{BODY}]\nsolver: {{kind: implicit{words}}}\n").solver.contact == sp.Contact()
+    assert load(f"bodies: [{BODY}]\nsolver: {{kind: implicit, contact: null}}\n").solver.contact is None
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        ("dhat: -1", "solver.contact.dhat: is -1; it must be above 0"),
+        ("stiffness: stiff", "solver.contact.stiffness: is the text 'stiff'"),
+        ("friction_iterations: 0", "solver.contact.friction_iterations: is 0; it must be at least 1"),
+        ("dhatt: 1", "solver.contact.dhatt: unknown key; did you mean `dhat`?"),
+    ],
+)
+def test_complaints_about_contact_of_the_implicit_solver(load, words, complaint):
+    with pytest.raises(sp.SceneError) as caught:
+        load(f"bodies: [{BODY}]\nsolver: {{kind: implicit, contact: {{{words}}}}}\n")
+    assert complaint in str(caught.value)
+
+
 def test_contact_pairs_of_copies_and_of_unnamed_obstacles(load):
     text = f"""
 bodies:

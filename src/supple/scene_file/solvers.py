@@ -43,8 +43,25 @@ class XPBDModel(Model):
         return XPBD(self.substeps, self.momentum_restore, contact, self.threads)
 
 
+class ContactModel(Model):
+    """Incremental potential contact: surfaces never intersect."""
+
+    dhat: Positive | None = Field(
+        default=None, description="distance below which surfaces repel each other [m]; from the bodies without it"
+    )
+    stiffness: Positive | Literal["adaptive"] = Field(
+        default="adaptive", description="pressure scale of the barrier [Pa]; adaptive: from the bodies' moduli"
+    )
+    friction_velocity: Positive | None = Field(
+        default=None, description="relative velocity below which friction is static [m/s]; from the bodies without it"
+    )
+    friction_iterations: Iterations | None = Field(
+        default=None, description="updates of friction's normal forces in a step; null: until they change by under 10 %"
+    )
+
+
 class ImplicitModel(Model):
-    """Implicit finite elements by projected Newton: no tetrahedron inverts."""
+    """Implicit finite elements by projected Newton: no tetrahedron inverts, no surfaces intersect."""
 
     kind: Literal["implicit"]
     integrator: Literal["backward_euler", "bdf2", "newmark", "static"] = Field(default="backward_euler")
@@ -54,11 +71,16 @@ class ImplicitModel(Model):
     max_iterations: Iterations = Field(default=120, description="of Newton in one step")
     linear_solver: Literal["auto", "pcg", "direct"] = Field(default="auto")
     max_substeps: Iterations = Field(default=64, description="a step that fails is halved until it would take more")
+    contact: ContactModel | None = Field(
+        default_factory=ContactModel, description="of bodies with all obstacles, each other and themselves; null: none"
+    )
 
     def build(self) -> Solver:
+        from supple.implicit.contact.settings import Contact
         from supple.implicit.solver import Implicit
 
-        return Implicit(**self.model_dump(exclude={"kind"}))
+        contact = None if self.contact is None else Contact(**self.contact.model_dump())
+        return Implicit(**self.model_dump(exclude={"kind", "contact"}), contact=contact)
 
 
 SolverModel = Annotated[XPBDModel | ImplicitModel, Field(discriminator="kind")]
