@@ -156,7 +156,7 @@ _IMPLICIT = Demo(
     name="squash",
     summary="a sphere squeezed between its caps and released",
     explanation=(
-        "The same ball on the implicit solver, which has no contact with obstacles yet: a pin holds its bottom cap in "
+        "The same ball on the implicit solver, held by itself, without obstacles: a pin holds its bottom cap in "
         "place of a floor, and springs press its top cap down to 55 % of the ball's height, then let it come back. "
         "Stable Neo-Hookean rubber (E = 50 kPa, nu = 0.49) in place of edges and volumes; no tetrahedron ever inverts."
     ),

@@ -87,8 +87,8 @@ TWIST = Demo(
     explanation=(
         "Scripted pins turn the ends of a nearly incompressible bar (Neo-Hookean, E = 100 kPa, nu = 0.45) against each "
         "other, by four turns in four seconds. Its energy is infinite where a tetrahedron has no volume left; the step "
-        "filter keeps every step of Newton's method on the near side of that. Nothing keeps the bar from passing "
-        "through itself: this solver has no contact yet."
+        "filter keeps every step of Newton's method on the near side of that. Contact "
+        "keeps the bar from passing through itself."
     ),
     scene=scene,
     solvers={"implicit": Implicit},
