@@ -87,7 +87,7 @@ def test_friction_brakes_a_sliding_block(iterations):
     body = sp.Body("block", mesh, material, position=(0, 0.0501, 0), velocity=(1, 0, 0))
     scene = sp.Scene([body], obstacles=[sp.HalfSpace(friction=0.5)])
     solver = sp.Implicit(contact=sp.Contact(friction_iterations=iterations))
-    frames = list(sp.simulate(scene, solver, 0.005, 60))
+    frames = list(sp.simulate(scene, solver, 0.01, 30))
     assert {frame.report.status for frame in frames} == {"converged"}
     way = frames[-1].positions["block"][:, 0].mean()
     assert way == pytest.approx(1.0 / (2 * 0.5 * GRAVITY), rel=0.06)

@@ -90,7 +90,7 @@ def test_contacts_lie_between_the_surfaces_and_sum_to_the_reported_forces():
     assert (found.distances > 0.0).all()
     assert (found.distances < details["dhat"]).all()
     assert found.distances.min() == pytest.approx(last.report.min_distance)
-    # Forces push the first thing away from the second; the smoothing of nearly parallel edges pulls, by next to nothing.
+    # Forces push the first thing away from the second; smoothed nearly parallel edges may pull, by next to nothing.
     assert (np.einsum("ij,ij->i", found.forces, found.normals) >= -1e-3 * WEIGHT).all()
     for name in ("lower", "upper", "table"):
         total = sum(found.force_between(name, other) for other in found.names if other != name)
