@@ -30,6 +30,11 @@ logger = logging.getLogger(__name__)
 _LOOSEST = 1e-2
 _TIGHTEST = 1e-8
 
+# Where a body buckles, its convex model is far too stiff, and Newton's steps crawl: directions that shrink by less than
+# this are made longer, twice at a time, up to so many times.
+_CRAWL = 0.7
+_LONGEST_REACH = 16.0
+
 # Where there is contact: the tolerance of the last linear system, and of the forces left over, relative to contact's.
 _LAST = 1e-5
 _BALANCE = 1e-4
@@ -90,6 +95,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
     # Far from the minimum the energy is modelled convex. Near it, the model's convexity can cost the quadratic rate of
     # convergence: then the true Hessian is tried, until it turns out not to be positive definite.
     convex, patience, remaining = True, 1, 1
+    reach = 1.0
     for iteration in range(problem.max_iterations):
         gradient = here.gradient.copy()
         gradient[tools.pinned] = 0.0
@@ -119,9 +125,12 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
             # Without inertia a turn may cost nothing: the direction is as long as the linear solver's errors make it.
             direction *= min(1.0, problem.longest / max(float(np.abs(direction).max(initial=0.0)), 1e-300))
         length = float(np.abs(direction).max(initial=0.0))
+        last = length <= problem.tolerance
+        if last or not convex:
+            reach = 1.0
+        direction = reach * direction
         slope = float(np.einsum("ij,ij->", gradient, direction))
         largest, _ = limits.largest_step(here.positions, direction)
-        last = length <= problem.tolerance
         step, cuts = 0.0, 0
         slow = last_length > 0.0 and length > _LINEAR_RATE * last_length
         remaining = remaining - 1 if slow and largest == 1.0 else max(remaining, 1)
@@ -129,6 +138,10 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
         if slope < 0.0 and largest > 0.0:
             hessian = None if last else tools.hessian
             here, step, cuts = _guarded_search(problem, here, direction, slope, largest, limits, hessian, convex)
+        if step == 1.0 and last_length > 0.0 and length > _CRAWL * last_length:
+            reach = min(2.0 * reach, _LONGEST_REACH)
+        elif step < 1.0:
+            reach = max(0.5 * reach, 1.0)
         row = NewtonRow(
             iteration=iteration,
             energy=here.energy,
