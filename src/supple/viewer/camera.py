@@ -44,5 +44,6 @@ def look_from(client: Any, preset: str, view: View) -> None:
     """Take one visitor's camera to a preset."""
     with client.atomic():
         client.camera.up_direction = tuple(view.up)
-        client.camera.look_at = tuple(view.center)
         client.camera.position = tuple(eye_of(preset, view))
+        # Last: viser moves what is looked at along with the camera.
+        client.camera.look_at = tuple(view.center)

@@ -59,7 +59,7 @@ class BodyControls:
         made_for = (self.which.value, *values)
         if made_for != self._made_for:
             for made in self.inputs.values():
-                made.handle.remove()
+                made.remove()
             with self._folder:
                 self.inputs = {
                     name: ParameterInput(self._gui, self._desk, name, value, self._whose)

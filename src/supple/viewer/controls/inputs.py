@@ -17,6 +17,8 @@ from supple.viewer.values import number
 _HANDS_OFF = 1.0
 # The smallest power of ten of a slider whose left end is zero.
 _LEAST_POWER = -12.0
+# What stands beside a slider is short.
+_SHORT = {"youngs": "E", "edge_compliance": "Edges", "volume_compliance": "Volume"}
 # Ends of sliders, where the allowed range is wider than a slider can be used for.
 _HANDY = {"gravity": (-20.0, 20.0), "friction": (0.0, 2.0), "poisson": (0.0, 0.499), "youngs": (1e2, 1e9)}
 
@@ -34,7 +36,7 @@ class ParameterInput:
     ) -> None:
         self.parameter: Parameter = PARAMETERS[name]
         self._desk, self._whose = desk, whose
-        self._touched = -math.inf
+        self._touched, self._removed = -math.inf, False
         self.value: Value = value
         low, high = _HANDY.get(name, (self.parameter.low, self.parameter.high))
         self._low, self._high = min(low, float(value)), max(high, float(value))
@@ -54,6 +56,11 @@ class ParameterInput:
             self.handle.value = self._place(value)
             self.handle.label = self._label(value)
 
+    def remove(self) -> None:
+        """Take it off the panel."""
+        self._removed = True
+        self.handle.remove()
+
     def forget_touch(self) -> None:
         """Show the simulation's value at once, next time."""
         self._touched = -math.inf
@@ -61,12 +68,13 @@ class ParameterInput:
     def _moved(self, event: Any) -> None:
         if event.client is None:
             return
-        self._touched = time.monotonic()
-        value = self._value_at(self.handle.value)
-        if value == self.value:
-            return
-        self.value = value
-        self.handle.label = self._label(value)
+        with self._desk.lock:
+            value = self._value_at(self.handle.value)
+            if self._removed or value == self.value:
+                return
+            self._touched = time.monotonic()
+            self.value = value
+            self.handle.label = self._label(value)
         self._desk.ask(event.client, lambda: SetParameter(self.parameter.name, value, self._whose()))
 
     def _ends(self) -> tuple[float, float]:
@@ -105,12 +113,22 @@ class ParameterInput:
         return min(max(10.0**at, self.parameter.low), self.parameter.high)
 
     def _label(self, value: Value) -> str:
-        name = self.parameter.label[:1].upper() + self.parameter.label[1:]
-        unit = f" {_pretty(self.parameter.unit)}" if self.parameter.unit else ""
-        return f"{name} {value:.3g}{unit}" if self.parameter.logarithmic else f"{name}{unit and f' [{unit.strip()}]'}"
+        name, unit = self.parameter.label[:1].upper() + self.parameter.label[1:], _pretty(self.parameter.unit)
+        if self.parameter.logarithmic:
+            return f"{_SHORT.get(self.parameter.name, name)} {with_unit(float(value), unit)}"
+        return f"{name} [{unit}]" if unit else name
 
     def _hint(self) -> str | None:
         return "In powers of ten" if self.parameter.logarithmic else None
+
+
+def with_unit(value: float, unit: str) -> str:
+    """A number with its unit; pascals in thousands, millions or billions."""
+    if unit == "Pa":
+        for factor, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
+            if value >= factor:
+                return f"{value / factor:.3g} {prefix}Pa"
+    return f"{value:.3g} {unit}".strip()
 
 
 def _pretty(unit: str) -> str:

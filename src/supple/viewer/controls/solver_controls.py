@@ -37,7 +37,7 @@ class SolverControls:
         names = tuple(name for name in PARAMETERS if name in scene.values)
         if names != self._shown:
             for made in self.inputs.values():
-                made.handle.remove()
+                made.remove()
             with self._folder:
                 self.inputs = {n: ParameterInput(self._gui, self._desk, n, scene.values[n]) for n in names}
             self._shown = names

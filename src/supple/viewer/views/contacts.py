@@ -20,7 +20,12 @@ class ContactView(Layer):
         radius = moment.model.view.radius
         self._length = 0.15 * radius
         self._dots = scene.add_point_cloud(
-            "/contacts/points", np.zeros((1, 3), dtype=np.float32), _COLOR, point_size=0.03 * radius, visible=False
+            "/contacts/points",
+            np.zeros((1, 3), dtype=np.float32),
+            _COLOR,
+            point_size=0.02 * radius,
+            point_shape="circle",
+            visible=False,
         )
         self._arrows = Arrows(scene, "/contacts/normals", _COLOR, 0.05 * radius)
         self.update(moment)
