@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -29,6 +30,7 @@ class ViewControls:
         self, server: Any, stage: Stage, changed: Callable[[ViewOptions], None] = lambda options: None
     ) -> None:
         self._stage, self._changed = stage, changed
+        self._lock = threading.RLock()
         gui, options = server.gui, stage.options
         with gui.add_folder("View"):
             self.surface = gui.add_dropdown("Surface", SURFACES, initial_value=options.surface)
@@ -60,6 +62,11 @@ class ViewControls:
 
     def apply(self) -> None:
         """Draw as the panel says."""
+        # Inputs that change together are dealt with in any order; the last one must see what all of them say.
+        with self._lock:
+            self._apply()
+
+    def _apply(self) -> None:
         options = replace(
             self._stage.options,
             surface=one_of(self.surface.value, SURFACES),

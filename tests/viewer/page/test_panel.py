@@ -241,16 +241,28 @@ def test_what_is_looked_at_is_asked_for(live, visitor, told, until):
     until(lambda: live.stage.options.surface == "wireframe")
 
 
+def test_choices_made_at_once_are_all_taken(live, visitor, until):
+    views = live.panel.views
+    for k in range(20):
+        surface, color = ("tets", "energy density") if k % 2 else ("skin", "body")
+        visitor.set(views.surface, surface)
+        visitor.set(views.color_by, color)
+        visitor.set(views.velocities, bool(k % 2))
+    wanted = ("tets", "energy density", True)
+    shown = lambda: (live.stage.options.surface, live.stage.options.color_by, live.stage.options.velocities)  # noqa: E731
+    until(lambda: shown() == wanted)
+    time.sleep(0.3)
+    assert shown() == wanted
+
+
 @pytest.mark.parametrize(
     ("preset", "ahead"), [("top", (0.0, -1.0, 0.0)), ("corner", None), ("front", None), ("side", None)]
 )
 def test_camera_presets_look_at_everything(live, server, visitor, until, preset, ahead):
     view, camera = live.stage.model.view, next(iter(server.get_clients().values())).camera
-    if preset == "corner":  # the button's own value at first: it is told as well
-        visitor.set(live.panel.views.camera, "top")
-        until(lambda: camera.position[1] > 2.0)
     visitor.set(live.panel.views.camera, preset)
     until(lambda: np.allclose(camera.look_at, view.center) and np.linalg.norm(camera.position) > 3.0)
+    time.sleep(0.1)  # place, then direction
     looks = np.asarray(camera.look_at) - np.asarray(camera.position)
     angle = np.arcsin(view.radius / np.linalg.norm(looks))
     assert angle < 0.5 * np.radians(35.0)  # all of it is in the picture

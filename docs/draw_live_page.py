@@ -1,0 +1,116 @@
+"""Draw the pictures of docs/live.md anew: `python docs/draw_live_page.py`, with Chromium and the tools of tests."""
+
+from __future__ import annotations
+
+import io
+import shutil
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+from playwright.sync_api import sync_playwright
+
+import supple as sp
+from supple.viewer.app import Address, opened_page
+from supple.viewer.live_source import LiveSource
+from supple.viewer.messages import Grab, ReleaseGrab, Reset, SetParameter, Step
+
+FOLDER = Path(__file__).parent / "images"
+FLAGS = "--headless --no-sandbox --disable-gpu --use-angle=swiftshader --enable-unsafe-swiftshader"
+SIZE = {"width": 960, "height": 600}
+
+
+def scene() -> LiveSource:
+    """A bear with a fine skin, a ball, and two blocks that are stitched to each other."""
+    rubber = sp.StableNeoHookean(youngs=6e4, poisson=0.45, density=1000.0, damping=0.01)
+    skin = sp.shapes.gummy_bear_surface(height=0.5, resolution=36)
+    mesh = sp.shapes.gummy_bear(height=0.5, edge_length=0.05)
+    bear = sp.Body("bear", mesh, rubber, position=(0.0, 0.27, 0.0), skin=skin, friction=0.4)
+    ball = sp.Body("ball", sp.shapes.sphere(radius=0.16, edge_length=0.06), rubber, position=(0.55, 0.2, 0.15))
+    block = sp.shapes.box((0.3, 0.12, 0.2), (5, 2, 3))
+    low = sp.Body("low", block, rubber, position=(-0.55, 0.08, 0.1), friction=0.4)
+    high = sp.Body("high", block, rubber, position=(-0.55, 0.22, 0.1), friction=0.4)
+    stitch = sp.SoftVertexTriangleStitch("high", "low", max_distance=0.03, youngs=5e4, poisson=0.45)
+    floor = sp.HalfSpace(friction=0.6, name="floor")
+    made = sp.Scene([bear, ball, low, high], obstacles=[floor], stitches=[stitch])
+    return LiveSource("pictures", made, sp.XPBD(substeps=12), 1 / 60)
+
+
+def save(tab, name: str) -> None:
+    """A picture of the page, in few colors: they are small so."""
+    shot = Image.open(io.BytesIO(tab.screenshot())).convert("RGB")
+    shot.quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.FLOYDSTEINBERG).save(
+        FOLDER / name, optimize=True
+    )
+    print(name, (FOLDER / name).stat().st_size // 1000, "kB")
+
+
+def draw_live(tab, page) -> None:
+    """Every view of a running simulation."""
+    panel, desk = page.shown.panel, page.shown.desk
+    client = next(iter(page.server.get_clients().values()))
+    eye, center = np.asarray(client.camera.position), np.asarray(page.shown.stage.model.view.center)
+    with client.atomic():
+        client.camera.position = tuple(center + 0.82 * (eye - center))
+        client.camera.look_at = tuple(center - [0.0, 0.12, 0.0])
+
+    def settle(seconds: float = 2.5) -> None:
+        tab.wait_for_timeout(1000 * seconds)
+
+    def show(name: str, **values) -> None:
+        for key, value in values.items():
+            getattr(panel.views, key).value = value
+        settle()
+        save(tab, name)
+
+    tab.get_by_role("button", name="Play").click()
+    while desk.snapshot.time < 0.5:
+        settle(0.1)
+    bear = desk.snapshot.body_positions("bear")
+    ear = int(np.argmax(bear[:, 1]))
+    target = tuple(float(x) for x in bear[ear] + np.array([-0.1, 0.5, 0.0]))
+    desk.simulation.send(Grab(1, "bear", (ear,), (1.0,), target, stiffness=0.05))
+    settle(3.0)
+    save(tab, "live.png")
+    desk.simulation.send(ReleaseGrab(1))
+    tab.get_by_role("button", name="Pause").click()
+    settle(1.0)
+    for command in (Reset(), SetParameter("youngs", 1.5e4), Step(15)):
+        desk.simulation.send(command)
+    settle(2.0)
+    tab.get_by_role("tab", name="View").click()
+    show("live_stress.png", surface="tets", color_by="von Mises stress")
+    show("live_exploded.png", surface="exploded tets", color_by="volume ratio J")
+    show("live_cut.png", surface="cut", color_by="energy density", cut_axis="z", cut_place=0.5)
+    for command in (Reset(), SetParameter("youngs", 6e4), Step(9)):
+        desk.simulation.send(command)
+    show("live_velocities.png", surface="skin", color_by="body", velocities=True)
+    tab.get_by_role("button", name="Play").click()
+    settle(2.0)
+    tab.get_by_role("button", name="Pause").click()
+    show("live_stitches.png", surface="wireframe", velocities=False, contacts=True)
+    show("live_skin.png", surface="skin", contacts=False)
+    tab.get_by_role("tab", name="Solver").click()
+    tab.get_by_role("button", name="Play").click()
+    settle(4.0)
+    tab.get_by_text("Spin [rad/s]").scroll_into_view_if_needed()
+    save(tab, "live_solver.png")
+
+
+def main() -> None:
+    """All pictures."""
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS.split())
+        with opened_page(scene(), Address(port=0)) as page:
+            tab = browser.new_page(viewport=SIZE)
+            tab.goto(page.url)
+            tab.wait_for_selector("canvas")
+            tab.locator(".mantine-Notification-closeButton").first.click()
+            tab.wait_for_timeout(3000)
+            draw_live(tab, page)
+            tab.close()
+        browser.close()
+
+
+if __name__ == "__main__":
+    main()
