@@ -27,7 +27,14 @@ def model_of_recording(recording: Recording) -> Model:
         for body, color in zip(recording.bodies, colors, strict=True)
     )
     tets = np.ascontiguousarray(recording.tets, dtype=np.int32)
-    return Model(bodies, recording.obstacles, recording.rest_positions, tets, view_of(recording))
+    return Model(
+        bodies,
+        recording.obstacles,
+        recording.rest_positions,
+        tets,
+        view_of(recording),
+        recorded_stitches=recording.stitches,
+    )
 
 
 def moment_of_frame(model: Model, frame: RecordedFrame) -> Moment:

@@ -16,6 +16,7 @@ from supple.diagnostics import deformation_gradients
 from supple.materials.material import Material
 from supple.output.drawing import BODY_COLORS, View
 from supple.output.recorded_scene import RecordedObstacle
+from supple.output.recorded_stitches import RecordedStitches
 from supple.output.skinned_surface import SkinnedSurface
 
 # A tet's four facets, each counter-clockwise from outside.
@@ -56,6 +57,7 @@ class Model:
     rest_positions : (n, 3) [m]; tets : (m, 4) rows of them
     view : bounds of what happens, and which way is up
     stitches : (k, 4) a vertex, and the three of the triangle that it is stitched to
+    recorded_stitches : those of a recording, which are of more kinds
     """
 
     bodies: tuple[ModelBody, ...]
@@ -64,6 +66,7 @@ class Model:
     tets: NDArray[np.int32]
     view: View
     stitches: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 4), dtype=np.int32))
+    recorded_stitches: RecordedStitches | None = None
 
     @cached_property
     def surface_vertices(self) -> NDArray[np.int64]:
@@ -156,6 +159,15 @@ class Moment:
         return deformation_gradients(
             np.ascontiguousarray(self.positions), self.model.tets, self.model.rest_shape_inverse
         )
+
+    @cached_property
+    def stitch_segments(self) -> NDArray[np.float64]:
+        """(k, 2, 3) the two ends of every stitch [m]."""
+        x, recorded = self.shown_positions, self.model.recorded_stitches
+        if recorded is not None:
+            return np.asarray(recorded.segments(x, self.poses))
+        rows = self.model.stitches
+        return np.stack([x[rows[:, 0]], x[rows[:, 1:]].mean(axis=1)], axis=1)
 
     @cached_property
     def shown_positions(self) -> NDArray[np.float64]:

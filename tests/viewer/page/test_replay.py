@@ -148,3 +148,17 @@ def test_a_person_looks_through_a_recording(recorded, look, spot, tmp_path):
         assert spot(np.asarray(picture.convert("RGB")).astype(int), "red")[0] > 100
         assert screen.errors == []
         assert replace(replay.stage.options) == ViewOptions()
+
+
+def test_stitches_of_recordings_are_drawn(server, tmp_path):
+    block, rubber = sp.shapes.box((0.2, 0.1, 0.2), (2, 1, 2)), sp.StableNeoHookean(youngs=1e5, poisson=0.4)
+    bodies = [sp.Body("low", block, rubber), sp.Body("high", block, rubber, position=(0.0, 0.11, 0.0))]
+    stitch = sp.SoftVertexTriangleStitch("high", "low", max_distance=0.02, youngs=5e4, poisson=0.4)
+    path = tmp_path / "stitched.vtkhdf"
+    for _ in sp.simulate(sp.Scene(bodies, stitches=[stitch]), sp.XPBD(substeps=2), 1 / 60, 1, sinks=[Recorder(path)]):
+        pass
+    with read_recording(path) as recording:
+        Replay(server, recording).stop()
+        drawn = server.scene._handle_from_node_name["/stitches"].points
+        assert len(drawn) == len(recording.stitches) > 0
+        assert np.all(np.linalg.norm(drawn[:, 1] - drawn[:, 0], axis=1) < 0.15)

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from supple.viewer.model import Moment
 from supple.viewer.views.layer import Layer, single
 
@@ -16,20 +13,15 @@ class StitchView(Layer):
 
     def __init__(self, scene: Any, moment: Moment) -> None:
         self._handle = None
-        if len(moment.model.stitches):
+        if len(moment.stitch_segments):
             self._handle = scene.add_line_segments(
-                "/stitches", _ends(moment), (30, 30, 34), thickness=2.5, thickness_units="screen"
+                "/stitches", single(moment.stitch_segments), (30, 30, 34), thickness=2.5, thickness_units="screen"
             )
 
     def update(self, moment: Moment) -> None:
         if self._handle is not None:
-            self._handle.points = _ends(moment)
+            self._handle.points = single(moment.stitch_segments)
 
     def remove(self) -> None:
         if self._handle is not None:
             self._handle.remove()
-
-
-def _ends(moment: Moment) -> NDArray[np.float32]:
-    x, stitches = moment.shown_positions, moment.model.stitches
-    return single(np.stack([x[stitches[:, 0]], x[stitches[:, 1:]].mean(axis=1)], axis=1))
