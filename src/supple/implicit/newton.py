@@ -126,7 +126,8 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
             direction *= min(1.0, problem.longest / max(float(np.abs(direction).max(initial=0.0)), 1e-300))
         length = float(np.abs(direction).max(initial=0.0))
         last = length <= problem.tolerance
-        if last or not convex:
+        # Bodies that recover from a tangle find their way in small steps.
+        if last or not convex or not limits.guard.complete:
             reach = 1.0
         direction = reach * direction
         slope = float(np.einsum("ij,ij->", gradient, direction))
