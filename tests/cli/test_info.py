@@ -74,3 +74,20 @@ def test_a_recording(told):
     assert (rows["ended"], rows["problems"]) == ("converged", "none")
     assert float(rows["smallest J"].split()[0]) == pytest.approx(min(1.0, *(f.report.min_det_F for f in frames)), 1e-5)
     assert np.isfinite(frames[-1].time)
+
+
+def test_stitches_of_a_scene(told, tmp_path):
+    body = (
+        "shape: {kind: box, size: [1, 1, 1], divisions: [1, 1, 1]}, material: {kind: arap, youngs: 1e4, poisson: 0.3}"
+    )
+    (tmp_path / "scene.yaml").write_text(
+        f"bodies:\n  - {{name: a, {body}}}\n  - {{name: b, {body}, position: [0, 1.25, 0]}}\n"
+        "stitches:\n"
+        "  - {kind: soft_vertex_triangle, first: b, second: a, max_distance: 0.3, youngs: 1, poisson: 0.3,"
+        " min_separate_distance: 0.5}\n"
+        "  - {kind: vertex_vertex, name: thread, first: b, second: a, pairs: [[0, 0], [0, 1]], stiffness: 1}\n"
+    )
+    rows = told("scene.yaml")
+    soft, thread = rows["stitch of 'b' to 'a'"], rows["stitch 'thread'"]
+    assert soft == "SoftVertexTriangleStitch, 4 pairs, 0.25 to 0.25 m apart, 4 rest vertices offset"
+    assert thread.startswith("VertexVertexStitch, 2 pairs, 1.25 to ")

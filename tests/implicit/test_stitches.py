@@ -93,6 +93,78 @@ def start_angular_momentum():
     return np.linalg.norm(m @ np.cross(x - m @ x / m.sum(), v))
 
 
+def swinging(damping):
+    """A box that hangs on springs and tets, and is let go stretched; gravity off."""
+    sheet = sp.TriangleObstacle(name="sheet", surface=SHEET)
+    stitches = [
+        sp.SoftVertexTriangleStitch("a", "sheet", pairs=[[8, 0], [9, 1]], youngs=2e4, poisson=0.3, damping=damping),
+        sp.VertexEdgeStitch("a", "sheet", pairs=[[20, 0]], stiffness=50.0, damping=damping),
+        sp.VertexVertexStitch("a", "sheet", pairs=[[21, 1]], stiffness=50.0, damping=damping),
+    ]
+    return sp.Scene([box("a", -0.2, velocity=(0, -0.5, 0))], [sheet], stitches=stitches, gravity=(0, 0, 0))
+
+
+@pytest.mark.parametrize("integrator", ["bdf2", "newmark"])
+def test_damped_stitches_take_energy_from_a_swing_as_those_of_xpbd_do(integrator):
+    left = {}
+    for name, solver in (("implicit", sp.Implicit(integrator=integrator)), ("xpbd", sp.XPBD(substeps=40))):
+        for damping in (0.0, 0.05):
+            *_, frame = sp.simulate(swinging(damping), solver, 1 / 240, 24)
+            report = frame.report
+            assert report.status == "converged", report.message
+            left[name, damping] = report.kinetic_energy + report.elastic_energy + report.stitch_energy
+    assert left["implicit", 0.05] < 0.9 * left["implicit", 0.0]
+    assert left["implicit", 0.05] == pytest.approx(left["xpbd", 0.05], rel=0.15)
+
+
+def test_damping_is_a_potential_with_slope_two_that_sees_no_rotation():
+    from supple.implicit.damping import StrainRate
+    from supple.implicit.potential import HessianBlocks
+    from supple.implicit.stitch_damping import StitchDamping, StitchViscosity
+
+    scene = sewn_pair()
+    damped = [sp.SoftVertexTriangleStitch("a", "b", max_distance=0.051, youngs=1e5, poisson=0.3, damping=0.02)]
+    damped.append(sp.VertexEdgeStitch("b", "a", max_distance=0.051, stiffness=20.0, damping=0.03))
+    stitching = sp.Scene(scene.bodies, stitches=damped).stitching
+    viscosity = StitchViscosity.of(stitching)
+    assert viscosity is not None
+    assert StitchViscosity.of(scene.stitching) is None
+    rng = np.random.default_rng(4)
+    x = initial_state(scene).positions
+    x = x + 0.004 * rng.normal(size=x.shape)
+    before = x + 0.004 * rng.normal(size=x.shape)
+    potential = StitchDamping.of(viscosity, StrainRate(60.0, viscosity.strains(before)))
+    d = 1e-3 * rng.normal(size=x.shape)
+
+    def gradient(y):
+        out = np.zeros_like(y)
+        potential.add_gradient(y, out)
+        return out
+
+    blocks = HessianBlocks.zeros(0, len(x), len(stitching))
+    potential.add_hessian(x, blocks, False)
+    nodes = stitching.elements()
+    longer = np.concatenate([d, np.zeros((1, 3))])
+    product = np.zeros_like(longer)
+    moved = np.einsum("kij,kj->ki", blocks.stitches, longer[nodes].reshape(-1, 12))
+    np.add.at(product, nodes, moved.reshape(-1, 4, 3))
+    errors = []
+    for t in (1.0, 0.5, 0.25):
+        value = (potential.value(x + t * d) - potential.value(x - t * d)) / (2 * t) - (gradient(x) * d).sum()
+        change = (gradient(x + t * d) - gradient(x - t * d)) / (2 * t) - product[:-1]
+        errors.append([abs(value), np.abs(change).max()])
+    orders = np.log2(np.array(errors)[:-1] / np.array(errors)[1:])
+    assert np.abs(orders - 2.0).max() < 0.1, orders
+    # The same shape, turned: nothing to damp.
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    turn *= np.linalg.det(turn)
+    still = StitchDamping.of(viscosity, StrainRate(60.0, viscosity.strains(x)))
+    assert still.value(x @ turn.T + 1.0) < 1e-15 * potential.value(x)
+    v = rng.normal(size=x.shape)
+    rates = (viscosity.strains(x + 1e-6 * v) - viscosity.strains(x - 1e-6 * v)) / 2e-6
+    assert np.allclose(viscosity.strain_rates(x, v), rates, atol=1e-6 * np.abs(rates).max())
+
+
 @pytest.mark.parametrize("moving", [False, True])
 def test_a_body_hangs_on_an_obstacle(moving):
     motion = sp.Keyframes([0.0, 1.0], [[0, 0, 0], [0, 0.3, 0]]) if moving else None

@@ -13,6 +13,7 @@ which is often used, sees the chord of a rotation as a compression, and brakes i
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numba import njit, prange
@@ -47,6 +48,26 @@ class Viscosity:
     elasticity: Elasticity
     mu: NDArray[np.float64]
     lam: NDArray[np.float64]
+
+    def strains(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(m, 6), see `green_strains`."""
+        return green_strains(self.elasticity.system, x)
+
+    def strain_rates(self, x: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(m, 6), see `green_strain_rates`."""
+        return green_strain_rates(self.elasticity.system, x, v)
+
+
+class Strained(Protocol):
+    """Something whose strain is damped; strains are arrays of any shape."""
+
+    def strains(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """At positions x (n, 3) [m]."""
+        ...
+
+    def strain_rates(self, x: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+        """At positions x moving with v [m/s]."""
+        ...
 
 
 def viscosity_of(elasticity: Elasticity) -> Viscosity | None:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SolverError
-from supple.implicit.damping import StrainRate, green_strain_rates, green_strains
+from supple.implicit.damping import Strained, StrainRate
 from supple.state import State
 from supple.system import System
 
@@ -31,7 +31,7 @@ class Plan:
     scale : s [s^2]; None where there is no inertia
     predicted : x~ (n, 3) [m]
     velocity : positions at the end (n, 3) -> velocities at the end [m/s]
-    strain_rate : -> how the strain rate is written; called only where something is damped
+    strain_rate : what is damped -> how its strain rate is written
     contact_weight : factor of the contact energies. The force s a of the trapezoidal rule counts a half at either end;
         contact acts at the end alone, and twice (Kane et al., "Finite element analysis of nonsmooth contact", 1999)
     memory : what the next step must know of this one
@@ -40,7 +40,7 @@ class Plan:
     scale: float | None
     predicted: NDArray[np.float64]
     velocity: Callable[[NDArray[np.float64]], NDArray[np.float64]]
-    strain_rate: Callable[[], StrainRate]
+    strain_rate: Callable[[Strained], StrainRate]
     memory: History | None = None
     contact_weight: float = 1.0
 
@@ -80,7 +80,7 @@ class BackwardEuler(Integrator):
             scale=h * h,
             predicted=x + h * v,
             velocity=lambda end: (end - x) / h,
-            strain_rate=lambda: StrainRate(1.0 / h, green_strains(system, x)),
+            strain_rate=lambda damped: StrainRate(1.0 / h, damped.strains(x)),
             memory=History(x, v, h),
         )
 
@@ -108,8 +108,8 @@ class BDF2(Integrator):
         old_x = one * x - two * past.positions
         old_v = one * v - two * past.velocities
 
-        def strain_rate() -> StrainRate:
-            return StrainRate(1.0 / b, one * green_strains(system, x) - two * green_strains(system, past.positions))
+        def strain_rate(damped: Strained) -> StrainRate:
+            return StrainRate(1.0 / b, one * damped.strains(x) - two * damped.strains(past.positions))
 
         return Plan(
             scale=b * b,
@@ -138,8 +138,8 @@ class Newmark(Integrator):
             at_end[pinned] = (end[pinned] - x[pinned]) / h
             return at_end
 
-        def strain_rate() -> StrainRate:
-            return StrainRate(2.0 / h, green_strains(system, x) + 0.5 * h * green_strain_rates(system, x, v))
+        def strain_rate(damped: Strained) -> StrainRate:
+            return StrainRate(2.0 / h, damped.strains(x) + 0.5 * h * damped.strain_rates(x, v))
 
         return Plan(
             scale=s,
@@ -159,7 +159,7 @@ class Static(Integrator):
     def plan(self, system: System, state: State, h: float, acceleration: Acceleration) -> Plan:
         x = state.positions
         nothing = StrainRate(0.0, np.zeros((0, 6)))
-        return Plan(scale=None, predicted=x, velocity=np.zeros_like, strain_rate=lambda: nothing)
+        return Plan(scale=None, predicted=x, velocity=np.zeros_like, strain_rate=lambda damped: nothing)
 
 
 INTEGRATORS: dict[str, Integrator] = {method.name: method for method in (BackwardEuler(), BDF2(), Newmark(), Static())}

@@ -22,6 +22,7 @@ from supple.implicit.pin_paths import bends
 from supple.implicit.potential import HessianBlocks
 from supple.implicit.reactions import reaction_forces
 from supple.implicit.stabilizer import stabilizer_of
+from supple.implicit.stitch_damping import StitchViscosity
 from supple.implicit.stitch_energy import StitchEnergy
 from supple.implicit.substep import StepSettings, Substep, take_substep
 from supple.implicit.trace import NewtonRow
@@ -119,7 +120,18 @@ class Implicit(Solver):
         )
         stitches = StitchEnergy.of(system.stitching, 0.0) if len(system.stitching) else None
         viscosity = viscosity_of(elasticity)
-        return Workspace(system, contact, elasticity, viscosity, tools, diagonal, stabilizer_of(elasticity), stitches)
+        damped = StitchViscosity.of(system.stitching)
+        return Workspace(
+            system,
+            contact,
+            elasticity,
+            viscosity,
+            tools,
+            diagonal,
+            stabilizer_of(elasticity),
+            stitches,
+            damped,
+        )
 
     def step(self, system: System, state: State, dt: float, workspace: Workspace) -> tuple[State, StepReport]:
         """Advance by dt, in as many substeps as it takes; see `Solver.step`.

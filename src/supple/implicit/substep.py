@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.implicit.contact_step import ContactStep
-from supple.implicit.damping import Damping, StrainRate, green_strain_rates, green_strains
+from supple.implicit.damping import Damping, StrainRate
 from supple.implicit.external_forces import ExternalForces, total_forces
 from supple.implicit.gravity import Gravity
 from supple.implicit.guard import Guard
@@ -21,6 +21,7 @@ from supple.implicit.pin_motion import move_pins
 from supple.implicit.potential import Potential
 from supple.implicit.soft_targets import soft_targets_at
 from supple.implicit.step_limits import StepLimits
+from supple.implicit.stitch_damping import StitchDamping
 from supple.implicit.trace import NewtonRow
 from supple.implicit.workspace import Workspace
 from supple.state import State, Status
@@ -143,7 +144,10 @@ def _objective(
     else:
         terms.append(Inertia(system.masses, plan.predicted, plan.scale))
         if workspace.viscosity is not None:
-            terms.append(Damping(workspace.viscosity, plan.strain_rate()))
+            terms.append(Damping(workspace.viscosity, plan.strain_rate(workspace.viscosity)))
+        if workspace.stitch_viscosity is not None:
+            rate = plan.strain_rate(workspace.stitch_viscosity)
+            terms.append(StitchDamping.of(workspace.stitch_viscosity, rate))
     return Objective(terms, workspace.tools.clock)
 
 
@@ -155,9 +159,13 @@ def _acceleration(system: System, state: State, workspace: Workspace) -> NDArray
     """
     x, v = state.positions, state.velocities
     terms = _potentials(system, x, state.time, total_forces(system, state.time), workspace)
-    if workspace.viscosity is not None:
-        rate = green_strain_rates(system, x, v)
-        terms.append(Damping(workspace.viscosity, StrainRate(1.0, green_strains(system, x) - rate)))
+    viscosity, of_stitches = workspace.viscosity, workspace.stitch_viscosity
+    if viscosity is not None:
+        rate = StrainRate(1.0, viscosity.strains(x) - viscosity.strain_rates(x, v))
+        terms.append(Damping(viscosity, rate))
+    if of_stitches is not None:
+        rate = StrainRate(1.0, of_stitches.strains(x) - of_stitches.strain_rates(x, v))
+        terms.append(StitchDamping.of(of_stitches, rate))
     return -Objective(terms).gradient(x) / system.masses[:, None]
 
 

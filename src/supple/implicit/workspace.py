@@ -12,6 +12,7 @@ from supple.implicit.damping import Viscosity
 from supple.implicit.elasticity import Elasticity
 from supple.implicit.newton import Tools
 from supple.implicit.stabilizer import Stabilizer
+from supple.implicit.stitch_damping import StitchViscosity
 from supple.implicit.stitch_energy import StitchEnergy
 from supple.state import State
 from supple.system import System
@@ -36,6 +37,7 @@ class Workspace:
     diagonal: float
     stabilizer: Stabilizer
     stitches: StitchEnergy | None
+    stitch_viscosity: StitchViscosity | None
     last: NDArray[np.float64] | None = None
 
     @property
