@@ -5,11 +5,13 @@ import pytest
 
 import supple as sp
 from supple.implicit.free_motion import FreeMotion
+from supple.implicit.guard import Guard
 from supple.implicit.inertia import Inertia
 from supple.implicit.linear_solver import LinearSolver
 from supple.implicit.newton import Problem, Tools, minimize
 from supple.implicit.objective import Objective
 from supple.implicit.potential import HessianBlocks
+from supple.implicit.step_limits import StepLimits
 from supple.implicit.stitch_energy import StitchEnergy
 from supple.scene.stitches.elements import Springs
 from supple.scene.stitches.side import Side
@@ -56,30 +58,19 @@ def sewn(vertices, triangle, **stitch):
     return system, x, pairs
 
 
-class Unlimited:
-    """Stitch tets are not guarded: every step is allowed."""
-
-    def largest_step(self, x, direction):
-        return 1.0, -1
-
-    def allows(self, x):
-        return True
-
-    def widen(self, x):
-        pass
-
-
 def by_newton(system, x, h=0.05, steps=200):
     """Backward Euler, which loses energy; every position on the way."""
     linear = LinearSolver.of(system, "direct")
     hessian = HessianBlocks.zeros(0, len(x), len(system.stitching))
     tools = Tools(linear, hessian, system.pinned_vertices, FreeMotion.of(system))
+    # There is no tet to guard: stitch tets are not.
+    limits = StepLimits(Guard(system, np.zeros(0, dtype=np.bool_), complete=True), None, tools.clock)
     stitches = StitchEnergy.of(system.stitching, 0.0)
     v = np.zeros_like(x)
     way = [x]
     for _ in range(steps):
         objective = Objective([stitches, Inertia(system.masses, x + h * v, h * h)])
-        outcome = minimize(Problem(objective, h * h, 1e-10, 60, 1.0), x, Unlimited(), tools)
+        outcome = minimize(Problem(objective, h * h, 1e-10, 60, 1.0), x, limits, tools)
         assert outcome.status is Status.CONVERGED, outcome.message
         v = (outcome.end.positions - x) / h
         x = outcome.end.positions
