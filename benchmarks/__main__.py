@@ -1,6 +1,6 @@
 """All benchmarks after each other: `make bench`, or `python -m benchmarks`."""
 
-from benchmarks import hanging_beam, implicit_scaling, live, projections, startup, work_precision
+from benchmarks import contact_scenes, hanging_beam, implicit_scaling, live, projections, startup, work_precision
 
 if __name__ == "__main__":
     startup.main()
@@ -9,4 +9,5 @@ if __name__ == "__main__":
     hanging_beam.main(busy=True)
     work_precision.main()
     implicit_scaling.main()
+    contact_scenes.main()
     live.main()

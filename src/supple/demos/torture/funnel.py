@@ -94,5 +94,5 @@ def _demo(edge_length: float, neck: float, dt: float, steps: int | None = None) 
 
 
 FUNNEL = Torture(
-    small=_demo(0.014, 0.022, 1 / 10), full=_demo(0.0095, 0.018, 1 / 50), large=_demo(0.0034, 0.018, 1 / 50, 40)
+    small=_demo(0.014, 0.022, 1 / 10), full=_demo(0.011, 0.018, 1 / 25), large=_demo(0.0042, 0.018, 1 / 25, 12)
 )

@@ -71,4 +71,4 @@ def _demo(cells: int, steps: int) -> Demo:
     )
 
 
-HEAVY = Torture(small=_demo(2, 30), full=_demo(4, 100))
+HEAVY = Torture(small=_demo(2, 30), full=_demo(4, 60))

@@ -101,4 +101,4 @@ def _demo(edge_length: float, dt: float, seconds: float) -> Demo:
     )
 
 
-ROLLERS = Torture(small=_demo(0.05, 1 / 50, 0.5), full=_demo(0.025, 1 / 100, 0.5))
+ROLLERS = Torture(small=_demo(0.05, 1 / 50, 0.5), full=_demo(0.033, 1 / 100, 0.5))

@@ -102,4 +102,4 @@ def _demo(cells: int, dt: float) -> Demo:
     )
 
 
-SLOPE = Torture(small=_demo(1, 1 / 40), full=_demo(4, 1 / 100))
+SLOPE = Torture(small=_demo(1, 1 / 40), full=_demo(2, 1 / 100))

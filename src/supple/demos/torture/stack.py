@@ -98,4 +98,4 @@ def _demo(cells: int, steps: int) -> Demo:
     )
 
 
-STACK = Torture(small=_demo(2, 50), full=_demo(4, 100), large=_demo(8, 10))
+STACK = Torture(small=_demo(2, 50), full=_demo(4, 75), large=_demo(8, 8))
