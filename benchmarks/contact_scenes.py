@@ -2,7 +2,7 @@
 
 usage: python -m benchmarks.contact_scenes [SCENE ...] [--quick]
 
-SCENE is a name such as `stack`, or `stack:small`, `stack:full`, `stack:large`; without any, all full and large scenes are
+SCENE is a name such as `stack`, or `stack:small`, `stack:full`, `stack:large`; without any, all full and large ones are
 run. A scene is run for at most 100 steps. Means are over the steps that have contacts.
 """
 

@@ -57,3 +57,19 @@ def test_the_live_ball_is_simulated_with_and_without_its_page(capsys):
     assert list(times) == ["headless", "engine", "page"]
     assert all(len(each) == 1 and each[0] > 0.0 for each in times.values())
     assert "of real time" in capsys.readouterr().out
+
+
+def test_the_time_of_steps_with_contact_is_told_apart():
+    from dataclasses import replace
+
+    from benchmarks.contact_scenes import PARTS, measured
+
+    from supple.demos.torture.registry import TORTURE
+
+    said = measured(replace(TORTURE["knives"].small, steps=14))
+    assert said["tets"] == 300
+    assert said["contacts"] > 0
+    assert said["converged"]
+    assert said["iterations"] >= 1.0
+    assert all(0.0 < said[part] < 1.0 for part in PARTS)
+    assert sum(said[part] for part in PARTS) <= 1.0

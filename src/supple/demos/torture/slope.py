@@ -25,7 +25,6 @@ SECONDS = 2.5
 DENSITY = 1000.0
 # Where contact begins [m], the stiffness of its barrier [Pa], and the velocity below which friction is static [m/s].
 DHAT, STIFFNESS, SLOW = 1e-5, 1e7, 1e-4
-TOLERANCE = 1e-8
 COEFFICIENTS = {"sticks": 0.5, "slides": 0.49}
 DOWN = np.array([1.0, 0.0, 0.0])
 
@@ -83,7 +82,7 @@ class _Watch(ContactWatch):
 
 
 def _solver() -> Implicit:
-    return Implicit(contact=Contact(dhat=DHAT, stiffness=STIFFNESS, friction_velocity=SLOW), tolerance=TOLERANCE)
+    return Implicit(contact=Contact(dhat=DHAT, stiffness=STIFFNESS, friction_velocity=SLOW))
 
 
 def _demo(cells: int, dt: float) -> Demo:

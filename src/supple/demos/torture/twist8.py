@@ -83,7 +83,8 @@ def demo(cells: tuple[int, int], dt: float, turns: float = TURNS, steps: int | N
             "itself; contact keeps it from passing through itself."
         ),
         scene=partial(scene, cells, turns),
-        solvers={"implicit": Implicit},
+        # Steps of seconds take many substeps where the rod folds.
+        solvers={"implicit": lambda: Implicit(max_substeps=512)},
         measurement=_Watch,
         dt=dt,
         steps=round(SECONDS * turns / TURNS / dt) if steps is None else steps,

@@ -55,6 +55,7 @@ class ContactWatch(Measurement):
             self.complaint = f"; at {frame.time:.4g} s: {report.message}"
 
     def claims(self) -> list[Claim]:
+        gap = f"smallest distance {1e3 * self.nearest:.3g} mm" if np.isfinite(self.nearest) else "nothing came near"
         ends = ", ".join(f"{count} {status}" for status, count in self.statuses.items())
         return [
             Claim(
@@ -63,7 +64,7 @@ class ContactWatch(Measurement):
                 self.frames == self.steps and set(self.statuses) == {Status.CONVERGED},
             ),
             Claim("no tetrahedron inverts", f"smallest det F {self.min_J:.3g}", self.min_J > 0.0),
-            Claim("no surfaces touch", f"smallest distance {1e3 * self.nearest:.3g} mm", self.nearest > 0.0),
+            Claim("no surfaces touch", gap, self.nearest > 0.0),
             *self.own_claims(),
         ]
 
