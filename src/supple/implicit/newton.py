@@ -39,6 +39,9 @@ _LONGEST_REACH = 16.0
 _LAST = 1e-5
 _BALANCE = 1e-4
 
+# Of the largest coordinate: shorter directions are lost in rounding, and so is what they would balance.
+_ROUNDED = 1e-14
+
 # Directions that shrink by less than this from iteration to iteration converge linearly.
 _LINEAR_RATE = 0.2
 
@@ -159,7 +162,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
         rows.append(row)
         logger.debug("%s", row)
         limits.widen(here.positions)
-        if last and (step == 0.0 or _in_balance(problem, here, tools)):
+        if last and (step == 0.0 or _is_rounded(length, here) or _in_balance(problem, here, tools)):
             return Outcome(Status.CONVERGED, here, "", rows)
         if last:
             here = problem.objective.model(here.positions, tools.hessian, convex)
@@ -174,6 +177,11 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
         f"the tolerance is {problem.tolerance:.2e} m"
     )
     return Outcome(Status.ITERATION_LIMIT, here, text, rows)
+
+
+def _is_rounded(length: float, here: Model) -> bool:
+    """Whether a direction of this length [m] changes nothing that could be told from round-off."""
+    return length <= _ROUNDED * float(np.abs(here.positions).max(initial=0.0))
 
 
 def _in_balance(problem: Problem, here: Model, tools: Tools) -> bool:
