@@ -103,6 +103,7 @@ class Damping(Potential):
 
     viscosity: Viscosity
     rate: StrainRate
+    label = "elasticity"
 
     def value(self, x: NDArray[np.float64]) -> float:
         s = self.viscosity.elasticity.system

@@ -39,6 +39,7 @@ class InversionBarrier(Potential):
 
     elasticity: Elasticity
     stiffness: NDArray[np.float64]
+    label = "elasticity"
 
     def value(self, x: NDArray[np.float64]) -> float:
         s = self.elasticity.system

@@ -22,7 +22,8 @@ class StepLimits:
 
     def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, int]:
         """How far along `direction`, at most 1, and the tet that allows no more; -1 where none or a contact does."""
-        step, tet = self.guard.largest_step(x, direction)
+        with self.clock.of("elasticity"):
+            step, tet = self.guard.largest_step(x, direction)
         if self.contact is None or step == 0.0:
             return step, tet
         with self.clock.of("contact"):
