@@ -91,4 +91,4 @@ def demo(cells: tuple[int, int], dt: float, turns: float = TURNS, steps: int | N
     )
 
 
-TWIST8 = Torture(small=demo((24, 1), 1 / 4, 3.0), full=demo((48, 2), 1 / 10), large=demo((136, 5), 1 / 2, steps=14))
+TWIST8 = Torture(small=demo((24, 1), 1 / 4, 3.0), full=demo((48, 2), 1 / 10), large=demo((136, 5), 1 / 2, steps=22))
