@@ -60,6 +60,8 @@ class Replay:
         if not self.playing:
             self.play.label = "Play"
         self._time = first
+        # Where playing has put the slider last; elsewhere, a visitor has moved it, who will be heard soon.
+        self._put = self.slider.value
         self.slider.on_update(self._seek)
         self.play.on_click(lambda _: self._toggle())
         self.export.on_click(self._send_page)
@@ -118,6 +120,7 @@ class Replay:
                 if self.playing:
                     self._toggle()
                 times = self._recording.times
+                self._put = self.slider.value
                 self.show(number(self.slider.value, float(times[0]), float(times[-1])))
 
     def _run(self) -> None:
@@ -127,13 +130,14 @@ class Replay:
             passed, before = now - before, now
             times = self._recording.times
             with self._turn:
-                if self.playing and self._pace.may_send():
+                if self.playing and self.slider.value == self._put and self._pace.may_send():
                     following = self._time + passed * number(self.speed.value, _SLOWEST, _FASTEST)
                     if following > times[-1]:
                         following = float(times[0])
                     with self._pace.sending():
                         self.show(following)
                         self.slider.value = float(times[self.frame_at(following)])
+                        self._put = self.slider.value
 
     def _facts(self, shown: int) -> str:
         recording = self._recording
