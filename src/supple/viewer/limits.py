@@ -40,8 +40,6 @@ MESSAGES_PER_SECOND, MESSAGES_AT_ONCE = 600.0, 1_200.0
 LARGEST_MESSAGE, LARGEST_PICTURE = 64 * 1024, 32 * 1024 * 1024
 # Browsers with an open page.
 MOST_CLIENTS = 32
-# Scene files, and meshes that a scene file of the viewer may name [bytes].
-LARGEST_MESH_FILE = 256 * 1024 * 1024
 
 # Points of contact that a snapshot tells of.
 MOST_CONTACT_POINTS = 2_000

@@ -90,10 +90,6 @@ class Model:
         """(m, 3) centres of the tets at rest [m]."""
         return self.rest_positions[self.tets].sum(axis=1) / 4.0
 
-    def body_of_vertex(self, vertex: int) -> ModelBody:
-        """The body that a vertex belongs to."""
-        return next(body for body in self.bodies if body.vertices.start <= vertex < body.vertices.stop)
-
 
 @dataclass(frozen=True, eq=False)
 class Facets:

@@ -85,7 +85,6 @@ class ContactModel:
             else None
         )
         if with_planes is not None:
-            # Obstacles are counted from the first one.
             terms.append(with_planes)
         return terms
 
