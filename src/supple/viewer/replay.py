@@ -5,6 +5,8 @@ from __future__ import annotations
 import threading
 import time
 from collections import OrderedDict
+from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -22,6 +24,7 @@ from supple.viewer.view_controls import ViewControls
 
 _SLOWEST, _FASTEST = 0.05, 4.0
 _KEPT = 64  # frames
+_SETTLES = 0.3  # after a visitor's last move of the slider [s]
 
 
 class Replay:
@@ -62,6 +65,8 @@ class Replay:
         self._time = first
         # Where playing has put the slider last; elsewhere, a visitor has moved it, who will be heard soon.
         self._put = self.slider.value
+        self._settle_at: float | None = None
+        self._loop = server.get_event_loop()
         self.slider.on_update(self._seek)
         self.play.on_click(lambda _: self._toggle())
         self.export.on_click(self._send_page)
@@ -119,6 +124,7 @@ class Replay:
             with self._turn:
                 if self.playing:
                     self._toggle()
+                self._settle_at = time.monotonic() + _SETTLES
                 times = self._recording.times
                 self._put = self.slider.value
                 self.show(number(self.slider.value, float(times[0]), float(times[-1])))
@@ -136,8 +142,32 @@ class Replay:
                         following = float(times[0])
                     with self._pace.sending():
                         self.show(following)
-                        self.slider.value = float(times[self.frame_at(following)])
-                        self._put = self.slider.value
+                        self._in_loop(self._advance, float(times[self.frame_at(following)]))
+                elif self._settle_at is not None and now > self._settle_at:
+                    self._settle_at = None
+                    self._in_loop(self._send_again)
+
+    def _in_loop(self, call: Callable[..., None], *arguments: float) -> None:
+        """Let the server's loop do it, which also reads what visitors say: nothing comes in between."""
+        with suppress(RuntimeError):  # the server has stopped
+            self._loop.call_soon_threadsafe(call, *arguments)
+
+    def _advance(self, seconds: float) -> None:
+        """Put the slider where playing is, unless a visitor has moved it."""
+        if self.playing and self.slider.value == self._put:
+            self._put = seconds
+            self.slider.value = seconds
+
+    def _send_again(self) -> None:
+        """Put the sliders of all visitors where this one is.
+
+        What playing sent last may have crossed a visitor's move on the line, and that browser then shows a time
+        which is not the one shown. viser sends no value twice, so it becomes another by its last bit.
+        """
+        if not self.playing:
+            times = self._recording.times
+            self._put = float(np.nextafter(self.slider.value, 0.5 * (times[0] + times[-1])))
+            self.slider.value = self._put
 
     def _facts(self, shown: int) -> str:
         recording = self._recording

@@ -301,9 +301,16 @@ class Screen:
         self.tab.get_by_role("option", name=option, exact=True).click()
 
     def slide(self, handle, key: str, times: int = 1) -> None:
-        thumb = self.tab.locator(f'[id="{handle._impl.uuid}"] [role=slider]')
+        thumb = self._thumb(handle)
         for _ in range(times):
             thumb.press(key)
+
+    def reads(self, handle) -> float:
+        """What a slider says in the browser."""
+        return float(self._thumb(handle).get_attribute("aria-valuenow"))
+
+    def _thumb(self, handle):
+        return self.tab.locator(f'[id="{handle._impl.uuid}"] [role=slider]')
 
 
 @pytest.fixture(scope="session")

@@ -63,6 +63,18 @@ def test_the_slider_shows_the_frame_of_its_time(replay, server, visit, until):
     visitor.leave()
 
 
+def test_a_visitor_who_moves_the_playing_slider_is_told_where_it_came_to_rest(replay, server, visit, until):
+    visitor = visit(server.get_port())
+    until(server.get_clients)
+    aim = float(replay._recording.times[7]) + 1e-3  # where playing never is
+    visitor.set(replay.slider, aim)
+    until(lambda: not replay.playing and replay.stage.moment is replay.moment(7))
+    # What playing sent may come after the visitor's own move; viser sends only what differs from the value before.
+    until(lambda: replay.slider.value not in (aim, replay._recording.times[7]))
+    assert replay.slider.value == pytest.approx(aim, abs=1e-12)
+    visitor.leave()
+
+
 def test_times_between_frames_and_beyond_them(replay):
     times = replay._recording.times
     assert replay.frame_at(-1.0) == 0
@@ -132,6 +144,15 @@ def test_a_person_looks_through_a_recording(recorded, look, spot, tmp_path):
     with opened_page(recorded, Address(port=0)) as page:
         screen, replay = look(page.url, page.server), page.shown
         where = lambda: spot(screen.shot(), "red")  # noqa: E731
+        agree = lambda: screen.reads(replay.slider) == pytest.approx(replay.slider.value, abs=1e-9)  # noqa: E731
+        # A key that comes as the last frame is shown moves nothing, hence again.
+        for _ in range(20):
+            if not replay.playing:
+                break
+            screen.slide(replay.slider, "ArrowRight")
+            screen.tab.wait_for_timeout(200)
+        assert not replay.playing
+        screen.wait(agree, "the time that is shown in the browser's slider")
         screen.slide(replay.slider, "Home")
         screen.wait(lambda: replay.stage.moment is replay.moment(0), "the first frame")
         screen.wait(lambda: where()[0] > 100, "the ball")
