@@ -5,6 +5,7 @@ import pytest
 import supple as sp
 from supple.viewer.live_scene import LiveScene
 from supple.viewer.live_source import LiveSource
+from supple.viewer.messages import Grab
 from supple.viewer.simulation_loop import SimulationLoop
 
 
@@ -21,6 +22,22 @@ def small_source(**changes):
         **changes,
     }
     return LiveSource("small", sp.Scene(**parts), sp.XPBD(substeps=8), 1 / 60)
+
+
+def free_source(**changes):
+    """One rubber cube in free space."""
+    rubber = sp.StableNeoHookean(youngs=1e5, poisson=0.4, density=1000.0, damping=0.01)
+    cube = sp.Body("cube", sp.shapes.box((0.4, 0.4, 0.4), (3, 3, 3)), rubber)
+    return LiveSource("free", sp.Scene([cube], gravity=(0, 0, 0), **changes), sp.XPBD(substeps=8), 1 / 60)
+
+
+def run(live, steps):
+    for _ in range(steps):
+        assert live.step().status == "converged"
+
+
+def corner_grab(target, **more):
+    return Grab(7, "cube", (0,), (1.0,), target, **more)
 
 
 @pytest.fixture

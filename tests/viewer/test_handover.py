@@ -13,8 +13,7 @@ from supple.viewer.live_scene import LiveScene
 from supple.viewer.messages import MovePusher, SetSolver
 from supple.viewer.obstacle_distance import moved_out, signed_distance
 
-from .conftest import small_source
-from .test_changes import free_source, run
+from .conftest import free_source, run, small_source
 
 
 class TestHandover:
