@@ -94,12 +94,15 @@ def test_a_demo_is_shown_live_and_nothing_is_recorded(tmp_path, monkeypatch, ser
 
 @pytest.mark.skipif(os.name != "posix", reason="sends an interrupt as a terminal does")
 def test_the_shell_serves_a_page_until_ctrl_c(scene):
+    # Whoever runs the tests in the background may have had SIGINT ignored; a person at a terminal has not.
+    heard = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731
     shell = subprocess.Popen(
         [sys.executable, "-m", "supple", "view", str(scene), "--port", "0", "--no-open"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        preexec_fn=heard,
     )
     address = shell.stdout.readline().split()[0]
     with urllib.request.urlopen(address, timeout=60) as response:

@@ -101,6 +101,28 @@ def test_a_step_that_does_not_end_is_given_up(loop, endless):
     assert loop.live.frame == 1
 
 
+def test_compiling_kernels_is_no_part_of_a_step(loop):
+    """On a machine where a solver was never used, its first step takes long, and is not given up for that."""
+    import numba
+
+    def compiles(state):
+        # Each is compiled anew, for half a second or more in all.
+        began, compiled = time.monotonic(), 0
+        while time.monotonic() - began < 0.5:
+            kernel = numba.njit(lambda x, y=compiled: np.sort(x)[::-1].sum() + y)
+            kernel(np.zeros(3))
+            compiled += 1
+        return state, StepReport(Status.CONVERGED, 1)
+
+    loop.watch.longest = 0.25
+    loop.obey(say.Play())
+    with_solver_that(loop, compiles)
+    loop.step()
+    assert loop.notices == deque()
+    assert loop.live.frame == 1
+    assert loop.playing
+
+
 def test_who_asks_for_a_pause_does_not_wait_for_a_long_step(loop):
     loop.watch.patience = 0.1
     loop.obey(say.Play())

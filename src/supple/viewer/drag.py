@@ -78,7 +78,9 @@ class Mouse:
 
     async def drag(self, event: Any) -> None:
         """Called by viser while something is dragged."""
-        if self._controls.pushes:
+        if event.phase == "end":  # whatever the mouse did when it began
+            self.let_go(event.client_id)
+        elif self._controls.pushes:
             self._push(event)
         else:
             self._pull(event)
@@ -103,11 +105,9 @@ class Mouse:
 
     def _pull(self, event: Any) -> None:
         visitor = event.client_id
-        if event.phase == "end":
-            self.let_go(visitor)
-        elif not _finite(event.start_position, event.end_position) or self._stage is None:
+        if not _finite(event.start_position, event.end_position) or self._stage is None:
             return
-        elif event.phase == "start":
+        if event.phase == "start":
             self.let_go(visitor)
             point = nearest_surface_point(self._stage.moment, event.start_position)
             number = self._grabs[visitor] = next(self._numbers)
@@ -127,9 +127,6 @@ class Mouse:
 
     def _push(self, event: Any) -> None:
         visitor = event.client_id
-        if event.phase == "end":
-            self._pushes.pop(visitor, None)
-            return
         if not _finite(event.start_position, event.end_position) or self._stage is None:
             return
         camera = event.client.camera

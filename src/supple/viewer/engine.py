@@ -30,14 +30,14 @@ class Engine:
     Parameters
     ----------
     source : what to simulate.
-    start_timeout : how long to wait for the first snapshot [s].
+    start_timeout : how long to wait for the first snapshot [s]; on a new machine, kernels are compiled before it.
 
     Raises
     ------
     SceneError, SolverError : where the source cannot be simulated.
     """
 
-    def __init__(self, source: LiveSource, start_timeout: float = 120.0) -> None:
+    def __init__(self, source: LiveSource, start_timeout: float = 600.0) -> None:
         self.source = source
         self._arrived = threading.Condition()
         self._description: SceneDescription | None = None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
+import time
 from typing import Any
 
 from supple.viewer.controls.desk import Desk, Simulation
@@ -15,6 +16,9 @@ from supple.viewer.snapshots import Snapshot
 from supple.viewer.stage import Stage
 
 logger = logging.getLogger(__name__)
+
+# The simulation says something every half a second, unless it is amid something long. Then the page says so [s].
+_SILENCE = 2.0
 
 
 class LivePage:
@@ -32,7 +36,7 @@ class LivePage:
     ) -> None:
         self._simulation = simulation
         self._translator = Translator()
-        self._shown = first
+        self._shown, self._heard = first, time.monotonic()
         self.desk = Desk(simulation, first)
         self.panel = Panel(server, self.desk)
         moment = self._translator.moment(first)
@@ -66,7 +70,11 @@ class LivePage:
             self.panel.time.mourn(error)
         snapshot = self._simulation.latest()
         if snapshot is None or snapshot is self._shown:
+            silent = time.monotonic() - self._heard
+            if error is None and silent > _SILENCE:
+                self.panel.time.wait(silent)
             return
+        self._heard = time.monotonic()
         with self._pace.sending():
             self._shown = snapshot
             self.stage.show(self._translator.moment(snapshot))

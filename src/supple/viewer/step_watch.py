@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from supple.errors import SolverError
+from supple.viewer.compile_clock import CompileClock
 
 # How often the watch looks at the clock, and after which time it tries again [s].
 _LOOK, _AGAIN = 0.05, 0.5
@@ -24,7 +25,8 @@ class StepWatch:
     """Ends what the main thread does within `limited`, by an exception, once it takes too long.
 
     Solvers make new states and leave old ones alone, so that a step can be given up anywhere; only the workspace has to
-    be prepared anew.
+    be prepared anew. Time in which kernels are compiled does not count, and nothing ends it: given up, it would only
+    begin anew.
 
     Parameters
     ----------
@@ -36,6 +38,8 @@ class StepWatch:
         self.longest, self.patience = longest, patience
         self._impatient = impatient
         self._began: float | None = None
+        self._compiled = CompileClock()
+        self._compiled_before = 0.0
         self._not_before = 0.0
         self._thread: threading.Thread | None = None
 
@@ -49,7 +53,8 @@ class StepWatch:
             self._thread = threading.Thread(target=self._watch, name="step watch", daemon=True)
             self._thread.start()
         before = signal.signal(signal.SIGINT, self._give_up)
-        self._began, self._not_before = time.monotonic(), 0.0
+        self._compiled_before, self._not_before = self._compiled.seconds, 0.0
+        self._began = time.monotonic()
         try:
             yield
         finally:
@@ -67,8 +72,8 @@ class StepWatch:
 
     def _is_over(self, began: float) -> bool:
         now = time.monotonic()
-        taken = now - began
-        if now < self._not_before:
+        taken = now - began - (self._compiled.seconds - self._compiled_before)
+        if now < self._not_before or self._compiled.running:
             return False
         return taken > self.longest or (taken > self.patience and self._impatient())
 

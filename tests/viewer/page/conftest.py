@@ -26,9 +26,12 @@ class MadeUpSimulation:
 
     def __init__(self, snapshot: Snapshot) -> None:
         self.snapshot, self.told, self.error = snapshot, [], None
+        self.sent = 0  # commands; what `snapshot.applied` says of them is up to the test
 
     def send(self, command):
         self.told.append(command)
+        self.sent += 1
+        return self.sent
 
     def latest(self):
         return self.snapshot
@@ -304,6 +307,22 @@ class Screen:
         thumb = self._thumb(handle)
         for _ in range(times):
             thumb.press(key)
+
+    def insist(self, act, holds, what: str, patience: float = 5.0):
+        """Do something until it has an effect. A busy browser may lose a key, or have drawn too little to be clicked.
+
+        For what can be done twice without harm.
+        """
+        again = 0.0
+
+        def done():
+            nonlocal again
+            if time.monotonic() > again:
+                act()
+                again = time.monotonic() + patience
+            return holds()
+
+        return self.wait(done, what)
 
     def reads(self, handle) -> float:
         """What a slider says in the browser."""

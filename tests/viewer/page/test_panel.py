@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from supple.viewer import live_page
+from supple.viewer.controls import wish
 from supple.viewer.from_snapshot import Translator
 from supple.viewer.messages import (
     AddBody,
@@ -77,6 +79,16 @@ def test_the_page_says_when_the_simulation_is_slow_or_gone(live, made_up, until)
     until(lambda: "gone" in said() and "out of memory" in said())
 
 
+def test_the_page_says_when_nothing_is_heard_of_the_simulation(live, made_up, until, monkeypatch):
+    said = lambda: live.panel.time._said.content  # noqa: E731
+    monkeypatch.setattr(live_page, "_SILENCE", 0.05)
+    made_up.show(time=1.25)
+    until(lambda: "t = 1.25 s" in said() and "Busy for 0 s" in said())
+    monkeypatch.setattr(live_page, "_SILENCE", 1e9)
+    made_up.show(time=2.5)
+    until(lambda: "t = 2.50 s" in said() and "Busy" not in said())
+
+
 def test_solver_and_its_numbers(live, made_up, visitor, told, until):
     solver = live.panel.solver
     assert list(solver.inputs) == ["substeps", "momentum_restore", "gravity"]
@@ -139,7 +151,7 @@ def test_bodies_come_and_go(live, made_up, visitor, told, until):
     assert bodies.which.value == "all bodies"
 
 
-def test_values_follow_the_simulation_but_not_under_the_hand(live, made_up, visitor, told, until):
+def test_values_follow_the_simulation_but_not_under_the_hand(live, made_up, visitor, told, until, monkeypatch):
     old = made_up.snapshot.description
     changed = replace(old, revision=2, values=old.values | {"substeps": 33})
     made_up.show(description=changed)
@@ -147,12 +159,52 @@ def test_values_follow_the_simulation_but_not_under_the_hand(live, made_up, visi
     until(lambda: substeps.handle.value == 33)
     visitor.set(substeps.handle, 50)
     told()
-    made_up.show()  # the command has not been acted upon yet
-    time.sleep(0.4)
+    shown = lambda snapshot: until(lambda: live.panel._numbers_of is snapshot)  # noqa: E731
+    # The command has not been acted upon yet, however long that takes: a step may be long.
+    monkeypatch.setattr(wish, "_HANDS_OFF", 0.0)
+    shown(made_up.show())
     assert substeps.handle.value == 50
-    substeps.forget_touch()  # it never will be
-    made_up.show()
+    # Now it has been, and came to nothing.
+    made_up.show(applied=made_up.sent)
     until(lambda: substeps.handle.value == 33)
+
+
+def test_a_choice_of_solver_stands_until_it_is_answered(live, made_up, visitor, told, until, monkeypatch):
+    monkeypatch.setattr(wish, "_HANDS_OFF", 0.0)
+    solver = live.panel.solver
+    visitor.set(solver.kind, "implicit")
+    assert told() == SetSolver("implicit")
+    snapshot = made_up.show()
+    until(lambda: live.panel._numbers_of is snapshot)
+    assert solver.kind.value == "implicit"
+    made_up.show(applied=made_up.sent)  # it was refused
+    until(lambda: solver.kind.value == "xpbd")
+    visitor.set(solver.kind, "implicit")
+    assert told() == SetSolver("implicit")
+
+
+def test_clicks_that_come_at_once_are_taken_one_by_one(live, visitor, made_up, until):
+    """Each is what it was, whatever was clicked right after it."""
+    time_controls, bodies = live.panel.time, live.panel.bodies
+    youngs = bodies.inputs["youngs"].handle
+    for k in range(20):
+        visitor.set(time_controls.back, "step" if k % 2 else "reset")
+        visitor.set(bodies.squash, "stretch" if k % 2 else "squash")
+        visitor.set(youngs, 5.0 + 0.1 * k)
+    until(lambda: len(made_up.told) >= 59)  # the first modulus is there already
+    assert [command for command in made_up.told if isinstance(command, (Step, Reset))] == [Reset(), Step()] * 10
+    assert [command for command in made_up.told if isinstance(command, Squash)] == [Squash(0.5), Squash(1.5)] * 10
+    moduli = [command.value for command in made_up.told if isinstance(command, SetParameter)]
+    np.testing.assert_allclose(moduli, 10.0 ** (5.0 + 0.1 * np.arange(1, 20)))
+
+
+def test_a_drag_ends_whatever_the_mouse_does_by_then(live, visitor, told, until):
+    handle, x = live.stage.body_handles[0], live.stage.moment.positions[0]
+    visitor.drag(handle, "start", x, x)
+    grab = told()
+    visitor.set(live.panel.mouse_controls.mode, "push")  # by anyone
+    visitor.drag(handle, "end", x, x)
+    assert told() == ReleaseGrab(grab.grab)
 
 
 def test_a_drag_is_a_spring_that_is_let_go(live, visitor, told):
@@ -202,7 +254,7 @@ def test_a_click_pins_and_unpins(live, made_up, visitor, told, until):
 def test_the_ball_follows_the_pointer(live, server, visitor, told, until):
     controls = live.panel.mouse_controls
     visitor.set(controls.mode, "push")
-    until(lambda: "/backdrop" in server.scene._handle_from_node_name)
+    until(lambda: live.panel.mouse._backdrop is not None)
     visitor.set(controls.radius_input, 0.2)
     backdrop = server.scene._handle_from_node_name["/backdrop"]
     # The camera stands at z = -5 and looks along z: the ball stays in the plane of the bodies' middle.
@@ -261,17 +313,24 @@ def test_choices_made_at_once_are_all_taken(live, visitor, until):
 def test_camera_presets_look_at_everything(live, server, visitor, until, preset, ahead):
     view, camera = live.stage.model.view, next(iter(server.get_clients().values())).camera
     visitor.set(live.panel.views.camera, preset)
-    until(lambda: np.allclose(camera.look_at, view.center) and np.linalg.norm(camera.position) > 3.0)
-    time.sleep(0.1)  # place, then direction
+
+    def axis():
+        """The camera's third axis, which it looks along."""
+        w, x, y, z = camera.wxyz
+        return np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
+
+    def looks_there():
+        looks = np.asarray(camera.look_at) - np.asarray(camera.position)
+        return np.allclose(camera.look_at, view.center) and np.allclose(
+            axis(), looks / np.linalg.norm(looks), atol=1e-6
+        )
+
+    until(lambda: np.linalg.norm(camera.position) > 3.0 and looks_there())
     looks = np.asarray(camera.look_at) - np.asarray(camera.position)
     angle = np.arcsin(view.radius / np.linalg.norm(looks))
     assert angle < 0.5 * np.radians(35.0)  # all of it is in the picture
     if ahead is not None:
         np.testing.assert_allclose(looks / np.linalg.norm(looks), ahead, atol=2e-3)
-    # The camera's third axis, which it looks along.
-    w, x, y, z = camera.wxyz
-    axis = [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]
-    np.testing.assert_allclose(axis, looks / np.linalg.norm(looks), atol=1e-6)
 
 
 def test_notices_are_shown_once(live, server, made_up, visitor, until, monkeypatch):
@@ -334,22 +393,23 @@ def test_a_thousand_random_events(live, server, made_up, visit, until, caplog, c
             grabs = (GrabState(1, "body 0", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),) if rng.random() < 0.5 else ()
             made_up.show(grabs=grabs, time=0.01 * k)
     # All of it has been dealt with once what was said last has come through; another visitor may have been faster.
-    factors = iter(np.linspace(0.2, 0.9, 200))
+    factors = iter(np.linspace(0.2, 0.9, 1000))
 
-    def heard(visitor):
-        factor = float(next(factors))
-        visitor.set(live.panel.time.speed, factor)
+    def heard(visitor, said):
+        said.append(float(next(factors)))
+        visitor.set(live.panel.time.speed, said[-1])
         time.sleep(0.3)
-        return SetSpeed(factor) in made_up.told
+        return any(SetSpeed(factor) in made_up.told for factor in said)
 
     for visitor in visitors:
-        until(lambda: heard(visitor), 60.0)  # noqa: B023 - it is asked for here and now
+        said = []
+        until(lambda: heard(visitor, said), 60.0)  # noqa: B023 - it is asked for here and now
     made_up.show(time=99.0)
     until(lambda: live.desk.snapshot.time == 99.0)
     assert len(server.get_clients()) == 3
     assert caplog.records == []
-    said = capfd.readouterr()
-    assert "Traceback" not in said.out + said.err
+    printed = capfd.readouterr()
+    assert "Traceback" not in printed.out + printed.err
     assert Translator().moment(made_up.snapshot).positions is not None
     for visitor in visitors:
         visitor.leave()

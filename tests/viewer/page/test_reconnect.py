@@ -1,7 +1,10 @@
 """A page whose server goes away says so, and goes on when it is back."""
 
+import os
+
 from supple.output.viser_server import start_server, stop_server
 from supple.viewer.app import dress
+from supple.viewer.gate import first_free_port
 from supple.viewer.live_page import LivePage
 
 
@@ -12,7 +15,8 @@ def serve(port, simulation):
 
 
 def test_the_server_goes_and_comes_back(made_up, look, spot):
-    server, page = serve(0, made_up)
+    # Not any free port: those that the system hands out may be another's by the time the server comes back.
+    server, page = serve(first_free_port("127.0.0.1", 20_000 + 50 * (os.getpid() % 200)), made_up)
     screen = look(f"http://127.0.0.1:{server.get_port()}", server)
     said = screen.tab.get_by_text("Connected", exact=True)
     screen.wait(lambda: said.count() == 1 and spot(screen.shot(), "red")[0] > 100, "the page")

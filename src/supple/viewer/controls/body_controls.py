@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from supple.viewer import limits
-from supple.viewer.controls.desk import Desk
+from supple.viewer.controls.desk import Desk, in_order
 from supple.viewer.controls.inputs import ParameterInput
 from supple.viewer.messages import AddBody, CopyBody, RemoveBody, Squash
 from supple.viewer.parameters import PARAMETERS
@@ -37,10 +37,10 @@ class BodyControls:
             self.resolution = gui.add_slider("Edges across", limits.COARSEST, 16, 1, initial_value=6)
             self.youngs = gui.add_slider("Young's modulus 10^", 3.0, 8.0, 0.1, initial_value=5.0)
             self.add = gui.add_button("Add")
-        self.squash.on_click(self._squash)
+        self.squash.on_click(in_order(self._squash))
         self.which.on_update(lambda _: self.show(desk.snapshot))
-        self.change.on_click(self._change)
-        self.add.on_click(self._add)
+        self.change.on_click(in_order(self._change))
+        self.add.on_click(in_order(self._add))
         self.show(desk.snapshot)
 
     def show(self, snapshot: Snapshot) -> None:
@@ -68,7 +68,7 @@ class BodyControls:
             self._made_for = made_for
             self.change.visible = self.which.value != ALL
         for name, made in self.inputs.items():
-            made.show(values[name])
+            made.show(values[name], snapshot.applied)
 
     def _whose(self) -> str | None:
         return None if self.which.value == ALL else str(self.which.value)

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from typing import Any
 
-from supple.viewer.controls.desk import Desk
+from supple.viewer.controls.desk import Desk, in_order
+from supple.viewer.controls.wish import Wish
 from supple.viewer.messages import SetParameter
 from supple.viewer.parameters import PARAMETERS, Parameter
 from supple.viewer.snapshots import Value
 from supple.viewer.values import number
 
-# How long after a visitor's touch the input shows what the visitor wants, not yet what the simulation has [s].
-_HANDS_OFF = 1.0
 # The smallest power of ten of a slider whose left end is zero.
 _LEAST_POWER = -12.0
 # What stands beside a slider is short.
@@ -36,7 +34,7 @@ class ParameterInput:
     ) -> None:
         self.parameter: Parameter = PARAMETERS[name]
         self._desk, self._whose = desk, whose
-        self._touched, self._removed = -math.inf, False
+        self._wish, self._removed = Wish(), False
         self.value: Value = value
         low, high = _HANDY.get(name, (self.parameter.low, self.parameter.high))
         self._low, self._high = min(low, float(value)), max(high, float(value))
@@ -47,11 +45,16 @@ class ParameterInput:
             self.handle = gui.add_slider(
                 self._label(value), *self._ends(), self._step(), initial_value=place, hint=self._hint()
             )
-        self.handle.on_update(self._moved)
+        self.handle.on_update(in_order(self._moved))
 
-    def show(self, value: Value) -> None:
-        """Bring the input to the simulation's value, unless a visitor is at it."""
-        if time.monotonic() - self._touched > _HANDS_OFF and value != self.value:
+    def show(self, value: Value, applied: int) -> None:
+        """Bring the input to the simulation's value, unless a visitor is at it.
+
+        Parameters
+        ----------
+        applied : number of the newest command that the simulation has acted upon
+        """
+        if value != self.value and not self._wish.stands(applied):
             self.value = value
             self.handle.value = self._place(value)
             self.handle.label = self._label(value)
@@ -63,7 +66,7 @@ class ParameterInput:
 
     def forget_touch(self) -> None:
         """Show the simulation's value at once, next time."""
-        self._touched = -math.inf
+        self._wish.forget()
 
     def _moved(self, event: Any) -> None:
         if event.client is None:
@@ -72,10 +75,11 @@ class ParameterInput:
             value = self._value_at(self.handle.value)
             if self._removed or value == self.value:
                 return
-            self._touched = time.monotonic()
             self.value = value
             self.handle.label = self._label(value)
-        self._desk.ask(event.client, lambda: SetParameter(self.parameter.name, value, self._whose()))
+            # Within the lock: else a moment's old value could be shown between the two.
+            name, whose = self.parameter.name, self._whose()
+            self._wish.made(self._desk.ask(event.client, lambda: SetParameter(name, value, whose)))
 
     def _ends(self) -> tuple[float, float]:
         if self.parameter.kind is int:

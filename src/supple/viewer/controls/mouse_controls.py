@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from supple.viewer import limits
-from supple.viewer.controls.desk import Desk
+from supple.viewer.controls.desk import Desk, in_order
 from supple.viewer.messages import RemovePusher, Unpin
 from supple.viewer.values import number, one_of
 
@@ -36,8 +36,9 @@ class MouseControls:
                 "Ball [m]", *self._radii, 0.01 * size, initial_value=0.15 * size, visible=False
             )
             self.unpin = gui.add_button("Unpin all")
-        self.mode.on_update(self._switch)
-        self.unpin.on_click(lambda e: desk.ask(e.client, Unpin))
+        # One after the other, so that the backdrop is there just when the ball can be moved.
+        self.mode.on_update(in_order(self._switch))
+        self.unpin.on_click(in_order(lambda e: desk.ask(e.client, Unpin)))
 
     @property
     def pushes(self) -> bool:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from supple.viewer.controls.desk import Desk
+from supple.viewer.controls.desk import Desk, in_order
 from supple.viewer.controls.inputs import ParameterInput
+from supple.viewer.controls.wish import Wish
 from supple.viewer.messages import SetSolver
 from supple.viewer.parameters import PARAMETERS
 from supple.viewer.snapshots import Snapshot
@@ -21,10 +22,12 @@ class SolverControls:
         self._gui, self._desk = gui, desk
         self.inputs: dict[str, ParameterInput] = {}
         self._shown: tuple[str, ...] = ()
+        self._wish = Wish()
+        self._kind = desk.snapshot.description.solver
         self._folder = gui.add_folder("Solver")
         with self._folder:
             self.kind = gui.add_dropdown("Solver", _KINDS, initial_value=desk.snapshot.description.solver)
-        self.kind.on_update(self._switch)
+        self.kind.on_update(in_order(self._switch))
         self.show(desk.snapshot)
 
     def show(self, snapshot: Snapshot) -> None:
@@ -42,11 +45,13 @@ class SolverControls:
                 self.inputs = {n: ParameterInput(self._gui, self._desk, n, scene.values[n]) for n in names}
             self._shown = names
         for name, made in self.inputs.items():
-            made.show(scene.values[name])
-        if self.kind.value != scene.solver:
-            self.kind.value = scene.solver
+            made.show(scene.values[name], snapshot.applied)
+        # What was shown last, not what the input says by now: a choice that has just come in is not to be lost.
+        if self._kind != scene.solver and not self._wish.stands(snapshot.applied):
+            self.kind.value = self._kind = scene.solver
 
     def _switch(self, event: Any) -> None:
         if event.client is not None:
-            kind = one_of(self.kind.value, _KINDS)
-            self._desk.ask(event.client, lambda: SetSolver(kind))
+            with self._desk.lock:
+                self._kind = one_of(self.kind.value, _KINDS)
+                self._wish.made(self._desk.ask(event.client, lambda: SetSolver(self._kind)))

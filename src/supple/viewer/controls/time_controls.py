@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from supple.viewer import limits
-from supple.viewer.controls.desk import Desk
+from supple.viewer.controls.desk import Desk, in_order
 from supple.viewer.messages import Pause, Play, Reset, SetSpeed, Step
 from supple.viewer.snapshots import Snapshot
 from supple.viewer.values import number, one_of
@@ -20,22 +20,28 @@ class TimeControls:
         self._desk = desk
         with gui.add_folder("Time"):
             self._said = gui.add_markdown("")
-            self._text = ""
+            self._text = self._stands = ""
             self.play = gui.add_button("Play")
             self.back = gui.add_button_group("Frames", _BACK)
             self.speed = gui.add_slider(
                 "Slow motion", limits.SLOWEST_MOTION, limits.FASTEST_MOTION, 0.01, initial_value=1.0
             )
-        self.play.on_click(lambda e: desk.ask(e.client, Play if desk.snapshot.paused else Pause))
-        self.back.on_click(lambda e: desk.ask(e.client, Step if one_of(self.back.value, _BACK) == "step" else Reset))
-        self.speed.on_update(self._set_speed)
+        self.play.on_click(in_order(lambda e: desk.ask(e.client, Play if desk.snapshot.paused else Pause)))
+        self.back.on_click(in_order(self._go_back))
+        self.speed.on_update(in_order(self._set_speed))
 
     def show(self, snapshot: Snapshot) -> None:
         """Say how things stand."""
         wanted = "Play" if snapshot.paused else "Pause"
         if self.play.label != wanted:
             self.play.label = wanted
-        self._say(said_of_time(snapshot))
+        self._stands = said_of_time(snapshot)
+        self._say(self._stands)
+
+    def wait(self, seconds: float) -> None:
+        """Say that nothing has been heard of the simulation for some seconds."""
+        why = "a long step, or kernels that are compiled when they are first used"
+        self._say(f"{self._stands}  \n**Busy for {seconds:.0f} s:** {why}")
 
     def mourn(self, error: str) -> None:
         """Say that the simulation is gone."""
@@ -47,6 +53,9 @@ class TimeControls:
     def _say(self, text: str) -> None:
         if text != self._text:
             self._said.content = self._text = text
+
+    def _go_back(self, event: Any) -> None:
+        self._desk.ask(event.client, Step if one_of(self.back.value, _BACK) == "step" else Reset)
 
     def _set_speed(self, event: Any) -> None:
         if event.client is not None:
