@@ -13,9 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from supple.errors import SceneError
-from supple.materials.isotropic import element_energies, element_gradients, element_hessians
 from supple.materials.lame import lame_from_engineering
 from supple.materials.registry import ELASTIC_MATERIALS, kind_of
+from supple.materials.tet_energies import element_energies, element_gradients, element_hessians
 from supple.numerics.svd3 import rotation_variant_svd
 
 YOUNGS, POISSON = 1e5, 0.4
@@ -263,7 +263,7 @@ def test_same_bits_on_any_number_of_threads(soup):
 def test_compiled_kernels_come_from_the_cache_in_a_new_process(soup):
     element_energies(*soup, np.empty(len(soup[1])))
     code = (
-        "import numpy as np; from supple.materials import isotropic as iso\n"
+        "import numpy as np; from supple.materials import tet_energies as iso\n"
         "i, f = np.int32, np.float64\n"
         "iso.element_energies(np.zeros((4, 3)), np.arange(4, dtype=i)[None], np.eye(3)[None].copy(), np.ones(1),"
         " np.zeros(1, i), np.ones(1), np.ones(1), np.empty(1))\n"

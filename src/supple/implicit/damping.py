@@ -23,6 +23,7 @@ from supple.implicit.elasticity import SERIAL_TETS, Elasticity, gather_gradients
 from supple.implicit.potential import HessianBlocks, Potential
 from supple.materials.lame import lame_from_engineering
 from supple.materials.material import Elastic
+from supple.materials.tet_energies import deformation_gradient, edge_matrix, put_gradient
 from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed, transpose
 from supple.numerics.threads import threads_for
 from supple.system import System
@@ -132,22 +133,6 @@ class Damping(Potential):
 
 
 @njit(cache=True, error_model="numpy")
-def _edges(x, tets, e):
-    a, b, c, d = tets[e, 0], tets[e, 1], tets[e, 2], tets[e, 3]
-    return (
-        x[b, 0] - x[a, 0],
-        x[c, 0] - x[a, 0],
-        x[d, 0] - x[a, 0],
-        x[b, 1] - x[a, 1],
-        x[c, 1] - x[a, 1],
-        x[d, 1] - x[a, 1],
-        x[b, 2] - x[a, 2],
-        x[c, 2] - x[a, 2],
-        x[d, 2] - x[a, 2],
-    )
-
-
-@njit(cache=True, error_model="numpy")
 def _symmetric_part(M):
     return (M[0], M[4], M[8], 0.5 * (M[5] + M[7]), 0.5 * (M[2] + M[6]), 0.5 * (M[1] + M[3]))
 
@@ -184,9 +169,9 @@ def _full(S):
 def _strains(x, v, tets, Dm_inv, rates, out):
     for e in range(len(tets)):
         B = load_mat(Dm_inv, e)
-        F = mat_mul(_edges(x, tets, e), B)
+        F = mat_mul(edge_matrix(x, tets, e), B)
         if rates:
-            E = _symmetric_part(mat_mul(transpose(F), mat_mul(_edges(v, tets, e), B)))
+            E = _symmetric_part(mat_mul(transpose(F), mat_mul(edge_matrix(v, tets, e), B)))
         else:
             E = _strain(F)
         for k in range(6):
@@ -196,7 +181,7 @@ def _strains(x, v, tets, Dm_inv, rates, out):
 @njit(cache=True, parallel=True, error_model="numpy")
 def _energies(x, tets, Dm_inv, volumes, mu, lam, factor, reference, out):
     for e in prange(len(tets)):
-        F = mat_mul(_edges(x, tets, e), load_mat(Dm_inv, e))
+        F = deformation_gradient(x, tets, Dm_inv, e)
         out[e] = volumes[e] * _stress(F, reference, e, factor, mu[e], lam[e])[1]
 
 
@@ -204,16 +189,9 @@ def _energies(x, tets, Dm_inv, volumes, mu, lam, factor, reference, out):
 def _gradients(x, tets, Dm_inv, volumes, mu, lam, factor, reference, out):
     for e in prange(len(tets)):
         B = load_mat(Dm_inv, e)
-        F = mat_mul(_edges(x, tets, e), B)
+        F = mat_mul(edge_matrix(x, tets, e), B)
         S = _full(_stress(F, reference, e, factor, mu[e], lam[e])[0])
-        G = mat_mul_transposed(mat_mul(F, S), B)
-        for i in range(3):
-            total = 0.0
-            for p in range(3):
-                force = volumes[e] * G[3 * i + p]
-                out[e, p + 1, i] = force
-                total += force
-            out[e, 0, i] = -total
+        put_gradient(mat_mul(F, S), B, volumes[e], out, e)
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
@@ -227,7 +205,7 @@ def _hessians(x, tets, Dm_inv, volumes, mu, lam, factor, reference, project, out
         if mu[e] == 0.0 and lam[e] == 0.0:
             continue
         B = load_mat(Dm_inv, e)
-        F = mat_mul(_edges(x, tets, e), B)
+        F = mat_mul(edge_matrix(x, tets, e), B)
         S = _full(_stress(F, reference, e, factor, mu[e], lam[e])[0])
         FFt = mat_mul_transposed(F, F)
         g = np.empty((4, 3))

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from supple.errors import SolverError
 from supple.implicit.potential import HessianBlocks, Potential
-from supple.materials.isotropic import element_energies, element_gradients, element_hessians, element_models
 from supple.materials.material import Elastic
 from supple.materials.per_tet import TetMaterial
+from supple.materials.tet_energies import element_energies, element_gradients, element_hessians, element_models
 from supple.numerics.block_csr import incidences
 from supple.numerics.threads import threads_for
 from supple.system import System

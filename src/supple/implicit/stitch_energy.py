@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from supple.implicit.elasticity import SERIAL_TETS, gather_gradients
 from supple.implicit.potential import HessianBlocks, Potential
 from supple.implicit.stitch_springs import spring_energies, spring_gradients, spring_hessians
-from supple.materials.isotropic import element_energies, element_gradients, element_hessians
 from supple.materials.registry import kind_of
 from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.materials.tet_energies import element_energies, element_gradients, element_hessians
 from supple.numerics.block_csr import incidences
 from supple.numerics.threads import threads_for
 from supple.scene.stitches.stitching import Stitching

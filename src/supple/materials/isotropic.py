@@ -1,4 +1,4 @@
-"""Isotropic hyperelasticity in principal stretches: energy, stress and Hessian of any material, and of tetrahedra.
+"""Isotropic hyperelasticity in principal stretches: energy, stress and Hessian of any material.
 
 With F = U diag(s) V^T (rotations U, V) and psi(s):
 
@@ -38,42 +38,23 @@ from supple.numerics.threads import threads_for
 if TYPE_CHECKING:
     from supple.materials.material import Elastic
 
-_density = dispatch("density", [kind.stretch_functions.density for kind in ELASTIC_MATERIALS], UNKNOWN_ONE)
-_gradient = dispatch("gradient", [kind.stretch_functions.gradient for kind in ELASTIC_MATERIALS], UNKNOWN_THREE)
-_curvature = dispatch("curvature", [kind.stretch_functions.curvature for kind in ELASTIC_MATERIALS], UNKNOWN_SIX)
-_quotients = dispatch("quotients", [kind.stretch_functions.quotients for kind in ELASTIC_MATERIALS], UNKNOWN_SIX)
-
-
-@njit(error_model="numpy")
-def deformation_gradient(x, tets, Dm_inv, e):
-    """F = Ds Dm^-1 of tet e, nine numbers row after row."""
-    a, b, c, d = tets[e, 0], tets[e, 1], tets[e, 2], tets[e, 3]
-    Ds = (
-        x[b, 0] - x[a, 0],
-        x[c, 0] - x[a, 0],
-        x[d, 0] - x[a, 0],
-        x[b, 1] - x[a, 1],
-        x[c, 1] - x[a, 1],
-        x[d, 1] - x[a, 1],
-        x[b, 2] - x[a, 2],
-        x[c, 2] - x[a, 2],
-        x[d, 2] - x[a, 2],
-    )
-    return mat_mul(Ds, load_mat(Dm_inv, e))
+density = dispatch("density", [kind.stretch_functions.density for kind in ELASTIC_MATERIALS], UNKNOWN_ONE)
+gradient = dispatch("gradient", [kind.stretch_functions.gradient for kind in ELASTIC_MATERIALS], UNKNOWN_THREE)
+curvature = dispatch("curvature", [kind.stretch_functions.curvature for kind in ELASTIC_MATERIALS], UNKNOWN_SIX)
+quotients = dispatch("quotients", [kind.stretch_functions.quotients for kind in ELASTIC_MATERIALS], UNKNOWN_SIX)
 
 
 @njit(error_model="numpy")
 def energy_density(F, kind, mu, lam):
     """psi of one F."""
     _, s, _ = decompose(F)
-    return _density(kind, s, mu, lam)
+    return density(kind, s, mu, lam)
 
 
 @njit(error_model="numpy")
-def first_piola(F, kind, mu, lam):
-    """P = U diag(psi_i) V^T of one F, nine numbers."""
-    U, s, V = decompose(F)
-    p = _gradient(kind, s, mu, lam)
+def stress(U, s, V, kind, mu, lam):
+    """P = U diag(psi_i) V^T, nine numbers, for F = U diag(s) V^T."""
+    p = gradient(kind, s, mu, lam)
     Up = (
         U[0] * p[0],
         U[1] * p[1],
@@ -86,6 +67,13 @@ def first_piola(F, kind, mu, lam):
         U[8] * p[2],
     )
     return mat_mul_transposed(Up, V)
+
+
+@njit(error_model="numpy")
+def first_piola(F, kind, mu, lam):
+    """P of one F, nine numbers."""
+    U, s, V = decompose(F)
+    return stress(U, s, V, kind, mu, lam)
 
 
 @njit(error_model="numpy")
@@ -119,8 +107,8 @@ def principal_hessian(s, kind, mu, lam, project):
     A : psi_ij as (a00, a11, a22, a12, a02, a01)
     alpha, beta : (three numbers each, for the pairs 12, 02, 01)
     """
-    A = _curvature(kind, s, mu, lam)
-    q = _quotients(kind, s, mu, lam)
+    A = curvature(kind, s, mu, lam)
+    q = quotients(kind, s, mu, lam)
     if project:
         A = _nearest_semidefinite(A)
         q = (max(q[0], 0.0), max(q[1], 0.0), max(q[2], 0.0), max(q[3], 0.0), max(q[4], 0.0), max(q[5], 0.0))
@@ -148,107 +136,7 @@ def hessian_block(U, A, alpha, beta, g, h):
     return mat_mul_transposed(mat_mul(U, K), U)
 
 
-@njit(error_model="numpy")
-def _symmetric(K):
-    """A block of one node with itself, made symmetric to the last bit."""
-    a, b, c = 0.5 * (K[1] + K[3]), 0.5 * (K[2] + K[6]), 0.5 * (K[5] + K[7])
-    return (K[0], a, b, a, K[4], c, b, c, K[8])
-
-
-@njit(error_model="numpy")
-def _put_pair(out, e, p, q, K):
-    """Write block (p, q) of a 12x12 matrix, and its transpose as block (q, p)."""
-    for i in range(3):
-        for j in range(3):
-            value = K[3 * i + j]
-            out[e, 3 * p + i, 3 * q + j] = value
-            out[e, 3 * q + j, 3 * p + i] = value
-
-
-@njit(error_model="numpy")
-def _minus_sum(A, B, C):
-    return (
-        -(A[0] + B[0] + C[0]),
-        -(A[1] + B[1] + C[1]),
-        -(A[2] + B[2] + C[2]),
-        -(A[3] + B[3] + C[3]),
-        -(A[4] + B[4] + C[4]),
-        -(A[5] + B[5] + C[5]),
-        -(A[6] + B[6] + C[6]),
-        -(A[7] + B[7] + C[7]),
-        -(A[8] + B[8] + C[8]),
-    )
-
-
-@njit(error_model="numpy")
-def _tet_hessian(F, B, volume, kind, mu, lam, project, out, e):
-    """The 12x12 Hessian of one tet into out[e]; B = Dm^-1, whose rows are the shape gradients of nodes 1, 2, 3."""
-    U, s, V = decompose(F)
-    _tet_hessian_of(U, s, V, B, volume, kind, mu, lam, project, out, e)
-
-
-@njit(error_model="numpy")
-def _tet_hessian_of(U, s, V, B, volume, kind, mu, lam, project, out, e):
-    """The same for F = U diag(s) V^T."""
-    A, alpha, beta = principal_hessian(s, kind, mu, lam, project)
-    v = volume
-    A = (v * A[0], v * A[1], v * A[2], v * A[3], v * A[4], v * A[5])
-    alpha = (v * alpha[0], v * alpha[1], v * alpha[2])
-    beta = (v * beta[0], v * beta[1], v * beta[2])
-    G = mat_mul(B, V)
-    g1, g2, g3 = (G[0], G[1], G[2]), (G[3], G[4], G[5]), (G[6], G[7], G[8])
-    H11 = _symmetric(hessian_block(U, A, alpha, beta, g1, g1))
-    H12 = hessian_block(U, A, alpha, beta, g1, g2)
-    H13 = hessian_block(U, A, alpha, beta, g1, g3)
-    H22 = _symmetric(hessian_block(U, A, alpha, beta, g2, g2))
-    H23 = hessian_block(U, A, alpha, beta, g2, g3)
-    H33 = _symmetric(hessian_block(U, A, alpha, beta, g3, g3))
-    # Shape gradients sum to zero, hence the blocks of every row do: translations cost nothing, exactly.
-    H01 = _minus_sum(H11, mat3.transpose(H12), mat3.transpose(H13))
-    H02 = _minus_sum(H12, H22, mat3.transpose(H23))
-    H03 = _minus_sum(H13, H23, H33)
-    _put_pair(out, e, 0, 0, _symmetric(_minus_sum(H01, H02, H03)))
-    _put_pair(out, e, 0, 1, H01)
-    _put_pair(out, e, 0, 2, H02)
-    _put_pair(out, e, 0, 3, H03)
-    _put_pair(out, e, 1, 1, H11)
-    _put_pair(out, e, 1, 2, H12)
-    _put_pair(out, e, 1, 3, H13)
-    _put_pair(out, e, 2, 2, H22)
-    _put_pair(out, e, 2, 3, H23)
-    _put_pair(out, e, 3, 3, H33)
-
-
-@njit(error_model="numpy")
-def _tet_gradient_of(U, s, V, B, volume, kind, mu, lam, out, e):
-    """The gradient of one tet's energy by its nodes into out[e], for F = U diag(s) V^T."""
-    p = _gradient(kind, s, mu, lam)
-    Up = (
-        U[0] * p[0],
-        U[1] * p[1],
-        U[2] * p[2],
-        U[3] * p[0],
-        U[4] * p[1],
-        U[5] * p[2],
-        U[6] * p[0],
-        U[7] * p[1],
-        U[8] * p[2],
-    )
-    G = mat_mul_transposed(mat_mul_transposed(Up, V), B)
-    for i in range(3):
-        total = 0.0
-        for k in range(3):
-            force = volume * G[3 * i + k]
-            out[e, k + 1, i] = force
-            total += force
-        out[e, 0, i] = -total
-
-
 class _Kernels(NamedTuple):
-    element_models: Any
-    element_energies: Any
-    element_gradients: Any
-    element_hessians: Any
     densities: Any
     piolas: Any
     hessians: Any
@@ -256,45 +144,6 @@ class _Kernels(NamedTuple):
 
 def _build_kernels(version: int) -> _Kernels:
     """The compiled loops. `version` is in their closures, so that no cached kernel outlives a change of a material."""
-
-    @njit(parallel=True, cache=True, error_model="numpy")
-    def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, energies, gradients, hessians):
-        _ = version
-        for e in prange(len(tets)):
-            U, s, V = decompose(deformation_gradient(x, tets, Dm_inv, e))
-            B = load_mat(Dm_inv, e)
-            energies[e] = volumes[e] * _density(kind[e], s, mu[e], lam[e])
-            _tet_gradient_of(U, s, V, B, volumes[e], kind[e], mu[e], lam[e], gradients, e)
-            if second:
-                _tet_hessian_of(U, s, V, B, volumes[e], kind[e], mu[e], lam[e], project, hessians, e)
-
-    @njit(parallel=True, cache=True, error_model="numpy")
-    def element_energies(x, tets, Dm_inv, volumes, kind, mu, lam, out):
-        _ = version
-        for e in prange(len(tets)):
-            F = deformation_gradient(x, tets, Dm_inv, e)
-            out[e] = volumes[e] * energy_density(F, kind[e], mu[e], lam[e])
-
-    @njit(parallel=True, cache=True, error_model="numpy")
-    def element_gradients(x, tets, Dm_inv, volumes, kind, mu, lam, out):
-        _ = version
-        for e in prange(len(tets)):
-            P = first_piola(deformation_gradient(x, tets, Dm_inv, e), kind[e], mu[e], lam[e])
-            G = mat_mul_transposed(P, load_mat(Dm_inv, e))
-            for i in range(3):
-                total = 0.0
-                for p in range(3):
-                    force = volumes[e] * G[3 * i + p]
-                    out[e, p + 1, i] = force
-                    total += force
-                out[e, 0, i] = -total
-
-    @njit(parallel=True, cache=True, error_model="numpy")
-    def element_hessians(x, tets, Dm_inv, volumes, kind, mu, lam, project, out):
-        _ = version
-        for e in prange(len(tets)):
-            F = deformation_gradient(x, tets, Dm_inv, e)
-            _tet_hessian(F, load_mat(Dm_inv, e), volumes[e], kind[e], mu[e], lam[e], project, out, e)
 
     @njit(parallel=True, cache=True, error_model="numpy")
     def densities(F, kind, mu, lam, out):
@@ -323,51 +172,10 @@ def _build_kernels(version: int) -> _Kernels:
                             out[e, 3 * i + j, 3 * n + k] = K[3 * i + n]
                             out[e, 3 * n + k, 3 * i + j] = K[3 * i + n]
 
-    return _Kernels(element_models, element_energies, element_gradients, element_hessians, densities, piolas, hessians)
+    return _Kernels(densities, piolas, hessians)
 
 
 _KERNELS = _build_kernels(fingerprint([*Path(__file__).parent.glob("*.py"), Path(mat3.__file__), Path(svd3.__file__)]))
-
-
-def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, energies, gradients, hessians) -> None:
-    """Energies (m,), gradients (m, 4, 3) and, with `second`, Hessians (m, 12, 12) of all tets at once: one
-    decomposition of each F serves all three.
-
-    Parameters
-    ----------
-    x, tets, Dm_inv, volumes, kind, mu, lam : as of `element_energies`
-    second : whether Hessians are wanted; if not, `hessians` is left as it is
-    project : see `element_hessians`
-    """
-    _KERNELS.element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, energies, gradients, hessians)
-
-
-def element_energies(x, tets, Dm_inv, volumes, kind, mu, lam, out) -> None:
-    """Elastic energy of every tet [J], zero at rest, into out (m,).
-
-    Parameters
-    ----------
-    x : (n, 3) positions [m]; tets : (m, 4) int32; Dm_inv : (m, 3, 3) rest shape inverse [1/m]; volumes : (m,) [m^3];
-    kind, mu, lam : (m,) of `TetMaterial`. All C-contiguous; float64, but int32 for tets and kind.
-    """
-    _KERNELS.element_energies(x, tets, Dm_inv, volumes, kind, mu, lam, out)
-
-
-def element_gradients(x, tets, Dm_inv, volumes, kind, mu, lam, out) -> None:
-    """Gradient of every tet's energy by its four nodes [N] (minus the elastic forces), into out (m, 4, 3).
-
-    Parameters as of `element_energies`.
-    """
-    _KERNELS.element_gradients(x, tets, Dm_inv, volumes, kind, mu, lam, out)
-
-
-def element_hessians(x, tets, Dm_inv, volumes, kind, mu, lam, project, out) -> None:
-    """Hessian of every tet's energy [N/m] into out (m, 12, 12): entry (3 p + i, 3 q + k) for coordinate i of node p and
-    coordinate k of node q. With `project`, of the nearest convex energy: eigenvalues of d^2 psi / dF^2 are clamped.
-
-    Other parameters as of `element_energies`.
-    """
-    _KERNELS.element_hessians(x, tets, Dm_inv, volumes, kind, mu, lam, project, out)
 
 
 def _flat(material: Elastic, F: ArrayLike) -> tuple[NDArray[np.float64], tuple[int, ...], Any]:

@@ -21,11 +21,9 @@ from numpy.typing import NDArray
 
 from supple.errors import SolverError
 from supple.system import BodyRange, System
+from supple.xpbd.compilation import FLAGS, serial_and_parallel
 from supple.xpbd.ordering import Layout
 from supple.xpbd.segments import Segments, gather, sort_into_segments
-
-# No flag that assumes finite numbers (NaN must be seen) and none that reorders sums (same bits for any thread count).
-FLAGS = {"contract", "arcp", "nsz"}
 
 
 class EdgeConstraints:
@@ -45,13 +43,11 @@ class EdgeConstraints:
 
     def project(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:
         """See `ConstraintSet.project`."""
-        sweep = _sweep_edges_parallel if parallel else _sweep_edges
-        sweep(points, self.ends, self.rest, *_scaled(self.segments, self.table, h, 1.0))
+        _sweep_edges[parallel](points, self.ends, self.rest, *_scaled(self.segments, self.table, h, 1.0))
 
     def damp(self, points: NDArray[np.float64], previous: NDArray[np.float64], h: float, parallel: bool) -> None:
         """See `ConstraintSet.damp`."""
-        sweep = _damp_edges_parallel if parallel else _damp_edges
-        sweep(points, previous, self.ends, *_scaled(self.segments, self.table, h, 1.0))
+        _damp_edges[parallel](points, previous, self.ends, *_scaled(self.segments, self.table, h, 1.0))
 
 
 class VolumeConstraints:
@@ -71,13 +67,11 @@ class VolumeConstraints:
     def project(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:
         """See `ConstraintSet.project`."""
         # The energy C^2 / (2 alpha) of C = V - V0 is that of 6 C with 36 alpha.
-        sweep = _sweep_volumes_parallel if parallel else _sweep_volumes
-        sweep(points, self.corners, self.rest, *_scaled(self.segments, self.table, h, 36.0))
+        _sweep_volumes[parallel](points, self.corners, self.rest, *_scaled(self.segments, self.table, h, 36.0))
 
     def damp(self, points: NDArray[np.float64], previous: NDArray[np.float64], h: float, parallel: bool) -> None:
         """See `ConstraintSet.damp`."""
-        sweep = _damp_volumes_parallel if parallel else _damp_volumes
-        sweep(points, previous, self.corners, *_scaled(self.segments, self.table, h, 36.0))
+        _damp_volumes[parallel](points, previous, self.corners, *_scaled(self.segments, self.table, h, 36.0))
 
 
 def _constants(part: BodyRange, compliance: str) -> NDArray[np.float64]:
@@ -252,16 +246,8 @@ def _determinant(x, a, b, d, e):
     return ux * (vy * qz - vz * qy) + uy * (vz * qx - vx * qz) + uz * (vx * qy - vy * qx)
 
 
-@njit(cache=True)
+@serial_and_parallel
 def _sweep_edges(points, ends, rest, pointers, bounds, constants):
-    n_chunks = len(pointers) - 1
-    for parity in range(2):
-        for c in range(parity, n_chunks, 2):
-            _project_edges(points, ends, rest, pointers[c], pointers[c + 1], bounds, constants)
-
-
-@njit(cache=True, parallel=True)
-def _sweep_edges_parallel(points, ends, rest, pointers, bounds, constants):
     n_chunks = len(pointers) - 1
     for parity in range(2):
         for k in prange((n_chunks + 1 - parity) // 2):
@@ -269,20 +255,11 @@ def _sweep_edges_parallel(points, ends, rest, pointers, bounds, constants):
             _project_edges(points, ends, rest, pointers[c], pointers[c + 1], bounds, constants)
 
 
-@njit(cache=True)
+@serial_and_parallel
 def _damp_edges(points, previous, ends, pointers, bounds, constants):
     n_chunks = len(pointers) - 1
     for turn in range(4):
         # even, odd, and back: odd, even
-        for c in range(0 if turn == 0 or turn == 3 else 1, n_chunks, 2):
-            first, last = pointers[c], pointers[c + 1]
-            _damp_edges_of_chunk(points, previous, ends, first, last, bounds, constants, turn >= 2)
-
-
-@njit(cache=True, parallel=True)
-def _damp_edges_parallel(points, previous, ends, pointers, bounds, constants):
-    n_chunks = len(pointers) - 1
-    for turn in range(4):
         parity = 0 if turn == 0 or turn == 3 else 1
         for k in prange((n_chunks + 1 - parity) // 2):
             c = 2 * k + parity
@@ -290,16 +267,8 @@ def _damp_edges_parallel(points, previous, ends, pointers, bounds, constants):
             _damp_edges_of_chunk(points, previous, ends, first, last, bounds, constants, turn >= 2)
 
 
-@njit(cache=True)
+@serial_and_parallel
 def _sweep_volumes(points, corners, rest, pointers, bounds, constants):
-    n_chunks = len(pointers) - 1
-    for parity in range(2):
-        for c in range(parity, n_chunks, 2):
-            _project_volumes(points, corners, rest, pointers[c], pointers[c + 1], bounds, constants)
-
-
-@njit(cache=True, parallel=True)
-def _sweep_volumes_parallel(points, corners, rest, pointers, bounds, constants):
     n_chunks = len(pointers) - 1
     for parity in range(2):
         for k in prange((n_chunks + 1 - parity) // 2):
@@ -307,20 +276,11 @@ def _sweep_volumes_parallel(points, corners, rest, pointers, bounds, constants):
             _project_volumes(points, corners, rest, pointers[c], pointers[c + 1], bounds, constants)
 
 
-@njit(cache=True)
+@serial_and_parallel
 def _damp_volumes(points, previous, corners, pointers, bounds, constants):
     n_chunks = len(pointers) - 1
     for turn in range(4):
         # even, odd, and back: odd, even
-        for c in range(0 if turn == 0 or turn == 3 else 1, n_chunks, 2):
-            first, last = pointers[c], pointers[c + 1]
-            _damp_volumes_of_chunk(points, previous, corners, first, last, bounds, constants, turn >= 2)
-
-
-@njit(cache=True, parallel=True)
-def _damp_volumes_parallel(points, previous, corners, pointers, bounds, constants):
-    n_chunks = len(pointers) - 1
-    for turn in range(4):
         parity = 0 if turn == 0 or turn == 3 else 1
         for k in prange((n_chunks + 1 - parity) // 2):
             c = 2 * k + parity

@@ -10,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
+from supple.xpbd.compilation import serial_and_parallel
+
 BLOCK = 4096
 # Positions beyond are lost, whether or not they are finite: at this distance [m] round-off is a tenth of a millimetre.
 FARTHEST = 1e12
@@ -46,7 +48,7 @@ def _predict_block(points, previous, velocities, gravity, h, low, high):
             points[i, 0], points[i, 1], points[i, 2] = x + h * vx, y + h * vy, z + h * vz
 
 
-@njit(cache=True)
+@serial_and_parallel
 def predict(points, previous, velocities, gravity, h):
     """Begin a substep: x_n = x, v += h g, x += h v.
 
@@ -57,12 +59,6 @@ def predict(points, previous, velocities, gravity, h):
     gravity : (3,) [m/s^2]
     h : length of the substep [s]
     """
-    _predict_block(points, previous, velocities, gravity, h, 0, len(points))
-
-
-@njit(cache=True, parallel=True)
-def predict_parallel(points, previous, velocities, gravity, h):
-    """The same as `predict`, on several threads."""
     for block in prange((len(points) + BLOCK - 1) // BLOCK):
         low = block * BLOCK
         _predict_block(points, previous, velocities, gravity, h, low, min(low + BLOCK, len(points)))

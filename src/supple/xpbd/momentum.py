@@ -23,6 +23,7 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from supple.system import System
+from supple.xpbd.compilation import serial_and_parallel
 
 BLOCK = 2048
 # Of each block: sum m x_n (3), sum m x (3), sum m d (3), sum m x_n x d (3), sum m x x_n^T (9), with d = x - x*.
@@ -73,8 +74,7 @@ class MomentumRestore:
         parallel : whether blocks of vertices run on several threads.
         """
         work = self.members, self.blocks, self.totals, self.free, self._sums, self._motion
-        restore = _restore_parallel if parallel else _restore
-        restore(points, previous, velocities, h, self.masses, *work)
+        _restore[parallel](points, previous, velocities, h, self.masses, *work)
 
 
 @njit(cache=True)
@@ -184,19 +184,8 @@ def _move_block(points, velocities, h, members, low, high, motion):
         velocities[i, 2] -= dz / h
 
 
-@njit(cache=True)
+@serial_and_parallel
 def _restore(points, previous, velocities, h, masses, members, blocks, totals, free, sums, motion):
-    for b in range(len(blocks)):
-        _sum_block(points, previous, velocities, h, masses, members, blocks[b, 1], blocks[b, 2], sums[b])
-    _rigid_corrections(blocks, totals, sums, motion)
-    for b in range(len(blocks)):
-        component = blocks[b, 0]
-        if free[component]:
-            _move_block(points, velocities, h, members, blocks[b, 1], blocks[b, 2], motion[component])
-
-
-@njit(cache=True, parallel=True)
-def _restore_parallel(points, previous, velocities, h, masses, members, blocks, totals, free, sums, motion):
     for b in prange(len(blocks)):
         _sum_block(points, previous, velocities, h, masses, members, blocks[b, 1], blocks[b, 2], sums[b])
     _rigid_corrections(blocks, totals, sums, motion)

@@ -30,7 +30,6 @@ from supple.xpbd.integration import (
     hold,
     origins_of_components,
     predict,
-    predict_parallel,
     take_changes,
     to_world,
     update_velocities,
@@ -218,8 +217,7 @@ def _begin_substep(ws: XPBDWorkspace, targets: NDArray[np.float64], end: float, 
     """
     damped = [constraints for constraints in ws.sets if constraints.damped]
     gravity = ws.system.gravity
-    begin = predict_parallel if parallel else predict
-    begin(ws.points, ws.previous, ws.velocities, np.zeros(3) if damped else gravity, h)
+    predict[parallel](ws.points, ws.previous, ws.velocities, np.zeros(3) if damped else gravity, h)
     if len(targets):
         hold(ws.points, ws.system.pinned_vertices, targets, ws.origins)
     ws.extended_previous[len(ws.points) :] = ws.extended[len(ws.points) :, :3]

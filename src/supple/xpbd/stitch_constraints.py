@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from supple.scene.stitches.elements import StitchTets
 from supple.system import System
-from supple.xpbd.constraints_stable_neo_hookean import FLAGS, BlocksOfTwo
+from supple.xpbd.compilation import FLAGS
+from supple.xpbd.constraints_stable_neo_hookean import BlocksOfTwo
 from supple.xpbd.segments import Segments
 
 

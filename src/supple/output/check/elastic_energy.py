@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.materials.isotropic import element_energies
+from supple.materials.tet_energies import element_energies
 from supple.numerics.threads import threads_for
 from supple.output.recording_reader import Recording
 

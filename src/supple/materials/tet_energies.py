@@ -1,0 +1,208 @@
+"""Energy, gradient and Hessian of every tetrahedron of a mesh, by its four nodes.
+
+With Dm^-1 of the rest shape and F = Ds Dm^-1, the gradient by the nodes is V P Dm^-T, and the Hessian V times d^2 psi
+contracted with the shape gradients, block by block (formulas per F: `isotropic.py`).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from numba import njit, prange
+
+from supple.materials.isotropic import density, energy_density, first_piola, hessian_block, principal_hessian, stress
+from supple.numerics import mat3, svd3
+from supple.numerics.kernel_cache import fingerprint
+from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed
+from supple.numerics.svd3 import svd3 as decompose
+
+
+@njit(error_model="numpy")
+def edge_matrix(x, tets, e):
+    """Ds = [x1 - x0, x2 - x0, x3 - x0] of tet e, nine numbers row after row."""
+    a, b, c, d = tets[e, 0], tets[e, 1], tets[e, 2], tets[e, 3]
+    return (
+        x[b, 0] - x[a, 0],
+        x[c, 0] - x[a, 0],
+        x[d, 0] - x[a, 0],
+        x[b, 1] - x[a, 1],
+        x[c, 1] - x[a, 1],
+        x[d, 1] - x[a, 1],
+        x[b, 2] - x[a, 2],
+        x[c, 2] - x[a, 2],
+        x[d, 2] - x[a, 2],
+    )
+
+
+@njit(error_model="numpy")
+def deformation_gradient(x, tets, Dm_inv, e):
+    """F = Ds Dm^-1 of tet e, nine numbers row after row."""
+    return mat_mul(edge_matrix(x, tets, e), load_mat(Dm_inv, e))
+
+
+@njit(error_model="numpy")
+def put_gradient(P, B, volume, out, e):
+    """The gradient of a tet's energy by its four nodes into out[e], for its stress P and B = Dm^-1."""
+    G = mat_mul_transposed(P, B)
+    for i in range(3):
+        total = 0.0
+        for k in range(3):
+            force = volume * G[3 * i + k]
+            out[e, k + 1, i] = force
+            total += force
+        out[e, 0, i] = -total
+
+
+@njit(error_model="numpy")
+def _symmetric(K):
+    """A block of one node with itself, made symmetric to the last bit."""
+    a, b, c = 0.5 * (K[1] + K[3]), 0.5 * (K[2] + K[6]), 0.5 * (K[5] + K[7])
+    return (K[0], a, b, a, K[4], c, b, c, K[8])
+
+
+@njit(error_model="numpy")
+def _put_pair(out, e, p, q, K):
+    """Write block (p, q) of a 12x12 matrix, and its transpose as block (q, p)."""
+    for i in range(3):
+        for j in range(3):
+            value = K[3 * i + j]
+            out[e, 3 * p + i, 3 * q + j] = value
+            out[e, 3 * q + j, 3 * p + i] = value
+
+
+@njit(error_model="numpy")
+def _minus_sum(A, B, C):
+    return (
+        -(A[0] + B[0] + C[0]),
+        -(A[1] + B[1] + C[1]),
+        -(A[2] + B[2] + C[2]),
+        -(A[3] + B[3] + C[3]),
+        -(A[4] + B[4] + C[4]),
+        -(A[5] + B[5] + C[5]),
+        -(A[6] + B[6] + C[6]),
+        -(A[7] + B[7] + C[7]),
+        -(A[8] + B[8] + C[8]),
+    )
+
+
+@njit(error_model="numpy")
+def _put_hessian(U, s, V, B, volume, kind, mu, lam, project, out, e):
+    """The 12x12 Hessian of one tet into out[e], for F = U diag(s) V^T; B = Dm^-1, whose rows are the shape gradients of
+    nodes 1, 2, 3."""
+    A, alpha, beta = principal_hessian(s, kind, mu, lam, project)
+    v = volume
+    A = (v * A[0], v * A[1], v * A[2], v * A[3], v * A[4], v * A[5])
+    alpha = (v * alpha[0], v * alpha[1], v * alpha[2])
+    beta = (v * beta[0], v * beta[1], v * beta[2])
+    G = mat_mul(B, V)
+    g1, g2, g3 = (G[0], G[1], G[2]), (G[3], G[4], G[5]), (G[6], G[7], G[8])
+    H11 = _symmetric(hessian_block(U, A, alpha, beta, g1, g1))
+    H12 = hessian_block(U, A, alpha, beta, g1, g2)
+    H13 = hessian_block(U, A, alpha, beta, g1, g3)
+    H22 = _symmetric(hessian_block(U, A, alpha, beta, g2, g2))
+    H23 = hessian_block(U, A, alpha, beta, g2, g3)
+    H33 = _symmetric(hessian_block(U, A, alpha, beta, g3, g3))
+    # Shape gradients sum to zero, hence the blocks of every row do: translations cost nothing, exactly.
+    H01 = _minus_sum(H11, mat3.transpose(H12), mat3.transpose(H13))
+    H02 = _minus_sum(H12, H22, mat3.transpose(H23))
+    H03 = _minus_sum(H13, H23, H33)
+    _put_pair(out, e, 0, 0, _symmetric(_minus_sum(H01, H02, H03)))
+    _put_pair(out, e, 0, 1, H01)
+    _put_pair(out, e, 0, 2, H02)
+    _put_pair(out, e, 0, 3, H03)
+    _put_pair(out, e, 1, 1, H11)
+    _put_pair(out, e, 1, 2, H12)
+    _put_pair(out, e, 1, 3, H13)
+    _put_pair(out, e, 2, 2, H22)
+    _put_pair(out, e, 2, 3, H23)
+    _put_pair(out, e, 3, 3, H33)
+
+
+class _Kernels(NamedTuple):
+    element_models: Any
+    element_energies: Any
+    element_gradients: Any
+    element_hessians: Any
+
+
+def _build_kernels(version: int) -> _Kernels:
+    """The compiled loops. `version` is in their closures, so that no cached kernel outlives a change of a material."""
+
+    @njit(parallel=True, cache=True, error_model="numpy")
+    def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, energies, gradients, hessians):
+        _ = version
+        for e in prange(len(tets)):
+            U, s, V = decompose(deformation_gradient(x, tets, Dm_inv, e))
+            B = load_mat(Dm_inv, e)
+            energies[e] = volumes[e] * density(kind[e], s, mu[e], lam[e])
+            put_gradient(stress(U, s, V, kind[e], mu[e], lam[e]), B, volumes[e], gradients, e)
+            if second:
+                _put_hessian(U, s, V, B, volumes[e], kind[e], mu[e], lam[e], project, hessians, e)
+
+    @njit(parallel=True, cache=True, error_model="numpy")
+    def element_energies(x, tets, Dm_inv, volumes, kind, mu, lam, out):
+        _ = version
+        for e in prange(len(tets)):
+            F = deformation_gradient(x, tets, Dm_inv, e)
+            out[e] = volumes[e] * energy_density(F, kind[e], mu[e], lam[e])
+
+    @njit(parallel=True, cache=True, error_model="numpy")
+    def element_gradients(x, tets, Dm_inv, volumes, kind, mu, lam, out):
+        _ = version
+        for e in prange(len(tets)):
+            P = first_piola(deformation_gradient(x, tets, Dm_inv, e), kind[e], mu[e], lam[e])
+            put_gradient(P, load_mat(Dm_inv, e), volumes[e], out, e)
+
+    @njit(parallel=True, cache=True, error_model="numpy")
+    def element_hessians(x, tets, Dm_inv, volumes, kind, mu, lam, project, out):
+        _ = version
+        for e in prange(len(tets)):
+            U, s, V = decompose(deformation_gradient(x, tets, Dm_inv, e))
+            _put_hessian(U, s, V, load_mat(Dm_inv, e), volumes[e], kind[e], mu[e], lam[e], project, out, e)
+
+    return _Kernels(element_models, element_energies, element_gradients, element_hessians)
+
+
+_KERNELS = _build_kernels(fingerprint([*Path(__file__).parent.glob("*.py"), Path(mat3.__file__), Path(svd3.__file__)]))
+
+
+def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, energies, gradients, hessians) -> None:
+    """Energies (m,), gradients (m, 4, 3) and, with `second`, Hessians (m, 12, 12) of all tets at once: one
+    decomposition of each F serves all three.
+
+    Parameters
+    ----------
+    x, tets, Dm_inv, volumes, kind, mu, lam : as of `element_energies`
+    second : whether Hessians are wanted; if not, `hessians` is left as it is
+    project : see `element_hessians`
+    """
+    _KERNELS.element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, energies, gradients, hessians)
+
+
+def element_energies(x, tets, Dm_inv, volumes, kind, mu, lam, out) -> None:
+    """Elastic energy of every tet [J], zero at rest, into out (m,).
+
+    Parameters
+    ----------
+    x : (n, 3) positions [m]; tets : (m, 4) int32; Dm_inv : (m, 3, 3) rest shape inverse [1/m]; volumes : (m,) [m^3];
+    kind, mu, lam : (m,) of `TetMaterial`. All C-contiguous; float64, but int32 for tets and kind.
+    """
+    _KERNELS.element_energies(x, tets, Dm_inv, volumes, kind, mu, lam, out)
+
+
+def element_gradients(x, tets, Dm_inv, volumes, kind, mu, lam, out) -> None:
+    """Gradient of every tet's energy by its four nodes [N] (minus the elastic forces), into out (m, 4, 3).
+
+    Parameters as of `element_energies`.
+    """
+    _KERNELS.element_gradients(x, tets, Dm_inv, volumes, kind, mu, lam, out)
+
+
+def element_hessians(x, tets, Dm_inv, volumes, kind, mu, lam, project, out) -> None:
+    """Hessian of every tet's energy [N/m] into out (m, 12, 12): entry (3 p + i, 3 q + k) for coordinate i of node p and
+    coordinate k of node q. With `project`, of the nearest convex energy: eigenvalues of d^2 psi / dF^2 are clamped.
+
+    Other parameters as of `element_energies`.
+    """
+    _KERNELS.element_hessians(x, tets, Dm_inv, volumes, kind, mu, lam, project, out)
