@@ -91,3 +91,30 @@ def test_every_module_imports_without_what_only_posix_has():
     """
     found = python(code, json.dumps([POSIX_ONLY, POSIX_NAMES])).split()
     assert {"supple.simulate", "supple.cli.app", "supple.mesh.tetrahedralize", "supple.scene_file.loader"} <= set(found)
+
+
+def test_what_works_without_the_ipc_toolkit_which_has_no_wheels_for_linux_on_arm():
+    code = """
+        import sys
+        sys.modules["ipctk"] = None
+        import importlib.util, supple as sp
+        find = importlib.util.find_spec
+        importlib.util.find_spec = lambda name, *rest: None if name == "ipctk" else find(name, *rest)
+        rubber = sp.StableNeoHookean(youngs=1e4, poisson=0.3)
+        body = sp.Body("block", sp.shapes.box((0.1, 0.1, 0.1), (1, 1, 1)), rubber, position=(0, 0.06, 0))
+        floor = sp.HalfSpace(name="floor")
+        for scene, solver in (
+            (sp.Scene([body], obstacles=[floor]), sp.XPBD(substeps=4)),
+            (sp.Scene([body]), sp.Implicit(contact=None)),
+        ):
+            for frame in sp.simulate(scene, solver, dt=0.01, steps=2):
+                print(frame.report.status)
+        print(sp.shapes.gummy_bear_surface(resolution=16).check().ok)
+        try:
+            list(sp.simulate(sp.Scene([body], obstacles=[floor]), sp.Implicit(), dt=0.01, steps=1))
+        except sp.SolverError as error:
+            print(error)
+    """
+    *said, refusal = python(code).splitlines()
+    assert said == [*["converged"] * 4, "True"]
+    assert refusal.startswith("Implicit: contact needs the package ipctk, which is not installed")

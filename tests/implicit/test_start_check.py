@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.implicit.contact.exact_predicates import side_of_plane
 from supple.implicit.contact.refusal import refuse_intersecting
 from supple.implicit.contact.start_check import find_intersections
+from supple.numerics.exact_predicates import side_of_plane
 from supple.scene.contact_pairs import pair_table
 from supple.system import build_system, initial_state
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from supple.mesh.checked_arrays import frozen, place
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.topology import edge_keys, facet_keys
+from supple.numerics.triangle_crossings import crossing_triangles
 
 # Intersections are listed one by one; a soup of triangles has millions, and nobody reads more than a few.
 MAX_INTERSECTIONS = 100
@@ -234,39 +235,17 @@ def _folded_triangles(
 
 
 def _intersecting_triangles(surface: SurfaceMesh, sound: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """Pairs of triangles, at most `MAX_INTERSECTIONS`, where an edge of one meets another that it has no vertex in."""
-    import ipctk
-
+    """Pairs of triangles, at most `MAX_INTERSECTIONS`, that meet in more than the vertices they share; exact."""
     rows = np.flatnonzero(sound)
     if len(rows) < 2:
         return np.empty((0, 2), dtype=np.int32)
-    # Centred and scaled, so that the broad phase's boxes have all their digits.
-    low, high = surface.bounds
-    vertices = np.asfortranarray((surface.vertices - 0.5 * (low + high)) / max(float((high - low).max()), 1e-300))
-    faces = np.asfortranarray(surface.triangles[rows])
-    edges = np.asfortranarray(ipctk.edges(faces))
-    if not ipctk.has_intersections(ipctk.CollisionMesh(vertices, edges, faces), vertices):
-        return np.empty((0, 2), dtype=np.int32)
-    n = len(vertices)
-    keys = edge_keys(surface.triangles[rows], n).ravel()
-    order = np.argsort(keys, kind="stable")
-    low_end, high_end = np.sort(edges, axis=1).astype(np.int64).T
-    owner = rows[order[np.searchsorted(keys[order], low_end * n + high_end)] // 3]
-
-    broad_phase = ipctk.LBVH()
-    broad_phase.build(vertices, edges, faces)
-    found: set[tuple[int, int]] = set()
-    for candidate in broad_phase.detect_edge_face_candidates():
-        a, b = edges[candidate.edge_id]
-        c, d, e = faces[candidate.face_id]
-        if a in (c, d, e) or b in (c, d, e):
-            continue
-        if ipctk.is_edge_intersecting_triangle(vertices[a], vertices[b], vertices[c], vertices[d], vertices[e]):
-            pair = sorted((int(owner[candidate.edge_id]), int(rows[candidate.face_id])))
-            found.add((pair[0], pair[1]))
-            if len(found) >= MAX_INTERSECTIONS:
-                break
-    return np.array(sorted(found), dtype=np.int32).reshape(-1, 2)
+    # Scaled by a power of two, which rounds nothing, so that products of three coordinates neither over- nor underflow.
+    _, power = np.frexp(np.abs(surface.vertices).max())
+    one_thing = np.zeros(len(rows), dtype=np.int32)
+    pairs, _ = crossing_triangles(
+        np.ldexp(surface.vertices, -power), surface.triangles[rows], one_thing, np.array([[True]]), MAX_INTERSECTIONS
+    )
+    return rows[pairs].astype(np.int32)
 
 
 def _wrong_facing(surface: SurfaceMesh, nested: bool) -> NDArray[np.int32]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,6 +37,8 @@ def _mean_edge(system: System) -> float:
 
 
 def _between_surfaces(system: System, positions: NDArray[np.float64], time: float, near: float) -> NDArray[np.float64]:
+    if find_spec("ipctk") is None:  # it has no wheels for Linux on ARM
+        return np.zeros((0, 3))
     import ipctk
 
     vertices, triangles = [positions], [system.triangles]

@@ -11,7 +11,6 @@ Contact" (2023), for the areas and the unit.
 
 from __future__ import annotations
 
-import ipctk
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,6 +30,8 @@ class Barrier(Potential):
     label = "contact"
 
     def __init__(self, collisions: Collisions, stiffness: float) -> None:
+        import ipctk
+
         self.collisions = collisions
         self.potential = ipctk.BarrierPotential(collisions.dhat, stiffness=stiffness, use_physical_barrier=True)
 
@@ -49,6 +50,8 @@ class Barrier(Potential):
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
         found = self.collisions.at(x)
         if not found.empty():
+            import ipctk
+
             method = ipctk.PSDProjectionMethod.CLAMP if project else ipctk.PSDProjectionMethod.NONE
             surface = self.collisions.surface
             try:

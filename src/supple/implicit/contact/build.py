@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
+
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.errors import SolverError
 from supple.implicit.contact.collisions import Collisions
 from supple.implicit.contact.kinematic import obstacle_positions, with_obstacles
 from supple.implicit.contact.model import ContactModel
@@ -22,7 +25,16 @@ def contact_model(system: System, settings: Contact, shear_moduli: NDArray[np.fl
     Parameters
     ----------
     shear_moduli : (m,) of the tets [Pa]
+
+    Raises
+    ------
+    SolverError : where the IPC Toolkit is not installed: it has no wheels for Linux on ARM.
     """
+    if find_spec("ipctk") is None:
+        raise SolverError(
+            "Implicit: contact needs the package ipctk, which is not installed (it has no wheels for Linux on ARM); "
+            "build it with `pip install 'ipctk>=1.6.1,<1.7'`, give contact=None, or use XPBD"
+        )
     extended, obstacles = with_obstacles(system)
     table = pair_table(system.scene)
     start = np.concatenate([initial_state(system.scene).positions, obstacle_positions(obstacles, 0.0)])

@@ -9,7 +9,6 @@ Source: Li et al., "Incremental Potential Contact" (2020), section 5.
 
 from __future__ import annotations
 
-import ipctk
 import numpy as np
 from numpy.typing import NDArray
 
@@ -39,6 +38,8 @@ class Friction(Potential):
         coefficients: NDArray[np.float64],
         slow: float,
     ) -> None:
+        import ipctk
+
         self.surface = barrier.collisions.surface
         self.start = self.surface.points(start)
         self.h = h
@@ -67,6 +68,8 @@ class Friction(Potential):
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
         if not self.contacts.empty():
+            import ipctk
+
             method = ipctk.PSDProjectionMethod.CLAMP if project else ipctk.PSDProjectionMethod.NONE
             hessian = self.potential.hessian(self.contacts, self.surface.mesh, self._velocities(x), method)
             out.couplings.append(self.surface.blocks(hessian / self.h, len(x)))

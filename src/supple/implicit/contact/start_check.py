@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.implicit.contact.start_surfaces import StartSurfaces, start_surfaces, winding_number
-from supple.implicit.contact.triangle_crossings import CROSSING, crossing_triangles
+from supple.numerics.triangle_crossings import CROSSING, crossing_triangles
 from supple.scene.contact_pairs import PairTable
 from supple.system import System
 

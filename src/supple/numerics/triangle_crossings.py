@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from supple.implicit.contact.exact_predicates import side_of_line, side_of_plane
+from supple.numerics.exact_predicates import side_of_line, side_of_plane
 from supple.numerics.mat3 import cross, row, subtract
 
 APART, TOUCHING, CROSSING = 0, 1, 2
@@ -160,8 +160,8 @@ def triangles_meet(x, first, second, sides):
 
 
 @njit(cache=True, error_model="numpy")
-def _sweep(x, triangles, owner, collide, low, high, order, axis, pairs, kinds):
-    """Write as many pairs as fit; returns how many there are."""
+def _sweep(x, triangles, owner, collide, low, high, order, axis, most, pairs, kinds):
+    """Write as many pairs as fit; returns how many there are, `most` where there are more."""
     count = 0
     sides = np.zeros((2, 3), dtype=np.int64)
     y, z = (axis + 1) % 3, (axis + 2) % 3
@@ -183,11 +183,17 @@ def _sweep(x, triangles, owner, collide, low, high, order, axis, pairs, kinds):
                 pairs[count, 0], pairs[count, 1] = min(i, j), max(i, j)
                 kinds[count] = kind
             count += 1
+            if count == most:
+                return count
     return count
 
 
 def crossing_triangles(
-    x: NDArray[np.float64], triangles: NDArray[np.int32], owner: NDArray[np.int32], collide: NDArray[np.bool_]
+    x: NDArray[np.float64],
+    triangles: NDArray[np.int32],
+    owner: NDArray[np.int32],
+    collide: NDArray[np.bool_],
+    most: int = -1,
 ) -> tuple[NDArray[np.int64], NDArray[np.int8]]:
     """Pairs of triangles that have a point in common beside shared vertices, in ascending order, lower row first.
 
@@ -195,6 +201,7 @@ def crossing_triangles(
     ----------
     x : (n, 3) [m]; triangles : (t, 3); owner : (t,) which thing a triangle is of
     collide : (p, p) which things' triangles are looked at; the diagonal: those of one thing with each other
+    most : with that many found, the search ends; -1: with all
 
     Returns
     -------
@@ -211,7 +218,7 @@ def crossing_triangles(
     room = 4096
     while True:
         pairs, kinds = np.zeros((room, 2), dtype=np.int64), np.zeros(room, dtype=np.int8)
-        count = _sweep(x, triangles, owner, collide, low, high, order, axis, pairs, kinds)
+        count = _sweep(x, triangles, owner, collide, low, high, order, axis, most, pairs, kinds)
         if count <= room:
             break
         room = count
