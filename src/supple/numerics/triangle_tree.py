@@ -18,9 +18,9 @@ from supple.numerics.mat3 import cross, dot, row, subtract
 
 _LEAF = 4
 _DEPTH = 64  # of a tree that halves: more than any memory holds
-# Squared distances that agree to this share are equal: a point above a common edge is as near to both triangles. Near
-# zero, those that agree to this share of the squared size of the coordinates (1e-14 of a length) are.
-TIE, ROUND_OFF = 1e-12, 1e-28
+# Squared distances that agree to this share are equal, and distances that agree to this share of the coordinates: a
+# point above a common edge is as near to both triangles, also far from the origin.
+TIE, ROUND_OFF = 1e-12, 1e-14
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,28 +179,42 @@ def _square_height(p, points, triangles, t):
 
 
 @njit(error_model="numpy")
-def _comes_first(p, points, triangles, t, best, slack):
+def _largest(boxes):
+    """The largest coordinate [m]."""
+    return np.abs(boxes[0]).max()
+
+
+@njit(error_model="numpy")
+def _slack(square, p, largest):
+    """By how much a squared distance from p is uncertain."""
+    off = ROUND_OFF * max(largest, abs(p[0]), abs(p[1]), abs(p[2]))
+    return TIE * square + off * (2.0 * np.sqrt(square) + off)
+
+
+@njit(error_model="numpy")
+def _comes_first(p, points, triangles, t, best, largest):
     """Whether of two triangles that are equally near, t is the one to take."""
     if best < 0:
         return True
     one, other = _square_height(p, points, triangles, t), _square_height(p, points, triangles, best)
-    margin = 1e-6 * (one + other) + slack
+    margin = 1e-6 * (one + other) + _slack(max(one, other), p, largest)
     return one > other + margin or (one >= other - margin and t < best)
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def _nearest(queries, within, points, triangles, order, bounds, boxes, found, squares):
-    slack = ROUND_OFF * np.abs(boxes[0]).max() ** 2
+    largest = _largest(boxes)
     for q in prange(len(queries)):
         p = row(queries, q)
         stack = np.empty(_DEPTH, dtype=np.int64)
         stack[0] = 0
         depth = 1
         best, least = -1, within * within
+        slack = _slack(least, p, largest) if np.isfinite(least) else 0.0
         while depth > 0:
             depth -= 1
             node = stack[depth]
-            if bounds[node, 0] == bounds[node, 1] or _square_to_box(p, boxes, node) > least * (1.0 + TIE) + slack:
+            if bounds[node, 0] == bounds[node, 1] or _square_to_box(p, boxes, node) > least + slack:
                 continue
             left = 2 * node + 1
             if left < len(boxes):
@@ -214,9 +228,10 @@ def _nearest(queries, within, points, triangles, order, bounds, boxes, found, sq
             for k in range(bounds[node, 0], bounds[node, 1]):
                 t = order[k]
                 square = _square_to_triangle(p, points, triangles, t)
-                tie = square <= least * (1.0 + TIE) + slack
-                if square < least * (1.0 - TIE) - slack or (tie and _comes_first(p, points, triangles, t, best, slack)):
+                tie = square <= least + slack
+                if square < least - slack or (tie and _comes_first(p, points, triangles, t, best, largest)):
                     best, least = t, min(square, least)
+                    slack = _slack(least, p, largest)
         if best >= 0:
             found[q] = best
             squares[q] = _square_to_triangle(p, points, triangles, best)
@@ -225,9 +240,10 @@ def _nearest(queries, within, points, triangles, order, bounds, boxes, found, sq
 @njit(cache=True, parallel=True, error_model="numpy")
 def _all_within(queries, within, points, triangles, order, bounds, boxes, counts, starts, found, squares):
     """With `found` empty, count only."""
-    limit = within * within * (1.0 + TIE)
+    largest = _largest(boxes)
     for q in prange(len(queries)):
         p = row(queries, q)
+        limit = within * within + _slack(within * within, p, largest)
         stack = np.empty(_DEPTH, dtype=np.int64)
         stack[0] = 0
         depth, count = 1, 0

@@ -149,7 +149,8 @@ def _viscous_chunk(points, previous, corners, data, h, first, last, bounds, gamm
             third = (e00 + e11 + e22) / 3.0
             e00, e11, e22 = e00 - third, e11 - third, e22 - third
             shear = 2.0 * mu * gamma
-            bulk = (lam - mu / 3.0) * gamma
+            # Of a stitch, lam may be below mu / 3; damping gives no energy even so.
+            bulk = max(lam - mu / 3.0, 0.0) * gamma
             c00, c10, c20 = f11 * f22 - f21 * f12, f21 * f02 - f01 * f22, f01 * f12 - f11 * f02
             c01, c11, c21 = f12 * f20 - f22 * f10, f22 * f00 - f02 * f20, f02 * f10 - f12 * f00
             c02, c12, c22 = f10 * f21 - f20 * f11, f20 * f01 - f00 * f21, f00 * f11 - f10 * f01

@@ -1,9 +1,12 @@
 """What a user says of stitches: pairs given and found, numbers, rest shapes; and what is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import supple as sp
+from supple.scene.rotation import rotation_matrix
 from supple.scene.stitches.registry import STITCHES
 from supple.scene.stitches.stitch import Stitch
 from supple.system import build_system, initial_state
@@ -15,18 +18,12 @@ SHEET = sp.SurfaceMesh([[9, 9, 9], [-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1
 
 def scene(*stitches, gap=0.01, turned=(0, 0, 0), shift=(0, 0, 0), obstacles=()):
     """Two boxes, one `gap` above the other, the whole turned and shifted."""
-    R = rotation(turned)
+    R = rotation_matrix(turned)
     bodies = [
         sp.Body(name, BOX, SOFT, position=R @ [0, y, 0] + shift, rotation=turned)
         for name, y in (("low", -0.1), ("high", 0.1 + gap))
     ]
     return sp.Scene(bodies, obstacles, stitches=stitches)
-
-
-def rotation(vector):
-    from supple.scene.rotation import rotation_matrix
-
-    return rotation_matrix(vector)
 
 
 def soft(first="high", second="low", **more):
@@ -50,6 +47,18 @@ def test_pairs_are_found_in_the_world(turned):
     assert np.all(found.tets.vertices[:, 0] >= len(BOX.vertices))
     assert np.all(found.tets.vertices[:, 1:] < len(BOX.vertices))
     assert not found.tets.offset.any()
+
+
+@pytest.mark.parametrize("gap", [1e-3, 0.01])
+@pytest.mark.parametrize("pairing", ["closest", "all"])
+def test_the_same_pairs_are_found_far_from_the_origin(gap, pairing):
+    """Where round-off is a thousand times larger, it must still not decide which of equally near triangles it is."""
+    rng = np.random.default_rng(0)
+    here = scene(soft(max_distance=gap + 1e-9, pairing=pairing), gap=gap).stitching.tets.vertices
+    for _ in range(4):
+        place = {"turned": rng.normal(size=3), "shift": 100.0 * rng.normal(size=3)}
+        there = scene(soft(max_distance=gap + 1e-9, pairing=pairing), gap=gap, **place).stitching.tets.vertices
+        assert np.array_equal(there, here)
 
 
 def test_all_in_reach_are_more():
@@ -92,6 +101,20 @@ def test_values_may_be_given_for_each_pair():
     engineering = soft(pairs=[[0, 1], [4, 7]], youngs=[1e5, 2e5], poisson=[0.25, 0.1])
     assert engineering.mu == pytest.approx([4e4, 2e5 / 2.2])
     assert engineering.lam == pytest.approx([4e4, 2e5 * 0.1 / (1.1 * 0.8)])
+
+
+def test_a_stitch_can_be_made_from_another_one():
+    harder = replace(soft(pairs=[[0, 1]], youngs=1e5, poisson=0.25), damping=0.1)
+    assert (float(harder.mu), float(harder.lam), harder.damping) == (4e4, 4e4, 0.1)
+    assert float(replace(harder, youngs=2e5, mu=None, lam=None).mu) == 8e4
+    with pytest.raises(sp.SceneError, match="give one pair, not both"):
+        replace(harder, youngs=2e5)
+
+
+def test_a_density_wants_deformation_gradients():
+    for wrong in ("x", [[1, 2], [3]], np.eye(2)):
+        with pytest.raises(sp.SceneError, match="its last two axes must be"):
+            soft(pairs=[[0, 1]]).energy_density(wrong)
 
 
 def test_rest_shapes_are_those_of_the_scene_whatever_state_a_simulation_begins_with():
@@ -141,7 +164,11 @@ def test_nothing_in_reach_is_an_error_that_says_what_would_be():
     assert "\n" not in str(refused.value)
 
 
-FLAT = sp.SurfaceMesh([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0]], [[0, 1, 2], [0, 1, 3]])
+LOWEST = BOX.vertices[6] - [0, 0.1, 0]
+FLAT = sp.SurfaceMesh(
+    [[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], LOWEST, np.add(LOWEST, [1, 0, 0]), np.add(LOWEST, [0, 0, 1])],
+    [[0, 1, 2], [0, 1, 3], [4, 5, 6]],
+)
 REFUSED = {
     "itself": (lambda: soft("low", "low", max_distance=1), "joins a body with itself"),
     "neither": (lambda: soft(), "either pairs or max_distance"),
@@ -171,6 +198,12 @@ REFUSED = {
     "triangle": (lambda: soft(pairs=[[0, 99]]), "number 99 of 48 triangles"),
     "edge": (lambda: sp.VertexEdgeStitch("high", "low", pairs=[[0, 999]], stiffness=1.0), "number 999 of 72 edges"),
     "count": (lambda: soft(pairs=[[0, 0], [1, 1]], youngs=[1.0, 2.0, 3.0]), "3 values for 2 pairs"),
+    "unlike": (lambda: soft(pairs=[[0, 0]], youngs=[1.0, 2.0], poisson=[0.1] * 3), "youngs has 2 values and poisson 3"),
+    "said": (lambda: soft(pairs=[[0, 0], [1, 1]], youngs=[1.0] * 3), "youngs has 3 values for 2 pairs"),
+    "thin": (
+        lambda: soft("low", "flat", pairs=[[6, 2]], min_separate_distance=1e-18),
+        "in the plane of triangle 2",
+    ),
     "body": (lambda: soft("top", pairs=[[0, 0]]), "no body 'top'"),
     "second": (lambda: soft("low", "top", pairs=[[0, 0]]), "no body or obstacle 'top'"),
     "floor": (lambda: soft("low", "floor", pairs=[[0, 0]]), "hold on to bodies and TriangleObstacles"),

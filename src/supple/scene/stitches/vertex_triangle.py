@@ -16,6 +16,8 @@ from supple.scene.stitches.elements import Pairs, StitchTets
 from supple.scene.stitches.side import Side
 from supple.scene.stitches.stitch import Stitch
 
+_MODULI = {"mu": "Pa", "lam": "Pa", "youngs": "Pa", "poisson": "-"}
+
 
 @dataclass(frozen=True, eq=False)
 class SoftVertexTriangleStitch(Stitch):
@@ -53,23 +55,33 @@ class SoftVertexTriangleStitch(Stitch):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        given = [key for key in ("mu", "lam", "youngs", "poisson") if getattr(self, key) is not None]
-        if given == ["youngs", "poisson"]:
-            youngs = self.checked_numbers(self.youngs, "youngs", "Pa")
-            nu = self.checked_numbers(self.poisson, "poisson", "-")
-            if (nu >= 0.5).any():
-                raise SceneError(f"{self.label}: poisson is {nu.max():g}; it must be above 0 and below 0.5")
-            mu, lam = lame_from_engineering(youngs, nu)
-        elif given == ["mu", "lam"]:
-            mu = self.checked_numbers(self.mu, "mu", "Pa")
-            lam = self.checked_numbers(self.lam, "lam", "Pa")
+        given = [key for key in _MODULI if getattr(self, key) is not None]
+        for key in given:
+            object.__setattr__(self, key, self.checked_numbers(getattr(self, key), key, _MODULI[key]))
+        if given == ["mu", "lam"]:
+            _same_count(self, "mu", "lam")
+        elif given in (["youngs", "poisson"], list(_MODULI)):
+            lame = self._converted()
+            # All four are there where a stitch is made from another one by `dataclasses.replace`.
+            if len(given) == 4 and not all(map(np.array_equal, (self.mu, self.lam), lame)):
+                raise SceneError(f"{self.label}: mu, lam are not those of youngs, poisson; give one pair, not both")
+            object.__setattr__(self, "mu", lame[0])
+            object.__setattr__(self, "lam", lame[1])
         else:
             said = " and ".join(given) or "neither"
             raise SceneError(f"{self.label}: give mu and lam, or youngs and poisson (given: {said})")
-        object.__setattr__(self, "mu", mu)
-        object.__setattr__(self, "lam", lam)
         distance = self.checked_numbers(self.min_separate_distance, "min_separate_distance", "m")
         object.__setattr__(self, "min_separate_distance", distance)
+
+    def _converted(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """mu and lam of youngs and poisson."""
+        assert self.youngs is not None
+        assert self.poisson is not None
+        nu = np.asarray(self.poisson)
+        if (nu >= 0.5).any():
+            raise SceneError(f"{self.label}: poisson is {nu.max():g}; it must be above 0 and below 0.5")
+        _same_count(self, "youngs", "poisson")
+        return lame_from_engineering(self.youngs, nu)
 
     def energy_density(self, F: ArrayLike) -> NDArray[np.float64]:
         """psi as published, mu^2/lam^2 included, which is not zero at rest.
@@ -85,7 +97,10 @@ class SoftVertexTriangleStitch(Stitch):
         -------
         (...) [Pa]
         """
-        F = np.asarray(F, dtype=np.float64)
+        try:
+            F = np.asarray(F, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise SceneError("F is not an array of numbers; its last two axes must be (3, 3)") from None
         if F.shape[-2:] != (3, 3):
             raise SceneError(f"F has shape {F.shape}; its last two axes must be (3, 3)")
         mu, lam = np.asarray(self.mu), np.asarray(self.lam)
@@ -102,11 +117,14 @@ class SoftVertexTriangleStitch(Stitch):
 
         Raises
         ------
-        SceneError : where a triangle has no area.
+        SceneError : where a triangle has no area, or a tet no height that round-off leaves.
         """
         count = len(pairs.vertices)
         corners = second.triangles[pairs.rows]
         d = self.per_pair(self.min_separate_distance, count, "min_separate_distance")
+        for key in ("youngs", "poisson"):
+            if getattr(self, key) is not None:
+                self.per_pair(getattr(self, key), count, key)
         x0, (x1, x2, x3) = first.points[pairs.vertices], second.points[corners].transpose(1, 0, 2)
         n = np.cross(x2 - x1, x3 - x1)
         length = np.linalg.norm(n, axis=1)
@@ -122,6 +140,12 @@ class SoftVertexTriangleStitch(Stitch):
         round_off = 8.0 * np.finfo(np.float64).eps * np.max(np.abs([x0, x1, x2, x3]), axis=(0, 2))
         above = s >= -round_off
         near = np.abs(s) < d - round_off
+        thin = np.flatnonzero(np.maximum(np.abs(s), d) <= round_off)
+        if len(thin):
+            raise SceneError(
+                f"{self.label}: min_separate_distance is {d[thin[0]]:g}, and vertex {pairs.vertices[thin[0]]} of "
+                f"{first.label} lies in the plane of triangle {pairs.rows[thin[0]]} of {second.label}; give more"
+            )
         x0 = x0 + np.where(near, np.where(above, d, -d) - s, 0.0)[:, None] * n
         corners, second_corner, third_corner = corners.copy(), x2, x3
         corners[above] = corners[above][:, [0, 2, 1]]
@@ -141,3 +165,12 @@ class SoftVertexTriangleStitch(Stitch):
 
 def _longest_edge(a: NDArray, b: NDArray, c: NDArray) -> NDArray[np.float64]:
     return np.max([np.linalg.norm(b - a, axis=1), np.linalg.norm(c - b, axis=1), np.linalg.norm(a - c, axis=1)], axis=0)
+
+
+def _same_count(stitch: SoftVertexTriangleStitch, one: str, other: str) -> None:
+    """Raise where both are lists, of different lengths."""
+    sizes = [np.asarray(getattr(stitch, key)).shape for key in (one, other)]
+    if all(sizes) and sizes[0] != sizes[1]:
+        raise SceneError(
+            f"{stitch.label}: {one} has {sizes[0][0]} values and {other} {sizes[1][0]}; give one, or one for each pair"
+        )
