@@ -14,6 +14,7 @@ from supple.viewer.live_scene import LiveScene
 from supple.viewer.live_source import LiveSource
 from supple.viewer.messages import (
     AddBody,
+    AddMesh,
     CopyBody,
     MovePusher,
     Pin,
@@ -139,6 +140,26 @@ class TestBodies:
             assert np.array_equal(live.body_positions(name), before)
         assert describe(live).bodies[-1].added
         run(live, 2)
+
+    def test_a_mesh_that_is_given_lands_above_the_others(self, live):
+        mesh = sp.shapes.box((0.3, 0.2, 0.1), (2, 2, 2))
+        top = live.state.positions[:, 1].max()
+        for k in (1, 2):
+            change(AddMesh(mesh.vertices, mesh.tets, youngs=3e5, name="mine"), live)
+            body = live.setup.scene.bodies[-1]
+            assert (body.name, body.material.youngs) == (f"mine {k}", 3e5)
+            placed = live.body_positions(body.name)
+            assert np.ptp(placed, axis=0) == pytest.approx([0.3, 0.2, 0.1])
+            assert placed[:, 1].min() > top
+            top = placed[:, 1].max()
+        run(live, 2)
+        count = len(live.system.tets)
+        with pytest.raises(SuppleError, match=r"flat|volume"):
+            change(AddMesh(np.zeros((4, 3)), np.array([[0, 1, 2, 3]], dtype=np.int32)), live)
+        assert len(live.system.tets) == count
+        change(RemoveBody("mine 1"), live)
+        change(Reset(), live)
+        assert [body.name for body in live.setup.scene.bodies] == ["cube", "block", "mine 2"]
 
     def test_copies_and_removal_leave_everything_else_as_it_was(self, live):
         run(live, 5)

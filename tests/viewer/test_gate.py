@@ -19,6 +19,7 @@ from supple.errors import OutputError
 from supple.viewer import limits
 from supple.viewer.gate import Allowance, first_free_port, gate, is_loopback, new_token, require_free_port
 from supple.viewer.message_check import Malformed, is_wanted
+from supple.viewer.uploads.transfers import refuse_transfers
 
 PROTOCOL = f"viser-v{viser.__version__}"
 PATIENCE = 30.0
@@ -185,6 +186,35 @@ MALFORMED = {
 }
 
 
+def part(size=10, **changes):
+    fields = {"source_component_uuid": "a", "transfer_uuid": "b", "part_index": 0, "content": bytes(size)}
+    return msgspec.msgpack.encode({"type": "FileTransferPart", **fields, **changes})
+
+
+def file_start(**changes):
+    fields = {
+        "source_component_uuid": "a",
+        "transfer_uuid": "b",
+        "filename": "ball.stl",
+        "mime_type": "",
+        "part_count": 1,
+        "size_bytes": 10,
+    }
+    return msgspec.msgpack.encode({"type": "FileTransferStartUpload", **fields, **changes})
+
+
+MALFORMED |= {
+    "a part of a file that is too large": part(limits.UPLOAD_PART + limits.LARGEST_MESSAGE + 1),
+    "a part that is no bytes": part(content="x"),
+    "a part with a field too many": part(path="/etc/passwd"),
+    "a part without a number": part(part_index=NAN),
+    "a file with a long name": file_start(filename="x" * 70_000),
+    "a file with a folder of its own": file_start(folder="/tmp"),
+    "a file of no size": file_start(size_bytes=None),
+    "a file for nothing": file_start(source_component_uuid=None),
+}
+
+
 class TestMalformed:
     @pytest.mark.parametrize("name", MALFORMED)
     def test_the_connection_is_dropped_and_others_stay(self, local, name):
@@ -220,8 +250,24 @@ class TestMalformed:
 
     def test_requests_to_share_the_page_with_the_world_are_passed_over(self):
         assert not is_wanted(msgspec.msgpack.encode({"type": "ShareUrlRequest"}))
-        assert not is_wanted(msgspec.msgpack.encode({"type": "FileTransferStartUpload", "anything": 1}))
         assert is_wanted(camera())
+
+    def test_files_and_their_parts_pass(self):
+        # Whether anybody asked for them is decided later.
+        assert is_wanted(file_start())
+        assert is_wanted(part(limits.UPLOAD_PART))
+
+    def test_a_file_is_for_nobody_where_there_is_no_button(self, local):
+        """As on the page of a recording."""
+        refuse_transfers(local)
+        slider = local.gui.add_slider("youngs", min=0.0, max=10.0, step=0.5, initial_value=1.0)
+        with dial(local) as connection:
+            connection.send(camera())
+            connection.send(file_start(source_component_uuid=slider._impl.uuid))
+            connection.send(part(source_component_uuid=slider._impl.uuid))
+            connection.ping().wait(PATIENCE)
+        assert slider.value == 1.0
+        assert local.gui._current_file_upload_states == {}
 
     def test_random_changes_of_a_good_message_are_judged_without_an_exception(self):
         rng, good, wanted = random.Random(1), camera(), 0

@@ -19,6 +19,7 @@ from supple.viewer.input_check import guard_inputs
 from supple.viewer.live_page import LivePage
 from supple.viewer.live_source import LiveSource
 from supple.viewer.replay import Replay
+from supple.viewer.uploads.transfers import refuse_transfers
 
 
 @dataclass(frozen=True)
@@ -106,3 +107,4 @@ def dress(server: Any) -> None:
     server.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(36, 108, 168))
     server.gui.main_panel.dock_right()
     guard_inputs(server)
+    refuse_transfers(server)

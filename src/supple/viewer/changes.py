@@ -21,7 +21,7 @@ from supple.viewer import commands as say
 from supple.viewer import limits
 from supple.viewer.grab_spring import make_spring
 from supple.viewer.live_scene import LiveScene
-from supple.viewer.new_bodies import check_room, free_name, new_body, place_for
+from supple.viewer.new_bodies import body_of_mesh, check_room, free_name, new_body, place_for
 from supple.viewer.obstacle_distance import moved_out
 from supple.viewer.parameters import find_parameter
 from supple.viewer.pusher import Pusher
@@ -243,6 +243,11 @@ def flattened(points: NDArray[np.float64], up: NDArray[np.float64], factor: floa
 @change.register
 def _(command: say.AddBody, live: LiveScene) -> None:
     _add(live, new_body(command, live.setup.scene, live.state.positions, live.up))
+
+
+@change.register
+def _(command: say.AddMesh, live: LiveScene) -> None:
+    _add(live, body_of_mesh(command, live.setup.scene, live.state.positions, live.up))
 
 
 @change.register

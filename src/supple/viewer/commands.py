@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from supple.errors import CommandError, SceneError
 from supple.scene.values import check_name
@@ -273,6 +274,28 @@ class AddBody(Command):
             _set(self, "name", _name(self.name, "name"))
 
 
+@dataclass(frozen=True, eq=False)
+class AddMesh(Command):
+    """Add a body of stable Neo-Hookean rubber above everything else, with a mesh that is given.
+
+    Parameters
+    ----------
+    vertices : (n, 3) [m]; tets : (m, 4) rows of them
+    youngs [Pa]
+    name : free ones are made of it, with a number.
+    """
+
+    vertices: NDArray[np.float64]
+    tets: NDArray[np.int32]
+    youngs: float = 1e5
+    name: str = "mesh"
+
+    def __post_init__(self) -> None:
+        _mesh_arrays(self.vertices, self.tets)
+        _set(self, "youngs", find_parameter("youngs").checked(self.youngs))
+        _set(self, "name", _name(self.name, "name"))
+
+
 @dataclass(frozen=True)
 class CopyBody(Command):
     """Add a body like one that is there, at rest and undeformed; `position` as for `AddBody`."""
@@ -328,6 +351,20 @@ def _items(value: object, what: str, least: int, most: int) -> list[object]:
     if not least <= len(value) <= most:
         raise CommandError(f"{what} has {len(value)} values; give {least if least == most else f'{least} to {most}'}")
     return list(value)
+
+
+def _mesh_arrays(vertices: object, tets: object) -> None:
+    for array, width, kind, what in ((vertices, 3, "f", "vertices"), (tets, 4, "i", "tets")):
+        if not isinstance(array, np.ndarray) or array.ndim != 2 or array.shape[1] != width or array.dtype.kind != kind:
+            raise CommandError(f"{what} must be an array of {width} numbers each")
+    assert isinstance(vertices, np.ndarray)
+    assert isinstance(tets, np.ndarray)
+    if not 1 <= len(tets) <= limits.MOST_TETS or not 4 <= len(vertices) <= 4 * len(tets):
+        raise CommandError(
+            f"{len(tets)} tets, {len(vertices)} vertices; a live page has at most {limits.MOST_TETS} tets"
+        )
+    if not np.all(np.abs(vertices) <= limits.LARGEST_LENGTH) or tets.min() < 0 or tets.max() >= len(vertices):
+        raise CommandError("a vertex is too far away, or a tet has one that is not there")
 
 
 def _vertices(value: object) -> tuple[int, ...]:

@@ -237,6 +237,9 @@ def _checked(receive: Callable[[], Awaitable[Any]]) -> Callable[[], Awaitable[by
             raw = await receive()
             if not allowance.take(time.monotonic()):
                 raise Malformed("more messages than a page sends")
+            if len(raw) > limits.LARGEST_MESSAGE:
+                # Who sends much is read slowly; the others do not notice.
+                await asyncio.sleep(len(raw) / limits.LARGE_MESSAGES_PER_SECOND)
             if is_wanted(raw):
                 return raw
 

@@ -38,6 +38,18 @@ MOST_WAITING = 512
 MESSAGES_PER_SECOND, MESSAGES_AT_ONCE = 600.0, 1_200.0
 # One message of a browser [bytes], and one that holds a picture which it was asked for.
 LARGEST_MESSAGE, LARGEST_PICTURE = 64 * 1024, 32 * 1024 * 1024
+# Of any one browser, in large messages [bytes/s].
+LARGE_MESSAGES_PER_SECOND = 64 * 1024 * 1024
+
+# Of a surface that a visitor uploads: its file [bytes], in parts as viser sends them, and its triangles. Reading it and
+# filling it with tets may take this long [s] and this much memory [bytes]. Files that come in at once; one that gets no
+# further for this long [s] is given up.
+UPLOAD_FORMATS = (".stl", ".obj", ".ply", ".off", ".vtp", ".vtk")
+LARGEST_UPLOAD, UPLOAD_PART = 16 * 1024 * 1024, 512 * 1024
+MOST_UPLOADED_TRIANGLES = 20_000
+LONGEST_UPLOAD, UPLOAD_MEMORY = 60.0, 3 * 2**30
+MOST_UPLOADS, UPLOAD_PATIENCE = 4, 60.0
+
 # Browsers with an open page.
 MOST_CLIENTS = 32
 

@@ -50,6 +50,7 @@ class LivePage:
     def stop(self) -> None:
         """End the thread that draws."""
         self._end.set()
+        self.panel.stop()
         self._thread.join()
 
     def _run(self) -> None:

@@ -12,10 +12,12 @@ from typing import Any
 from supple.viewer import limits
 
 # What a page needs. What viser knows beside these is passed over: a request to share the page through a public server,
-# for one, or files that nobody asked for.
+# for one.
 KINDS = frozenset(
     {
         "CommandTriggerMessage",
+        "FileTransferPart",
+        "FileTransferStartUpload",
         "GetRenderResponseMessage",
         "GuiButtonHoldMessage",
         "GuiFormDirtyMessage",
@@ -31,8 +33,12 @@ KINDS = frozenset(
         "ViewerCameraMessage",
     }
 )
-# Pictures that the page was asked for are large; nothing else is.
-LARGE_KINDS = frozenset({"GetRenderResponseMessage"})
+# What may be larger than `limits.LARGEST_MESSAGE` [bytes]: pictures that the page was asked for, and parts of files.
+# Whether a file is taken, `supple.viewer.uploads.transfers` decides.
+LARGE_KINDS = {
+    "GetRenderResponseMessage": limits.LARGEST_PICTURE,
+    "FileTransferPart": limits.UPLOAD_PART + limits.LARGEST_MESSAGE,
+}
 DEEPEST = 8
 
 
@@ -61,7 +67,7 @@ def is_wanted(raw: object) -> bool:
         raise Malformed("an unknown kind of message")
     if kind not in KINDS:
         return False
-    if len(raw) > limits.LARGEST_MESSAGE and kind not in LARGE_KINDS:
+    if len(raw) > LARGE_KINDS.get(kind, limits.LARGEST_MESSAGE):
         raise Malformed(f"{len(raw)} bytes")
     _check_fields(kind, message)
     if kind == "GuiUpdateMessage" and set(message["updates"]) != {"value"}:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from supple.viewer.commands import (
     AddBody,
+    AddMesh,
     Command,
     CopyBody,
     Grab,
@@ -39,6 +40,7 @@ from supple.viewer.snapshots import (
 __all__ = [
     "PARAMETERS",
     "AddBody",
+    "AddMesh",
     "BodyDescription",
     "Command",
     "CopyBody",

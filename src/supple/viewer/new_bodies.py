@@ -16,10 +16,12 @@ from supple.mesh.tetmesh import TetMesh
 from supple.scene.body import Body
 from supple.scene.scene import Scene
 from supple.viewer import limits
-from supple.viewer.commands import AddBody, Point
+from supple.viewer.commands import AddBody, AddMesh, Point
 
 # Of the new body's height: the gap to what is below.
 GAP = 0.1
+# Of new bodies.
+_DAMPING, _FRICTION = 0.005, 0.3
 
 
 def make_mesh(shape: str, size: float, resolution: int) -> TetMesh:
@@ -42,9 +44,24 @@ def make_mesh(shape: str, size: float, resolution: int) -> TetMesh:
 def new_body(command: AddBody, scene: Scene, positions: NDArray[np.float64], up: NDArray[np.float64]) -> Body:
     """The body that a command describes, above `positions` (n, 3) [m] unless it names a place."""
     mesh = make_mesh(command.shape, command.size, command.resolution)
-    material = StableNeoHookean(youngs=command.youngs, poisson=command.poisson, density=command.density, damping=0.005)
+    material = StableNeoHookean(
+        youngs=command.youngs, poisson=command.poisson, density=command.density, damping=_DAMPING
+    )
     name = command.name if command.name is not None else free_name(scene, command.shape.replace("_", " "))
-    return Body(name, mesh, material, position=place_for(mesh, command.position, positions, up), friction=0.3)
+    return Body(name, mesh, material, position=place_for(mesh, command.position, positions, up), friction=_FRICTION)
+
+
+def body_of_mesh(command: AddMesh, scene: Scene, positions: NDArray[np.float64], up: NDArray[np.float64]) -> Body:
+    """The body that a command brings the mesh of, above `positions` (n, 3) [m].
+
+    Raises
+    ------
+    MeshError : where the mesh cannot be used.
+    """
+    mesh = TetMesh(command.vertices, command.tets)
+    material = StableNeoHookean(youngs=command.youngs, poisson=0.45, density=1000.0, damping=_DAMPING)
+    place = place_for(mesh, None, positions, up)
+    return Body(free_name(scene, command.name), mesh, material, position=place, friction=_FRICTION)
 
 
 def place_for(

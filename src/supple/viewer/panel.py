@@ -11,6 +11,7 @@ from supple.viewer.controls.measures import Measures
 from supple.viewer.controls.mouse_controls import MouseControls
 from supple.viewer.controls.solver_controls import SolverControls
 from supple.viewer.controls.time_controls import TimeControls
+from supple.viewer.controls.upload_controls import UploadControls
 from supple.viewer.drag import Mouse
 from supple.viewer.messages import SetView
 from supple.viewer.options import ViewOptions
@@ -53,7 +54,9 @@ class Panel:
         self.stage = stage
         gui = self._server.gui
         with self._bodies_tab:
-            self.bodies = BodyControls(gui, self._desk)
+            self.bodies = bodies = BodyControls(gui, self._desk)
+            with bodies.new:
+                self.upload = UploadControls(self._server, self._desk, bodies.new_size, bodies.new_youngs)
         with self._view_tab:
             self.views = ViewControls(self._server, stage, self._view_changed)
             self.record = RecordControls(self._server, stage)
@@ -63,6 +66,10 @@ class Panel:
         self.mouse.attach(stage)
         self.show(self._desk.snapshot)
         self.refresh()
+
+    def stop(self) -> None:
+        """End what it does by itself."""
+        self.upload.stop()
 
     def show(self, snapshot: Snapshot) -> None:
         """Take notice of a snapshot; `refresh` shows it."""

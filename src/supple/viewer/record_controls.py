@@ -10,6 +10,7 @@ from supple.errors import SuppleError
 from supple.viewer.film import Film, kinds_of_films, png_of
 from supple.viewer.model import Moment
 from supple.viewer.page_of_moments import page_of_moments
+from supple.viewer.plain import plain
 from supple.viewer.stage import Stage
 
 _PAGE = "page (HTML)"
@@ -57,7 +58,7 @@ class RecordControls:
 
     def say(self, text: str) -> None:
         """Show a line below the buttons."""
-        self._said.content, self._said.visible = text, bool(text)
+        self._said.content, self._said.visible = plain(text), bool(text)
 
     def _take_picture(self, event: Any) -> None:
         if event.client is None or not self._busy.acquire(blocking=False):

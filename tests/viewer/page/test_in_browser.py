@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.mesh.shape_surfaces import sphere_surface
 from supple.viewer.app import Address, opened_page
 from supple.viewer.live_source import LiveSource
+from supple.viewer.messages import RemoveBody
 
 RADIUS, START = 0.3, 0.5
 MASS = 1000.0 * 4.0 / 3.0 * np.pi * RADIUS**3
@@ -189,6 +191,40 @@ def test_a_body_comes_and_goes(still, spot):
     screen.tab.get_by_text("Add a body").click()
 
 
+def test_a_file_becomes_a_body_and_a_bad_one_a_line(resting, spot, tmp_path):
+    """Uploaded in the browser, filled with tets in a process of its own, while the simulation goes on."""
+    screen, upload = resting.screen, resting.panel.upload
+    blue = lambda: spot(screen.shot(), "blue")[0]  # noqa: E731
+    # The page is open to files within reach of the camera: a ball of 30 cm lands beside or on the one that is there.
+    sphere_surface(radius=50.0, edge_length=25.0).save(tmp_path / "my ball.stl")
+    screen.tab.get_by_text("Add a body").click()
+    files = screen.tab.locator(f'[id="file_upload_{upload.button._impl.uuid}"]')
+    frames = []
+
+    def added():
+        frames.append(resting.snapshot().frame)
+        return len(resting.snapshot().description.bodies) == 2
+
+    files.set_input_files(tmp_path / "my ball.stl")
+    screen.wait(added, "the body")
+    assert frames[-1] > frames[0] + 5  # time did not stand still
+    body = resting.snapshot().description.bodies[1]
+    assert body.name == "my ball 1"
+    assert np.ptp(body.rest_positions, axis=0).max() == pytest.approx(0.18, abs=0.01)  # the size that the panel says
+    screen.wait(lambda: blue() > 60, "the body in the picture")
+    data = bytearray((tmp_path / "my ball.stl").read_bytes())
+    (tmp_path / "half.stl").write_bytes(data[: len(data) // 2])
+    files.set_input_files(tmp_path / "half.stl")
+    line = screen.tab.get_by_text("half.stl: its header promises")
+    screen.wait(lambda: line.count() == 1, "why the file is refused")
+    frame = resting.snapshot().frame
+    screen.wait(lambda: resting.snapshot().frame > frame + 5, "the simulation to go on")
+    assert len(resting.snapshot().description.bodies) == 2
+    resting.page.desk.ask(None, lambda: RemoveBody("my ball 1"))
+    screen.wait(lambda: len(resting.snapshot().description.bodies) == 1, "no second body")
+    screen.tab.get_by_text("Add a body").click()
+
+
 def test_the_ball_of_the_mouse_pushes(resting):
     screen, controls = resting.screen, resting.panel.mouse_controls
     screen.choose(controls.mode, "push")
@@ -204,7 +240,7 @@ def test_the_ball_of_the_mouse_pushes(resting):
         mouse.down()
         mouse.move(x + 120, y, steps=2)
 
-    screen.insist(hold, lambda: resting.snapshot().pusher is not None, "the ball of the mouse")
+    screen.insist(hold, lambda: resting.snapshot().pusher is not None, "the ball of the mouse", patience=15.0)
     for k in range(10):
         mouse.move(x + 120 - 12 * k, y)
         screen.tab.wait_for_timeout(60)

@@ -1,5 +1,6 @@
 """What is recorded from a running simulation, and who gets it."""
 
+import html
 from types import SimpleNamespace
 
 import numpy as np
@@ -78,4 +79,4 @@ def test_what_is_not_installed_is_said(live, guest, monkeypatch):
     record.kind.value = "MP4"
     record._toggle(SimpleNamespace(client=guest))
     assert not record.recording
-    assert "pip install 'supple[video]'" in record._said.content
+    assert "pip install 'supple[video]'" in html.unescape(record._said.content)

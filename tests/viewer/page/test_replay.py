@@ -1,6 +1,7 @@
 """Recordings on the page, and what visitors take home from it."""
 
 import io
+import time
 
 import numpy as np
 import pytest
@@ -94,8 +95,8 @@ def test_a_page_of_the_recording_stands_alone(replay, browser, pixels, spot, tmp
     asked = []
     tab.on("request", lambda request: asked.append(request.url))
     tab.goto(file.as_uri())
-    places = []
-    for _ in range(100):
+    places, end = [], time.monotonic() + 90.0
+    while time.monotonic() < end:
         tab.wait_for_timeout(100)
         count, middle, _ = spot(pixels(tab)[:260, 160:], "red")
         if count > 100:

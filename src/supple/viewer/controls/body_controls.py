@@ -29,7 +29,7 @@ class BodyControls:
             self.squash = gui.add_button_group("All bodies", ("squash", "stretch"))
             self.which = gui.add_dropdown("Of", (ALL, *(body.name for body in scene.bodies)), initial_value=ALL)
             self.change = gui.add_button_group("This one", ("copy", "remove"), visible=False)
-        with gui.add_folder("Add a body", expand_by_default=False):
+        with gui.add_folder("Add a body", expand_by_default=False) as self.new:
             self.shape = gui.add_dropdown("Shape", limits.SHAPES, initial_value="sphere")
             self.size = gui.add_number(
                 "Size [m]", initial_value=round(0.3 * size, 3), min=1e-3, max=100.0, step=round(0.01 * size, 4) or 0.001
@@ -97,8 +97,16 @@ class BodyControls:
             event.client,
             lambda: AddBody(
                 one_of(self.shape.value, limits.SHAPES),
-                size=number(self.size.value, 1e-3, 100.0),
+                size=self.new_size(),
                 resolution=round(number(self.resolution.value, limits.COARSEST, 16)),
-                youngs=10.0 ** number(self.youngs.value, 3.0, 8.0),
+                youngs=self.new_youngs(),
             ),
         )
+
+    def new_size(self) -> float:
+        """Of a body that is added [m]."""
+        return number(self.size.value, 1e-3, 100.0)
+
+    def new_youngs(self) -> float:
+        """Young's modulus of a body that is added [Pa]."""
+        return 10.0 ** number(self.youngs.value, 3.0, 8.0)

@@ -7,6 +7,7 @@ from typing import Any
 from supple.viewer import limits
 from supple.viewer.controls.desk import Desk, in_order
 from supple.viewer.messages import Pause, Play, Reset, SetSpeed, Step
+from supple.viewer.plain import plain
 from supple.viewer.snapshots import Snapshot
 from supple.viewer.values import number, one_of
 
@@ -45,7 +46,7 @@ class TimeControls:
 
     def mourn(self, error: str) -> None:
         """Say that the simulation is gone."""
-        self._say(f"**The simulation is gone:** {error}")
+        self._say(f"**The simulation is gone:** {plain(error)}")
         for handle in (self.play, self.speed):
             if not handle.disabled:
                 handle.disabled = True
