@@ -297,6 +297,37 @@ def test_stitches_that_are_refused_are_refused_in_their_line(load, tmp_path, lin
     assert "\n" not in str(refused.value)
 
 
+def test_pairs_are_found_once_and_by_the_names_that_the_scene_gives(load, tmp_path, monkeypatch):
+    from supple.scene.stitches.stitch import Stitch
+    from supple.system import build_system
+
+    looked, find = [], Stitch.find
+    monkeypatch.setattr(Stitch, "find", lambda self, *sides: (looked.append(self.name), find(self, *sides))[1])
+    sp.shapes.box_surface((4, 1, 4), (1, 1, 1)).save(tmp_path / "roof.obj")
+    soft = "kind: soft_vertex_triangle, first: high, max_distance: 0.3, youngs: 1e5, poisson: 0.3"
+    nameless = STITCHED.replace("name: roof, ", "")
+    run = load(
+        nameless + f"  - {{name: a, {soft}, second: low}}\n  - {{name: b, {soft}, second: TriangleObstacle 1}}\n"
+    )
+    assert len(build_system(run.scene).stitching) == 8
+    assert looked == ["a", "b"]
+
+
+@pytest.mark.parametrize(
+    "pairs", ["[[0, 1, 2]]", "[[0]]", "[]", "[[0, 1.5]]", "[[0, -1]]", "[[0, 99]]", "[[0, 1], [0, 1]]", "7"]
+)
+def test_pairs_that_are_none_are_refused_in_their_line(load, tmp_path, pairs):
+    sp.shapes.box_surface((4, 1, 4), (1, 1, 1)).save(tmp_path / "roof.obj")
+    line = f"first: high, second: low, pairs: {pairs}, youngs: 1, poisson: 0.3"
+    with pytest.raises(sp.SceneError) as refused:
+        load(
+            STITCHED + "  - {kind: vertex_vertex, first: high, second: low, pairs: [[0, 0]], stiffness: 1}\n"
+            f"  - {{kind: soft_vertex_triangle, {line}}}\n"
+        )
+    assert re.search(r"scene.yaml:9:", str(refused.value))
+    assert "\n" not in str(refused.value)
+
+
 def test_contact_of_the_implicit_solver(load):
     solver = load(
         f"bodies: [{BODY}]\n"

@@ -17,7 +17,7 @@ from supple.scene.forces import Force, SoftTarget
 from supple.scene.obstacles import Obstacle
 from supple.scene.pins import Pin
 from supple.scene.stitches.stitch import Stitch
-from supple.scene.stitches.stitching import Stitching, stitch_together
+from supple.scene.stitches.stitching import Stitching, check_names, stitch_together
 from supple.scene.values import finite_vector
 
 _PARTS = (
@@ -100,17 +100,7 @@ class Scene:
         rules = PairRules(self)
         for pair in self.contact_pairs:
             rules.add(pair)
-        for stitch in self.stitches:
-            if stitch.first not in known:
-                raise SceneError(
-                    f"{stitch.label}: there is no body {stitch.first!r}; the scene has {', '.join(map(repr, known))}"
-                )
-            things = [*known, *(str(obstacle.name) for obstacle in self.obstacles)]
-            if stitch.second not in things:
-                raise SceneError(
-                    f"{stitch.label}: there is no body or obstacle {stitch.second!r}; the scene has "
-                    f"{', '.join(map(repr, things))}"
-                )
+        check_names(self.stitches, known, [str(obstacle.name) for obstacle in self.obstacles])
 
     @cached_property
     def stitching(self) -> Stitching:

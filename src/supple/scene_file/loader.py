@@ -21,7 +21,7 @@ from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.scene.selection import InBox
 from supple.scene.stitches.stitch import Stitch
-from supple.scene.stitches.stitching import stitch_together
+from supple.scene.stitches.stitching import StitchError
 from supple.scene_file.complaints import complaint, suggestion
 from supple.scene_file.contact_pairs import built_pairs
 from supple.scene_file.document import OutputModel, SceneFileModel
@@ -133,15 +133,18 @@ def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
     stitches: list[Stitch] = []
     for i, described in enumerate(model.stitches):
         with at("stitches", i):
-            stitch = described.build()
-            stitch_together(list(bodies.values()), obstacles, [stitch])
-            stitches.append(stitch)
+            stitches.append(described.build())
     with at("solver"):
         solver = model.solver.build()
     with at():
-        scene = Scene(list(bodies.values()), obstacles, pins, model.gravity, forces, targets, stitches)
-        if model.contact_pairs:
-            scene = replace(scene, contact_pairs=built_pairs(model.contact_pairs, scene))
+        try:
+            scene = Scene(list(bodies.values()), obstacles, pins, model.gravity, forces, targets, stitches)
+            if model.contact_pairs:
+                scene = replace(scene, contact_pairs=built_pairs(model.contact_pairs, scene))
+            # Found here, where an error's place in the file is known; the scene keeps them.
+            logger.debug("%d stitched pairs", len(scene.stitching))
+        except StitchError as error:
+            raise LocatedError(("stitches", error.number), str(error)) from None
     return Run(scene, solver, model.dt, model.steps, starts, model.output)
 
 

@@ -22,6 +22,14 @@ from supple.scene.stitches.side import Side, side_of
 from supple.scene.stitches.stitch import Stitch
 
 
+class StitchError(SceneError):
+    """One of a scene's stitches is wrong: the one of that `number`."""
+
+    def __init__(self, number: int, message: str) -> None:
+        super().__init__(message)
+        self.number = number
+
+
 @dataclass(frozen=True, eq=False)
 class StitchRange:
     """One stitch of the scene, its pairs, and which tets or springs are its own."""
@@ -147,11 +155,11 @@ def no_stitching(body_vertices: int) -> Stitching:
 
 
 def stitch_together(bodies: Sequence[Body], obstacles: Sequence[Obstacle], stitches: Sequence[Stitch]) -> Stitching:
-    """Find the pairs of all stitches, and number them.
+    """Find the pairs of all stitches, and number them. What they name is there: see `check_names`.
 
     Raises
     ------
-    SceneError : where there is no such body or obstacle, a pair does not exist, or none is within reach.
+    StitchError : where a thing cannot be held on to, a pair does not exist, or none is within reach.
     """
     starts = np.concatenate([[0], np.cumsum([len(body.mesh.vertices) for body in bodies])])
     n = int(starts[-1])
@@ -164,20 +172,19 @@ def stitch_together(bodies: Sequence[Body], obstacles: Sequence[Obstacle], stitc
     numbers: dict[tuple[int, int], int] = {}  # of anchors, by obstacle and vertex
     ranges: list[StitchRange] = []
     tets, springs = [StitchTets.none()], [Springs.none()]
-    for stitch in stitches:
-        if stitch.first not in first_of:
-            raise _unknown(stitch, stitch.first, "body", first_of)
-        if stitch.second not in things:
-            raise _unknown(stitch, stitch.second, "body or obstacle", things)
+    for number, stitch in enumerate(stitches):
         for name in (stitch.first, stitch.second):
             if name not in sides:
                 try:
                     sides[name] = side_of(things[name])
                 except SceneError as error:
-                    raise SceneError(f"{stitch.label}: {error}") from None
+                    raise StitchError(number, f"{stitch.label}: {error}") from None
         first, second = sides[stitch.first], sides[stitch.second]
-        pairs = stitch.find(first, second)
-        part = stitch.join(first, second, pairs)
+        try:
+            pairs = stitch.find(first, second)
+            part = stitch.join(first, second, pairs)
+        except SceneError as error:
+            raise StitchError(number, str(error)) from None
         if stitch.second in first_of:
             numbering = first_of[stitch.second] + np.arange(len(second.points))
         else:
@@ -202,5 +209,18 @@ def _anchors(obstacles: Sequence[Obstacle], numbers: dict[tuple[int, int], int])
     return Anchors(tuple(obstacles), places[:, 0], places[:, 1], points)
 
 
-def _unknown(stitch: Stitch, name: str, what: str, known: dict) -> SceneError:
-    return SceneError(f"{stitch.label}: there is no {what} {name!r}; there are {', '.join(map(repr, known))}")
+def check_names(stitches: Sequence[Stitch], bodies: Sequence[str], obstacles: Sequence[str]) -> None:
+    """Raise where a stitch names what is not among the names of bodies, or of bodies and obstacles.
+
+    Raises
+    ------
+    StitchError : says what there is.
+    """
+    for number, stitch in enumerate(stitches):
+        for name, what, known in (
+            (stitch.first, "body", bodies),
+            (stitch.second, "body or obstacle", [*bodies, *obstacles]),
+        ):
+            if name not in known:
+                there = ", ".join(map(repr, known))
+                raise StitchError(number, f"{stitch.label}: there is no {what} {name!r}; the scene has {there}")

@@ -61,12 +61,14 @@ class SoftVertexTriangleStitch(Stitch):
         if given == ["mu", "lam"]:
             _same_count(self, "mu", "lam")
         elif given in (["youngs", "poisson"], list(_MODULI)):
-            lame = self._converted()
+            mu, lam = self._converted()
             # All four are there where a stitch is made from another one by `dataclasses.replace`.
-            if len(given) == 4 and not all(map(np.array_equal, (self.mu, self.lam), lame)):
+            if len(given) == 4 and not (
+                np.array_equal(mu, np.asarray(self.mu)) and np.array_equal(lam, np.asarray(self.lam))
+            ):
                 raise SceneError(f"{self.label}: mu, lam are not those of youngs, poisson; give one pair, not both")
-            object.__setattr__(self, "mu", lame[0])
-            object.__setattr__(self, "lam", lame[1])
+            object.__setattr__(self, "mu", mu)
+            object.__setattr__(self, "lam", lam)
         else:
             said = " and ".join(given) or "neither"
             raise SceneError(f"{self.label}: give mu and lam, or youngs and poisson (given: {said})")
