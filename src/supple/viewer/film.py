@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import io
+import itertools
 import tempfile
 import threading
 import time
+from collections.abc import Iterable
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -28,14 +30,18 @@ def picture_of(client: Any, tallest: int = 2160, kind: str = "png") -> NDArray[n
     ------
     OutputError : where the browser sends none.
     """
-    height, width = client.camera.image_height, client.camera.image_width
-    scale = min(1.0, tallest / max(1, height))
+    # What a browser says of its window may be anything.
+    height, width = (max(1.0, float(n)) for n in (client.camera.image_height, client.camera.image_width))
+    scale = min(1.0, tallest / height, 4.0 * tallest / width)
     # Even numbers of pixels: what encoders of video ask for.
     size = [max(2, int(n * scale) // 2 * 2) for n in (height, width)]
     try:
-        return client.get_render(*size, transport_format=kind, timeout=_PATIENCE)
-    except (RuntimeError, TimeoutError, ConnectionError) as error:
+        picture = client.get_render(*size, transport_format=kind, timeout=_PATIENCE)
+    except (RuntimeError, TimeoutError, ConnectionError, OSError, ValueError) as error:
         raise OutputError(f"the browser sent no picture: {error}") from None
+    if list(picture.shape[:2]) != size:
+        raise OutputError("the browser sent a picture of another size")
+    return picture
 
 
 def png_of(client: Any) -> bytes:
@@ -63,7 +69,8 @@ class Film:
 
     def __init__(self, client: Any) -> None:
         self._client = client
-        self._frames: list[NDArray[np.uint8]] = []
+        self._frames: list[bytes] = []  # as JPEG: a minute of pixels would be gigabytes
+        self._size: tuple[int, ...] = ()
         self._times: list[float] = []
         self._error: OutputError | None = None
         self._stop = threading.Event()
@@ -77,10 +84,14 @@ class Film:
             if now > _MOST_SECONDS:
                 break
             try:
-                self._frames.append(picture_of(self._client, _TALLEST, "jpeg")[..., :3])
+                picture = picture_of(self._client, _TALLEST, "jpeg")[..., :3]
             except OutputError as error:
                 self._error = error
                 break
+            self._size = self._size or picture.shape
+            if picture.shape != self._size:  # a window that is resized ends the film
+                break
+            self._frames.append(_packed(picture))
             self._times.append(now)
             self._stop.wait(_SMALLEST_PAUSE)
 
@@ -98,33 +109,50 @@ class Film:
             raise OutputError(f"{kind.upper()} {missing}")
         if not self._frames:
             raise self._error or OutputError("there is no picture yet; record for longer")
-        size = self._frames[0].shape  # a window that is resized ends the film
-        frames = [frame for frame in self._frames if frame.shape == size]
-        lasted = self._times[-1] - self._times[0] if len(self._times) > 1 else 0.1
-        rate = max(1.0, (len(frames) - 1) / lasted) if len(frames) > 1 else 10.0
+        count = len(self._frames)
+        lasted = self._times[-1] - self._times[0] if count > 1 else 0.1
+        rate = max(1.0, (count - 1) / lasted) if count > 1 else 10.0
+        frames = (_unpacked(frame) for frame in self._frames)
         return gif_of(frames, rate) if kind == "gif" else mp4_of(frames, rate)
 
 
-def gif_of(frames: list[NDArray[np.uint8]], rate: float) -> bytes:
-    """Frames (h, w, 3) as an animated GIF of `rate` frames per second."""
+def _packed(frame: NDArray[np.uint8]) -> bytes:
     from PIL import Image
 
-    pictures = [Image.fromarray(frame) for frame in frames]
     out = io.BytesIO()
-    pictures[0].save(out, "GIF", save_all=True, append_images=pictures[1:], duration=round(1000.0 / rate), loop=0)
+    Image.fromarray(np.ascontiguousarray(frame)).save(out, "JPEG", quality=95, subsampling=0)
     return out.getvalue()
 
 
-def mp4_of(frames: list[NDArray[np.uint8]], rate: float) -> bytes:
-    """Frames (h, w, 3) as H.264 video of `rate` frames per second."""
+def _unpacked(frame: bytes) -> NDArray[np.uint8]:
+    from PIL import Image
+
+    with Image.open(io.BytesIO(frame)) as picture:
+        return np.asarray(picture)
+
+
+def gif_of(frames: Iterable[NDArray[np.uint8]], rate: float) -> bytes:
+    """Frames (h, w, 3), at least one, as an animated GIF of `rate` frames per second."""
+    from PIL import Image
+
+    pictures = (Image.fromarray(frame) for frame in frames)
+    first, out = next(pictures), io.BytesIO()
+    first.save(out, "GIF", save_all=True, append_images=pictures, duration=round(1000.0 / rate), loop=0)
+    return out.getvalue()
+
+
+def mp4_of(frames: Iterable[NDArray[np.uint8]], rate: float) -> bytes:
+    """Frames (h, w, 3), at least one, as H.264 video of `rate` frames per second."""
     import imageio_ffmpeg
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "film.mp4"
-        height, width = frames[0].shape[:2]
+        pictures = iter(frames)
+        first = next(pictures)
+        height, width = first.shape[:2]
         writer = imageio_ffmpeg.write_frames(str(path), (width, height), fps=max(1, round(rate)), macro_block_size=2)
         writer.send(None)
-        for frame in frames:
+        for frame in itertools.chain([first], pictures):
             writer.send(np.ascontiguousarray(frame))
         writer.close()
         return path.read_bytes()

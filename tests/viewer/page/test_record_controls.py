@@ -58,6 +58,43 @@ def test_a_film_of_what_the_browser_shows(live, guest, until):
         assert made.size == (60, 40)
 
 
+def test_a_video_of_what_the_browser_shows(live, guest, until, tmp_path):
+    """Every picture of it is in the MP4, in order and in its shade."""
+    ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    record, event = live.panel.record, SimpleNamespace(client=guest)
+    record.kind.value = "MP4"
+    record._toggle(event)
+    assert record.recording
+    until(lambda: guest.shade >= 100)
+    record._toggle(event)
+    assert record._said.content == ""
+    (tmp_path / "film.mp4").write_bytes(guest.files["supple.mp4"])
+    reader = ffmpeg.read_frames(str(tmp_path / "film.mp4"))
+    facts = next(reader)
+    assert (facts["size"], facts["codec"]) == ((60, 40), "h264")
+    shades = [np.frombuffer(frame, np.uint8).mean() for frame in reader]
+    assert len(shades) >= 4
+    wanted = 20.0 * np.arange(1, len(shades) + 1) % 250
+    np.testing.assert_allclose(shades, wanted, atol=6.0)
+
+
+def test_a_picture_of_another_size_than_asked_for_is_not_taken(live, guest):
+    """A browser may say and send anything."""
+    record = live.panel.record
+    guest.camera = SimpleNamespace(image_height=1e300, image_width=1e300)
+    asked = []
+
+    def another(height, width, **_):
+        asked.append((height, width))
+        return np.zeros((height + 2, width, 3), dtype=np.uint8)
+
+    guest.get_render = another
+    record._take_picture(SimpleNamespace(client=guest))
+    assert asked == [(2160, 2160)]
+    assert guest.files == {}
+    assert "another size" in record._said.content
+
+
 def test_a_browser_that_sends_no_picture_is_told(live, guest):
     record = live.panel.record
 
