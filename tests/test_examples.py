@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from supple.scene_file.loader import load_run
+from supple.simulate import simulate
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
@@ -48,6 +49,19 @@ def test_every_example_is_run_by_a_test_of_this_file():
     numbers = {path.name[:2] for path in EXAMPLES.glob("[0-9]*.py")}
     tested = {name[5:7] for name in globals() if name.startswith("test_0")}
     assert numbers == tested
+
+
+def test_the_patch_stays_on_the_bar_that_swings():
+    run = load_run(EXAMPLES / "scenes" / "patch.yaml")
+    (seam,) = run.scene.stitching.ranges
+    assert len(seam.pairs.rows) == 28
+    *_, frame = simulate(run.scene, run.solver, run.dt, 30, **run.start)
+    report = frame.report
+    assert report.status == "converged"
+    assert frame.positions["bar"][:, 1].min() < -0.5, "the bar hangs down"
+    assert 1.0 < report.largest_stitch_stretch < 1.2
+    assert 0.0 < report.stitch_energy < 0.01 * report.elastic_energy
+    assert report.min_det_F > 0.5
 
 
 @pytest.mark.parametrize("path", sorted((EXAMPLES / "scenes").glob("*.yaml")), ids=lambda path: path.stem)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.numerics.triangle_tree import pair_distances
 from supple.system import build_system, initial_state
 from supple.xpbd.collisions import Collisions
 from supple.xpbd.constraints_stable_neo_hookean import BlocksOfTwo
@@ -42,8 +43,9 @@ def test_only_what_is_stitched_together_does_not_collide(kind, second):
     stitch = stitches_to(second, pairs=[[3, 1]])[kind]
     obstacle = sp.TriangleObstacle(name="sheet", surface=SHEET)
     system = build_system(sp.Scene([box("a", 0.2), box("b", 0.05)], [obstacle], stitches=[stitch]))
-    surfaces = Collisions(system, ContactSettings()).surfaces.surfaces
-    points, triangles = stitched_contacts(system, surfaces)
+    collisions = Collisions(system, ContactSettings())
+    surfaces = collisions.surfaces.surfaces
+    points, triangles = stitched_contacts(system, surfaces, collisions.poses)
     found = set(zip(points.tolist(), triangles.tolist(), strict=True))
     n = len(system.masses)
     # In numbers of vertices: bodies', then the obstacle's.
@@ -59,6 +61,53 @@ def test_only_what_is_stitched_together_does_not_collide(kind, second):
                     wanted.add((p, t))
     assert found == wanted
     assert len(wanted) >= 4
+
+
+@pytest.mark.parametrize("pairs", [[[6, 0]], [[6, 0], [7, 1], [8, 5], [15, 20]], None])
+@pytest.mark.parametrize("second", ["b", "sheet"])
+def test_what_is_sewn_face_to_face_does_not_collide(pairs, second):
+    """Where the point is stitched, or all of the triangle, and they are nearer than contact's gap at the start."""
+    few = 48 if second == "b" else 2
+    how = {"pairs": [[v, t % few] for v, t in pairs]} if pairs else {"max_distance": 0.0011}
+    obstacle = sp.TriangleObstacle(name="sheet", surface=SHEET)
+    stitch = sp.SoftVertexTriangleStitch("a", second, youngs=1e5, poisson=0.3, **how)
+    system = build_system(sp.Scene([box("a", 0.051), box("b", -0.05)], [obstacle], stitches=[stitch]))
+    collisions = Collisions(system, ContactSettings())
+    surfaces = collisions.surfaces.surfaces
+    points, triangles = stitched_contacts(system, surfaces, collisions.poses)
+    n = len(system.masses)
+    place = np.concatenate([surfaces.rows, n + np.arange(4)])
+    x = np.concatenate([initial_state(system.scene).positions, SHEET.vertices])[place]
+    thing = np.concatenate([np.repeat([0, 1], n // 2), np.full(4, 2)])[place]
+    numbers = np.concatenate([np.arange(n), n + system.stitching.anchors.vertices])
+    sewn = np.isin(place, numbers[system.stitching.tets.vertices])
+    p, t = (k.ravel() for k in np.indices((len(x), len(surfaces.triangles))))
+    corners = surfaces.triangles[t]
+    near = pair_distances(x[p], x, corners.astype(np.int32)) < collisions.thickness
+    joined = {(0, 1), (1, 0)} if second == "b" else {(0, 2), (2, 0)}
+    apart = np.array([(one, other) in joined for one, other in zip(thing[p], thing[corners[:, 0]], strict=True)])
+    wanted = near & apart & (sewn[p] | sewn[corners].all(axis=1))
+    tets = numbers[system.stitching.tets.vertices]
+    for vertex, *held in tets:
+        wanted |= (place[p] == vertex) & np.isin(place[corners], held).all(axis=1)
+        wanted |= np.isin(place[p], held) & (place[corners] == vertex).any(axis=1)
+    assert set(zip(points.tolist(), triangles.tolist(), strict=True)) == set(zip(p[wanted], t[wanted], strict=True))
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.001])
+def test_a_pair_sewn_face_to_face_is_held_by_its_stitches_alone(gap):
+    a, b = box("a", 0.15 + gap, angular_velocity=(0, 2, 1), velocity=(0.1, 0, 0)), box("b", 0.05)
+    stitch = sp.SoftVertexTriangleStitch("a", "b", max_distance=gap + 1e-6, youngs=1e5, poisson=0.3)
+    scene = sp.Scene([a, b], stitches=[stitch], gravity=(0, 0, 0))
+    m, first = build_system(scene).masses, initial_state(scene)
+    center = m @ first.positions / m.sum()
+    P, L = m @ first.velocities, m @ np.cross(first.positions - center, first.velocities)
+    for frame in sp.simulate(scene, XPBD(substeps=20), 1 / 60, 30):
+        report = frame.report
+        assert report.details["contacts"] == 0
+        assert report.largest_stitch_stretch < 1.2
+        assert np.abs(report.linear_momentum - P).max() <= 1e-9 * np.abs(P).max()
+        assert np.abs(report.angular_momentum - L).max() <= 1e-9 * np.abs(L).max()
 
 
 def test_a_masked_pair_touches_and_its_neighbours_do_not():

@@ -32,7 +32,8 @@ def excluded_pairs(
         (np.ones(3 * count, dtype=np.int32), triangles.ravel(), 3 * np.minimum(np.arange(every + 1), count)),
         shape=(every, n),
     )
-    near_points, near_triangles = _close_at_rest(surfaces, rest_positions, closer_than)
+    same = np.ascontiguousarray(np.diag(np.diagonal(surfaces.allowed)))
+    near_points, near_triangles = pairs_closer_than(surfaces, rest_positions, closer_than, same)
     close = csr_array(
         (np.ones(len(near_points), dtype=np.int32), (near_triangles, near_points)),
         shape=(every, n),
@@ -42,16 +43,21 @@ def excluded_pairs(
     return found.indptr.astype(np.int64), found.indices.astype(np.int32)
 
 
-def _close_at_rest(
-    surfaces: ContactSurfaces, rest_positions: NDArray[np.float64], closer_than: float
+def pairs_closer_than(
+    surfaces: ContactSurfaces, positions: NDArray[np.float64], closer_than: float, pieces: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """(q,) points and (q,) triangles that are closer than that to each other [m].
+
+    Parameters
+    ----------
+    positions : (n, 3) of all points [m]; pieces : (p, p) of which pieces the points and the triangles may be
+    """
     n, t = len(surfaces.point_piece), len(surfaces.triangles)
     finder = PairFinder(n, len(surfaces.closed), closer_than)
     look = np.zeros((n, 3))
     look[:, 0] = closer_than
-    same = np.ascontiguousarray(np.diag(np.diagonal(surfaces.allowed)))
-    none = (same, np.zeros(t + 1, dtype=np.int64), np.zeros(0, dtype=np.int32))
-    shapes = (rest_positions, surfaces.point_piece, surfaces.triangles, surfaces.triangle_piece)
+    none = (pieces, np.zeros(t + 1, dtype=np.int64), np.zeros(0, dtype=np.int32))
+    shapes = (positions, surfaces.point_piece, surfaces.triangles, surfaces.triangle_piece)
     finder.gather(shapes, (look, look), none)
     points = np.repeat(np.arange(n, dtype=np.int32), np.diff(finder.starts))
     return points, finder.triangles[: finder.count]

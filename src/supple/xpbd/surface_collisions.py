@@ -31,7 +31,7 @@ class SurfaceCollisions:
         rest = np.concatenate([system.rest_positions[s.rows], s.fixed_points])
         widest = float(np.diagonal(s.gaps).max(initial=0.0))
         excluded = excluded_pairs(s, rest, 2.0 * min(widest, 0.5 * edge_length))
-        self._stitched = stitched_points(system, s)
+        self._stitched = stitched_points(system, s, poses)
         self._rules = (s.allowed, *excluded)
         self._finder = PairFinder(n, pieces, edge_length)
         self._x, self._before, self._gathered = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
