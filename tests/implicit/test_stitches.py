@@ -223,6 +223,16 @@ def test_surfaces_may_touch_where_they_are_stitched_and_nowhere_else():
     assert goes(scene(under))
 
 
+def test_what_is_refused_is_not_the_seam():
+    """Halves sewn face to face touch, and may; the floor that one of them touches is what has to be mended."""
+    seam = sp.SoftVertexTriangleStitch("a", "b", max_distance=1e-6, youngs=1e5, poisson=0.3)
+    scene = sp.Scene([box("a", 0.15), box("b", 0.05)], [sp.HalfSpace(name="floor")], stitches=[seam])
+    with pytest.raises(sp.SceneError, match="body 'b' touches obstacle 'floor'"):
+        list(sp.simulate(scene, sp.Implicit(), 1 / 60, 1))
+    higher = sp.Scene([box("a", 0.151), box("b", 0.051)], scene.obstacles, stitches=[seam])
+    assert [frame.report.status for frame in sp.simulate(higher, sp.Implicit(), 1 / 60, 2)] == ["converged"] * 2
+
+
 def inside(p, corners):
     a, b, c = corners
     signs = [(v - u)[0] * (p - u)[1] - (v - u)[1] * (p - u)[0] for u, v in ((a, b), (b, c), (c, a))]

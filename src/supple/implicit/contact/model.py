@@ -115,7 +115,7 @@ class ContactModel:
         apart = self.allows(x) and not self.collisions.intersect(x) and self.smallest_distance(x) > 0.0
         if len(stitching) and apart:
             return
-        refuse_intersecting(self.system, x, time, self.table)
+        refuse_intersecting(self.system, x, time, self.table, sewn=self._sewn_things())
         if not apart:
             raise SolverError("the scene starts with surfaces that touch; move them apart, or give contact=None")
 
@@ -140,6 +140,15 @@ class ContactModel:
             if distances[k] ** 2 < best:
                 names = self._names([self.planes.owner[k], self.surface.body_count + self.planes.obstacle[k]])
         return names
+
+    def _sewn_things(self) -> set[tuple[int, int]]:
+        """Which things a stitch joins: bodies in the scene's order, then obstacles."""
+        names = self.surface.names
+        return {
+            (min(pair), max(pair))
+            for stitch in self.system.scene.stitches
+            for pair in [(names.index(stitch.first), names.index(stitch.second))]
+        }
 
     def _names(self, owners: list[int]) -> str:
         kinds = [f"{'body' if k < self.surface.body_count else 'obstacle'} {self.surface.names[k]!r}" for k in owners]
