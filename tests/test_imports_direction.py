@@ -22,7 +22,7 @@ FLOORS = (
     ("system",),
     ("scene",),
     ("mesh", "materials"),
-    ("numerics", "state", "contact_points", "errors"),
+    ("numerics", "state", "contact_points", "replacing", "errors"),
 )
 LEVEL = {part: -k for k, floor in enumerate(FLOORS) for part in floor}
 GROUND = FLOORS[-1]

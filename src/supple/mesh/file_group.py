@@ -6,24 +6,24 @@ import contextlib
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from uuid import uuid4
 
 from supple.errors import MeshError
+from supple.replacing import put_in_place, remove_abandoned, temporary_name
 
 
 def write_together(texts: Mapping[Path, Iterable[str]]) -> None:
     """Write each text (in pieces) to its path; where one cannot be written, all files stay as they were.
 
-    Everything is first written under temporary names in the same folder. Only then are old files moved aside and new
-    ones moved in, and moved back if that fails halfway.
+    Everything is first written under temporary names in the same folder. Only then are all old files moved aside and
+    the new ones moved in, and moved back if that fails halfway. Where the process is killed halfway, files are missing;
+    old and new ones never stand side by side.
 
     Raises
     ------
     MeshError : naming the file and the reason.
     """
-    tag = uuid4().hex[:8]
-    fresh = {path: path.with_name(f".{path.name}.{tag}.new") for path in texts}
-    saved = {path: path.with_name(f".{path.name}.{tag}.old") for path in texts}
+    fresh = {path: temporary_name(path) for path in texts}
+    saved = {path: temporary_name(path) for path in texts}
     moved_aside: list[Path] = []
     moved_in: list[Path] = []
     current = Path()
@@ -37,7 +37,8 @@ def write_together(texts: Mapping[Path, Iterable[str]]) -> None:
             if current.exists():
                 os.replace(current, saved[current])
                 moved_aside.append(current)
-            os.replace(fresh[current], current)
+        for current in texts:
+            put_in_place(fresh[current], current)
             moved_in.append(current)
     except BaseException as error:
         # A KeyboardInterrupt must not leave half a family either.
@@ -53,3 +54,5 @@ def write_together(texts: Mapping[Path, Iterable[str]]) -> None:
         for path in (*fresh.values(), *saved.values()):
             with contextlib.suppress(OSError):
                 path.unlink(missing_ok=True)
+    for path in texts:
+        remove_abandoned(path)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from supple.mesh.formats.polygons import triangles_of
 from supple.mesh.merge import merge_map
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
+from supple.replacing import put_in_place, remove_abandoned, temporary_name
 
 logger = logging.getLogger(__name__)
 
@@ -163,14 +163,15 @@ def _contents(path: Path) -> bytes:
 
 def _write_whole(path: Path, write: Callable[[Path], object]) -> None:
     """Write under a temporary name in the same folder, then rename: either the whole file is there or none of it."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    temporary = temporary_name(path)
     try:
         write(temporary)
-        os.replace(temporary, path)
+        put_in_place(temporary, path)
     except OSError as error:
         raise MeshError(f"{path}: it cannot be written: {error.strerror or error}") from None
     finally:
         temporary.unlink(missing_ok=True)
+    remove_abandoned(path)
 
 
 def _unknown_extension(path: Path, known: tuple[str, ...], hint: str) -> MeshError:

@@ -7,9 +7,9 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from uuid import uuid4
 
 from supple.errors import OutputError
+from supple.replacing import put_in_place, remove_abandoned, temporary_name
 
 
 def output_error(path: Path, error: OSError) -> OutputError:
@@ -31,11 +31,6 @@ def parent_folder(path: Path) -> Path:
     return path.parent
 
 
-def temporary_name(path: Path) -> Path:
-    """A name beside `path`, with its suffix, that nobody uses."""
-    return path.with_name(f".{path.stem}.{uuid4().hex[:8]}{path.suffix}")
-
-
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
     """A temporary path to write to; it becomes `path` where the block ends well, and vanishes where it does not.
@@ -47,14 +42,17 @@ def whole_file(path: Path) -> Iterator[Path]:
     parent_folder(path)
     if path.is_dir():
         raise OutputError(f"{path}: is a folder; give the name of a file")
+    if path.exists() and not path.is_file():
+        raise OutputError(f"{path}: is not an ordinary file; give the name of one")
     fresh = temporary_name(path)
     try:
         yield fresh
-        os.replace(fresh, path)
+        put_in_place(fresh, path)
     except OSError as error:
         raise output_error(path, error) from None
     finally:
         fresh.unlink(missing_ok=True)
+    remove_abandoned(path)
 
 
 @contextmanager
@@ -80,7 +78,7 @@ def whole_folder(path: Path) -> Iterator[Path]:
             if foreign:
                 raise OutputError(f"{path}: holds {foreign[0]!r}, which is not ours to delete; give a new folder")
             os.replace(path, aside)
-        os.replace(fresh, path)
+        put_in_place(fresh, path)
     except OSError as error:
         if aside.exists() and not path.exists():
             os.replace(aside, path)
@@ -88,3 +86,4 @@ def whole_folder(path: Path) -> Iterator[Path]:
     finally:
         shutil.rmtree(fresh, ignore_errors=True)
         shutil.rmtree(aside, ignore_errors=True)
+    remove_abandoned(path)

@@ -8,16 +8,16 @@ from __future__ import annotations
 import json
 import logging
 import math
-import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from supple.errors import OutputError
-from supple.output.atomic import output_error, parent_folder, temporary_name
+from supple.output.atomic import output_error, parent_folder
 from supple.output.recorded_scene import write_scene
 from supple.output.recording_file import STEP_TIMES, Layout, RecordingFile, Series, create, rewrite
+from supple.replacing import put_in_place, remove_abandoned, temporary_name
 from supple.simulate import Frame, Report
 from supple.state import Status
 
@@ -113,6 +113,7 @@ class Recorder:
             self._file = RecordingFile(fresh, layout, capacity)
             self._put(first)
             self._file = self._file.moved(self.path)
+            remove_abandoned(self.path)
         except OSError as error:
             raise output_error(self.path, error) from None
         finally:
@@ -141,7 +142,7 @@ class Recorder:
         fresh = temporary_name(self.path)
         try:
             rewrite(self.path, fresh, file.layout, None, compress=self._compress)
-            os.replace(fresh, self.path)
+            put_in_place(fresh, self.path)
         except (OSError, RuntimeError) as error:
             # The recording is whole as it is; there is only unused room in it.
             logger.warning("%s: stays larger than it must be: %s", self.path, " ".join(str(error).split()))

@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from supple.errors import OutputError
+from supple.replacing import put_in_place
 
 WRITTEN = "supple/frames_written"
 STEP_TIMES, _TIMES = "VTKHDF/Steps/Values", "supple/frames/time"
@@ -126,7 +127,7 @@ class RecordingFile:
     def moved(self, path: Path) -> RecordingFile:
         """The same file, under the name that it has now. It is closed first: some systems rename no open file."""
         self.close()
-        os.replace(self.path, path)
+        put_in_place(self.path, path)
         there = copy.copy(self)
         there.path, there._file = path, open(path, "r+b", buffering=0)  # noqa: SIM115
         return there
