@@ -195,6 +195,26 @@ def test_gif_shows_motion(tmp_path, tools):
     assert np.abs(shown[0] - shown[1]).max(axis=2).astype(bool).mean() > 0.01
 
 
+def test_mp4_plays_every_frame_at_the_speed_of_the_simulation(tmp_path, tools):
+    ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    pytest.importorskip("pyvista")
+    tools.record(tmp_path / "short.vtkhdf", 4)
+    try:
+        path = export(tmp_path / "short.vtkhdf", "mp4")
+    except OutputError as error:
+        if "OpenGL" not in str(error) or "CI" in os.environ:
+            raise
+        pytest.skip(str(error))
+    assert ffmpeg.count_frames_and_secs(str(path)) == (5, pytest.approx(5 / 30, abs=0.01))
+    frames = ffmpeg.read_frames(str(path))
+    facts = next(frames)
+    assert (facts["size"], facts["codec"], facts["fps"]) == ((960, 720), "h264", 30.0)
+    shown = [np.frombuffer(frame, np.uint8).reshape(720, 960, 3).astype(int) for frame in frames]
+    red = (shown[0][..., 0] - shown[0][..., 2]) > 80
+    assert red.sum() > 800  # the red body is seen
+    assert (np.abs(shown[0] - shown[4]).max(axis=2) > 30).mean() > 0.01
+
+
 def test_a_drawing_process_that_dies_is_one_clear_line(tmp_path, recorded, monkeypatch):
     """Where OpenGL is missing, VTK aborts its process; here another one does so in its place."""
     die = "import os, sys; sys.stderr.write('libEGL warning: no display\\nvtkEGLRenderWindow failed\\n'); os.abort()"

@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+import errno
+import re
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -29,7 +31,7 @@ def write_usd(recording: Recording, output: Path) -> None:
         raise OutputError("export to USD needs OpenUSD, which is not installed; pip install 'supple[usd]'")
     if output.suffix.lower() not in _SUFFIXES:
         raise OutputError(f"{output}: USD knows a file by its ending; name it {output.stem}.usdc")
-    from pxr import Usd, UsdGeom
+    from pxr import Tf, Usd, UsdGeom
 
     with whole_file(output) as fresh:
         stage = Usd.Stage.CreateNew(str(fresh))
@@ -54,7 +56,12 @@ def write_usd(recording: Recording, output: Path) -> None:
                     _set_points(mesh, obstacle.at(frame), k)
             else:
                 _set_points(mesh, obstacle.at(recording[0]), None)
-        stage.GetRootLayer().Save()
+        try:
+            stage.GetRootLayer().Save()
+        except Tf.ErrorException as error:
+            # USD says which of its source lines failed, then why, then what it finds when it reads that back.
+            said = re.search(r"rror occurred writing file: ([^'\n]*)", str(error))
+            raise OSError(errno.EIO, said[1] if said else "USD could not write it") from None
 
 
 def _define(stage, path: str, name: str, picture):

@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from supple.errors import OutputError
-from supple.replacing import put_in_place
+from supple.replacing import put_in_place, temporary_name
 
 WRITTEN = "supple/frames_written"
 STEP_TIMES, _TIMES = "VTKHDF/Steps/Values", "supple/frames/time"
@@ -146,7 +146,8 @@ def create(path: Path, layout: Layout, capacity: int, write_static: Callable[[h5
         write_static(draft)
         draft.flush()
         static_bytes = len(draft.id.get_file_image())
-    _require_room(path, static_bytes + _STEP_COLUMNS * 8 * capacity + layout.frame_bytes)
+    fixed = static_bytes + _STEP_COLUMNS * 8 * capacity
+    _require_room(path, fixed + layout.frame_bytes, length=fixed + layout.frame_bytes * capacity)
     with h5py.File(path, "w", libver=("earliest", "v110")) as file:
         _write_step_count(file, _STEPS_MARK)
         write_static(file)
@@ -166,7 +167,8 @@ def rewrite(source: Path, target: Path, layout: Layout, capacity: int | None, *,
     OSError : where there is no room.
     RuntimeError, TypeError, ValueError, KeyError : from HDF5, where the source is damaged.
     """
-    _require_room(target, _STEP_COLUMNS * 8 * (capacity or 1))
+    fixed = _STEP_COLUMNS * 8 * (capacity or 1)
+    _require_room(target, fixed, length=fixed + layout.frame_bytes * (capacity or 0))
     with h5py.File(source, "r", locking=False) as old, h5py.File(target, "w", libver=("earliest", "v110")) as new:
         written = int(_dataset(old, WRITTEN)[()])
         _write_step_count(new, _STEPS_MARK if capacity else written)
@@ -194,10 +196,22 @@ def rewrite(source: Path, target: Path, layout: Layout, capacity: int | None, *,
         _write_steps(new, layout, capacity or written)
 
 
-def _require_room(path: Path, size: int) -> None:
-    """Raise `OSError` unless `size` more bytes fit beside `path`: HDF5 itself crashes on a full disk."""
+def _require_room(path: Path, size: int, *, length: int = 0) -> None:
+    """Raise `OSError` unless `path` may grow by `size` bytes, and be `length` bytes long.
+
+    Where HDF5 itself meets a full disk, a quota or a limit of file sizes, it crashes.
+    """
     if shutil.disk_usage(path.parent).free < size + _SPARE_ROOM:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    before = path.stat().st_size if path.exists() else 0
+    probe = temporary_name(path)
+    try:
+        with probe.open("wb") as file:
+            file.truncate(max(length, before + size) + _SPARE_ROOM)
+            if hasattr(os, "posix_fallocate"):
+                os.posix_fallocate(file.fileno(), 0, size + _SPARE_ROOM)
+    finally:
+        probe.unlink(missing_ok=True)
 
 
 def _copy_static(old: h5py.Group, new: h5py.Group, where: str, series: set[str]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -103,18 +104,32 @@ def _write_mp4(images: Iterator[NDArray[np.uint8]], output: Path, rate: float, s
         output_params=["-f", "mp4", "-movflags", "+faststart"],
     )
     writer.send(None)
-    for image in images:
+    sent = 0
+    for sent, image in enumerate(images, start=1):  # noqa: B007
         writer.send(image)
     writer.close()
+    # The writer does not tell whether ffmpeg could write all that it was given.
+    try:
+        written = imageio_ffmpeg.count_frames_and_secs(str(output))[0]
+    except RuntimeError:
+        written = 0
+    if written != sent:
+        raise OSError(errno.EIO, f"ffmpeg wrote {written} of {sent} frames; is there room?")
+
+
+def _refuse(reason: str) -> int:
+    print(f"video: {' '.join(reason.split())}", file=sys.stderr)
+    return 2
 
 
 def main(arguments: list[str]) -> int:
     source, output, kind = arguments
     try:
         write(Path(source), Path(output), kind)
-    except (SuppleError, OSError) as error:
-        print(f"video: {' '.join(str(error).split())}", file=sys.stderr)
-        return 2
+    except SuppleError as error:
+        return _refuse(str(error))
+    except OSError as error:
+        return _refuse(f"cannot be written: {error.strerror or error}; choose another place or make room there")
     return 0
 
 

@@ -1,0 +1,65 @@
+"""Where a system limits the size of files, as quotas do: one line, nothing half-written. HDF5 alone would crash."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from importlib.util import find_spec
+
+import pytest
+
+pytest.importorskip("resource", reason="only POSIX limits the size of files")
+
+IN_NO_ROOM = """
+import json, resource, sys
+from pathlib import Path
+import numpy as np
+import supple as sp
+from supple.errors import OutputError
+from supple.output.export import export
+from supple.output.plots import plot_recording
+from supple.output.video_worker import _write_mp4
+
+ENDINGS = {"usdc": "usd"}
+source, folder = Path(sys.argv[1]), Path(sys.argv[2])
+mesh = sp.TetMesh(np.vstack([np.zeros(3), np.eye(3)]), [[0, 1, 2, 3]])
+scene = sp.Scene([sp.Body("tet", mesh, sp.StableNeoHookean(youngs=1e4, poisson=0.3))])
+noise = np.random.default_rng(0).integers(0, 255, (96, 128, 3), np.uint8)
+
+def record(steps):
+    return list(sp.simulate(scene, sp.XPBD(), 0.01, steps, sinks=[sp.Recorder(folder / "recording.vtkhdf")]))
+
+resource.setrlimit(resource.RLIMIT_FSIZE, (12_000, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
+works = {
+    "recording.vtkhdf": lambda: record(1000),
+    "plot.png": lambda: plot_recording(source, folder / "plot.png"),
+    "mesh.ele": lambda: sp.shapes.box((1, 1, 1), (12, 12, 12)).save(folder / "mesh.ele"),
+    **{f"a.{to}": lambda to=to: export(source, ENDINGS.get(to, to), folder / f"a.{to}") for to in sys.argv[3:]},
+    "video": lambda: _write_mp4(iter([np.roll(noise, k) for k in range(60)]), folder / "a.mp4", 30.0, (128, 96)),
+}
+said = {}
+for name, work in works.items():
+    try:
+        work()
+        said[name] = "done"
+    except (OSError, sp.SuppleError) as error:
+        said[name] = str(error)
+(folder / "a.mp4").unlink(missing_ok=True)  # its own writer renames it only when it is whole
+print(json.dumps(said))
+"""
+
+
+def test_files_that_may_not_be_large_are_refused_and_leave_nothing(tmp_path, recorded):
+    formats = ["vtkhdf", "glb", *(["usdc"] if find_spec("pxr") else [])]
+    command = [sys.executable, "-c", IN_NO_ROOM, str(recorded[0]), str(tmp_path), *formats]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=200)
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert "Traceback" not in done.stderr
+    said = json.loads(done.stdout)
+    assert said.pop("video").endswith("of 60 frames; is there room?")
+    assert set(said) == {"recording.vtkhdf", "plot.png", "mesh.ele", *(f"a.{to}" for to in formats)}
+    for name, text in said.items():
+        assert "cannot be written: File too large" in text, name
+        assert "\n" not in text
+    assert list(tmp_path.iterdir()) == []
