@@ -289,7 +289,7 @@ def test_places_that_are_not_ours_are_left_alone(tmp_path, recorded):
         export(recorded[0], "glb", tmp_path / "mine")
     with pytest.raises(OutputError, match="is a file"):
         export(recorded[0], "pvd", tmp_path / "mine" / "thesis.txt")
-    with pytest.raises(OutputError, match="is the recording itself"):
+    with pytest.raises(OutputError, match="itself, which is read"):
         export(recorded[0], "vtkhdf", recorded[0])
 
 

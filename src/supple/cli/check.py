@@ -53,6 +53,7 @@ def check(
     quiet
         Print nothing but what failed.
     """
+    from supple.output.atomic import refuse_to_replace
     from supple.output.check.checker import check_recording
     from supple.output.check.settings import CheckSettings
 
@@ -65,6 +66,8 @@ def check(
         "max_momentum_change": max_momentum_change,
     }
     settings = CheckSettings(**{key: value for key, value in given.items() if value is not None})
+    if json is not None:
+        refuse_to_replace(recording, json)
     report = check_recording(recording, settings)
     if json is not None:
         report.save(json)

@@ -66,6 +66,7 @@ def mesh(
     from supple.mesh.surface import SurfaceMesh
     from supple.mesh.tetgen_files import family_paths, is_tetgen_path, write_tetgen
     from supple.mesh.tetrahedralize import tetrahedralize_reported
+    from supple.output.atomic import refuse_to_replace
 
     # Before minutes of meshing, not after.
     if output.suffix.lower() not in TET_EXTENSIONS:
@@ -78,6 +79,7 @@ def mesh(
     for target in targets:
         if target.is_dir():
             raise MeshError(f"{target}: is a folder; give another name")
+        refuse_to_replace(surface, target)
     loaded = SurfaceMesh.load(surface)
     with Console(stderr=True).status(f"meshing {len(loaded.triangles)} triangles"):
         try:

@@ -23,6 +23,9 @@ def plot(
     output
         Picture to write (.png, .pdf or .svg); without it, plot.png beside the recording.
     """
+    from supple.output.atomic import refuse_to_replace
     from supple.output.plots import plot_recording
 
-    print(plot_recording(recording, recording.with_name("plot.png") if output is None else output))
+    picture = recording.with_name("plot.png") if output is None else output
+    refuse_to_replace(recording, picture)
+    print(plot_recording(recording, picture))

@@ -56,6 +56,10 @@ def run(
     from supple.scene_file.loader import load_run
     from supple.scene_file.solvers import solver_of_kind
 
+    if trace is not None:
+        from supple.output.atomic import refuse_to_replace
+
+        refuse_to_replace(scene, trace)
     described = load_run(scene)
     if separate:
         from supple.cli.separation import moved_apart

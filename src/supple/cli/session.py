@@ -10,6 +10,7 @@ from typing import Any
 
 from supple.cli.complain import complain
 from supple.cli.exit_codes import ExitCode
+from supple.errors import OutputError
 from supple.scene.scene import Scene
 from supple.simulate import Frame, Sink, simulate
 from supple.solver import Solver
@@ -72,6 +73,9 @@ def run_session(
     from supple.output.recording import Recorder
 
     recording = products.folder / "recording.vtkhdf"
+    for path in _wanted(products):
+        if path.is_dir():  # told before the simulation, not after
+            raise OutputError(f"{path}: is a folder, where a file is to be written; choose another --output")
     recorder = Recorder(recording, scene_text=products.scene_text, solver=solver, compress=products.compress)
     all_sinks: list[Sink] = [recorder, *sinks]
     if not products.quiet:
@@ -99,6 +103,12 @@ def run_session(
     if not products.quiet:
         _tell(outcome, recording, products)
     return outcome
+
+
+def _wanted(products: Products) -> list[Path]:
+    """What is written beside the recording."""
+    wanted = {"index.html": products.page, "plot.png": products.plot}
+    return [products.folder / name for name, is_wanted in wanted.items() if is_wanted]
 
 
 def _tell_of_older(products: Products) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from supple.errors import OutputError
@@ -26,9 +26,18 @@ def parent_folder(path: Path) -> Path:
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise OutputError(f"{path.parent}: is no folder, and must be one to hold {path.name}; give another") from None
     except OSError as error:
         raise output_error(path.parent, error) from None
     return path.parent
+
+
+def refuse_to_replace(source: Path, output: Path) -> None:
+    """Raise `OutputError` where `output` is the very file that is read."""
+    with suppress(OSError):  # of files that are not there, or cannot be reached: others will say so
+        if output.samefile(source):
+            raise OutputError(f"{output}: is {source} itself, which is read; give another name")
 
 
 @contextmanager

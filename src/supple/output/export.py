@@ -8,6 +8,7 @@ from importlib import import_module
 from pathlib import Path
 
 from supple.errors import OutputError
+from supple.output.atomic import refuse_to_replace
 from supple.output.drawing import opened
 from supple.output.recording_reader import Recording
 
@@ -66,7 +67,6 @@ def export(recording: Recording | str | Path, to: str, output: str | Path | None
         raise OutputError(f"export: there is no format {to!r}; take one of {', '.join(FORMATS)}")
     with opened(recording) as source:
         path = Path(output) if output is not None else source.path.with_name(source.path.stem + chosen.ending)
-        if path.exists() and source.path.exists() and path.samefile(source.path):
-            raise OutputError(f"{path}: is the recording itself; give the export another name")
+        refuse_to_replace(source.path, path)
         chosen.writer()(source, path)
     return path

@@ -1,0 +1,83 @@
+"""Where commands write: never over what they read, and no simulation for a place that cannot be written."""
+
+import pytest
+
+import supple as sp
+from supple.cli.app import main
+from supple.cli.exit_codes import ExitCode
+
+SCENE = """\
+bodies:
+  - name: cube
+    shape: {kind: box, divisions: [1, 1, 1]}
+    material: {kind: stable_neo_hookean, youngs: 1e5, poisson: 0.4}
+solver: {kind: implicit}
+steps: 2
+"""
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    """A folder, the current one, with a scene, a surface, and a recording."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scene.yaml").write_text(SCENE)
+    cube = sp.shapes.box((1, 1, 1), (1, 1, 1))
+    cube.surface.save(tmp_path / "cube.vtk")
+    body = sp.Body("cube", cube, sp.StableNeoHookean(youngs=1e5, poisson=0.4))
+    list(sp.simulate(sp.Scene([body]), sp.XPBD(), 0.01, 2, sinks=[sp.Recorder(tmp_path / "r.vtkhdf")]))
+    (tmp_path / "link.svg").symlink_to("r.vtkhdf")
+    return tmp_path
+
+
+def contents(place):
+    return {path: path.read_bytes() for path in place.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["check", "r.vtkhdf", "--json", "r.vtkhdf"],
+        ["export", "r.vtkhdf", "--to", "vtkhdf", "-o", "r.vtkhdf"],
+        ["plot", "r.vtkhdf", "-o", "link.svg"],
+        ["run", "scene.yaml", "-o", "out", "--trace", "scene.yaml"],
+        ["mesh", "cube.vtk", "-o", "cube.vtk"],
+    ],
+    ids=lambda arguments: arguments[0],
+)
+def test_what_is_read_is_not_replaced(place, capsys, arguments):
+    before = contents(place)
+    assert main(arguments) == ExitCode.INPUT
+    said = capsys.readouterr().err
+    assert "itself, which is read; give another name" in said
+    assert said.count("\n") == 1
+    assert contents(place) == before
+
+
+@pytest.mark.parametrize(
+    ("in_the_way", "says"),
+    [
+        ("out/index.html/", "out/index.html: is a folder, where a file is to be written; choose another --output"),
+        ("out/plot.png/", "out/plot.png: is a folder, where a file is to be written; choose another --output"),
+        ("out/recording.vtkhdf/", "out/recording.vtkhdf: is a folder"),
+        ("out", "out: is no folder, and must be one to hold recording.vtkhdf; give another"),
+    ],
+)
+def test_what_stands_in_the_way_is_said_before_the_simulation(place, capsys, in_the_way, says):
+    if in_the_way.endswith("/"):
+        (place / in_the_way).mkdir(parents=True)
+    else:
+        (place / in_the_way).write_text("mine")
+    before = contents(place)
+    assert main(["run", "scene.yaml", "-o", "out"]) == ExitCode.INPUT
+    assert f"supple: {says}" in capsys.readouterr().err
+    assert contents(place) == before
+
+
+def test_names_may_hold_spaces_and_any_letters(place, capsys):
+    folder = place / "ü b" / "日本"
+    assert main(["run", "scene.yaml", "-o", str(folder), "-q"]) == ExitCode.OK
+    assert {path.name for path in folder.iterdir()} >= {"recording.vtkhdf"}
+    assert (
+        main(["export", str(folder / "recording.vtkhdf"), "--to", "glb", "-o", str(folder / "ñ a.glb")]) == ExitCode.OK
+    )
+    assert (folder / "ñ a.glb").read_bytes()[:4] == b"glTF"
