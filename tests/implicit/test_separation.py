@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.errors import SceneError
 from supple.implicit.contact.separation import default_gap, separate
 from supple.implicit.contact.start_check import find_intersections
 from supple.scene.contact_pairs import pair_table
@@ -138,3 +139,51 @@ def test_hopeless_scenes_are_refused_in_one_line_that_names_the_two(what):
 def test_the_gap_is_a_hundredth_of_an_edge():
     system = build_system(sp.Scene([cube("a", (0, 0, 0))]))
     assert default_gap(system) == pytest.approx(0.01 * (2 * 0.5 + np.sqrt(0.5)) / 3)
+
+
+def sewn(low, high, first="low", second="high"):
+    """Two cubes a hundredth apart, one upon the other, sewn where they face each other."""
+    stitch = sp.SoftVertexTriangleStitch(first, second, max_distance=0.05, youngs=1e5, poisson=0.4)
+    return [cube("low", low), cube("high", high)], stitch
+
+
+def test_what_is_stitched_together_moves_as_one():
+    bodies, stitch = sewn((0, 0.4, 0), (0, 1.41, 0))
+    scene = sp.Scene(bodies, [sp.HalfSpace()], stitches=[stitch])
+    result = separate(scene, gap=0.001)
+    assert [move.body for move in result.moves] == ["low", "high"]
+    for move in result.moves:
+        assert move.shift == pytest.approx([0, 0.101, 0], abs=1e-9)
+    before, after = scene.stitching, result.scene.stitching
+    assert np.array_equal(before.nodes(), after.nodes())
+    assert after.tets.rest_shape_inverse == pytest.approx(before.tets.rest_shape_inverse, rel=1e-9, abs=1e-9)
+
+
+def test_the_lighter_of_two_is_what_is_stitched_together():
+    bodies, stitch = sewn((0, 0, 0), (0, 1.01, 0))
+    heavier = cube("third", (0.9, 0.5, 0), density=1500.0)
+    result = separate(sp.Scene([*bodies, heavier], stitches=[stitch]), gap=0.001)
+    assert [move.body for move in result.moves] == ["third"]
+    assert apart(result.scene)
+
+
+def test_what_is_stitched_together_and_intersects_is_refused():
+    bodies, stitch = sewn((0, 0, 0), (0, 0.97, 0))
+    with pytest.raises(SceneError, match=r"'low' overlaps body 'high' .* they are stitched together, and move as one"):
+        separate(sp.Scene(bodies, stitches=[stitch]))
+
+
+def test_what_is_stitched_to_something_pinned_stays():
+    bodies, stitch = sewn((0, 0.4, 0), (0, 1.41, 0))
+    pin = sp.Pin("high", vertices=[0])
+    with pytest.raises(SceneError, match="pins or stitches hold what would have to move"):
+        separate(sp.Scene(bodies, [sp.HalfSpace()], stitches=[stitch], pins=[pin]))
+
+
+def test_what_is_stitched_to_an_obstacle_stays():
+    corners = [(-5, -0.51, -5), (0, -0.51, 9), (9, -0.51, -5)]
+    sheet = sp.TriangleObstacle(surface=sp.SurfaceMesh(corners, [[0, 1, 2]]), name="sheet")
+    stitch = sp.SoftVertexTriangleStitch("a", "sheet", max_distance=0.05, youngs=1e5, poisson=0.4)
+    scene = sp.Scene([cube("a", (0, 0, 0))], [sheet, sp.HalfSpace(point=(0, -0.4, 0))], stitches=[stitch])
+    with pytest.raises(SceneError, match="pins or stitches hold what would have to move"):
+        separate(scene)

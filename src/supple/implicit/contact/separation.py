@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from supple.errors import SceneError
 from supple.implicit.contact.start_check import Intersection, intersections_of
@@ -59,7 +61,8 @@ def separate(
     """Move bodies apart that intersect, or touch, at the start.
 
     Bodies are moved as a whole, each by no more than half its diagonal, upwards rather than downwards, and the upper or
-    the lighter of two. Pinned bodies and obstacles stay where they are.
+    the lighter of two. Bodies that are stitched together move as one. Pinned bodies, what is stitched to an obstacle,
+    and obstacles stay where they are.
 
     Parameters
     ----------
@@ -88,11 +91,13 @@ def separate(
             if way is None:
                 raise SceneError(f"{mover.say(item)}; {mover.why_not(item)}")
             body, shift = way
-            total[body] += shift
+            together = np.flatnonzero(mover.group == mover.group[body])
+            total[together] += shift
             if np.linalg.norm(total[body]) > mover.limits[body]:
                 raise SceneError(f"{mover.say(item)}; {mover.why_not(item)}")
-            surfaces = shifted(system, surfaces, body, shift)
-            moved.add(body)
+            for one in together.tolist():
+                surfaces = shifted(system, surfaces, one, shift)
+            moved.update(together.tolist())
     raise SceneError(f"{mover.say(found[0])}; {mover.why_not(found[0])}")
 
 
@@ -133,18 +138,27 @@ class Mover:
 
     Attributes
     ----------
-    limits : (b,) how far each body may be moved [m]; zero where a pin holds it
+    group : (b,) what each body belongs to: those that are stitched together are one
+    masses, limits, free : (b,) of each body's group: its mass [kg], how far it may be moved [m], and whether nothing
+        holds it
+    held : (b,) the same of each body alone: whether it is pinned, or stitched to an obstacle
     """
 
     def __init__(self, system: System, table: PairTable, gap: float) -> None:
         self.system, self.table, self.gap = system, table, gap
         self.names = [f"body {p.name!r}" for p in system.bodies] + [o.label for o in system.obstacles]
-        self.masses = [float(system.masses[part.vertices].sum()) for part in system.bodies]
-        spans = [np.ptp(system.rest_positions[part.vertices], axis=0) for part in system.bodies]
+        self.group, self.held = _groups(system)
+        positions = initial_state(system.scene).positions
+        members = [np.flatnonzero(self.group == group) for group in self.group]
+        spans, self.masses = [], []
+        for together in members:
+            rows = np.concatenate([np.arange(len(positions))[system.bodies[k].vertices] for k in together])
+            # Alone, a body is as long as it was made; together, they are as long as they begin.
+            points = system.rest_positions if len(together) == 1 else positions
+            spans.append(np.ptp(points[rows], axis=0))
+            self.masses.append(float(system.masses[rows].sum()))
         self.limits = FURTHEST * np.linalg.norm(spans, axis=1)
-        # Obstacles may be among the pins here: the solver moves their vertices in the same way.
-        held = {pin.pin.body for pin in system.pins if isinstance(pin, PinRange)}
-        self.free = [part.name not in held for part in system.bodies]
+        self.free = [not self.held[together].any() for together in members]
         size = float(np.linalg.norm(system.gravity))
         self.up = -system.gravity / size if size > 0.0 else np.array([0.0, 1.0, 0.0])
 
@@ -152,7 +166,7 @@ class Mover:
         """Which body to move, and by how much (3,) [m]; None where no small translation separates the two."""
         a, b = item.first, item.second
         bodies = [k for k in (a, b) if k < len(self.masses) and self.free[k]]
-        if a == b or not bodies:
+        if a == b or not bodies or self.together(a, b):
             return None
         limit = float(min(self.limits[k] for k in (a, b) if k < len(self.masses)))
         pair = self._pair(s, a, b)
@@ -174,6 +188,10 @@ class Mover:
         _, mover, sign, direction, length = best
         return mover, sign * self._shortened(pair, item, direction, length) * direction
 
+    def together(self, a: int, b: int) -> bool:
+        """Whether two things are bodies that are stitched together."""
+        return a < len(self.group) and b < len(self.group) and bool(self.group[a] == self.group[b])
+
     def say(self, item: Intersection) -> str:
         """What is wrong, in words."""
         first, second = self.names[item.first], self.names[item.second]
@@ -188,8 +206,14 @@ class Mover:
         """Why nothing can be moved, and what to do instead."""
         if item.first == item.second:
             return "no translation separates a body from itself: change its mesh, or how it starts"
+        if self.together(item.first, item.second):
+            return (
+                "they are stitched together, and move as one: change their places in the scene, or switch their "
+                "contact off in contact_pairs"
+            )
         if not any(k < len(self.masses) and self.free[k] for k in (item.first, item.second)):
-            return "pins hold what would have to move: change their places in the scene"
+            holders = "pins or stitches" if self.system.scene.stitches else "pins"
+            return f"{holders} hold what would have to move: change their places in the scene"
         return (
             "they cannot be separated by a small translation (half a body's diagonal): change their places in the scene"
         )
@@ -297,6 +321,23 @@ class Mover:
         collide = np.zeros_like(self.table.collide)
         collide[item.first, item.second] = collide[item.second, item.first] = True
         return replace(self.table, collide=collide)
+
+
+def _groups(system: System) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+    """(b,) which bodies are stitched together, and (b,) which of them something holds."""
+    number = {part.name: k for k, part in enumerate(system.bodies)}
+    # Obstacles may be among the pins here: the solver moves their vertices in the same way.
+    pinned = {pin.pin.body for pin in system.pins if isinstance(pin, PinRange)}
+    held = np.array([part.name in pinned for part in system.bodies])
+    joins = []
+    for stitch in system.scene.stitches:
+        if stitch.second in number:
+            joins.append((number[stitch.first], number[stitch.second]))
+        else:
+            held[number[stitch.first]] = True
+    ends = np.array(joins, dtype=np.int64).reshape(-1, 2)
+    graph = coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(len(number), len(number)))
+    return connected_components(graph, directed=False)[1], held
 
 
 def _triangles(item: Intersection) -> str:
