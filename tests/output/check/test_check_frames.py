@@ -8,7 +8,7 @@ import pytest
 import supple as sp
 from supple.output.recording import REPORT_NUMBERS, REPORT_VECTORS
 
-from .conftest import V, X, failures, nan_position
+from .conftest import JELLY, V, X, failures, nan_position, recorded
 
 
 def nan_velocity(file, n):
@@ -143,6 +143,33 @@ def test_a_frame_left_out(free, spoilt):
         file["supple/frames/index"][4:] = file["supple/frames/index"][4:] + 1
 
     assert failures(spoilt(free, change)) == {"sequence": 4}
+
+
+@pytest.fixture(scope="module")
+def landing(folder):
+    """A cube that falls on a floor; nothing but the floor tells when."""
+    cube = sp.Body("cube", sp.shapes.box((0.2, 0.2, 0.2), (1, 1, 1)), JELLY, position=(0, 0.105, 0))
+    return recorded(folder / "landing.vtkhdf", sp.Scene([cube], [sp.HalfSpace()]), sp.Implicit())
+
+
+def test_frames_in_another_order(landing, spoilt):
+    """All that stands in a frame is true, but its time."""
+
+    def change(file, n):
+        copies = {k: [data[k * rows : (k + 1) * rows] for data, rows in parts(file, n)] for k in (1, 2)}
+        for source, target in ((1, 2), (2, 1)):
+            for (data, rows), values in zip(parts(file, n), copies[source], strict=True):
+                data[target * rows : (target + 1) * rows] = values
+
+    def parts(file, n):
+        kept = [data for data in frame_series(file) if data.name.rpartition("/")[2] not in ("time", "index")]
+        m = len(file["supple/tets"])
+        return [(file[X], n), (file[V], n), (file["VTKHDF/CellData/det_F"], m), *((data, 1) for data in kept)]
+
+    assert failures(landing) == {}
+    report = sp.check_recording(spoilt(landing, change))
+    assert [(result.name, result.first_failure) for result in report.failures] == [("sequence", 2)]
+    assert "elsewhere than its velocities say" in report["sequence"].where
 
 
 def test_a_step_that_did_not_converge(free, spoilt):

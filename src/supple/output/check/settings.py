@@ -11,7 +11,7 @@ from supple.errors import OutputError
 
 NAMES = {
     "finite": "every recorded number is finite",
-    "sequence": "times and numbers of frames go up by one step, and no frame repeats another",
+    "sequence": "times and numbers of frames go up by one step, and each frame follows from the one before",
     "status": "every step converged",
     "rest shape": "no tet is inverted or flat at rest; volumes and masses are above zero",
     "inversion": "no tet is inverted or flat, by the exact sign of its determinant",
