@@ -37,6 +37,7 @@ def pixels() -> Callable:
     image = pytest.importorskip("PIL.Image")
 
     def shot(page, **options) -> np.ndarray:
-        return np.asarray(image.open(io.BytesIO(page.screenshot(**options))).convert("RGB")).astype(int)
+        taken = page.screenshot(timeout=90_000, **options)  # drawn in software, on a machine that may do much else
+        return np.asarray(image.open(io.BytesIO(taken)).convert("RGB")).astype(int)
 
     return shot

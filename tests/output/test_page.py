@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 
 from supple.output import page as page_module
@@ -13,14 +15,15 @@ def test_the_page_plays_in_a_browser(tmp_path, tools, browser, pixels):
     tools.record(tmp_path / "r.vtkhdf", 30)
     page_file = write_page(tmp_path / "r.vtkhdf", tmp_path / "index.html")
     page = browser.new_page(viewport={"width": 480, "height": 360})
+    page.set_default_timeout(90_000)
     errors, asked = [], []
     page.on("pageerror", lambda error: errors.append(str(error)))
     page.on("console", lambda said: errors.append(said.text) if said.type == "error" else None)
     page.on("request", lambda request: asked.append(request.url))
     page.goto(page_file.as_uri())
-    page.wait_for_selector("canvas", timeout=30_000)
-    shots = []
-    for _ in range(40):  # until bodies are drawn, and have moved
+    page.wait_for_selector("canvas")
+    shots, end = [], time.monotonic() + 90.0
+    while time.monotonic() < end:  # until bodies are drawn, and have moved
         page.wait_for_timeout(250)
         shots.append(pixels(page)[:300])  # above the player's bar
         if _red(shots[0]) <= 100:

@@ -1,6 +1,7 @@
 """The gate in front of viser's server: tokens, other sites, malformed messages. Real server, real websocket client."""
 
 import contextlib
+import http.client
 import io
 import os
 import random
@@ -247,6 +248,26 @@ class TestMalformed:
             with dial(local) as second:
                 assert ended(second) == 1013
             first.ping().wait(PATIENCE)
+
+    def test_connections_that_say_nothing_are_bounded(self, monkeypatch):
+        monkeypatch.setattr(limits, "MOST_CONNECTIONS", 5)
+        with served() as server, contextlib.ExitStack() as ends:
+            place = ("127.0.0.1", server.get_port())
+            silent = [ends.enter_context(socket.create_connection(place, timeout=PATIENCE)) for _ in range(5)]
+            for line in silent:
+                line.sendall(b"GET / HTTP/1.1\r\n")
+            one_more = ends.enter_context(socket.create_connection(place, timeout=PATIENCE))
+            with contextlib.suppress(ConnectionResetError):
+                assert one_more.recv(100) == b""  # dropped
+            silent[0].close()  # there is room again, once the server has noticed
+            end = time.monotonic() + PATIENCE
+            while True:
+                try:
+                    assert fetch(server)[0] == 200
+                    break
+                except (OSError, http.client.HTTPException):
+                    assert time.monotonic() < end, "nobody gets in any more"
+                    time.sleep(0.05)
 
     def test_requests_to_share_the_page_with_the_world_are_passed_over(self):
         assert not is_wanted(msgspec.msgpack.encode({"type": "ShareUrlRequest"}))

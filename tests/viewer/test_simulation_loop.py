@@ -166,6 +166,17 @@ def test_steps_are_simulated_without_waiting_for_the_clock(loop):
     assert loop.steps_left == 0
 
 
+def test_steps_that_come_at_once_all_count_and_none_outlives_a_reset(loop):
+    loop.inbox.put_all(enumerate([say.Step(), say.Step(), say.Step(2)], 1))
+    for _ in range(6):
+        loop.turn(0.0)
+    assert loop.live.frame == 4
+    loop.inbox.put_all(enumerate([say.Step(3), say.Reset()], 4))
+    for _ in range(6):
+        loop.turn(0.0)
+    assert loop.live.frame == 0
+
+
 def test_slow_motion_shows_states_between_two_steps(loop):
     loop.obey(say.SetSpeed(0.1))
     loop.obey(say.Play())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import fields, replace
 from functools import singledispatch
 from typing import Any
@@ -258,7 +259,7 @@ def _(command: say.CopyBody, live: LiveScene) -> None:
         live,
         replace(
             body,
-            name=free_name(live.setup.scene, body.name),
+            name=free_name(live.setup.scene, re.sub(r" \d+$", "", body.name)),  # a copy of "ball 1" is "ball 2"
             position=place,
             rotation=np.zeros(3),
             velocity=np.zeros(3),

@@ -25,6 +25,7 @@ from urllib.parse import parse_qs, urlsplit
 
 from supple.errors import OutputError
 from supple.viewer import limits
+from supple.viewer.connection_limit import bounded_connections
 from supple.viewer.message_check import Malformed, is_wanted
 
 logger = logging.getLogger(__name__)
@@ -165,6 +166,8 @@ def gate(host: str, token: str | None = None) -> Iterator[None]:
         taken_over = True
         # Who floods the server does not answer a farewell: it is not waited for.
         options |= {"max_size": limits.LARGEST_PICTURE, "max_queue": 16, "close_timeout": 1.0}
+        options["create_connection"] = bounded_connections(limits.MOST_CONNECTIONS)
+        asyncio.get_running_loop().set_exception_handler(_log_quietly)
         answer = _guarded(process_request, keeper)
         return original(_watched(handler, clients), *arguments, process_request=answer, **options)
 
@@ -203,7 +206,6 @@ def _watched(handler: Callable[[Any], Awaitable[None]], clients: set[Any]) -> Ca
     """viser's handler of one connection, which gets well-formed messages only, and no more than a person can send."""
 
     async def watch(connection: Any) -> None:
-        asyncio.get_running_loop().set_exception_handler(_log_quietly)
         if len(clients) >= limits.MOST_CLIENTS:
             await connection.close(_TRY_LATER, "too many pages are open")
             return

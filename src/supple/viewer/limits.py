@@ -50,7 +50,8 @@ MOST_UPLOADED_TRIANGLES = 20_000
 LONGEST_UPLOAD, UPLOAD_MEMORY = 60.0, 3 * 2**30
 MOST_UPLOADS, UPLOAD_PATIENCE = 4, 60.0
 
-# Browsers with an open page.
+# Connections of any kind, also of those that have not shown a token; and browsers with an open page.
+MOST_CONNECTIONS = 256
 MOST_CLIENTS = 32
 
 # Points of contact that a snapshot tells of.

@@ -88,7 +88,8 @@ class SimulationLoop:
                     self.playing, self.steps_left = False, 0
                 case say.Step():
                     self.playing = False
-                    self.steps_left = command.count
+                    # Each counts, also where the one before has not been simulated yet.
+                    self.steps_left = min(self.steps_left + command.count, limits.MOST_STEPS)
                 case say.SetSpeed():
                     self.speed = command.factor
                     self.pacing.start(time.perf_counter())
@@ -97,6 +98,8 @@ class SimulationLoop:
                 case _:
                     with self.watch.limited():
                         change(command, self.live)
+                    if isinstance(command, say.Reset):  # frames that were asked for before are not of the new start
+                        self.steps_left = 0
                     self._before = self.live.state
         except (SuppleError, MemoryError) as error:
             self.tell("error", _one_line(error))

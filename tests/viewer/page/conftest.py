@@ -249,12 +249,13 @@ class Screen:
         self._pixels, self.server = pixels, server
         self.errors: list[str] = []
         self.tab = browser.new_page(viewport={"width": 720, "height": 420})
+        self.tab.set_default_timeout(90_000)  # drawing in software, on a machine that does much else
         self.tab.on("pageerror", lambda error: self.errors.append(str(error)))
         self.tab.on("console", self._hear)
         self.tab.goto(url)
-        self.tab.wait_for_selector("canvas", timeout=30_000)
+        self.tab.wait_for_selector("canvas")
         # Software OpenGL is told of in a corner, in the color of a body.
-        self.tab.locator(".mantine-Notification-closeButton").first.click()
+        self.tab.locator(".mantine-Notification-closeButton").first.dispatch_event("click")
         self.wait(lambda: server.get_clients(), "the browser as a visitor")
 
     def wait(self, holds, what: str, seconds: float = 90.0):
@@ -338,6 +339,9 @@ def look(browser, pixels):
     opened = []
 
     def open_page(url: str, server) -> Screen:
+        for screen in opened:  # its test is over; drawing on would slow this one down
+            screen.tab.close()
+        opened.clear()
         opened.append(Screen(browser, pixels, url, server))
         return opened[-1]
 

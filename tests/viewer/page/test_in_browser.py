@@ -193,6 +193,14 @@ def test_a_body_comes_and_goes(still, spot):
 
 def test_a_file_becomes_a_body_and_a_bad_one_a_line(resting, spot, tmp_path):
     """Uploaded in the browser, filled with tets in a process of its own, while the simulation goes on."""
+    try:
+        upload_two_files(resting, spot, tmp_path)
+    finally:
+        resting.page.desk.ask(None, lambda: RemoveBody("my ball 1"))
+        resting.screen.wait(lambda: len(resting.snapshot().description.bodies) == 1, "no second body")
+
+
+def upload_two_files(resting, spot, tmp_path):
     screen, upload = resting.screen, resting.panel.upload
     blue = lambda: spot(screen.shot(), "blue")[0]  # noqa: E731
     # The page is open to files within reach of the camera: a ball of 30 cm lands beside or on the one that is there.
@@ -211,7 +219,10 @@ def test_a_file_becomes_a_body_and_a_bad_one_a_line(resting, spot, tmp_path):
     body = resting.snapshot().description.bodies[1]
     assert body.name == "my ball 1"
     assert np.ptp(body.rest_positions, axis=0).max() == pytest.approx(0.18, abs=0.01)  # the size that the panel says
+    screen.press("Pause")  # it rolls away else
+    screen.press("reset")
     screen.wait(lambda: blue() > 60, "the body in the picture")
+    screen.press("Play")
     data = bytearray((tmp_path / "my ball.stl").read_bytes())
     (tmp_path / "half.stl").write_bytes(data[: len(data) // 2])
     files.set_input_files(tmp_path / "half.stl")
@@ -220,8 +231,6 @@ def test_a_file_becomes_a_body_and_a_bad_one_a_line(resting, spot, tmp_path):
     frame = resting.snapshot().frame
     screen.wait(lambda: resting.snapshot().frame > frame + 5, "the simulation to go on")
     assert len(resting.snapshot().description.bodies) == 2
-    resting.page.desk.ask(None, lambda: RemoveBody("my ball 1"))
-    screen.wait(lambda: len(resting.snapshot().description.bodies) == 1, "no second body")
     screen.tab.get_by_text("Add a body").click()
 
 

@@ -92,6 +92,7 @@ def test_a_page_of_the_recording_stands_alone(replay, browser, pixels, spot, tmp
     file = tmp_path / "page.html"
     file.write_text(replay.page(), encoding="utf-8")
     tab = browser.new_page(viewport={"width": 480, "height": 320})
+    tab.set_default_timeout(90_000)
     asked = []
     tab.on("request", lambda request: asked.append(request.url))
     tab.goto(file.as_uri())
