@@ -15,6 +15,7 @@ from supple.scene_file.located import at
 from supple.scene_file.materials import MaterialModel
 from supple.scene_file.mesh_sources import MeshFileModel, MeshStore, SurfaceModel
 from supple.scene_file.model import Count, Model, Name, NonNegative, Positive, Vector
+from supple.scene_file.regions import RegionModel, with_regions
 from supple.scene_file.shapes import ShapeModel
 
 MAX_COPIES = 10_000
@@ -77,6 +78,12 @@ class BodyModel(Model):
     mesh: MeshFileModel | None = Field(default=None, description="of tetrahedra, or a surface to fill with them")
     shape: ShapeModel | None = Field(default=None, description="instead of `mesh`: one that Supple makes itself")
     material: MaterialModel
+    regions: list[RegionModel] | None = Field(
+        default=None,
+        min_length=1,
+        max_length=1000,
+        description="parts of the body that are made of other materials; of two that overlap, the later one counts",
+    )
     position: Vector = Field(default=[0.0, 0.0, 0.0], description="where the mesh's origin is placed [m]")
     rotation: Vector = Field(default=[0.0, 0.0, 0.0], description="rotation vector about the mesh's origin [rad]")
     velocity: Vector = Field(default=[0.0, 0.0, 0.0], description="of the center of mass, at the start [m/s]")
@@ -109,6 +116,9 @@ class BodyModel(Model):
             skin = meshes.surface(self.skin) if self.skin is not None else None
         with at("material"):
             material = self.material.build()
+        if self.regions is not None:
+            with at("regions"):
+                material = with_regions(material, self.regions, mesh)
         copies = list(self.copies.placements()) if self.copies is not None else [(np.zeros(3), None)]
         digits = max(2, len(str(len(copies))))
         built = []

@@ -44,7 +44,7 @@ class ElasticModel(_MaterialModel):
     youngs: Positive = Field(description="Young's modulus [Pa]")
     poisson: float = Field(gt=-1.0, lt=0.5, description="Poisson's ratio, above -1 and below 0.5")
 
-    def build(self) -> Material:
+    def build(self) -> Elastic:
         return ELASTIC_KINDS[self.kind](**self.model_dump(exclude={"kind"}))
 
 
@@ -56,7 +56,10 @@ def _elastic_model(kind: str) -> type[ElasticModel]:
 
 
 if TYPE_CHECKING:
+    ElasticMaterialModel = ElasticModel
     MaterialModel = EdgesAndVolumeModel | ElasticModel
 else:
-    _KINDS = (EdgesAndVolumeModel, *(_elastic_model(kind) for kind in ELASTIC_KINDS))
-    MaterialModel = Annotated[Union[_KINDS], Field(discriminator="kind")]  # noqa: UP007 (built from a list of models)
+    # Built from lists of models.
+    _ELASTIC = tuple(_elastic_model(kind) for kind in ELASTIC_KINDS)
+    ElasticMaterialModel = Annotated[Union[_ELASTIC], Field(discriminator="kind")]  # noqa: UP007
+    MaterialModel = Annotated[Union[(EdgesAndVolumeModel, *_ELASTIC)], Field(discriminator="kind")]
