@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import shutil
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 import supple as sp
+from supple.mesh.shape_surfaces import torus_surface
 from supple.viewer.app import Address, opened_page
 from supple.viewer.live_source import LiveSource
 from supple.viewer.messages import Grab, ReleaseGrab, Reset, SetParameter, Step
@@ -97,18 +99,37 @@ def draw_live(tab, page) -> None:
     save(tab, "live_solver.png")
 
 
+def draw_file(tab, page) -> None:
+    """A body from a file, above the others."""
+    desk = page.shown.desk
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "ring.stl"
+        torus_surface(radius=0.3, tube_radius=0.11, edge_length=0.08).save(file)
+        tab.get_by_role("tab", name="Bodies").click()
+        tab.get_by_text("Add a body").click()
+        tab.locator("input[type=file]").set_input_files(file)
+        while len(desk.snapshot.description.bodies) < 5:
+            tab.wait_for_timeout(100)
+    desk.simulation.send(Step(18))
+    tab.get_by_role("button", name="From a file").scroll_into_view_if_needed()
+    tab.wait_for_timeout(6000)
+    save(tab, "live_file.png")
+
+
 def main() -> None:
     """All pictures."""
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS.split())
-        with opened_page(scene(), Address(port=0)) as page:
-            tab = browser.new_page(viewport=SIZE)
-            tab.goto(page.url)
-            tab.wait_for_selector("canvas")
-            tab.locator(".mantine-Notification-closeButton").first.click()
-            tab.wait_for_timeout(3000)
-            draw_live(tab, page)
-            tab.close()
+        for draw in (draw_live, draw_file):
+            with opened_page(scene(), Address(port=0)) as page:
+                tab = browser.new_page(viewport=SIZE)
+                tab.set_default_timeout(120_000)
+                tab.goto(page.url)
+                tab.wait_for_selector("canvas")
+                tab.locator(".mantine-Notification-closeButton").first.dispatch_event("click")
+                tab.wait_for_timeout(3000)
+                draw(tab, page)
+                tab.close()
         browser.close()
 
 

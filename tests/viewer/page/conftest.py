@@ -258,6 +258,10 @@ class Screen:
         self.tab.locator(".mantine-Notification-closeButton").first.dispatch_event("click")
         self.wait(lambda: server.get_clients(), "the browser as a visitor")
 
+    def close(self) -> None:
+        """To be called when its test is over: drawing on, in software, it would slow down all others."""
+        self.tab.close()
+
     def wait(self, holds, what: str, seconds: float = 90.0):
         """Wait until something holds, while the browser goes on."""
         end = time.monotonic() + seconds
@@ -339,15 +343,12 @@ def look(browser, pixels):
     opened = []
 
     def open_page(url: str, server) -> Screen:
-        for screen in opened:  # its test is over; drawing on would slow this one down
-            screen.tab.close()
-        opened.clear()
         opened.append(Screen(browser, pixels, url, server))
         return opened[-1]
 
     yield open_page
     for screen in opened:
-        screen.tab.close()
+        screen.close()
 
 
 @pytest.fixture(scope="session")

@@ -38,6 +38,7 @@ def live(look, spot):
 
         made.drawn = drawn
         yield made
+        screen.close()
 
 
 @pytest.fixture

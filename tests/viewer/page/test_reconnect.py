@@ -35,6 +35,7 @@ def test_the_server_goes_and_comes_back(made_up, look, spot):
         screen.wait(lambda: said.count() == 1, "the connection")
         screen.wait(lambda: spot(screen.shot(), "red")[1][0] > before[0] + 50, "the new state in the picture")
     finally:
+        screen.close()
         page.stop()
         stop_server(server)
     assert [error for error in screen.errors if "WebSocket" not in error] == []

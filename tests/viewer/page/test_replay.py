@@ -105,6 +105,7 @@ def test_a_page_of_the_recording_stands_alone(replay, browser, pixels, spot, tmp
         if len(places) > 2 and max(places) - min(places) > 40:
             break
     tab.close()
+    assert places, "the red body was never drawn"
     assert max(places) - min(places) > 40
     assert asked == [file.as_uri()]
 
@@ -173,6 +174,7 @@ def test_a_person_looks_through_a_recording(recorded, look, spot, tmp_path):
         assert spot(np.asarray(picture.convert("RGB")).astype(int), "red")[0] > 100
         assert screen.errors == []
         assert replace(replay.stage.options) == ViewOptions()
+        screen.close()
 
 
 def test_stitches_of_recordings_are_drawn(server, tmp_path):
