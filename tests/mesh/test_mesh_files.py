@@ -178,6 +178,37 @@ def test_big_endian_ply_with_other_elements_and_mixed_faces(tmp_path):
     assert loaded.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [2, 1, 0]]
 
 
+@pytest.mark.parametrize("name", ["a.obj", "a.off", "a.ply", "a.stl", "a.vtk", "a.msh"])
+def test_byte_order_marks_and_line_ends_of_other_systems(tmp_path, name):
+    if name == "a.msh":
+        tet = (
+            "$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n$Elements\n1\n1 4 2 0 1 1 2 3 4\n$EndElements\n"
+        )
+        text = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n" + tet
+    elif name == "a.stl":
+        corners = BALL.vertices[BALL.triangles]
+        rows = [
+            "facet\nouter loop\n" + "".join(f"vertex {x} {y} {z}\n" for x, y, z in t) + "endloop\n" for t in corners
+        ]
+        text = "solid\n" + "".join(rows)
+    elif name in ("a.ply", "a.vtk"):
+        # What meshio writes as text.
+        meshio.write(tmp_path / name, meshio.Mesh(BALL.vertices, [("triangle", BALL.triangles)]), binary=False)
+        text = (tmp_path / name).read_text()
+    else:
+        BALL.save(tmp_path / name)
+        text = (tmp_path / name).read_text()
+    kind = TetMesh if name == "a.msh" else SurfaceMesh
+    plain = kind.load(write(tmp_path / name, text))
+    variants = [b"\xef\xbb\xbf" + text.encode(), text.replace("\n", "\r\n").encode()]
+    if name in ("a.obj", "a.off", "a.stl"):
+        variants.append(text.replace("\n", "\r").encode())
+    for variant in variants:
+        loaded = kind.load(write(tmp_path / name, variant))
+        assert np.array_equal(loaded.vertices, plain.vertices)
+        assert loaded.volume == plain.volume
+
+
 def test_concave_polygons_are_cut_inside(tmp_path):
     # An arrowhead whose fan from its first corner would leave the polygon.
     text = "OFF\n4 1 0\n1 0 0\n0 1 0\n-1 0 0\n0 0.3 0\n4 0 1 2 3\n"

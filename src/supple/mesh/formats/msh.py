@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.mesh.formats.cells import CellSoup, FormatError, joined
+from supple.mesh.formats.text import without_mark
 
 # Gmsh's element types: nodes, and VTK's number for the same cell.
 ELEMENTS = {
@@ -138,6 +139,7 @@ class _Section:
 
 def read(data: bytes) -> CellSoup:
     """Points and cells of a .msh file; physical groups and data are passed over."""
+    data = without_mark(data)
     form = _form(data)
     tags, points = (_nodes_2 if form.version == "2" else _nodes_4)(_Section(data, "Nodes", form))
     blocks = (_elements_2 if form.version == "2" else _elements_4)(_Section(data, "Elements", form))

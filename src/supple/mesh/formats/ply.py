@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.mesh.formats.cells import CellSoup, FormatError
-from supple.mesh.formats.text import integer, numbers, shortened
+from supple.mesh.formats.text import integer, numbers, shortened, without_mark
 
 SCALARS = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
@@ -41,6 +41,7 @@ class Element(NamedTuple):
 
 def read(data: bytes) -> CellSoup:
     """Polygons of a PLY file; other elements and columns are passed over."""
+    data = without_mark(data)
     order, elements, start, line = _header(data)
     body = _Text(data, start, line) if order == "" else _Binary(data, start, order)
     points: NDArray[np.float64] | None = None

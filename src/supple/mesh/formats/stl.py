@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.mesh.formats.cells import TRIANGLE, CellSoup, FormatError
-from supple.mesh.formats.text import decoded, meaningful_lines, numbers, shortened
+from supple.mesh.formats.text import decoded, meaningful_lines, numbers, shortened, without_mark
 
 logger = logging.getLogger(__name__)
 
@@ -20,7 +20,7 @@ def read(data: bytes) -> CellSoup:
     """Triangles of an STL file. Whether it is text is decided by its length, not by the word `solid` alone."""
     if len(data) >= 84 and len(data) == 84 + 50 * struct.unpack_from("<I", data, 80)[0]:
         return _read_binary(data)
-    if data.lstrip()[:5].lower() == b"solid" and b"\0" not in data[:512]:
+    if without_mark(data).lstrip()[:5].lower() == b"solid" and b"\0" not in data[:512]:
         return _read_text(data)
     return _read_binary(data)
 

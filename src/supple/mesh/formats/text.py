@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+import codecs
 from collections.abc import Iterator, Sequence
 
 from supple.mesh.formats.cells import FormatError
 
 
+def without_mark(data: bytes) -> bytes:
+    """What follows the byte order mark that some editors put at the start. Taken for a letter, it would hide the word
+    after it, and an OBJ file's first vertex with that."""
+    return data.removeprefix(codecs.BOM_UTF8)
+
+
 def decoded(data: bytes) -> str:
-    """Text of a file, or a `FormatError` where it is binary."""
+    """Text of a file with lines that end in a line feed, or a `FormatError` where it is binary."""
     if b"\0" in data:
         raise FormatError("it is not a text file; is the extension right?", data[: data.index(b"\0")].count(b"\n") + 1)
-    return data.decode("utf-8", errors="replace")
+    text = without_mark(data).decode("utf-8", errors="replace")
+    # Lines of old Macs end in a carriage return alone.
+    return text if "\n" in text else text.replace("\r", "\n")
 
 
 def meaningful_lines(text: str) -> Iterator[tuple[int, list[str]]]:

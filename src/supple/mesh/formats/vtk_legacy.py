@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.mesh.formats.cells import POLYGON, TETRA, TRIANGLE, TRIANGLE_STRIP, CellSoup, FormatError
-from supple.mesh.formats.text import integer, shortened
+from supple.mesh.formats.text import integer, shortened, without_mark
 
 SCALARS = {
     "char": "i1", "unsigned_char": "u1", "short": "i2", "unsigned_short": "u2", "int": "i4", "unsigned_int": "u4",
@@ -63,7 +63,7 @@ class _Cursor:
 
 def read(data: bytes) -> CellSoup:
     """Points and cells of a legacy VTK file; data on points and cells is passed over."""
-    cursor = _Cursor(data)
+    cursor = _Cursor(without_mark(data))
     first = cursor.next_line() or ""
     if not first.startswith("# vtk DataFile"):
         raise FormatError("it does not begin with '# vtk DataFile Version'; is it a legacy VTK file?", 1)
