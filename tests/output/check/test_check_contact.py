@@ -48,6 +48,21 @@ def test_a_body_that_meets_itself(free, spoilt):
     assert failures(spoilt(free, change), only=["intersection"]) == {"intersection": 1}
 
 
+def test_what_is_sewn_face_to_face_is_not_swallowed(tmp_path):
+    """A vertex on the other's surface is neither inside nor outside of it; the rest of its body is outside."""
+    material = sp.StableNeoHookean(youngs=1e5, poisson=0.3)
+    mesh = sp.shapes.box((0.1, 0.1, 0.1), (2, 2, 2))
+    bodies = [
+        sp.Body(name, mesh, material, position=(0, y, 0))
+        for name, y in (("high", 0.16), ("low", np.nextafter(0.06, 1.0)))
+    ]
+    seam = sp.SoftVertexTriangleStitch("high", "low", max_distance=1e-6, youngs=1e5, poisson=0.3)
+    scene = sp.Scene(bodies, stitches=[seam], gravity=(0, 0, 0))
+    path = tmp_path / "r.vtkhdf"
+    list(sp.simulate(scene, sp.XPBD(substeps=10), 1 / 60, 3, sinks=[sp.Recorder(path)]))
+    assert not sp.check_recording(path, sp.CheckSettings(only=["containment"])).failures
+
+
 def test_a_body_swallowed_whole(free, spoilt):
     def change(file, n):
         x = file[X][2 * n : 3 * n]

@@ -103,6 +103,19 @@ def test_values_may_be_given_for_each_pair():
     assert engineering.lam == pytest.approx([4e4, 2e5 * 0.1 / (1.1 * 0.8)])
 
 
+@pytest.mark.parametrize("shift", [(0, 0, 0), (100, -70, 30)])
+@pytest.mark.parametrize("given", [{"max_distance": 1e-6}, {"pairs": [[k, 0] for k in range(27)]}])
+def test_what_touches_is_at_no_distance(shift, given):
+    """Else springs of 1e-17 m would report stretches of 1e13."""
+    touching = sp.VertexEdgeStitch("high", "low", stiffness=1.0, **given)
+    one = scene(touching, gap=0.0, turned=(0.3, -1.0, 2.0), shift=shift)
+    (part,) = one.stitching.ranges
+    nearest = part.pairs.distances < 1e-9
+    assert nearest.all() or "pairs" in given
+    assert not part.pairs.distances[nearest].any()
+    assert not one.stitching.springs.rest_lengths[nearest].any()
+
+
 def test_a_stitch_can_be_made_from_another_one():
     harder = replace(soft(pairs=[[0, 1]], youngs=1e5, poisson=0.25), damping=0.1)
     assert (float(harder.mu), float(harder.lam), harder.damping) == (4e4, 4e4, 0.1)

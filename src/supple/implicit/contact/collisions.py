@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 # Swept boxes of a long way overlap everything: it is looked at in pieces, each as long as this share of the mean edge.
 _PIECE = 2.0
+# Of one pair. Where two have come as near as round-off, ten million, the library's own limit, take minutes; wherever it
+# stops, it is on the safe side.
+_MOST_ADVANCES = 100_000
 _MOST_PIECES = 64
 
 
@@ -35,7 +38,7 @@ class Collisions:
         self.surface = surface
         self.dhat = dhat
         # The library's default continuous detection takes minutes on aligned cubes; this one milliseconds.
-        self._ccd = ipctk.AdditiveCCD()
+        self._ccd = ipctk.AdditiveCCD(max_iterations=_MOST_ADVANCES)
         mesh = surface.mesh
         ends = mesh.rest_positions[mesh.edges]
         self._piece = _PIECE * float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean()) if len(ends) else np.inf

@@ -102,9 +102,11 @@ class Containment(FrameCheck):
                 pair = frozenset((piece.owner, solid.owner))
                 if piece is solid or not surfaces.allowed[piece.owner, solid.owner] or pair in crossing:
                     continue
-                point = x[piece.vertex].copy()
-                if (point < low).any() or (point > high).any():
+                # Of a whole piece inside nothing sticks out; its vertex alone may also lie on the surface.
+                whole = x[surfaces.triangles[piece.triangles].ravel()]
+                if (whole < low).any() or (whole > high).any():
                     continue
+                point = x[piece.vertex].copy()
                 if is_inside(x, point, surfaces.triangles, solid.triangles):
                     yield f"{surfaces.names[piece.owner]} in {surfaces.names[solid.owner]}"
 

@@ -107,7 +107,7 @@ class Stitch(ABC):
                     raise SceneError(f"{self.label}: pairs names number {bad} of {count} {what} of {side.label}")
             vertices, rows = pairs[:, 0], pairs[:, 1]
             distances = pair_distances(first.points[vertices], second.points, partners[rows])
-            return Pairs(vertices.astype(np.int32), rows.astype(np.int32), distances)
+            return Pairs(vertices.astype(np.int32), rows.astype(np.int32), _without_round_off(distances, first, second))
         assert self.max_distance is not None
         looked_at = self.surface_partners(second)
         tree = TriangleTree.of(second.points, partners[looked_at])
@@ -124,7 +124,8 @@ class Stitch(ABC):
                 f"{self.label}: no vertex of {first.label} is within max_distance = {self.max_distance:g} m of "
                 f"{second.label}; the smallest distance there is is {smallest:.6g} m"
             )
-        return Pairs(first.surface_vertices[queries].astype(np.int32), looked_at[rows].astype(np.int32), distances)
+        vertices = first.surface_vertices[queries].astype(np.int32)
+        return Pairs(vertices, looked_at[rows].astype(np.int32), _without_round_off(distances, first, second))
 
     def _checked_pairs(self) -> NDArray[np.int64]:
         try:
@@ -166,3 +167,9 @@ class Stitch(ABC):
             must = "zero or more" if zero else "above zero"
             raise SceneError(f"{self.label}: {what} is {values[bad].flat[0]:g}; it must be finite and {must} [{unit}]")
         return values
+
+
+def _without_round_off(distances: NDArray[np.float64], first: Side, second: Side) -> NDArray[np.float64]:
+    """What touches is at the distance zero: a spring of 1e-17 m would be stretched a billionfold by nothing."""
+    size = max(float(np.abs(side.points).max(initial=0.0)) for side in (first, second))
+    return np.where(distances <= 8.0 * np.finfo(np.float64).eps * size, 0.0, distances)
