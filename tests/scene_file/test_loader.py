@@ -345,6 +345,10 @@ def test_stitches(load, tmp_path, line):
 @pytest.mark.parametrize(
     ("line", "says"),
     [
+        (
+            "kind: vertex_vertex, first: hihg, second: low, max_distance: 1, stiffness: 1",
+            "no body 'hihg'; did you mean 'high'",
+        ),
         ("kind: vertex_edge, first: high, second: low, max_distance: 0.1, stiffness: 1", "smallest distance"),
         ("kind: vertex_edge, first: high, second: law, max_distance: 0.1, stiffness: 1", "no body or obstacle 'law'"),
         ("kind: vertex_edge, first: high, second: low, max_distance: 0.1, stiffness: 0", "stiffness"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
+from supple.scene.suggestion import suggestion
 from supple.scene.values import non_negative
 
 if TYPE_CHECKING:
@@ -137,19 +137,13 @@ class PairRules:
         for name in getattr(pair, key):
             found = [i for i, known in enumerate(self._names) if _matches(name, known)]
             if not found:
-                raise SceneError(f"{pair.label}: {key}: there is no body or obstacle {name!r}; {self._near(name)}")
+                mend = suggestion(name, self._names)
+                raise SceneError(f"{pair.label}: {key}: there is no body or obstacle {name!r}; {mend}")
             if len({self._names[i] for i in found}) < len(found):
                 twice = next(self._names[i] for i in found if [self._names[j] for j in found].count(self._names[i]) > 1)
                 raise SceneError(f"{pair.label}: {key}: a body and an obstacle are both named {twice!r}; rename one")
             numbers.update(found)
         return sorted(numbers)
-
-    def _near(self, name: str) -> str:
-        near = difflib.get_close_matches(name, self._names, n=1, cutoff=0.6)
-        if near:
-            return f"did you mean {near[0]!r}?"
-        shown = ", ".join(map(repr, self._names[:12]))
-        return f"there are {shown}{', ...' if len(self._names) > 12 else ''}"
 
 
 def pair_table(scene: Scene) -> PairTable:

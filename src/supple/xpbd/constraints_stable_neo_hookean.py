@@ -81,7 +81,7 @@ class BlocksOfTwo:
     def _prepare(self, h: float) -> None:
         """Step lengths for substeps of h: h^2 phi with phi the largest length at which a tet cannot overshoot."""
         stiffness = 2.0 * self.data[:, 9] * self.curvatures[:, 2] * h**2
-        self.data[:, 12] = h**2 * np.minimum(1.0, 1.0 / stiffness)
+        self.data[:, 12] = h**2 * (1.0 / np.maximum(1.0, stiffness))
         self._prepared_for = h
         shortened = np.count_nonzero(stiffness > 1.0) / self.count
         if shortened > 0.5:

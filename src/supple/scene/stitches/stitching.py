@@ -20,6 +20,7 @@ from supple.scene.obstacles import Obstacle
 from supple.scene.stitches.elements import Pairs, Springs, StitchTets
 from supple.scene.stitches.side import Side, side_of
 from supple.scene.stitches.stitch import Stitch
+from supple.scene.suggestion import suggestion
 
 
 class StitchError(SceneError):
@@ -222,5 +223,5 @@ def check_names(stitches: Sequence[Stitch], bodies: Sequence[str], obstacles: Se
             (stitch.second, "body or obstacle", [*bodies, *obstacles]),
         ):
             if name not in known:
-                there = ", ".join(map(repr, known))
-                raise StitchError(number, f"{stitch.label}: there is no {what} {name!r}; the scene has {there}")
+                mend = suggestion(name, known)
+                raise StitchError(number, f"{stitch.label}: there is no {what} {name!r}; {mend}")
