@@ -13,37 +13,13 @@ import supple as sp
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.scene.contact_pairs import pair_table
 from supple.scene_file.document import SceneFileModel, json_schema
-from supple.scene_file.loader import load_run, load_scene
+from supple.scene_file.loader import load_scene
 from supple.scene_file.materials import ELASTIC_KINDS
 from supple.scene_file.solvers import solver_of_kind
 from supple.scene_file.yaml_reader import read_yaml
 
 RUBBER = "{kind: stable_neo_hookean, youngs: 1e5, poisson: 0.4}"
 BODY = f"{{name: cube, shape: {{kind: box, divisions: [1, 1, 1]}}, material: {RUBBER}}}"
-
-
-@pytest.fixture
-def load(tmp_path):
-    def loader(text, function=load_run):
-        path = tmp_path / "scene.yaml"
-        path.write_text(text, encoding="utf-8")
-        return function(path)
-
-    return loader
-
-
-REGIONS = """
-bodies:
-  - name: arm
-    shape: {kind: box, size: [4, 1, 1], divisions: [4, 1, 1]}
-    material: {kind: stable_neo_hookean, youngs: 1e4, poisson: 0.4, density: 1000}
-    position: [100, 0, 0]
-    copies: {offsets: [[0, 0, 0], [0, 5, 0]]}
-    regions:
-      - box: {low: [0, -9, -9], high: [2, 9, 9]}
-        material: {kind: neo_hookean, youngs: 1e7, poisson: 0.3, density: 2000}
-      - {tets: [0, 1], material: {kind: arap, youngs: 1e3, poisson: 0.4}}
-"""
 
 
 EVERYTHING = f"""
@@ -126,56 +102,6 @@ def test_a_scene_file_says_all_that_the_api_can(load):
     assert (run.dt, run.steps) == (1 / 30, 12)
     assert (run.solver.substeps, run.solver.momentum_restore, run.solver.threads) == (7, False, 1)
     assert (run.output.page, run.output.plot) == (False, True)
-
-
-def test_regions_of_a_body_have_materials_of_their_own(load, tmp_path):
-    scene = load(REGIONS).scene
-    assert len(scene.bodies) == 2
-    for body in scene.bodies:
-        material, mesh = body.material, body.mesh
-        assert isinstance(material, sp.Regions)
-        assert [type(part) for part in material.materials] == [sp.StableNeoHookean, sp.NeoHookean, sp.ARAP]
-        right = mesh.vertices[mesh.tets].mean(axis=1)[:, 0] > 0
-        expected = np.where(right, 1e7, 1e4)
-        expected[[0, 1]] = 1e3
-        np.testing.assert_array_equal(material.youngs, expected)
-    mass = (scene.bodies[0].material.density * scene.bodies[0].mesh.volumes).sum()
-    assert mass == pytest.approx(2 * 1000 + 2 * 2000)
-    data = read_yaml(tmp_path / "scene.yaml").data
-    validator = Draft202012Validator(json_schema())
-    assert list(validator.iter_errors(data)) == []
-    data["bodies"][0]["regions"][0]["material"] = {"kind": "edges_and_volume"}
-    assert not validator.is_valid(data)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "says"),
-    [
-        ("low: [0, -9, -9]", "low: [1.99, 8, 8]", r"scene.yaml:9: bodies\[0\].regions\[0\].box: no tet has its center"),
-        ("low: [0, -9, -9]", "low: [3, -9, -9]", r"scene.yaml:9: bodies\[0\].regions\[0\].box.low: .*swap them"),
-        (
-            "tets: [0, 1]",
-            "tets: [0, 24]",
-            r":11: bodies\[0\].regions\[1\].tets: names tet 24; the mesh has tets 0 to 23",
-        ),
-        ("tets: [0, 1], ", "", r":11: bodies\[0\].regions\[1\]: give the tets of a region by either `box` or `tets`"),
-        ("tets: [0, 1]", "tet: [0, 1]", r"regions\[1\].tet: unknown key; did you mean `tets`"),
-        (
-            "{kind: arap, youngs: 1e3, poisson: 0.4}",
-            "{kind: edges_and_volume}",
-            r"regions\[1\].material.kind: unknown kind",
-        ),
-        (
-            "{kind: stable_neo_hookean, youngs: 1e4, poisson: 0.4, density: 1000}",
-            "{kind: edges_and_volume}",
-            r"bodies\[0\].regions: .*elastic material beside them, which EdgesAndVolume is not",
-        ),
-    ],
-)
-def test_regions_that_are_refused_are_refused_in_their_line(load, old, new, says):
-    assert REGIONS.count(old) == 1
-    with pytest.raises(sp.SceneError, match=says):
-        load(REGIONS.replace(old, new))
 
 
 def test_a_squeezed_start_keeps_its_center_and_its_widths(load):
