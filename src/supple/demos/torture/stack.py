@@ -1,7 +1,7 @@
-"""Five cubes, one per cent of their size apart, that fall on each other and rest, without friction.
+"""Five equal cubes, one per cent of their size apart, that fall on each other and rest, without friction.
 
-Every cube is one per cent smaller than the one below it. Of two equal ones the upper would slip off, if slowly: the
-barrier between them is a soft layer, and it sinks deeper into one that is smaller.
+Where they have less than four cells along an edge, every cube is one per cent smaller than the one below it: outlines
+that lie above each other repel each other, and in coarse meshes nothing else outweighs that.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ from supple.scene.obstacles import HalfSpace
 from supple.scene.scene import Scene
 from supple.simulate import Frame
 
-COUNT, SIDE, GAP, SMALLER, YOUNGS = 5, 0.1, 1e-3, 0.01, 1e7
+COUNT, SIDE, GAP, YOUNGS = 5, 0.1, 1e-3, 1e7
+SMALLER, COARSE = 0.01, 4
 GRAVITY = 9.81
 TOLERANCE = 1e-8  # what drifts so slowly must not be lost in Newton's errors
 SETTLED = 0.5  # [s] from then on the stack rests
@@ -36,7 +37,7 @@ def scene(cells: int, scale: float = 1.0) -> Scene:
     material = StableNeoHookean(youngs=YOUNGS * scale**2, poisson=0.3, density=1000.0, damping=0.01)
     bodies, height = [], 0.0
     for k in range(COUNT):
-        side = SIDE * (1.0 - SMALLER * k)
+        side = SIDE * (1.0 - (SMALLER if cells < COARSE else 0.0) * k)
         mesh = mirrored_box((scale * side,) * 3, cells)
         bodies.append(Body(f"cube{k + 1}", mesh, material, position=(0, scale * (height + GAP + side / 2), 0)))
         height += GAP + side

@@ -51,10 +51,11 @@ class Planes:
     ) -> Planes:
         """Every body's surface vertices with every half-space that the body may touch."""
         half_spaces = [part for part in obstacles if part.is_plane]
+        owner = surface.owner[: len(surface.vertices)]
         rows, which = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
         for k, part in enumerate(half_spaces):
             bodies = np.flatnonzero(collide[: surface.body_count, surface.body_count + part.index])
-            rows.append(np.flatnonzero(np.isin(surface.owner, bodies)))
+            rows.append(np.flatnonzero(np.isin(owner, bodies)))
             which.append(np.full(len(rows[-1]), k))
         row, plane = np.concatenate(rows), np.concatenate(which)
         ends = np.array([part.vertices for part in half_spaces], dtype=np.int32).reshape(-1, 2)[plane]
@@ -62,7 +63,7 @@ class Planes:
         return cls(
             vertices=surface.vertices[row],
             areas=surface.areas[row],
-            owner=surface.owner[row],
+            owner=owner[row],
             obstacle=index,
             base=ends[:, 0],
             tip=ends[:, 1],

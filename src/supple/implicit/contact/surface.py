@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_matrix, csc_matrix, csr_matrix
+from scipy.sparse import bsr_matrix, coo_matrix, csc_matrix, csr_matrix, identity, kron
 
+from supple.implicit.contact.even_squares import cut_evenly
 from supple.implicit.contact.kinematic import ObstacleRange
 from supple.implicit.contact.stitched import StitchedContacts
 from supple.system import System
@@ -23,9 +25,10 @@ class ContactSurface:
 
     Attributes
     ----------
-    mesh : the collision mesh, in numbers of its own
-    vertices : (s,) the solver's vertex of each of the mesh's, ascending
-    owner : (s,) which body, or len(bodies) + which obstacle, each belongs to
+    mesh : the collision mesh, in numbers of its own: first vertices of the solver, then middles
+    vertices : (s,) the solver's vertex of each of the mesh's first, ascending
+    middles : (k, 2) which of those each of the further points lies between (see `even_squares`)
+    owner : (s + k,) which body, or len(bodies) + which obstacle, each belongs to
     areas : (s,) a third of the adjacent triangles' area at rest [m^2]
     body_count : how many of the owners are bodies; names : of all owners
     stitched : what of the mesh does not collide because it is stitched together
@@ -33,6 +36,7 @@ class ContactSurface:
 
     mesh: ipctk.CollisionMesh
     vertices: NDArray[np.int32]
+    middles: NDArray[np.int32]
     owner: NDArray[np.int32]
     areas: NDArray[np.float64]
     body_count: int
@@ -40,21 +44,39 @@ class ContactSurface:
     stitched: StitchedContacts | None
 
     def points(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Rows of x (n, 3) that the mesh has, in the memory layout that the library wants."""
-        return np.asfortranarray(x[self.vertices])
+        """Points of the mesh, or ways that they go, from those of all vertices x (n, 3), laid out for the library."""
+        own = x[self.vertices]
+        if len(self.middles):
+            own = np.concatenate([own, 0.5 * (own[self.middles[:, 0]] + own[self.middles[:, 1]])])
+        return np.asfortranarray(own)
 
     def add_gradient(self, gradient: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-        """Add (3 s,) to the rows of `out` (n, 3)."""
-        out[self.vertices] += gradient.reshape(-1, 3)
+        """Add one by the mesh's points (3 (s + k),) to the rows of `out` (n, 3)."""
+        rows = gradient.reshape(-1, 3)
+        s = len(self.vertices)
+        out[self.vertices] += rows[:s]
+        for ends in self.middles.T:
+            np.add.at(out, self.vertices[ends], 0.5 * rows[s:])
 
     def blocks(self, hessian: csc_matrix, n: int) -> bsr_matrix:
-        """The symmetric matrix (3 s, 3 s) over all n vertices, in blocks."""
+        """A symmetric matrix by the mesh's points (3 (s + k), 3 (s + k)) over all n vertices, in blocks."""
         size = 3 * len(self.vertices)
+        if len(self.middles):
+            hessian = self.weights.T @ hessian @ self.weights
         blocks = bsr_matrix(csr_of_symmetric(hessian), blocksize=(3, 3), shape=(size, size))
         counts = np.zeros(n, dtype=np.int32)
         counts[self.vertices] = np.diff(blocks.indptr)
         start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
         return bsr_matrix((blocks.data, self.vertices[blocks.indices], start), shape=(3 * n, 3 * n))
+
+    @cached_property
+    def weights(self) -> csc_matrix:
+        """(3 (s + k), 3 s) the mesh's coordinates from those of its first vertices."""
+        s, k = len(self.vertices), len(self.middles)
+        rows = np.concatenate([np.arange(s), np.repeat(np.arange(s, s + k), 2)])
+        columns = np.concatenate([np.arange(s), self.middles.ravel()])
+        values = np.concatenate([np.ones(s), np.full(2 * k, 0.5)])
+        return csc_matrix(kron(coo_matrix((values, (rows, columns)), shape=(s + k, s)), identity(3)))
 
 
 def csr_of_symmetric(matrix: csc_matrix) -> csr_matrix:
@@ -93,17 +115,23 @@ def contact_surface(
     for part in obstacles:
         owner_of[part.vertices] = len(system.bodies) + part.index
     owner = owner_of[vertices]
-    faces = np.asfortranarray(number[triangles], dtype=np.int32)
-    rest = np.asfortranarray(system.rest_positions[vertices])
-    mesh = ipctk.CollisionMesh(rest, ipctk.edges(faces), faces)
-    mesh.can_collide = _filter(owner, len(system.bodies), collide)
-    nodes = np.append(number, -1)[system.stitching.nodes()]
-    stitched = StitchedContacts.of(mesh, nodes, owner, np.asfortranarray(start[vertices]))
+    faces = number[triangles]
+    rest = system.rest_positions[vertices]
     corners = rest[faces]
     doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     areas = np.bincount(faces.ravel(order="C"), weights=np.repeat(doubled / 6.0, 3), minlength=len(vertices))
+    middles = np.zeros((0, 2), dtype=np.int32)
+    if not len(system.stitching):  # what is stitched is told by vertices, edges and triangles of the bodies
+        faces, middles = cut_evenly(rest, faces)
+        rest = np.concatenate([rest, rest[middles].mean(axis=1)])
+        owner = np.concatenate([owner, owner[middles[:, 0]]])
+    faces = np.asfortranarray(faces, dtype=np.int32)
+    mesh = ipctk.CollisionMesh(np.asfortranarray(rest), ipctk.edges(faces), faces)
+    mesh.can_collide = _filter(owner, len(system.bodies), collide)
+    nodes = np.append(number, -1)[system.stitching.nodes()]
+    stitched = StitchedContacts.of(mesh, nodes, owner, np.asfortranarray(start[vertices]))
     names = tuple(part.name for part in system.bodies) + tuple(str(o.name) for o in system.obstacles)
-    return ContactSurface(mesh, vertices, owner, areas.astype(np.float64), len(system.bodies), names, stitched)
+    return ContactSurface(mesh, vertices, middles, owner, areas.astype(np.float64), len(system.bodies), names, stitched)
 
 
 def _filter(owner: NDArray[np.int32], body_count: int, collide: NDArray[np.bool_]) -> ipctk.CollisionFilter:
