@@ -85,9 +85,9 @@ def test_backward_euler_never_gains_energy():
 @pytest.mark.parametrize("integrator", ["bdf2", "newmark"])
 def test_second_order_collisions_keep_most_of_the_energy(integrator):
     energies = np.array([energy(frame) for frame in collide(oblique(), 0.0025, 80, integrator=integrator)])
-    # Measured: 0.598 (Newmark) and 0.894 (BDF2) of it; how much they keep shaking depends on every detail.
+    # Measured: BDF2 gains 2.2 % while they touch.
     assert energies.max() <= energies[0] * 1.03
-    assert energies[-1] > 0.55 * energies[0]
+    assert energies[-1] > 0.6 * energies[0]
 
 
 @pytest.mark.parametrize("dt", [0.001, 0.05, 0.2])

@@ -13,6 +13,10 @@ from supple.system import build_system, initial_state
 SIDE = 0.1
 
 
+def cut(points, faces):
+    return cut_evenly(points, faces, np.zeros(len(points), dtype=np.int32))
+
+
 def areas(points, faces):
     a, b, c = points[faces].transpose(1, 0, 2)
     return 0.5 * np.cross(b - a, c - a)
@@ -20,7 +24,7 @@ def areas(points, faces):
 
 def test_a_box_has_both_diagonals_in_every_square():
     surface = sp.shapes.box((3.0, 2.0, 1.0), (3, 4, 2)).surface
-    faces, diagonals = cut_evenly(surface.vertices, surface.triangles)
+    faces, diagonals = cut(surface.vertices, surface.triangles)
     squares = 2 * (3 * 4 + 4 * 2 + 2 * 3)
     assert len(diagonals) == squares
     assert len(faces) == 4 * squares
@@ -35,8 +39,8 @@ def test_a_box_has_both_diagonals_in_every_square():
 
 
 def test_a_bent_surface_stays_where_it_is():
-    surface = sp.shapes.box((1.0, 1.0, 1.0), (2, 2, 2)).surface
-    faces, diagonals = cut_evenly(surface.vertices, surface.triangles)
+    surface = sp.shapes.box((1.0, 1.0, 1.0), (3, 3, 3)).surface
+    faces, diagonals = cut(surface.vertices, surface.triangles)
     bent = surface.vertices + 0.1 * np.sin(5.0 * surface.vertices[:, [1, 2, 0]])
     points = np.concatenate([bent, bent[diagonals].mean(axis=1)])
     old, new = areas(bent, surface.triangles), areas(points, faces)
@@ -45,13 +49,15 @@ def test_a_bent_surface_stays_where_it_is():
 
 def test_what_is_no_rectangle_is_left_alone():
     ball = sp.shapes.sphere(radius=0.5, edge_length=0.2).surface
-    faces, diagonals = cut_evenly(ball.vertices, ball.triangles)
+    faces, diagonals = cut(ball.vertices, ball.triangles)
     assert len(diagonals) == 0
     assert np.array_equal(faces, ball.triangles)
+    coarse = sp.shapes.box((1, 1, 1), (2, 2, 2)).surface
+    assert len(cut(coarse.vertices, coarse.triangles)[1]) == 0
     # Three squares that share one diagonal are no surface.
     corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0.7]], dtype=float)
     fan = np.array([[0, 1, 2], [0, 2, 3], [0, 2, 4]])
-    assert len(cut_evenly(corners, fan)[1]) == 0
+    assert len(cut(corners, fan)[1]) == 0
 
 
 def two_cubes(divisions, gap=1e-4):
@@ -98,7 +104,8 @@ def test_equal_cubes_above_each_other_are_held_there(divisions):
 
 
 def test_the_barrier_of_cut_squares_has_the_right_derivatives():
-    model, x = two_cubes(2)
+    model, x = two_cubes(3)
+    assert len(model.surface.middles) == 2 * 54
     chance = np.random.default_rng(3)
     x = x + 2e-6 * chance.standard_normal(x.shape)
     way = chance.standard_normal(x.shape)

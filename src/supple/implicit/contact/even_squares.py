@@ -13,13 +13,19 @@ from numpy.typing import NDArray
 # Of the diagonal: how far from a flat rectangle a square may be.
 _ALMOST = 1e-6
 
+# Bodies with fewer squares are left as they are: their outlines weigh more than what is between them.
+FEWEST = 50
 
-def cut_evenly(points: NDArray[np.float64], faces: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Cut every flat rectangle's two halves into four, at a new point in the middle of its diagonal.
+
+def cut_evenly(
+    points: NDArray[np.float64], faces: NDArray[np.int32], owner: NDArray[np.int32]
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Cut flat rectangles' two halves into four, at a new point in the middle of the diagonal, in things with many.
 
     Parameters
     ----------
     points : (s, 3) at rest [m]; faces : (f, 3)
+    owner : (s,) which thing each point belongs to
 
     Returns
     -------
@@ -41,6 +47,9 @@ def cut_evenly(points: NDArray[np.float64], faces: NDArray[np.int32]) -> tuple[N
     off = np.linalg.norm(tips + ends - points[a[one]] - points[b[one]], axis=1)
     even = (off <= _ALMOST * span) & (np.abs(np.linalg.norm(tips - ends, axis=1) - span) <= _ALMOST * span)
     one, other = one[even], other[even]
+    many = np.bincount(owner[c[one]], minlength=int(owner.max(initial=0)) + 1) >= FEWEST
+    some = many[owner[c[one]]]
+    one, other = one[some], other[some]
     middle = np.full(len(faces), -1, dtype=np.int32)
     middle[one] = middle[other] = len(points) + np.arange(len(one))
     cut = middle >= 0

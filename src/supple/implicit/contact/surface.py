@@ -122,7 +122,7 @@ def contact_surface(
     areas = np.bincount(faces.ravel(order="C"), weights=np.repeat(doubled / 6.0, 3), minlength=len(vertices))
     middles = np.zeros((0, 2), dtype=np.int32)
     if not len(system.stitching):  # what is stitched is told by vertices, edges and triangles of the bodies
-        faces, middles = cut_evenly(rest, faces)
+        faces, middles = cut_evenly(rest, faces, owner)
         rest = np.concatenate([rest, rest[middles].mean(axis=1)])
         owner = np.concatenate([owner, owner[middles[:, 0]]])
     faces = np.asfortranarray(faces, dtype=np.int32)
