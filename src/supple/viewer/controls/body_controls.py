@@ -52,9 +52,9 @@ class BodyControls:
         scene = snapshot.description
         names = (ALL, *(body.name for body in scene.bodies))
         if self.which.options != names:
-            chosen = self.which.value
+            if self.which.value not in names:  # first: else a body that is gone would be chosen for a moment
+                self.which.value = ALL
             self.which.options = names
-            self.which.value = chosen if chosen in names else ALL
         values = self._values(scene)
         made_for = (self.which.value, *values)
         if made_for != self._made_for:
