@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import supple as sp
+from supple.implicit.convexity import Convexity
 from supple.implicit.damping import Damping, StrainRate, green_strain_rates, green_strains, viscosity_of
 from supple.implicit.elasticity import elasticity_of
 from supple.implicit.external_forces import ExternalForces
@@ -112,7 +113,7 @@ def test_the_model_at_once_is_the_same_as_its_parts(material):
     for project in (False, True):
         together = HessianBlocks.zeros(len(system.tets), len(x))
         apart = HessianBlocks.zeros(len(system.tets), len(x))
-        model = objective.model(x, together, project)
+        model = objective.model(x, together, Convexity.ALL if project else Convexity.NONE)
         objective.hessian(x, apart, project)
         assert model.energy == pytest.approx(objective.value(x), rel=1e-12)
         assert np.allclose(model.gradient, objective.gradient(x), rtol=1e-10, atol=1e-9)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.implicit.convexity import Convexity
 from supple.implicit.objective import Model, Objective
 from supple.implicit.potential import HessianBlocks
 
@@ -26,14 +27,14 @@ def backtrack(
     slope: float,
     largest: float,
     hessian: HessianBlocks | None,
-    project: bool,
+    convexity: Convexity,
 ) -> tuple[Model, float, int]:
     """Search along `direction` for a sufficient decrease.
 
     Parameters
     ----------
     start : the objective where the search begins; slope : gradient . direction, negative
-    largest : first length to try; hessian, project : where the Hessian at the end goes, if it is
+    largest : first length to try; hessian, convexity : where the Hessian at the end goes, if it is
         wanted, and of what kind
 
     Returns
@@ -44,11 +45,11 @@ def backtrack(
     for cuts in range(_MOST_CUTS):
         moved = start.positions + step * direction
         # Nearly always the first try is good, and then nothing is left to do.
-        model = objective.model(moved, hessian, project) if cuts == 0 else None
+        model = objective.model(moved, hessian, convexity) if cuts == 0 else None
         energy, size = (model.energy, model.size) if model is not None else objective.value_and_size(moved)
         if energy <= start.energy + _SUFFICIENT * step * slope + _ROUND_OFF * max(size, start.size):
-            return model or objective.model(moved, hessian, project), step, cuts
+            return model or objective.model(moved, hessian, convexity), step, cuts
         step *= _SHRINK
     if hessian is not None:
-        objective.model(start.positions, hessian, project)
+        objective.model(start.positions, hessian, convexity)
     return start, 0.0, _MOST_CUTS

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.implicit.clock import Clock
+from supple.implicit.convexity import Convexity, ConvexityChoice
 from supple.implicit.free_motion import FreeMotion
 from supple.implicit.line_search import backtrack
 from supple.implicit.linear_solver import LinearSolver
@@ -95,30 +96,29 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
         return Outcome(Status.NOT_FINITE, here, "the energy at the start of Newton's method is not finite", rows)
     forcing = _LOOSEST
     last_norm = last_length = 0.0
-    # Far from the minimum the energy is modelled convex. Near it, the model's convexity can cost the quadratic rate of
-    # convergence: then the true Hessian is tried, until it turns out not to be positive definite.
-    convex, patience, remaining = True, 1, 1
+    choice = ConvexityChoice()
     reach = 1.0
     for iteration in range(problem.max_iterations):
         gradient = here.gradient.copy()
         gradient[tools.pinned] = 0.0
         with tools.clock.of("linear_solve"):
             tools.linear_solver.assemble(tools.hessian)
-            direction, said = tools.linear_solver.solve(-gradient, forcing, convex)
-        if direction is None and not convex:
-            convex, patience = True, 2 * patience
-            remaining = patience
-            problem.objective.model(here.positions, tools.hessian, True)
+            direction, said = tools.linear_solver.solve(-gradient, forcing, choice.now is Convexity.ALL)
+        while direction is None and choice.now is not Convexity.ALL:
+            choice.refuse(bool(tools.hessian.couplings))
+            problem.objective.model(here.positions, tools.hessian, choice.now)
             with tools.clock.of("linear_solve"):
                 tools.linear_solver.assemble(tools.hessian)
-                direction, said = tools.linear_solver.solve(-gradient, forcing)
+                direction, said = tools.linear_solver.solve(-gradient, forcing, choice.now is Convexity.ALL)
+        used = choice.now
         if direction is None or not np.isfinite(direction).all():
             return Outcome(Status.NOT_FINITE, here, "the linear system of a Newton step could not be solved", rows)
         ends = float(np.abs(direction).max(initial=0.0)) <= problem.tolerance
-        if ends and tools.hessian.couplings and forcing > _LAST:
+        touching = bool(tools.hessian.couplings)
+        if ends and touching and forcing > _LAST:
             # Contact is stiff: what a loose solution leaves over is little in length, and much in force.
             with tools.clock.of("linear_solve"):
-                better, more = tools.linear_solver.solve(-gradient, _LAST, convex)
+                better, more = tools.linear_solver.solve(-gradient, _LAST, used is Convexity.ALL)
             if better is not None and np.isfinite(better).all():
                 direction = better
                 said = replace(said, iterations=said.iterations + more.iterations)
@@ -130,18 +130,17 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
         length = float(np.abs(direction).max(initial=0.0))
         last = length <= problem.tolerance
         # Bodies that recover from a tangle find their way in small steps.
-        if last or not convex or not limits.guard.complete:
+        if (last and not touching) or used is not Convexity.ALL or not limits.guard.complete:
             reach = 1.0
         direction = reach * direction
         slope = float(np.einsum("ij,ij->", gradient, direction))
         largest, _ = limits.largest_step(here.positions, direction)
         step, cuts = 0.0, 0
         slow = last_length > 0.0 and length > _LINEAR_RATE * last_length
-        remaining = remaining - 1 if slow and largest == 1.0 else max(remaining, 1)
-        used, convex = convex, convex and remaining > 0
+        choice.note(slow and largest == 1.0, touching)
         if slope < 0.0 and largest > 0.0:
             hessian = None if last else tools.hessian
-            here, step, cuts = _guarded_search(problem, here, direction, slope, largest, limits, hessian, convex)
+            here, step, cuts = _guarded_search(problem, here, direction, slope, largest, limits, hessian, choice.now)
         if step == 1.0 and last_length > 0.0 and length > _CRAWL * last_length:
             reach = min(2.0 * reach, _LONGEST_REACH)
         elif step < 1.0:
@@ -157,7 +156,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
             filter=largest,
             step=step,
             cuts=cuts,
-            projected=used,
+            projected=used is Convexity.ALL,
         )
         rows.append(row)
         logger.debug("%s", row)
@@ -165,7 +164,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
         if last and (step == 0.0 or _is_rounded(length, here) or _in_balance(problem, here, tools)):
             return Outcome(Status.CONVERGED, here, "", rows)
         if last:
-            here = problem.objective.model(here.positions, tools.hessian, convex)
+            here = problem.objective.model(here.positions, tools.hessian, choice.now)
         if step == 0.0:
             text = f"no step along Newton's direction ({length:.2e} m) lowers the energy, in iteration {iteration}"
             return Outcome(Status.LINE_SEARCH_FAILED, here, text, rows)
@@ -203,11 +202,11 @@ def _guarded_search(
     largest: float,
     limits: StepLimits,
     hessian: HessianBlocks | None,
-    project: bool,
+    convexity: Convexity,
 ) -> tuple[Model, float, int]:
     """A line search that ends where every guarded tet has a positive volume, in rounded numbers too."""
-    end, step, cuts = backtrack(problem.objective, start, direction, slope, largest, hessian, project)
+    end, step, cuts = backtrack(problem.objective, start, direction, slope, largest, hessian, convexity)
     while step > 0.0 and not limits.allows(end.positions):
-        end, step, more = backtrack(problem.objective, start, direction, slope, 0.5 * step, hessian, project)
+        end, step, more = backtrack(problem.objective, start, direction, slope, 0.5 * step, hessian, convexity)
         cuts += more + 1
     return end, step, cuts

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.implicit.clock import Clock
+from supple.implicit.convexity import Convexity
 from supple.implicit.potential import HessianBlocks, Potential
 
 
@@ -64,15 +65,17 @@ class Objective(Potential):
         for term in self.terms:
             term.add_gradient(x, out)
 
-    def model(self, x: NDArray[np.float64], hessian: HessianBlocks | None, project: bool = True) -> Model:
-        """Energy and gradient at x; the Hessian into `hessian`, where given, of a convex model with `project`."""
+    def model(
+        self, x: NDArray[np.float64], hessian: HessianBlocks | None, convexity: Convexity = Convexity.ALL
+    ) -> Model:
+        """Energy and gradient at x; the Hessian into `hessian`, where given, of a model as convex as asked for."""
         gradient = np.zeros_like(x)
         if hessian is not None:
             hessian.clear()
         values = []
         for term in self.terms:
             with self.clock.of(term.label):
-                values.append(term.add_model(x, gradient, hessian, project))
+                values.append(term.add_model(x, gradient, hessian, convexity.projects(term.label)))
         return Model(x, sum(values), sum(abs(value) for value in values), gradient)
 
     def hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool = True) -> None:

@@ -12,13 +12,13 @@ from supple.errors import SolverError
 from supple.implicit.contact.build import contact_model
 from supple.implicit.contact.settings import Contact
 from supple.implicit.damping import viscosity_of
+from supple.implicit.division import Division
 from supple.implicit.elasticity import elasticity_of
 from supple.implicit.free_motion import FreeMotion
 from supple.implicit.guard import refuse_inverted
 from supple.implicit.integrators import Integrator, Static, integrator_of
 from supple.implicit.linear_solver import LinearSolver
 from supple.implicit.newton import Tools
-from supple.implicit.pin_paths import bends
 from supple.implicit.potential import HessianBlocks
 from supple.implicit.reactions import reaction_forces
 from supple.implicit.stabilizer import stabilizer_of
@@ -49,7 +49,8 @@ class Implicit(Solver):
         second of the step; for "static", than this share of the diagonal. None: 1e-3 1/s, or 1e-9.
     max_iterations : of Newton in one (sub)step.
     linear_solver : "pcg", "direct", or "auto": CG, and a factorization where CG stalls.
-    max_substeps : a step that fails is halved until it would take more substeps than this.
+    max_substeps : a step that fails is halved until it would take more substeps than this. Steps in which scripts turn
+        far are first divided into straight pieces (1024 at most), each of which may take so many. 1: never divided.
     contact : of bodies with each other, with themselves and with obstacles; None turns it off.
 
     Raises
@@ -144,35 +145,26 @@ class Implicit(Solver):
         n = len(state.positions)
         state = workspace.taken_in(state)
         workspace.tools.clock.restart()
-        finest = 1 << int(np.log2(self.max_substeps))
-        done, size = 0, finest
-        begin, now = state.time, state
+        division = Division.of(workspace.system, state.time, dt, workspace.diagonal, self.max_substeps)
+        now = state
         settings = StepSettings(integrator_of(self.integrator), self.tolerance, self.max_iterations)
         rows: list[NewtonRow] = []
         substeps = 0
         worst, message = Status.CONVERGED, ""
         last: Substep | None = None
-        while done < finest:
-            end = begin + dt * ((done + size) / finest)
-            if size > 1 and bends(workspace.system, now.time, end, workspace.diagonal):
-                size //= 2
-                continue
-            taken = take_substep(now, end, dt * (size / finest), settings, workspace)
+        while not division.over:
+            taken = take_substep(now, division.end, division.length, settings, workspace)
             rows += [replace(row, substep=substeps) for row in taken.outcome.rows]
-            good = taken.outcome.status is Status.CONVERGED
-            if not good and size > 1:
-                logger.debug("step of %g s: %s; halved", dt * size / finest, taken.outcome.status)
-                size //= 2
-                continue
-            if not good:
-                worst, message = taken.outcome.status, taken.outcome.message
+            if taken.outcome.status is not Status.CONVERGED:
+                logger.debug("step of %g s: %s", division.length, taken.outcome.status)
+                if division.halve():
+                    continue
+                worst, message = taken.outcome.status, _limit_message(taken.outcome.message, division)
                 if not worst.can_go_on:
                     break
             now, last = taken.state, taken
             substeps += 1
-            done += size
-            while size < finest and done % (2 * size) == 0 and done + 2 * size <= finest:
-                size *= 2
+            division.advance()
         now = replace(now, positions=now.positions[:n], velocities=now.velocities[:n])
         workspace.last = now.positions
         details = _details(rows, substeps)
@@ -183,6 +175,13 @@ class Implicit(Solver):
             report = last.contact.completed(report, last.state.positions)
         report.details["seconds"] = workspace.tools.clock.shares()
         return now, report
+
+
+def _limit_message(said: str, division: Division) -> str:
+    """Why a substep failed that may not be divided any more."""
+    if division.halves == 1:
+        return said
+    return f"{said}; in a substep of {division.length:.3g} s, which max_substeps lets be no shorter"
 
 
 def _details(rows: list[NewtonRow], substeps: int) -> dict[str, Any]:

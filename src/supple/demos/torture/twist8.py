@@ -83,8 +83,7 @@ def demo(cells: tuple[int, int], dt: float, turns: float = TURNS, steps: int | N
             "itself; contact keeps it from passing through itself."
         ),
         scene=partial(scene, cells, turns),
-        # Steps of seconds take many substeps where the rod folds.
-        solvers={"implicit": lambda: Implicit(max_substeps=512)},
+        solvers={"implicit": Implicit},
         measurement=_Watch,
         dt=dt,
         steps=round(SECONDS * turns / TURNS / dt) if steps is None else steps,
