@@ -31,25 +31,21 @@ class UploadControls:
         self.button = server.gui.add_upload_button("From a file", mime_type=",".join(limits.UPLOAD_FORMATS), hint=_HINT)
         self._said = server.gui.add_markdown("", visible=False)
         self._busy, self._stop = threading.Lock(), threading.Event()
-        self._thread: threading.Thread | None = None
         self.transfers = Transfers(server, self.button, self._take, self._refuse)
 
     def stop(self) -> None:
-        """End what is under way."""
+        """End what is under way, and wait for its end."""
         self._stop.set()
-        if self._thread is not None:
-            self._thread.join()
+        with self._busy:
+            pass
 
     def _take(self, client: Any, name: str, suffix: str, content: bytes) -> None:
+        upload, youngs = Upload(name, suffix, content, self._size()), self._youngs()
         if self._stop.is_set() or not self._busy.acquire(blocking=False):
             self._refuse(client, f"{name}: another file is being read; try again when it is done")
             return
-        upload = Upload(name, suffix, content, self._size())
         self._say(_progress(0.0))
-        self._thread = threading.Thread(
-            target=self._work, args=(client, upload, self._youngs()), name="supple upload", daemon=True
-        )
-        self._thread.start()
+        threading.Thread(target=self._work, args=(client, upload, youngs), name="supple upload", daemon=True).start()
 
     def _work(self, client: Any, upload: Upload, youngs: float) -> None:
         """In a thread of its own: the page and the simulation go on meanwhile."""
