@@ -237,6 +237,15 @@ def live(server, made_up):
     page.stop()
 
 
+@pytest.fixture
+def visitor(live, server, visit, until):
+    """One who looks at the page of the made-up simulation."""
+    made = visit(server.get_port())
+    until(server.get_clients)
+    yield made
+    made.leave()
+
+
 class Screen:
     """A browser that looks at a page, and what a person does there.
 

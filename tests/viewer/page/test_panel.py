@@ -37,14 +37,6 @@ from supple.viewer.messages import (
 
 
 @pytest.fixture
-def visitor(live, server, visit, until):
-    made = visit(server.get_port())
-    until(server.get_clients)
-    yield made
-    made.leave()
-
-
-@pytest.fixture
 def told(made_up, until):
     """The command that comes next."""
 

@@ -20,14 +20,6 @@ PART = limits.UPLOAD_PART
 
 
 @pytest.fixture
-def visitor(live, server, visit, until):
-    made = visit(server.get_port())
-    until(server.get_clients)
-    yield made
-    made.leave()
-
-
-@pytest.fixture
 def heard(live, server, visitor, monkeypatch):
     """The lines that the visitor is shown."""
     lines = []

@@ -64,10 +64,6 @@ class ParameterInput:
         self._removed = True
         self.handle.remove()
 
-    def forget_touch(self) -> None:
-        """Show the simulation's value at once, next time."""
-        self._wish.forget()
-
     def _moved(self, event: Any) -> None:
         if event.client is None:
             return

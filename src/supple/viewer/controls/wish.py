@@ -30,7 +30,3 @@ class Wish:
         """Whether it is to be left on show, where the simulation has acted upon the commands up to `applied`."""
         since = time.monotonic() - self._touched
         return since < _HANDS_OFF or (applied < self._number and since < _LONGEST)
-
-    def forget(self) -> None:
-        """Show the simulation's value at once, next time."""
-        self._touched = -math.inf
