@@ -19,9 +19,9 @@ from statistics import median
 
 import supple as sp
 from supple.viewer.app import Address, opened_page
-from supple.viewer.engine import Engine
-from supple.viewer.live_source import LiveSource
-from supple.viewer.messages import Play, Reset, Step
+from supple.viewer.engine.engine import Engine
+from supple.viewer.protocol.live_source import LiveSource
+from supple.viewer.protocol.messages import Play, Reset, Step
 
 WAYS = {
     "headless": "simulate(), no page",

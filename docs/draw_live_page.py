@@ -12,10 +12,10 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 import supple as sp
-from supple.mesh.shape_surfaces import torus_surface
+from supple.mesh.primitives.surfaces import torus_surface
 from supple.viewer.app import Address, opened_page
-from supple.viewer.live_source import LiveSource
-from supple.viewer.messages import Grab, ReleaseGrab, Reset, SetParameter, Step
+from supple.viewer.protocol.live_source import LiveSource
+from supple.viewer.protocol.messages import Grab, ReleaseGrab, Reset, SetParameter, Step
 
 FOLDER = Path(__file__).parent / "images"
 FLAGS = "--headless --no-sandbox --disable-gpu --use-angle=swiftshader --enable-unsafe-swiftshader"

@@ -4,21 +4,21 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.implicit.free_motion import FreeMotion
-from supple.implicit.guard import Guard
-from supple.implicit.inertia import Inertia
-from supple.implicit.linear_solver import LinearSolver
-from supple.implicit.newton import Problem, Tools, minimize
-from supple.implicit.objective import Objective
-from supple.implicit.potential import HessianBlocks
-from supple.implicit.step_limits import StepLimits
-from supple.implicit.stitch_energy import StitchEnergy
+from supple.implicit.energies.inertia import Inertia
+from supple.implicit.energies.potential import HessianBlocks
+from supple.implicit.energies.stitches import StitchEnergy
+from supple.implicit.limits.inversion_guard import Guard
+from supple.implicit.limits.step_limits import StepLimits
+from supple.implicit.newton.free_motion import FreeMotion
+from supple.implicit.newton.linear_solver import LinearSolver
+from supple.implicit.newton.minimize import Problem, Tools, minimize
+from supple.implicit.newton.objective import Objective
 from supple.scene.stitches.elements import Springs
 from supple.scene.stitches.side import Side
 from supple.scene.stitches.stitching import Anchors, Stitching
 from supple.state import Status
 from supple.system import PinRange, System
-from supple.xpbd.stitch_constraints import stitch_constraints
+from supple.xpbd.constraints.stitches import stitch_constraints
 
 NO_ANCHORS = Anchors((), np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros((0, 3)))
 

@@ -19,14 +19,14 @@ _HOME = {
     "CheckSettings": "supple.output.check.settings",
     "CommandError": "supple.errors",
     "ContactPair": "supple.scene.contact_pairs",
-    "ContactSettings": "supple.xpbd.contact_settings",
+    "XPBDContact": "supple.xpbd.contact.settings",
     "EdgesAndVolume": "supple.materials.edges_and_volume",
     "Embedding": "supple.mesh.skin",
     "FixedCorotated": "supple.materials.fixed_corotated",
     "Force": "supple.scene.forces",
     "Frame": "supple.simulate",
     "HalfSpace": "supple.scene.obstacles",
-    "Contact": "supple.implicit.contact.settings",
+    "IPCContact": "supple.implicit.contact.settings",
     "ContactPoints": "supple.contact_points",
     "Implicit": "supple.implicit.solver",
     "InBox": "supple.scene.selection",
@@ -38,8 +38,8 @@ _HOME = {
     "OutputError": "supple.errors",
     "Pin": "supple.scene.pins",
     "ProgressBar": "supple.output.progress",
-    "Recorder": "supple.output.recording",
-    "Recording": "supple.output.recording_reader",
+    "Recorder": "supple.output.recording.recorder",
+    "Recording": "supple.output.recording.reader",
     "Regions": "supple.materials.regions",
     "Report": "supple.simulate",
     "Scene": "supple.scene.scene",
@@ -61,20 +61,20 @@ _HOME = {
     "VertexVertexStitch": "supple.scene.stitches.vertex_vertex",
     "XPBD": "supple.xpbd.solver",
     "check_recording": "supple.output.check.checker",
-    "export": "supple.output.export",
-    "largest_noninverting_step": "supple.implicit.step_filter",
+    "export": "supple.output.export.exporter",
+    "largest_noninverting_step": "supple.implicit.limits.step_filter",
     "load_run": "supple.scene_file.loader",
     "load_scene": "supple.scene_file.loader",
     "plot_recording": "supple.output.plots",
-    "read_recording": "supple.output.recording_reader",
-    "read_tetgen": "supple.mesh.tetgen_files",
-    "repair_surface": "supple.mesh.repair",
+    "read_recording": "supple.output.recording.reader",
+    "read_tetgen": "supple.mesh.io.tetgen_files",
+    "repair_surface": "supple.mesh.meshing.repair",
     "rotation_variant_svd": "supple.numerics.svd3",
     "simulate": "supple.simulate",
     "smallest_positive_cubic_root": "supple.numerics.cubic",
-    "tetrahedralize": "supple.mesh.tetrahedralize",
+    "tetrahedralize": "supple.mesh.meshing.tetrahedralize",
     "write_page": "supple.output.page",
-    "write_tetgen": "supple.mesh.tetgen_files",
+    "write_tetgen": "supple.mesh.io.tetgen_files",
 }
 _MODULES = {"shapes": "supple.mesh.shapes"}
 
@@ -119,9 +119,9 @@ if TYPE_CHECKING:
         SolverError,
         SuppleError,
     )
-    from supple.implicit.contact.settings import Contact
+    from supple.implicit.contact.settings import IPCContact
+    from supple.implicit.limits.step_filter import largest_noninverting_step
     from supple.implicit.solver import Implicit
-    from supple.implicit.step_filter import largest_noninverting_step
     from supple.materials.arap import ARAP
     from supple.materials.edges_and_volume import EdgesAndVolume
     from supple.materials.fixed_corotated import FixedCorotated
@@ -130,24 +130,24 @@ if TYPE_CHECKING:
     from supple.materials.st_venant_kirchhoff import StVenantKirchhoff
     from supple.materials.stable_neo_hookean import StableNeoHookean
     from supple.mesh import shapes
-    from supple.mesh.repair import repair_surface
+    from supple.mesh.io.tetgen_files import read_tetgen, write_tetgen
+    from supple.mesh.meshing.repair import repair_surface
+    from supple.mesh.meshing.tetrahedralize import tetrahedralize
     from supple.mesh.skin import Embedding
     from supple.mesh.surface import SurfaceMesh
     from supple.mesh.surface_checks import SurfaceReport
-    from supple.mesh.tetgen_files import read_tetgen, write_tetgen
     from supple.mesh.tetmesh import TetMesh
-    from supple.mesh.tetrahedralize import tetrahedralize
     from supple.numerics.cubic import smallest_positive_cubic_root
     from supple.numerics.svd3 import rotation_variant_svd
     from supple.output.check.checker import check_recording
     from supple.output.check.report import CheckReport, CheckResult
     from supple.output.check.settings import CheckSettings
-    from supple.output.export import export
+    from supple.output.export.exporter import export
     from supple.output.page import write_page
     from supple.output.plots import plot_recording
     from supple.output.progress import ProgressBar
-    from supple.output.recording import Recorder
-    from supple.output.recording_reader import Recording, read_recording
+    from supple.output.recording.reader import Recording, read_recording
+    from supple.output.recording.recorder import Recorder
     from supple.scene.body import Body
     from supple.scene.contact_pairs import ContactPair
     from supple.scene.forces import Force, SoftTarget
@@ -162,5 +162,5 @@ if TYPE_CHECKING:
     from supple.scene_file.loader import load_run, load_scene
     from supple.simulate import Frame, NullSink, Report, simulate
     from supple.state import State, Status
-    from supple.xpbd.contact_settings import ContactSettings
+    from supple.xpbd.contact.settings import XPBDContact
     from supple.xpbd.solver import XPBD

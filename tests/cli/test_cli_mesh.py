@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from supple.cli.app import main
-from supple.mesh.shape_surfaces import sphere_surface
+from supple.mesh.primitives.surfaces import sphere_surface
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 

@@ -5,7 +5,7 @@ import pytest
 from supple.cli.app import main
 from supple.cli.exit_codes import ExitCode
 from supple.demos.registry import DEMOS
-from supple.output.recording_reader import read_recording
+from supple.output.recording.reader import read_recording
 
 
 @pytest.mark.parametrize("arguments", [["demo"], ["demo", "--list"], ["demo", "squash", "-l"]])

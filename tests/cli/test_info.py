@@ -6,7 +6,7 @@ import pytest
 import supple as sp
 from supple.cli.app import main
 from supple.cli.exit_codes import ExitCode
-from supple.output.recording import Recorder
+from supple.output.recording.recorder import Recorder
 
 
 @pytest.fixture

@@ -12,8 +12,8 @@ import pytest
 import supple as sp
 from supple.cli.app import main
 from supple.cli.exit_codes import ExitCode
-from supple.output.recording import Recorder
-from supple.output.recording_reader import read_recording
+from supple.output.recording.reader import read_recording
+from supple.output.recording.recorder import Recorder
 from supple.xpbd.solver import XPBD
 
 SCENE = """

@@ -4,7 +4,7 @@ import pytest
 
 from supple.cli.app import main
 from supple.cli.exit_codes import ExitCode
-from supple.output.recording_reader import read_recording
+from supple.output.recording.reader import read_recording
 
 CUBE = "shape: {kind: box, divisions: [2, 2, 2]}, material: {kind: stable_neo_hookean, youngs: 1e5, poisson: 0.3}"
 

@@ -13,7 +13,7 @@ import pytest
 import supple as sp
 from supple.cli.app import main
 from supple.cli.exit_codes import ExitCode
-from supple.viewer.live_source import LiveSource
+from supple.viewer.protocol.live_source import LiveSource
 
 SCENE = """
 bodies:

@@ -162,8 +162,8 @@ def test_same_bits_on_one_and_two_threads():
 
     if numba.config.NUMBA_NUM_THREADS < 2:
         pytest.skip("this machine has one core")
-    from supple.implicit import damping, elasticity
-    from supple.numerics import block_csr, pcg
+    from supple.implicit.energies import damping, elasticity
+    from supple.numerics.sparse import block_csr, pcg
 
     body = cube(divisions=(5, 5, 5), damping=0.001, youngs=5e3)
     scene = sp.Scene([body], pins=[sp.Pin("cube", [0, 1, 2, 3])])
@@ -173,7 +173,7 @@ def test_same_bits_on_one_and_two_threads():
         (block_csr, "SERIAL_BLOCKS"),
         (pcg, "_SERIAL_BLOCKS"),
     ]
-    from supple.numerics import preconditioner
+    from supple.numerics.sparse import preconditioner
 
     thresholds.append((preconditioner, "SERIAL_BLOCKS"))
     before = numba.get_num_threads()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from supple.errors import MeshError
-from supple.mesh.gummy_bear import bear_distance, gummy_bear, gummy_bear_surface
+from supple.mesh.primitives.gummy_bear import bear_distance, gummy_bear, gummy_bear_surface
 
 
 @pytest.mark.parametrize("edge_length", [0.14, 0.1, 0.08, 0.05])

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from supple.errors import MeshError
 from supple.mesh import shapes
-from supple.mesh.mesh_files import SURFACE_READERS, SURFACE_WRITERS
+from supple.mesh.io.mesh_files import SURFACE_READERS, SURFACE_WRITERS
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from supple.mesh import shapes
-from supple.mesh.mesh_files import SURFACE_WRITERS
+from supple.mesh.io.mesh_files import SURFACE_WRITERS
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from supple.errors import MeshingError
-from supple.mesh import repair
-from supple.mesh.repair import repair_surface
-from supple.mesh.shape_surfaces import sphere_surface
+from supple.mesh.meshing import repair
+from supple.mesh.meshing.repair import repair_surface
+from supple.mesh.meshing.tetrahedralize import tetrahedralize_reported
+from supple.mesh.primitives.surfaces import sphere_surface
 from supple.mesh.surface import SurfaceMesh
-from supple.mesh.tetrahedralize import tetrahedralize_reported
 
 BALL = sphere_surface(radius=0.5, edge_length=0.25)
 FAR = BALL.transformed(translation=(2, 0, 0))

@@ -15,15 +15,15 @@ import numpy as np
 import pytest
 
 from supple.errors import MeshingError
-from supple.mesh import ftetwild, mesher_worker, tetrahedralize
-from supple.mesh.child_process import Limits, MesherFailure
-from supple.mesh.gummy_bear import gummy_bear_surface
-from supple.mesh.shape_surfaces import box_surface, sphere_surface, torus_surface
+from supple.mesh.meshing import ftetwild, mesher_worker, tetrahedralize
+from supple.mesh.meshing.child_process import Limits, MesherFailure
+from supple.mesh.meshing.tetgen_mesher import mesh_with_tetgen
+from supple.mesh.meshing.tetrahedralize import tetrahedralize as fill
+from supple.mesh.meshing.tetrahedralize import tetrahedralize_reported
+from supple.mesh.primitives.gummy_bear import gummy_bear_surface
+from supple.mesh.primitives.surfaces import box_surface, sphere_surface, torus_surface
 from supple.mesh.surface import SurfaceMesh
-from supple.mesh.tetgen_mesher import mesh_with_tetgen
 from supple.mesh.tetmesh import TetMesh
-from supple.mesh.tetrahedralize import tetrahedralize as fill
-from supple.mesh.tetrahedralize import tetrahedralize_reported
 
 SPHERE = sphere_surface(radius=0.5, edge_length=0.15)
 SMALL = sphere_surface(radius=0.2, edge_length=0.15)
@@ -280,8 +280,8 @@ def test_an_interrupt_ends_the_child(tmp_path: Path) -> None:
     """Ctrl-C in a program that meshes: no child and no temporary files remain."""
     program = (
         "import sys; from supple.mesh import mesher_worker\n"
-        "from supple.mesh.shape_surfaces import sphere_surface\n"
-        "from supple.mesh.tetrahedralize import tetrahedralize\n"
+        "from supple.mesh.primitives.surfaces import sphere_surface\n"
+        "from supple.mesh.meshing.tetrahedralize import tetrahedralize\n"
         f"mesher_worker.__file__ = {str(tmp_path / 'worker.py')!r}\n"
         "tetrahedralize(sphere_surface(radius=.5, edge_length=.3))\n"
     )

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from supple.numerics.block_csr import build_pattern
+from supple.numerics.sparse.block_csr import build_pattern
 
 
 def dense_sum(elements, matrices, diagonal):
@@ -67,7 +67,7 @@ def test_columns_ascend_and_mirrors_are_mutual():
 def test_same_bits_on_any_number_of_threads(threads):
     import numba
 
-    from supple.numerics import block_csr
+    from supple.numerics.sparse import block_csr
 
     if threads > numba.config.NUMBA_NUM_THREADS:
         pytest.skip("this machine has one core")

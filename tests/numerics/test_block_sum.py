@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse import bsr_matrix, coo_matrix
 
-from supple.numerics.block_csr import build_pattern
-from supple.numerics.block_sum import join
+from supple.numerics.sparse.block_csr import build_pattern
+from supple.numerics.sparse.block_sum import join
 
 
 def random_symmetric(rng, n, count):
@@ -95,8 +95,8 @@ def test_what_couples_pinned_vertices_is_left_out():
 @pytest.mark.parametrize("kind", ["pcg", "auto"])
 def test_systems_with_couplings_are_solved_as_directly(kind):
     import supple as sp
-    from supple.implicit.linear_solver import LinearSolver
-    from supple.implicit.potential import HessianBlocks
+    from supple.implicit.energies.potential import HessianBlocks
+    from supple.implicit.newton.linear_solver import LinearSolver
     from supple.system import build_system
 
     rng = np.random.default_rng(2)

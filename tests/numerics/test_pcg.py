@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.numerics import pcg
-from supple.numerics.aggregates import bisected_groups
-from supple.numerics.block_csr import build_pattern
-from supple.numerics.envelope_cholesky import factorize, solve
-from supple.numerics.pcg import conjugate_gradients
-from supple.numerics.preconditioner import order_rows, two_level
+from supple.numerics.sparse import pcg
+from supple.numerics.sparse.block_csr import build_pattern
+from supple.numerics.sparse.partition import bisected_groups
+from supple.numerics.sparse.pcg import conjugate_gradients
+from supple.numerics.sparse.preconditioner import order_rows, two_level
+from supple.numerics.sparse.skyline_cholesky import factorize, solve
 
 
 def linear_elasticity(mesh, mu, lam):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from supple.numerics.triangle_tree import TriangleTree, pair_distances
+from supple.numerics.geometry.triangle_tree import TriangleTree, pair_distances
 
 
 def soup(count, seed):

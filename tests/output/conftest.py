@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.output.recording import Recorder
-from supple.output.recording_reader import Recording, read_recording
+from supple.output.recording.reader import Recording, read_recording
+from supple.output.recording.recorder import Recorder
 from supple.simulate import simulate
 from supple.solver import Solver
 from supple.state import State, Status, StepReport

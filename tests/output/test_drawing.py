@@ -8,8 +8,8 @@ import pytest
 import supple as sp
 from supple.mesh.surface import SurfaceMesh
 from supple.output.drawing import evenly, obstacle_pictures, pictures, vertex_normals, view_of
-from supple.output.recording import Recorder
-from supple.output.recording_reader import read_recording
+from supple.output.recording.reader import read_recording
+from supple.output.recording.recorder import Recorder
 from supple.simulate import simulate
 
 

@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 from supple.errors import OutputError
-from supple.output import export_glb, video
 from supple.output.drawing import pictures
-from supple.output.export import FORMATS, export
-from supple.output.recording_reader import read_recording
+from supple.output.export import glb as export_glb
+from supple.output.export import video
+from supple.output.export.exporter import FORMATS, export
+from supple.output.recording.reader import read_recording
 
 _TYPES = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
 
@@ -164,7 +165,7 @@ def test_usd_has_time_samples(tmp_path, recorded, recording):
 
 @pytest.mark.parametrize(
     ("to", "module", "extra"),
-    [("usd", "supple.output.export_usd", "usd"), ("mp4", "supple.output.video", "video")],
+    [("usd", "supple.output.export.usd", "usd"), ("mp4", "supple.output.export.video", "video")],
 )
 def test_what_is_not_installed_is_named(tmp_path, recorded, monkeypatch, to, module, extra):
     monkeypatch.setattr(f"{module}.find_spec", lambda name: None)
@@ -228,8 +229,8 @@ def test_a_drawing_process_that_dies_is_one_clear_line(tmp_path, recorded, monke
 
 def test_a_killed_recording_is_mended_by_exporting_it(tmp_path, tools, recorded):
     """What a killed writer leaves: frames counted for us that VTK's part of the file does not count yet, and room."""
-    from supple.output.recording import Recorder
-    from supple.output.recording_file import RecordingFile
+    from supple.output.recording.file import RecordingFile
+    from supple.output.recording.recorder import Recorder
     from supple.simulate import simulate
 
     path = tmp_path / "killed.vtkhdf"
@@ -268,8 +269,8 @@ def test_outputs_appear_whole_or_not_at_all(tmp_path, recorded, monkeypatch):
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("supple.output.export_obj.np.savetxt", fail)
-        patch.setattr("supple.output.export_glb._Glb.to_bytes", fail)
+        patch.setattr("supple.output.export.obj.np.savetxt", fail)
+        patch.setattr("supple.output.export.glb._Glb.to_bytes", fail)
         for to, output in (("obj", folder), ("glb", tmp_path / "old.glb")):
             with pytest.raises(OutputError, match="No space left"):
                 export(recorded[0], to, output)

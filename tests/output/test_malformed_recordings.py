@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from supple.errors import OutputError
-from supple.output.export import export
-from supple.output.recording_reader import read_recording
+from supple.output.export.exporter import export
+from supple.output.recording.reader import read_recording
 
 
 def _header(**changes):

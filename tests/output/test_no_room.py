@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy as np
 import supple as sp
 from supple.errors import OutputError
-from supple.output.export import export
+from supple.output.export.exporter import export
 from supple.output.plots import plot_recording
-from supple.output.video_worker import _write_mp4
+from supple.output.export.video_worker import _write_mp4
 
 ENDINGS = {"usdc": "usd"}
 source, folder = Path(sys.argv[1]), Path(sys.argv[2])

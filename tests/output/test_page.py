@@ -8,7 +8,7 @@ import numpy as np
 
 from supple.output import page as page_module
 from supple.output.page import write_page
-from supple.output.recording_reader import read_recording
+from supple.output.recording.reader import read_recording
 
 
 def test_the_page_plays_in_a_browser(tmp_path, tools, browser, pixels):

@@ -15,12 +15,12 @@ import pytest
 
 import supple as sp
 from supple.errors import OutputError
-from supple.output import recording as recording_module
-from supple.output import recording_file
-from supple.output.export import export
-from supple.output.recording import Recorder
-from supple.output.recording_file import RecordingFile
-from supple.output.recording_reader import read_recording
+from supple.output.export.exporter import export
+from supple.output.recording import file as recording_file
+from supple.output.recording import recorder as recording_module
+from supple.output.recording.file import RecordingFile
+from supple.output.recording.reader import read_recording
+from supple.output.recording.recorder import Recorder
 from supple.simulate import simulate
 from supple.state import Status
 
@@ -181,8 +181,8 @@ _RECORDS_WITHOUT_END = """
 import os, random, runpy, sys, time
 from pathlib import Path
 import supple as sp
-import supple.output.recording as module
-from supple.output.recording_reader import read_recording
+import supple.output.recording.recorder as module
+from supple.output.recording.reader import read_recording
 from supple.simulate import simulate
 
 tools = runpy.run_path(sys.argv[1])

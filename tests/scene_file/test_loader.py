@@ -13,9 +13,9 @@ import supple as sp
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.scene.contact_pairs import pair_table
 from supple.scene_file.document import SceneFileModel, json_schema
+from supple.scene_file.entries.materials import ELASTIC_KINDS
+from supple.scene_file.entries.solvers import solver_of_kind
 from supple.scene_file.loader import load_scene
-from supple.scene_file.materials import ELASTIC_KINDS
-from supple.scene_file.solvers import solver_of_kind
 from supple.scene_file.yaml_reader import read_yaml
 
 RUBBER = "{kind: stable_neo_hookean, youngs: 1e5, poisson: 0.4}"
@@ -328,9 +328,9 @@ def test_contact_of_the_implicit_solver(load):
         "solver: {kind: implicit, contact: {dhat: 1e-3, stiffness: 1e5, "
         "friction_velocity: 0.01, friction_iterations: 3}}\n"
     ).solver
-    assert solver.contact == sp.Contact(1e-3, 1e5, 0.01, 3)
+    assert solver.contact == sp.IPCContact(1e-3, 1e5, 0.01, 3)
     for words in ("", ", contact: {}", ", contact: {stiffness: adaptive}"):
-        assert load(f"bodies: [{BODY}]\nsolver: {{kind: implicit{words}}}\n").solver.contact == sp.Contact()
+        assert load(f"bodies: [{BODY}]\nsolver: {{kind: implicit{words}}}\n").solver.contact == sp.IPCContact()
     assert load(f"bodies: [{BODY}]\nsolver: {{kind: implicit, contact: null}}\n").solver.contact is None
 
 

@@ -3,10 +3,10 @@
 import pytest
 
 import supple as sp
-from supple.viewer.live_scene import LiveScene
-from supple.viewer.live_source import LiveSource
-from supple.viewer.messages import Grab
-from supple.viewer.simulation_loop import SimulationLoop
+from supple.viewer.engine.scene.live_scene import LiveScene
+from supple.viewer.engine.simulation_loop import SimulationLoop
+from supple.viewer.protocol.live_source import LiveSource
+from supple.viewer.protocol.messages import Grab
 
 
 def small_source(**changes):
@@ -61,6 +61,6 @@ class Collected:
 @pytest.fixture
 def loop(live):
     """A loop without processes: commands go in with `obey`, snapshots come out of `snapshot`."""
-    from supple.viewer.command_queue import CommandQueue
+    from supple.viewer.protocol.command_queue import CommandQueue
 
     return SimulationLoop(live, CommandQueue(), Collected())

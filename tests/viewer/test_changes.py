@@ -7,12 +7,12 @@ import pytest
 
 import supple as sp
 from supple.errors import CommandError, SolverError, SuppleError
-from supple.viewer import limits
-from supple.viewer.changes import change
-from supple.viewer.describe import describe, measures
-from supple.viewer.live_scene import LiveScene
-from supple.viewer.live_source import LiveSource
-from supple.viewer.messages import (
+from supple.viewer.engine.measurement.describe import describe, measures
+from supple.viewer.engine.scene.changes import change
+from supple.viewer.engine.scene.live_scene import LiveScene
+from supple.viewer.protocol import limits
+from supple.viewer.protocol.live_source import LiveSource
+from supple.viewer.protocol.messages import (
     AddBody,
     AddMesh,
     CopyBody,

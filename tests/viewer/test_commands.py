@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from supple.errors import CommandError
-from supple.viewer.messages import (
+from supple.viewer.protocol.messages import (
     PARAMETERS,
     AddBody,
     CopyBody,

@@ -15,9 +15,9 @@ import pytest
 
 import supple as sp
 from supple.errors import CommandError, SceneError, SolverError
-from supple.viewer.engine import Engine
-from supple.viewer.live_source import LiveSource
-from supple.viewer.messages import (
+from supple.viewer.engine.engine import Engine
+from supple.viewer.protocol.live_source import LiveSource
+from supple.viewer.protocol.messages import (
     AddBody,
     MoveGrab,
     Pause,
@@ -29,7 +29,7 @@ from supple.viewer.messages import (
     SetView,
     Step,
 )
-from supple.viewer.outbox import DESCRIPTION, SNAPSHOT, Outbox
+from supple.viewer.protocol.outbox import DESCRIPTION, SNAPSHOT, Outbox
 
 from .conftest import small_source
 
@@ -207,9 +207,9 @@ def test_it_ends_when_the_pages_process_is_killed(tmp_path):
         textwrap.dedent("""
         import time
         import supple as sp
-        from supple.viewer.engine import Engine
-        from supple.viewer.live_source import LiveSource
-        from supple.viewer.messages import Play
+        from supple.viewer.engine.engine import Engine
+        from supple.viewer.protocol.live_source import LiveSource
+        from supple.viewer.protocol.messages import Play
 
         if __name__ == "__main__":
             body = sp.Body("cube", sp.shapes.box((1, 1, 1), (2, 2, 2)), sp.StableNeoHookean(youngs=1e5, poisson=0.3))

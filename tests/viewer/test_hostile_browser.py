@@ -12,11 +12,11 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from supple.viewer.app import Address, opened_page
-from supple.viewer.engine import Engine
-from supple.viewer.messages import Pause, Play, Reset
+from supple.viewer.engine.engine import Engine
+from supple.viewer.protocol.messages import Pause, Play, Reset
 
 from .conftest import small_source
-from .test_gate import MALFORMED, camera
+from .server.test_gate import MALFORMED, camera
 
 PATIENCE = 60.0
 

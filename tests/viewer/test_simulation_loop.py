@@ -16,13 +16,13 @@ import pytest
 import supple as sp
 from supple.errors import CommandError, SolverError
 from supple.state import Status, StepReport
-from supple.viewer import limits
-from supple.viewer import messages as say
-from supple.viewer.command_queue import CommandQueue
-from supple.viewer.live_scene import LiveScene
-from supple.viewer.live_source import LiveSource
-from supple.viewer.pacing import Pacing
-from supple.viewer.simulation_loop import SimulationLoop
+from supple.viewer.engine.pacing import Pacing
+from supple.viewer.engine.scene.live_scene import LiveScene
+from supple.viewer.engine.simulation_loop import SimulationLoop
+from supple.viewer.protocol import limits
+from supple.viewer.protocol import messages as say
+from supple.viewer.protocol.command_queue import CommandQueue
+from supple.viewer.protocol.live_source import LiveSource
 
 from .conftest import Collected
 

@@ -5,8 +5,8 @@ import pytest
 
 import supple as sp
 from supple.system import build_system
-from supple.viewer.contact_points import contact_points
-from supple.viewer.tet_values import QUANTITIES, tet_values
+from supple.viewer.engine.measurement.contact_points import contact_points
+from supple.viewer.engine.measurement.tet_values import QUANTITIES, tet_values
 
 
 def cube_system(material, **parts):

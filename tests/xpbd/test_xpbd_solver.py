@@ -5,12 +5,12 @@ import pytest
 
 import supple as sp
 from supple.errors import SolverError
-from supple.numerics.pace import Pace
+from supple.numerics.thread_tuning import Pace
 from supple.state import State
 from supple.system import build_system, initial_state
-from supple.xpbd import ordering
-from supple.xpbd.contact_settings import ContactSettings
+from supple.xpbd.contact.settings import XPBDContact
 from supple.xpbd.solver import XPBD
+from supple.xpbd.sweeps import ordering
 
 DT = 1.0 / 60.0
 CUBE = sp.shapes.box((1.0, 1.0, 1.0), (3, 3, 3))
@@ -36,7 +36,7 @@ def test_wrong_parameters_are_refused(parameters, says):
 
 
 def test_a_solver_is_frozen_and_keeps_its_contact_settings():
-    assert XPBD().contact == ContactSettings()
+    assert XPBD().contact == XPBDContact()
     assert XPBD(contact=None).contact is None
     with pytest.raises(AttributeError):
         XPBD().substeps = 3  # pyright: ignore[reportAttributeAccessIssue]

@@ -34,15 +34,15 @@ app = App(
 
 # Import paths: a command's module is loaded when it is called for.
 COMMANDS = {
-    "demo": "supple.cli.demo:demo",
-    "run": "supple.cli.run:run",
-    "view": "supple.cli.view:view",
-    "mesh": "supple.cli.mesh:mesh",
-    "export": "supple.cli.export:export",
-    "check": "supple.cli.check:check",
-    "plot": "supple.cli.plot:plot",
-    "schema": "supple.cli.schema:schema",
-    "info": "supple.cli.info:info",
+    "demo": "supple.cli.commands.demo:demo",
+    "run": "supple.cli.commands.run:run",
+    "view": "supple.cli.commands.view:view",
+    "mesh": "supple.cli.commands.mesh:mesh",
+    "export": "supple.cli.commands.export:export",
+    "check": "supple.cli.commands.check:check",
+    "plot": "supple.cli.commands.plot:plot",
+    "schema": "supple.cli.commands.schema:schema",
+    "info": "supple.cli.commands.info:info",
 }
 for _order, (_name, _path) in enumerate(COMMANDS.items()):
     app.command(_path, name=_name, sort_key=_order)

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from supple.cli.numbers import whole_number
 
 if TYPE_CHECKING:
-    from supple.viewer.live_source import LiveSource
+    from supple.viewer.protocol.live_source import LiveSource
 
 DEFAULT_PORT = 8080
 
@@ -31,7 +31,7 @@ def serve_page(source: LiveSource | Path, host: str, port: int | None, open_brow
     """
     from supple.errors import OutputError
     from supple.viewer.app import Address, serve
-    from supple.viewer.gate import first_free_port, is_loopback, new_token, require_free_port
+    from supple.viewer.server.gate import first_free_port, is_loopback, new_token, require_free_port
 
     if port is not None and not 0 <= port <= 65535:
         raise OutputError(f"--port is {port}; give a number from 1 to 65535, or 0 for any free one")

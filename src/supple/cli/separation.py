@@ -17,7 +17,7 @@ def moved_apart(described: Run) -> Run:
     from rich.markup import escape
 
     from supple.cli.console import shell_console
-    from supple.implicit.contact.separation import separate
+    from supple.contact.start.separation import separate
 
     console = shell_console()
     separation = separate(described.scene, initial_positions=described.initial_positions)

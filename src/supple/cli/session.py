@@ -70,7 +70,7 @@ def run_session(
     ------
     SuppleError : where the input, or the place for the output, cannot be used. Whole frames recorded before stay.
     """
-    from supple.output.recording import Recorder
+    from supple.output.recording.recorder import Recorder
 
     recording = products.folder / "recording.vtkhdf"
     for path in _wanted(products):

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from supple.errors import SolverError
+from supple.implicit.newton.trace import NewtonRow, trace_csv
 from supple.implicit.solver import Implicit
-from supple.implicit.trace import NewtonRow, trace_csv
-from supple.output.atomic import parent_folder, whole_file
+from supple.output.files.atomic import parent_folder, whole_file
 from supple.simulate import Frame
 from supple.solver import Solver
 

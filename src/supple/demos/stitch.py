@@ -9,7 +9,7 @@ from supple.demos.demo import Claim, Demo, Measurement
 from supple.implicit.solver import Implicit
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
-from supple.numerics.triangle_tree import TriangleTree
+from supple.numerics.geometry.triangle_tree import TriangleTree
 from supple.scene.body import Body
 from supple.scene.obstacles import HalfSpace
 from supple.scene.scene import Scene

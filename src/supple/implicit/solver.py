@@ -10,22 +10,22 @@ import numpy as np
 
 from supple.errors import SolverError
 from supple.implicit.contact.build import contact_model
-from supple.implicit.contact.settings import Contact
-from supple.implicit.damping import viscosity_of
-from supple.implicit.division import Division
-from supple.implicit.elasticity import elasticity_of
-from supple.implicit.free_motion import FreeMotion
-from supple.implicit.guard import refuse_inverted
-from supple.implicit.integrators import Integrator, Static, integrator_of
-from supple.implicit.linear_solver import LinearSolver
-from supple.implicit.newton import Tools
-from supple.implicit.potential import HessianBlocks
-from supple.implicit.reactions import reaction_forces
-from supple.implicit.stabilizer import stabilizer_of
-from supple.implicit.stitch_damping import StitchViscosity
-from supple.implicit.stitch_energy import StitchEnergy
-from supple.implicit.substep import StepSettings, Substep, take_substep
-from supple.implicit.trace import NewtonRow
+from supple.implicit.contact.settings import IPCContact
+from supple.implicit.energies.damping import viscosity_of
+from supple.implicit.energies.elasticity import elasticity_of
+from supple.implicit.energies.potential import HessianBlocks
+from supple.implicit.energies.regularization import stabilizer_of
+from supple.implicit.energies.stitch_damping import StitchViscosity
+from supple.implicit.energies.stitches import StitchEnergy
+from supple.implicit.limits.inversion_guard import refuse_inverted
+from supple.implicit.newton.free_motion import FreeMotion
+from supple.implicit.newton.linear_solver import LinearSolver
+from supple.implicit.newton.minimize import Tools
+from supple.implicit.newton.trace import NewtonRow
+from supple.implicit.stepping.integrators import Integrator, Static, integrator_of
+from supple.implicit.stepping.reactions import reaction_forces
+from supple.implicit.stepping.substep import StepSettings, Substep, take_substep
+from supple.implicit.stepping.substepping import Division
 from supple.implicit.workspace import Workspace
 from supple.solver import Solver
 from supple.state import State, Status, StepReport
@@ -65,7 +65,7 @@ class Implicit(Solver):
     max_iterations: int = 120
     linear_solver: str = "auto"
     max_substeps: int = 64
-    contact: Contact | None = field(default_factory=Contact)
+    contact: IPCContact | None = field(default_factory=IPCContact)
 
     def __post_init__(self) -> None:
         integrator_of(self.integrator)
@@ -99,7 +99,7 @@ class Implicit(Solver):
                 elasticity = elasticity_of(system)
         elif system.obstacles:
             raise SolverError(
-                f"{system.obstacles[0].label}: with contact=None obstacles do nothing; give contact=Contact(), or take "
+                f"{system.obstacles[0].label}: with contact=None obstacles do nothing; give contact=IPCContact(), or take "
                 "them out"
             )
         method = integrator_of(self.integrator)

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.implicit.contact.model import ContactModel
-from supple.implicit.damping import Viscosity
-from supple.implicit.elasticity import Elasticity
-from supple.implicit.newton import Tools
-from supple.implicit.stabilizer import Stabilizer
-from supple.implicit.stitch_damping import StitchViscosity
-from supple.implicit.stitch_energy import StitchEnergy
+from supple.implicit.energies.damping import Viscosity
+from supple.implicit.energies.elasticity import Elasticity
+from supple.implicit.energies.regularization import Stabilizer
+from supple.implicit.energies.stitch_damping import StitchViscosity
+from supple.implicit.energies.stitches import StitchEnergy
+from supple.implicit.newton.minimize import Tools
 from supple.state import State
 from supple.system import System
 

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.mesh.gummy_bear import gummy_bear, gummy_bear_surface
-from supple.mesh.isosurface_stuffing import stuff
-from supple.mesh.shape_sizes import check_torus, counts, fits, lengths, not_too_many, positive
-from supple.mesh.shape_surfaces import box_surface, cylinder_surface, sphere_surface, torus_surface
+from supple.mesh.primitives.gummy_bear import gummy_bear, gummy_bear_surface
+from supple.mesh.primitives.isosurface_stuffing import stuff
+from supple.mesh.primitives.sizes import check_torus, counts, fits, lengths, not_too_many, positive
+from supple.mesh.primitives.surfaces import box_surface, cylinder_surface, sphere_surface, torus_surface
 from supple.mesh.tetmesh import TetMesh
 
 __all__ = [

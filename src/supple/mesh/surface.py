@@ -64,7 +64,7 @@ class SurfaceMesh:
         MeshError : where the file is missing, broken, of another kind, or holds no surface; the text starts with
             the path.
         """
-        from supple.mesh.mesh_files import load_surface
+        from supple.mesh.io.mesh_files import load_surface
 
         return load_surface(path)
 
@@ -75,7 +75,7 @@ class SurfaceMesh:
         ------
         MeshError : where the extension is none of these, or the file cannot be written. No partial file is left.
         """
-        from supple.mesh.mesh_files import save_surface
+        from supple.mesh.io.mesh_files import save_surface
 
         save_surface(self, path)
 

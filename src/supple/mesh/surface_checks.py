@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from supple.mesh.checked_arrays import frozen, place
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.topology import edge_keys, facet_keys
-from supple.numerics.triangle_crossings import crossing_triangles
+from supple.numerics.geometry.triangle_crossings import crossing_triangles
 
 # Intersections are listed one by one; a soup of triangles has millions, and nobody reads more than a few.
 MAX_INTERSECTIONS = 100

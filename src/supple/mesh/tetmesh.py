@@ -88,7 +88,7 @@ class TetMesh:
         MeshError : where the file is missing, broken, of another kind, or holds no usable tets; the text starts
             with the path.
         """
-        from supple.mesh.mesh_files import load_tetmesh
+        from supple.mesh.io.mesh_files import load_tetmesh
 
         return load_tetmesh(path)
 
@@ -99,7 +99,7 @@ class TetMesh:
         ------
         MeshError : where the extension is none of these, or the file cannot be written. No partial file is left.
         """
-        from supple.mesh.mesh_files import save_tetmesh
+        from supple.mesh.io.mesh_files import save_tetmesh
 
         save_tetmesh(self, path)
 

@@ -15,7 +15,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SolverError
-from supple.numerics.double_double import product_error, sum_error
+from supple.numerics.geometry.double_double import product_error, sum_error
 
 # Bounds on what is lost, relative to the sum of the terms' sizes: by Horner's rule, and by its compensated form.
 _ROUND_OFF = 2e-15

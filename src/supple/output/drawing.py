@@ -14,8 +14,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.output.recorded_scene import RecordedBody, RecordedObstacle
-from supple.output.recording_reader import RecordedFrame, Recording, read_recording
+from supple.output.recording.reader import RecordedFrame, Recording, read_recording
+from supple.output.recording.scene import RecordedBody, RecordedObstacle
 
 # Gummy colors, told apart also by those who see few colors (after Okabe and Ito, brightened).
 BODY_COLORS = (

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.output.atomic import whole_file
 from supple.output.drawing import (
     OBSTACLE_COLOR,
     STITCH_COLOR,
@@ -23,7 +22,8 @@ from supple.output.drawing import (
     pictures,
     view_of,
 )
-from supple.output.recording_reader import Recording
+from supple.output.files.atomic import whole_file
+from supple.output.recording.reader import Recording
 from supple.output.viser_server import server_for_a_moment
 
 # Bytes of moving vertices before compression, which halves them or better; longer recordings are shown with fewer

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from supple.errors import SceneError
-from supple.scene_file.mesh_sources import MeshStore
+from supple.scene_file.entries.mesh_sources import MeshStore
 from supple.scene_file.yaml_reader import shown
 
 LARGEST_FILE = 256 * 1024 * 1024

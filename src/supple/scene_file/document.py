@@ -6,14 +6,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
-from supple.scene_file.bodies import BodyModel
-from supple.scene_file.contact_pairs import ContactPairModel
+from supple.scene_file.entries.bodies import BodyModel
+from supple.scene_file.entries.contact_pairs import ContactPairModel
+from supple.scene_file.entries.obstacles import ObstacleModel
+from supple.scene_file.entries.selections import ForceModel, PinModel, SoftTargetModel
+from supple.scene_file.entries.solvers import SolverModel, XPBDModel
+from supple.scene_file.entries.stitches import StitchModel
 from supple.scene_file.fraction import number_or_fraction
 from supple.scene_file.model import Model, Vector
-from supple.scene_file.obstacles import ObstacleModel
-from supple.scene_file.selections import ForceModel, PinModel, SoftTargetModel
-from supple.scene_file.solvers import SolverModel, XPBDModel
-from supple.scene_file.stitches import StitchModel
 
 MAX_STEPS = 10_000_000
 

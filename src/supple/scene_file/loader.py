@@ -23,10 +23,10 @@ from supple.scene.selection import InBox
 from supple.scene.stitches.stitch import Stitch
 from supple.scene.stitches.stitching import StitchError
 from supple.scene_file.complaints import complaint, suggestion
-from supple.scene_file.contact_pairs import built_pairs
 from supple.scene_file.document import OutputModel, SceneFileModel
+from supple.scene_file.entries.contact_pairs import built_pairs
+from supple.scene_file.entries.mesh_sources import MeshStore
 from supple.scene_file.located import LocatedError, at
-from supple.scene_file.mesh_sources import MeshStore
 from supple.scene_file.yaml_reader import Key, read_yaml
 from supple.solver import Solver
 

@@ -11,15 +11,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from supple.output.recording_reader import read_recording
+from supple.output.recording.reader import read_recording
 from supple.output.viser_server import start_server, stop_server
-from supple.viewer.engine import Engine
-from supple.viewer.gate import gate, require_free_port
-from supple.viewer.input_check import guard_inputs
+from supple.viewer.engine.engine import Engine
 from supple.viewer.live_page import LivePage
-from supple.viewer.live_source import LiveSource
+from supple.viewer.protocol.live_source import LiveSource
 from supple.viewer.replay import Replay
-from supple.viewer.uploads.transfers import refuse_transfers
+from supple.viewer.server.gate import gate, require_free_port
+from supple.viewer.server.input_check import guard_inputs
+from supple.viewer.server.uploads.transfers import refuse_transfers
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,13 @@ import threading
 import time
 from typing import Any
 
-from supple.viewer.controls.desk import Desk, Simulation
-from supple.viewer.from_snapshot import Translator
-from supple.viewer.options import ViewOptions
-from supple.viewer.pace import Pace
+from supple.viewer.controls.controller import Desk, Simulation
+from supple.viewer.drawing.frame_rate import Pace
+from supple.viewer.drawing.moments.from_snapshot import Translator
+from supple.viewer.drawing.options import ViewOptions
+from supple.viewer.drawing.stage import Stage
 from supple.viewer.panel import Panel
-from supple.viewer.snapshots import Snapshot
-from supple.viewer.stage import Stage
+from supple.viewer.protocol.snapshots import Snapshot
 
 logger = logging.getLogger(__name__)
 

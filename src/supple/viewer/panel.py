@@ -6,20 +6,20 @@ import time
 from typing import Any
 
 from supple.viewer.controls.body_controls import BodyControls
-from supple.viewer.controls.desk import Desk, tell
+from supple.viewer.controls.controller import Desk, tell
 from supple.viewer.controls.measures import Measures
+from supple.viewer.controls.mouse import Mouse
 from supple.viewer.controls.mouse_controls import MouseControls
+from supple.viewer.controls.record_controls import RecordControls
 from supple.viewer.controls.solver_controls import SolverControls
 from supple.viewer.controls.time_controls import TimeControls
 from supple.viewer.controls.upload_controls import UploadControls
-from supple.viewer.drag import Mouse
-from supple.viewer.messages import SetView
-from supple.viewer.options import ViewOptions
-from supple.viewer.record_controls import RecordControls
-from supple.viewer.snapshots import Snapshot
-from supple.viewer.stage import Stage
-from supple.viewer.view_controls import ViewControls
-from supple.viewer.views.fields import FIELDS
+from supple.viewer.controls.view_controls import ViewControls
+from supple.viewer.drawing.coloring.fields import FIELDS
+from supple.viewer.drawing.options import ViewOptions
+from supple.viewer.drawing.stage import Stage
+from supple.viewer.protocol.messages import SetView
+from supple.viewer.protocol.snapshots import Snapshot
 
 _NUMBERS_EVERY = 0.15  # [s]: numbers that change faster cannot be read
 _PLOTS_EVERY = 0.5  # [s]

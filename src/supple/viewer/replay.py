@@ -11,16 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from supple.output.recording_reader import Recording
-from supple.viewer.from_recording import model_of_recording, moment_of_frame
-from supple.viewer.model import Moment
-from supple.viewer.options import ViewOptions
-from supple.viewer.pace import Pace
-from supple.viewer.page_of_moments import evenly, most_moments, page_of_moments
-from supple.viewer.record_controls import RecordControls
-from supple.viewer.stage import Stage
-from supple.viewer.values import number
-from supple.viewer.view_controls import ViewControls
+from supple.output.recording.reader import Recording
+from supple.viewer.controls.record_controls import RecordControls
+from supple.viewer.controls.view_controls import ViewControls
+from supple.viewer.drawing.frame_rate import Pace
+from supple.viewer.drawing.moments.from_recording import model_of_recording, moment_of_frame
+from supple.viewer.drawing.moments.model import Moment
+from supple.viewer.drawing.options import ViewOptions
+from supple.viewer.drawing.page_of_moments import evenly, most_moments, page_of_moments
+from supple.viewer.drawing.stage import Stage
+from supple.viewer.server.browser_values import number
 
 _SLOWEST, _FASTEST = 0.05, 4.0
 _KEPT = 64  # frames

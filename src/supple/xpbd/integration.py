@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from supple.xpbd.compilation import serial_and_parallel
+from supple.xpbd.sweeps.compilation import serial_and_parallel
 
 BLOCK = 4096
 # Positions beyond are lost, whether or not they are finite: at this distance [m] round-off is a tenth of a millimetre.

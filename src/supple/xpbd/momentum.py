@@ -23,7 +23,7 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from supple.system import System
-from supple.xpbd.compilation import serial_and_parallel
+from supple.xpbd.sweeps.compilation import serial_and_parallel
 
 BLOCK = 2048
 # Of each block: sum m x_n (3), sum m x (3), sum m d (3), sum m x_n x d (3), sum m x x_n^T (9), with d = x - x*.

@@ -16,14 +16,16 @@ from numba.core import config
 from numpy.typing import NDArray
 
 from supple.errors import SolverError
-from supple.numerics.pace import Pace
+from supple.numerics.thread_tuning import Pace
 from supple.solver import Solver
 from supple.state import State, Status, StepReport
 from supple.system import System
-from supple.xpbd.collisions import Collisions
-from supple.xpbd.constraints import ConstraintSet, build_constraint_sets
-from supple.xpbd.contact_settings import ContactSettings
-from supple.xpbd.external import ExternalForces
+from supple.xpbd.constraints.registry import ConstraintSet, build_constraint_sets
+from supple.xpbd.constraints.stitch_anchors import StitchAnchors
+from supple.xpbd.constraints.stitches import stitch_constraints
+from supple.xpbd.contact.collisions import Collisions
+from supple.xpbd.contact.settings import XPBDContact
+from supple.xpbd.external_forces import ExternalForces
 from supple.xpbd.integration import (
     accelerate,
     first_lost,
@@ -35,9 +37,7 @@ from supple.xpbd.integration import (
     update_velocities,
 )
 from supple.xpbd.momentum import MomentumRestore
-from supple.xpbd.ordering import Layout, make_layout, reordered
-from supple.xpbd.stitch_anchors import StitchAnchors
-from supple.xpbd.stitch_constraints import stitch_constraints
+from supple.xpbd.sweeps.ordering import Layout, make_layout, reordered
 
 # Below this much work, in edges or volumes, a sweep is over before a second thread has woken up.
 PARALLEL_FROM = 20_000
@@ -101,15 +101,15 @@ class XPBD(Solver):
 
     substeps: int = 20
     momentum_restore: bool = True
-    contact: ContactSettings | None = field(default_factory=ContactSettings)
+    contact: XPBDContact | None = field(default_factory=XPBDContact)
     threads: int | None = None
 
     def __post_init__(self) -> None:
         _check_count("substeps", self.substeps)
         if not isinstance(self.momentum_restore, bool):
             raise SolverError(f"XPBD: momentum_restore is {self.momentum_restore!r}; give True or False")
-        if self.contact is not None and not isinstance(self.contact, ContactSettings):
-            raise SolverError(f"XPBD: contact is {self.contact!r}; give ContactSettings(...), or None to turn it off")
+        if self.contact is not None and not isinstance(self.contact, XPBDContact):
+            raise SolverError(f"XPBD: contact is {self.contact!r}; give XPBDContact(...), or None to turn it off")
         if self.threads is not None:
             _check_count("threads", self.threads)
             if self.threads > _MOST_THREADS:

@@ -6,8 +6,8 @@ import pytest
 
 import supple as sp
 from supple.implicit.contact.build import contact_model
-from supple.implicit.contact.planes import PlaneBarrier, barrier_terms, plane_friction
-from supple.implicit.potential import HessianBlocks
+from supple.implicit.contact.half_spaces import PlaneBarrier, barrier_terms, plane_friction
+from supple.implicit.energies.potential import HessianBlocks
 from supple.numerics.svd3 import rotation_variant_svd
 from supple.system import build_system, initial_state
 
@@ -54,7 +54,7 @@ def model_of(bodies, size, obstacles=(), friction=0.3):
             sp.Body(f"tet {k}", mesh, sp.StableNeoHookean(youngs=1e4, poisson=0.3, density=1000.0), friction=friction)
         )
     scene = sp.Scene(made, obstacles=list(obstacles))
-    contact = sp.Contact(dhat=5 * GAP * size, stiffness=1e4, friction_velocity=SLOW * size)
+    contact = sp.IPCContact(dhat=5 * GAP * size, stiffness=1e4, friction_velocity=SLOW * size)
     model = contact_model(build_system(scene), contact, np.full(len(made), 1e4))
     x = np.concatenate([initial_state(scene).positions, model.obstacle_positions(0.0)])
     return model, x

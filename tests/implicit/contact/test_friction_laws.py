@@ -34,7 +34,7 @@ def block(friction=0.0, size=0.2, youngs=1e9):
 
 def slide(scene, time=TIME, dt=DT, **contact):
     """Frames, and how far the block has slid down at the end [m]."""
-    frames = list(sp.simulate(scene, sp.Implicit(contact=sp.Contact(**contact)), dt, round(time / dt)))
+    frames = list(sp.simulate(scene, sp.Implicit(contact=sp.IPCContact(**contact)), dt, round(time / dt)))
     assert {frame.report.status for frame in frames} == {"converged"}
     body = scene.body("block")
     moved = (frames[-1].positions["block"] - body.place(body.mesh.vertices)).mean(axis=0)
@@ -86,7 +86,7 @@ def test_friction_brakes_a_sliding_block(iterations):
     mesh = sp.shapes.box((0.2, 0.1, 0.2), (1, 1, 1))
     body = sp.Body("block", mesh, material, position=(0, 0.0501, 0), velocity=(1, 0, 0))
     scene = sp.Scene([body], obstacles=[sp.HalfSpace(friction=0.5)])
-    solver = sp.Implicit(contact=sp.Contact(friction_iterations=iterations))
+    solver = sp.Implicit(contact=sp.IPCContact(friction_iterations=iterations))
     frames = list(sp.simulate(scene, solver, 0.01, 30))
     assert {frame.report.status for frame in frames} == {"converged"}
     way = frames[-1].positions["block"][:, 0].mean()

@@ -29,7 +29,7 @@ def pressed(across, layers):
     ball = sp.Body("ball", mesh, material, position=(0, 1.1 * DHAT, 0))
     pin = sp.Pin("ball", vertices=top, motion=down)
     scene = sp.Scene([ball], [sp.HalfSpace(name="floor")], pins=[pin], gravity=(0, 0, 0))
-    solver = sp.Implicit(integrator="static", contact=sp.Contact(dhat=DHAT))
+    solver = sp.Implicit(integrator="static", contact=sp.IPCContact(dhat=DHAT))
     (frame,) = sp.simulate(scene, solver, 1.0, 1)
     assert frame.report.status == "converged"
     found = frame.contacts

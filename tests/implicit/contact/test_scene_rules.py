@@ -39,8 +39,8 @@ def run(scene, dt, steps, solver=None, **start):
     ],
 )
 def test_settings_out_of_range_are_refused(given, complaint):
-    with pytest.raises(sp.SolverError, match=rf"Contact: {complaint}") as caught:
-        sp.Contact(**given)
+    with pytest.raises(sp.SolverError, match=rf"IPCContact: {complaint}") as caught:
+        sp.IPCContact(**given)
     assert "\n" not in str(caught.value)
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import supple as sp
 from supple.implicit.contact.build import contact_model
-from supple.implicit.contact.planes import Planes
+from supple.implicit.contact.half_spaces import Planes
 from supple.system import build_system, initial_state
 
 KEEP = Fraction(1, 10)
@@ -121,7 +121,7 @@ def two_boxes(gap=0.3, divisions=2):
     material = sp.StableNeoHookean(youngs=1e4, poisson=0.3, density=1000.0)
     mesh = sp.shapes.box((1, 1, 1), (divisions,) * 3)
     scene = sp.Scene([sp.Body("one", mesh, material), sp.Body("two", mesh, material, position=(0.05, 1 + gap, 0.02))])
-    model = contact_model(build_system(scene), sp.Contact(), np.full(2 * len(mesh.tets), 1e4))
+    model = contact_model(build_system(scene), sp.IPCContact(), np.full(2 * len(mesh.tets), 1e4))
     return model, initial_state(scene).positions
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.output.recording import REPORT_NUMBERS, REPORT_VECTORS
+from supple.output.recording.recorder import REPORT_NUMBERS, REPORT_VECTORS
 
 from .conftest import JELLY, V, X, failures, nan_position, recorded
 

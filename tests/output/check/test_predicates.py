@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from supple.output.check.containment import is_inside
-from supple.output.check.orientation import (
+from supple.output.check.geometry.containment import is_inside
+from supple.output.check.geometry.orientation import (
     area_sign,
     plane_sides,
     rational_area_sign,
@@ -20,7 +20,7 @@ from supple.output.check.orientation import (
     volume_sign,
     volume_signs,
 )
-from supple.output.check.triangle_pairs import triangles_meet
+from supple.output.check.geometry.triangle_pairs import triangles_meet
 
 # Few values on a coarse grid: most points are coplanar, collinear or equal; then moved by a bit or two, or not at all.
 STEPS = st.integers(-2, 2)

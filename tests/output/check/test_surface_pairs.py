@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from supple.output.check.box_tree import build_tree, triangle_boxes
-from supple.output.check.surface_pairs import closest_pair, meeting_pairs
-from supple.output.check.triangle_distance import distances_from, triangles_apart
-from supple.output.check.triangle_pairs import triangles_meet
+from supple.output.check.geometry.box_tree import build_tree, triangle_boxes
+from supple.output.check.geometry.surface_pairs import closest_pair, meeting_pairs
+from supple.output.check.geometry.triangle_distance import distances_from, triangles_apart
+from supple.output.check.geometry.triangle_pairs import triangles_meet
 
 
 def soup(seed, count=120, size=0.25):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.viewer.messages import (
+from supple.viewer.protocol.messages import (
     BodyDescription,
     Measures,
     ObstacleDescription,

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.mesh.shape_surfaces import sphere_surface
+from supple.mesh.primitives.surfaces import sphere_surface
 from supple.viewer.app import Address, opened_page
-from supple.viewer.live_source import LiveSource
-from supple.viewer.messages import RemoveBody
+from supple.viewer.protocol.live_source import LiveSource
+from supple.viewer.protocol.messages import RemoveBody
 
 RADIUS, START = 0.3, 0.5
 MASS = 1000.0 * 4.0 / 3.0 * np.pi * RADIUS**3

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from supple.viewer.input_check import is_offered
+from supple.viewer.server.input_check import is_offered
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,8 @@ import os
 
 from supple.output.viser_server import start_server, stop_server
 from supple.viewer.app import dress
-from supple.viewer.gate import first_free_port
 from supple.viewer.live_page import LivePage
+from supple.viewer.server.gate import first_free_port
 
 
 def serve(port, simulation):

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.output.recording import Recorder
-from supple.output.recording_reader import read_recording
+from supple.output.recording.reader import read_recording
+from supple.output.recording.recorder import Recorder
 from supple.viewer.app import Address, opened_page
-from supple.viewer.film import gif_of, kinds_of_films
-from supple.viewer.from_recording import model_of_recording, moment_of_frame
-from supple.viewer.options import ViewOptions
-from supple.viewer.page_of_moments import evenly, page_of_moments
+from supple.viewer.drawing.moments.from_recording import model_of_recording, moment_of_frame
+from supple.viewer.drawing.options import ViewOptions
+from supple.viewer.drawing.page_of_moments import evenly, page_of_moments
+from supple.viewer.drawing.video_capture import gif_of, kinds_of_films
 from supple.viewer.replay import Replay
 
 STEPS = 30
@@ -111,7 +111,7 @@ def test_a_page_of_the_recording_stands_alone(replay, browser, pixels, spot, tmp
 
 
 def test_pages_keep_the_time_and_thin_out(recorded, monkeypatch):
-    from supple.viewer import page_of_moments as module
+    from supple.viewer.drawing import page_of_moments as module
 
     with read_recording(recorded) as recording:
         model = model_of_recording(recording)
@@ -134,7 +134,7 @@ def test_films_have_all_pictures():
 
 
 def test_what_is_missing_for_a_film_is_said(monkeypatch):
-    from supple.viewer import film
+    from supple.viewer.drawing import video_capture as film
 
     monkeypatch.setattr(film, "find_spec", lambda name: None)
     assert "pip install 'supple[video]'" in kinds_of_films()["mp4"]

@@ -50,8 +50,8 @@ def test_a_visitor_that_takes_nothing_holds_up_nobody(busy, server, visit, until
 
 
 def test_the_page_asks_less_of_a_server_that_lags(server, until, monkeypatch):
-    from supple.viewer import pace as pace_module
-    from supple.viewer.pace import FASTEST, Pace
+    from supple.viewer.drawing import frame_rate as pace_module
+    from supple.viewer.drawing.frame_rate import FASTEST, Pace
 
     pace = Pace(server)
     assert pace.interval == FASTEST
@@ -81,7 +81,7 @@ def test_the_page_asks_less_of_a_server_that_lags(server, until, monkeypatch):
 def test_fine_skins_are_carried_at_once(made_up):
     """What is done for every picture: 100k vertices, in bounded work per vertex and without a Python loop."""
     from supple.mesh.skin import Embedding
-    from supple.output.skinned_surface import SkinnedSurface
+    from supple.output.recording.skinned_surface import SkinnedSurface
 
     mesh = sp.shapes.box(size=(1.0, 1.0, 1.0), divisions=(8, 8, 8))
     points = np.random.default_rng(0).uniform(-0.5, 0.5, (100_000, 3))

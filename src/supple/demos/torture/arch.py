@@ -8,7 +8,7 @@ import numpy as np
 
 from supple.demos.demo import Claim, Demo
 from supple.demos.torture.watch import ContactWatch, Torture, center, mass
-from supple.implicit.contact.settings import Contact
+from supple.implicit.contact.settings import IPCContact
 from supple.implicit.solver import Implicit
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
@@ -71,7 +71,7 @@ def _demo(cells: int, dt: float) -> Demo:
             "line of thrust fits within its thickness: it stands."
         ),
         scene=partial(scene, cells),
-        solvers={"implicit": lambda: Implicit(contact=Contact(dhat=DHAT, friction_velocity=SLOW))},
+        solvers={"implicit": lambda: Implicit(contact=IPCContact(dhat=DHAT, friction_velocity=SLOW))},
         measurement=_Watch,
         dt=dt,
         steps=round(SECONDS / dt),

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from supple.demos.demo import Claim, Demo
 from supple.demos.torture.watch import ContactWatch, Torture, center
-from supple.implicit.contact.settings import Contact
+from supple.implicit.contact.settings import IPCContact
 from supple.implicit.solver import Implicit
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
@@ -82,7 +82,7 @@ class _Watch(ContactWatch):
 
 
 def _solver() -> Implicit:
-    return Implicit(contact=Contact(dhat=DHAT, stiffness=STIFFNESS, friction_velocity=SLOW))
+    return Implicit(contact=IPCContact(dhat=DHAT, stiffness=STIFFNESS, friction_velocity=SLOW))
 
 
 def _demo(cells: int, dt: float) -> Demo:

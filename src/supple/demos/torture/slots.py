@@ -8,7 +8,7 @@ import numpy as np
 
 from supple.demos.demo import Claim, Demo
 from supple.demos.torture.watch import ContactWatch, Torture, center
-from supple.implicit.contact.settings import Contact
+from supple.implicit.contact.settings import IPCContact
 from supple.implicit.solver import Implicit
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
@@ -97,7 +97,7 @@ def _demo(names: tuple[str, ...], dt: float, steps: int) -> Demo:
             "either side: they neither touch its walls nor get stuck."
         ),
         scene=partial(scene, names),
-        solvers={"implicit": lambda: Implicit(contact=Contact(dhat=CLEARANCE / 2))},
+        solvers={"implicit": lambda: Implicit(contact=IPCContact(dhat=CLEARANCE / 2))},
         measurement=_Watch,
         dt=dt,
         steps=steps,

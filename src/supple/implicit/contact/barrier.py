@@ -14,9 +14,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.contact.collision_mesh.collisions import Collisions
 from supple.errors import SolverError
-from supple.implicit.contact.collisions import Collisions
-from supple.implicit.potential import HessianBlocks, Potential
+from supple.implicit.energies.potential import HessianBlocks, Potential
 
 
 class Barrier(Potential):

@@ -7,19 +7,19 @@ from importlib.util import find_spec
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.contact.collision_mesh.collisions import Collisions
+from supple.contact.collision_mesh.contact_surface import contact_surface
+from supple.contact.obstacle_vertices import obstacle_positions, with_obstacles
 from supple.errors import SolverError
-from supple.implicit.contact.collisions import Collisions
-from supple.implicit.contact.kinematic import obstacle_positions, with_obstacles
+from supple.implicit.contact.half_spaces import Planes
 from supple.implicit.contact.model import ContactModel
-from supple.implicit.contact.planes import Planes
 from supple.implicit.contact.scales import largest_dhat, scales_of
-from supple.implicit.contact.settings import Contact
-from supple.implicit.contact.surface import contact_surface
+from supple.implicit.contact.settings import IPCContact
 from supple.scene.contact_pairs import pair_table
 from supple.system import System, initial_state
 
 
-def contact_model(system: System, settings: Contact, shear_moduli: NDArray[np.float64]) -> ContactModel:
+def contact_model(system: System, settings: IPCContact, shear_moduli: NDArray[np.float64]) -> ContactModel:
     """The model, whose `system` has the obstacles' vertices.
 
     Parameters

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.implicit.contact.barrier import Barrier
-from supple.implicit.potential import HessianBlocks, Potential
+from supple.implicit.energies.potential import HessianBlocks, Potential
 
 
 class Friction(Potential):

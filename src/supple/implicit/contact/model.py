@@ -8,15 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.contact.collision_mesh.collisions import Collisions
+from supple.contact.collision_mesh.contact_surface import ContactSurface
+from supple.contact.obstacle_vertices import ObstacleRange, obstacle_positions
+from supple.contact.start.start_error import refuse_intersecting
 from supple.errors import SolverError
 from supple.implicit.contact.barrier import Barrier
-from supple.implicit.contact.collisions import Collisions
 from supple.implicit.contact.friction import Friction
-from supple.implicit.contact.kinematic import ObstacleRange, obstacle_positions
-from supple.implicit.contact.planes import PlaneBarrier, PlaneFriction, Planes, plane_friction
-from supple.implicit.contact.refusal import refuse_intersecting
+from supple.implicit.contact.half_spaces import PlaneBarrier, PlaneFriction, Planes, plane_friction
 from supple.implicit.contact.scales import Scales
-from supple.implicit.contact.surface import ContactSurface
 from supple.scene.contact_pairs import PairTable
 from supple.system import System
 

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact_points import ContactPoints
+from supple.implicit.contact.half_spaces import barrier_terms
 from supple.implicit.contact.model import Barriers, ContactModel
-from supple.implicit.contact.planes import barrier_terms
 
 
 def contact_points(model: ContactModel, barriers: Barriers, x: NDArray[np.float64], weight: float) -> ContactPoints:

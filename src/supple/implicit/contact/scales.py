@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.contact.settings import Contact
+from supple.implicit.contact.settings import IPCContact
 from supple.system import System
 
 _DHAT_SHARE = 1e-3  # of the smallest body's diagonal
@@ -37,7 +37,7 @@ class Scales:
     adaptive: bool
 
 
-def scales_of(settings: Contact, system: System, shear_moduli: NDArray[np.float64], gap: float) -> Scales:
+def scales_of(settings: IPCContact, system: System, shear_moduli: NDArray[np.float64], gap: float) -> Scales:
     """Complete the settings.
 
     Parameters

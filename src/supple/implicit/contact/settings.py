@@ -11,7 +11,7 @@ from supple.errors import SolverError
 
 
 @dataclass(frozen=True)
-class Contact:
+class IPCContact:
     """Incremental potential contact. All defaults scale with the scene.
 
     Parameters
@@ -49,11 +49,13 @@ class Contact:
         count = self.friction_iterations
         whole = isinstance(count, (int, np.integer)) and not isinstance(count, bool)
         if count is not None and not (whole and count >= 1):
-            raise SolverError(f"Contact: friction_iterations is {count!r}; give a whole number of one or more, or None")
+            raise SolverError(
+                f"IPCContact: friction_iterations is {count!r}; give a whole number of one or more, or None"
+            )
 
 
 def _positive(value: Any, key: str, wanted: str) -> float:
     number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
     if not number or not np.isfinite(value) or value <= 0.0:
-        raise SolverError(f"Contact: {key} is {value!r}; it must be finite and {wanted}")
+        raise SolverError(f"IPCContact: {key} is {value!r}; it must be finite and {wanted}")
     return float(value)

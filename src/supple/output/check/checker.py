@@ -7,17 +7,17 @@ from pathlib import Path
 
 import numpy as np
 
-from supple.output.check.budgets import Energy, Momentum, Spin
-from supple.output.check.contact import Containment, Distance, Intersection, Obstacles
+from supple.output.check.checks.budgets import Energy, Momentum, Spin
+from supple.output.check.checks.contact import Containment, Distance, Intersection, Obstacles
+from supple.output.check.checks.plain_values import CONSTANTS, Converged, Finite, Sequence
+from supple.output.check.checks.records import Records
+from supple.output.check.checks.tets import Inversion, RestShape, Volume
 from supple.output.check.frame_check import FrameCheck
-from supple.output.check.plain_values import CONSTANTS, Converged, Finite, Sequence
-from supple.output.check.records import Records
 from supple.output.check.report import CheckReport, CheckResult
 from supple.output.check.settings import CheckSettings
 from supple.output.check.snapshot import Scene, Snapshot
 from supple.output.check.tally import skipped
-from supple.output.check.tets import Inversion, RestShape, Volume
-from supple.output.recording_reader import Recording, read_recording
+from supple.output.recording.reader import Recording, read_recording
 
 CHECKS: tuple[type[FrameCheck], ...] = (
     Finite,

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from supple.materials.tet_energies import element_energies
 from supple.numerics.threads import threads_for
-from supple.output.recording_reader import Recording
+from supple.output.recording.reader import Recording
 
 _TETS_PER_THREAD = 5_000
 _EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])

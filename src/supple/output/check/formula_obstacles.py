@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.output.check.orientation import plane_sides
+from supple.output.check.geometry.orientation import plane_sides
+from supple.output.check.geometry.triangle_distance import distances_from
 from supple.output.check.surfaces import moved
-from supple.output.check.triangle_distance import distances_from
-from supple.output.recorded_scene import RecordedObstacle
+from supple.output.recording.scene import RecordedObstacle
 
 # A moved obstacle, and every distance from a ball or a wall, is rounded a few times.
 _ROUNDINGS = 16.0

@@ -8,12 +8,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.output.check.box_tree import build_tree, triangle_boxes
 from supple.output.check.elastic_energy import elastic_energy, stiffness_scale
-from supple.output.check.orientation import volume_signs
-from supple.output.check.surface_pairs import meeting_pairs
+from supple.output.check.geometry.box_tree import build_tree, triangle_boxes
+from supple.output.check.geometry.orientation import volume_signs
+from supple.output.check.geometry.surface_pairs import meeting_pairs
 from supple.output.check.surfaces import Surfaces, surfaces_of
-from supple.output.recording_reader import RecordedFrame, Recording
+from supple.output.recording.reader import RecordedFrame, Recording
 
 _MOST_PAIRS = 1000
 

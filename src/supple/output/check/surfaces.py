@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from supple.output.recorded_scene import RecordedObstacle
-from supple.output.recording_reader import Recording
+from supple.output.recording.reader import Recording
+from supple.output.recording.scene import RecordedObstacle
 
 _BOX_CORNERS = np.array([[i, j, k] for i in (-0.5, 0.5) for j in (-0.5, 0.5) for k in (-0.5, 0.5)])
 _BOX_FACES = (

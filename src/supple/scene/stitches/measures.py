@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.numerics.triangle_tree import closest_places
+from supple.numerics.geometry.triangle_tree import closest_places
 from supple.scene.stitches.stitching import Stitching
 
 

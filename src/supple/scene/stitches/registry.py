@@ -1,4 +1,4 @@
-"""All kinds of stitches. A new kind is one file, and one line here (and one in `supple.scene_file.stitches`)."""
+"""All kinds of stitches. A new kind is one file, and one line here (and one in `supple.scene_file.entries.stitches`)."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.numerics.triangle_tree import TriangleTree, pair_distances
+from supple.numerics.geometry.triangle_tree import TriangleTree, pair_distances
 from supple.scene.stitches.elements import Pairs, Springs, StitchTets
 from supple.scene.stitches.side import Side
 from supple.scene.values import check_name, non_negative, positive

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from supple.viewer import limits
-from supple.viewer.controls.desk import Desk, in_order
+from supple.viewer.controls.controller import Desk, in_order
 from supple.viewer.controls.inputs import ParameterInput
-from supple.viewer.messages import AddBody, CopyBody, RemoveBody, Squash
-from supple.viewer.parameters import PARAMETERS
-from supple.viewer.snapshots import SceneDescription, Snapshot, Value
-from supple.viewer.values import number, one_of
+from supple.viewer.protocol import limits
+from supple.viewer.protocol.messages import AddBody, CopyBody, RemoveBody, Squash
+from supple.viewer.protocol.parameters import PARAMETERS
+from supple.viewer.protocol.snapshots import SceneDescription, Snapshot, Value
+from supple.viewer.server.browser_values import number, one_of
 
 ALL = "all bodies"
 _SQUASH, _STRETCH = 0.5, 1.5

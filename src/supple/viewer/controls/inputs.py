@@ -6,12 +6,12 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from supple.viewer.controls.desk import Desk, in_order
-from supple.viewer.controls.wish import Wish
-from supple.viewer.messages import SetParameter
-from supple.viewer.parameters import PARAMETERS, Parameter
-from supple.viewer.snapshots import Value
-from supple.viewer.values import number
+from supple.viewer.controls.controller import Desk, in_order
+from supple.viewer.controls.pending import Wish
+from supple.viewer.protocol.messages import SetParameter
+from supple.viewer.protocol.parameters import PARAMETERS, Parameter
+from supple.viewer.protocol.snapshots import Value
+from supple.viewer.server.browser_values import number
 
 # The smallest power of ten of a slider whose left end is zero.
 _LEAST_POWER = -12.0

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.viewer.snapshots import Snapshot
+from supple.viewer.protocol.snapshots import Snapshot
 
 _SECONDS = 10.0  # of simulated time in a plot
 _MOST_POINTS = 300

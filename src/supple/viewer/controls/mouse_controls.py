@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from supple.viewer import limits
-from supple.viewer.controls.desk import Desk, in_order
-from supple.viewer.messages import RemovePusher, Unpin
-from supple.viewer.values import number, one_of
+from supple.viewer.controls.controller import Desk, in_order
+from supple.viewer.protocol import limits
+from supple.viewer.protocol.messages import RemovePusher, Unpin
+from supple.viewer.server.browser_values import number, one_of
 
 DRAG, PUSH = "drag and pin", "push"
 MODES = (DRAG, PUSH)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from supple.viewer.controls.desk import Desk, in_order
+from supple.viewer.controls.controller import Desk, in_order
 from supple.viewer.controls.inputs import ParameterInput
-from supple.viewer.controls.wish import Wish
-from supple.viewer.messages import SetSolver
-from supple.viewer.parameters import PARAMETERS
-from supple.viewer.snapshots import Snapshot
-from supple.viewer.values import one_of
+from supple.viewer.controls.pending import Wish
+from supple.viewer.protocol.messages import SetSolver
+from supple.viewer.protocol.parameters import PARAMETERS
+from supple.viewer.protocol.snapshots import Snapshot
+from supple.viewer.server.browser_values import one_of
 
 _KINDS = ("xpbd", "implicit")
 

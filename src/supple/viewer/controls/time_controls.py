@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from supple.viewer import limits
-from supple.viewer.controls.desk import Desk, in_order
-from supple.viewer.messages import Pause, Play, Reset, SetSpeed, Step
-from supple.viewer.plain import plain
-from supple.viewer.snapshots import Snapshot
-from supple.viewer.values import number, one_of
+from supple.viewer.controls.controller import Desk, in_order
+from supple.viewer.protocol import limits
+from supple.viewer.protocol.messages import Pause, Play, Reset, SetSpeed, Step
+from supple.viewer.protocol.snapshots import Snapshot
+from supple.viewer.server.browser_values import number, one_of
+from supple.viewer.server.plain_markdown import plain
 
 _BACK = ("step", "reset")
 

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from typing import Any
 
 from supple.errors import SuppleError
-from supple.viewer import limits
-from supple.viewer.controls.desk import Desk, tell
-from supple.viewer.messages import AddMesh
-from supple.viewer.uploads.meshing import Upload, mesh_of_upload
-from supple.viewer.uploads.transfers import Transfers
+from supple.viewer.controls.controller import Desk, tell
+from supple.viewer.protocol import limits
+from supple.viewer.protocol.messages import AddMesh
+from supple.viewer.server.uploads.meshing import Upload, mesh_of_upload
+from supple.viewer.server.uploads.transfers import Transfers
 
 _HINT = f"A closed surface, at most {limits.LARGEST_UPLOAD // 2**20} MiB and {limits.MOST_UPLOADED_TRIANGLES} triangles"
 # Characters that no body's name may have, see `supple.scene.values.check_name`.

@@ -1,0 +1,105 @@
+"""`supple check`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from supple.cli.exit_codes import ExitCode
+from supple.cli.numbers import Steps
+
+if TYPE_CHECKING:
+    from supple.output.check.report import CheckReport
+
+Names = Annotated[list[str] | None, Parameter(negative="", consume_multiple=False)]
+
+
+def check(
+    recording: Path,
+    /,
+    *,
+    every: Steps = None,
+    only: Names = None,
+    skip: Names = None,
+    max_volume_change: float | None = None,
+    max_energy_gain: float | None = None,
+    max_momentum_change: float | None = None,
+    json: Path | None = None,
+    quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
+) -> ExitCode:
+    """Verify a recording, independently of the solver that made it. Exit code 0: all passed, 1: something failed.
+
+    Parameters
+    ----------
+    recording
+        The recording (.vtkhdf).
+    every
+        Check every k-th frame, and the last.
+    only
+        Make only the check of this name; may be given several times.
+    skip
+        Leave out the check of this name; may be given several times.
+    max_volume_change
+        How far a body's volume may change, as a share of it. Without it: 0.5 where Poisson's ratio is 0.45 or more,
+        else any.
+    max_energy_gain
+        How far the energy may grow where nothing does work, as a share of what is moved about; 0.05 without it.
+    max_momentum_change
+        How far momenta may change without a cause, as a share of themselves; 1e-6 without it.
+    json
+        Write the results to this file.
+    quiet
+        Print nothing but what failed.
+    """
+    from supple.output.check.checker import check_recording
+    from supple.output.check.settings import CheckSettings
+    from supple.output.files.atomic import refuse_to_replace
+
+    given = {
+        "every": every,
+        "only": only,
+        "skip": skip,
+        "max_volume_change": max_volume_change,
+        "max_energy_gain": max_energy_gain,
+        "max_momentum_change": max_momentum_change,
+    }
+    settings = CheckSettings(**{key: value for key, value in given.items() if value is not None})
+    if json is not None:
+        refuse_to_replace(recording, json)
+    report = check_recording(recording, settings)
+    if json is not None:
+        report.save(json)
+    if not quiet or not report.ok:
+        _print(report, only_failures=quiet)
+    return ExitCode.OK if report.ok else ExitCode.FAILED
+
+
+def _print(report: CheckReport, *, only_failures: bool) -> None:
+    from rich.markup import escape
+    from rich.table import Table
+
+    from supple.cli.console import ShellConsole
+    from supple.output.check.report import Verdict
+
+    colors = {Verdict.PASS: "green", Verdict.FAIL: "bold red", Verdict.SKIPPED: "dim"}
+    looked = "all" if report.frames == report.frames_checked else f"{report.frames_checked} of"
+    title = escape(f"{report.path}: {looked} {report.frames} frames checked")
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
+    table.add_column("check", style="bold", no_wrap=True)
+    table.add_column("verdict", no_wrap=True)
+    table.add_column("found", overflow="fold")
+    table.add_column("frame", justify="right", no_wrap=True)
+    table.add_column("time [s]", justify="right", no_wrap=True)
+    for result in report.results:
+        if only_failures and result.verdict is not Verdict.FAIL:
+            continue
+        table.add_row(
+            result.name,
+            f"[{colors[result.verdict]}]{result.verdict}[/]",
+            escape(result.said),
+            "" if result.frame is None else str(result.frame),
+            "" if result.time is None else f"{result.time:.6g}",
+        )
+    ShellConsole().print(table)

@@ -1,0 +1,104 @@
+"""`supple demo`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from supple.cli.exit_codes import ExitCode
+from supple.cli.live import Host, Open, Port
+from supple.cli.numbers import Steps
+
+
+def demo(
+    name: str | None = None,
+    /,
+    *,
+    list_: Annotated[bool, Parameter(name=["--list", "-l"], negative="")] = False,
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+    steps: Steps = None,
+    solver: str | None = None,
+    trace: Path | None = None,
+    page: bool = True,
+    plot: bool = True,
+    quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
+    live: Annotated[bool, Parameter(name="--live", negative="")] = False,
+    host: Host = "127.0.0.1",
+    port: Port = None,
+    open_: Open = True,
+) -> int:
+    """Run a named demo, record it, and measure what it claims.
+
+    Parameters
+    ----------
+    name
+        Which demo; without it, the demos are listed.
+    list_
+        List the demos.
+    output
+        Folder for recording.vtkhdf, index.html and plot.png; without it, out/NAME.
+    steps
+        Number of frames, instead of the demo's own; a shortened demo may not reach what it claims.
+    solver
+        Kind of solver: xpbd or implicit, where the demo has both.
+    trace
+        CSV file for every iteration of Newton's method; for the implicit solver.
+    page
+        Write index.html, which plays the recording in a browser.
+    plot
+        Write plot.png: energies, momentum, volume ratio and smallest J over time.
+    quiet
+        Print no progress; only what was measured.
+    live
+        Nothing is recorded: show the scene in a browser while it runs, to be dragged and tuned, until Ctrl-C.
+    host
+        With --live: address to serve at; 0.0.0.0 is all of this machine's.
+    port
+        With --live: port to serve at; without it, 8080 or the next free one.
+    open_
+        With --live: open the page in a browser.
+    """
+    from rich.markup import escape
+
+    from supple.cli.console import shell_console
+    from supple.demos.registry import DEMOS, find_demo
+
+    console = shell_console()
+    if list_ or name is None:
+        width = max(map(len, DEMOS))
+        for known in DEMOS.values():
+            console.print(f"[bold]{known.name:<{width}}[/]  {escape(known.summary)}")
+        return ExitCode.OK
+
+    chosen = find_demo(name)
+    if solver is not None:
+        chosen = chosen.on(solver)
+    if live:
+        from supple.cli.live import serve_page
+        from supple.viewer.protocol.live_source import LiveSource
+
+        serve_page(LiveSource(chosen.name, chosen.scene(), chosen.solver(solver), chosen.dt), host, port, open_)
+        return ExitCode.OK
+
+    from supple.cli.session import Products, run_session
+    from supple.cli.trace import traces
+
+    used = chosen.solver(solver)
+    measurement = chosen.measurement()
+    if not quiet:
+        console.print(f"[bold]{chosen.name}[/]: {escape(chosen.explanation)}")
+    outcome = run_session(
+        chosen.scene(),
+        used,
+        chosen.dt,
+        chosen.steps if steps is None else steps,
+        products=Products(Path("out") / chosen.name if output is None else output, page, plot, quiet),
+        sinks=[measurement, *traces(trace, used)],
+    )
+    if outcome.frames:
+        for claim in measurement.claims():
+            mark = "[green]holds[/]" if claim.holds else "[red]does not hold[/]"
+            console.print(f"{mark}: {escape(claim.text)} ({escape(claim.measured)})")
+    return outcome.code

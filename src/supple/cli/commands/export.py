@@ -1,0 +1,32 @@
+"""`supple export`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+
+def export(
+    recording: Path,
+    /,
+    *,
+    to: str,
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+) -> None:
+    """Write a recording in another program's format.
+
+    Parameters
+    ----------
+    recording
+        The recording (.vtkhdf).
+    to
+        glb (Blender, three.js), obj (a folder, one file per frame), pvd (a folder for ParaView), vtu (the last frame),
+        vtkhdf (compressed, or mended after a kill), usd (extra: usd), gif or mp4 (extra: video), html (a page).
+    output
+        File or folder to write; without it, beside the recording and under its name.
+    """
+    from supple.output.export.exporter import export as write
+
+    print(write(recording, to, output))

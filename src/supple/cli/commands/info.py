@@ -1,0 +1,220 @@
+"""`supple info`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from supple.mesh.surface import SurfaceMesh
+    from supple.mesh.tetmesh import TetMesh
+    from supple.scene.stitches.stitching import Stitching
+
+SCENE_FILES = (".yaml", ".yml")
+RECORDINGS = (".vtkhdf", ".hdf", ".h5")
+PACKAGES = ("numpy", "scipy", "numba", "h5py", "tetgen", "ipctk", "viser", "pydantic")
+EXTRAS = ("pytetwild", "pymeshfix", "usd-core", "pyvista")
+
+
+def info(file: Path | None = None, /) -> None:
+    """Say what is in a file: counts, sizes, quality, problems. Without a file: versions, platform and threads.
+
+    Parameters
+    ----------
+    file
+        A scene (.yaml), a surface, a tet mesh or a recording (.vtkhdf).
+    """
+    if file is None:
+        _print_table("Supple", _platform())
+        return
+    suffix = file.suffix.lower()
+    if suffix in SCENE_FILES:
+        _scene(file)
+    elif suffix in RECORDINGS:
+        _recording(file)
+    else:
+        _mesh(file, suffix)
+
+
+def _print_table(title: str, rows: list[tuple[str, str]]) -> None:
+    from rich.markup import escape
+    from rich.table import Table
+
+    from supple.cli.console import ShellConsole
+
+    table = Table(title=escape(title), title_justify="left", show_header=False, box=None, pad_edge=False)
+    table.add_column(style="bold")
+    table.add_column(overflow="fold")
+    for name, value in rows:
+        table.add_row(escape(name), escape(value))
+    ShellConsole().print(table)
+
+
+def _platform() -> list[tuple[str, str]]:
+    import os
+    import platform
+    from importlib.metadata import PackageNotFoundError, version
+
+    import supple
+
+    rows = [
+        ("supple", supple.__version__),
+        ("python", f"{platform.python_version()} ({platform.python_implementation()})"),
+        ("platform", platform.platform()),
+        ("processors", str(os.cpu_count())),
+    ]
+    import numba
+
+    rows.append(("threads", str(numba.get_num_threads())))
+    for name in (*PACKAGES, *EXTRAS):
+        try:
+            rows.append((name, version(name)))
+        except PackageNotFoundError:
+            rows.append((name, "not installed (an extra)" if name in EXTRAS else "missing"))
+    return rows
+
+
+def _extent(low: np.ndarray, high: np.ndarray) -> str:
+    return " x ".join(f"{x:.6g}" for x in high - low) + " m"
+
+
+def _surface_rows(surface: SurfaceMesh) -> list[tuple[str, str]]:
+    report = surface.check()
+    return [
+        ("kind", "surface"),
+        ("vertices", str(len(surface.vertices))),
+        ("triangles", str(len(surface.triangles))),
+        ("components", str(report.component_count)),
+        ("size", _extent(*surface.bounds)),
+        ("area", f"{surface.area:.6g} m^2"),
+        ("volume", f"{surface.volume:.6g} m^3" if report.watertight else "none, the surface is open"),
+        ("problems", "none" if report.ok else "\n".join(report.problems)),
+    ]
+
+
+def _tet_rows(mesh: TetMesh) -> list[tuple[str, str]]:
+    return [
+        ("kind", "tetrahedral mesh"),
+        ("vertices", str(len(mesh.vertices))),
+        ("tets", str(len(mesh.tets))),
+        ("edges", str(len(mesh.edges))),
+        ("surface triangles", str(len(mesh.surface.triangles))),
+        ("components", str(mesh.components.count)),
+        ("size", _extent(mesh.vertices.min(axis=0), mesh.vertices.max(axis=0))),
+        ("volume", f"{mesh.volume:.6g} m^3"),
+        ("tet volumes", f"{mesh.volumes.min():.3g} to {mesh.volumes.max():.3g} m^3"),
+        ("smallest dihedral", f"{mesh.min_dihedrals.min():.2f} degrees (tet {int(mesh.min_dihedrals.argmin())})"),
+        ("radius ratio", f"worst {mesh.radius_ratios.min():.3f}, mean {mesh.radius_ratios.mean():.3f} (1 is regular)"),
+        ("tets turned", str(mesh.turned)),
+    ]
+
+
+def _mesh(file: Path, suffix: str) -> None:
+    from supple.errors import MeshError
+    from supple.mesh.io.mesh_files import SURFACE_READERS, TET_EXTENSIONS
+    from supple.mesh.surface import SurfaceMesh
+    from supple.mesh.tetmesh import TetMesh
+
+    known = (*SCENE_FILES, *RECORDINGS[:1], *dict.fromkeys((*SURFACE_READERS, *TET_EXTENSIONS)))
+    if suffix not in known:
+        raise MeshError(f"{file}: unknown extension {suffix or '(none)'}; known are {', '.join(known)}")
+    if suffix in TET_EXTENSIONS:
+        try:
+            mesh = TetMesh.load(file)
+        except MeshError as error:
+            surface = _surface_of_same_kind(file, suffix in SURFACE_READERS)
+            if surface is None:
+                raise error from None
+            _print_table(str(file), _surface_rows(surface))
+        else:
+            _print_table(str(file), _tet_rows(mesh))
+        return
+    _print_table(str(file), _surface_rows(SurfaceMesh.load(file)))
+
+
+def _surface_of_same_kind(file: Path, may_hold_one: bool) -> SurfaceMesh | None:
+    """The surface in a file whose format may hold tets or triangles, or None."""
+    from supple.errors import MeshError
+    from supple.mesh.surface import SurfaceMesh
+
+    if not may_hold_one:
+        return None
+    try:
+        return SurfaceMesh.load(file)
+    except MeshError:
+        return None
+
+
+def _scene(file: Path) -> None:
+    from supple.scene_file.loader import load_run
+    from supple.system import build_system
+
+    run = load_run(file)
+    scene, system = run.scene, build_system(run.scene)
+    rows = [
+        ("kind", "scene"),
+        ("bodies", str(len(scene.bodies))),
+        ("vertices", str(len(system.masses))),
+        ("tets", str(len(system.tets))),
+        ("obstacles", ", ".join(f"{o.name} ({type(o).__name__})" for o in scene.obstacles) or "none"),
+        ("pins", ", ".join(f"{p.pin.label}: {len(p.vertices)} vertices" for p in system.pins) or "none"),
+        ("solver", str(run.solver)),
+        ("time", f"{run.steps} steps of {run.dt:.6g} s: {run.steps * run.dt:.6g} s"),
+    ]
+    for part in system.bodies:
+        mass = system.masses[part.vertices].sum()
+        mesh = part.body.mesh
+        text = f"{type(part.body.material).__name__}, {len(mesh.tets)} tets, {mesh.volume:.6g} m^3, {mass:.6g} kg"
+        rows.append((f"body {part.name}", text))
+    rows += _stitch_rows(system.stitching)
+    _print_table(str(file), rows)
+
+
+def _stitch_rows(stitching: Stitching) -> list[tuple[str, str]]:
+    """How many pairs each stitch has, how far they are apart, and how many rest vertices had to be moved."""
+    rows = []
+    for part in stitching.ranges:
+        near, far = part.pairs.distances.min(), part.pairs.distances.max()
+        text = f"{type(part.stitch).__name__}, {len(part.pairs.vertices)} pairs, {near:.6g} to {far:.6g} m apart"
+        if part.tets.stop > part.tets.start:
+            text += f", {int(stitching.tets.offset[part.tets].sum())} rest vertices offset"
+        rows.append((part.stitch.label, text))
+    return rows
+
+
+def _recording(file: Path) -> None:
+    import numpy as np
+
+    from supple.output.recording.reader import read_recording
+
+    with read_recording(file) as recording:
+        J = recording.series("min_det_F")
+        rows = [
+            ("kind", "recording"),
+            ("frames", f"{len(recording)} to t = {recording.times[-1]:.6g} s, dt = {recording.dt:.6g} s"),
+            ("bodies", ", ".join(f"{body.name} ({body.material})" for body in recording.bodies)),
+            ("obstacles", ", ".join(f"{o.name} ({o.kind})" for o in recording.obstacles) or "none"),
+            ("vertices", str(len(recording.masses))),
+            ("tets", str(len(recording.tets))),
+            ("volume", f"{recording.rest_volumes.sum():.6g} m^3 at rest"),
+            ("mass", f"{recording.masses.sum():.6g} kg"),
+            ("solver", recording.solver or "not said"),
+            ("smallest J", f"{J.min():.6g} at t = {recording.times[int(np.argmin(J))]:.6g} s"),
+            ("ended", str(recording.statuses[-1])),
+            ("scene file", "inside" if recording.scene_text else "none"),
+            ("written by", f"supple {recording.supple_version}"),
+        ]
+        bad = [k for k, status in enumerate(recording.statuses) if not status.can_go_on]
+        rows.append(("problems", _recording_problems(float(J.min()), bad)))
+    _print_table(str(file), rows)
+
+
+def _recording_problems(smallest_J: float, stopped: list[int]) -> str:
+    problems = []
+    if smallest_J <= 0.0:
+        problems.append("a tetrahedron is inverted or flat (J <= 0)")
+    if stopped:
+        problems.append(f"the solver stopped at frame {stopped[0]}")
+    return "; ".join(problems) or "none"

@@ -1,0 +1,136 @@
+"""`supple mesh`."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from cyclopts import Parameter
+
+from supple.errors import MeshError, MeshingError
+
+if TYPE_CHECKING:
+    from supple.mesh.meshing.tetrahedralize import MeshingReport
+    from supple.mesh.tetmesh import TetMesh
+
+
+def mesh(
+    surface: Path,
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=["--output", "-o"])],
+    max_volume: float | None = None,
+    quality: float = 1.4,
+    min_dihedral: float | None = None,
+    keep_surface: Annotated[bool, Parameter(negative="")] = False,
+    mesher: Literal["auto", "tetgen", "ftetwild"] = "auto",
+    repair: Annotated[bool, Parameter(negative="")] = False,
+    envelope: float = 1e-3,
+    time_limit: float = 120.0,
+    memory_limit: float = 4.0,
+    base_index: Literal[0, 1] = 1,
+) -> None:
+    """Fill a surface with tets: TetGen for clean surfaces, fTetWild for dirty ones.
+
+    Parameters
+    ----------
+    surface
+        STL, OBJ, PLY, OFF, VTP, VTK or VTU file.
+    output
+        One of TetGen's names (bear.1.node writes .node, .ele, .edge and .face), or a .msh, .vtu or .vtk file.
+    max_volume
+        No tet is larger than this [m^3].
+    quality
+        TetGen's bound on circumradius over shortest edge, above 1: smaller is better shaped, and more tets.
+    min_dihedral
+        TetGen's aim for the smallest dihedral angle [degrees]; much above 18 it may not end.
+    keep_surface
+        Add no vertices on the surface.
+    mesher
+        "auto" takes TetGen for a clean surface and fTetWild, an extra, for any other.
+    repair
+        Mend a surface that is not clean first, and say what that changed.
+    envelope
+        How far fTetWild may move the surface, as a part of the bounding box's diagonal.
+    time_limit
+        Seconds that the mesher may take.
+    memory_limit
+        GiB of address space that the mesher may take.
+    base_index
+        Number of the first vertex in TetGen's files.
+    """
+    from rich.console import Console
+
+    from supple.mesh.io.mesh_files import TET_EXTENSIONS
+    from supple.mesh.io.tetgen_files import family_paths, is_tetgen_path, write_tetgen
+    from supple.mesh.meshing.tetrahedralize import tetrahedralize_reported
+    from supple.mesh.surface import SurfaceMesh
+    from supple.output.files.atomic import refuse_to_replace
+
+    # Before minutes of meshing, not after.
+    if output.suffix.lower() not in TET_EXTENSIONS:
+        raise MeshError(f"{output}: the extension must be one of {', '.join(TET_EXTENSIONS)}")
+    if not output.absolute().parent.is_dir():
+        raise MeshError(f"{output}: there is no folder {output.absolute().parent}")
+    if not os.access(output.absolute().parent, os.W_OK):
+        raise MeshError(f"{output}: the folder cannot be written to")
+    targets = list(family_paths(output).values()) if is_tetgen_path(output) else [output]
+    for target in targets:
+        if target.is_dir():
+            raise MeshError(f"{target}: is a folder; give another name")
+        refuse_to_replace(surface, target)
+    loaded = SurfaceMesh.load(surface)
+    with Console(stderr=True).status(f"meshing {len(loaded.triangles)} triangles"):
+        try:
+            tets, report = tetrahedralize_reported(
+                loaded,
+                max_volume=max_volume,
+                quality=quality,
+                min_dihedral=min_dihedral,
+                keep_surface=keep_surface,
+                mesher=mesher,
+                repair=repair,
+                envelope=envelope,
+                time_limit=time_limit,
+                memory_limit=_bytes(memory_limit),
+            )
+        except MeshingError as error:
+            raise MeshingError(f"{surface}: {error}") from None
+    if is_tetgen_path(output):
+        write_tetgen(tets, output, base_index)
+    else:
+        tets.save(output)
+    _summarize(tets, report, targets)
+
+
+def _bytes(gibibytes: float) -> int:
+    if not 0.0 < gibibytes < 2.0**33:
+        raise MeshingError(f"memory limit must be a number of GiB above 0, not {gibibytes:g}")
+    return max(1, int(gibibytes * 2**30))
+
+
+def _summarize(tets: TetMesh, report: MeshingReport, files: list[Path]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    rows = {
+        "mesher": f"{report.mesher}, {report.seconds:.2f} s",
+        "vertices": str(len(tets.vertices)),
+        "tets": str(len(tets.tets)),
+        "surface triangles": str(len(tets.surface.triangles)),
+        "volume": f"{tets.volume:.6g} m^3",
+        "largest tet": f"{tets.volumes.max():.4g} m^3",
+        "smallest dihedral": f"{tets.min_dihedrals.min():.2f} degrees",
+        "files": "\n".join(map(str, files)),
+    }
+    if report.repair is not None:
+        rows["repair"] = str(report.repair)
+    table = Table(show_header=False, box=None, pad_edge=False)
+    table.add_column(style="bold")
+    table.add_column(overflow="fold")
+    for name, value in rows.items():
+        # Text is not searched for markup: a file may be called [bold].
+        table.add_row(name, Text(value))
+    Console().print(table)

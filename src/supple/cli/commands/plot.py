@@ -1,0 +1,31 @@
+"""`supple plot`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+
+def plot(
+    recording: Path,
+    /,
+    *,
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+) -> None:
+    """Draw what a recording measured: energies, momenta, volumes, smallest J, and time per step.
+
+    Parameters
+    ----------
+    recording
+        The recording (.vtkhdf).
+    output
+        Picture to write (.png, .pdf or .svg); without it, plot.png beside the recording.
+    """
+    from supple.output.files.atomic import refuse_to_replace
+    from supple.output.plots import plot_recording
+
+    picture = recording.with_name("plot.png") if output is None else output
+    refuse_to_replace(recording, picture)
+    print(plot_recording(recording, picture))

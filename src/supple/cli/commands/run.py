@@ -1,0 +1,84 @@
+"""`supple run`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from supple.cli.numbers import Seconds, Steps
+
+
+def run(
+    scene: Path,
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=["--output", "-o"])] = Path("out"),
+    steps: Steps = None,
+    dt: Seconds = None,
+    solver: str | None = None,
+    trace: Path | None = None,
+    separate: Annotated[bool, Parameter(negative="")] = False,
+    page: bool | None = None,
+    plot: bool | None = None,
+    quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
+) -> int:
+    """Simulate a scene file and record it.
+
+    The recording is written while the scene runs and is readable up to the last whole frame, whatever happens.
+
+    Parameters
+    ----------
+    scene
+        The scene file (.yaml); `supple schema` describes it.
+    output
+        Folder for recording.vtkhdf, index.html and plot.png; it is made where it is missing.
+    steps
+        Number of frames, instead of the file's.
+    dt
+        Time from frame to frame [s], instead of the file's; 1/60 may be written as such.
+    solver
+        Kind of solver, instead of the file's, with its default parameters.
+    trace
+        CSV file for every iteration of Newton's method; for the implicit solver.
+    separate
+        Move bodies apart that intersect at the start, where a small translation does it, and say which and how far.
+    page
+        Write index.html, which plays the recording in a browser; as the file says without this.
+    plot
+        Write plot.png; as the file says without this.
+    quiet
+        Print neither progress nor summary.
+    """
+    from supple.cli.session import Products, run_session
+    from supple.cli.trace import traces
+    from supple.scene_file.entries.solvers import solver_of_kind
+    from supple.scene_file.loader import load_run
+
+    if trace is not None:
+        from supple.output.files.atomic import refuse_to_replace
+
+        refuse_to_replace(scene, trace)
+    described = load_run(scene)
+    if separate:
+        from supple.cli.separation import moved_apart
+
+        described = moved_apart(described)
+    used = described.solver if solver is None else solver_of_kind(solver)
+    return run_session(
+        described.scene,
+        used,
+        described.dt if dt is None else dt,
+        described.steps if steps is None else steps,
+        start=described.start,
+        sinks=traces(trace, used),
+        products=Products(
+            folder=output,
+            page=described.output.page if page is None else page,
+            plot=described.output.plot if plot is None else plot,
+            quiet=quiet,
+            compress=described.output.compress,
+            scene_text=described.text,
+        ),
+    ).code

@@ -1,0 +1,31 @@
+"""`supple schema`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+
+def schema(*, output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None) -> None:
+    """Write the JSON Schema of scene files, for editors that complete and check them.
+
+    Parameters
+    ----------
+    output
+        File to write; without it, the schema goes to the screen.
+    """
+    import json
+
+    from supple.output.files.atomic import whole_file
+    from supple.scene_file.document import json_schema
+
+    text = json.dumps(json_schema(), indent=2) + "\n"
+    if output is None:
+        sys.stdout.write(text)
+        return
+    with whole_file(output) as fresh:
+        fresh.write_text(text, encoding="utf-8")
+    print(f"wrote {output}")

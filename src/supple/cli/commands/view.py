@@ -1,0 +1,80 @@
+"""`supple view`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from supple.cli.live import Host, Open, Port
+
+SCENE_FILES = (".yaml", ".yml")
+RECORDINGS = (".vtkhdf", ".hdf", ".h5")
+
+
+def view(
+    source: Path,
+    /,
+    *,
+    solver: str | None = None,
+    host: Host = "127.0.0.1",
+    port: Port = None,
+    open_: Open = True,
+) -> None:
+    """Show a scene while it is simulated, to be dragged and tuned, or a recording, in a browser.
+
+    Runs until Ctrl-C. The page is served to this machine only, unless --host says otherwise; then its address holds a
+    secret, and only who has the address gets in. A scene's meshes must be in its file's folder.
+
+    Parameters
+    ----------
+    source
+        A scene file (.yaml), or a recording (.vtkhdf, or the folder that holds it).
+    solver
+        Kind of solver, instead of the file's, with its default parameters.
+    host
+        Address to serve at; 0.0.0.0 is all of this machine's.
+    port
+        Port to serve at; without it, 8080 or the next free one.
+    open_
+        Open the page in a browser.
+    """
+    from supple.cli.live import serve_page
+
+    found = find_source(source)
+    if found.suffix.lower() not in SCENE_FILES:
+        if solver is not None:
+            from supple.errors import OutputError
+
+            raise OutputError(f"{found} is a recording, which no solver changes; leave --solver out")
+        serve_page(found, host, port, open_)
+        return
+
+    from supple.scene_file.confined import ConfinedMeshStore
+    from supple.scene_file.entries.solvers import solver_of_kind
+    from supple.scene_file.loader import load_run
+    from supple.viewer.protocol.live_source import LiveSource
+
+    run = load_run(found, ConfinedMeshStore)
+    used = run.solver if solver is None else solver_of_kind(solver)
+    live = LiveSource(found.stem, run.scene, used, run.dt, run.initial_positions)
+    serve_page(live, host, port, open_)
+
+
+def find_source(path: Path) -> Path:
+    """The scene file or recording that is meant.
+
+    Raises
+    ------
+    OutputError : where there is none.
+    """
+    from supple.errors import OutputError
+
+    if path.is_dir():
+        inside = path / "recording.vtkhdf"
+        if not inside.exists():
+            raise OutputError(f"{path} is a folder without recording.vtkhdf; name a scene file or a recording")
+        return inside
+    if not path.exists():
+        raise OutputError(f"{path}: there is no such file")
+    if path.suffix.lower() not in (*SCENE_FILES, *RECORDINGS):
+        raise OutputError(f"{path} is neither a scene file (.yaml) nor a recording (.vtkhdf)")
+    return path

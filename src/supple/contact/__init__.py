@@ -1,0 +1,1 @@
+"""Contact of surfaces, for both solvers: it knows neither."""

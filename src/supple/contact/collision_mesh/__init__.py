@@ -1,0 +1,1 @@
+"""Surfaces as the contact library sees them."""

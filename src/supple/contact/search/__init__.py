@@ -1,0 +1,1 @@
+"""Which points and triangles are near each other."""

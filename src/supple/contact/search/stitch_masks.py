@@ -1,0 +1,76 @@
+"""Which of the points and triangles that may touch are stitched to each other.
+
+Beside what `supple.scene.stitches.masks` says, that is what is nearer at the start than the gap that contact keeps,
+between things that are stitched to each other, where the point is stitched, or all of the triangle is: contact would
+push a seam apart that is sewn face to face.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.contact.obstacle_poses import ObstaclePoses
+from supple.contact.search.excluded_pairs import pairs_closer_than
+from supple.contact.search.surfaces import ContactSurfaces
+from supple.scene.obstacles import TriangleObstacle
+from supple.scene.stitches.masks import Pair, stitched_triangles
+from supple.system import System
+
+
+def stitched_contacts(system: System, surfaces: ContactSurfaces, poses: ObstaclePoses) -> Pair:
+    """(q,) points and (q,) triangles of `surfaces` that never collide."""
+    # The last one for what is no node.
+    nodes = np.append(_points_of_vertices(system, surfaces), -1)[system.stitching.nodes()]
+    points, triangles = stitched_triangles(nodes, surfaces.triangles, len(surfaces.point_piece))
+    near_points, near_triangles = _touching(system, surfaces, poses, nodes)
+    return np.concatenate([points, near_points]), np.concatenate([triangles, near_triangles])
+
+
+def stitched_points(
+    system: System, surfaces: ContactSurfaces, poses: ObstaclePoses
+) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """For each triangle, the points that are stitched to it: starts (t + 1,) and points."""
+    points, triangles = stitched_contacts(system, surfaces, poses)
+    order = np.lexsort((points, triangles))
+    starts = np.searchsorted(triangles[order], np.arange(len(surfaces.triangles) + 1))
+    return starts.astype(np.int64), points[order].astype(np.int32)
+
+
+def _touching(system: System, surfaces: ContactSurfaces, poses: ObstaclePoses, nodes: NDArray[np.int64]) -> Pair:
+    """Those of things that stitches with these nodes (k, 4) join, which are too near at the start; see the module."""
+    first, second = np.repeat(nodes[:, 0], 3), nodes[:, 1:].ravel()
+    both = (first >= 0) & (second >= 0)
+    one, other = surfaces.point_piece[first[both]], surfaces.point_piece[second[both]]
+    joined = np.zeros_like(surfaces.allowed)
+    joined[one, other] = joined[other, one] = True
+    joined &= surfaces.allowed
+    nothing = np.zeros(0, dtype=np.int64)
+    if not joined.any():
+        return nothing, nothing
+    placed = np.concatenate([part.body.place(system.rest_positions[part.vertices]) for part in system.bodies])
+    start = np.zeros((len(surfaces.point_piece), 3))
+    start[: len(surfaces.rows)] = placed[surfaces.rows]
+    surfaces.place_obstacles(poses, 0.0, start)
+    points, triangles = pairs_closer_than(surfaces, start, float(surfaces.gaps[joined].max()), joined)
+    sewn = np.zeros(len(start), dtype=np.bool_)
+    sewn[nodes[nodes >= 0]] = True
+    kept = sewn[points] | sewn[surfaces.triangles[triangles]].all(axis=1)
+    return points[kept].astype(np.int64), triangles[kept].astype(np.int64)
+
+
+def _points_of_vertices(system: System, surfaces: ContactSurfaces) -> NDArray[np.int64]:
+    """(n + a,) the point of each vertex and anchor; -1 for vertices inside bodies."""
+    anchors = system.stitching.anchors
+    point = np.full(len(system.masses) + len(anchors), -1, dtype=np.int64)
+    point[surfaces.rows] = np.arange(len(surfaces.rows))
+    for k in np.unique(anchors.owner):
+        obstacle = anchors.obstacles[k]
+        assert isinstance(obstacle, TriangleObstacle)
+        assert obstacle.surface is not None
+        first = len(surfaces.rows) + int(np.argmax(surfaces.fixed_owners == k))
+        mine = np.flatnonzero(anchors.owner == k)
+        # An obstacle's points are those of its vertices that triangles use, in order.
+        place = np.searchsorted(obstacle.surface.used_vertices, anchors.vertices[mine])
+        point[len(system.masses) + mine] = first + place
+    return point

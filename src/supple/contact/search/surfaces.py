@@ -1,0 +1,201 @@
+"""All surfaces of a scene that can touch: points and triangles of bodies and of triangle obstacles, as flat arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.contact.obstacle_poses import ObstaclePoses
+from supple.mesh.topology import connected_components
+from supple.scene.contact_pairs import PairTable
+from supple.scene.obstacles import Box, Obstacle, Sphere, TriangleObstacle
+from supple.system import System
+from supple.xpbd.contact.settings import XPBDContact
+
+
+@dataclass(frozen=True, eq=False)
+class ContactSurfaces:
+    """Points and triangles, and which of them may touch. A piece is a connected part of one body or one obstacle.
+
+    The bodies' points come first, then those of obstacles: vertices of triangle obstacles, corners of blocks, and the
+    centers of balls that are small beside the bodies' triangles (they touch at a gap of their radius).
+
+    Attributes
+    ----------
+    rows : (nb,) which vertices of the system the bodies' points are
+    fixed_points : (no, 3) obstacles' points at time 0 [m]; fixed_owners : (no,) which obstacle each belongs to
+    inverse_masses : (n,) 1/m [1/kg] with n = nb + no
+    point_piece : (n,)
+    triangles : (t, 3) indices of points, pieces one after the other, those of bodies first; triangle_piece : (t,)
+    body_triangles : how many triangles belong to bodies
+    closed : (p,) whether a piece has an inside
+    allowed : (p, p) whether points of the first piece may touch triangles of the second
+    gaps : (p, p) the gap that is kept between the two [m]; friction : (p, p) Coulomb coefficients
+    """
+
+    rows: NDArray[np.int32]
+    fixed_points: NDArray[np.float64]
+    fixed_owners: NDArray[np.int32]
+    inverse_masses: NDArray[np.float64]
+    point_piece: NDArray[np.int32]
+    triangles: NDArray[np.int32]
+    triangle_piece: NDArray[np.int32]
+    body_triangles: int
+    closed: NDArray[np.bool_]
+    allowed: NDArray[np.bool_]
+    gaps: NDArray[np.float64]
+    friction: NDArray[np.float64]
+
+    @property
+    def is_needed(self) -> bool:
+        """Whether anything here may touch anything."""
+        return bool(self.allowed.any()) and len(self.triangles) > 0
+
+    def place_obstacles(self, poses: ObstaclePoses, time: float, out: NDArray[np.float64]) -> None:
+        """Write where the obstacles' points are at `time` [s] into the last rows of out (n, 3)."""
+        if len(self.fixed_points):
+            R, t = poses.at(time)
+            out[len(self.rows) :] = (
+                np.einsum("kij,kj->ki", R[self.fixed_owners], self.fixed_points) + t[self.fixed_owners]
+            )
+
+
+@dataclass
+class _Piece:
+    """What decides how a piece meets others: `owner` is the row of its body or obstacle in the scene's `PairTable`."""
+
+    owner: int
+    closed: bool = True
+    gap: float | None = None
+
+
+def build_surfaces(
+    system: System, table: PairTable, settings: XPBDContact | None, thickness: float, edge_length: float
+) -> ContactSurfaces:
+    """Collect what may touch. `edge_length` [m] is the mean of the bodies' surfaces."""
+    obstacles = _obstacle_parts(system.obstacles, len(system.bodies), edge_length)
+    pieces, rows, body_piece, triangles = _body_parts(system)
+    points, owners, point_piece = [np.zeros((0, 3))], [np.zeros(0, np.int32)], [body_piece]
+    triangle_parts, piece_parts = [triangles], [body_piece[triangles[:, 0]]]
+    count = len(rows)
+    for k, part in obstacles:
+        offset = len(pieces)
+        pieces += part["pieces"]
+        points.append(part["points"])
+        owners.append(np.full(len(part["points"]), k, np.int32))
+        point_piece.append(part["point_piece"] + offset)
+        triangle_parts.append(part["triangles"] + count)
+        piece_parts.append(part["triangle_piece"] + offset)
+        count += len(part["points"])
+    fixed = np.concatenate(points)
+    allowed, gaps, friction = _rules(pieces, table, settings, thickness)
+    return ContactSurfaces(
+        rows=rows,
+        fixed_points=fixed,
+        fixed_owners=np.concatenate(owners),
+        inverse_masses=np.concatenate([system.inverse_masses[rows], np.zeros(len(fixed))]),
+        point_piece=np.concatenate(point_piece).astype(np.int32),
+        triangles=np.ascontiguousarray(np.concatenate(triangle_parts), dtype=np.int32),
+        triangle_piece=np.concatenate(piece_parts).astype(np.int32),
+        body_triangles=len(triangles),
+        closed=np.array([piece.closed for piece in pieces], dtype=np.bool_),
+        allowed=allowed,
+        gaps=gaps,
+        friction=friction,
+    )
+
+
+def _body_parts(
+    system: System,
+) -> tuple[list[_Piece], NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
+    rows = np.unique(system.triangles).astype(np.int32)
+    index = np.full(len(system.masses), -1, dtype=np.int32)
+    index[rows] = np.arange(len(rows), dtype=np.int32)
+    labels, piece = np.unique(system.components[rows], return_inverse=True)
+    owner = np.zeros(len(system.masses), dtype=np.int64)
+    for k, part in enumerate(system.bodies):
+        owner[part.vertices] = k
+    pieces = []
+    for label in labels:
+        vertex = int(np.argmax(system.components == label))
+        pieces.append(_Piece(int(owner[vertex])))
+    triangles = index[system.triangles]
+    order = np.argsort(piece[triangles[:, 0]], kind="stable")
+    return pieces, rows, piece.astype(np.int32), triangles[order]
+
+
+def _obstacle_parts(obstacles: Sequence[Obstacle], bodies: int, edge_length: float) -> list[tuple[int, dict[str, Any]]]:
+    parts = []
+    for number, obstacle in enumerate(obstacles):
+        owner = bodies + number
+        if isinstance(obstacle, TriangleObstacle):
+            parts.append((number, _triangle_part(owner, obstacle)))
+        elif isinstance(obstacle, Box) and not obstacle.inside:
+            signs = np.array([[i, j, k] for i in (-0.5, 0.5) for j in (-0.5, 0.5) for k in (-0.5, 0.5)])
+            corners = np.asarray(obstacle.center) + (signs * np.asarray(obstacle.size)) @ obstacle.orientation.T
+            parts.append((number, _points_part(_Piece(owner, gap=0.0), corners)))
+        elif isinstance(obstacle, Sphere) and not obstacle.inside and obstacle.radius < 2.0 * edge_length:
+            center = np.asarray(obstacle.center)[None]
+            parts.append((number, _points_part(_Piece(owner, gap=obstacle.radius), center)))
+    return parts
+
+
+def _points_part(piece: _Piece, points: NDArray[np.float64]) -> dict[str, Any]:
+    none = np.zeros(0, dtype=np.int32)
+    return {
+        "pieces": [piece],
+        "points": points,
+        "point_piece": np.zeros(len(points), dtype=np.int32),
+        "triangles": none.reshape(0, 3),
+        "triangle_piece": none,
+    }
+
+
+def _triangle_part(owner: int, obstacle: TriangleObstacle) -> dict[str, Any]:
+    assert obstacle.surface is not None  # the obstacle has checked it
+    surface = obstacle.surface.compact()
+    triangles = surface.triangles
+    count, labels = connected_components(triangles, len(surface.vertices))
+    order = np.argsort(labels, kind="stable")
+    triangles, labels = triangles[order], labels[order]
+    closed = np.array([_is_closed(triangles[labels == piece]) for piece in range(count)])
+    inward = closed[labels].all() and surface.volume < 0.0
+    point_piece = np.zeros(len(surface.vertices), dtype=np.int32)
+    point_piece[triangles] = labels[:, None]
+    return {
+        "pieces": [_Piece(owner, closed=bool(c)) for c in closed],
+        "points": surface.vertices,
+        "point_piece": point_piece,
+        "triangles": triangles[:, ::-1] if inward else triangles,
+        "triangle_piece": labels,
+    }
+
+
+def _is_closed(triangles: NDArray[np.int32]) -> bool:
+    """Whether every edge of consistently wound triangles has one triangle on each side."""
+    starts, ends = triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
+    n = int(triangles.max()) + 1
+    forward, backward = starts.astype(np.int64) * n + ends, ends.astype(np.int64) * n + starts
+    return len(np.unique(forward)) == len(forward) and np.array_equal(np.sort(forward), np.sort(backward))
+
+
+def _rules(
+    pieces: Sequence[_Piece], table: PairTable, settings: XPBDContact | None, thickness: float
+) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.float64]]:
+    """(p, p) arrays: may touch, gap, friction. What the table lets touch, the settings may still switch off."""
+    owner = np.array([piece.owner for piece in pieces])
+    fixed = owner >= table.bodies
+    gap = np.array([thickness if piece.gap is None else piece.gap for piece in pieces])
+    same = np.eye(len(pieces), dtype=np.bool_)
+    both_bodies = ~fixed[:, None] & ~fixed[None, :]
+    allowed = fixed[:, None] ^ fixed[None, :]
+    if settings is not None:
+        allowed |= both_bodies & ((same & settings.self_collision) | (~same & settings.body_collision))
+    gaps = np.where(fixed[:, None], gap[:, None], gap[None, :])
+    pairs = np.ix_(owner, owner)
+    allowed &= table.collide[pairs]
+    return allowed, np.ascontiguousarray(gaps), np.ascontiguousarray(table.friction[pairs])

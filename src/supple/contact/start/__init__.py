@@ -1,0 +1,1 @@
+"""Intersections at the start, and moving bodies apart."""

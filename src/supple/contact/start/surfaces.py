@@ -1,0 +1,107 @@
+"""The surfaces of a scene at its start, as one list of triangles, and which points are inside of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from supple.contact.obstacle_vertices import with_obstacles
+from supple.numerics.mat3 import cross, dot, row, subtract
+from supple.scene.obstacles import Box, HalfSpace, Sphere
+from supple.system import System
+
+
+@dataclass(frozen=True, eq=False)
+class StartSurfaces:
+    """Surfaces as the implicit solver has them: round obstacles are made of triangles. Things: bodies, then obstacles.
+
+    Attributes
+    ----------
+    points : (n, 3) [m], the system's vertices first; triangles : (t, 3), the system's first
+    owner : (t,) which thing a triangle is of; first_row : (p,) the row of each thing's first triangle
+    pieces : (s, 2) for each connected part of a surface its thing and one of its vertices
+    planes : half-spaces, as (thing, point (3,), normal (3,))
+    rooms : obstacles that keep bodies in; solid : (p,) whether a thing has an inside that nothing may be in
+    """
+
+    points: NDArray[np.float64]
+    triangles: NDArray[np.int32]
+    owner: NDArray[np.int32]
+    first_row: NDArray[np.int64]
+    pieces: NDArray[np.int64]
+    planes: tuple[tuple[int, NDArray[np.float64], NDArray[np.float64]], ...]
+    rooms: tuple[int, ...]
+    solid: NDArray[np.bool_]
+
+    def of(self, thing: int) -> NDArray[np.int32]:
+        """Triangles (k, 3) of one thing."""
+        return self.triangles[self.owner == thing]
+
+
+def start_surfaces(system: System, positions: NDArray[np.float64], time: float) -> StartSurfaces:
+    """Collect the surfaces of a system at positions (n, 3) [m] and a time [s]. Rows beyond the bodies' are not used."""
+    bodies = len(system.bodies)
+    n = system.bodies[-1].vertices.stop
+    count = bodies + len(system.obstacles)
+    points, triangles = [np.asarray(positions, dtype=np.float64)[:n]], [system.triangles]
+    owner = [np.repeat(np.arange(bodies), [part.triangles.stop - part.triangles.start for part in system.bodies])]
+    planes, rooms, solid = [], [], np.ones(count, dtype=np.bool_)
+    for part in with_obstacles(system)[1]:
+        thing, corners = bodies + part.index, part.targets(time)
+        if isinstance(part.obstacle, HalfSpace):
+            normal = corners[1] - corners[0]
+            planes.append((thing, corners[0], normal / np.linalg.norm(normal)))
+            continue
+        if isinstance(part.obstacle, (Box, Sphere)) and part.obstacle.inside:
+            rooms.append(thing)
+            solid[thing] = False
+        local = part.triangles - part.vertices[0]
+        solid[thing] &= _is_closed(local)
+        triangles.append(local + sum(map(len, points)))
+        points.append(corners)
+        owner.append(np.full(len(local), thing))
+    all_triangles = np.ascontiguousarray(np.concatenate(triangles), dtype=np.int32)
+    all_owners = np.concatenate(owner).astype(np.int32)
+    first_row = np.searchsorted(all_owners, np.arange(count))
+    all_points = np.ascontiguousarray(np.concatenate(points))
+    pieces = _pieces(all_triangles, all_owners, len(all_points))
+    return StartSurfaces(all_points, all_triangles, all_owners, first_row, pieces, tuple(planes), tuple(rooms), solid)
+
+
+def _is_closed(triangles: NDArray[np.integer]) -> bool:
+    """Whether every edge has as many triangles on one side as on the other."""
+    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]).astype(np.int64)
+    n = int(edges.max(initial=0)) + 1
+    keys, backward = np.sort(edges[:, 0] * n + edges[:, 1]), np.sort(edges[:, 1] * n + edges[:, 0])
+    return np.array_equal(keys, backward)
+
+
+def _pieces(triangles: NDArray[np.int32], owner: NDArray[np.int32], n: int) -> NDArray[np.int64]:
+    first = triangles[:, [0, 0]].ravel()
+    graph = coo_matrix((np.ones(len(first), dtype=np.int8), (first, triangles[:, 1:].ravel())), shape=(n, n))
+    labels = connected_components(graph, directed=False)[1]
+    _, rows = np.unique(labels[triangles[:, 0]], return_index=True)
+    rows = np.sort(rows)
+    return np.column_stack([owner[rows], triangles[rows, 0]]).astype(np.int64)
+
+
+@njit(cache=True, error_model="numpy")
+def winding_number(x, triangles, q):
+    """How often a closed surface of triangles of x (n, 3) goes around the point q: 0 outside.
+
+    Source: van Oosterom, Strackee, "The solid angle of a plane triangle" (1983).
+    """
+    total = 0.0
+    for t in range(len(triangles)):
+        a = subtract(row(x, triangles[t, 0]), q)
+        b = subtract(row(x, triangles[t, 1]), q)
+        c = subtract(row(x, triangles[t, 2]), q)
+        la, lb, lc = np.sqrt(dot(a, a)), np.sqrt(dot(b, b)), np.sqrt(dot(c, c))
+        det = dot(a, cross(b, c))
+        total += np.arctan2(det, la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb)
+    return total / (2.0 * np.pi)

@@ -1,0 +1,122 @@
+"""Elastic energy of all tets: sum V psi(F)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+from supple.errors import SolverError
+from supple.implicit.energies.potential import HessianBlocks, Potential
+from supple.materials.material import Elastic
+from supple.materials.per_tet import TetMaterial
+from supple.materials.tet_energies import element_energies, element_gradients, element_hessians, element_models
+from supple.numerics.sparse.block_csr import incidences
+from supple.numerics.threads import threads_for
+from supple.system import System
+
+# Fewer tets than this are worked on by one thread.
+SERIAL_TETS = 2_000
+
+
+@dataclass(frozen=True, eq=False)
+class Elasticity(Potential):
+    """The hyperelastic energy of every tet with its own material.
+
+    Attributes
+    ----------
+    material : one row per tet
+    start, incidence : for every vertex the (tet, node) pairs that name it, coded 4 tet + node
+    """
+
+    system: System
+    material: TetMaterial
+    start: NDArray[np.int32]
+    incidence: NDArray[np.int32]
+    label = "elasticity"
+
+    def value(self, x: NDArray[np.float64]) -> float:
+        s = self.system
+        energies = np.empty(len(s.tets))
+        with threads_for(len(s.tets), SERIAL_TETS):
+            element_energies(x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters(), energies)
+        return float(energies.sum())
+
+    def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+        s = self.system
+        gradients = np.empty((len(s.tets), 4, 3))
+        with threads_for(len(s.tets), SERIAL_TETS):
+            element_gradients(x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters(), gradients)
+            gather_gradients(self.start, self.incidence, gradients, out)
+
+    def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
+        """The Hessian; *overwrites* the tets' matrices in `out`, so that they need no clearing."""
+        s = self.system
+        with threads_for(len(s.tets), SERIAL_TETS):
+            element_hessians(x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters(), project, out.tets)
+
+    def add_model(
+        self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
+    ) -> float:
+        s = self.system
+        energies = np.empty(len(s.tets))
+        gradients = np.empty((len(s.tets), 4, 3))
+        with threads_for(len(s.tets), SERIAL_TETS):
+            element_models(
+                x,
+                s.tets,
+                s.rest_shape_inverse,
+                s.rest_volumes,
+                *self._parameters(),
+                hessian is not None,
+                project,
+                energies,
+                gradients,
+                _NOTHING if hessian is None else hessian.tets,
+            )
+            gather_gradients(self.start, self.incidence, gradients, gradient)
+        return float(energies.sum())
+
+    def _parameters(self) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
+        return self.material.kind, self.material.mu, self.material.lam
+
+
+_NOTHING = np.zeros((0, 12, 12))
+
+
+def elasticity_of(system: System) -> Elasticity:
+    """The elastic energy of a system.
+
+    Raises
+    ------
+    SolverError : where a body's material has no elastic energy; the text names the body.
+    """
+    rows = []
+    for part in system.bodies:
+        if not isinstance(part.body.material, Elastic):
+            raise SolverError(
+                f"body {part.name!r}: {type(part.body.material).__name__} is a material for XPBD only; for Implicit, "
+                "give it an elastic one such as StableNeoHookean"
+            )
+        rows.append(part.body.material.per_tet(part.tets.stop - part.tets.start))
+    material = TetMaterial(
+        *(np.concatenate([getattr(row, key) for row in rows]) for key in ("density", "damping", "kind", "mu", "lam"))
+    )
+    start, incidence = incidences(system.tets, len(system.rest_positions))
+    return Elasticity(system, material, start, incidence)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def gather_gradients(start, incidence, gradients, out):
+    """Add every tet's gradient (m, 4, 3) to its nodes' rows of out (n, 3), in the order of the tets."""
+    for i in prange(len(start) - 1):
+        a, b, c = out[i, 0], out[i, 1], out[i, 2]
+        for p in range(start[i], start[i + 1]):
+            e = incidence[p] >> 2
+            k = incidence[p] & 3
+            a += gradients[e, k, 0]
+            b += gradients[e, k, 1]
+            c += gradients[e, k, 2]
+        out[i, 0], out[i, 1], out[i, 2] = a, b, c

@@ -1,0 +1,44 @@
+"""A hair of stiffness in the Hessian of a static problem, none in its energy: where it ends does not change.
+
+Without inertia, a body that hangs on one vertex can turn at no cost, and its Hessian is singular.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.implicit.energies.elasticity import Elasticity
+from supple.implicit.energies.potential import HessianBlocks, Potential
+
+# Relative to the vertex's own elastic stiffness: far below what can slow Newton's method down.
+_SHARE = 1e-8
+
+
+@dataclass(frozen=True, eq=False)
+class Stabilizer(Potential):
+    """No energy, no force; stiffness : (n,) [N/m] on the diagonal of the convex model."""
+
+    stiffness: NDArray[np.float64]
+
+    def value(self, x: NDArray[np.float64]) -> float:
+        return 0.0
+
+    def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+        """Zero."""
+
+    def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
+        if project:
+            for k in range(3):
+                out.vertices[:, k, k] += self.stiffness
+
+
+def stabilizer_of(elasticity: Elasticity) -> Stabilizer:
+    """In proportion to mu V |g|^2, summed over a vertex's tets, with shape gradients g."""
+    system = elasticity.system
+    squares = np.einsum("eij,eij->e", system.rest_shape_inverse, system.rest_shape_inverse)
+    share = _SHARE * elasticity.material.mu * system.rest_volumes * squares
+    stiffness = np.bincount(system.tets.ravel(), weights=np.repeat(share, 4), minlength=len(system.rest_positions))
+    return Stabilizer(stiffness.astype(np.float64))

@@ -1,0 +1,80 @@
+"""Energy of stitches: tetrahedra of stable Neo-Hookean material, and springs.
+
+Neither is guarded against inversion: a stitch may begin flat. Corners on obstacles are not minimized over; they are
+where the obstacle is at the end of the step.
+
+Source: "Soft Vertex Triangle Stitch", the documentation of libuipc's constitution #30; the constant of its energy
+density is left out, so that the energy is zero at rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.implicit.energies.elasticity import SERIAL_TETS, gather_gradients
+from supple.implicit.energies.potential import HessianBlocks, Potential
+from supple.implicit.energies.stitch_springs import spring_energies, spring_gradients, spring_hessians
+from supple.materials.registry import kind_of
+from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.materials.tet_energies import element_energies, element_gradients, element_hessians
+from supple.numerics.sparse.block_csr import incidences
+from supple.numerics.threads import threads_for
+from supple.scene.stitches.stitching import Stitching
+
+
+@dataclass(frozen=True, eq=False)
+class StitchEnergy(Potential):
+    """The energy of all stitches, with the anchors (a, 3) where they are at one time [m]."""
+
+    stitching: Stitching
+    anchors: NDArray[np.float64]
+    gathering: tuple[NDArray[np.int32], NDArray[np.int32]] = field(repr=False)
+
+    @classmethod
+    def of(cls, stitching: Stitching, time: float) -> StitchEnergy:
+        """As it is at `time` [s]."""
+        gathering = incidences(stitching.elements(), stitching.body_vertices)
+        return cls(stitching, stitching.anchors.at(time), gathering)
+
+    def at(self, time: float) -> StitchEnergy:
+        """The same at another time [s]."""
+        return StitchEnergy(self.stitching, self.stitching.anchors.at(time), self.gathering)
+
+    def value(self, x: NDArray[np.float64]) -> float:
+        return float(self.energies(x).sum())
+
+    def energies(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(k,) of each stitch, tets first [J]."""
+        points = self._points(x)
+        out = np.empty(len(self.stitching.tets))
+        with threads_for(len(out), SERIAL_TETS):
+            element_energies(points, *self._tets, out)
+        return np.concatenate([out, spring_energies(self.stitching.springs, points)])
+
+    def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+        points, count = self._points(x), len(self.stitching.tets)
+        gradients = np.empty((len(self.stitching), 4, 3))
+        with threads_for(count, SERIAL_TETS):
+            element_gradients(points, *self._tets, gradients[:count])
+            spring_gradients(self.stitching.springs, points, gradients[count:])
+            gather_gradients(*self.gathering, gradients, out)
+
+    def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
+        """The Hessian; *overwrites* the stitches' matrices in `out`, so that they need no clearing."""
+        points, count = self._points(x), len(self.stitching.tets)
+        with threads_for(count, SERIAL_TETS):
+            element_hessians(points, *self._tets, project, out.stitches[:count])
+        spring_hessians(self.stitching.springs, points, project, out.stitches[count:])
+
+    def _points(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.concatenate([x[: self.stitching.body_vertices], self.anchors]) if len(self.anchors) else x
+
+    @cached_property
+    def _tets(self) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray, NDArray]:
+        tets = self.stitching.tets
+        kind = np.full(len(tets), kind_of(StableNeoHookean), dtype=np.int32)
+        return tets.vertices, tets.rest_shape_inverse, tets.rest_volumes, kind, tets.mu, tets.lam

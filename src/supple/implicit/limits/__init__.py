@@ -1,0 +1,1 @@
+"""What bounds a Newton step: no tetrahedron inverts, no surfaces touch."""

@@ -1,0 +1,1 @@
+"""Projected Newton: objective, direction, step, convergence."""

@@ -1,0 +1,200 @@
+"""Newton's linear systems in the free vertices: assembled in place, solved by preconditioned CG or directly."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import bsr_matrix
+
+from supple.implicit.energies.potential import HessianBlocks
+from supple.implicit.newton.direct_solver import solve_directly
+from supple.numerics.sparse.block_csr import SERIAL_BLOCKS, BlockPattern, BlockRows, build_pattern
+from supple.numerics.sparse.block_sum import JointPattern, join
+from supple.numerics.sparse.pcg import conjugate_gradients
+from supple.numerics.sparse.preconditioner import RowOrder, TwoLevel, order_rows, two_level
+from supple.numerics.thread_tuning import Pace
+from supple.numerics.threads import one_thread
+from supple.system import System
+
+logger = logging.getLogger(__name__)
+
+# Where CG has not converged after so many iterations, factorizing is likely faster.
+_STALLED = 400
+
+# After so many systems the slower number of threads is tried again (see `Pace`); a system is as much work as its
+# iterations, and its assembly as much as so many of them.
+_REST = 40
+_ASSEMBLY = 10
+
+
+@dataclass(frozen=True)
+class LinearReport:
+    """How a solve went: its method, its CG iterations, and the residual's preconditioned norm at the start."""
+
+    method: str
+    iterations: int
+    first_norm: float
+
+
+@dataclass(eq=False)
+class LinearSolver:
+    """The matrix of the free vertices and its preconditioner; its coarse level is reused from iteration to iteration.
+
+    Attributes
+    ----------
+    kind : "auto" (CG, and a factorization where CG stalls), "pcg" or "direct"
+    order : which vertex each row belongs to; row_of : (n,) row of each vertex, -1 where it is pinned
+    age, fresh_iterations : how often CG has run on the coarse level as it is, and how many iterations its first run
+        took
+    """
+
+    kind: str
+    order: RowOrder
+    row_of: NDArray[np.int32]
+    pattern: BlockPattern
+    elements_only: TwoLevel
+    elements: NDArray[np.float64]
+    matrix: NDArray[np.float64] = field(init=False)
+    preconditioner: TwoLevel = field(init=False)
+    joint: JointPattern | None = None
+    joined: tuple[NDArray[np.int32], NDArray[np.int32]] | None = None
+    age: int = -1
+    fresh_iterations: int = 0
+    pace: Pace = field(init=False)
+    parallel: bool = True
+    spent: float = 0.0
+
+    @classmethod
+    def of(cls, system: System, kind: str) -> LinearSolver:
+        """Build the pattern and the groups of a system's free vertices."""
+        free = np.ones(len(system.rest_positions), dtype=bool)
+        free[system.pinned_vertices] = False
+        order = order_rows(system.rest_positions, system.components, system.elements, free)
+        rows = np.full(len(free) + 1, -1, dtype=np.int32)  # the last one for nodes without a vertex, number -1
+        rows[order.vertices] = np.arange(len(order.vertices), dtype=np.int32)
+        pattern = build_pattern(rows[system.elements], len(order.vertices))
+        preconditioner = two_level(pattern, system.rest_positions[order.vertices], order.group_start)
+        return cls(kind, order, rows[:-1], pattern, preconditioner, np.zeros((pattern.blocks, 3, 3)))
+
+    def __post_init__(self) -> None:
+        self.matrix, self.preconditioner = self.elements, self.elements_only
+        choice = numba.get_num_threads() > 1 and self.pattern.blocks >= SERIAL_BLOCKS
+        self.pace = Pace(choice, choice, _REST)
+
+    def begin_step(self) -> None:
+        """Forget what earlier steps left behind, so that a step depends on its state alone."""
+        self.age = -1
+
+    def assemble(self, hessian: HessianBlocks) -> None:
+        """Take over a new Hessian."""
+        began = perf_counter()
+        self.parallel = self.pace.choose()
+        with one_thread(not self.parallel):
+            self._assemble(hessian)
+        self.spent = perf_counter() - began
+
+    def _assemble(self, hessian: HessianBlocks) -> None:
+        self.pattern.assemble(hessian.elements, hessian.vertices[self.order.vertices], self.elements)
+        self._add_couplings(hessian.couplings)
+        if self.kind != "direct":
+            self.preconditioner.update(self.matrix, coarse=self.age < 0)
+
+    def _add_couplings(self, couplings: list[bsr_matrix]) -> None:
+        """Add what couples vertices that no element joins; the joint pattern is made anew where that has changed."""
+        if not couplings:
+            if self.joint is not None:
+                self.joint, self.joined, self.age = None, None, -1
+            self.matrix, self.preconditioner = self.elements, self.elements_only
+            return
+        extra: Any = couplings[0]
+        for more in couplings[1:]:
+            extra = extra + more
+        same = self.joined is not None and all(
+            np.array_equal(a, b) for a, b in zip(self.joined, (extra.indptr, extra.indices), strict=True)
+        )
+        if self.joint is None or not same:
+            self.joint = join(self.pattern, extra, self.row_of)
+            self.joined = extra.indptr, extra.indices
+            before = self.preconditioner.first
+            self.preconditioner = self.elements_only.on(self.joint.rows)
+            if not np.array_equal(before, self.preconditioner.first):
+                self.age = -1
+        self.matrix = self.joint.add(self.elements, extra.data)
+
+    @property
+    def rows(self) -> BlockRows:
+        """Where the matrix has its blocks now."""
+        return self.preconditioner.pattern
+
+    def solve(
+        self, force: NDArray[np.float64], tolerance: float, convex: bool = True
+    ) -> tuple[NDArray[np.float64] | None, LinearReport]:
+        """Solve H p = force.
+
+        Parameters
+        ----------
+        force : (n, 3), of which the free rows are read; tolerance : relative, for CG
+        convex : whether the Hessian is known to be positive semi-definite; where that is not known and CG finds that it
+            is not so, None is returned at once
+
+        Returns
+        -------
+        p : (n, 3), zero where pinned; None where the system could not be solved
+        """
+        began = perf_counter()
+        with one_thread(not self.parallel):
+            p, said = self._solve(force, tolerance, convex)
+        seconds = self.spent + perf_counter() - began
+        self.pace.note(self.parallel, seconds / (_ASSEMBLY + said.iterations))
+        return p, said
+
+    def _solve(
+        self, force: NDArray[np.float64], tolerance: float, convex: bool
+    ) -> tuple[NDArray[np.float64] | None, LinearReport]:
+        b = force[self.order.vertices]
+        x = np.zeros_like(b)
+        p = np.zeros_like(force)
+        if len(b) == 0 or not b.any():
+            return p, LinearReport("none", 0, 0.0)
+        first_norm = 0.0
+        iterations = 0
+        if self.kind != "direct":
+            most = _STALLED if self.kind == "auto" else max(1000, 3 * b.size)
+            result = conjugate_gradients(self.matrix, self.preconditioner, b, x, tolerance, most)
+            if result.indefinite and not convex:
+                return None, LinearReport("pcg", result.iterations, result.first_norm)
+            if not result.converged and self.age > 0:
+                # The coarse level belongs to an older matrix.
+                iterations += result.iterations
+                self.preconditioner.update(self.matrix)
+                self.age = -1
+                result = conjugate_gradients(self.matrix, self.preconditioner, b, x, tolerance, most)
+            iterations += result.iterations
+            first_norm = result.first_norm
+            self._grow_old(result.iterations)
+            if result.converged or (self.kind == "pcg" and np.isfinite(x).all() and x.any()):
+                p[self.order.vertices] = x
+                return p, LinearReport("pcg", iterations, first_norm)
+            if self.kind == "pcg":
+                return None, LinearReport("pcg", iterations, first_norm)
+            logger.debug("CG stalled after %d iterations; factorizing", iterations)
+        solution = solve_directly(self.rows, self.matrix, b)
+        if solution is None:
+            return None, LinearReport("direct", iterations, first_norm)
+        p[self.order.vertices] = solution
+        return p, LinearReport("direct", iterations, first_norm)
+
+    def _grow_old(self, iterations: int) -> None:
+        """Keep the coarse level until CG takes clearly longer than when it was new."""
+        if self.age < 0:
+            self.fresh_iterations = iterations
+            self.age = 0
+        self.age += 1
+        if iterations > 1.5 * self.fresh_iterations + 4:
+            self.age = -1

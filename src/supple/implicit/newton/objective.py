@@ -1,0 +1,88 @@
+"""The objective of a step: one sum of potentials."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.implicit.energies.potential import HessianBlocks, Potential
+from supple.implicit.newton.hessian_projection import Convexity
+from supple.implicit.timings import Clock
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """The objective near one point.
+
+    Attributes
+    ----------
+    positions : (n, 3) [m]; energy : [J]; size : sum of the absolute values of the energy's terms [J]
+    gradient : (n, 3) [N]
+    """
+
+    positions: NDArray[np.float64]
+    energy: float
+    size: float
+    gradient: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Objective(Potential):
+    """The sum of its terms, each an energy [J]. Elasticity comes first: it overwrites the tets' matrices."""
+
+    terms: Sequence[Potential]
+    clock: Clock = field(default_factory=Clock)
+
+    def value(self, x: NDArray[np.float64]) -> float:
+        return self.value_and_size(x)[0]
+
+    def value_and_size(self, x: NDArray[np.float64]) -> tuple[float, float]:
+        """The energy, and the sum of the terms' absolute values: round-off in the first is relative to the second."""
+        values = []
+        for term in self.terms:
+            with self.clock.of(term.label):
+                values.append(term.value(x))
+        return sum(values), sum(abs(value) for value in values)
+
+    def contact_gradient(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n, 3) of the contact terms alone [N]."""
+        out = np.zeros_like(x)
+        for term in self.terms:
+            if term.label == "contact":
+                term.add_gradient(x, out)
+        return out
+
+    def gradient(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n, 3) [N]."""
+        out = np.zeros_like(x)
+        self.add_gradient(x, out)
+        return out
+
+    def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+        for term in self.terms:
+            term.add_gradient(x, out)
+
+    def model(
+        self, x: NDArray[np.float64], hessian: HessianBlocks | None, convexity: Convexity = Convexity.ALL
+    ) -> Model:
+        """Energy and gradient at x; the Hessian into `hessian`, where given, of a model as convex as asked for."""
+        gradient = np.zeros_like(x)
+        if hessian is not None:
+            hessian.clear()
+        values = []
+        for term in self.terms:
+            with self.clock.of(term.label):
+                values.append(term.add_model(x, gradient, hessian, convexity.projects(term.label)))
+        return Model(x, sum(values), sum(abs(value) for value in values), gradient)
+
+    def hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool = True) -> None:
+        """The Hessian [N/m] into `out`, whatever it held."""
+        out.clear()
+        self.add_hessian(x, out, project)
+
+    def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
+        for term in self.terms:
+            term.add_hessian(x, out, project)

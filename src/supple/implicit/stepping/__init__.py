@@ -1,0 +1,1 @@
+"""One step of time: integrators, substeps, pinned and scripted vertices."""

@@ -1,0 +1,191 @@
+"""One step of an integrator: its minimization problem, set up and solved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.implicit.energies.damping import Damping, StrainRate
+from supple.implicit.energies.external_forces import ExternalForces, total_forces
+from supple.implicit.energies.gravity import Gravity
+from supple.implicit.energies.inertia import Inertia
+from supple.implicit.energies.inversion_barrier import inversion_barrier
+from supple.implicit.energies.potential import Potential
+from supple.implicit.energies.soft_targets import soft_targets_at
+from supple.implicit.energies.stitch_damping import StitchDamping
+from supple.implicit.limits.inversion_guard import Guard
+from supple.implicit.limits.step_limits import StepLimits
+from supple.implicit.newton.minimize import Outcome, Problem, minimize
+from supple.implicit.newton.objective import Objective
+from supple.implicit.newton.trace import NewtonRow
+from supple.implicit.stepping.contact_step import ContactStep
+from supple.implicit.stepping.dirichlet import move_pins
+from supple.implicit.stepping.integrators import Integrator, Plan, Static
+from supple.implicit.workspace import Workspace
+from supple.state import State, Status
+from supple.system import System
+
+_DYNAMIC_TOLERANCE = 1e-3
+_STATIC_TOLERANCE = 1e-9
+
+# Of the displacement below which friction is static: Newton's method has to see the difference.
+_FRICTION_SHARE = 1e-2
+
+# Of the distance at which contact begins.
+_DHAT_SHARE = 0.1
+
+
+@dataclass(frozen=True)
+class StepSettings:
+    """How a step is taken; see `Implicit`."""
+
+    integrator: Integrator
+    tolerance: float | None
+    max_iterations: int
+
+    def shortest(self, workspace: Workspace, h: float) -> float:
+        """The length of Newton's step [m] below which the minimum of a step of h [s] is reached."""
+        static = isinstance(self.integrator, Static)
+        if self.tolerance is not None:
+            return float(self.tolerance) * workspace.diagonal * (1.0 if static else h)
+        length = (_STATIC_TOLERANCE if static else _DYNAMIC_TOLERANCE * h) * workspace.diagonal
+        contact = workspace.contact
+        if contact is not None:
+            length = min(length, _DHAT_SHARE * contact.scales.dhat)
+            if contact.coefficients.any():
+                length = min(length, _FRICTION_SHARE * contact.scales.friction_velocity * h)
+        return length
+
+
+@dataclass(frozen=True, eq=False)
+class Substep:
+    """What came of a step: the state at its end, how Newton's method went, and the contact there."""
+
+    state: State
+    outcome: Outcome
+    contact: ContactStep
+
+
+def take_substep(state: State, end: float, h: float, settings: StepSettings, workspace: Workspace) -> Substep:
+    """One step of length h [s] to the time `end` [s], from a state with the obstacles' vertices."""
+    system, tools = workspace.system, workspace.tools
+    targets = system.pin_targets(end)
+    obstacles = len(state.positions) - workspace.bodies_end
+    if obstacles:
+        # What moves by script arrives by script: its inertia then plays no part.
+        state.velocities[workspace.bodies_end :] = (targets[-obstacles:] - state.positions[-obstacles:]) / h
+    plan = settings.integrator.plan(system, state, h, lambda start: _acceleration(system, start, workspace))
+    forces = total_forces(system, end)
+    guard = Guard.at(system, state.positions)
+    limits = StepLimits(guard, workspace.contact, tools.clock)
+    base = _objective(system, state, end, plan, forces, guard, workspace)
+    contact = ContactStep.of(workspace.contact, state.positions, (state.time, end), plan.contact_weight)
+    problem = Problem(
+        contact.added_to(base, state.positions),
+        plan.scale,
+        settings.shortest(workspace, h),
+        settings.max_iterations,
+        workspace.diagonal,
+    )
+    tools.linear_solver.begin_step()
+    x = state.positions
+    rows: list[NewtonRow] = []
+    if np.array_equal(targets, x[tools.pinned]):
+        x = _first_guess(system, problem, x, plan, forces, limits, tools.pinned)
+    else:
+        x, carried = move_pins(system, problem, x, targets, limits, tools)
+        rows = carried.rows
+        if carried.status is not Status.CONVERGED:
+            return Substep(state, carried, contact)
+    while True:
+        outcome = minimize(problem, x, limits, tools)
+        rows = rows + outcome.rows
+        x = outcome.end.positions
+        if outcome.status is not Status.CONVERGED or not contact.refine(x):
+            break
+        problem = replace(problem, objective=contact.added_to(base, x))
+    outcome = contact.verified(replace(outcome, rows=rows))
+    return Substep(State(end, x, plan.velocity(x), plan.memory), outcome, contact)
+
+
+def _potentials(
+    system: System, x: NDArray[np.float64], time: float, forces: NDArray[np.float64], workspace: Workspace
+) -> list[Potential]:
+    """Everything but inertia and damping, at `time`; energies of loads are zero at x."""
+    terms: list[Potential] = [workspace.elasticity]
+    if workspace.stitches is not None:
+        terms.append(workspace.stitches.at(time))
+    if system.gravity.any():
+        terms.append(Gravity(system.masses, system.gravity, x))
+    if system.forces:
+        terms.append(ExternalForces(forces, x))
+    if system.soft_targets:
+        terms.append(soft_targets_at(system, time))
+    return terms
+
+
+def _objective(
+    system: System,
+    state: State,
+    end: float,
+    plan: Plan,
+    forces: NDArray[np.float64],
+    guard: Guard,
+    workspace: Workspace,
+) -> Objective:
+    terms = _potentials(system, state.positions, end, forces, workspace)
+    barrier = inversion_barrier(workspace.elasticity, guard.guarded)
+    if barrier is not None:
+        terms.append(barrier)
+    if plan.scale is None:
+        terms.append(workspace.stabilizer)
+    else:
+        terms.append(Inertia(system.masses, plan.predicted, plan.scale))
+        if workspace.viscosity is not None:
+            terms.append(Damping(workspace.viscosity, plan.strain_rate(workspace.viscosity)))
+        if workspace.stitch_viscosity is not None:
+            rate = plan.strain_rate(workspace.stitch_viscosity)
+            terms.append(StitchDamping.of(workspace.stitch_viscosity, rate))
+    return Objective(terms, workspace.tools.clock)
+
+
+def _acceleration(system: System, state: State, workspace: Workspace) -> NDArray[np.float64]:
+    """(n, 3) of a state by its forces, pins aside [m/s^2].
+
+    The inversion barrier is left out: it is a guard at the end of a step, and so stiff that the trapezoidal rule, which
+    does not damp what is stiff, would throw its force back in the next step.
+    """
+    x, v = state.positions, state.velocities
+    terms = _potentials(system, x, state.time, total_forces(system, state.time), workspace)
+    viscosity, of_stitches = workspace.viscosity, workspace.stitch_viscosity
+    if viscosity is not None:
+        rate = StrainRate(1.0, viscosity.strains(x) - viscosity.strain_rates(x, v))
+        terms.append(Damping(viscosity, rate))
+    if of_stitches is not None:
+        rate = StrainRate(1.0, of_stitches.strains(x) - of_stitches.strain_rates(x, v))
+        terms.append(StitchDamping.of(of_stitches, rate))
+    return -Objective(terms).gradient(x) / system.masses[:, None]
+
+
+def _first_guess(
+    system: System,
+    problem: Problem,
+    x: NDArray[np.float64],
+    plan: Plan,
+    forces: NDArray[np.float64],
+    limits: StepLimits,
+    pinned: NDArray[np.int32],
+) -> NDArray[np.float64]:
+    """Where the vertices would go without elasticity, as far as the filter allows, or x where that has less energy."""
+    if plan.scale is None:
+        return x
+    ahead = plan.predicted + plan.scale * (system.gravity + forces / system.masses[:, None])
+    ahead[pinned] = x[pinned]
+    step, _ = limits.largest_step(x, ahead - x)
+    if step < 1.0:
+        ahead = x + step * (ahead - x)
+    if not limits.allows(ahead):
+        return x
+    return ahead if problem.objective.value(ahead) <= problem.objective.value(x) else x

@@ -1,0 +1,251 @@
+"""Stanford PLY, ASCII and binary of either byte order."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.mesh.io.cells import CellSoup, FormatError
+from supple.mesh.io.text import integer, numbers, shortened, without_mark
+
+SCALARS = {
+    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
+    "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4", "float32": "f4",
+    "double": "f8", "float64": "f8", "int64": "i8", "uint64": "u8",
+}  # fmt: skip
+FACE_LISTS = ("vertex_indices", "vertex_index")
+
+
+class Property(NamedTuple):
+    """A column of an element: a scalar, or a list with a length of type `length` before it."""
+
+    name: str
+    kind: str
+    length: str | None = None
+
+
+class Element(NamedTuple):
+    """A table: its name, its number of rows, and its columns."""
+
+    name: str
+    count: int
+    properties: list[Property]
+
+    @property
+    def smallest_row(self) -> int:
+        """Bytes that a binary row takes at least."""
+        return sum(np.dtype(p.length or p.kind).itemsize for p in self.properties)
+
+
+def read(data: bytes) -> CellSoup:
+    """Polygons of a PLY file; other elements and columns are passed over."""
+    data = without_mark(data)
+    order, elements, start, line = _header(data)
+    body = _Text(data, start, line) if order == "" else _Binary(data, start, order)
+    points: NDArray[np.float64] | None = None
+    faces: tuple[NDArray[np.int64], NDArray[np.int64]] | None = None
+    for element in elements:
+        body.expect(element)
+        if element.name == "vertex":
+            points = body.points(element)
+        elif element.name == "face":
+            faces = body.lists(element)
+        elif points is None or faces is None:
+            body.lists(element)
+    if points is None or faces is None:
+        raise FormatError("it has no 'vertex' element with x, y, z, or no 'face' element: it holds no surface")
+    return CellSoup.of_sizes(points, *faces)
+
+
+def _header(data: bytes) -> tuple[str, list[Element], int, int]:
+    """Byte order ('' for text), elements, and where the body starts: byte and line."""
+    end = data.find(b"end_header")
+    stop = data.find(b"\n", end)
+    if not data.startswith(b"ply") or end < 0 or stop < 0:
+        raise FormatError("it has no PLY header ('ply' ... 'end_header'): it is truncated, or not a PLY file", 1)
+    order: str | None = None
+    elements: list[Element] = []
+    lines = data[:end].decode("latin-1").split("\n")
+    for line, text in enumerate(lines, start=1):
+        words = text.split()
+        if not words or words[0] in ("ply", "comment", "obj_info"):
+            continue
+        if words[0] == "format" and len(words) > 1:
+            order = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}.get(words[1])
+        elif words[0] == "element" and len(words) == 3:
+            count = integer(words[2], line, "element count")
+            if count < 0 or count > len(data):
+                raise FormatError(f"{count} rows of '{shortened(words[1:2])}' cannot be in {len(data)} bytes", line)
+            elements.append(Element(words[1], count, []))
+        elif words[0] == "property" and elements and len(words) in (3, 5):
+            elements[-1].properties.append(_property(words, line))
+        else:
+            raise FormatError(f"'{shortened(words)}' does not belong into a PLY header", line)
+    if order is None:
+        raise FormatError("the format is none of ascii, binary_little_endian, binary_big_endian", 2)
+    return order, elements, stop + 1, len(lines)
+
+
+def _property(words: list[str], line: int) -> Property:
+    is_list = words[1] == "list"
+    kinds = words[2:4] if is_list else words[1:2]
+    if len(words) != (5 if is_list else 3) or any(kind not in SCALARS for kind in kinds):
+        raise FormatError(f"'{shortened(words)}' is no property that is known", line)
+    length = SCALARS[kinds[0]] if is_list else None
+    if length is not None and length.startswith("f"):
+        raise FormatError("the length of a list must be an integer", line)
+    return Property(words[-1], SCALARS[kinds[-1]], length)
+
+
+def _columns(element: Element) -> list[int]:
+    names = [p.name for p in element.properties]
+    if any(p.length for p in element.properties):
+        raise FormatError("vertices with lists cannot be read")
+    if not {"x", "y", "z"} <= set(names):
+        raise FormatError("its vertices have no x, y and z")
+    return [names.index(axis) for axis in "xyz"]
+
+
+def _which_list(element: Element) -> int:
+    """Which column holds the corners of the faces; -1 where the element is no face."""
+    found = [k for k, p in enumerate(element.properties) if p.length and p.name in FACE_LISTS]
+    if element.name == "face" and not found:
+        raise FormatError("its faces have no list 'vertex_indices' or 'vertex_index'")
+    return found[0] if found else -1
+
+
+def _truncated(element: Element, left: str) -> FormatError:
+    return FormatError(
+        f"its header promises {element.count} rows of '{element.name}', but only {left} are left: it is truncated"
+    )
+
+
+class _Binary:
+    def __init__(self, data: bytes, start: int, order: str) -> None:
+        self.data, self.at, self.order = data, start, order
+
+    def expect(self, element: Element) -> None:
+        left = len(self.data) - self.at
+        if element.count * element.smallest_row > left:
+            raise _truncated(element, f"{left} bytes")
+
+    def points(self, element: Element) -> NDArray[np.float64]:
+        columns = _columns(element)
+        dtype = np.dtype([(f"c{k}", self.order + p.kind) for k, p in enumerate(element.properties)])
+        table = np.frombuffer(self.data, dtype=dtype, count=element.count, offset=self.at)
+        self.at += dtype.itemsize * element.count
+        return np.column_stack([table[f"c{k}"].astype(np.float64) for k in columns])
+
+    def lists(self, element: Element) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        wanted = _which_list(element)
+        fast = self._equal_lists(element, wanted)
+        return self._any_lists(element, wanted) if fast is None else fast
+
+    def _equal_lists(self, element: Element, wanted: int) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
+        """All rows at once, where every list is as long as in the first row; None where they differ."""
+        columns, at = [], self.at
+        lengths = {}
+        for k, p in enumerate(element.properties):
+            if p.length is not None and element.count:
+                kind = np.dtype(self.order + p.length)
+                if at + kind.itemsize > len(self.data):
+                    return None
+                lengths[k] = int(np.frombuffer(self.data, kind, 1, at)[0])
+                if lengths[k] < 0 or lengths[k] > 64:
+                    return None
+                columns.append((f"n{k}", kind))
+                columns.append((f"c{k}", self.order + p.kind, (lengths[k],)))
+            else:
+                columns.append((f"c{k}", self.order + p.kind))
+            at = self.at + np.dtype(columns).itemsize
+        dtype = np.dtype(columns)
+        if dtype.itemsize * element.count > len(self.data) - self.at:
+            return None
+        table = np.frombuffer(self.data, dtype=dtype, count=element.count, offset=self.at)
+        if any((table[f"n{k}"] != length).any() for k, length in lengths.items()):
+            return None
+        self.at += dtype.itemsize * element.count
+        flat = table[f"c{wanted}"].astype(np.int64).ravel() if wanted >= 0 else np.empty(0, dtype=np.int64)
+        return np.full(element.count, lengths.get(wanted, 0), dtype=np.int64), flat
+
+    def _any_lists(self, element: Element, wanted: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        sizes, pieces = [], []
+        kinds = [
+            (np.dtype(self.order + p.kind), None if p.length is None else np.dtype(self.order + p.length))
+            for p in element.properties
+        ]
+        for row in range(element.count):
+            for k, (kind, length) in enumerate(kinds):
+                try:
+                    size = 1
+                    if length is not None:
+                        size = int(np.frombuffer(self.data, length, 1, self.at)[0])
+                        self.at += length.itemsize
+                    if size < 0 or size * kind.itemsize > len(self.data) - self.at:
+                        raise ValueError
+                    values = np.frombuffer(self.data, kind, size, self.at)
+                except ValueError:
+                    raise FormatError(f"row {row} of '{element.name}' goes beyond the end of the file") from None
+                self.at += size * kind.itemsize
+                if k == wanted:
+                    sizes.append(size)
+                    pieces.append(values)
+        flat = np.concatenate(pieces).astype(np.int64) if pieces else np.empty(0, dtype=np.int64)
+        return np.array(sizes, dtype=np.int64), flat
+
+
+class _Text:
+    def __init__(self, data: bytes, start: int, line: int) -> None:
+        text = data[start:].decode("utf-8", errors="replace")
+        self.lines = [(k, words) for k, t in enumerate(text.split("\n"), start=line + 1) if (words := t.split())]
+        self.at = 0
+
+    def expect(self, element: Element) -> None:
+        left = len(self.lines) - self.at
+        if element.count > left:
+            raise _truncated(element, f"{left} lines")
+
+    def _rows(self, element: Element) -> list[tuple[int, list[str]]]:
+        rows = self.lines[self.at : self.at + element.count]
+        self.at += element.count
+        return rows
+
+    def points(self, element: Element) -> NDArray[np.float64]:
+        columns = _columns(element)
+        width = len(element.properties)
+        table = [numbers(words, width, line, "vertex") for line, words in self._rows(element)]
+        return np.array(table, dtype=np.float64).reshape(-1, width)[:, columns]
+
+    def lists(self, element: Element) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        wanted = _which_list(element)
+        sizes: list[int] = []
+        flat: list[int] = []
+        for line, words in self._rows(element):
+            at = 0
+            for k, p in enumerate(element.properties):
+                size = 1
+                if p.length is not None:
+                    size = integer(words[at], line, "length of a list") if at < len(words) else -1
+                    at += 1
+                if size < 0 or at + size > len(words):
+                    raise FormatError(f"'{shortened(words)}' is too short for '{p.name}'", line)
+                if k == wanted:
+                    sizes.append(size)
+                    flat += [integer(word, line, "face index") for word in words[at : at + size]]
+                at += size
+        return np.array(sizes, dtype=np.int64), np.array(flat, dtype=np.int64)
+
+
+def written(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> bytes:
+    """Binary little-endian PLY in double precision."""
+    header = (
+        "ply\nformat binary_little_endian 1.0\ncomment written by supple\n"
+        f"element vertex {len(vertices)}\nproperty double x\nproperty double y\nproperty double z\n"
+        f"element face {len(triangles)}\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    faces = np.empty(len(triangles), dtype=np.dtype([("n", "u1"), ("corners", "<i4", 3)]))
+    faces["n"] = 3
+    faces["corners"] = triangles
+    return header.encode() + np.asarray(vertices, dtype="<f8").tobytes() + faces.tobytes()

@@ -1,0 +1,59 @@
+"""Reading text files line by line, with errors that name the line."""
+
+from __future__ import annotations
+
+import codecs
+from collections.abc import Iterator, Sequence
+
+from supple.mesh.io.cells import FormatError
+
+
+def without_mark(data: bytes) -> bytes:
+    """What follows the byte order mark that some editors put at the start. Taken for a letter, it would hide the word
+    after it, and an OBJ file's first vertex with that."""
+    return data.removeprefix(codecs.BOM_UTF8)
+
+
+def decoded(data: bytes) -> str:
+    """Text of a file with lines that end in a line feed, or a `FormatError` where it is binary."""
+    if b"\0" in data:
+        raise FormatError("it is not a text file; is the extension right?", data[: data.index(b"\0")].count(b"\n") + 1)
+    text = without_mark(data).decode("utf-8", errors="replace")
+    # Lines of old Macs end in a carriage return alone.
+    return text if "\n" in text else text.replace("\r", "\n")
+
+
+def meaningful_lines(text: str) -> Iterator[tuple[int, list[str]]]:
+    """Number (1-based) and words of each line that is neither blank nor a comment after `#`."""
+    for number, line in enumerate(text.split("\n"), start=1):
+        words = line.split("#", 1)[0].split()
+        if words:
+            yield number, words
+
+
+def numbers(words: Sequence[str], count: int, line: int, what: str) -> list[float]:
+    """The first `count` words as floats."""
+    if len(words) < count:
+        raise FormatError(f"{what} needs {count} numbers, but the line has {len(words)}", line)
+    try:
+        return [float(w) for w in words[:count]]
+    except ValueError:
+        raise FormatError(f"{what} is '{shortened(words[:count])}', which is not {count} numbers", line) from None
+
+
+def integer(word: str, line: int, what: str) -> int:
+    """A word as an integer."""
+    try:
+        value = int(word)
+        if abs(value) >= 2**62:
+            raise ValueError
+        return value
+    except ValueError:
+        raise FormatError(f"{what} is '{shortened([word])}', which is no integer in range", line) from None
+
+
+def shortened(words: Sequence[str]) -> str:
+    """Words as printable text of bounded length, to be quoted in an error."""
+    text = " ".join(words)
+    text = "".join(c if c.isprintable() else "?" for c in text)
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,183 @@
+"""Running a mesher in a child process: whatever it does to itself, this process lives on and says what happened."""
+
+from __future__ import annotations
+
+import json
+import logging
+import mmap
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.errors import MeshingError
+from supple.mesh.meshing import mesher_worker
+from supple.mesh.surface import SurfaceMesh
+
+logger = logging.getLogger(__name__)
+
+# A crash at more than this part of the allowed address space is taken for lack of memory.
+STARVED = 0.8
+# How TetGen, C++, NumPy and the loader of shared libraries say it, in lower case.
+OUT_OF_MEMORY = (
+    "out of memory",
+    "bad_alloc",
+    "memoryerror",
+    "unable to allocate",
+    "cannot allocate memory",
+    "failed to map segment",
+)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Wall-clock time [s] and address space [bytes] of the child; None for no memory limit."""
+
+    time: float
+    memory: int | None
+
+
+@dataclass(frozen=True, eq=False)
+class MesherResult:
+    """Vertices (n, 3), elements (m, 4 or 3) with a label each (m,), unchecked, and the seconds the mesher took."""
+
+    vertices: NDArray[np.float64]
+    elements: NDArray[np.int32]
+    labels: NDArray[np.float64]
+    seconds: float
+
+
+class MesherFailure(MeshingError):
+    """The child ended without a mesh; `kind` is "time", "memory", "crash" or "refused"."""
+
+    def __init__(self, kind: str, text: str) -> None:
+        super().__init__(text)
+        self.kind = kind
+
+
+def run_mesher(mesher: str, surface: SurfaceMesh, options: dict[str, Any], limits: Limits) -> MesherResult:
+    """Give a surface to "tetgen", "ftetwild" (elements are tets) or "meshfix" (triangles) in a child process.
+
+    Raises
+    ------
+    MesherFailure : where the child ran out of time or memory, crashed, or gave up; the child is gone by then.
+    """
+    with tempfile.TemporaryDirectory(prefix="supple-mesh-", ignore_cleanup_errors=True) as name:
+        folder = Path(name)
+        threads = options.get("threads", 1) or os.cpu_count() or 1
+        job = {
+            "mesher": mesher,
+            "options": options,
+            "memory_limit": limits.memory,
+            "cpu_seconds": (limits.time + 10.0) * threads,
+        }
+        (folder / "job.json").write_text(json.dumps(job), "utf-8")
+        np.savez(folder / "surface.npz", vertices=surface.vertices, triangles=surface.triangles)
+        code, peak = _run_child(mesher, folder, limits)
+        answer_file = folder / "answer.json"
+        answer = json.loads(answer_file.read_text("utf-8")) if answer_file.exists() else {}
+        for note in filter(None, answer.get("notes", [])):
+            logger.info("%s: %s", mesher, note)
+        if code == 0 and "error" not in answer:
+            with np.load(folder / "mesh.npz") as mesh:
+                return MesherResult(mesh["vertices"], mesh["elements"], mesh["labels"], float(answer["seconds"]))
+        starved = limits.memory is not None and peak > STARVED * limits.memory
+        raise _failure(mesher, code, answer.get("error", ""), _last_words(folder), limits, starved)
+
+
+def _run_child(mesher: str, folder: Path, limits: Limits) -> tuple[int, int]:
+    """Exit code of the child and its largest address space [bytes], 0 where the platform does not tell.
+
+    The child is ended when time is up, and when this process is interrupted.
+    """
+    environment = os.environ | {
+        # The child finds the same packages as this process, however this one found them.
+        "PYTHONPATH": os.pathsep.join(os.path.abspath(entry) for entry in sys.path if entry),
+        # Idle threads of linear algebra would use up the address space.
+        "OPENBLAS_NUM_THREADS": "1",
+        "MALLOC_ARENA_MAX": "2",
+        "PYTHONIOENCODING": "utf-8",
+    }
+    # -P: not the worker's folder, nor any current one, on the module search path.
+    command = [sys.executable, "-P", str(Path(mesher_worker.__file__).resolve()), str(folder)]
+    with (folder / "output.txt").open("wb") as output:
+        try:
+            # In its own folder, because TetGen writes files such as `_skipped.node` into the current one.
+            child = subprocess.Popen(
+                command,
+                cwd=folder,
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+            )
+        except (OSError, ValueError, TypeError) as error:
+            raise MesherFailure("crash", f"{mesher}: cannot start Python ({sys.executable!r}): {error}") from None
+        try:
+            end, peak = time.monotonic() + limits.time, 0
+            while True:
+                try:
+                    return child.wait(timeout=max(0.0, min(0.05, end - time.monotonic()))), peak
+                except subprocess.TimeoutExpired:
+                    peak = max(peak, _address_space(child.pid))
+                if time.monotonic() >= end:
+                    raise MesherFailure(
+                        "time",
+                        f"{mesher} was stopped at the time limit of {limits.time:g} s; ask for less (a larger "
+                        "max_volume, a larger quality ratio, no min_dihedral) or raise time_limit",
+                    )
+        finally:
+            if child.poll() is None:
+                child.kill()
+            child.wait()
+
+
+def _address_space(pid: int) -> int:
+    """Address space [bytes] of a running process, 0 where only a platform other than Linux could tell."""
+    try:
+        pages = int(Path(f"/proc/{pid}/statm").read_text().split()[0])
+    except (OSError, ValueError, IndexError):
+        return 0
+    return pages * mmap.PAGESIZE
+
+
+def _failure(mesher: str, code: int, error: str, words: str, limits: Limits, starved: bool) -> MesherFailure:
+    said = (error or words).lower()
+    # A program that was refused memory may well crash over it without a word.
+    if any(sign in said for sign in OUT_OF_MEMORY) or (starved and not error):
+        limit = "" if limits.memory is None else f" within the memory limit of {limits.memory / 2**20:.0f} MiB"
+        return MesherFailure(
+            "memory", f"{mesher} ran out of memory{limit}; ask for less (a larger max_volume) or raise memory_limit"
+        )
+    if error:
+        return MesherFailure("refused", f"{mesher} gave up: {error.rstrip('.')}")
+    how = f"exit code {code}" if code >= 0 else _signal_name(-code)
+    return MesherFailure("crash", f"{mesher} crashed ({how})" + (f", its last words: {words}" if words else ""))
+
+
+def _signal_name(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"
+
+
+def _last_words(folder: Path) -> str:
+    """The last line that the child wrote, shortened."""
+    try:
+        with (folder / "output.txt").open("rb") as file:
+            file.seek(max(0, file.seek(0, os.SEEK_END) - 4096))
+            lines = file.read().decode("utf-8", "replace").split("\n")
+    except OSError:
+        return ""
+    filled = [line.strip() for line in lines if line.strip()]
+    return filled[-1][:200] if filled else ""

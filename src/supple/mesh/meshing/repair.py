@@ -1,0 +1,225 @@
+"""Mending triangle surfaces, and saying what that changed."""
+
+from __future__ import annotations
+
+import importlib.util
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.errors import MeshingError
+from supple.mesh.meshing.child_process import Limits, run_mesher
+from supple.mesh.surface import SurfaceMesh
+from supple.mesh.surface_checks import SurfaceReport
+from supple.mesh.topology import facet_keys
+
+logger = logging.getLogger(__name__)
+
+# MeshFix cuts away what intersects; when it takes more than this part of a component's area, it cut the wrong thing.
+LARGEST_LOSS = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class RepairReport:
+    """What a repair found and changed.
+
+    Attributes
+    ----------
+    steps : one line for each thing that was done
+    before, after : the checks of the surface before and after
+    """
+
+    steps: tuple[str, ...]
+    before: SurfaceReport
+    after: SurfaceReport
+
+    @property
+    def volume_change(self) -> float:
+        """Volume after minus volume before [m^3]; the one before means little where the surface was open."""
+        return self.after.surface.volume - self.before.surface.volume
+
+    def __str__(self) -> str:
+        a, b = self.before.surface, self.after.surface
+        counts = (
+            f"{len(a.triangles)} -> {len(b.triangles)} triangles, {self.before.component_count} -> "
+            f"{self.after.component_count} components, volume {a.volume:.6g} -> {b.volume:.6g} m^3"
+        )
+        return "; ".join([*self.steps, counts])
+
+
+def repair_surface(
+    surface: SurfaceMesh,
+    *,
+    allow_lost_components: bool = False,
+    time_limit: float = 120.0,
+    memory_limit: int | None = 4 * 2**30,
+) -> tuple[SurfaceMesh, RepairReport]:
+    """Mend a surface: duplicates, slivers without area, mixed orientation, then holes and self-intersections.
+
+    The first steps are exact and done here. What then is still wrong goes through MeshFix (Attene 2010, "A lightweight
+    approach to repairing digitized polygon meshes"; the extra `dirty`), in a child process and one component at a
+    time, so that none is taken for dirt and dropped. The log tells what was done.
+
+    Parameters
+    ----------
+    surface : SurfaceMesh
+    allow_lost_components : bool
+        Whether a component may lose more than half of its area, or vanish.
+    time_limit, memory_limit : float [s], int [bytes]
+        Of MeshFix's process.
+
+    Returns
+    -------
+    surface, report
+
+    Raises
+    ------
+    MeshingError : where MeshFix is needed and not there, a component would vanish, or the surface is beyond repair.
+    """
+    before = surface.check()
+    steps: list[str] = []
+    mended = _drop_useless(surface, steps)
+    mended = _orient(mended, steps)
+    after = mended.check()
+    if not after.ok:
+        mended = _meshfix_components(mended, steps, allow_lost_components, Limits(time_limit, memory_limit))
+        mended = _orient(mended, steps)
+        after = mended.check()
+    if not after.ok:
+        raise MeshingError(
+            f'repair could not mend the surface: {"; ".join(after.problems)}; use mesher="ftetwild" or mend it in a '
+            "modelling program"
+        )
+    report = RepairReport(tuple(steps), before, after)
+    if steps:
+        logger.warning("repaired the surface: %s", report)
+    return mended, report
+
+
+def _drop_useless(surface: SurfaceMesh, steps: list[str]) -> SurfaceMesh:
+    """Without triangles that have no area or repeat others, and without vertices that no triangle uses.
+
+    A triangle without area leaves no hole only where it has a vertex twice; others are left for the later steps.
+    """
+    triangles = surface.triangles
+    collapsed = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
+    _, first = np.unique(facet_keys(triangles, len(surface.vertices)), return_index=True)
+    repeats = np.ones(len(triangles), dtype=bool)
+    repeats[first] = False
+    repeats &= ~collapsed
+    for rows, what in ((collapsed, "had a vertex twice"), (repeats, "repeated others")):
+        if rows.any():
+            steps.append(f"dropped {np.count_nonzero(rows)} triangles that {what}")
+    keep = ~(collapsed | repeats)
+    if not keep.any():
+        raise MeshingError("repair could not mend the surface: none of its triangles has an area")
+    unused = len(surface.vertices) - len(np.unique(triangles[keep]))
+    if keep.all() and unused == 0:
+        return surface
+    if unused:
+        steps.append(f"dropped {unused} vertices that no triangle uses")
+    return SurfaceMesh(surface.vertices, triangles[keep]).compact()
+
+
+def _orient(surface: SurfaceMesh, steps: list[str]) -> SurfaceMesh:
+    """Neighbours turned to agree, then whole components turned to face outward."""
+    report = surface.check()
+    triangles = surface.triangles
+    if len(report.inconsistent_edges) and len(report.non_manifold_edges) == 0:
+        turned = _disagreeing(triangles, len(surface.vertices))
+        if turned is not None:
+            triangles = np.where(turned[:, None], triangles[:, ::-1], triangles)
+            steps.append(f"turned {np.count_nonzero(turned)} triangles to agree with their neighbours")
+            surface = SurfaceMesh(surface.vertices, triangles)
+            report = surface.check()
+    if len(report.wrong_facing_components):
+        rows = np.isin(surface.components.labels, report.wrong_facing_components)
+        surface = SurfaceMesh(surface.vertices, np.where(rows[:, None], triangles[:, ::-1], triangles))
+        steps.append(f"turned {len(report.wrong_facing_components)} components that faced the wrong way")
+    return surface
+
+
+def _disagreeing(triangles: NDArray[np.int32], n_vertices: int) -> NDArray[np.bool_] | None:
+    """Which triangles to turn so that neighbours agree (the fewer of each piece); None for a one-sided surface.
+
+    Each triangle gets a side 0 or 1; a walk over the double cover (triangle, side) tells both apart.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    starts, ends = triangles.ravel().astype(np.int64), np.roll(triangles, -1, axis=1).ravel().astype(np.int64)
+    keys = np.minimum(starts, ends) * n_vertices + np.maximum(starts, ends)
+    order = np.argsort(keys, kind="stable")
+    same = np.flatnonzero(keys[order][1:] == keys[order][:-1])
+    a, b = order[same], order[same + 1]
+    m = len(triangles)
+    # Good neighbours run along their common edge in opposite directions.
+    agree = starts[a] != starts[b]
+    ta, tb = a // 3, b // 3
+    rows = np.concatenate([ta, ta + m])
+    columns = np.concatenate([np.where(agree, tb, tb + m), np.where(agree, tb + m, tb)])
+    graph = coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(2 * m, 2 * m))
+    _, labels = connected_components(graph.tocsr(), directed=False)
+    if (labels[:m] == labels[m:]).any():
+        return None
+    # A piece appears twice in the double cover, as it is and turned; its lower label is one of its two sides.
+    turned = labels[:m] > labels[m:]
+    piece = np.minimum(labels[:m], labels[m:])
+    share = np.bincount(piece, weights=turned) / np.maximum(np.bincount(piece), 1)
+    return turned ^ (share[piece] > 0.5)
+
+
+def _meshfix_components(surface: SurfaceMesh, steps: list[str], allow_lost: bool, limits: Limits) -> SurfaceMesh:
+    """MeshFix on each component that has faults of its own; components that cut each other are beyond it."""
+    if importlib.util.find_spec("pymeshfix") is None:
+        faults = "; ".join(surface.check().problems)
+        raise MeshingError(f'repair needs MeshFix for this surface ({faults}): pip install "supple[dirty]"')
+    count, labels = surface.components
+    pieces = [SurfaceMesh(surface.vertices, surface.triangles[labels == k]).compact() for k in range(count)]
+    faults = [_own_faults(piece) for piece in pieces]
+    faulty = [k for k in range(count) if faults[k]]
+    if not faulty:
+        return surface
+    result = run_mesher("meshfix", surface, {"components": labels.tolist(), "faulty": faulty}, limits)
+    kept: list[SurfaceMesh] = []
+    for k, piece in enumerate(pieces):
+        if not faults[k]:
+            kept.append(piece)
+            continue
+        rows = result.elements[result.labels == k]
+        fixed = SurfaceMesh(result.vertices, rows).compact() if len(rows) else None
+        loss = 1.0 if fixed is None or _own_faults(fixed) else 1.0 - fixed.area / piece.area
+        what = f"component {k} of {count} ({len(piece.triangles)} triangles; {'; '.join(faults[k])})"
+        if loss > LARGEST_LOSS and not allow_lost:
+            how_much = "all" if loss == 1.0 else f"{100.0 * loss:.0f} % of the area"
+            raise MeshingError(
+                f"repair would drop {how_much} of {what}: remove it yourself, allow it with repair_surface(surface, "
+                'allow_lost_components=True), or use mesher="ftetwild"'
+            )
+        if fixed is None or loss == 1.0:
+            steps.append(f"dropped {what}")
+        else:
+            steps.append(_change(f"MeshFix mended component {k} of {count}", piece, fixed))
+            kept.append(fixed)
+    if not kept:
+        raise MeshingError("repair could not mend the surface: no component remains")
+    offsets = np.cumsum([0, *(len(p.vertices) for p in kept[:-1])])
+    return SurfaceMesh(
+        np.concatenate([p.vertices for p in kept]),
+        np.concatenate([p.triangles + offset for p, offset in zip(kept, offsets, strict=True)]),
+    )
+
+
+def _own_faults(piece: SurfaceMesh) -> list[str]:
+    """What is wrong with a component taken by itself; which way a cavity faces cannot be judged so."""
+    report = piece.check()
+    return report.problems[: len(report.problems) - bool(len(report.wrong_facing_components))]
+
+
+def _change(what: str, before: SurfaceMesh, after: SurfaceMesh) -> str:
+    return (
+        f"{what}: {len(before.triangles)} -> {len(after.triangles)} triangles, "
+        f"area {before.area:.6g} -> {after.area:.6g} m^2"
+    )

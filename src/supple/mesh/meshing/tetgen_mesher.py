@@ -1,0 +1,68 @@
+"""Clean closed surfaces to tets by TetGen (Si 2015, "TetGen, a Delaunay-based quality tetrahedral mesh generator")."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.mesh.meshing.child_process import Limits, MesherFailure, MesherResult, run_mesher
+from supple.mesh.surface import SurfaceMesh
+from supple.mesh.surface_checks import winding_number
+
+
+def mesh_with_tetgen(surface: SurfaceMesh, options: dict[str, Any], limits: Limits) -> MesherResult:
+    """Tets inside a surface that is taken to be clean; what lies in cavities is left out.
+
+    `options`: max_volume [m^3], quality, min_dihedral [degrees] (each may be None) and keep_surface.
+
+    Raises
+    ------
+    MesherFailure : with what TetGen said and the mend.
+    """
+    # By a power of two, so that not one bit of the coordinates changes; TetGen's tolerances fit a unit size best.
+    low, high = surface.bounds
+    scale = 2.0 ** -math.frexp(float((high - low).max()) or 1.0)[1]
+    volume = options["max_volume"]
+    scaled = options | {"max_volume": None if volume is None else volume * scale**3}
+    try:
+        result = run_mesher("tetgen", SurfaceMesh(surface.vertices * scale, surface.triangles), scaled, limits)
+    except MesherFailure as failure:
+        raise _with_mend(failure) from None
+    vertices = result.vertices / scale
+    inside = _inside(surface, vertices, result)
+    if inside.all():
+        return replace(result, vertices=vertices)
+    used, elements = np.unique(result.elements[inside], return_inverse=True)
+    elements = elements.reshape(-1, 4).astype(np.int32)
+    return replace(result, vertices=vertices[used], elements=elements, labels=result.labels[inside])
+
+
+def _inside(surface: SurfaceMesh, vertices: NDArray[np.float64], result: MesherResult) -> NDArray[np.bool_]:
+    """Which tets lie inside: TetGen fills all that the surface encloses, its cavities (each a region) included."""
+    inside = np.ones(len(result.elements), dtype=bool)
+    regions = np.unique(result.labels)
+    if len(regions) < 2:
+        return inside
+    corners = vertices[result.elements]
+    volumes = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))
+    triangles = surface.vertices[surface.triangles]
+    for region in regions:
+        members = np.flatnonzero(result.labels == region)
+        middle = corners[members[volumes[members].argmax()]].mean(axis=0)
+        if winding_number(triangles, middle) < 0.5:
+            inside[members] = False
+    return inside
+
+
+def _with_mend(failure: MesherFailure) -> MesherFailure:
+    if failure.kind not in ("crash", "refused"):
+        return failure
+    return MesherFailure(
+        failure.kind,
+        f"{failure}; the surface is most likely damaged or has details near round-off: mend it (repair=True) or use "
+        'mesher="ftetwild" (pip install "supple[dirty]")',
+    )

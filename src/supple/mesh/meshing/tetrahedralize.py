@@ -1,0 +1,238 @@
+"""From a surface to a tet mesh: checks, the choice of the mesher, and checks of what it made."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from supple.errors import MeshError, MeshingError
+from supple.mesh.meshing.child_process import Limits
+from supple.mesh.meshing.ftetwild import INSTALL, ftetwild_installed, mesh_with_ftetwild
+from supple.mesh.meshing.repair import RepairReport, repair_surface
+from supple.mesh.meshing.tetgen_mesher import mesh_with_tetgen
+from supple.mesh.surface import SurfaceMesh
+from supple.mesh.surface_checks import SurfaceReport
+from supple.mesh.tetmesh import TetMesh
+
+logger = logging.getLogger(__name__)
+
+Mesher = Literal["auto", "tetgen", "ftetwild"]
+
+# TetGen's facets are planar to 0.1 degrees; more than this part of the volume is no effect of that.
+VOLUME_TOLERANCE = 1e-3
+DEFAULT_QUALITY = 1.4
+
+
+@dataclass(frozen=True)
+class MeshingReport:
+    """How a tet mesh came about: "tetgen" or "ftetwild", its seconds, and the repair before it, if any."""
+
+    mesher: str
+    seconds: float
+    repair: RepairReport | None
+
+
+def tetrahedralize(
+    surface: SurfaceMesh,
+    *,
+    max_volume: float | None = None,
+    quality: float | None = DEFAULT_QUALITY,
+    min_dihedral: float | None = None,
+    keep_surface: bool = False,
+    mesher: Mesher = "auto",
+    repair: bool = False,
+    envelope: float = 1e-3,
+    time_limit: float = 120.0,
+    memory_limit: int | None = 4 * 2**30,
+) -> TetMesh:
+    """Fill a surface with tets.
+
+    The mesher runs in a child process, so that neither its crash, its hunger nor its endless loop touches this one.
+    Components that face inward are turned; cavities (closed shells inside others, facing inward) stay empty.
+
+    Parameters
+    ----------
+    surface : SurfaceMesh
+        For TetGen watertight, oriented and free of self-intersections.
+    max_volume : float [m^3], optional
+        No tet is larger.
+    quality : float, optional
+        TetGen's bound on circumradius over shortest edge of each tet, above 1: the smaller, the better shaped and
+        the more tets. Small angles of the surface itself may exceed it. None leaves the shapes to chance.
+    min_dihedral : float [degrees], optional
+        TetGen's aim for the smallest dihedral angle, below 70; much above 18 it may not end.
+    keep_surface : bool
+        Add no vertices on the surface.
+    mesher : "auto", "tetgen" or "ftetwild"
+        "auto" takes TetGen for a clean surface, and fTetWild, an extra, for any other; the log says so.
+    repair : bool
+        Mend a surface that is not clean first, see `repair_surface`.
+    envelope : float
+        How far fTetWild may move the surface, as a part of the bounding box's diagonal.
+    time_limit : float [s]
+        Of the mesher.
+    memory_limit : int [bytes], optional
+        Address space of the mesher; left out, with a log line, where the platform has no such limit.
+
+    Raises
+    ------
+    MeshingError : for a surface that cannot be meshed (what is wrong, where, and the mend), a mesher that failed or
+        met a limit, a wish that the result does not fulfil, or a parameter out of its range.
+    """
+    return tetrahedralize_reported(
+        surface,
+        max_volume=max_volume,
+        quality=quality,
+        min_dihedral=min_dihedral,
+        keep_surface=keep_surface,
+        mesher=mesher,
+        repair=repair,
+        envelope=envelope,
+        time_limit=time_limit,
+        memory_limit=memory_limit,
+    )[0]
+
+
+def tetrahedralize_reported(
+    surface: SurfaceMesh,
+    *,
+    max_volume: float | None = None,
+    quality: float | None = DEFAULT_QUALITY,
+    min_dihedral: float | None = None,
+    keep_surface: bool = False,
+    mesher: Mesher = "auto",
+    repair: bool = False,
+    envelope: float = 1e-3,
+    time_limit: float = 120.0,
+    memory_limit: int | None = 4 * 2**30,
+) -> tuple[TetMesh, MeshingReport]:
+    """`tetrahedralize`, and how it went."""
+    if not isinstance(surface, SurfaceMesh):
+        raise MeshingError(f"tetrahedralize needs a SurfaceMesh, not {type(surface).__name__}")
+    _in_range("max_volume", max_volume, 0.0, np.inf)
+    _in_range("quality", quality, 1.0, np.inf)
+    _in_range("min_dihedral", min_dihedral, 0.0, 70.0)
+    _in_range("envelope", envelope, 0.0, 1.0)
+    _in_range("time_limit", time_limit, 0.0, np.inf)
+    _in_range("memory_limit", memory_limit, 0.0, np.inf)
+    limits = Limits(time_limit, None if memory_limit is None else int(memory_limit))
+
+    repaired = None
+    report = surface.check()
+    if repair and not report.ok:
+        surface, repaired = repair_surface(surface, time_limit=time_limit, memory_limit=limits.memory)
+        report = surface.check()
+    if len(report.unused_vertices):
+        logger.info("left out %d vertices that no triangle uses", len(report.unused_vertices))
+        surface = surface.compact()
+        report = surface.check()
+    surface, report = _facing_outward(surface, report)
+    chosen = _choose(mesher, report, repair)
+    if chosen == "tetgen":
+        options = {
+            "max_volume": max_volume,
+            "quality": quality,
+            "min_dihedral": min_dihedral,
+            "keep_surface": keep_surface,
+        }
+        result = mesh_with_tetgen(surface, options, limits)
+    else:
+        _refuse_tetgen_wishes(quality, min_dihedral, keep_surface)
+        result = mesh_with_ftetwild(surface, max_volume, envelope, limits)
+    try:
+        mesh = TetMesh.dropping_unused(result.vertices, result.elements)
+    except MeshError as error:
+        raise MeshingError(
+            f"{chosen} made an unusable mesh: {str(error).removeprefix('TetMesh: ')}; the surface has triangles that "
+            'are too thin or too close to each other: remesh it more evenly, or use mesher="ftetwild"'
+        ) from None
+    _check_result(mesh, surface, chosen, max_volume, keep_surface)
+    logger.info("%s: %d vertices, %d tets in %.2f s", chosen, len(mesh.vertices), len(mesh.tets), result.seconds)
+    return mesh, MeshingReport(chosen, result.seconds, repaired)
+
+
+def _in_range(name: str, value: float | None, low: float, high: float) -> None:
+    """Refuse a parameter that is not a number strictly between `low` and `high`."""
+    if value is None:
+        return
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, (int, float, np.integer, np.floating))
+        or not low < value < high
+    ):
+        span = f"between {low:g} and {high:g}" if np.isfinite(high) else f"above {low:g} and finite"
+        raise MeshingError(f"{name} must be a number {span}, not {value!r}")
+
+
+def _facing_outward(surface: SurfaceMesh, report: SurfaceReport) -> tuple[SurfaceMesh, SurfaceReport]:
+    """Turn bodies that face inward. A body inside a body is left as it is, for it may be a cavity or a mistake."""
+    wrong = report.wrong_facing_components
+    if len(wrong) == 0 or report.self_intersecting:
+        return surface, report
+    flipped = np.isin(surface.components.labels, wrong)
+    # All of them wrong: the file is inside out. Otherwise only what should be a body can be turned without a guess.
+    if len(wrong) < report.component_count:
+        for k in wrong:
+            alone = SurfaceMesh(
+                surface.vertices, surface.triangles[surface.components.labels == k], shares_vertices=True
+            )
+            if alone.volume > 0.0:
+                flipped[surface.components.labels == k] = False
+    if not flipped.any():
+        return surface, report
+    logger.warning("turned %d of %d triangles that faced inward", np.count_nonzero(flipped), len(flipped))
+    triangles = surface.triangles.copy()
+    triangles[flipped] = triangles[flipped][:, ::-1]
+    turned = SurfaceMesh(surface.vertices, triangles)
+    return turned, turned.check()
+
+
+def _choose(mesher: Mesher, report: SurfaceReport, repaired: bool) -> Literal["tetgen", "ftetwild"]:
+    if mesher not in ("auto", "tetgen", "ftetwild"):
+        raise MeshingError(f'mesher must be "auto", "tetgen" or "ftetwild", not {mesher!r}')
+    if mesher == "ftetwild":
+        if not ftetwild_installed():
+            raise MeshingError(f'mesher="ftetwild" is not installed: {INSTALL}')
+        return "ftetwild"
+    if report.ok:
+        return "tetgen"
+    faults = "; ".join(report.problems)
+    if mesher == "auto" and ftetwild_installed():
+        logger.warning("the surface is not clean (%s): meshing it with fTetWild, which may move it slightly", faults)
+        return "ftetwild"
+    mends = ["mend it in a modelling program"] if repaired else ["mend it with repair=True"]
+    mends.append('use mesher="ftetwild"' + ("" if ftetwild_installed() else f" ({INSTALL})"))
+    still = "even after repair, " if repaired else ""
+    raise MeshingError(f"TetGen cannot mesh this surface: {still}{faults}; {' or '.join(mends)}")
+
+
+def _refuse_tetgen_wishes(quality: float | None, min_dihedral: float | None, keep_surface: bool) -> None:
+    """fTetWild cannot do these; better to say so than to let a wish do nothing."""
+    for name, wished in (("keep_surface", keep_surface), ("min_dihedral", min_dihedral is not None)):
+        if wished:
+            raise MeshingError(f"fTetWild has no {name}; leave it out, or clean the surface so that TetGen can mesh it")
+    if quality != DEFAULT_QUALITY:
+        logger.warning("fTetWild optimizes shapes in its own way: quality=%s is not used", quality)
+
+
+def _check_result(
+    mesh: TetMesh, surface: SurfaceMesh, mesher: str, max_volume: float | None, keep_surface: bool
+) -> None:
+    if max_volume is not None and (largest := float(mesh.volumes.max())) > max_volume * (1.0 + 1e-6):
+        mend = "leave keep_surface out, give a finer surface" if keep_surface else "give a finer surface"
+        raise MeshingError(
+            f"{mesher} left a tet of {largest:.4g} m^3, larger than max_volume={max_volume:g}; {mend}, or allow larger "
+            "tets"
+        )
+    if mesher != "tetgen":
+        return
+    if abs(mesh.volume - surface.volume) > VOLUME_TOLERANCE * surface.volume:
+        raise MeshingError(
+            f"the tets fill {mesh.volume:.6g} m^3 of the surface's {surface.volume:.6g} m^3; its components may "
+            "overlap or touch: separate or join them"
+        )
+    if keep_surface and len(mesh.surface.used_vertices) > len(surface.vertices):
+        raise MeshingError("TetGen had to add vertices on the surface; leave keep_surface out, or give a finer surface")

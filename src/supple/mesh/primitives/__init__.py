@@ -1,0 +1,1 @@
+"""How the ready-made shapes are built."""

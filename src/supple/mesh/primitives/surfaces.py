@@ -1,0 +1,98 @@
+"""Surfaces of the ready-made bodies, to be meshed, shown, or collided with."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from supple.mesh.merge import merge_map
+from supple.mesh.primitives.sizes import check_torus, fits, not_too_many, positive
+from supple.mesh.surface import SurfaceMesh
+
+
+def box_surface(size: Sequence[float] = (1.0, 1.0, 1.0), divisions: Sequence[int] = (4, 4, 4)) -> SurfaceMesh:
+    """The surface of `box`, with the same parameters."""
+    from supple.mesh.shapes import box
+
+    return box(size, divisions).surface.compact()
+
+
+def cylinder_surface(radius: float = 0.5, height: float = 1.0, edge_length: float = 0.1) -> SurfaceMesh:
+    """The surface of `cylinder`, with the same parameters."""
+    from supple.mesh.shapes import cylinder
+
+    return cylinder(radius, height, edge_length).surface.compact()
+
+
+def sphere_surface(radius: float = 0.5, edge_length: float = 0.1) -> SurfaceMesh:
+    """A sphere of nearly equal triangles: an icosahedron with its faces cut into smaller ones.
+
+    Parameters
+    ----------
+    radius : [m]
+    edge_length : about the length of edges [m], at most `radius`
+
+    Raises
+    ------
+    MeshError : where a length is not positive, or the edge too long or too short for the radius.
+    """
+    positive("sphere_surface", radius=radius, edge_length=edge_length)
+    fits("sphere_surface", edge_length, "radius", radius)
+    # An edge of the icosahedron spans the angle arctan 2.
+    n = max(1, math.ceil(radius * math.atan(2.0) / edge_length))
+    not_too_many("sphere_surface", 20.0 * n**2, "make edge_length longer")
+    golden = 0.5 * (1.0 + math.sqrt(5.0))
+    signs = [(a, b) for a in (-1.0, 1.0) for b in (-1.0, 1.0)]
+    corners = np.array([np.roll((0.0, a, b * golden), shift) for shift in range(3) for a, b in signs])
+    corners /= np.linalg.norm(corners[0])
+    near = np.linalg.norm(corners[:, None] - corners[None], axis=2) < 1.1
+    faces = [
+        (i, j, k) for i in range(12) for j in range(i) for k in range(j) if near[i, j] and near[j, k] and near[k, i]
+    ]
+    # A face holds rows of points i, j with i + j <= n; row i begins where the shorter rows before it end.
+    grid = np.array([(i, j) for i in range(n + 1) for j in range(n + 1 - i)])
+    begin = np.cumsum([0] + [n + 1 - i for i in range(n + 1)])
+    up = [(begin[i] + j, begin[i + 1] + j, begin[i] + j + 1) for i in range(n) for j in range(n - i)]
+    down = [(begin[i + 1] + j, begin[i + 1] + j + 1, begin[i] + j + 1) for i in range(n - 1) for j in range(n - 1 - i)]
+    pattern = np.array(up + down)
+    points, triangles = [], []
+    for face in faces:
+        a, b, c = corners[list(face)]
+        if np.dot(a, np.cross(b, c)) < 0.0:
+            b, c = c, b
+        flat = a + grid[:, :1] / n * (b - a) + grid[:, 1:] / n * (c - a)
+        triangles.append(pattern + len(grid) * len(points))
+        points.append(flat / np.linalg.norm(flat, axis=1, keepdims=True))
+    every = radius * np.concatenate(points)
+    keep, index = merge_map(every, 1e-3 * radius / n)
+    return SurfaceMesh(every[keep], index[np.concatenate(triangles)])
+
+
+def torus_surface(radius: float = 0.5, tube_radius: float = 0.2, edge_length: float = 0.1) -> SurfaceMesh:
+    """A ring around the y axis as a grid of triangles.
+
+    Parameters
+    ----------
+    radius : of the circle in the middle of the tube [m]
+    tube_radius : of the tube [m], less than `radius`
+    edge_length : of edges along the middle of the tube and around it [m], at most `tube_radius`
+
+    Raises
+    ------
+    MeshError : as `torus`.
+    """
+    check_torus("torus_surface", radius, tube_radius, edge_length)
+    n = math.ceil(2.0 * math.pi * radius / edge_length)
+    m = math.ceil(2.0 * math.pi * tube_radius / edge_length)
+    not_too_many("torus_surface", 2.0 * n * m, "make edge_length longer")
+    i, j = np.meshgrid(np.arange(n), np.arange(m), indexing="ij")
+    around, tube = 2.0 * np.pi * i / n, 2.0 * np.pi * j / m
+    reach = radius + tube_radius * np.cos(tube)
+    points = np.stack([reach * np.cos(around), tube_radius * np.sin(tube), reach * np.sin(around)], axis=-1)
+    index = i * m + j
+    onward, above = np.roll(index, -1, axis=0), np.roll(index, -1, axis=1)
+    both = np.roll(onward, -1, axis=1)
+    triangles = np.concatenate([np.stack([index, above, both], axis=-1), np.stack([index, both, onward], axis=-1)])
+    return SurfaceMesh(points.reshape(-1, 3), triangles.reshape(-1, 3))

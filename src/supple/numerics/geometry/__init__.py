@@ -1,0 +1,1 @@
+"""Predicates and queries on points and triangles."""

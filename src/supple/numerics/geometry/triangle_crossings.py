@@ -1,0 +1,227 @@
+"""All pairs of triangles that have a point in common: a sweep along one axis, and exact tests of what it finds."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from supple.numerics.geometry.exact_predicates import side_of_line, side_of_plane
+from supple.numerics.mat3 import cross, row, subtract
+
+APART, TOUCHING, CROSSING = 0, 1, 2
+
+
+@njit
+def _flat(p, axis):
+    """Without one coordinate."""
+    if axis == 0:
+        return (p[1], p[2])
+    if axis == 1:
+        return (p[2], p[0])
+    return (p[0], p[1])
+
+
+@njit
+def _segments_meet(p, q, a, b):
+    """Whether two segments of a plane, ends included, meet."""
+    s, t = side_of_line(p, q, a), side_of_line(p, q, b)
+    u, v = side_of_line(a, b, p), side_of_line(a, b, q)
+    if s == 0 and t == 0 and u == 0 and v == 0:  # on one line
+        for k in range(2):  # the boxes of the two decide
+            one, other = (min(p[k], q[k]), max(p[k], q[k])), (min(a[k], b[k]), max(a[k], b[k]))
+            if one[1] < other[0] or other[1] < one[0]:
+                return False
+        return True
+    return s * t <= 0 and u * v <= 0
+
+
+@njit
+def _in_triangle(p, a, b, c):
+    r, s, t = side_of_line(a, b, p), side_of_line(b, c, p), side_of_line(c, a, p)
+    return (r >= 0 and s >= 0 and t >= 0) or (r <= 0 and s <= 0 and t <= 0)
+
+
+@njit
+def _coplanar_edge(p, q, a, b, c):
+    """Whether the segment p q meets the triangle a b c in their common plane.
+
+    A triangle without area is apart from everything; its neighbours have its edges.
+    """
+    n = cross(subtract(b, a), subtract(c, a))
+    axis = 0
+    for k in range(1, 3):
+        if abs(n[k]) > abs(n[axis]):
+            axis = k
+    if n[axis] == 0.0:
+        return APART
+    p2, q2, a2, b2, c2 = _flat(p, axis), _flat(q, axis), _flat(a, axis), _flat(b, axis), _flat(c, axis)
+    if (
+        _in_triangle(p2, a2, b2, c2)
+        or _segments_meet(p2, q2, a2, b2)
+        or _segments_meet(p2, q2, b2, c2)
+        or _segments_meet(p2, q2, c2, a2)
+    ):
+        return TOUCHING
+    return APART
+
+
+@njit
+def edge_and_triangle(p, q, a, b, c, at_p, at_q):
+    """Whether the segment p q and the triangle a b c, both with their boundaries, are apart, touch or cross.
+
+    `at_p`, `at_q`: on which sides of the triangle's plane the two ends are.
+    """
+    if at_p * at_q > 0:
+        return APART
+    if at_p == 0 and at_q == 0:
+        return _coplanar_edge(p, q, a, b, c)
+    r, s, t = side_of_plane(p, q, a, b), side_of_plane(p, q, b, c), side_of_plane(p, q, c, a)
+    if r * s < 0 or s * t < 0 or r * t < 0:
+        return APART
+    if at_p != 0 and at_q != 0 and r != 0 and s != 0 and t != 0:
+        return CROSSING
+    return TOUCHING
+
+
+@njit
+def _sides(x, one, other, out):
+    """Write on which side of the plane of `other` each corner of `one` is; returns whether all are on the same one."""
+    a, b, c = row(x, other[0]), row(x, other[1]), row(x, other[2])
+    for k in range(3):
+        i = one[k]
+        shared = i == other[0] or i == other[1] or i == other[2]
+        out[k] = 0 if shared else side_of_plane(a, b, c, row(x, i))
+    return (out[0] > 0 and out[1] > 0 and out[2] > 0) or (out[0] < 0 and out[1] < 0 and out[2] < 0)
+
+
+@njit
+def _clearly_apart(x, first, second):
+    """Whether a plane across the line of the triangles' centers parts them, with room for rounding.
+
+    Where they share a vertex, the plane goes through it, and the others must be well on their sides. Nearly all
+    neighbours on a surface are told apart so, for a small part of what the exact test takes.
+    """
+    origin = row(x, first[0])
+    shared = False
+    for k in range(3):
+        i = first[k]
+        if i == second[0] or i == second[1] or i == second[2]:
+            origin, shared = row(x, i), True
+    dx = dy = dz = 0.0
+    for k in range(3):
+        u, v = row(x, first[k]), row(x, second[k])
+        dx, dy, dz = dx + (u[0] - v[0]), dy + (u[1] - v[1]), dz + (u[2] - v[2])
+    least, most, size = np.inf, -np.inf, 0.0
+    for k in range(3):
+        u, v = subtract(row(x, first[k]), origin), subtract(row(x, second[k]), origin)
+        size = max(size, abs(u[0]), abs(u[1]), abs(u[2]), abs(v[0]), abs(v[1]), abs(v[2]))
+        if not (shared and u[0] == 0.0 and u[1] == 0.0 and u[2] == 0.0):
+            least = min(least, dx * u[0] + dy * u[1] + dz * u[2])
+        if not (shared and v[0] == 0.0 and v[1] == 0.0 and v[2] == 0.0):
+            most = max(most, dx * v[0] + dy * v[1] + dz * v[2])
+    margin = 1e-12 * (abs(dx) + abs(dy) + abs(dz)) * size
+    if shared:
+        return least > margin and most < -margin
+    return least - most > margin
+
+
+@njit
+def triangles_meet(x, first, second, sides):
+    """Whether two triangles (3,) of indices into x (n, 3) are apart, touch or cross; what they share is left out.
+
+    `sides` (2, 3) is scratch.
+    """
+    shared = 0
+    for k in range(3):
+        i = first[k]
+        if i == second[0] or i == second[1] or i == second[2]:
+            shared += 1
+    if shared > 1:  # every edge of one has a vertex of the other
+        return APART
+    if _clearly_apart(x, first, second):
+        return APART
+    if _sides(x, first, second, sides[0]) or _sides(x, second, first, sides[1]):
+        return APART
+    worst = APART
+    for turn in range(2):
+        one, other = (first, second) if turn == 0 else (second, first)
+        for k in range(3):
+            n = (k + 1) % 3
+            i, j = one[k], one[n]
+            if i == other[0] or i == other[1] or i == other[2] or j == other[0] or j == other[1] or j == other[2]:
+                continue
+            a, b, c = row(x, other[0]), row(x, other[1]), row(x, other[2])
+            found = edge_and_triangle(row(x, i), row(x, j), a, b, c, sides[turn, k], sides[turn, n])
+            worst = max(worst, found)
+            if worst == CROSSING:
+                return worst
+    return worst
+
+
+@njit(cache=True, error_model="numpy")
+def _sweep(x, triangles, owner, collide, low, high, order, axis, most, pairs, kinds):
+    """Write as many pairs as fit; returns how many there are, `most` where there are more."""
+    count = 0
+    sides = np.zeros((2, 3), dtype=np.int64)
+    y, z = (axis + 1) % 3, (axis + 2) % 3
+    for a in range(len(order)):
+        i = order[a]
+        mine = collide[owner[i]]
+        for b in range(a + 1, len(order)):
+            j = order[b]
+            if low[j, axis] > high[i, axis]:
+                break
+            if low[j, y] > high[i, y] or low[i, y] > high[j, y] or low[j, z] > high[i, z] or low[i, z] > high[j, z]:
+                continue
+            if not mine[owner[j]]:
+                continue
+            kind = triangles_meet(x, triangles[i], triangles[j], sides)
+            if kind == APART:
+                continue
+            if count < len(pairs):
+                pairs[count, 0], pairs[count, 1] = min(i, j), max(i, j)
+                kinds[count] = kind
+            count += 1
+            if count == most:
+                return count
+    return count
+
+
+def crossing_triangles(
+    x: NDArray[np.float64],
+    triangles: NDArray[np.int32],
+    owner: NDArray[np.int32],
+    collide: NDArray[np.bool_],
+    most: int = -1,
+) -> tuple[NDArray[np.int64], NDArray[np.int8]]:
+    """Pairs of triangles that have a point in common beside shared vertices, in ascending order, lower row first.
+
+    Parameters
+    ----------
+    x : (n, 3) [m]; triangles : (t, 3); owner : (t,) which thing a triangle is of
+    collide : (p, p) which things' triangles are looked at; the diagonal: those of one thing with each other
+    most : with that many found, the search ends; -1: with all
+
+    Returns
+    -------
+    pairs (k, 2), kinds (k,): TOUCHING, or CROSSING where an edge goes through a triangle's inside.
+    """
+    if len(triangles) == 0:
+        return np.zeros((0, 2), dtype=np.int64), np.zeros(0, dtype=np.int8)
+    corners = x[triangles]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    # Along the axis on which boxes overlap least.
+    extent = np.maximum(np.ptp(x[triangles.ravel()], axis=0), 1e-300)
+    axis = int(((high - low).mean(axis=0) / extent).argmin())
+    order = np.argsort(low[:, axis], kind="stable")
+    room = 4096
+    while True:
+        pairs, kinds = np.zeros((room, 2), dtype=np.int64), np.zeros(room, dtype=np.int8)
+        count = _sweep(x, triangles, owner, collide, low, high, order, axis, most, pairs, kinds)
+        if count <= room:
+            break
+        room = count
+    pairs, kinds = pairs[:count], kinds[:count]
+    ascending = np.lexsort((pairs[:, 1], pairs[:, 0]))
+    return pairs[ascending], kinds[ascending]

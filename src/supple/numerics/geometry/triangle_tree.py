@@ -1,0 +1,268 @@
+"""Triangles near points: a tree of bounding boxes over triangles.
+
+Edges and vertices go in as triangles whose corners coincide, (a, b, b) and (a, a, a).
+
+Source: Ericson, "Real-Time Collision Detection" (2005), section 6.2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+from supple.numerics.geometry.closest_point import closest_on_triangle, combine
+from supple.numerics.mat3 import cross, dot, row, subtract
+
+_LEAF = 4
+_DEPTH = 64  # of a tree that halves: more than any memory holds
+# Squared distances that agree to this share are equal, and distances that agree to this share of the coordinates: a
+# point above a common edge is as near to both triangles, also far from the origin.
+TIE, ROUND_OFF = 1e-12, 1e-14
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleTree:
+    """A balanced tree; node i has the children 2 i + 1 and 2 i + 2, the last level are the leaves.
+
+    Attributes
+    ----------
+    points : (n, 3) [m]; triangles : (t, 3), at least one
+    order : (t,) the triangles, leaf after leaf; bounds : (nodes, 2) which part of `order` a node has
+    boxes : (nodes, 6) lowest and highest coordinates [m]
+    """
+
+    points: NDArray[np.float64]
+    triangles: NDArray[np.int32]
+    order: NDArray[np.int64]
+    bounds: NDArray[np.int64]
+    boxes: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, points: NDArray[np.float64], triangles: NDArray[np.int32]) -> TriangleTree:
+        """Build the tree, in O(t log^2 t)."""
+        points = np.ascontiguousarray(points, dtype=np.float64)
+        triangles = np.ascontiguousarray(triangles, dtype=np.int32)
+        corners = points[triangles]
+        boxes = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
+        levels = max(0, int(np.ceil(np.log2(max(1, len(triangles)) / _LEAF))))
+        return cls(points, triangles, *_build(boxes, levels))
+
+    def nearest(self, queries: NDArray[np.float64], within: float = np.inf) -> tuple[NDArray, NDArray]:
+        """The nearest triangle of each point, up to a distance.
+
+        Where several are equally near (up to round-off), it is the one that faces the point most squarely, from which
+        the point is furthest in the direction of its normal; and of these the one of lowest number.
+
+        Parameters
+        ----------
+        queries : (q, 3) [m]; within : [m]
+
+        Returns
+        -------
+        triangles : (q,) int64, -1 where none is near enough; distances : (q,) [m], inf there.
+        """
+        found = np.full(len(queries), -1, dtype=np.int64)
+        squares = np.full(len(queries), np.inf)
+        _nearest(np.ascontiguousarray(queries, dtype=np.float64), within, *self._arrays(), found, squares)
+        return found, np.sqrt(squares)
+
+    def all_within(self, queries: NDArray[np.float64], within: float) -> tuple[NDArray, NDArray, NDArray]:
+        """Every triangle up to a distance of each point.
+
+        Returns
+        -------
+        queries, triangles : (k,) int64, sorted; distances : (k,) [m]
+        """
+        queries = np.ascontiguousarray(queries, dtype=np.float64)
+        counts = np.zeros(len(queries), dtype=np.int64)
+        nothing = np.zeros(0, dtype=np.int64)
+        _all_within(queries, within, *self._arrays(), counts, nothing, nothing, np.zeros(0))
+        starts = np.concatenate([[0], np.cumsum(counts)])
+        found, squares = np.empty(starts[-1], dtype=np.int64), np.empty(starts[-1])
+        _all_within(queries, within, *self._arrays(), counts, starts, found, squares)
+        of_query = np.repeat(np.arange(len(queries)), counts)
+        order = np.lexsort((found, of_query))
+        return of_query[order], found[order], np.sqrt(squares[order])
+
+    def _arrays(self) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
+        return self.points, self.triangles, self.order, self.bounds, self.boxes
+
+
+@njit(cache=True, error_model="numpy")
+def _build(boxes, levels):
+    nodes = (1 << (levels + 1)) - 1
+    order = np.arange(len(boxes))
+    bounds = np.zeros((nodes, 2), dtype=np.int64)
+    bounds[0, 1] = len(boxes)
+    out = np.empty((nodes, 6))
+    for node in range(nodes):
+        low, high = bounds[node, 0], bounds[node, 1]
+        for k in range(3):
+            out[node, k], out[node, 3 + k] = np.inf, -np.inf
+        for p in range(low, high):
+            for k in range(3):
+                out[node, k] = min(out[node, k], boxes[order[p], k])
+                out[node, 3 + k] = max(out[node, 3 + k], boxes[order[p], 3 + k])
+        left = 2 * node + 1
+        if left >= nodes:
+            continue
+        axis = 0
+        for k in range(1, 3):
+            if out[node, 3 + k] - out[node, k] > out[node, 3 + axis] - out[node, axis]:
+                axis = k
+        part = order[low:high].copy()
+        middle = boxes[part, axis] + boxes[part, 3 + axis]
+        order[low:high] = part[np.argsort(middle, kind="mergesort")]
+        half = low + (high - low + 1) // 2
+        bounds[left, 0], bounds[left, 1] = low, half
+        bounds[left + 1, 0], bounds[left + 1, 1] = half, high
+    return order, bounds, out
+
+
+@njit(error_model="numpy")
+def _square_to_box(p, boxes, node):
+    total = 0.0
+    for k in range(3):
+        off = max(max(boxes[node, k] - p[k], p[k] - boxes[node, 3 + k]), 0.0)
+        total += off * off
+    return total
+
+
+@njit(error_model="numpy")
+def _square_to_triangle(p, points, triangles, t):
+    a, b, c = row(points, triangles[t, 0]), row(points, triangles[t, 1]), row(points, triangles[t, 2])
+    off = subtract(p, combine(closest_on_triangle(p, a, b, c), a, b, c))
+    return dot(off, off)
+
+
+def pair_distances(
+    queries: NDArray[np.float64], points: NDArray[np.float64], triangles: NDArray[np.int32]
+) -> NDArray[np.float64]:
+    """(k,) from the k-th of the queries (k, 3) to the k-th of the triangles (k, 3), rows of points (n, 3) [m]."""
+    out = np.empty(len(queries))
+    _pair_distances(np.ascontiguousarray(queries), np.ascontiguousarray(points), np.ascontiguousarray(triangles), out)
+    return out
+
+
+def closest_places(
+    queries: NDArray[np.float64], points: NDArray[np.float64], triangles: NDArray[np.int32]
+) -> NDArray[np.float64]:
+    """(k, 3) barycentric coordinates of the place on the k-th triangle that is nearest to the k-th of the queries."""
+    out = np.empty((len(queries), 3))
+    _closest_places(np.ascontiguousarray(queries), np.ascontiguousarray(points), np.ascontiguousarray(triangles), out)
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def _closest_places(queries, points, triangles, out):
+    for k in range(len(queries)):
+        a, b, c = triangles[k, 0], triangles[k, 1], triangles[k, 2]
+        out[k] = closest_on_triangle(row(queries, k), row(points, a), row(points, b), row(points, c))
+
+
+@njit(cache=True, error_model="numpy")
+def _pair_distances(queries, points, triangles, out):
+    for k in range(len(queries)):
+        out[k] = np.sqrt(_square_to_triangle(row(queries, k), points, triangles, k))
+
+
+@njit(error_model="numpy")
+def _square_height(p, points, triangles, t):
+    """Of the distance from the triangle's plane; 0 where it has none."""
+    a, b, c = row(points, triangles[t, 0]), row(points, triangles[t, 1]), row(points, triangles[t, 2])
+    n = cross(subtract(b, a), subtract(c, a))
+    area = dot(n, n)
+    return dot(n, subtract(p, a)) ** 2 / area if area > 0.0 else 0.0
+
+
+@njit(error_model="numpy")
+def _largest(boxes):
+    """The largest coordinate [m]."""
+    return np.abs(boxes[0]).max()
+
+
+@njit(error_model="numpy")
+def _slack(square, p, largest):
+    """By how much a squared distance from p is uncertain."""
+    off = ROUND_OFF * max(largest, abs(p[0]), abs(p[1]), abs(p[2]))
+    return TIE * square + off * (2.0 * np.sqrt(square) + off)
+
+
+@njit(error_model="numpy")
+def _comes_first(p, points, triangles, t, best, largest):
+    """Whether of two triangles that are equally near, t is the one to take."""
+    if best < 0:
+        return True
+    one, other = _square_height(p, points, triangles, t), _square_height(p, points, triangles, best)
+    margin = 1e-6 * (one + other) + _slack(max(one, other), p, largest)
+    return one > other + margin or (one >= other - margin and t < best)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def _nearest(queries, within, points, triangles, order, bounds, boxes, found, squares):
+    largest = _largest(boxes)
+    for q in prange(len(queries)):
+        p = row(queries, q)
+        stack = np.empty(_DEPTH, dtype=np.int64)
+        stack[0] = 0
+        depth = 1
+        best, least = -1, within * within
+        slack = _slack(least, p, largest) if np.isfinite(least) else 0.0
+        while depth > 0:
+            depth -= 1
+            node = stack[depth]
+            if bounds[node, 0] == bounds[node, 1] or _square_to_box(p, boxes, node) > least + slack:
+                continue
+            left = 2 * node + 1
+            if left < len(boxes):
+                near, far = left, left + 1
+                if _square_to_box(p, boxes, far) < _square_to_box(p, boxes, near):
+                    near, far = far, near
+                stack[depth] = far
+                stack[depth + 1] = near
+                depth += 2
+                continue
+            for k in range(bounds[node, 0], bounds[node, 1]):
+                t = order[k]
+                square = _square_to_triangle(p, points, triangles, t)
+                tie = square <= least + slack
+                if square < least - slack or (tie and _comes_first(p, points, triangles, t, best, largest)):
+                    best, least = t, min(square, least)
+                    slack = _slack(least, p, largest)
+        if best >= 0:
+            found[q] = best
+            squares[q] = _square_to_triangle(p, points, triangles, best)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def _all_within(queries, within, points, triangles, order, bounds, boxes, counts, starts, found, squares):
+    """With `found` empty, count only."""
+    largest = _largest(boxes)
+    for q in prange(len(queries)):
+        p = row(queries, q)
+        limit = within * within + _slack(within * within, p, largest)
+        stack = np.empty(_DEPTH, dtype=np.int64)
+        stack[0] = 0
+        depth, count = 1, 0
+        while depth > 0:
+            depth -= 1
+            node = stack[depth]
+            if bounds[node, 0] == bounds[node, 1] or _square_to_box(p, boxes, node) > limit:
+                continue
+            left = 2 * node + 1
+            if left < len(boxes):
+                stack[depth] = left
+                stack[depth + 1] = left + 1
+                depth += 2
+                continue
+            for k in range(bounds[node, 0], bounds[node, 1]):
+                square = _square_to_triangle(p, points, triangles, order[k])
+                if square <= limit:
+                    if len(found):
+                        found[starts[q] + count] = order[k]
+                        squares[starts[q] + count] = square
+                    count += 1
+        counts[q] = count

@@ -1,0 +1,210 @@
+"""A two-level preconditioner for elasticity on 3x3-block matrices.
+
+    M^-1 r = S^-1 r + Z (Z^T A Z)^-1 Z^T r
+
+S is symmetric Gauss-Seidel inside each group of neighbouring vertices (couplings between groups are left out, so that
+the groups are independent of each other and of the number of threads). The columns of Z are the affine displacement
+fields of each group, twelve of them: rigid motions, stretches and shears. The coarse matrix is small and is factorized.
+
+Measured on hanging, twisted and squeezed beams, Poisson's ratio .25 to .49, 8k to 60k tets (CG iterations to 1e-4):
+block Jacobi 62 to 331; groups' Gauss-Seidel with rigid modes 13 to 50, with affine fields 11 to 30. Block incomplete
+Cholesky needs fewer iterations where it exists, but breaks down near incompressibility.
+
+Sources: Toselli, Widlund, "Domain Decomposition Methods" (2005), chapters 2 and 3; Saad, "Iterative Methods for Sparse
+Linear Systems" (2003), section 10.2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+from supple.numerics.sparse.block_csr import SERIAL_BLOCKS, BlockRows
+from supple.numerics.sparse.partition import bisected_groups
+from supple.numerics.sparse.skyline_cholesky import factorize
+from supple.numerics.threads import threads_for
+
+_GROUP_SIZE = 96
+_MOST_GROUPS = 128
+
+
+@dataclass(frozen=True, eq=False)
+class RowOrder:
+    """The order of the free vertices in a matrix: group after group, groups so that neighbours are near each other.
+
+    Attributes
+    ----------
+    vertices : (n,) vertex of each row
+    group_start : (g + 1,) first row of each group
+    """
+
+    vertices: NDArray[np.int32]
+    group_start: NDArray[np.int32]
+
+
+def order_rows(
+    points: NDArray[np.float64], components: NDArray[np.int32], elements: NDArray[np.int32], free: NDArray[np.bool_]
+) -> RowOrder:
+    """Choose groups for the free ones of the vertices.
+
+    Parameters
+    ----------
+    points : (n, 3) rest positions; components : (n,); elements : (m, 4), -1 for no vertex; free : (n,) which
+        vertices get a row.
+    """
+    vertices = np.flatnonzero(free)
+    count = min(max(1, len(vertices) // _GROUP_SIZE), _MOST_GROUPS)
+    groups = bisected_groups(points[vertices], components[vertices], count)
+    group_of = np.full(len(points) + 1, -1, dtype=np.int64)
+    for g, members in enumerate(groups):
+        group_of[vertices[members]] = g
+    near = group_of[elements]
+    pairs = np.concatenate([near[:, [a, b]] for a in range(4) for b in range(4)])
+    pairs = np.unique(pairs[(pairs >= 0).all(axis=1)], axis=0)
+    pairs = np.concatenate([pairs, np.repeat(np.arange(len(groups))[:, None], 2, axis=1)])
+    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(groups), len(groups))).tocsr()
+    sequence = reverse_cuthill_mckee(graph, symmetric_mode=True) if len(groups) > 1 else np.arange(len(groups))
+    ordered = [vertices[np.sort(groups[g])] for g in sequence]
+    start = np.concatenate([[0], np.cumsum([len(members) for members in ordered])])
+    rows = np.concatenate(ordered) if ordered else np.zeros(0)
+    return RowOrder(rows.astype(np.int32), start.astype(np.int32))
+
+
+@dataclass(frozen=True, eq=False)
+class TwoLevel:
+    """What the preconditioner needs to know of the pattern, and the arrays it is updated in.
+
+    Attributes
+    ----------
+    group_start : (g + 1,) rows of each group; inner : (n, 2) blocks of each row whose columns are in the row's group
+    first : (g,) envelope of the coarse matrix
+    fields : (n, 4) 1 and the vertex's position relative to its group, in units of the group's size
+    inverse_diagonal : (n, 3, 3); coarse : (g, g, 12, 12) factored
+    """
+
+    pattern: BlockRows
+    group_start: NDArray[np.int32]
+    inner: NDArray[np.int32]
+    first: NDArray[np.int32]
+    fields: NDArray[np.float64]
+    inverse_diagonal: NDArray[np.float64]
+    coarse: NDArray[np.float64]
+
+    def update(self, data: NDArray[np.float64], coarse: bool = True) -> None:
+        """Take over a new matrix; with `coarse=False` only its diagonal, the coarse level stays as it was."""
+        p = self.pattern
+        _invert_diagonal(p.diagonal, data, self.inverse_diagonal)
+        if coarse:
+            with threads_for(p.blocks, SERIAL_BLOCKS):
+                _project_matrix(p.row_start, p.columns, data, self.group_start, self.fields, self.coarse)
+                factorize(self.coarse, self.first)
+
+    def on(self, pattern: BlockRows) -> TwoLevel:
+        """The same groups and memory for a matrix with other blocks. Its coarse level has to be updated."""
+        inner, first = _couplings(pattern, self.group_start)
+        return replace(self, pattern=pattern, inner=inner, first=first)
+
+
+def two_level(pattern: BlockRows, points: NDArray[np.float64], group_start: NDArray[np.int32]) -> TwoLevel:
+    """Prepare the preconditioner for a pattern whose rows come in groups.
+
+    Parameters
+    ----------
+    points : (n, 3) rest position of each row; group_start : (g + 1,).
+    """
+    groups = len(group_start) - 1
+    fields = np.ones((len(points), 4))
+    for g in range(groups):
+        rows = slice(group_start[g], group_start[g + 1])
+        offset = points[rows] - points[rows].mean(axis=0)
+        size = np.sqrt((offset**2).sum(axis=1).mean())
+        fields[rows, 1:] = offset / size if size > 0.0 else 0.0
+    start = np.ascontiguousarray(group_start)
+    return TwoLevel(
+        pattern,
+        start,
+        *_couplings(pattern, start),
+        fields,
+        np.zeros((pattern.rows, 3, 3)),
+        np.zeros((groups, groups, 12, 12)),
+    )
+
+
+def _couplings(pattern: BlockRows, group_start: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """(n, 2) the blocks of each row in its own group, and (g,) the first group that each group is coupled with."""
+    groups = len(group_start) - 1
+    group_of = np.repeat(np.arange(groups), np.diff(group_start)).astype(np.int32)
+    return _inner_blocks(pattern.row_start, pattern.columns, group_start, group_of)
+
+
+@njit(cache=True, error_model="numpy")
+def _inner_blocks(row_start, columns, group_start, group_of):
+    inner = np.empty((len(row_start) - 1, 2), dtype=np.int32)
+    first = np.arange(len(group_start) - 1).astype(np.int32)
+    for i in range(len(row_start) - 1):
+        if row_start[i + 1] > row_start[i]:
+            first[group_of[i]] = min(first[group_of[i]], group_of[columns[row_start[i]]])
+        low, high = group_start[group_of[i]], group_start[group_of[i] + 1]
+        begin = row_start[i]
+        while columns[begin] < low:
+            begin += 1
+        end = begin
+        while end < row_start[i + 1] and columns[end] < high:
+            end += 1
+        inner[i, 0] = begin
+        inner[i, 1] = end
+    return inner, first
+
+
+@njit(cache=True, error_model="numpy")
+def _invert_diagonal(diagonal, data, out):
+    for i in range(len(diagonal)):
+        q = diagonal[i]
+        a, b, c = data[q, 0, 0], data[q, 0, 1], data[q, 0, 2]
+        d, e, f = data[q, 1, 1], data[q, 1, 2], data[q, 2, 2]
+        A, B, C = d * f - e * e, c * e - b * f, b * e - c * d
+        det = a * A + b * B + c * C
+        trace = a + d + f
+        if not det > 1e-30 * trace * trace * trace:
+            # Semi-definite: a vertex that nothing holds in some direction. Any positive matrix of its scale will do.
+            scale = 1.0 / trace if trace > 0.0 else 1.0
+            for r in range(3):
+                for s in range(3):
+                    out[i, r, s] = scale if r == s else 0.0
+            continue
+        out[i, 0, 0] = A / det
+        out[i, 1, 1] = (a * f - c * c) / det
+        out[i, 2, 2] = (a * d - b * b) / det
+        out[i, 0, 1] = out[i, 1, 0] = B / det
+        out[i, 0, 2] = out[i, 2, 0] = C / det
+        out[i, 1, 2] = out[i, 2, 1] = (b * c - a * e) / det
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def _project_matrix(row_start, columns, data, group_start, fields, coarse):
+    """coarse <- Z^T A Z, the lower triangle of blocks and the diagonal ones."""
+    groups = len(group_start) - 1
+    for g in prange(groups):
+        for h in range(g + 1):
+            for r in range(12):
+                for c in range(12):
+                    coarse[g, h, r, c] = 0.0
+        for i in range(group_start[g], group_start[g + 1]):
+            h = 0
+            for q in range(row_start[i], row_start[i + 1]):
+                j = columns[q]
+                if j >= group_start[g + 1]:
+                    break
+                while j >= group_start[h + 1]:
+                    h += 1
+                for a in range(4):
+                    for b in range(4):
+                        w = fields[i, a] * fields[j, b]
+                        for r in range(3):
+                            for c in range(3):
+                                coarse[g, h, 3 * a + r, 3 * b + c] += w * data[q, r, c]

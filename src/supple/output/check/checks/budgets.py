@@ -1,0 +1,173 @@
+"""Checks of what motion must keep: momentum, angular momentum, and energy, as far as a recording lets one know."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.output.check.frame_check import FrameCheck, Moment
+from supple.output.check.report import CheckResult
+from supple.output.check.settings import CheckSettings
+from supple.output.check.snapshot import Scene, Snapshot
+from supple.output.check.tally import Tally, skipped
+from supple.output.recording.reader import Recording
+
+_UNKNOWN = "the recording does not tell what acts on its bodies: an older version wrote it"
+# Motion slower than this share of a body's size per step, and energy of the same share, is round-off.
+_FLOOR = 1e-9
+
+
+def external_push(recording: Recording) -> str | None:
+    """What may push on the scene from outside, gravity apart, or None where nothing does."""
+    physics = recording.physics
+    if physics is None:
+        return _UNKNOWN
+    if len(recording.pinned_vertices):
+        return "pins hold bodies"
+    if recording.obstacles:
+        return "bodies may rest on obstacles"
+    if physics.forces or physics.soft_targets:
+        return "forces or soft targets act on bodies"
+    return None
+
+
+class Momentum(FrameCheck):
+    """P(t) - P(0) = M g t, where nothing else pushes."""
+
+    name = "momentum"
+
+    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
+        super().__init__(scene, settings)
+        self._tally = Tally(self.name)
+        self._why_not = external_push(scene.recording)
+        self._start: tuple[float, NDArray[np.float64]] | None = None
+        self._scale = 0.0
+
+    def see(self, at: Snapshot) -> None:
+        if self._why_not is not None:
+            return
+        recording = self.scene.recording
+        m, v, g = recording.masses, at.velocities, recording.gravity
+        P = m @ v
+        if self._start is None:
+            self._start = at.time, P
+        t, total = at.time - self._start[0], float(m.sum())
+        floor = total * _FLOOR * self.scene.size / recording.dt
+        pushed = total * float(np.linalg.norm(g)) * t
+        self._scale = max(self._scale, float(m @ np.linalg.norm(v, axis=1)) + pushed + floor)
+        change = float(np.linalg.norm(P - self._start[1] - total * g * t)) / self._scale
+        self._tally.see(at, change, not change <= self.settings.max_momentum_change)
+
+    def result(self) -> CheckResult:
+        if self._why_not is not None:
+            return skipped(self.name, self._why_not)
+        return self._tally.result(
+            "changes by gravity alone, within {worst}", "changes by {worst} of itself without a cause"
+        )
+
+
+class Spin(FrameCheck):
+    """Angular momentum about the center of mass, from frame to frame, where nothing else pushes.
+
+    Implicit integrators keep it only as the steps shrink. With r' = r + h v' and forces without a torque about r',
+    backward Euler gives L' - L = h sum m (v' - v) x v, velocities relative to the center of mass. Others give terms of
+    the same size: an implicit recording may change L by as much as h sum m |v' - v| (|v| + |v'|) in a step.
+    """
+
+    name = "spin"
+
+    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
+        super().__init__(scene, settings)
+        self._tally = Tally(self.name)
+        recording = scene.recording
+        self._why_not = external_push(recording)
+        self._implicit = (recording.solver or "").startswith("Implicit")
+        if self._why_not is None and self._implicit and settings.every > 1:
+            self._why_not = "an implicit integrator's own change is known from one frame to the next only"
+        self._last: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+        self._drift, self._scale = 0.0, 0.0
+
+    def see(self, at: Snapshot) -> None:
+        if self._why_not is not None:
+            return
+        recording = self.scene.recording
+        m, x = recording.masses, at.positions
+        total = float(m.sum())
+        r, v = x - m @ x / total, at.velocities - m @ at.velocities / total
+        L = m @ np.cross(r, v)
+        moving = float(m @ (np.linalg.norm(r, axis=1) * np.linalg.norm(v, axis=1)))
+        self._scale = max(self._scale, moving + total * self.scene.size**2 * _FLOOR / recording.dt)
+        if self._last is not None:
+            old_L, old_v = self._last
+            change = float(np.linalg.norm(L - old_L))
+            if self._implicit:
+                speeds = np.linalg.norm(v, axis=1) + np.linalg.norm(old_v, axis=1)
+                change -= recording.dt * float(m @ (np.linalg.norm(v - old_v, axis=1) * speeds))
+            # What single steps lose or gain beyond what is allowed adds up.
+            self._drift += max(0.0, change)
+            share = self._drift / self._scale
+            self._tally.see(at, share, not share <= self.settings.max_momentum_change)
+        self._last = L, v
+
+    def result(self) -> CheckResult:
+        if self._why_not is not None:
+            return skipped(self.name, self._why_not)
+        good = "kept within {worst}" + (", beyond what the integrator explains" if self._implicit else "")
+        return self._tally.result(good, "angular momentum changes by {worst} of what turns, without a cause")
+
+
+class Energy(FrameCheck):
+    """Kinetic, elastic and potential energy together never exceed those at the start, where nothing does work."""
+
+    name = "energy"
+
+    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
+        super().__init__(scene, settings)
+        recording = scene.recording
+        physics = recording.physics
+        self._why_not = None
+        if physics is None:
+            self._why_not = _UNKNOWN
+        elif physics.forces or physics.soft_targets:
+            self._why_not = "forces or soft targets do work"
+        elif physics.scripted_pins:
+            self._why_not = "scripted pins do work"
+        elif physics.stitches:
+            self._why_not = "stitches store energy that is not computed here"
+        self._first: Snapshot | None = None
+        self._rows: list[tuple[Moment, float, float]] = []
+
+    def see(self, at: Snapshot) -> None:
+        if self._why_not is not None:
+            return
+        recording = self.scene.recording
+        self._first = self._first or at
+        held = recording.pinned_vertices
+        if not np.array_equal(at.positions[held], self._first.positions[held]):
+            self._why_not = "pinned vertices move, which does work"
+        elif not np.array_equal(at.poses, self._first.poses):
+            self._why_not = "obstacles move, which does work"
+        else:
+            m, v = recording.masses, at.velocities
+            elastic = at.elastic_energy
+            if elastic is None:
+                elastic = float(recording.series("elastic_energy")[at.number])
+            moved = 0.5 * float(m @ np.einsum("ij,ij->i", v, v)) + elastic
+            fallen = at.positions - self._first.positions
+            self._rows.append((Moment(at.number, at.time), moved, -float((m @ fallen) @ recording.gravity)))
+
+    def result(self) -> CheckResult:
+        if self._why_not is not None:
+            return skipped(self.name, self._why_not)
+        if not self._rows:
+            return skipped(self.name, "there is no frame to compute it from")
+        recording = self.scene.recording
+        stored = np.array([row[1] for row in self._rows])
+        height = np.array([row[2] for row in self._rows])
+        weight = float(recording.masses.sum() * np.linalg.norm(recording.gravity))
+        scale = float(stored.max() + np.ptp(height)) + _FLOOR * weight * self.scene.size + 1e-300
+        gains = (stored + height - stored[0] - height[0]) / scale
+        tally = Tally(self.name)
+        for (moment, _, _), gain in zip(self._rows, gains, strict=True):
+            tally.see(moment, float(gain), not gain <= self.settings.max_energy_gain)
+        return tally.result("never above the start by more than {worst} of what is moved", "grows by {worst}")

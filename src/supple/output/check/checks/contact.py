@@ -1,0 +1,163 @@
+"""Checks of surfaces: that they do not meet, are not swallowed, and how far apart they are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from supple.output.check.formula_obstacles import Clearance, clearance
+from supple.output.check.frame_check import FrameCheck
+from supple.output.check.geometry.containment import is_inside
+from supple.output.check.geometry.surface_pairs import closest_pair
+from supple.output.check.geometry.triangle_distance import triangles_apart
+from supple.output.check.report import CheckResult
+from supple.output.check.settings import CheckSettings
+from supple.output.check.snapshot import Scene, Snapshot
+from supple.output.check.surfaces import is_mesh, moved
+from supple.output.check.tally import Tally, skipped
+
+
+class Intersection(FrameCheck):
+    """Bodies with each other, with themselves, and with obstacles made of triangles."""
+
+    name = "intersection"
+
+    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
+        super().__init__(scene, settings)
+        self._tally = Tally(self.name, "pairs")
+
+    def see(self, at: Snapshot) -> None:
+        count, pairs = at.meeting
+        name = self.scene.surfaces.name_triangle
+        where = f"{name(int(pairs[0, 0]))} and {name(int(pairs[0, 1]))}" if count else ""
+        self._tally.see(at, count, count > 0, where)
+
+    def result(self) -> CheckResult:
+        return self._tally.result("no triangles meet", "triangles meet: {worst}")
+
+
+def clearances(scene: Scene, at: Snapshot) -> Iterator[tuple[str, Clearance]]:
+    """How each body keeps away from each obstacle that is a formula: where, and how far."""
+    surfaces = scene.surfaces
+    for j, obstacle in enumerate(scene.recording.obstacles):
+        if is_mesh(obstacle):
+            continue
+        for i in range(surfaces.bodies):
+            if not surfaces.allowed[i, surfaces.bodies + j]:
+                continue
+            rows = np.flatnonzero(surfaces.owners == i)
+            triangles = surfaces.triangles[rows]
+            if len(triangles) == 0:
+                continue
+            found = clearance(obstacle, at.poses[j], at.points, np.unique(triangles), triangles)
+            part = surfaces.name_vertex(found.row) if found.by_vertex else surfaces.name_triangle(int(rows[found.row]))
+            yield f"{part} and {obstacle.name}", found
+
+
+class Obstacles(FrameCheck):
+    """Bodies and the obstacles that are formulas."""
+
+    name = "obstacles"
+
+    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
+        super().__init__(scene, settings)
+        self._tally = Tally(self.name, "m", lowest=True)
+
+    def see(self, at: Snapshot) -> None:
+        found = list(clearances(self.scene, at))
+        if found:
+            where, worst = min(found, key=lambda item: (not item[1].entered, item[1].smallest))
+            self._tally.see(at, worst.smallest, worst.entered, where)
+
+    def result(self) -> CheckResult:
+        if all(is_mesh(obstacle) for obstacle in self.scene.recording.obstacles):
+            return skipped(self.name, "the scene has no half-space, ball or room")
+        return self._tally.result("closest {worst}", "a body is in an obstacle, at {worst}")
+
+
+class Containment(FrameCheck):
+    """Pieces of bodies and obstacles that are wholly inside of others, where no triangles meet."""
+
+    name = "containment"
+
+    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
+        super().__init__(scene, settings)
+        self._tally = Tally(self.name, "pieces")
+
+    def see(self, at: Snapshot) -> None:
+        found = [*self._swallowed(at), *self._around_balls(at)]
+        self._tally.see(at, len(found), bool(found), found[0] if found else "")
+
+    def _swallowed(self, at: Snapshot) -> Iterator[str]:
+        surfaces, x = self.scene.surfaces, at.points
+        owners = surfaces.owners
+        crossing = {frozenset(pair) for pair in owners[at.meeting[1]].tolist()}
+        for solid in surfaces.pieces:
+            if not solid.closed:
+                continue
+            corners = x[surfaces.triangles[solid.triangles].ravel()]
+            low, high = corners.min(axis=0), corners.max(axis=0)
+            for piece in surfaces.pieces:
+                pair = frozenset((piece.owner, solid.owner))
+                if piece is solid or not surfaces.allowed[piece.owner, solid.owner] or pair in crossing:
+                    continue
+                # Of a whole piece inside nothing sticks out; its vertex alone may also lie on the surface.
+                whole = x[surfaces.triangles[piece.triangles].ravel()]
+                if (whole < low).any() or (whole > high).any():
+                    continue
+                point = x[piece.vertex].copy()
+                if is_inside(x, point, surfaces.triangles, solid.triangles):
+                    yield f"{surfaces.names[piece.owner]} in {surfaces.names[solid.owner]}"
+
+    def _around_balls(self, at: Snapshot) -> Iterator[str]:
+        surfaces = self.scene.surfaces
+        for j, obstacle in enumerate(self.scene.recording.obstacles):
+            if obstacle.kind != "Sphere" or obstacle.parameters.get("inside", False):
+                continue
+            center = moved(np.asarray(obstacle.parameters["center"], dtype=np.float64)[None], at.poses[j])[0]
+            for solid in surfaces.pieces:
+                allowed = solid.owner < surfaces.bodies and surfaces.allowed[solid.owner, surfaces.bodies + j]
+                if allowed and solid.closed and is_inside(at.points, center, surfaces.triangles, solid.triangles):
+                    yield f"{obstacle.name} in {surfaces.names[solid.owner]}"
+
+    def result(self) -> CheckResult:
+        return self._tally.result("nothing is inside of another", "swallowed: {worst}")
+
+
+class Distance(FrameCheck):
+    """The smallest distance between triangles without a common corner, and from obstacles that are formulas."""
+
+    name = "distance"
+
+    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
+        super().__init__(scene, settings)
+        self._tally = Tally(self.name, "m", lowest=True)
+        self._last: tuple[int, int] | None = None
+
+    def see(self, at: Snapshot) -> None:
+        surfaces = self.scene.surfaces
+        name = surfaces.name_triangle
+        count, pairs = at.meeting
+        if count:
+            a, b = int(pairs[0, 0]), int(pairs[0, 1])
+            self._tally.see(at, 0.0, True, f"{name(a)} and {name(b)} meet")
+            return
+        best = np.inf
+        if self._last is not None:
+            # The closest pair of the last frame is close still: what is farther apart need not be looked at.
+            first, second = (surfaces.triangles[row] for row in self._last)
+            best = float(triangles_apart(at.points, first, second)) * (1.0 + 1e-12) + 1e-300
+        squared, a, b = closest_pair(
+            at.points, surfaces.triangles, surfaces.owners, surfaces.allowed, surfaces.ignored, *at.tree, best
+        )
+        if a >= 0:
+            self._last = a, b
+            self._tally.see(at, float(np.sqrt(squared)), squared <= 0.0, lambda: f"{name(a)} and {name(b)}")
+        for where, found in clearances(self.scene, at):
+            self._tally.see(at, found.smallest, found.smallest <= 0.0, where)
+
+    def result(self) -> CheckResult:
+        if self._tally.worst is None:
+            return skipped(self.name, "there are no two surfaces")
+        return self._tally.result("smallest {worst}", "surfaces touch or meet: {worst}")

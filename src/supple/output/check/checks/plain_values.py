@@ -1,0 +1,153 @@
+"""Checks of what a recording says plainly: numbers that are numbers, frames in order, steps that converged."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.output.check.frame_check import FrameCheck, Moment
+from supple.output.check.report import CheckResult
+from supple.output.check.settings import CheckSettings
+from supple.output.check.snapshot import Scene, Snapshot
+from supple.output.check.tally import Tally
+from supple.output.recording.recorder import REPORT_NUMBERS, REPORT_VECTORS
+from supple.state import Status
+
+# What all frames share.
+CONSTANTS = ("rest_positions", "rest_volumes", "masses", "gravity")
+# Not a number stands for "not known" there.
+_MAY_BE_UNKNOWN = ("min_distance", "largest_stitch_stretch")
+_SAME_TIME = 1e-9
+_MOVING = 1e-9
+
+# Of the speed that a body has: by how much its way may differ from where its velocities lead. In recordings that nobody
+# touched it was less than 0.1.
+_ASTRAY = 0.75
+
+
+class Finite(FrameCheck):
+    """Every number of the file, the reports' among them."""
+
+    name = "finite"
+    sees_all = True
+    needs_frames = False
+
+    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
+        super().__init__(scene, settings)
+        self._tally = Tally(self.name, "numbers")
+        recording = scene.recording
+        for what in CONSTANTS:
+            count = _bad_count(getattr(recording, what))
+            if count:
+                self._tally.see(None, count, True, what.replace("_", " "))
+        names = [name for name in (*REPORT_NUMBERS, *REPORT_VECTORS) if name not in _MAY_BE_UNKNOWN]
+        self._series = {name: recording.series(name) for name in names}
+
+    def see(self, at: Snapshot) -> None:
+        found = [(count, where) for count, where in self._bad(at) if count]
+        self._tally.see(at, sum(count for count, _ in found), bool(found), found[0][1] if found else "")
+
+    def _bad(self, at: Snapshot) -> Iterator[tuple[int, str]]:
+        surfaces = self.scene.surfaces
+        for what, values in (("position", at.positions), ("velocity", at.velocities)):
+            count = _bad_count(values)
+            row = int(np.argmin(np.isfinite(values).all(axis=1)))
+            yield count, f"{what} of {surfaces.name_vertex(row)}" if count else ""
+        count = _bad_count(at.det_F)
+        yield count, f"det F of {self.scene.name_tet(int(np.argmin(np.isfinite(at.det_F))))}" if count else ""
+        yield _bad_count(at.poses), "pose of an obstacle"
+        for name, series in self._series.items():
+            yield _bad_count(series[at.number]), f"recorded {name}"
+
+    def result(self) -> CheckResult:
+        return self._tally.result("all numbers are finite", "not finite: {worst}")
+
+
+def _bad_count(values: NDArray[np.float64]) -> int:
+    return int(np.count_nonzero(~np.isfinite(values)))
+
+
+class Sequence(FrameCheck):
+    """Times and numbers of frames, for all frames; repetitions among those that are looked at."""
+
+    name = "sequence"
+    needs_frames = False
+
+    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
+        super().__init__(scene, settings)
+        self._tally = Tally(self.name)
+        self._last: Snapshot | None = None
+        recording = scene.recording
+        # XPBD may stop within a frame what it has thrown out of something in the same frame.
+        self._implicit = (recording.solver or "").startswith("Implicit")
+        indices = np.array([frame.index for frame in recording])
+        for k in range(1, len(recording)):
+            at = Moment(k, float(recording.times[k]))
+            step = at.time - float(recording.times[k - 1])
+            rounding = 4.0 * np.finfo(np.float64).eps * abs(at.time)
+            if not step > 0.0:
+                self._tally.see(at, step, True, f"time {at.time:.9g} s does not come after the one before")
+            elif indices[k] - indices[k - 1] != 1:
+                self._tally.see(at, step, True, f"number {indices[k]} does not follow {indices[k - 1]}")
+            elif abs(step - recording.dt) > _SAME_TIME * recording.dt + rounding:
+                self._tally.see(at, step, True, f"a step of {step:.9g} s, not of {recording.dt:.9g} s")
+
+    def see(self, at: Snapshot) -> None:
+        before, self._last = self._last, at
+        recording = self.scene.recording
+        if before is None:
+            return
+        if not np.array_equal(before.positions, at.positions):
+            whole = recording.statuses[at.number] is Status.CONVERGED
+            if self._implicit and whole and at.number == before.number + 1:
+                self._follow(before, at)
+            return
+        slowest = min(float(np.abs(frame.velocities).max(initial=0.0)) for frame in (before, at))
+        if slowest * recording.dt > _MOVING * self.scene.size and recording.statuses[at.number].can_go_on:
+            self._tally.see(at, slowest, True, f"repeats frame {before.number} although it moves")
+
+    def _follow(self, before: Snapshot, at: Snapshot) -> None:
+        """Whether bodies went where their velocities, before and after the step, took them."""
+        recording = self.scene.recording
+        step = at.time - before.time
+        fall = float(np.linalg.norm(recording.gravity)) * abs(step)
+        for body in recording.bodies:
+            rows, share = body.vertices, recording.masses[body.vertices]
+            share = share / share.sum()
+            speeds = [float(np.sqrt(share @ (frame.velocities[rows] ** 2).sum(axis=1))) for frame in (before, at)]
+            first, last = (share @ frame.velocities[rows] for frame in (before, at))
+            went = share @ (at.positions[rows] - before.positions[rows]) / step
+            # The mean velocity of a step lies between that before and that after it; a statics solver leaves none.
+            change = last - first
+            along = np.clip((went - first) @ change / max(float(change @ change), 1e-300), 0.0, 1.0)
+            off = float(np.linalg.norm(went - first - along * change))
+            rounding = _MOVING * self.scene.size / abs(step)
+            if max(speeds) > 0.0 and off > _ASTRAY * (max(speeds) + fall) + rounding:
+                where = f"{body.name} went {off * abs(step):.3g} m elsewhere than its velocities say"
+                self._tally.see(at, off, True, where)
+
+    def result(self) -> CheckResult:
+        return self._tally.result("frames follow each other", "frames do not follow each other")
+
+
+class Converged(FrameCheck):
+    """The recorded status of every step."""
+
+    name = "status"
+    needs_frames = False
+
+    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
+        super().__init__(scene, settings)
+        self._tally = Tally(self.name)
+        recording = scene.recording
+        for k, status in enumerate(recording.statuses):
+            if status is not Status.CONVERGED:
+                self._tally.see(Moment(k, float(recording.times[k])), 1.0, True, str(status))
+
+    def see(self, at: Snapshot) -> None:
+        """All is known from the start."""
+
+    def result(self) -> CheckResult:
+        return self._tally.result("every step converged", "a step did not converge")

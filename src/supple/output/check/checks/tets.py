@@ -1,0 +1,110 @@
+"""Checks of the tetrahedra: at rest, in every frame, and of the volumes that they add up to."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from supple.materials.registry import ELASTIC_MATERIALS
+from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.output.check.frame_check import FrameCheck
+from supple.output.check.geometry.orientation import volume_signs
+from supple.output.check.report import CheckResult
+from supple.output.check.settings import CheckSettings
+from supple.output.check.snapshot import Scene, Snapshot, edge_vectors
+from supple.output.check.tally import Tally
+
+NEARLY_INCOMPRESSIBLE = 0.45
+GENEROUS_VOLUME_CHANGE = 0.5
+_SAME_VOLUME = 1e-9
+
+
+class RestShape(FrameCheck):
+    """Tets, volumes and masses that no frame changes."""
+
+    name = "rest shape"
+    needs_frames = False
+
+    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
+        super().__init__(scene, settings)
+        self._tally = Tally(self.name, "m^3", lowest=True)
+        recording = scene.recording
+        D = edge_vectors(recording.rest_positions, recording.tets)
+        volumes = np.einsum("ij,ij->i", D[:, :, 0], np.cross(D[:, :, 1], D[:, :, 2])) / 6.0
+        bad = np.flatnonzero(volume_signs(recording.rest_positions, recording.tets) <= 0)
+        row = int(bad[0]) if len(bad) else int(np.argmin(volumes))
+        self._tally.see(None, volumes[row], len(bad) > 0, scene.name_tet(row))
+        sizes = np.abs(D).max(axis=(1, 2)) ** 3
+        wrong = np.flatnonzero(~(np.abs(recording.rest_volumes - volumes) <= _SAME_VOLUME * sizes))
+        if len(wrong):
+            row = int(wrong[0])
+            said = f"{scene.name_tet(row)} is said to have {recording.rest_volumes[row]:.6g} m^3"
+            self._tally.see(None, volumes[row], True, said)
+        light = np.flatnonzero(~(recording.masses > 0.0))
+        if len(light):
+            row = int(light[0])
+            said = f"{scene.surfaces.name_vertex(row)} has a mass of {recording.masses[row]:.6g} kg"
+            self._tally.see(None, volumes.min(), True, said)
+
+    def see(self, at: Snapshot) -> None:
+        """All is known from the start."""
+
+    def result(self) -> CheckResult:
+        return self._tally.result("smallest tet at rest {worst}", "not a rest shape: {worst}")
+
+
+class Inversion(FrameCheck):
+    """The exact sign of every tet's determinant; the smallest det F is told."""
+
+    name = "inversion"
+
+    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
+        super().__init__(scene, settings)
+        self._tally = Tally(self.name, lowest=True)
+
+    def see(self, at: Snapshot) -> None:
+        bad = np.flatnonzero(at.signs <= 0)
+        J = np.where(np.isfinite(at.J), at.J, np.inf)
+        row = int(bad[np.argmin(J[bad])]) if len(bad) else int(np.argmin(J))
+        self._tally.see(at, float(J[row]), len(bad) > 0, lambda: self.scene.name_tet(row))
+
+    def result(self) -> CheckResult:
+        return self._tally.result("smallest det F {worst}", "inverted or flat, det F {worst}")
+
+
+class Volume(FrameCheck):
+    """How far each body's volume goes from the one at rest."""
+
+    name = "volume"
+
+    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
+        super().__init__(scene, settings)
+        self._tally = Tally(self.name)
+        bodies = scene.recording.bodies
+        self._limits = [self._limit(k) for k in range(len(bodies))]
+        self._rest = [float(scene.recording.rest_volumes[body.tets].sum()) for body in bodies]
+
+    def _limit(self, number: int) -> float:
+        if self.settings.max_volume_change is not None:
+            return self.settings.max_volume_change
+        recording = self.scene.recording
+        physics, tets = recording.physics, recording.bodies[number].tets
+        if physics is None:
+            return np.inf
+        known = physics.kind[tets] < len(ELASTIC_MATERIALS)
+        if not known.all():
+            return np.inf
+        laws = np.array([law is StableNeoHookean for law in ELASTIC_MATERIALS])[physics.kind[tets]]
+        mu = physics.mu[tets]
+        # The lam of stable Neo-Hookean's density is lam + mu of Hooke's law.
+        hooke = physics.lam[tets] - np.where(laws, mu, 0.0)
+        poisson = hooke / (2.0 * (hooke + mu))
+        return GENEROUS_VOLUME_CHANGE if (poisson >= NEARLY_INCOMPRESSIBLE - 1e-9).all() else np.inf
+
+    def see(self, at: Snapshot) -> None:
+        for k, body in enumerate(self.scene.recording.bodies):
+            volume = float(self.scene.recording.rest_volumes[body.tets] @ at.J[body.tets])
+            change = abs(volume / self._rest[k] - 1.0)
+            self._tally.see(at, change, not change <= self._limits[k], body.name)
+
+    def result(self) -> CheckResult:
+        return self._tally.result("largest change {worst} of a body's volume", "changes by {worst} of a body's volume")

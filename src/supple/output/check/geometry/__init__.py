@@ -1,0 +1,1 @@
+"""Exact and floating-point geometry of the checks; independent of the solvers."""

@@ -1,0 +1,94 @@
+"""Universal Scene Description: meshes with a time sample of their points for each frame."""
+
+# pyright: reportAttributeAccessIssue=false
+# (OpenUSD comes without types.)
+
+from __future__ import annotations
+
+import errno
+import re
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+
+from supple.errors import OutputError
+from supple.output.drawing import OBSTACLE_COLOR, obstacle_pictures, pictures, view_of
+from supple.output.files.atomic import whole_file
+from supple.output.recording.reader import Recording
+
+_SUFFIXES = (".usd", ".usdc", ".usda")
+
+
+def write_usd(recording: Recording, output: Path) -> None:
+    """Write bodies and obstacles to a .usdc (binary), .usda (text) or .usd file: metres, y up, one time code per frame.
+
+    Raises
+    ------
+    OutputError : where OpenUSD is not installed, or the file cannot be written.
+    """
+    if find_spec("pxr") is None:
+        raise OutputError("export to USD needs OpenUSD, which is not installed; pip install 'supple[usd]'")
+    if output.suffix.lower() not in _SUFFIXES:
+        raise OutputError(f"{output}: USD knows a file by its ending; name it {output.stem}.usdc")
+    from pxr import Tf, Usd, UsdGeom
+
+    with whole_file(output) as fresh:
+        stage = Usd.Stage.CreateNew(str(fresh))
+        UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+        UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+        stage.SetTimeCodesPerSecond(1.0 / recording.dt)
+        stage.SetFramesPerSecond(1.0 / recording.dt)
+        stage.SetStartTimeCode(0)
+        stage.SetEndTimeCode(len(recording) - 1)
+        stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, "/recording").GetPrim())
+        bodies = UsdGeom.Scope.Define(stage, "/recording/bodies").GetPath()
+        for i, picture in enumerate(pictures(recording)):
+            mesh = _define(stage, f"{bodies}/{_identifier(picture.name, i)}", picture.name, picture)
+            for k, frame in enumerate(recording):
+                _set_points(mesh, picture.at(frame), k)
+        rigid = UsdGeom.Scope.Define(stage, "/recording/obstacles").GetPath()
+        for i, obstacle in enumerate(obstacle_pictures(recording, view_of(recording))):
+            mesh = _define(stage, f"{rigid}/{_identifier(obstacle.name, i)}", obstacle.name, obstacle)
+            poses = np.stack([frame.poses[obstacle.number] for frame in recording])
+            if np.any(poses != poses[0]):
+                for k, frame in enumerate(recording):
+                    _set_points(mesh, obstacle.at(frame), k)
+            else:
+                _set_points(mesh, obstacle.at(recording[0]), None)
+        try:
+            stage.GetRootLayer().Save()
+        except Tf.ErrorException as error:
+            # USD says which of its source lines failed, then why, then what it finds when it reads that back.
+            said = re.search(r"rror occurred writing file: ([^'\n]*)", str(error))
+            raise OSError(errno.EIO, said[1] if said else "USD could not write it") from None
+
+
+def _define(stage, path: str, name: str, picture):
+    from pxr import Gf, UsdGeom, Vt
+
+    mesh = UsdGeom.Mesh.Define(stage, path)
+    mesh.GetPrim().SetDisplayName(name)
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    triangles = picture.triangles
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(triangles), 3, dtype=np.int32)))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(triangles.ravel(), dtype=np.int32)))
+    color = np.array(getattr(picture, "color", OBSTACLE_COLOR)) / 255.0
+    mesh.CreateDisplayColorAttr([Gf.Vec3f(*(float(c) for c in color**2.2))])
+    return mesh
+
+
+def _set_points(mesh, x, time: int | None) -> None:
+    from pxr import Usd, Vt
+
+    code = Usd.TimeCode.Default() if time is None else Usd.TimeCode(time)
+    points = Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(x, dtype=np.float32))
+    mesh.CreatePointsAttr().Set(points, code)
+    bounds = np.stack([x.min(axis=0), x.max(axis=0)]).astype(np.float32)
+    mesh.CreateExtentAttr().Set(Vt.Vec3fArray.FromNumpy(bounds), code)
+
+
+def _identifier(name: str, number: int) -> str:
+    """A name that USD allows, and that nothing else has."""
+    plain = "".join(c if c.isascii() and c.isalnum() else "_" for c in name)
+    return f"_{number}_{plain}" if not plain or plain[0].isdigit() else f"{plain}_{number}"

@@ -1,0 +1,50 @@
+"""Videos of a recording. They are drawn in a child process: where OpenGL is missing, drawing ends the whole process."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+from supple.errors import OutputError
+from supple.output.files.atomic import whole_file
+from supple.output.recording.reader import Recording
+
+_NEEDED = {"gif": ("pyvista", "PIL"), "mp4": ("pyvista", "imageio_ffmpeg")}
+
+
+def write_gif(recording: Recording, output: Path) -> None:
+    """Write an animated GIF, of about 20 frames per second."""
+    _write(recording, output, "gif")
+
+
+def write_mp4(recording: Recording, output: Path) -> None:
+    """Write an H.264 video, of at most 60 frames per second, that plays at the speed of the simulation."""
+    _write(recording, output, "mp4")
+
+
+def _write(recording: Recording, output: Path, kind: str) -> None:
+    missing = [name for name in _NEEDED[kind] if find_spec(name) is None]
+    if missing:
+        raise OutputError(f"export to {kind} needs {missing[0]}, which is not installed; pip install 'supple[video]'")
+    with whole_file(output) as fresh:
+        # The new name may have any suffix; the drawer goes by `kind`.
+        command = [sys.executable, "-m", "supple.output.export.video_worker", str(recording.path), str(fresh), kind]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode != 0 or not fresh.exists():
+            raise OutputError(f"{output}: {_reason(done)}")
+
+
+def _reason(done: subprocess.CompletedProcess[str]) -> str:
+    said = [line for line in done.stderr.splitlines() if line.strip()]
+    last = said[-1] if said else ""
+    if last.startswith("video: "):
+        return last.removeprefix("video: ")
+    signs = ("EGL", "OpenGL", "GLX", "X server", "OSMesa", "render window")
+    if done.returncode < 0 or any(sign in done.stderr for sign in signs):
+        return (
+            "drawing needs OpenGL, which does not work here; on Debian and Ubuntu: apt install libegl1 libgl1 "
+            f"(the drawing process ended with code {done.returncode})"
+        )
+    return f"the drawing process ended with code {done.returncode}: {last or 'it said nothing'}"

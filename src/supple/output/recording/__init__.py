@@ -1,0 +1,1 @@
+"""Recordings: written frame by frame, read without trust."""

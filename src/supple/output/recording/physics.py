@@ -1,0 +1,177 @@
+"""What a recording keeps of its scene for whoever checks it: the bodies' laws, what acts on them, what may touch.
+
+Written since 0.1; recordings without it stay readable, and some checks say that they cannot be made.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.materials.edges_and_volume import EdgesAndVolume
+from supple.materials.material import Elastic
+from supple.materials.registry import ELASTIC_MATERIALS
+from supple.output.recording.checked_hdf5 import CheckedFile
+from supple.scene.contact_pairs import pair_table
+from supple.system import System
+
+NOT_KNOWN = 255
+_GROUP = "supple/physics"
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedPhysics:
+    """The laws of a recorded scene.
+
+    Attributes
+    ----------
+    kind : (m,) row of `registry.ELASTIC_MATERIALS` of each tet, or `NOT_KNOWN`; mu, lam : (m,) [Pa]
+    compliances : for each body those of its edges [m/N] and volumes [m^5/N], or None for a body of another law
+    forces, soft_targets, scripted_pins, stitches : how many the scene has
+    """
+
+    kind: NDArray[np.uint8]
+    mu: NDArray[np.float64]
+    lam: NDArray[np.float64]
+    compliances: tuple[tuple[float, float] | None, ...]
+    forces: int
+    soft_targets: int
+    scripted_pins: int
+    stitches: int
+
+    @property
+    def has_known_energy(self) -> bool:
+        """Whether tets and edges store all elastic energy."""
+        return self.stitches == 0
+
+    def knows_law(self, body: int, tets: slice) -> bool:
+        """Whether the elastic energy of a body can be computed."""
+        return self.compliances[body] is not None or bool((self.kind[tets] != NOT_KNOWN).all())
+
+
+def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
+    """Write the arrays to the recording's own group; returns what belongs into its header."""
+    m = len(system.tets)
+    kind, mu, lam = np.full(m, NOT_KNOWN, dtype=np.uint8), np.zeros(m), np.zeros(m)
+    compliances: list[list[float] | None] = []
+    for part in system.bodies:
+        material = part.body.material
+        compliances.append(None)
+        if isinstance(material, EdgesAndVolume):
+            compliances[-1] = [float(material.edge_compliance), float(material.volume_compliance)]
+        elif isinstance(material, Elastic):
+            rows = material.per_tet(part.tets.stop - part.tets.start)
+            kind[part.tets], mu[part.tets], lam[part.tets] = rows.kind, rows.mu, rows.lam
+    group = own.create_group("physics")
+    group["kind"], group["mu"], group["lam"] = kind, mu, lam
+    group["stitched"], group["anchors"] = _stitched(system), _anchors(system)
+    return {
+        "laws": [law.__name__ for law in ELASTIC_MATERIALS],
+        "compliances": compliances,
+        "forces": len(system.forces),
+        "soft_targets": len(system.soft_targets),
+        "scripted_pins": sum(part.pin.motion is not None for part in system.pins),
+        "stitches": len(system.stitching),
+        "untouching": _untouching(system),
+    }
+
+
+def _untouching(system: System) -> list[list[int]]:
+    """Pairs that the scene lets pass through each other: numbers of bodies, then obstacles."""
+    collide = pair_table(system.scene).collide
+    obstacle = np.arange(len(collide)) >= len(system.bodies)
+    passing = np.argwhere(np.triu(~collide & ~(obstacle[:, None] & obstacle[None, :])))
+    return passing.tolist()
+
+
+def _stitched(system: System) -> NDArray[np.int64]:
+    """(k, 4) the vertices of each stitch, some of them twice where it has fewer; anchors count on from the bodies'."""
+    stitching = system.stitching
+    springs = stitching.springs.vertices
+    return np.concatenate([stitching.tets.vertices, springs[:, [0, 1, 2, 2]]]).astype(np.int64)
+
+
+def _anchors(system: System) -> NDArray[np.int64]:
+    """(a, 2) obstacle, and row of its recorded vertices, of what is stitched to obstacles."""
+    anchors = system.stitching.anchors
+    out = np.zeros((len(anchors), 2), dtype=np.int64)
+    for k, (owner, point) in enumerate(zip(anchors.owner, anchors.points, strict=True)):
+        surface = getattr(anchors.obstacles[owner], "surface")  # noqa: B009 (a TriangleObstacle: others have no vertices)
+        out[k] = owner, np.flatnonzero((surface.compact().vertices == point).all(axis=1))[0]
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Untouching:
+    """What the scene lets touch, or pass through each other.
+
+    Attributes
+    ----------
+    pairs : numbers of bodies, then obstacles
+    stitched : (k, 4) vertices of stitches: the first may touch the triangles that have all of the others. Numbers from
+        n on, n being that of all bodies' vertices, are anchors
+    anchors : (a, 2) obstacle, and row of its vertices
+    """
+
+    pairs: tuple[tuple[int, int], ...]
+    stitched: NDArray[np.int64]
+    anchors: NDArray[np.int64]
+
+
+def read_physics(file: CheckedFile, header: dict[str, Any], m: int) -> RecordedPhysics | None:
+    """The laws of a recording with m tets, or None where it does not tell.
+
+    Raises
+    ------
+    OutputError : where it contradicts itself.
+    """
+    said = header.get("physics")
+    if said is None:
+        return None
+    try:
+        counts = [int(said[key]) for key in ("forces", "soft_targets", "scripted_pins", "stitches")]
+        laws = [str(law) for law in said["laws"]]
+        compliances = tuple(None if pair is None else (float(pair[0]), float(pair[1])) for pair in said["compliances"])
+    except (KeyError, TypeError, ValueError, IndexError):
+        raise file.broken("the physics in its header is not described as it should be") from None
+    if len(compliances) != len(header["bodies"]):
+        raise file.broken("its header describes the physics of another number of bodies")
+    here = [law.__name__ for law in ELASTIC_MATERIALS]
+    number = np.full(256, NOT_KNOWN, dtype=np.uint8)
+    for k, law in enumerate(laws[:NOT_KNOWN]):
+        number[k] = here.index(law) if law in here else NOT_KNOWN
+    kind = number[file.array(f"{_GROUP}/kind", "u", (m,)).astype(np.uint8)]
+    mu, lam = file.array(f"{_GROUP}/mu", "f", (m,)), file.array(f"{_GROUP}/lam", "f", (m,))
+    return RecordedPhysics(kind, mu, lam, compliances, *counts)
+
+
+def read_untouching(
+    file: CheckedFile, header: dict[str, Any], vertices: int, obstacle_vertices: list[int]
+) -> Untouching:
+    """What may touch, in a recording with so many vertices of bodies, and of each obstacle.
+
+    Raises
+    ------
+    OutputError : where it names something that is not there.
+    """
+    said = header.get("physics")
+    if said is None:
+        return Untouching((), np.zeros((0, 4), dtype=np.int64), np.zeros((0, 2), dtype=np.int64))
+    try:
+        pairs = tuple((int(i), int(j)) for i, j in said["untouching"])
+    except (KeyError, TypeError, ValueError):
+        raise file.broken("the pairs that may touch are not described as they should be") from None
+    stitched = file.array(f"{_GROUP}/stitched", "i", (None, 4)).astype(np.int64)
+    anchors = file.array(f"{_GROUP}/anchors", "i", (None, 2)).astype(np.int64)
+    owners = len(header["bodies"]) + len(obstacle_vertices)
+    numbers = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+    wrong = ((numbers < 0) | (numbers >= owners)).any()
+    wrong |= ((stitched < 0) | (stitched >= vertices + len(anchors))).any()
+    wrong |= any(not (0 <= i < len(obstacle_vertices) and 0 <= k < obstacle_vertices[i]) for i, k in anchors.tolist())
+    if wrong:
+        raise file.broken("what may touch names a body, obstacle or vertex that is not there")
+    return Untouching(pairs, stitched, anchors)

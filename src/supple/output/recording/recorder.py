@@ -1,0 +1,209 @@
+"""A sink that writes every frame to one VTKHDF file, which opens in ParaView and in `read_recording`.
+
+How the file survives a kill is told in `supple.output.recording.file`; what stands in it, in the tables below.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from supple.errors import OutputError
+from supple.output.files.atomic import output_error, parent_folder
+from supple.output.recording.file import STEP_TIMES, Layout, RecordingFile, Series, create, rewrite
+from supple.output.recording.scene import write_scene
+from supple.replacing import put_in_place, remove_abandoned, temporary_name
+from supple.simulate import Frame, Report
+from supple.state import Status
+
+logger = logging.getLogger(__name__)
+
+SUFFIXES = (".vtkhdf", ".hdf", ".hdf5", ".h5")
+REPORT_NUMBERS = (
+    "min_det_F",
+    "kinetic_energy",
+    "elastic_energy",
+    "potential_energy",
+    "stitch_energy",
+    "wall_seconds",
+    "min_distance",
+    "largest_stitch_stretch",
+)
+REPORT_VECTORS = ("linear_momentum", "angular_momentum")
+_TEXT_BYTES_PER_FRAME = 512
+# Frames, and bytes of frames, that are given room at first; more when they are needed.
+_FIRST_FRAMES, _FIRST_ROOM = 1 << 16, 1 << 30
+
+
+def frame_layout(points: int, tets: int, obstacles: int) -> Layout:
+    """The series that every recording has."""
+    numbers = (Series(f"supple/frames/{name}", 1) for name in REPORT_NUMBERS)
+    vectors = (Series(f"supple/frames/{name}", 1, (3,)) for name in REPORT_VECTORS)
+    series = (
+        Series("VTKHDF/Points", points, (3,)),
+        Series("VTKHDF/PointData/velocities", points, (3,)),
+        Series("VTKHDF/CellData/det_F", tets),
+        Series(STEP_TIMES, 1),
+        Series("supple/frames/time", 1),
+        Series("supple/frames/index", 1, (), "<i8"),
+        Series("supple/frames/status", 1, (), "|u1"),
+        Series("supple/frames/iterations", 1, (), "<i8"),
+        *numbers,
+        *vectors,
+        Series("supple/frames/poses", 1, (obstacles, 3, 4)),
+        Series("supple/frames/text_end", 1, (), "<i8"),
+        Series("supple/frames/text", 1, (_TEXT_BYTES_PER_FRAME,), "|u1", "supple/frames/text_end"),
+    )
+    return Layout(points, tets, series)
+
+
+class Recorder:
+    """Records a simulation: `simulate(scene, solver, dt, steps, sinks=[Recorder("out/recording.vtkhdf")])`.
+
+    The file appears, in place of an older one, with the first frame in it, and holds every whole frame from then on,
+    also while it is being written and when the writer is killed.
+
+    Parameters
+    ----------
+    path : of the file, ending in .vtkhdf (or .hdf, .hdf5, .h5). Its folder is made where it is missing.
+    scene_text : the scene file's text, kept in the recording.
+    solver : a description of the solver, kept in the recording.
+    compress : store the frames compressed once the simulation ends. Smaller, and slower to write.
+
+    Raises
+    ------
+    OutputError : here for an unusable path; from `begin` and `write` where the system refuses (no permission, no
+        room). All whole frames stay readable then.
+    """
+
+    def __init__(
+        self, path: str | Path, *, scene_text: str | None = None, solver: object = None, compress: bool = False
+    ) -> None:
+        self.path = Path(path)
+        if self.path.suffix.lower() not in SUFFIXES:
+            raise OutputError(f"{self.path}: ParaView knows a recording by its ending; name it {self.path.name}.vtkhdf")
+        if self.path.is_dir():
+            raise OutputError(f"{self.path}: is a folder; give the name of a file in it, such as recording.vtkhdf")
+        self._scene_text = scene_text
+        self._solver = None if solver is None else str(solver)
+        self._compress = bool(compress)
+        self._file: RecordingFile | None = None
+        self._text_end = 0
+        self._wanted = 0
+
+    def begin(self, first: Frame, dt: float, steps: int) -> None:
+        """Make the file, with the frame at the start."""
+        from supple import __version__
+
+        system = first.system
+        facts = {"supple_version": __version__, "dt": float(dt), "steps": int(steps), "solver": self._solver}
+        layout = frame_layout(len(system.rest_positions), len(system.tets), len(system.obstacles))
+        self._wanted = steps + 1
+        self._text_end = 0
+        capacity = min(self._wanted, _FIRST_FRAMES, max(2, _FIRST_ROOM // layout.frame_bytes))
+        parent_folder(self.path)
+        fresh = temporary_name(self.path)
+        try:
+            create(fresh, layout, capacity, lambda file: write_scene(file, first, facts, self._scene_text))
+            self._file = RecordingFile(fresh, layout, capacity)
+            self._put(first)
+            self._file = self._file.moved(self.path)
+            remove_abandoned(self.path)
+        except OSError as error:
+            raise output_error(self.path, error) from None
+        finally:
+            if self._file is not None and self._file.path == fresh:
+                self._file.close()
+                self._file = None
+            fresh.unlink(missing_ok=True)
+
+    def write(self, frame: Frame) -> None:
+        """Add one frame."""
+        if self._file is None:
+            raise OutputError(f"{self.path}: write was called before begin; let simulate drive the recorder")
+        try:
+            self._put(frame)
+        except OSError as error:
+            raise output_error(self.path, error) from None
+
+    def end(self) -> None:
+        """Give room that was not used back, and close the file."""
+        file, self._file = self._file, None
+        if file is None:
+            return
+        file.close()
+        if file.written == file.capacity and not self._compress:
+            return
+        fresh = temporary_name(self.path)
+        try:
+            rewrite(self.path, fresh, file.layout, None, compress=self._compress)
+            put_in_place(fresh, self.path)
+        except (OSError, RuntimeError) as error:
+            # The recording is whole as it is; there is only unused room in it.
+            logger.warning("%s: stays larger than it must be: %s", self.path, " ".join(str(error).split()))
+        finally:
+            fresh.unlink(missing_ok=True)
+
+    def _make_room(self, file: RecordingFile) -> RecordingFile:
+        """The same frames in a file with more room, which takes the place of this one."""
+        capacity = 2 * file.capacity
+        if file.capacity < self._wanted:
+            capacity = min(capacity, self._wanted)
+        fresh = temporary_name(file.path)
+        try:
+            file.close()
+            rewrite(file.path, fresh, file.layout, capacity)
+            larger = RecordingFile(fresh, file.layout, capacity, file.written)
+            larger.write_count()
+            logger.debug("%s: room for %d frames now", file.path, capacity)
+            return larger.moved(file.path)
+        finally:
+            fresh.unlink(missing_ok=True)
+
+    def _put(self, frame: Frame) -> None:
+        assert self._file is not None
+        report = frame.report
+        text = _frame_text(report)
+        full = self._file.written == self._file.capacity
+        while full or self._text_end + len(text) > self._file.room("supple/frames/text"):
+            self._file = self._make_room(self._file)
+            full = False
+        file = self._file
+        file.put("VTKHDF/Points", frame.state.positions)
+        file.put("VTKHDF/PointData/velocities", frame.state.velocities)
+        file.put("VTKHDF/CellData/det_F", frame.det_F)
+        file.put(STEP_TIMES, frame.time)
+        # VTK's own copy has its length changed a moment after the frame counts; ours does not.
+        file.put("supple/frames/time", frame.time)
+        file.put("supple/frames/index", frame.index)
+        file.put("supple/frames/status", list(Status).index(report.status))
+        file.put("supple/frames/iterations", report.iterations)
+        for name in REPORT_NUMBERS:
+            value = getattr(report, name)
+            file.put(f"supple/frames/{name}", math.nan if value is None else value)
+        for name in REPORT_VECTORS:
+            file.put(f"supple/frames/{name}", getattr(report, name))
+        poses = np.zeros((len(frame.system.obstacles), 3, 4))
+        for pose, obstacle in zip(poses, frame.system.obstacles, strict=True):
+            pose[:, :3], pose[:, 3] = obstacle.pose(frame.time)
+        file.put("supple/frames/poses", poses)
+        file.put_bytes("supple/frames/text", self._text_end, text)
+        file.put("supple/frames/text_end", self._text_end + len(text))
+        file.commit()
+        self._text_end += len(text)
+
+
+def _frame_text(report: Report) -> bytes:
+    """Message and details of a step, as JSON; nothing where there is neither."""
+    said = {key: value for key, value in (("message", report.message), ("details", report.details)) if value}
+    return json.dumps(said, default=_plain).encode() if said else b""
+
+
+def _plain(value: Any) -> Any:
+    """What JSON does not know: NumPy's numbers and arrays as numbers and lists, anything else as its text."""
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else str(value)

@@ -1,0 +1,231 @@
+"""What a recording keeps of its scene, once for all frames: bodies, skins and obstacles, and the arrays behind them."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.mesh.skin import Embedding
+from supple.output.recording.checked_hdf5 import CheckedFile
+from supple.output.recording.physics import write_physics
+from supple.output.recording.skinned_surface import SkinnedSurface
+from supple.output.recording.stitches import write_stitches
+from supple.scene.obstacles import Box, HalfSpace, Obstacle, Sphere, TriangleObstacle
+from supple.simulate import Frame
+from supple.state import Status
+from supple.system import BodyRange
+
+FORMAT_VERSION = 1
+VTK_TETRA = 10
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedBody:
+    """One body of a recording.
+
+    Attributes
+    ----------
+    name : of the body; material : its kind and parameters, as text
+    vertices, tets : rows of the recording's arrays that belong to it
+    triangles : (t, 3) its boundary, counter-clockwise from outside, rows of its own vertices
+    skin : a finer surface that it carries, or None; its corners are rows of its own vertices
+    """
+
+    name: str
+    material: str
+    vertices: slice
+    tets: slice
+    triangles: NDArray[np.int32]
+    skin: SkinnedSurface | None
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedObstacle:
+    """One obstacle of a recording, where it was at time 0.
+
+    Attributes
+    ----------
+    name : of the obstacle; kind : "HalfSpace", "Box", "Sphere" or "TriangleObstacle"
+    parameters : what it was made with: point, normal; center, size, orientation, inside; radius
+    vertices, triangles : of a TriangleObstacle, else empty
+    """
+
+    name: str
+    kind: str
+    parameters: dict[str, Any]
+    vertices: NDArray[np.float64]
+    triangles: NDArray[np.int32]
+
+
+def write_scene(file: h5py.File, first: Frame, facts: dict[str, Any], scene_text: str | None) -> None:
+    """Write everything that no frame changes; `facts` are added to the header."""
+    system = first.system
+    n, m = len(system.rest_positions), len(system.tets)
+    _write_grid(file.require_group("VTKHDF"), first, n, m)
+    own = file.create_group("supple")
+    own.attrs["format_version"] = FORMAT_VERSION
+    header = facts | {
+        "statuses": [str(status) for status in Status],
+        "bodies": [_describe_body(part) for part in system.bodies],
+        "obstacles": [_describe_obstacle(obstacle) for obstacle in system.obstacles],
+        "physics": write_physics(own, system),
+    }
+    own["header"] = json.dumps(header)
+    if scene_text is not None:
+        own["scene"] = scene_text
+    own["rest_positions"] = system.rest_positions
+    own["rest_volumes"] = system.rest_volumes
+    own["masses"] = system.masses
+    own["gravity"] = system.gravity
+    own["tets"] = system.tets
+    own["triangles"] = system.triangles
+    own["pinned_vertices"] = system.pinned_vertices
+    write_stitches(own, system)
+    for i, part in enumerate(system.bodies):
+        body = part.body
+        if body.skin is not None:
+            skin = body.skin.compact()
+            attached = Embedding.of(body.mesh, skin.vertices)
+            group = own.create_group(f"skins/{i}")
+            group["corners"], group["weights"] = attached.corners, attached.weights
+            group["triangles"] = skin.triangles
+    for i, obstacle in enumerate(system.obstacles):
+        if isinstance(obstacle, TriangleObstacle) and obstacle.surface is not None:
+            surface = obstacle.surface.compact()
+            group = own.create_group(f"obstacles/{i}")
+            group["vertices"], group["triangles"] = surface.vertices, surface.triangles
+
+
+def _write_grid(grid: h5py.Group, first: Frame, n: int, m: int) -> None:
+    system = first.system
+    grid.attrs.create("Version", np.array([2, 2], dtype=np.int64))
+    grid.attrs.create("Type", np.bytes_("UnstructuredGrid"))
+    for name, count in (("NumberOfPoints", n), ("NumberOfCells", m), ("NumberOfConnectivityIds", 4 * m)):
+        grid[name] = np.array([count], dtype=np.int64)
+    grid["Connectivity"] = system.tets.ravel().astype(np.int64)
+    grid["Offsets"] = np.arange(0, 4 * m + 1, 4, dtype=np.int64)
+    grid["Types"] = np.full(m, VTK_TETRA, dtype=np.uint8)
+    of_point, of_cell = np.zeros(n, dtype=np.int32), np.zeros(m, dtype=np.int32)
+    for i, part in enumerate(system.bodies):
+        of_point[part.vertices], of_cell[part.tets] = i, i
+    grid["PointData/body"], grid["CellData/body"] = of_point, of_cell
+
+
+def _describe_body(part: BodyRange) -> dict[str, Any]:
+    def ends(rows: slice) -> list[int]:
+        return [int(rows.start), int(rows.stop)]
+
+    return {
+        "name": part.name,
+        "material": _one_line(part.body.material),
+        "vertices": ends(part.vertices),
+        "tets": ends(part.tets),
+        "triangles": ends(part.triangles),
+        "skin": part.body.skin is not None,
+    }
+
+
+def _one_line(thing: object) -> str:
+    text = " ".join(repr(thing).split())
+    return text if len(text) <= 500 else text[:499] + "…"
+
+
+def _describe_obstacle(obstacle: Obstacle) -> dict[str, Any]:
+    numbers: dict[str, Any] = {"friction": float(obstacle.friction)}
+    if isinstance(obstacle, HalfSpace):
+        numbers |= {"point": _floats(obstacle.point), "normal": _floats(obstacle.normal)}
+    elif isinstance(obstacle, Box):
+        numbers |= {"center": _floats(obstacle.center), "size": _floats(obstacle.size)}
+        numbers |= {"orientation": obstacle.orientation.tolist(), "inside": bool(obstacle.inside)}
+    elif isinstance(obstacle, Sphere):
+        numbers |= {
+            "center": _floats(obstacle.center),
+            "radius": float(obstacle.radius),
+            "inside": bool(obstacle.inside),
+        }
+    return {"name": obstacle.name or obstacle.label, "kind": type(obstacle).__name__, "parameters": numbers}
+
+
+def _floats(value: Any) -> list[float]:
+    return np.asarray(value, dtype=np.float64).tolist()
+
+
+def read_header(file: CheckedFile) -> dict[str, Any]:
+    """The header of a recording, once it is clear that the file is one, of a version that we know.
+
+    Raises
+    ------
+    OutputError : where it is not.
+    """
+    version = file.attribute("supple", "format_version")
+    if version is None:
+        kind = file.attribute("VTKHDF", "Type")
+        said = (
+            f"a VTKHDF {kind.decode()} of another program"
+            if isinstance(kind, bytes)
+            else "an HDF5 file of another kind"
+        )
+        raise file.other(said)
+    if not isinstance(version, (int, np.integer)) or version < 1:
+        raise file.broken(f"its format version is {version!r}")
+    if version > FORMAT_VERSION:
+        raise file.newer(f"format {version}, this one reads {FORMAT_VERSION}")
+    try:
+        header = json.loads(file.text("supple/header"))
+        dt, lists = float(header["dt"]), [header[key] for key in ("statuses", "bodies", "obstacles")]
+    except (ValueError, TypeError, KeyError):
+        raise file.broken("its header is not the JSON that it should be") from None
+    if not all(isinstance(item, list) for item in lists) or not header["bodies"] or not dt > 0.0:
+        raise file.broken("its header has no bodies, or no time step")
+    return header
+
+
+def read_bodies(
+    file: CheckedFile, header: dict[str, Any], n: int, m: int, triangles: NDArray[np.int32]
+) -> tuple[RecordedBody, ...]:
+    """The bodies of a recording with n vertices and m tets."""
+    bodies = []
+    try:
+        for i, said in enumerate(header["bodies"]):
+            ends = [(int(a), int(b)) for a, b in (said["vertices"], said["tets"], said["triangles"])]
+            (v0, v1), (t0, t1), (f0, f1) = ends
+            if not (0 <= v0 < v1 <= n and 0 <= t0 < t1 <= m and 0 <= f0 <= f1 <= len(triangles)):
+                raise file.broken(f"body {said['name']!r} has rows {ends}, outside of {n} vertices and {m} tets")
+            own = triangles[f0:f1] - np.int32(v0)
+            if own.size and (own.min() < 0 or own.max() >= v1 - v0):
+                raise file.broken(f"body {said['name']!r} has triangles on vertices of another")
+            skin = _read_skin(file, f"supple/skins/{i}", v1 - v0) if said["skin"] else None
+            rows = slice(v0, v1), slice(t0, t1)
+            bodies.append(
+                RecordedBody(str(said["name"]), str(said["material"]), *rows, np.ascontiguousarray(own), skin)
+            )
+    except (KeyError, TypeError, ValueError):
+        raise file.broken("the bodies in its header are not described as they should be") from None
+    return tuple(bodies)
+
+
+def _read_skin(file: CheckedFile, path: str, vertices: int) -> SkinnedSurface:
+    corners = file.indices(f"{path}/corners", 4, vertices)
+    weights = file.array(f"{path}/weights", "f", (len(corners), 4))
+    return SkinnedSurface(corners, weights, file.indices(f"{path}/triangles", 3, len(corners)))
+
+
+def read_obstacles(file: CheckedFile, header: dict[str, Any]) -> tuple[RecordedObstacle, ...]:
+    """The obstacles of a recording."""
+    obstacles = []
+    try:
+        for i, said in enumerate(header["obstacles"]):
+            vertices, triangles = np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32)
+            if said["kind"] == "TriangleObstacle":
+                vertices = file.array(f"supple/obstacles/{i}/vertices", "f", (None, 3))
+                triangles = file.indices(f"supple/obstacles/{i}/triangles", 3, len(vertices))
+            made = RecordedObstacle(str(said["name"]), str(said["kind"]), dict(said["parameters"]), vertices, triangles)
+            obstacles.append(made)
+    except (KeyError, TypeError, ValueError):
+        raise file.broken("the obstacles in its header are not described as they should be") from None
+    return tuple(obstacles)

@@ -1,0 +1,71 @@
+"""What a recording keeps of stitches: what holds on to what, so that they can be drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.output.recording.checked_hdf5 import CheckedFile
+from supple.scene.stitches.measures import attachments
+from supple.system import System, initial_state
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedStitches:
+    """The stitches of a recording, each from a vertex to the place that was nearest to it at the start.
+
+    Attributes
+    ----------
+    nodes : (k, 4) the vertex, then the corners of what it is stitched to; from n on, vertices of obstacles
+    weights : (k, 3) of the corners
+    anchor_owners : (a,) which obstacle those vertices belong to; anchors : (a, 3) at time 0, before its pose [m]
+    """
+
+    nodes: NDArray[np.int32]
+    weights: NDArray[np.float64]
+    anchor_owners: NDArray[np.int32]
+    anchors: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.nodes)
+
+    def segments(self, x: NDArray[np.float64], poses: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(k, 2, 3) ends of the stitches [m].
+
+        Parameters
+        ----------
+        x : (n, 3) vertices of bodies [m]; poses : (obstacles, 3, 4) as of `RecordedFrame.poses`
+        """
+        pose = poses[self.anchor_owners]
+        there = np.einsum("aij,aj->ai", pose[:, :, :3], self.anchors) + pose[:, :, 3]
+        corners = np.concatenate([x, there])[self.nodes]
+        return np.stack([corners[:, 0], np.einsum("kc,kci->ki", self.weights, corners[:, 1:])], axis=1)
+
+
+def write_stitches(own: h5py.Group, system: System) -> None:
+    """Add them to a recording's own group; nothing where there are none."""
+    stitching = system.stitching
+    if not len(stitching):
+        return
+    start = initial_state(system.scene).positions
+    nodes, weights = attachments(stitching, stitching.points(start, 0.0))
+    group = own.create_group("stitches")
+    group["nodes"], group["weights"] = nodes, weights
+    group["anchor_owners"], group["anchors"] = stitching.anchors.owner, stitching.anchors.points
+
+
+def read_stitches(file: CheckedFile, n: int, obstacles: int) -> RecordedStitches:
+    """The stitches of a recording with n vertices."""
+    if "supple/stitches" not in file:
+        nothing = np.zeros(0, dtype=np.int32)
+        return RecordedStitches(nothing.reshape(0, 4), np.zeros((0, 3)), nothing, np.zeros((0, 3)))
+    anchors = file.array("supple/stitches/anchors", "f", (None, 3))
+    owners = file.array("supple/stitches/anchor_owners", "i", (len(anchors),))
+    if len(owners) and not 0 <= owners.min() <= owners.max() < obstacles:
+        raise file.broken("a stitch holds on to an obstacle that is not there")
+    nodes = file.indices("supple/stitches/nodes", 4, n + len(anchors))
+    weights = file.array("supple/stitches/weights", "f", (len(nodes), 3))
+    return RecordedStitches(nodes, weights, owners, anchors)

@@ -1,0 +1,145 @@
+"""Bodies of a scene file: what they are made of, where they start, and copies of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from supple.scene.body import Body
+from supple.scene_file.entries.materials import MaterialModel
+from supple.scene_file.entries.mesh_sources import MeshFileModel, MeshStore, SurfaceModel
+from supple.scene_file.entries.regions import RegionModel, with_regions
+from supple.scene_file.entries.shapes import ShapeModel
+from supple.scene_file.located import at
+from supple.scene_file.model import Count, Model, Name, NonNegative, Positive, Vector
+
+MAX_COPIES = 10_000
+
+
+class CopiesModel(Model):
+    """The body many times, named name01, name02, ...: at given offsets, or in a grid."""
+
+    offsets: list[Vector] | None = Field(
+        default=None, min_length=1, max_length=MAX_COPIES, description="from `position` [m]"
+    )
+    rotations: list[Vector] | None = Field(default=None, description="one per offset, instead of the body's [rad]")
+    grid: Annotated[list[Count], Field(min_length=3, max_length=3)] | None = Field(
+        default=None, description="instead of `offsets`: how many along x, y and z"
+    )
+    spacing: Vector | None = Field(default=None, description="between neighbours of the grid [m]")
+
+    @model_validator(mode="after")
+    def _one_layout(self) -> CopiesModel:
+        if (self.offsets is None) == (self.grid is None):
+            raise ValueError("copies need either `offsets` or `grid`; give one of them")
+        if (self.grid is None) != (self.spacing is None):
+            raise ValueError("`grid` and `spacing` go together; give both or neither")
+        if self.grid is not None and np.prod([float(n) for n in self.grid]) > MAX_COPIES:
+            raise ValueError(f"grid {self.grid} makes more than {MAX_COPIES} copies; make it smaller")
+        if self.rotations is not None and (self.offsets is None or len(self.rotations) != len(self.offsets)):
+            raise ValueError("`rotations` needs one entry for each of `offsets`")
+        return self
+
+    def placements(self) -> Iterator[tuple[NDArray[np.float64], list[float] | None]]:
+        """Offset (3,) [m], and rotation where one is given, of each copy."""
+        if self.offsets is not None:
+            for i, offset in enumerate(self.offsets):
+                yield np.array(offset), self.rotations[i] if self.rotations else None
+        if self.grid is not None:
+            for cell in np.ndindex(*reversed(self.grid)):
+                yield np.array(cell[::-1]) * np.array(self.spacing), None
+
+
+class InitialModel(Model):
+    """How a body starts, if not at rest in its shape."""
+
+    scale: Annotated[list[Positive], Field(min_length=3, max_length=3)] = Field(
+        description="along the world's x, y and z about the center of volume; [1, 0.5, 1] squeezes to half the height"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class BuiltBody:
+    """A body, and its vertices (n, 3) [m] at the start where they are not simply placed."""
+
+    body: Body
+    initial_positions: NDArray[np.float64] | None
+
+
+class BodyModel(Model):
+    """One soft body. Give `mesh` (a file) or `shape`."""
+
+    name: Name = Field(description="unique in the scene")
+    mesh: MeshFileModel | None = Field(default=None, description="of tetrahedra, or a surface to fill with them")
+    shape: ShapeModel | None = Field(default=None, description="instead of `mesh`: one that Supple makes itself")
+    material: MaterialModel
+    regions: list[RegionModel] | None = Field(
+        default=None,
+        min_length=1,
+        max_length=1000,
+        description="parts of the body that are made of other materials; of two that overlap, the later one counts",
+    )
+    position: Vector = Field(default=[0.0, 0.0, 0.0], description="where the mesh's origin is placed [m]")
+    rotation: Vector = Field(default=[0.0, 0.0, 0.0], description="rotation vector about the mesh's origin [rad]")
+    velocity: Vector = Field(default=[0.0, 0.0, 0.0], description="of the center of mass, at the start [m/s]")
+    angular_velocity: Vector = Field(
+        default=[0.0, 0.0, 0.0], description="about the center of mass, at the start [rad/s]"
+    )
+    friction: NonNegative = Field(default=0.0, description="Coulomb coefficient against other bodies and itself")
+    skin: SurfaceModel | None = Field(
+        default=None, description="a finer surface that follows the body in pages and exports"
+    )
+    copies: CopiesModel | None = Field(default=None, description="the body many times")
+    initial: InitialModel | None = Field(default=None, description="a deformed start")
+
+    @model_validator(mode="after")
+    def _one_mesh(self) -> BodyModel:
+        if (self.mesh is None) == (self.shape is None):
+            raise ValueError("a body needs either `mesh` or `shape`; give one of them")
+        return self
+
+    def build(self, meshes: MeshStore) -> list[BuiltBody]:
+        """The body, or all its copies."""
+        if self.mesh is not None:
+            with at("mesh"):
+                mesh = meshes.tets(self.mesh)
+        else:
+            assert self.shape is not None
+            with at("shape"):
+                mesh = meshes.shape(self.shape)
+        with at("skin"):
+            skin = meshes.surface(self.skin) if self.skin is not None else None
+        with at("material"):
+            material = self.material.build()
+        if self.regions is not None:
+            with at("regions"):
+                material = with_regions(material, self.regions, mesh)
+        copies = list(self.copies.placements()) if self.copies is not None else [(np.zeros(3), None)]
+        digits = max(2, len(str(len(copies))))
+        built = []
+        for i, (offset, rotation) in enumerate(copies):
+            body = Body(
+                self.name if self.copies is None else f"{self.name}{i + 1:0{digits}d}",
+                mesh,
+                material,
+                position=np.array(self.position) + offset,
+                rotation=self.rotation if rotation is None else rotation,
+                velocity=self.velocity,
+                angular_velocity=self.angular_velocity,
+                friction=self.friction,
+                skin=skin,
+            )
+            built.append(BuiltBody(body, _scaled(body, self.initial.scale) if self.initial else None))
+        return built
+
+
+def _scaled(body: Body, scale: list[float]) -> NDArray[np.float64]:
+    placed = body.place(body.mesh.vertices)
+    corners = placed[body.mesh.tets].mean(axis=1)
+    center = body.mesh.volumes @ corners / body.mesh.volume
+    return center + (placed - center) * np.array(scale)

@@ -1,0 +1,130 @@
+"""Where the meshes of a scene file come from, and the store that reads or makes each of them once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, Field, model_validator
+
+from supple.errors import MeshError
+from supple.mesh.surface import SurfaceMesh
+from supple.mesh.tetmesh import TetMesh
+from supple.scene.rotation import rotation_matrix
+from supple.scene_file.entries.shapes import ShapeModel, SurfaceShapeModel
+from supple.scene_file.located import at
+from supple.scene_file.model import FilePath, Model, Positive, Vector
+
+SURFACE_FILES = (".stl", ".obj", ".ply", ".off", ".vtp")
+TET_FILES = (".node", ".ele", ".edge", ".face", ".msh")
+MESHING_OPTIONS = ("max_volume", "quality", "min_dihedral", "keep_surface", "mesher", "repair", "time_limit")
+
+
+class MeshFileModel(Model):
+    """A mesh file. A surface is filled with tetrahedra as the meshing options say."""
+
+    file: FilePath = Field(description="relative to the scene file")
+    scale: Positive = Field(default=1.0, description="of all coordinates: 0.001 for a file in millimetres")
+    max_volume: Positive | None = Field(default=None, description="of a tetrahedron [m^3], after scaling")
+    quality: float | None = Field(
+        default=None, ge=1.0, le=100.0, description="largest ratio of circumradius to shortest edge"
+    )
+    min_dihedral: float | None = Field(default=None, ge=0.0, lt=70.0, description="[degrees]")
+    keep_surface: bool | None = Field(default=None, description="true: no new vertices on the surface")
+    mesher: Literal["auto", "tetgen", "ftetwild"] | None = Field(default=None, description="who fills the surface")
+    repair: bool | None = Field(default=None, description="true: mend the surface first")
+    time_limit: Positive | None = Field(default=None, description="of the mesher [s]")
+
+    @property
+    def meshing(self) -> dict[str, Any]:
+        """The meshing options that were given."""
+        return {key: getattr(self, key) for key in MESHING_OPTIONS if getattr(self, key) is not None}
+
+    def is_surface(self) -> bool:
+        """Whether the file is a surface to be filled: by its extension; where that says nothing, by the options."""
+        suffix = Path(self.file).suffix.lower()
+        if suffix in TET_FILES and self.meshing:
+            with at(next(iter(self.meshing))):
+                raise MeshError(f"{self.file} holds tetrahedra already; remove this")
+        return suffix in SURFACE_FILES or (suffix not in TET_FILES and bool(self.meshing))
+
+
+class SurfaceModel(Model):
+    """A triangle surface: of a file or of a shape, scaled, then turned, then moved."""
+
+    file: FilePath | None = Field(default=None, description="relative to the scene file")
+    shape: SurfaceShapeModel | None = Field(default=None, description="instead of `file`")
+    scale: Positive = Field(default=1.0, description="of all coordinates")
+    rotation: Vector = Field(default=[0.0, 0.0, 0.0], description="rotation vector about the origin [rad]")
+    position: Vector = Field(default=[0.0, 0.0, 0.0], description="[m]")
+
+    @model_validator(mode="after")
+    def _one_source(self) -> SurfaceModel:
+        if (self.file is None) == (self.shape is None):
+            raise ValueError("a surface needs either `file` or `shape`; give one of them")
+        return self
+
+
+class MeshStore:
+    """Reads and makes meshes; equal descriptions share one mesh.
+
+    Parameters
+    ----------
+    folder : what relative paths are relative to.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._made: dict[str, Any] = {}
+
+    def _once(self, description: BaseModel, make: Any) -> Any:
+        key = f"{type(description).__name__}{description.model_dump_json()}"
+        if key not in self._made:
+            self._made[key] = make()
+        return self._made[key]
+
+    def tets(self, source: MeshFileModel) -> TetMesh:
+        """The tet mesh of a file, or of the surface in it."""
+        return self._once(source, lambda: self._read(source))
+
+    def shape(self, shape: ShapeModel) -> TetMesh:
+        """The tet mesh of a shape."""
+        return self._once(shape, shape.build)
+
+    def surface(self, source: SurfaceModel) -> SurfaceMesh:
+        """The surface of a file or a shape, placed."""
+        return self._once(source, lambda: self._surface(source))
+
+    def located(self, file: str) -> Path:
+        """The path of a mesh file that a scene names.
+
+        Raises
+        ------
+        SceneError : where it may not be read.
+        """
+        return self.folder / file
+
+    def _read(self, source: MeshFileModel) -> TetMesh:
+        if source.is_surface():
+            from supple.mesh.meshing.tetrahedralize import tetrahedralize
+
+            with at("file"):
+                surface = SurfaceMesh.load(self.located(source.file))
+            if source.scale != 1.0:
+                surface = surface.transformed(source.scale)
+            return tetrahedralize(surface, **source.meshing)
+        with at("file"):
+            mesh = TetMesh.load(self.located(source.file))
+        return mesh if source.scale == 1.0 else mesh.transformed(source.scale)
+
+    def _surface(self, source: SurfaceModel) -> SurfaceMesh:
+        if source.file is not None:
+            with at("file"):
+                surface = SurfaceMesh.load(self.located(source.file))
+        else:
+            assert source.shape is not None
+            with at("shape"):
+                surface = source.shape.build_surface()
+        if source.scale == 1.0 and not any(source.rotation) and not any(source.position):
+            return surface
+        return surface.transformed(source.scale, rotation_matrix(source.rotation), source.position)

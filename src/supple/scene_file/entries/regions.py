@@ -1,0 +1,78 @@
+"""Parts of a body of a scene file that are made of other materials."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from supple.errors import SceneError
+from supple.materials.material import Elastic, Material
+from supple.materials.regions import Regions
+from supple.mesh.tetmesh import TetMesh
+from supple.scene.selection import InBox
+from supple.scene_file.entries.materials import ElasticMaterialModel
+from supple.scene_file.located import at
+from supple.scene_file.model import Model, Vector
+
+TetIndex = Annotated[int, Field(ge=0, lt=2**31)]
+
+
+class BoxOfMeshModel(Model):
+    """The tets whose center is inside an axis-aligned box, in the coordinates of the mesh: before `position`,
+    `rotation` and `copies`."""
+
+    low: Vector = Field(description="corner with the lowest coordinates [m]")
+    high: Vector = Field(description="corner with the highest coordinates [m]")
+
+
+class RegionModel(Model):
+    """Tets of a body that are made of another elastic material than the body's."""
+
+    material: ElasticMaterialModel
+    box: BoxOfMeshModel | None = Field(default=None, description="all tets whose center is inside")
+    tets: list[TetIndex] | None = Field(
+        default=None, min_length=1, description="instead of `box`: tet numbers of the mesh, from 0"
+    )
+
+    @model_validator(mode="after")
+    def _one_selection(self) -> RegionModel:
+        if (self.box is None) == (self.tets is None):
+            raise ValueError("give the tets of a region by either `box` or `tets`")
+        return self
+
+    def select(self, mesh: TetMesh) -> NDArray[np.int64]:
+        """Numbers (k,) of the tets that are meant."""
+        if self.box is not None:
+            with at("box"):
+                centers = mesh.vertices[mesh.tets].mean(axis=1)
+                inside = InBox(self.box.low, self.box.high).select(centers)
+                if not len(inside):
+                    low, high = (np.round(corner, 6).tolist() for corner in (centers.min(axis=0), centers.max(axis=0)))
+                    raise SceneError(
+                        f"no tet has its center inside; they reach from {low} to {high} in the coordinates of the mesh"
+                    )
+                return inside.astype(np.int64)
+        chosen = np.array(self.tets)
+        if chosen.max() >= len(mesh.tets):
+            with at("tets"):
+                raise SceneError(f"names tet {chosen.max()}; the mesh has tets 0 to {len(mesh.tets) - 1}")
+        return chosen
+
+
+def with_regions(material: Material, regions: list[RegionModel], mesh: TetMesh) -> Material:
+    """The body's material, but that of the last region that has it for each tet of a region.
+
+    Raises
+    ------
+    LocatedError : where a region is empty or not of this mesh, or the body's own material is not elastic.
+    """
+    if not isinstance(material, Elastic):
+        raise SceneError(f"regions need an elastic material beside them, which {type(material).__name__} is not")
+    index = np.zeros(len(mesh.tets), dtype=np.int64)
+    for k, region in enumerate(regions):
+        with at(k):
+            index[region.select(mesh)] = k + 1
+    return Regions(materials=[material, *(region.material.build() for region in regions)], index=index)

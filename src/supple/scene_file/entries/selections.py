@@ -1,0 +1,75 @@
+"""Parts of a scene file that speak of some vertices of one body: pins, forces and soft targets."""
+
+from __future__ import annotations
+
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from supple.scene.forces import Force, SoftTarget
+from supple.scene.pins import Pin
+from supple.scene.selection import InBox, Selection
+from supple.scene_file.entries.motions import KeyframesModel
+from supple.scene_file.located import at
+from supple.scene_file.model import Model, Name, Positive, Vector
+
+VertexIndex = Annotated[int, Field(ge=0, lt=2**31)]
+
+
+class InBoxModel(Model):
+    """The vertices inside an axis-aligned box of world coordinates, at the start."""
+
+    low: Vector = Field(description="corner with the lowest coordinates [m]")
+    high: Vector = Field(description="corner with the highest coordinates [m]")
+
+
+class _SelectionModel(Model):
+    body: Name = Field(description="name of the body")
+    vertices: list[VertexIndex] | None = Field(default=None, min_length=1, description="vertex numbers, from 0")
+    box: InBoxModel | None = Field(default=None, description="instead of `vertices`: all that are inside")
+    name: Name | None = Field(default=None, description="stands in messages and reports")
+
+    @model_validator(mode="after")
+    def _one_selection(self) -> Self:
+        if (self.vertices is None) == (self.box is None):
+            raise ValueError("give the vertices by either `vertices` or `box`")
+        return self
+
+    def selection(self) -> Selection:
+        if self.box is not None:
+            with at("box"):
+                return InBox(self.box.low, self.box.high)
+        assert self.vertices is not None
+        return self.vertices
+
+
+class PinModel(_SelectionModel):
+    """Vertices of one body that are held, or moved by keyframes."""
+
+    motion: KeyframesModel | None = Field(default=None, description="from where they are at the start; held without it")
+
+    def build(self) -> Pin:
+        with at("motion"):
+            motion = self.motion.build() if self.motion else None
+        return Pin(self.body, self.selection(), motion, name=self.name)
+
+
+class ForceModel(_SelectionModel):
+    """A load on vertices of one body that keeps its direction (implicit solver)."""
+
+    force: Vector = Field(description="in total, shared equally by the vertices [N]")
+
+    def build(self) -> Force:
+        return Force(self.body, self.selection(), self.force, name=self.name)
+
+
+class SoftTargetModel(_SelectionModel):
+    """Springs from vertices of one body to where they start, or are carried by keyframes (implicit solver)."""
+
+    stiffness: Positive = Field(description="of each vertex's spring [N/m]")
+    motion: KeyframesModel | None = Field(default=None, description="of the springs' other ends")
+
+    def build(self) -> SoftTarget:
+        with at("motion"):
+            motion = self.motion.build() if self.motion else None
+        return SoftTarget(self.body, self.selection(), self.stiffness, motion, name=self.name)

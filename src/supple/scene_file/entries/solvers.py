@@ -1,0 +1,100 @@
+"""Solvers of a scene file, by `kind`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from supple.errors import SolverError
+from supple.scene_file.complaints import suggestion
+from supple.scene_file.model import Model, Positive
+from supple.solver import Solver
+
+Iterations = Annotated[int, Field(ge=1, le=100_000)]
+
+
+class XPBDContactModel(Model):
+    """Contact of bodies with each other and with themselves. Obstacles act with or without it."""
+
+    thickness: Positive | None = Field(
+        default=None, description="gap between surfaces [m]; a twentieth of the mean surface edge without it"
+    )
+    body_collision: bool = Field(default=True, description="whether bodies collide with each other")
+    self_collision: bool = Field(default=True, description="whether a body collides with itself")
+
+
+class XPBDModel(Model):
+    """Extended position-based dynamics in small steps: fast, robust, approximate."""
+
+    kind: Literal["xpbd"]
+    substeps: Iterations = Field(default=20, description="per frame, each with one sweep over all constraints")
+    momentum_restore: bool = Field(default=True, description="false shows what XPBD does to momentum without")
+    contact: XPBDContactModel | None = Field(
+        default_factory=XPBDContactModel, description="of bodies with each other and themselves; null turns it off"
+    )
+    threads: int | None = Field(default=None, ge=1, le=1024, description="as the scene's size asks for, without it")
+
+    def build(self) -> Solver:
+        from supple.xpbd.contact.settings import XPBDContact
+        from supple.xpbd.solver import XPBD
+
+        contact = None if self.contact is None else XPBDContact(**self.contact.model_dump())
+        return XPBD(self.substeps, self.momentum_restore, contact, self.threads)
+
+
+class ContactModel(Model):
+    """Incremental potential contact: surfaces never intersect."""
+
+    dhat: Positive | None = Field(
+        default=None, description="distance below which surfaces repel each other [m]; from the bodies without it"
+    )
+    stiffness: Positive | Literal["adaptive"] = Field(
+        default="adaptive", description="pressure scale of the barrier [Pa]; adaptive: from the bodies' moduli"
+    )
+    friction_velocity: Positive | None = Field(
+        default=None, description="relative velocity below which friction is static [m/s]; from the bodies without it"
+    )
+    friction_iterations: Iterations | None = Field(
+        default=None, description="updates of friction's normal forces in a step; null: until they change by under 10 %"
+    )
+
+
+class ImplicitModel(Model):
+    """Implicit finite elements by projected Newton: no tetrahedron inverts, no surfaces intersect."""
+
+    kind: Literal["implicit"]
+    integrator: Literal["backward_euler", "bdf2", "newmark", "static"] = Field(default="backward_euler")
+    tolerance: Positive | None = Field(
+        default=None, description="of Newton's step, relative to the smallest body [1/s]"
+    )
+    max_iterations: Iterations = Field(default=120, description="of Newton in one step")
+    linear_solver: Literal["auto", "pcg", "direct"] = Field(default="auto")
+    max_substeps: Iterations = Field(default=64, description="a step that fails is halved until it would take more")
+    contact: ContactModel | None = Field(
+        default_factory=ContactModel, description="of bodies with all obstacles, each other and themselves; null: none"
+    )
+
+    def build(self) -> Solver:
+        from supple.implicit.contact.settings import IPCContact
+        from supple.implicit.solver import Implicit
+
+        contact = None if self.contact is None else IPCContact(**self.contact.model_dump())
+        return Implicit(**self.model_dump(exclude={"kind", "contact"}), contact=contact)
+
+
+SolverModel = Annotated[XPBDModel | ImplicitModel, Field(discriminator="kind")]
+
+_KINDS: dict[str, type[XPBDModel] | type[ImplicitModel]] = {"xpbd": XPBDModel, "implicit": ImplicitModel}
+
+
+def solver_of_kind(kind: str) -> Solver:
+    """The solver of that kind, with its default parameters.
+
+    Raises
+    ------
+    SolverError : where there is none.
+    """
+    if kind not in _KINDS:
+        raise SolverError(f"there is no solver {kind!r}; {suggestion(kind, _KINDS)}")
+    return _KINDS[kind](kind=kind).build()  # pyright: ignore[reportArgumentType]

@@ -1,0 +1,53 @@
+"""A grid below everything: it says where the floor is, and how large things are."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from supple.viewer.drawing.layers.primitives.layer import Layer
+from supple.viewer.drawing.layers.primitives.rotation import turning_z_to
+from supple.viewer.drawing.moments.model import Moment
+
+
+class Ground(Layer):
+    """Lines on the floor, or below the bodies where there is none."""
+
+    def __init__(self, scene: Any, moment: Moment) -> None:
+        model = moment.model
+        view, up = model.view, model.view.up
+        floors = [
+            np.asarray(obstacle.parameters["point"], dtype=float)
+            for obstacle in model.obstacles
+            if obstacle.kind == "HalfSpace" and float(np.dot(obstacle.parameters["normal"], up)) > 0.99
+        ]
+        lowest = float(np.min([corner @ up for corner in _corners(view.low, view.high)]))
+        height = max((float(point @ up) for point in floors), default=lowest)
+        # A hair above the floor: two surfaces in one plane flicker.
+        place = view.center + (height + 2e-3 * view.radius - float(view.center @ up)) * up
+        cell = 10.0 ** math.floor(math.log10(view.radius))
+        self._grid = scene.add_grid(
+            "/ground",
+            width=5.0 * view.radius,
+            height=5.0 * view.radius,
+            cell_size=cell,
+            section_size=5.0 * cell,
+            cell_color=(205, 208, 214),
+            section_color=(150, 154, 162),
+            fade_distance=12.0 * view.radius,
+            shadow_opacity=0.2,
+            wxyz=turning_z_to(up),
+            position=tuple(place),
+        )
+
+    def update(self, moment: Moment) -> None:
+        """It stays."""
+
+    def remove(self) -> None:
+        self._grid.remove()
+
+
+def _corners(low: np.ndarray, high: np.ndarray) -> list[np.ndarray]:
+    return [np.where([a, b, c], low, high) for a in (0, 1) for b in (0, 1) for c in (0, 1)]

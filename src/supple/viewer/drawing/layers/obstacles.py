@@ -1,0 +1,46 @@
+"""Obstacles, moving as they are scripted."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from supple.output.drawing import OBSTACLE_COLOR, obstacle_pictures
+from supple.viewer.drawing.layers.primitives.layer import Layer, single
+from supple.viewer.drawing.layers.primitives.rotation import quaternion
+from supple.viewer.drawing.moments.model import Moment
+
+
+class ObstacleView(Layer):
+    """One mesh for each obstacle."""
+
+    def __init__(self, scene: Any, moment: Moment) -> None:
+        model = moment.model
+        self._handles = {}
+        for picture in obstacle_pictures(model, model.view):
+            pose = moment.poses[picture.number]
+            handle = scene.add_mesh_simple(
+                f"/obstacles/{picture.number} {picture.name}",
+                single(picture.vertices),
+                picture.triangles.astype(np.uint32),
+                color=OBSTACLE_COLOR,
+                opacity=picture.opacity if picture.opacity < 1.0 else None,
+                flat_shading=model.obstacles[picture.number].kind != "Sphere",
+                side="double",
+                wxyz=quaternion(pose[:, :3]),
+                position=pose[:, 3],
+                cast_shadow=picture.opacity == 1.0,
+            )
+            self._handles[picture.number] = handle, pose
+
+    def update(self, moment: Moment) -> None:
+        for number, (handle, before) in self._handles.items():
+            pose = moment.poses[number]
+            if not np.array_equal(pose, before):
+                handle.wxyz, handle.position = quaternion(pose[:, :3]), pose[:, 3]
+                self._handles[number] = handle, pose
+
+    def remove(self) -> None:
+        for handle, _ in self._handles.values():
+            handle.remove()

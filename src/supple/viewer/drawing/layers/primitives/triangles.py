@@ -1,0 +1,69 @@
+"""Triangles each with a color of its own.
+
+The page's meshes have one color each, so triangles are sorted by color into as many meshes as there are colors.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.viewer.drawing.layers.primitives.layer import single
+
+_LEAST = 16  # room for triangles, at least
+
+
+class ColoredTriangles:
+    """Flat triangles in a few colors.
+
+    Parameters
+    ----------
+    scene : viser's scene; name : of the meshes, which get a number each; colors : (c, 3) from 0 to 255
+    """
+
+    def __init__(self, scene: Any, name: str, colors: NDArray[np.uint8]) -> None:
+        self.handles = [
+            scene.add_mesh_simple(
+                f"{name}/{i}",
+                np.zeros((3 * _LEAST, 3), dtype=np.float32),
+                _faces(_LEAST),
+                color=tuple(int(c) for c in color),
+                flat_shading=True,
+                side="double",
+                visible=False,
+            )
+            for i, color in enumerate(colors)
+        ]
+        self._room = [_LEAST] * len(self.handles)
+
+    def update(self, corners: NDArray[np.float64], color: NDArray[np.int64]) -> None:
+        """Draw triangles with these corners (t, 3, 3) [m], each in one of the colors (t,)."""
+        order = np.argsort(color, kind="stable")
+        ends = np.searchsorted(color[order], np.arange(len(self.handles) + 1))
+        for i, handle in enumerate(self.handles):
+            mine = corners[order[ends[i] : ends[i + 1]]]
+            if len(mine) == 0:
+                if handle.visible:
+                    handle.visible = False
+                continue
+            # Room in powers of two: the browser makes new buffers only where it changes.
+            room = max(_LEAST, 1 << (len(mine) - 1).bit_length())
+            points = np.repeat(mine[:1, :1], 3 * room, axis=0).reshape(-1, 3)
+            points[: 3 * len(mine)] = mine.reshape(-1, 3)
+            handle.vertices = single(points)
+            if room != self._room[i]:
+                handle.faces = _faces(room)
+                self._room[i] = room
+            if not handle.visible:
+                handle.visible = True
+
+    def remove(self) -> None:
+        """Take them off the page."""
+        for handle in self.handles:
+            handle.remove()
+
+
+def _faces(count: int) -> NDArray[np.uint32]:
+    return np.arange(3 * count, dtype=np.uint32).reshape(-1, 3)

@@ -1,0 +1,27 @@
+"""Stitches between bodies: from each stitched vertex to the middle of its triangle."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from supple.viewer.drawing.layers.primitives.layer import Layer, single
+from supple.viewer.drawing.moments.model import Moment
+
+
+class StitchView(Layer):
+    """A line for each stitch; nothing where there are none."""
+
+    def __init__(self, scene: Any, moment: Moment) -> None:
+        self._handle = None
+        if len(moment.stitch_segments):
+            self._handle = scene.add_line_segments(
+                "/stitches", single(moment.stitch_segments), (30, 30, 34), thickness=2.5, thickness_units="screen"
+            )
+
+    def update(self, moment: Moment) -> None:
+        if self._handle is not None:
+            self._handle.points = single(moment.stitch_segments)
+
+    def remove(self) -> None:
+        if self._handle is not None:
+            self._handle.remove()

@@ -1,0 +1,109 @@
+"""Bodies as tets: colored by a number of each, pulled apart, or cut open."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.viewer.drawing.coloring.color_scale import Limits, bin_of, not_known_color, palette
+from supple.viewer.drawing.coloring.fields import Field
+from supple.viewer.drawing.layers.primitives.layer import Layer
+from supple.viewer.drawing.layers.primitives.triangles import ColoredTriangles
+from supple.viewer.drawing.moments.model import TET_FACETS, Model, Moment
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A plane that hides what lies beyond it at rest.
+
+    Attributes
+    ----------
+    axis : 0, 1 or 2; place : from 0 (everything is hidden) to 1 (nothing is), as a part of each body's extent
+    """
+
+    axis: int
+    place: float
+
+
+class TetView(Layer):
+    """Facets of tets.
+
+    Parameters
+    ----------
+    field : what to color by, or None for the bodies' own colors
+    explode : how far the tets are pulled apart, as a part of their distance from the body's centre; 0 shows only the
+        surface
+    cut : a plane that hides tets, or None
+    """
+
+    def __init__(self, scene: Any, moment: Moment, field: Field | None, explode: float, cut: Cut | None) -> None:
+        model = moment.model
+        self._field, self._explode = field, explode
+        self._limits = Limits(field) if field is not None else None
+        self.range: tuple[float, float] | None = None
+        colors = palette(field) if field is not None else np.array([body.color for body in model.bodies])
+        self._triangles = ColoredTriangles(scene, "/bodies/tets", np.vstack([colors, [not_known_color()]]))
+        kept = kept_tets(model, cut)
+        self._corners, self._owner = exploded_facets(model, kept) if explode > 0.0 else outer_facets(model, kept)
+        self._body = np.empty(len(model.tets), dtype=np.int64)
+        for i, body in enumerate(model.bodies):
+            self._body[body.tets] = i
+        self.update(moment)
+
+    def update(self, moment: Moment) -> None:
+        x = moment.shown_positions[self._corners]
+        if self._explode > 0.0:
+            x = x + self._offsets(moment)[self._owner][:, None]
+        if self._field is None or self._limits is None:
+            color = self._body
+        else:
+            values = self._field.values(moment)
+            self.range = self._limits.follow(values)
+            color = bin_of(values, *self.range)
+        self._triangles.update(x, color[self._owner])
+
+    def remove(self) -> None:
+        self._triangles.remove()
+
+    @property
+    def handles(self) -> list[Any]:
+        return list(self._triangles.handles)
+
+    def _offsets(self, moment: Moment) -> NDArray[np.float64]:
+        """(m, 3) how far each tet is moved away from its body's centre [m]."""
+        model = moment.model
+        centers = moment.shown_positions[model.tets].mean(axis=1)
+        offsets = np.empty_like(centers)
+        for body in model.bodies:
+            offsets[body.tets] = centers[body.tets] - centers[body.tets].mean(axis=0)
+        return self._explode * offsets
+
+
+def kept_tets(model: Model, cut: Cut | None) -> NDArray[np.bool_]:
+    """(m,) which tets a cut leaves; at least one of each body."""
+    kept = np.ones(len(model.tets), dtype=bool)
+    if cut is not None:
+        for body in model.bodies:
+            along = model.rest_centers[body.tets, cut.axis]
+            low, high = float(along.min()), float(along.max())
+            kept[body.tets] = along <= low + cut.place * (high - low) * (1.0 + 1e-9)
+    return kept
+
+
+def outer_facets(model: Model, kept: NDArray[np.bool_]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+    """Facets (f, 3) between a tet that is kept and none, counter-clockwise from outside, and that tet (f,)."""
+    facets = model.facets
+    inner = kept[facets.inner]
+    outer = np.where(facets.outer >= 0, kept[facets.outer], False)
+    mine, turned = inner & ~outer, outer & ~inner
+    triangles = np.concatenate([facets.triangles[mine], facets.triangles[turned][:, ::-1]])
+    return triangles, np.concatenate([facets.inner[mine], facets.outer[turned]])
+
+
+def exploded_facets(model: Model, kept: NDArray[np.bool_]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+    """All facets (f, 3) of the tets that are kept, and their tets (f,)."""
+    rows = np.flatnonzero(kept)
+    return model.tets[rows][:, TET_FACETS].reshape(-1, 3), np.repeat(rows, 4)

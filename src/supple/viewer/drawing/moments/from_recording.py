@@ -1,0 +1,76 @@
+"""Recordings as what the page draws."""
+
+from __future__ import annotations
+
+import ast
+
+import numpy as np
+
+from supple.errors import SuppleError
+from supple.materials.edges_and_volume import EdgesAndVolume
+from supple.materials.material import Material
+from supple.materials.registry import ELASTIC_MATERIALS
+from supple.output.drawing import view_of
+from supple.output.recording.reader import RecordedFrame, Recording
+from supple.viewer.drawing.moments.model import Model, ModelBody, Moment, colors_of
+
+_MATERIALS = {kind.__name__: kind for kind in (*ELASTIC_MATERIALS, EdgesAndVolume)}
+
+
+def model_of_recording(recording: Recording) -> Model:
+    """What no frame of a recording changes."""
+    colors = colors_of([body.name for body in recording.bodies])
+    bodies = tuple(
+        ModelBody(
+            body.name, body.vertices, body.tets, body.triangles, body.skin, material_from_text(body.material), color
+        )
+        for body, color in zip(recording.bodies, colors, strict=True)
+    )
+    tets = np.ascontiguousarray(recording.tets, dtype=np.int32)
+    return Model(
+        bodies,
+        recording.obstacles,
+        recording.rest_positions,
+        tets,
+        view_of(recording),
+        recorded_stitches=recording.stitches,
+    )
+
+
+def moment_of_frame(model: Model, frame: RecordedFrame) -> Moment:
+    """One frame of a recording."""
+    return Moment(
+        model,
+        frame.time,
+        frame.state.positions,
+        frame.state.velocities,
+        frame.poses,
+        pinned=frame.recording.pinned_vertices.astype(np.int64),
+    )
+
+
+def material_from_text(text: str) -> Material | None:
+    """The material that a recording describes, such as "StableNeoHookean(youngs=1e4, ...)"; None where it is no such.
+
+    Only names of materials and plain numbers are understood: nothing in the text is run.
+    """
+    try:
+        call = ast.parse(text, mode="eval").body
+        if not isinstance(call, ast.Call) or not isinstance(call.func, ast.Name) or call.args:
+            return None
+        kind = _MATERIALS.get(call.func.id)
+        if kind is None:
+            return None
+        return kind(**{str(item.arg): _number(item.value) for item in call.keywords})
+    except (SyntaxError, ValueError, TypeError, RecursionError, MemoryError, SuppleError):
+        return None
+
+
+def _number(node: ast.expr) -> float:
+    """A number, plain or as NumPy writes its own: `np.float64(1.0)`."""
+    if isinstance(node, ast.Call) and len(node.args) == 1 and not node.keywords:
+        node = node.args[0]
+    value = ast.literal_eval(node)
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ValueError("no number")
+    return float(value)

@@ -1,0 +1,122 @@
+"""Snapshots of a running simulation as what the page draws."""
+
+from __future__ import annotations
+
+import zlib
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.mesh.skin import Embedding
+from supple.mesh.tetmesh import TetMesh
+from supple.output.drawing import View
+from supple.output.recording.scene import RecordedObstacle
+from supple.output.recording.skinned_surface import SkinnedSurface
+from supple.scene.rotation import rotation_matrix
+from supple.viewer.drawing.moments.model import Model, ModelBody, Moment, colors_of
+from supple.viewer.engine.scene.pusher import NAME as PUSHER
+from supple.viewer.protocol.snapshots import BodyDescription, ObstacleDescription, SceneDescription, Snapshot
+
+
+class Translator:
+    """Makes moments of snapshots. What does not change between them is made once."""
+
+    def __init__(self) -> None:
+        self._generation: int | None = None
+        self._model: Model | None = None
+        self._made_of: tuple[Any, ...] = ()
+        self._skins: dict[tuple[int, int], SkinnedSurface] = {}
+
+    def moment(self, snapshot: Snapshot) -> Moment:
+        """What a snapshot shows."""
+        if self._model is None or snapshot.generation != self._generation:
+            self._generation = snapshot.generation
+            # The ball of the mouse comes and goes as well, and must not interrupt a drag.
+            made_of = _made_of(snapshot.description)
+            if self._model is None or made_of != self._made_of:
+                self._model, self._made_of = self._model_of(snapshot.description), made_of
+        rotations, translations = snapshot.obstacle_poses
+        poses = np.concatenate([rotations.reshape(-1, 3, 3), translations.reshape(-1, 3, 1)], axis=2)
+        poses = poses[: len(self._model.obstacles)]
+        values = {}
+        if snapshot.tet_values is not None and snapshot.tet_quantity is not None:
+            values[snapshot.tet_quantity] = snapshot.tet_values
+        pusher = snapshot.pusher
+        return Moment(
+            self._model,
+            snapshot.time,
+            snapshot.positions,
+            snapshot.velocities,
+            poses,
+            contact_points=snapshot.contact_points,
+            pinned=snapshot.pinned.astype(np.int64),
+            springs={grab.grab: (np.array(grab.point), np.array(grab.target)) for grab in snapshot.grabs},
+            pusher=None if pusher is None else (np.array(pusher[0]), pusher[1]),
+            tet_values=values,
+        )
+
+    def _model_of(self, scene: SceneDescription) -> Model:
+        colors = colors_of([body.name for body in scene.bodies])
+        bodies = tuple(
+            ModelBody(body.name, body.vertices, body.tet_rows, body.triangles, self._skin_of(body), None, color)
+            for body, color in zip(scene.bodies, colors, strict=True)
+        )
+        tets = np.concatenate([body.tets + body.vertices.start for body in scene.bodies])
+        return Model(
+            bodies,
+            tuple(_obstacle(obstacle) for obstacle in _lasting(scene)),
+            np.concatenate([body.rest_positions for body in scene.bodies]),
+            np.ascontiguousarray(tets, dtype=np.int32),
+            _view_of(scene),
+            np.asarray(scene.stitches).reshape(-1, 4),
+        )
+
+    def _skin_of(self, body: BodyDescription) -> SkinnedSurface | None:
+        """Which tet carries each vertex of a fine surface. A body that comes again is not searched again."""
+        if body.skin is None:
+            return None
+        vertices, triangles = body.skin
+        key = _fingerprint(vertices), _fingerprint(body.rest_positions)
+        if key not in self._skins:
+            held = Embedding.of(TetMesh(body.rest_positions, body.tets), vertices)
+            self._skins[key] = SkinnedSurface(held.corners, held.weights, np.asarray(triangles, dtype=np.int32))
+        return self._skins[key]
+
+
+def _lasting(scene: SceneDescription) -> tuple[ObstacleDescription, ...]:
+    """The obstacles without the ball of the mouse, which comes last and is drawn on its own."""
+    some = scene.obstacles
+    return some[:-1] if some and some[-1].name == PUSHER else some
+
+
+def _made_of(scene: SceneDescription) -> tuple[Any, ...]:
+    """Something that is equal for scenes that look the same, apart from where everything is."""
+    bodies = ((b.name, _fingerprint(b.rest_positions), _fingerprint(b.tets), b.skin is None) for b in scene.bodies)
+    return (*bodies, *((o.name, o.kind) for o in _lasting(scene)), _fingerprint(scene.stitches))
+
+
+def _view_of(scene: SceneDescription) -> View:
+    """About the bodies as they start, and down to the floor if it is not far below them."""
+    low, high, up = np.asarray(scene.low), np.asarray(scene.high), np.asarray(scene.up)
+    bodies = View(low, high, up)
+    for obstacle in scene.obstacles:
+        if obstacle.kind == "HalfSpace" and float(np.dot(obstacle.shape["normal"], up)) > 0.99:
+            below = float((bodies.center - np.asarray(obstacle.shape["point"])) @ up)
+            if 0.0 < below < 4.0 * bodies.radius:
+                floor = bodies.center - below * up
+                low, high = np.minimum(low, floor), np.maximum(high, floor)
+    return View(low, high, up)
+
+
+def _fingerprint(values: NDArray[Any]) -> int:
+    return zlib.crc32(np.ascontiguousarray(values).tobytes())
+
+
+def _obstacle(obstacle: ObstacleDescription) -> RecordedObstacle:
+    shape = dict(obstacle.shape)
+    vertices = np.asarray(shape.pop("vertices", np.zeros((0, 3))), dtype=np.float64)
+    triangles = np.asarray(shape.pop("triangles", np.zeros((0, 3))), dtype=np.int32)
+    if "rotation" in shape:
+        shape["orientation"] = rotation_matrix(shape.pop("rotation"))
+    return RecordedObstacle(obstacle.name, obstacle.kind, shape, vertices, triangles)

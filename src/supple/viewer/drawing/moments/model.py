@@ -1,0 +1,176 @@
+"""What the page draws, wherever it comes from: a running simulation or a recording.
+
+A `Model` is what no frame changes; a `Moment` is one frame of it. Views know these two, and neither engine nor file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.diagnostics import deformation_gradients
+from supple.materials.material import Material
+from supple.output.drawing import BODY_COLORS, View
+from supple.output.recording.scene import RecordedObstacle
+from supple.output.recording.skinned_surface import SkinnedSurface
+from supple.output.recording.stitches import RecordedStitches
+
+# A tet's four facets, each counter-clockwise from outside.
+TET_FACETS = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+
+
+@dataclass(frozen=True, eq=False)
+class ModelBody:
+    """One body.
+
+    Attributes
+    ----------
+    name : of the body
+    vertices, tets : its rows in the model's arrays
+    triangles : (t, 3) its boundary, rows of its own vertices, counter-clockwise from outside
+    skin : a finer surface that it carries, or None
+    material : what it is made of, or None where that is not known
+    color : (r, g, b) from 0 to 255
+    """
+
+    name: str
+    vertices: slice
+    tets: slice
+    triangles: NDArray[np.int32]
+    skin: SkinnedSurface | None = None
+    material: Material | None = None
+    color: tuple[int, int, int] = BODY_COLORS[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """Everything that stays the same from frame to frame.
+
+    Attributes
+    ----------
+    bodies : see `ModelBody`
+    obstacles : what bodies collide with, where it is at time 0
+    rest_positions : (n, 3) [m]; tets : (m, 4) rows of them
+    view : bounds of what happens, and which way is up
+    stitches : (k, 4) a vertex, and the three of the triangle that it is stitched to
+    recorded_stitches : those of a recording, which are of more kinds
+    """
+
+    bodies: tuple[ModelBody, ...]
+    obstacles: Sequence[RecordedObstacle]
+    rest_positions: NDArray[np.float64]
+    tets: NDArray[np.int32]
+    view: View
+    stitches: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 4), dtype=np.int32))
+    recorded_stitches: RecordedStitches | None = None
+
+    @cached_property
+    def surface_vertices(self) -> NDArray[np.int64]:
+        """(k,) vertices on the boundaries of all bodies, ascending."""
+        parts = [np.unique(body.triangles) + body.vertices.start for body in self.bodies]
+        return np.concatenate(parts).astype(np.int64)
+
+    @cached_property
+    def facets(self) -> Facets:
+        """The facets of all tets."""
+        return facets_of(self.tets)
+
+    @cached_property
+    def rest_shape_inverse(self) -> NDArray[np.float64]:
+        """(m, 3, 3) Dm^-1 of every tet [1/m]."""
+        corners = self.rest_positions[self.tets]
+        return np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)).astype(np.float64, copy=False)
+
+    @cached_property
+    def rest_centers(self) -> NDArray[np.float64]:
+        """(m, 3) centres of the tets at rest [m]."""
+        return self.rest_positions[self.tets].sum(axis=1) / 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class Facets:
+    """Triangles between tets.
+
+    Attributes
+    ----------
+    triangles : (f, 3) vertices, counter-clockwise as seen from outside of `inner`
+    inner, outer : (f,) the two tets of each; outer is -1 on the boundary
+    """
+
+    triangles: NDArray[np.int32]
+    inner: NDArray[np.int64]
+    outer: NDArray[np.int64]
+
+
+def facets_of(tets: NDArray[np.int32]) -> Facets:
+    """Every facet once."""
+    triangles = tets[:, TET_FACETS].reshape(-1, 3)
+    owner = np.repeat(np.arange(len(tets)), 4)
+    key = np.sort(triangles, axis=1)
+    order = np.lexsort((key[:, 2], key[:, 1], key[:, 0]))
+    key = key[order]
+    second = np.zeros(len(key), dtype=bool)
+    second[1:] = (key[1:] == key[:-1]).all(axis=1)
+    first = np.flatnonzero(~second)
+    outer = np.full(len(key), -1)
+    outer[np.flatnonzero(second) - 1] = owner[order[second]]
+    return Facets(triangles[order[first]], owner[order[first]], outer[first])
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """One frame.
+
+    Attributes
+    ----------
+    model : what it is a frame of; time : [s]
+    positions : (n, 3) [m]; velocities : (n, 3) [m/s], or None where they are not known
+    poses : (obstacles, 3, 4) rotation and translation from where each obstacle is at time 0
+    contact_points, contact_normals : (c, 3) [m], or None where the solver does not tell
+    pinned : (p,) vertices that are held
+    springs : from a point of a body to where it is pulled, by number
+    pusher : center (3,) and radius of a ball [m], or None
+    tet_values : numbers of tets (m,) that are known already, by the key of their field
+    """
+
+    model: Model
+    time: float
+    positions: NDArray[np.float64]
+    velocities: NDArray[np.float64] | None
+    poses: NDArray[np.float64]
+    contact_points: NDArray[np.float64] | None = None
+    contact_normals: NDArray[np.float64] | None = None
+    pinned: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    springs: Mapping[int, tuple[NDArray[np.float64], NDArray[np.float64]]] = field(default_factory=dict)
+    pusher: tuple[NDArray[np.float64], float] | None = None
+    tet_values: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+
+    @cached_property
+    def deformation_gradients(self) -> NDArray[np.float64]:
+        """(m, 3, 3) F of every tet."""
+        return deformation_gradients(
+            np.ascontiguousarray(self.positions), self.model.tets, self.model.rest_shape_inverse
+        )
+
+    @cached_property
+    def stitch_segments(self) -> NDArray[np.float64]:
+        """(k, 2, 3) the two ends of every stitch [m]."""
+        x, recorded = self.shown_positions, self.model.recorded_stitches
+        if recorded is not None:
+            return np.asarray(recorded.segments(x, self.poses))
+        rows = self.model.stitches
+        return np.stack([x[rows[:, 0]], x[rows[:, 1:]].mean(axis=1)], axis=1)
+
+    @cached_property
+    def shown_positions(self) -> NDArray[np.float64]:
+        """(n, 3) [m], with zeros in place of what is not finite: a browser is given numbers only."""
+        return np.nan_to_num(self.positions, posinf=0.0, neginf=0.0)
+
+
+def colors_of(names: Sequence[str]) -> list[tuple[int, int, int]]:
+    """A color for each body."""
+    return [BODY_COLORS[i % len(BODY_COLORS)] for i in range(len(names))]

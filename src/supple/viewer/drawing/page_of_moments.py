@@ -1,0 +1,57 @@
+"""Moments as a page that plays them: one file, self-contained, drawn as the options say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from supple.output.page import quantum_of, titled
+from supple.output.viser_server import server_for_a_moment
+from supple.viewer.drawing.layers.skin import drawn_points
+from supple.viewer.drawing.moments.model import Model, Moment
+from supple.viewer.drawing.options import ViewOptions
+from supple.viewer.drawing.stage import Stage
+
+MOST_BYTES = 36_000_000  # of moving points before compression; longer takes are shown with fewer moments
+
+
+def most_moments(model: Model, options: ViewOptions) -> int:
+    """How many moments a page of reasonable size can hold."""
+    size = 12 * (drawn_points(model) if options.surface in ("skin", "wireframe") else 24 * len(model.tets))
+    return max(2, MOST_BYTES // max(1, size))
+
+
+def evenly(count: int, most: int) -> list[int]:
+    """At most `most` of the numbers below `count`, evenly spaced, the first and the last among them."""
+    return [int(i) for i in np.unique(np.linspace(0, count - 1, min(count, most)).round())]
+
+
+def page_of_moments(taken: Sequence[tuple[float, Moment]], options: ViewOptions) -> str:
+    """The HTML of a page that plays what was taken, in a loop.
+
+    Parameters
+    ----------
+    taken : at least one moment, each with when it is shown [s], ascending
+    options : how it is drawn
+    """
+    first = taken[0][1].model
+    taken = [taken[i] for i in evenly(len(taken), most_moments(first, options))]
+    with server_for_a_moment() as server:
+        stage = Stage(server, _rounded(taken[0][1]), options)
+        serializer = server.get_scene_serializer()
+        shown = taken[0][0]
+        for seconds, moment in taken[1:]:
+            serializer.insert_sleep(max(0.0, seconds - shown))
+            shown = seconds
+            stage.show(_rounded(moment))
+        serializer.insert_sleep(0.1)
+        text = serializer.as_html()
+    return titled(text, ", ".join(body.name for body in first.bodies))
+
+
+def _rounded(moment: Moment) -> Moment:
+    """With positions of few bits, which compress well."""
+    quantum = quantum_of(moment.model.view)
+    return replace(moment, positions=np.round(moment.shown_positions / quantum) * quantum)

@@ -1,0 +1,108 @@
+"""What is under the mouse: points of bodies, from places and rays in space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from supple.viewer.drawing.moments.model import Model, ModelBody, Moment
+
+
+@dataclass(frozen=True, eq=False)
+class SurfacePoint:
+    """A point of a body's boundary.
+
+    Attributes
+    ----------
+    body : the body
+    vertices : (3,) of the triangle that it lies on, rows of the body's own; weights : (3,) barycentric coordinates
+    place : (3,) where it is [m]
+    """
+
+    body: ModelBody
+    vertices: NDArray[np.int64]
+    weights: NDArray[np.float64]
+    place: NDArray[np.float64]
+
+    @property
+    def nearest_vertex(self) -> int:
+        """The vertex of the triangle that is nearest to it, a row of the body's own."""
+        return int(self.vertices[np.argmax(self.weights)])
+
+
+def _triangles(model: Model) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Triangles (t, 3) of all bodies, rows of the model's vertices, and the body of each (t,)."""
+    rows = [body.triangles.astype(np.int64) + body.vertices.start for body in model.bodies]
+    return np.concatenate(rows), np.repeat(np.arange(len(rows)), [len(row) for row in rows])
+
+
+def nearest_surface_point(moment: Moment, place: ArrayLike) -> SurfacePoint:
+    """The point of any boundary that is nearest to a place (3,) [m]."""
+    from trimesh.triangles import closest_point
+
+    rows, _ = _triangles(moment.model)
+    corners = moment.shown_positions[rows]
+    wanted = np.asarray(place, dtype=np.float64)
+    points = closest_point(corners, np.broadcast_to(wanted, (len(rows), 3)))
+    nearest = int(np.argmin(np.linalg.norm(points - wanted, axis=1)))
+    return _on_triangle(moment, nearest, points[nearest])
+
+
+def surface_point_on_ray(moment: Moment, origin: ArrayLike, direction: ArrayLike) -> SurfacePoint | None:
+    """The first point of any boundary that a ray from `origin` (3,) in `direction` (3,) meets; None where it misses.
+
+    Source: Möller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection" (1997).
+    """
+    rows, _ = _triangles(moment.model)
+    a, b, c = (moment.shown_positions[rows[:, k]] for k in range(3))
+    start, along = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
+    h = np.cross(along, c - a)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inverse = 1.0 / np.einsum("ij,ij->i", b - a, h)
+        u = inverse * np.einsum("ij,ij->i", start - a, h)
+        q = np.cross(start - a, b - a)
+        v = inverse * (q @ along)
+        t = inverse * np.einsum("ij,ij->i", c - a, q)
+        met = np.isfinite(t) & (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1.0 + 1e-9) & (t > 0.0)
+    if not met.any():
+        return None
+    first = int(np.argmin(np.where(met, t, np.inf)))
+    return _on_triangle(moment, first, start + t[first] * along)
+
+
+def _on_triangle(moment: Moment, triangle: int, place: NDArray[np.float64]) -> SurfacePoint:
+    from trimesh.triangles import points_to_barycentric
+
+    rows, owner = _triangles(moment.model)
+    body = moment.model.bodies[owner[triangle]]
+    corners = moment.shown_positions[rows[triangle]]
+    with np.errstate(all="ignore"):
+        weights = points_to_barycentric(corners[None], place[None], method="cross")[0]
+    if not np.isfinite(weights).all():  # a triangle without area
+        weights = (np.arange(3) == np.argmin(np.linalg.norm(corners - place, axis=1))).astype(np.float64)
+    weights = np.clip(weights, 0.0, 1.0)
+    return SurfacePoint(body, rows[triangle] - body.vertices.start, weights / weights.sum(), place)
+
+
+def point_on_camera_plane(
+    eye: ArrayLike, toward: ArrayLike, look: ArrayLike, through: ArrayLike
+) -> NDArray[np.float64] | None:
+    """Where the line from the eye (3,) to a place (3,) meets the plane through a point that faces the camera.
+
+    Parameters
+    ----------
+    look : (3,) the direction that the camera looks in; through : (3,) a point of the plane
+
+    Returns
+    -------
+    (3,) [m], or None where the line does not meet it before the eye.
+    """
+    start, along, normal = (np.asarray(v, dtype=np.float64) for v in (eye, toward, look))
+    along = along - start
+    slope = float(along @ normal)
+    reach = float((np.asarray(through, dtype=np.float64) - start) @ normal)
+    if slope * reach <= 0.0:
+        return None
+    return start + reach / slope * along

@@ -1,0 +1,110 @@
+"""The picture on the page: layers that are put up as the options say, and drawn anew for every moment."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from supple.viewer.drawing.camera import set_initial_camera
+from supple.viewer.drawing.coloring.fields import FIELDS, Field
+from supple.viewer.drawing.layers.contacts import ContactView
+from supple.viewer.drawing.layers.ground import Ground
+from supple.viewer.drawing.layers.obstacles import ObstacleView
+from supple.viewer.drawing.layers.pins import PinView
+from supple.viewer.drawing.layers.primitives.layer import Layer
+from supple.viewer.drawing.layers.skin import SkinView
+from supple.viewer.drawing.layers.springs import PusherView, SpringView
+from supple.viewer.drawing.layers.stitches import StitchView
+from supple.viewer.drawing.layers.tets import Cut, TetView
+from supple.viewer.drawing.layers.velocities import VelocityView
+from supple.viewer.drawing.moments.model import Model, Moment
+from supple.viewer.drawing.options import COLOR_BY_BODY, ViewOptions
+
+# What is done to the meshes of bodies whenever there are new ones: make them answer to the mouse.
+Prepare = Callable[[list[Any]], None]
+
+
+class Stage:
+    """Everything that is drawn in 3D.
+
+    Parameters
+    ----------
+    server : viser's; moment : the first one; options : see `ViewOptions`
+    prepare : is given the meshes of bodies whenever there are new ones
+    """
+
+    def __init__(self, server: Any, moment: Moment, options: ViewOptions, prepare: Prepare | None = None) -> None:
+        self._server, self._scene = server, server.scene
+        self._prepare = prepare
+        # Options change in threads of the server; moments come from the pump.
+        self._lock = threading.RLock()
+        self.options, self.moment = options, moment
+        self._layers: list[Layer] = []
+        self._bodies: Layer | None = None
+        set_initial_camera(server, moment.model.view)
+        self._build()
+
+    @property
+    def model(self) -> Model:
+        """What the moments are moments of."""
+        return self.moment.model
+
+    @property
+    def field(self) -> Field | None:
+        """What is colored by, if anything."""
+        return None if self.options.color_by == COLOR_BY_BODY else FIELDS[self.options.color_by]
+
+    @property
+    def color_range(self) -> tuple[float, float] | None:
+        """(low, high) of the color bar, where there is one."""
+        return self._bodies.range if isinstance(self._bodies, TetView) else None
+
+    @property
+    def body_handles(self) -> list[Any]:
+        """The meshes of bodies that are on show."""
+        return self._bodies.handles if self._bodies is not None else []
+
+    def show(self, moment: Moment) -> None:
+        """Draw a moment. One of another model, with other bodies, is built anew."""
+        with self._lock, self._server.atomic():
+            changed = moment.model is not self.moment.model
+            self.moment = moment
+            if changed:
+                self._build()
+                return
+            for layer in self._layers:
+                layer.update(moment)
+
+    def apply(self, options: ViewOptions) -> None:
+        """Draw the same moment in another way."""
+        with self._lock, self._server.atomic():
+            if options != self.options:
+                self.options = options
+                self._build()
+
+    def _build(self) -> None:
+        for layer in self._layers:
+            layer.remove()
+        scene, moment, options = self._scene, self.moment, self.options
+        self._bodies = self._make_bodies()
+        self._layers = [self._bodies, Ground(scene, moment), ObstacleView(scene, moment), PinView(scene, moment)]
+        self._layers += [SpringView(scene, moment), PusherView(scene, moment)]
+        if options.velocities:
+            self._layers.append(VelocityView(scene, moment))
+        if options.contacts:
+            self._layers.append(ContactView(scene, moment))
+        if options.stitches:
+            self._layers.append(StitchView(scene, moment))
+        if self._prepare is not None:
+            self._prepare(self._bodies.handles)
+
+    def _make_bodies(self) -> Layer:
+        options, field = self.options, self.field
+        if options.surface == "wireframe":
+            return SkinView(self._scene, self.moment, lines=True)
+        if options.surface == "skin" and field is None:
+            return SkinView(self._scene, self.moment)
+        explode = options.explode if options.surface == "exploded tets" else 0.0
+        cut = Cut("xyz".index(options.cut_axis), options.cut_place) if options.surface == "cut" else None
+        return TetView(self._scene, self.moment, field, explode, cut)

@@ -1,0 +1,1 @@
+"""The simulation's side of the live page: the only part of the viewer that knows solvers."""

@@ -1,0 +1,60 @@
+"""Where bodies touch: measured on the state itself, whatever the solver."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.scene.obstacles import TriangleObstacle
+from supple.system import System
+from supple.viewer.engine.scene.obstacle_distance import signed_distance
+from supple.viewer.protocol import limits
+
+# Of the mean edge of the surfaces: what counts as touching.
+NEAR = 0.1
+
+
+def contact_points(system: System, positions: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+    """(c, 3) points [m] where surfaces are nearer than a tenth of their mean edge; at most `MOST_CONTACT_POINTS`.
+
+    Vertices of bodies on half-spaces, boxes and balls; between bodies, and on triangle obstacles, the pairs of
+    vertices, edges and triangles that IPC would see.
+    """
+    near = NEAR * _mean_edge(system)
+    skin = np.unique(system.triangles)
+    points = [positions[skin][signed_distance(obstacle, positions[skin], time) < near] for obstacle in system.obstacles]
+    points.append(_between_surfaces(system, positions, time, near))
+    found = np.concatenate([np.zeros((0, 3)), *points])
+    stride = -(-len(found) // limits.MOST_CONTACT_POINTS)
+    return np.ascontiguousarray(found[:: max(stride, 1)])
+
+
+def _mean_edge(system: System) -> float:
+    a, b = system.rest_positions[system.triangles[:, :2]].transpose(1, 0, 2)
+    return float(np.linalg.norm(a - b, axis=1).mean())
+
+
+def _between_surfaces(system: System, positions: NDArray[np.float64], time: float, near: float) -> NDArray[np.float64]:
+    if find_spec("ipctk") is None:  # it has no wheels for Linux on ARM
+        return np.zeros((0, 3))
+    import ipctk
+
+    vertices, triangles = [positions], [system.triangles]
+    count = len(positions)
+    for obstacle in system.obstacles:
+        if isinstance(obstacle, TriangleObstacle) and obstacle.surface is not None:
+            R, t = obstacle.pose(time)
+            vertices.append(obstacle.surface.vertices @ R.T + t)
+            triangles.append(obstacle.surface.triangles + count)
+            count += len(obstacle.surface.vertices)
+    F = np.concatenate(triangles).astype(np.int32)
+    used, compact = np.unique(F, return_inverse=True)
+    X = np.asfortranarray(np.concatenate(vertices)[used])
+    F = np.asfortranarray(compact.reshape(F.shape), dtype=np.int32)
+    E = ipctk.edges(F)
+    found = ipctk.NormalCollisions()
+    found.build(ipctk.CollisionMesh(X, E, F), X, near)
+    middles = [X[[i for i in found[k].vertex_ids(E, F) if i >= 0]].mean(axis=0) for k in range(len(found))]
+    return np.array(middles).reshape(-1, 3)

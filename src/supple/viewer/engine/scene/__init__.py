@@ -1,0 +1,1 @@
+"""The scene of the live page and its changes."""

@@ -1,0 +1,333 @@
+"""What each command does to a running scene."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import fields, replace
+from functools import singledispatch
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.errors import CommandError
+from supple.materials.material import Material
+from supple.materials.regions import Regions
+from supple.scene.body import Body
+from supple.scene.pins import Pin
+from supple.scene.scene import Scene
+from supple.state import State
+from supple.system import BodyRange, initial_state
+from supple.viewer.engine.scene.grab_spring import make_spring
+from supple.viewer.engine.scene.live_scene import LiveScene
+from supple.viewer.engine.scene.new_bodies import body_of_mesh, check_room, free_name, new_body, place_for
+from supple.viewer.engine.scene.obstacle_distance import moved_out
+from supple.viewer.engine.scene.pusher import Pusher
+from supple.viewer.engine.scene.solvers import SOLVERS, kind_of, with_value
+from supple.viewer.protocol import commands as say
+from supple.viewer.protocol import limits
+from supple.viewer.protocol.parameters import find_parameter
+from supple.viewer.protocol.snapshots import Value
+
+# Of the mean edge: how far from obstacles vertices are when the implicit solver takes over.
+CLEARANCE = 1e-3
+
+
+@singledispatch
+def change(command: say.Command, live: LiveScene) -> None:
+    """Do to the scene what a command says.
+
+    Raises
+    ------
+    SuppleError : where that is impossible; nothing is changed then.
+    """
+    raise CommandError(f"a scene does not know the command {type(command).__name__}")
+
+
+@change.register
+def _(command: say.Reset, live: LiveScene) -> None:
+    live.reset()
+
+
+@change.register
+def _(command: say.SetSolver, live: LiveScene) -> None:
+    if kind_of(live.setup.solver) == command.kind:
+        return
+    setup = replace(live.setup, solver=live.solvers.get(command.kind) or SOLVERS[command.kind]())
+    if command.kind == "xpbd":
+        live.adopt(setup)
+    else:
+        live.adopt_tried(setup, clear_of_obstacles(live))
+
+
+def clear_of_obstacles(live: LiveScene) -> State | None:
+    """The state with all vertices a little off the obstacles, for a solver that knows no touching; None: as it is.
+
+    XPBD leaves vertices right on an obstacle, or a little inside. A thousandth of an edge is enough to begin with.
+    """
+    system, state = live.system, live.state
+    gap = CLEARANCE * float(system.rest_lengths.mean())
+    x = state.positions
+    free = np.setdiff1d(np.arange(len(x)), system.pinned_vertices)
+    moved = x.copy()
+    for obstacle in system.obstacles:
+        moved[free] = moved_out(obstacle, moved[free], state.time, gap)
+    return None if np.array_equal(moved, x) else replace(state, positions=moved, memory=None)
+
+
+@change.register
+def _(command: say.SetParameter, live: LiveScene) -> None:
+    setup, scene = live.setup, live.setup.scene
+    match find_parameter(command.name).owner:
+        case "solver":
+            live.adopt_tried(replace(setup, solver=with_value(setup.solver, command.name, command.value)))
+        case "scene" if command.name == "dt":
+            live.adopt(replace(setup, dt=float(command.value)))
+        case "scene":
+            live.adopt(replace(setup, scene=replace(scene, gravity=-float(command.value) * live.up)))
+        case _:
+            live.adopt(replace(setup, scene=_with_body_value(live, command)))
+
+
+def _with_body_value(live: LiveScene, command: say.SetParameter) -> Scene:
+    scene = live.setup.scene
+    if command.body is not None:
+        _part(live, command.body)
+    bodies = [
+        _tuned(body, command.name, command.value) if command.body in (None, body.name) else None
+        for body in scene.bodies
+    ]
+    if not any(bodies):
+        if command.body is None:
+            raise CommandError(f"no body here has {command.name}")
+        raise CommandError(f"body {command.body!r} has no {command.name}")
+    obstacles = scene.obstacles
+    if command.name == "friction" and command.body is None:
+        obstacles = [replace(obstacle, friction=float(command.value)) for obstacle in obstacles]
+    return replace(
+        scene,
+        bodies=[new or old for new, old in zip(bodies, scene.bodies, strict=True)],
+        obstacles=obstacles,
+    )
+
+
+def _tuned(body: Body, name: str, value: Value) -> Body | None:
+    """The body with that value, or None where it has no such parameter."""
+    if name == "friction":
+        return replace(body, friction=float(value))
+    material = _tuned_material(body.material, name, float(value))
+    return None if material is None else replace(body, material=material)
+
+
+def _tuned_material(material: Material, name: str, value: float) -> Material | None:
+    if isinstance(material, Regions):
+        return replace(material, materials=[_tuned_material(each, name, value) or each for each in material.materials])
+    if name not in {field.name for field in fields(material)}:
+        return None
+    return replace(material, **{name: value})
+
+
+@change.register
+def _(command: say.Grab, live: LiveScene) -> None:
+    part = _part(live, command.body)
+    others = {number: spring for number, spring in live.setup.grabs.items() if number != command.grab}
+    if len(others) >= limits.MOST_GRABS:
+        raise CommandError(f"there are {len(others)} hands on the scene already; let one go first")
+    spring = make_spring(command, live.setup.scene, part, live.system.masses, live.state.positions)
+    live.adopt(replace(live.setup, grabs={**others, command.grab: spring}))
+
+
+@change.register
+def _(command: say.MoveGrab, live: LiveScene) -> None:
+    spring = live.setup.grabs.get(command.grab)
+    if spring is not None:  # else let go meanwhile, by a reset for instance
+        spring.target[:] = command.target
+
+
+@change.register
+def _(command: say.ReleaseGrab, live: LiveScene) -> None:
+    grabs = dict(live.setup.grabs)
+    if grabs.pop(command.grab, None) is not None:
+        live.adopt(replace(live.setup, grabs=grabs))
+
+
+@change.register
+def _(command: say.Pin, live: LiveScene) -> None:
+    part = _part(live, command.body)
+    if command.vertex >= len(part.body.mesh.vertices):
+        raise CommandError(f"body {part.name!r} has no vertex {command.vertex}")
+    if part.vertices.start + command.vertex in live.system.pinned_vertices:
+        return
+    pins = dict(live.setup.hand_pins)
+    if len(pins) >= limits.MOST_PINS:
+        raise CommandError(f"{len(pins)} vertices are pinned by hand already; unpin some first")
+    pins[command.body, command.vertex] = Pin(command.body, [command.vertex], name="by hand")
+    live.adopt(replace(live.setup, hand_pins=pins))
+
+
+@change.register
+def _(command: say.Unpin, live: LiveScene) -> None:
+    setup = live.setup
+    if command.body is None or command.vertex is None:
+        if setup.hand_pins:
+            live.adopt(replace(setup, hand_pins={}))
+        return
+    part = _part(live, command.body)
+    if (command.body, command.vertex) in setup.hand_pins:
+        left = {key: pin for key, pin in setup.hand_pins.items() if key != (command.body, command.vertex)}
+        live.adopt(replace(setup, hand_pins=left))
+        return
+    _take_from_pin(live, part, command.vertex)
+
+
+def _take_from_pin(live: LiveScene, part: BodyRange, vertex: int) -> None:
+    """Take a vertex out of one of the scene's own pins."""
+    row = part.vertices.start + vertex
+    held = next((held for held in live.system.pins if row in held.vertices), None)
+    if held is None:
+        return
+    keep = held.vertices != row
+    pins = [pin for pin in live.setup.scene.pins if pin is not held.pin]
+    anchors = {each.pin: each.anchors for each in live.system.pins}
+    anchors |= {each.target: each.anchors for each in live.system.soft_targets}
+    if keep.any():
+        rest = replace(held.pin, vertices=held.vertices[keep] - part.vertices.start)
+        pins.append(rest)
+        anchors[rest] = held.anchors[keep]
+    live.adopt(replace(live.setup, scene=replace(live.setup.scene, pins=pins)), anchors=anchors)
+
+
+@change.register
+def _(command: say.MovePusher, live: LiveScene) -> None:
+    pusher = live.setup.pusher
+    if pusher is not None and pusher.radius == command.radius:
+        pusher.wanted[:] = command.center
+        return
+    live.adopt_tried(replace(live.setup, pusher=Pusher(np.array(command.center), command.radius)))
+
+
+@change.register
+def _(command: say.RemovePusher, live: LiveScene) -> None:
+    if live.setup.pusher is not None:
+        live.adopt(replace(live.setup, pusher=None))
+
+
+@change.register
+def _(command: say.Squash, live: LiveScene) -> None:
+    pinned = set(live.system.pinned_vertices.tolist())
+    free = [
+        part.vertices
+        for part in live.system.bodies
+        if pinned.isdisjoint(range(part.vertices.start, part.vertices.stop))
+    ]
+    if not free:
+        raise CommandError("every body is pinned; unpin one to squash it")
+    rows = np.concatenate([np.arange(part.start, part.stop) for part in free])
+    x, v = live.state.positions.copy(), live.state.velocities.copy()
+    x[rows] = flattened(x[rows], live.up, command.factor)
+    v[rows] = 0.0
+    live.adopt_tried(live.setup, State(live.state.time, x, v))
+
+
+def flattened(points: NDArray[np.float64], up: NDArray[np.float64], factor: float) -> NDArray[np.float64]:
+    """Points (k, 3) pressed to `factor` of their height along `up`, about the lowest, and widened by 1 / sqrt(factor).
+
+    One linear map for all, of determinant 1: no tet changes its volume, and bodies that did not touch do not.
+    """
+    heights = points @ up
+    low = heights.min()
+    flat = points - heights[:, None] * up
+    middle = flat.mean(axis=0)
+    return middle + (flat - middle) / np.sqrt(factor) + (low + factor * (heights - low))[:, None] * up
+
+
+@change.register
+def _(command: say.AddBody, live: LiveScene) -> None:
+    _add(live, new_body(command, live.setup.scene, live.state.positions, live.up))
+
+
+@change.register
+def _(command: say.AddMesh, live: LiveScene) -> None:
+    _add(live, body_of_mesh(command, live.setup.scene, live.state.positions, live.up))
+
+
+@change.register
+def _(command: say.CopyBody, live: LiveScene) -> None:
+    body = _part(live, command.body).body
+    place = place_for(body.mesh, command.position, live.state.positions, live.up)
+    _add(
+        live,
+        replace(
+            body,
+            name=free_name(live.setup.scene, re.sub(r" \d+$", "", body.name)),  # a copy of "ball 1" is "ball 2"
+            position=place,
+            rotation=np.zeros(3),
+            velocity=np.zeros(3),
+            angular_velocity=np.zeros(3),
+        ),
+    )
+
+
+def _add(live: LiveScene, body: Body) -> None:
+    scene = live.setup.scene
+    check_room(scene, body.mesh)
+    grown = replace(scene, bodies=(*scene.bodies, body))
+    alone = initial_state(Scene([body]))
+    state = State(
+        live.state.time,
+        np.concatenate([live.state.positions, alone.positions]),
+        np.concatenate([live.state.velocities, alone.velocities]),
+    )
+    live.adopt_tried(replace(live.setup, scene=grown, added=live.setup.added | {body.name}), state)
+
+
+@change.register
+def _(command: say.RemoveBody, live: LiveScene) -> None:
+    part, setup = _part(live, command.body), live.setup
+    if len(setup.scene.bodies) == 1:
+        raise CommandError(f"body {part.name!r} is the only one; a scene needs one")
+    keep = np.ones(len(live.state.positions), dtype=bool)
+    keep[part.vertices] = False
+    state = State(live.state.time, live.state.positions[keep], live.state.velocities[keep])
+    smaller = replace(
+        setup,
+        scene=without_body(setup.scene, part.name),
+        hand_pins={key: pin for key, pin in setup.hand_pins.items() if key[0] != part.name},
+        grabs={number: spring for number, spring in setup.grabs.items() if spring.command.body != part.name},
+        added=setup.added - {part.name},
+    )
+    live.adopt(smaller, state)
+
+
+def without_body(scene: Scene, name: str) -> Scene:
+    """The scene without a body, and without everything that names it: pins, forces, springs, stitches."""
+    changes: dict[str, Any] = {"bodies": [body for body in scene.bodies if body.name != name]}
+    for field in fields(scene):
+        items = getattr(scene, field.name)
+        if field.name not in ("bodies", "obstacles", "gravity") and isinstance(items, tuple):
+            left = [_without_name(item, name) for item in items]
+            changes[field.name] = [item for item in left if item is not None]
+    return replace(scene, **changes)
+
+
+def _without_name(item: Any, body: str) -> Any | None:
+    """A part of a scene without that body: None where it names it, less that name where it names several."""
+    changes: dict[str, Any] = {}
+    for field in fields(item):
+        value = getattr(item, field.name)
+        if field.name == "name" or not field.init:
+            continue
+        if isinstance(value, str) and value == body:
+            return None
+        if isinstance(value, tuple) and body in [each for each in value if isinstance(each, str)]:
+            changes[field.name] = tuple(each for each in value if each != body)
+            if not changes[field.name]:
+                return None
+    return replace(item, **changes) if changes else item
+
+
+def _part(live: LiveScene, name: str) -> BodyRange:
+    for part in live.system.bodies:
+        if part.name == name:
+            return part
+    raise CommandError(f"there is no body {name!r}; there are {', '.join(repr(p.name) for p in live.system.bodies)}")

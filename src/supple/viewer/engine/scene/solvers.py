@@ -1,0 +1,62 @@
+"""The solvers that a page can choose from, and which of their parameters it can change."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+from supple.errors import CommandError
+from supple.solver import Solver
+from supple.viewer.protocol.parameters import PARAMETERS
+from supple.viewer.protocol.snapshots import Value
+
+
+def _xpbd() -> Solver:
+    from supple.xpbd.solver import XPBD
+
+    return XPBD()
+
+
+def _implicit() -> Solver:
+    from supple.implicit.solver import Implicit
+
+    # A step that would take hundreds of iterations is one that nobody at a page waits for.
+    return Implicit(max_substeps=8)
+
+
+SOLVERS: dict[str, Callable[[], Solver]] = {"xpbd": _xpbd, "implicit": _implicit}
+
+
+def kind_of(solver: Solver) -> str:
+    """By which name a page knows a solver: that of its class, in lower case."""
+    return type(solver).__name__.lower()
+
+
+def solver_values(solver: Solver) -> dict[str, Value]:
+    """Of the solver's parameters, those that a page can change."""
+    values: dict[str, Value] = {}
+    for name in _fields(solver):
+        if name in PARAMETERS and PARAMETERS[name].owner == "solver":
+            value = getattr(solver, name)
+            values[name] = value is not None if name == "contact" else value
+    return values
+
+
+def with_value(solver: Solver, name: str, value: Value) -> Solver:
+    """The solver with one parameter changed.
+
+    Raises
+    ------
+    CommandError : where this solver has no such parameter.
+    """
+    fields = _fields(solver)
+    if name not in fields:
+        raise CommandError(f"the solver {kind_of(solver)} has no parameter {name}")
+    changed: object = value
+    if name == "contact":
+        changed = getattr(solver, name) or getattr(type(solver)(), name) if value else None
+    return dataclasses.replace(solver, **{name: changed})  # pyright: ignore[reportArgumentType]
+
+
+def _fields(solver: Solver) -> set[str]:
+    return {field.name for field in dataclasses.fields(solver)}  # pyright: ignore[reportArgumentType]

@@ -1,0 +1,247 @@
+"""The simulation's own process: steps in real time, does what commands say, and waits for nobody."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+from supple.errors import SuppleError
+from supple.state import State
+from supple.viewer.engine.measurement.contact_points import contact_points
+from supple.viewer.engine.measurement.describe import describe, measures, obstacle_poses
+from supple.viewer.engine.measurement.tet_values import tet_values
+from supple.viewer.engine.pacing import Pacing
+from supple.viewer.engine.scene.changes import change
+from supple.viewer.engine.scene.live_scene import LiveScene
+from supple.viewer.engine.step_watch import StepWatch
+from supple.viewer.protocol import commands as say
+from supple.viewer.protocol import limits
+from supple.viewer.protocol.command_queue import CommandQueue
+from supple.viewer.protocol.outbox import Outbox
+from supple.viewer.protocol.snapshots import Notice, Snapshot
+
+logger = logging.getLogger(__name__)
+
+HEARTBEAT = 0.5  # without anything new, a snapshot after this time all the same [s]
+NOTICES_KEPT = 8
+
+
+class SimulationLoop:
+    """Runs a live scene until its queue of commands is closed.
+
+    Attributes
+    ----------
+    playing : whether time runs; steps_left : how many frames to simulate although it does not
+    """
+
+    def __init__(self, live: LiveScene, inbox: CommandQueue, outbox: Outbox) -> None:
+        self.live, self.inbox, self.outbox = live, inbox, outbox
+        self.playing = False
+        self.steps_left = 0
+        self.speed = 1.0
+        self.view = say.SetView()
+        self.pacing = Pacing()
+        self.watch = StepWatch(
+            limits.LONGEST_STEP, lambda: inbox.holds(say.Pause, say.Reset), limits.LONGEST_STEP_WHEN_ASKED
+        )
+        self.applied = 0
+        self.notices: deque[Notice] = deque(maxlen=NOTICES_KEPT)
+        self._before: State = live.state
+        self._described = -1
+        self._published = 0.0
+        self._fresh = True
+
+    def run(self) -> None:
+        """Until the page's process is gone."""
+        with self.told_of_warnings():
+            while not self.inbox.closed:
+                self.turn(self._time_to_wait())
+
+    def turn(self, wait: float) -> None:
+        """One round: commands, a step if one is due, a snapshot if there is something to show."""
+        for number, command in self.inbox.take(wait):
+            self.obey(command)
+            self.applied = max(self.applied, number)
+            self._fresh = True
+        now = time.perf_counter()
+        if self.steps_left > 0 or (self.playing and now >= self.pacing.due):
+            self.step()
+        now = time.perf_counter()
+        since = now - self._published
+        if (self._fresh and since >= self._shortest()) or self._blends(now) or since >= HEARTBEAT:
+            self.publish(now)
+
+    def obey(self, command: say.Command) -> None:
+        """Do what a command says; what cannot be done becomes a notice."""
+        try:
+            match command:
+                case say.Play():
+                    if not self.playing:
+                        self.playing = True
+                        self.pacing.start(time.perf_counter())
+                case say.Pause():
+                    self.playing, self.steps_left = False, 0
+                case say.Step():
+                    self.playing = False
+                    # Each counts, also where the one before has not been simulated yet.
+                    self.steps_left = min(self.steps_left + command.count, limits.MOST_STEPS)
+                case say.SetSpeed():
+                    self.speed = command.factor
+                    self.pacing.start(time.perf_counter())
+                case say.SetView():
+                    self.view = command
+                case _:
+                    with self.watch.limited():
+                        change(command, self.live)
+                    if isinstance(command, say.Reset):  # frames that were asked for before are not of the new start
+                        self.steps_left = 0
+                    self._before = self.live.state
+        except (SuppleError, MemoryError) as error:
+            self.tell("error", _one_line(error))
+        except Exception as error:
+            logger.exception("the command %s failed", command)
+            self.tell("error", f"{type(command).__name__} failed: {_one_line(error)}")
+
+    def step(self) -> None:
+        """Simulate one frame; where that fails, time stops at the last good state, and a notice says why."""
+        began = time.perf_counter()
+        before = self.live.state
+        try:
+            with self.watch.limited():
+                report = self.live.step()
+            failed = "" if report.status.can_go_on else f"{report.status}: {report.message}"
+        except (SuppleError, ArithmeticError, MemoryError) as error:
+            failed = _one_line(error)
+        except Exception as error:
+            logger.exception("a step failed")
+            failed = f"{type(error).__name__}: {_one_line(error)}"
+        if failed:
+            self.live.renew()
+        now = time.perf_counter()
+        self.steps_left = max(0, self.steps_left - 1)
+        self._fresh = True
+        if failed:
+            self.playing, self.steps_left = False, 0
+            self.tell("error", f"paused at t = {self.live.state.time:.4g} s; {failed}")
+            return
+        self._before = before
+        self.pacing.stepped(now, now - began, self.live.setup.dt, self.speed)
+
+    def tell(self, level: str, text: str) -> None:
+        """Leave a notice for the person at the page."""
+        number = self.notices[-1].number + 1 if self.notices else 1
+        self.notices.append(Notice(number, level, text))
+
+    @contextmanager
+    def told_of_warnings(self) -> Iterator[None]:
+        """Whatever the library warns of within becomes a notice, once."""
+        log, handler = logging.getLogger("supple"), _Notices(self)
+        propagated, log.propagate = log.propagate, False
+        log.addHandler(handler)
+        try:
+            yield
+        finally:
+            log.removeHandler(handler)
+            log.propagate = propagated
+
+    def publish(self, now: float) -> None:
+        """Put out a snapshot, after a description where that has changed."""
+        live = self.live
+        if self._described != live.revision:
+            self.outbox.put_description(describe(live))
+            self._described = live.revision
+        self.outbox.put_snapshot(self.snapshot(now))
+        self._published, self._fresh = now, False
+
+    def snapshot(self, now: float) -> Snapshot:
+        """The present state; in slow motion, one between the last two. Its description stays on the other side."""
+        live, view = self.live, self.view
+        state = self._shown(now)
+        system, setup = live.system, live.setup
+        grabs = [spring.state(state.positions[_rows(live, spring.command.body)]) for spring in setup.grabs.values()]
+        pusher = setup.pusher
+        return Snapshot(
+            description=None,  # pyright: ignore[reportArgumentType]
+            frame=live.frame,
+            time=state.time,
+            positions=state.positions,
+            obstacle_poses=obstacle_poses(system, state.time),
+            pinned=system.pinned_vertices,
+            grabs=tuple(grabs),
+            pusher=None if pusher is None else (tuple(pusher.center.tolist()), pusher.radius),
+            paused=not self.playing,
+            speed=self.speed,
+            measures=measures(live),
+            timing=self.pacing.timing(now, self.speed, self.playing),
+            notices=tuple(self.notices),
+            applied=self.applied,
+            velocities=state.velocities if view.velocities else None,
+            tet_values=None if view.tet_values is None else tet_values(system, state.positions, view.tet_values),
+            tet_quantity=view.tet_values,
+            contact_points=contact_points(system, state.positions, state.time) if view.contacts else None,
+        )
+
+    def _shortest(self) -> float:
+        # A hair less than the time between two frames: else the clock's jitter would skip every other frame.
+        return 0.9 / limits.FRAMES_PER_SECOND
+
+    def _interval(self) -> float:
+        return self.live.setup.dt / self.speed
+
+    def _in_slow_motion(self) -> bool:
+        return self.playing and self.steps_left == 0 and self._interval() > 1.5 / limits.FRAMES_PER_SECOND
+
+    def _blends(self, now: float) -> bool:
+        return self._in_slow_motion() and now - self._published >= self._shortest()
+
+    def _shown(self, now: float) -> State:
+        after, before = self.live.state, self._before
+        if not self._in_slow_motion() or before is after or len(before.positions) != len(after.positions):
+            return after
+        share = float(np.clip(1.0 - (self.pacing.due - now) / self._interval(), 0.0, 1.0))
+        return State(
+            before.time + share * (after.time - before.time),
+            before.positions + share * (after.positions - before.positions),
+            before.velocities + share * (after.velocities - before.velocities),
+        )
+
+    def _time_to_wait(self) -> float:
+        if self.steps_left > 0:
+            return 0.0
+        now = time.perf_counter()
+        ends = [self._published + HEARTBEAT]
+        if self.playing:
+            ends.append(self.pacing.due)
+        if self._fresh or self._in_slow_motion():
+            ends.append(self._published + self._shortest())
+        return max(0.0, min(ends) - now)
+
+
+class _Notices(logging.Handler):
+    """Tells a loop of warnings. Errors are for the terminal as well: they are mistakes in the code."""
+
+    def __init__(self, loop: SimulationLoop) -> None:
+        super().__init__(logging.WARNING)
+        self.loop = loop
+        self.told: set[str] = set()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        text = " ".join(record.getMessage().split())[:500]
+        if record.levelno >= logging.ERROR:
+            logging.getLogger().handle(record)
+        elif text not in self.told and len(self.told) < 1000:
+            self.told.add(text)
+            self.loop.tell("info", text)
+
+
+def _rows(live: LiveScene, body: str) -> slice:
+    return next(part.vertices for part in live.system.bodies if part.name == body)
+
+
+def _one_line(error: BaseException) -> str:
+    return " ".join(str(error).split())[:500] or type(error).__name__

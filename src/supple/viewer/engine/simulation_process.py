@@ -1,0 +1,58 @@
+"""What runs in the simulation's process: from the pipes to the loop."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import threading
+from multiprocessing.connection import Connection
+
+from supple.errors import SuppleError
+from supple.viewer.protocol.command_queue import CommandQueue
+from supple.viewer.protocol.live_source import LiveSource
+
+
+def run_simulation(source: LiveSource, commands: Connection, snapshots: Connection, log_level: int) -> None:
+    """Simulate until the other end of `commands` is closed, by will or because the page's process has died."""
+    # Ctrl-C in a terminal reaches both processes; the page's ends this one.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    logging.basicConfig(level=log_level, format="%(levelname)s: %(message)s")
+    inbox = CommandQueue()
+    threading.Thread(target=_read, args=(commands, inbox), name="inbox", daemon=True).start()
+
+    from supple.viewer.engine.scene.live_scene import LiveScene
+    from supple.viewer.engine.simulation_loop import SimulationLoop
+    from supple.viewer.protocol.outbox import ERROR, Outbox, packed
+
+    try:
+        live = LiveScene(source)
+        warm_up(live)
+    except (SuppleError, MemoryError) as error:
+        snapshots.send_bytes(packed(ERROR, " ".join(str(error).split()) or type(error).__name__))
+        return
+    SimulationLoop(live, inbox, Outbox(snapshots)).run()
+
+
+def warm_up(live: object) -> None:
+    """Try one step and forget it: compiled kernels are loaded before a person waits for them."""
+    from supple.viewer.engine.scene.live_scene import LiveScene
+
+    assert isinstance(live, LiveScene)
+    state = live.state
+    live.step()
+    live.frame = 0
+    live.adopt(live.setup, state)
+
+
+def _read(commands: Connection, inbox: CommandQueue) -> None:
+    while True:
+        try:
+            inbox.put_all(commands.recv())
+        except (EOFError, OSError):
+            break
+        except Exception:
+            logging.getLogger(__name__).exception("commands could not be read")
+    inbox.close()
+    # The loop may be amid a long step, and nobody waits for it any more.
+    os._exit(0)

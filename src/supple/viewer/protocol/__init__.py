@@ -1,0 +1,1 @@
+"""What crosses the boundary between the page's process and the simulation's process."""

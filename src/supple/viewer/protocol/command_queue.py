@@ -1,0 +1,94 @@
+"""Commands on their way: in order, never more than a fixed number, and of a moving hand only the newest place."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Hashable, Iterable
+
+from supple.viewer.protocol import limits
+from supple.viewer.protocol.commands import Command, MoveGrab, MovePusher, SetParameter, SetSpeed, SetView, Unpin
+
+Numbered = tuple[int, Command]
+
+
+def subject(command: Command) -> Hashable | None:
+    """What a command is the last word on; None for commands of which each counts."""
+    match command:
+        case MoveGrab(grab=grab):
+            return "grab", grab
+        case SetParameter(name=name, body=body):
+            return "parameter", name, body
+        case MovePusher() | SetSpeed() | SetView():
+            return type(command)
+        case Unpin(body=None):
+            return "unpin"
+        case _:
+            return None
+
+
+class CommandQueue:
+    """A bounded queue between two threads. A newer word on the same subject takes the older one's place.
+
+    It does so only where no other kind of command came between the two, so that the outcome stays the same: moving a
+    grab after letting it go is not moving it before.
+    """
+
+    def __init__(self, capacity: int = limits.MOST_WAITING) -> None:
+        self.capacity = capacity
+        self.dropped = 0
+        self._waiting: list[Numbered] = []
+        self._places: dict[Hashable, int] = {}
+        self._changed = threading.Condition()
+        self._closed = False
+
+    def put(self, number: int, command: Command) -> bool:
+        """Append a command. Returns False, with the command dropped, where the queue is full."""
+        with self._changed:
+            about = subject(command)
+            if about is not None and about in self._places:
+                self._waiting[self._places[about]] = number, command
+            elif len(self._waiting) >= self.capacity:
+                self.dropped += 1
+                return False
+            else:
+                if about is None or (isinstance(command, SetParameter) and self._speaks_of(command.name)):
+                    self._places.clear()
+                if about is not None:
+                    self._places[about] = len(self._waiting)
+                self._waiting.append((number, command))
+            self._changed.notify()
+            return True
+
+    def put_all(self, commands: Iterable[Numbered]) -> None:
+        """Append commands."""
+        for number, command in commands:
+            self.put(number, command)
+
+    def take(self, timeout: float | None) -> list[Numbered]:
+        """Everything that waits, oldest first; waits for something until `timeout` [s] (None: for ever)."""
+        with self._changed:
+            if not self._waiting and not self._closed:
+                self._changed.wait(timeout)
+            taken, self._waiting = self._waiting, []
+            self._places.clear()
+            return taken
+
+    def holds(self, *kinds: type[Command]) -> bool:
+        """Whether a command of one of those kinds waits."""
+        with self._changed:
+            return any(isinstance(command, kinds) for _, command in self._waiting)
+
+    def close(self) -> None:
+        """Wake whoever waits; nothing will come any more."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+
+    @property
+    def closed(self) -> bool:
+        """Whether nothing will come any more."""
+        return self._closed
+
+    def _speaks_of(self, parameter: str) -> bool:
+        """Whether a word on that parameter waits: of one body and of all bodies, the later must stay the later."""
+        return any(isinstance(key, tuple) and key[:2] == ("parameter", parameter) for key in self._places)

@@ -1,0 +1,394 @@
+"""What a page may tell the simulation. Each command checks itself when it is made: none that exists is malformed.
+
+A command can still ask for the impossible, such as a body that is not there; the simulation then says so in a notice,
+and goes on.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.errors import CommandError, SceneError
+from supple.scene.values import check_name
+from supple.viewer.protocol import limits
+from supple.viewer.protocol.displayed import shown
+from supple.viewer.protocol.parameters import find_parameter
+
+Point = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Command:
+    """Base of all commands.
+
+    Raises
+    ------
+    CommandError : where a value is of the wrong kind, not finite, or beyond its limit (`supple.viewer.protocol.limits`).
+    """
+
+
+@dataclass(frozen=True)
+class Play(Command):
+    """Let time run."""
+
+
+@dataclass(frozen=True)
+class Pause(Command):
+    """Stop time."""
+
+
+@dataclass(frozen=True)
+class Step(Command):
+    """Pause, and simulate `count` frames."""
+
+    count: int = 1
+
+    def __post_init__(self) -> None:
+        _set(self, "count", _whole(self.count, "count", 1, limits.MOST_STEPS))
+
+
+@dataclass(frozen=True)
+class Reset(Command):
+    """Back to the start: bodies that were added stay, where they were added; hands let go; pins by hand are gone.
+
+    Parameters and solver stay as they are.
+    """
+
+
+@dataclass(frozen=True)
+class SetSpeed(Command):
+    """Slow motion: 1 is real time, 0.1 a tenth of it. The length of the simulation's steps stays the same."""
+
+    factor: float
+
+    def __post_init__(self) -> None:
+        _set(self, "factor", _number(self.factor, "speed", limits.SLOWEST_MOTION, limits.FASTEST_MOTION))
+
+
+@dataclass(frozen=True)
+class SetSolver(Command):
+    """Go on from the present state with another solver: "xpbd" or "implicit"."""
+
+    kind: str
+
+    def __post_init__(self) -> None:
+        if self.kind not in ("xpbd", "implicit"):
+            raise CommandError(f"there is no solver {shown(self.kind)}; there are xpbd and implicit")
+
+
+@dataclass(frozen=True)
+class SetParameter(Command):
+    """Change a number of the running simulation; `supple.viewer.protocol.parameters` lists them.
+
+    Parameters
+    ----------
+    body : whose, for parameters of bodies; None for all bodies that have it (and for friction: obstacles, too).
+    """
+
+    name: str
+    value: float | int | bool
+    body: str | None = None
+
+    def __post_init__(self) -> None:
+        parameter = find_parameter(self.name)
+        _set(self, "value", parameter.checked(self.value))
+        if self.body is not None:
+            if parameter.owner != "body":
+                raise CommandError(f"{self.name} belongs to the {parameter.owner}; give no body")
+            _set(self, "body", _name(self.body, "body"))
+
+
+@dataclass(frozen=True)
+class SetView(Command):
+    """Which numbers the page wants beside positions; none of them by default, since each costs time.
+
+    Parameters
+    ----------
+    tet_values : None, "J", "von_mises" [Pa] or "energy" [J/m^3]
+    velocities, contacts : whether snapshots should hold them
+    """
+
+    tet_values: str | None = None
+    velocities: bool = False
+    contacts: bool = False
+
+    def __post_init__(self) -> None:
+        if self.tet_values not in (None, "J", "von_mises", "energy"):
+            raise CommandError(f"there are no values {shown(self.tet_values)} of tets; there are J, von_mises, energy")
+        for name in ("velocities", "contacts"):
+            if not isinstance(getattr(self, name), bool):
+                raise CommandError(f"{name} is {shown(getattr(self, name))}; give true or false")
+
+
+@dataclass(frozen=True)
+class Grab(Command):
+    """Take hold of a point of a body with a spring, until `ReleaseGrab`. The body keeps its velocity then: a throw.
+
+    Parameters
+    ----------
+    grab : a number of the page's choice; with the number of a grab that is there already, this one takes its place.
+    body : its name.
+    vertices : one to four vertices of the body's mesh, numbered from 0 in the body.
+    weights : one per vertex; they are made to sum to 1. The point is there: (1,) for a vertex, the barycentric
+        coordinates of a point on a triangle or in a tet.
+    target : (3,) where the spring pulls the point to [m].
+    stiffness : factor of the strength that suits the body's mass and size.
+    """
+
+    grab: int
+    body: str
+    vertices: tuple[int, ...]
+    weights: tuple[float, ...]
+    target: Point
+    stiffness: float = 1.0
+
+    def __post_init__(self) -> None:
+        _set(self, "grab", _grab_number(self.grab))
+        _set(self, "body", _name(self.body, "body"))
+        _set(self, "vertices", _vertices(self.vertices))
+        _set(self, "weights", _weights(self.weights, len(self.vertices)))
+        _set(self, "target", _point(self.target, "target"))
+        _set(
+            self,
+            "stiffness",
+            _number(self.stiffness, "stiffness", limits.WEAKEST_GRAB, limits.STRONGEST_GRAB),
+        )
+
+
+@dataclass(frozen=True)
+class MoveGrab(Command):
+    """Move the place (3,) [m] that a grab pulls to."""
+
+    grab: int
+    target: Point
+
+    def __post_init__(self) -> None:
+        _set(self, "grab", _grab_number(self.grab))
+        _set(self, "target", _point(self.target, "target"))
+
+
+@dataclass(frozen=True)
+class ReleaseGrab(Command):
+    """Let go."""
+
+    grab: int
+
+    def __post_init__(self) -> None:
+        _set(self, "grab", _grab_number(self.grab))
+
+
+@dataclass(frozen=True)
+class Pin(Command):
+    """Hold a vertex where it is."""
+
+    body: str
+    vertex: int
+
+    def __post_init__(self) -> None:
+        _set(self, "body", _name(self.body, "body"))
+        _set(self, "vertex", _whole(self.vertex, "vertex", 0, 2**31 - 1))
+
+
+@dataclass(frozen=True)
+class Unpin(Command):
+    """Let go of a pinned vertex, whoever pinned it; without a vertex, of all that were pinned by hand."""
+
+    body: str | None = None
+    vertex: int | None = None
+
+    def __post_init__(self) -> None:
+        if (self.body is None) != (self.vertex is None):
+            raise CommandError("unpin needs a body and a vertex, or neither")
+        if self.body is not None:
+            _set(self, "body", _name(self.body, "body"))
+            _set(self, "vertex", _whole(self.vertex, "vertex", 0, 2**31 - 1))
+
+
+@dataclass(frozen=True)
+class MovePusher(Command):
+    """Put the pusher, a solid ball, at `center` (3,) [m], or move it there if it exists; `radius` [m]."""
+
+    center: Point
+    radius: float
+
+    def __post_init__(self) -> None:
+        _set(self, "center", _point(self.center, "center"))
+        _set(self, "radius", _number(self.radius, "radius", limits.SMALLEST_LENGTH, limits.LARGEST_LENGTH))
+
+
+@dataclass(frozen=True)
+class RemovePusher(Command):
+    """Take the pusher away."""
+
+
+@dataclass(frozen=True)
+class Squash(Command):
+    """Press all free bodies at once to `factor` of their height, along gravity; they get wider and keep their volume.
+
+    Above 1 this stretches them. They are at rest in that shape, and then let go. The lowest point stays where it is.
+    """
+
+    factor: float = 0.5
+
+    def __post_init__(self) -> None:
+        _set(self, "factor", _number(self.factor, "factor", limits.FLATTEST, limits.TALLEST))
+
+
+@dataclass(frozen=True)
+class AddBody(Command):
+    """Add a body of stable Neo-Hookean rubber.
+
+    Parameters
+    ----------
+    shape : one of `limits.SHAPES`.
+    size : of the whole shape: edge, diameter or height [m].
+    resolution : edges across it.
+    position : (3,) of its center [m], or None: above everything else.
+    youngs [Pa], poisson, density [kg/m^3]
+    name : None for the shape's own, with a number.
+    """
+
+    shape: str
+    size: float = 0.5
+    resolution: int = 8
+    position: Point | None = None
+    youngs: float = 1e5
+    poisson: float = 0.45
+    density: float = 1000.0
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.shape not in limits.SHAPES:
+            raise CommandError(f"there is no shape {shown(self.shape)}; there are {', '.join(limits.SHAPES)}")
+        _set(self, "size", _number(self.size, "size", limits.SMALLEST_LENGTH, limits.LARGEST_LENGTH))
+        _set(self, "resolution", _whole(self.resolution, "resolution", limits.COARSEST, limits.FINEST))
+        if self.position is not None:
+            _set(self, "position", _point(self.position, "position"))
+        for name in ("youngs", "poisson", "density"):
+            _set(self, name, find_parameter(name).checked(getattr(self, name)))
+        if self.name is not None:
+            _set(self, "name", _name(self.name, "name"))
+
+
+@dataclass(frozen=True, eq=False)
+class AddMesh(Command):
+    """Add a body of stable Neo-Hookean rubber above everything else, with a mesh that is given.
+
+    Parameters
+    ----------
+    vertices : (n, 3) [m]; tets : (m, 4) rows of them
+    youngs [Pa]
+    name : free ones are made of it, with a number.
+    """
+
+    vertices: NDArray[np.float64]
+    tets: NDArray[np.int32]
+    youngs: float = 1e5
+    name: str = "mesh"
+
+    def __post_init__(self) -> None:
+        _mesh_arrays(self.vertices, self.tets)
+        _set(self, "youngs", find_parameter("youngs").checked(self.youngs))
+        _set(self, "name", _name(self.name, "name"))
+
+
+@dataclass(frozen=True)
+class CopyBody(Command):
+    """Add a body like one that is there, at rest and undeformed; `position` as for `AddBody`."""
+
+    body: str
+    position: Point | None = None
+
+    def __post_init__(self) -> None:
+        _set(self, "body", _name(self.body, "body"))
+        if self.position is not None:
+            _set(self, "position", _point(self.position, "position"))
+
+
+@dataclass(frozen=True)
+class RemoveBody(Command):
+    """Remove a body, and the pins, forces, springs and stitches on it. The last one stays."""
+
+    body: str
+
+    def __post_init__(self) -> None:
+        _set(self, "body", _name(self.body, "body"))
+
+
+def _set(command: Command, name: str, value: object) -> None:
+    object.__setattr__(command, name, value)
+
+
+def _number(value: object, what: str, low: float, high: float) -> float:
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
+        raise CommandError(f"{what} is {shown(value)}; give a number")
+    if not low <= value <= high or not math.isfinite(value):
+        raise CommandError(f"{what} is {shown(value)}; it must be from {low:g} to {high:g}")
+    return float(value)
+
+
+def _whole(value: object, what: str, low: int, high: int) -> int:
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
+        raise CommandError(f"{what} is {shown(value)}; give a whole number")
+    if not low <= value <= high:
+        raise CommandError(f"{what} is {shown(value)}; it must be from {low} to {high}")
+    return int(value)
+
+
+def _point(value: object, what: str) -> Point:
+    values = _items(value, what, 3, 3)
+    x, y, z = (_number(each, what, -limits.FARTHEST, limits.FARTHEST) for each in values)
+    return x, y, z
+
+
+def _items(value: object, what: str, least: int, most: int) -> list[object]:
+    if not isinstance(value, (tuple, list, np.ndarray)) or (isinstance(value, np.ndarray) and value.ndim != 1):
+        raise CommandError(f"{what} is {shown(value)}; give a list")
+    if not least <= len(value) <= most:
+        raise CommandError(f"{what} has {len(value)} values; give {least if least == most else f'{least} to {most}'}")
+    return list(value)
+
+
+def _mesh_arrays(vertices: object, tets: object) -> None:
+    for array, width, kind, what in ((vertices, 3, "f", "vertices"), (tets, 4, "i", "tets")):
+        if not isinstance(array, np.ndarray) or array.ndim != 2 or array.shape[1] != width or array.dtype.kind != kind:
+            raise CommandError(f"{what} must be an array of {width} numbers each")
+    assert isinstance(vertices, np.ndarray)
+    assert isinstance(tets, np.ndarray)
+    if not 1 <= len(tets) <= limits.MOST_TETS or not 4 <= len(vertices) <= 4 * len(tets):
+        raise CommandError(
+            f"{len(tets)} tets, {len(vertices)} vertices; a live page has at most {limits.MOST_TETS} tets"
+        )
+    if not np.all(np.abs(vertices) <= limits.LARGEST_LENGTH) or tets.min() < 0 or tets.max() >= len(vertices):
+        raise CommandError("a vertex is too far away, or a tet has one that is not there")
+
+
+def _vertices(value: object) -> tuple[int, ...]:
+    vertices = tuple(_whole(each, "vertices", 0, 2**31 - 1) for each in _items(value, "vertices", 1, 4))
+    if len(set(vertices)) != len(vertices):
+        raise CommandError(f"vertices {list(vertices)} names a vertex twice")
+    return vertices
+
+
+def _weights(value: object, count: int) -> tuple[float, ...]:
+    weights = [_number(each, "weights", -1e3, 1e3) for each in _items(value, "weights", count, count)]
+    total = sum(weights)
+    if total < 1e-3:
+        raise CommandError(f"weights {weights} sum to {total:g}; give barycentric coordinates")
+    return tuple(each / total for each in weights)
+
+
+def _grab_number(value: object) -> int:
+    return _whole(value, "grab", 0, 2**31 - 1)
+
+
+def _name(value: object, what: str) -> str:
+    try:
+        check_name(value, what)
+    except SceneError as error:
+        raise CommandError(str(error)) from None
+    return str(value)

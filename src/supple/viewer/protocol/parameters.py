@@ -1,0 +1,88 @@
+"""The numbers that a page may change while a simulation runs, and the range of each: for sliders and for checks."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from supple.errors import CommandError
+from supple.viewer.protocol.displayed import shown
+
+Owner = Literal["solver", "scene", "body"]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of a running simulation.
+
+    Attributes
+    ----------
+    name : as commands and descriptions call it; label : as a panel calls it; unit : "" where it has none
+    owner : "body" where each body has a value of its own
+    kind : float, int or bool; low, high : both are allowed
+    logarithmic : whether a slider should run in powers of ten (zero, where allowed, is its left end)
+    """
+
+    name: str
+    label: str
+    owner: Owner
+    kind: type[float] | type[int] | type[bool]
+    low: float
+    high: float
+    unit: str = ""
+    logarithmic: bool = False
+
+    def checked(self, value: object) -> float | int | bool:
+        """`value`, as this parameter's kind.
+
+        Raises
+        ------
+        CommandError : where it is of another kind, not finite, or out of range.
+        """
+        if self.kind is bool:
+            if not isinstance(value, (bool, np.bool_)):
+                raise CommandError(f"{self.name} is {shown(value)}; give true or false")
+            return bool(value)
+        if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
+            raise CommandError(f"{self.name} is {shown(value)}; give a number")
+        if not self.low <= value <= self.high or not math.isfinite(value):
+            raise CommandError(f"{self.name} is {shown(value)}; it must be from {self.low:g} to {self.high:g}")
+        if self.kind is int:
+            if value != int(value):
+                raise CommandError(f"{self.name} is {shown(value)}; give a whole number")
+            return int(value)
+        return float(value)
+
+
+PARAMETERS: dict[str, Parameter] = {
+    parameter.name: parameter
+    for parameter in (
+        Parameter("substeps", "substeps", "solver", int, 1, 200),
+        Parameter("momentum_restore", "momentum restore", "solver", bool, 0, 1),
+        Parameter("contact", "contact of bodies", "solver", bool, 0, 1),
+        Parameter("dt", "time step", "scene", float, 1e-4, 0.1, "s", logarithmic=True),
+        Parameter("gravity", "gravity", "scene", float, -100.0, 100.0, "m/s^2"),
+        Parameter("youngs", "Young's modulus", "body", float, 1e2, 1e11, "Pa", logarithmic=True),
+        Parameter("poisson", "Poisson's ratio", "body", float, -0.5, 0.499),
+        Parameter("edge_compliance", "edge compliance", "body", float, 0.0, 1.0, "m/N", logarithmic=True),
+        Parameter("volume_compliance", "volume compliance", "body", float, 0.0, 1.0, "m^5/N", logarithmic=True),
+        Parameter("damping", "damping", "body", float, 0.0, 1.0, "s", logarithmic=True),
+        Parameter("density", "density", "body", float, 1.0, 1e5, "kg/m^3", logarithmic=True),
+        Parameter("friction", "friction", "body", float, 0.0, 10.0),
+    )
+}
+
+
+def find_parameter(name: object) -> Parameter:
+    """The parameter of that name.
+
+    Raises
+    ------
+    CommandError : where there is none.
+    """
+    if not isinstance(name, str) or name not in PARAMETERS:
+        raise CommandError(f"there is no parameter {shown(name)}; there are {', '.join(PARAMETERS)}")
+    return PARAMETERS[name]

@@ -1,0 +1,273 @@
+"""Who may see a page, and what may come in from a browser: in front of viser's server, on the same port.
+
+viser serves its page and its websocket with one call of `websockets`' `serve`. While the server is started, that call
+is taken over here, and gets limits and a doorkeeper. A viser that starts its server in another way is not let run.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import hmac
+import http
+import ipaddress
+import logging
+import os
+import secrets
+import socket
+import threading
+import time
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+from supple.errors import OutputError
+from supple.viewer.protocol import limits
+from supple.viewer.server.connection_limit import bounded_connections
+from supple.viewer.server.message_check import Malformed, is_wanted
+
+logger = logging.getLogger(__name__)
+
+_one_at_a_time = threading.Lock()
+# Ends of a connection, RFC 6455 section 7.4.1.
+_POLICY, _TRY_LATER, _ERROR = 1008, 1013, 1011
+
+
+def new_token() -> str:
+    """A secret for a page's address."""
+    return secrets.token_urlsafe(18)
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine can reach a server that listens at `host`."""
+    if host.lower() == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host.strip("[]")).is_loopback
+    except ValueError:
+        return False
+
+
+def require_free_port(host: str, port: int) -> None:
+    """Raise `OutputError` where nothing can listen at that host and port; port 0 is any that is free."""
+    try:
+        family, kind, protocol, _, place = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        with socket.socket(family, kind, protocol) as probe:
+            if os.name == "posix":
+                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # a port that was just given up is free
+            probe.bind(place)
+    except (OSError, UnicodeError) as error:
+        mend = "choose another --port" if port else "choose another --host"
+        raise OutputError(
+            f"cannot serve at {host}, port {port} ({getattr(error, 'strerror', None) or error}); {mend}"
+        ) from None
+
+
+def first_free_port(host: str, start: int, tries: int = 20) -> int:
+    """The first port from `start` on that can be listened at.
+
+    Raises
+    ------
+    OutputError : where none of `tries` can.
+    """
+    for port in range(start, start + tries - 1):
+        with contextlib.suppress(OutputError):
+            require_free_port(host, port)
+            return port
+    require_free_port(host, start + tries - 1)
+    return start + tries - 1
+
+
+@dataclass(frozen=True)
+class Doorkeeper:
+    """Answers a request for a connection.
+
+    Attributes
+    ----------
+    token : what the address, or the cookie that the first page sets, must hold; None: no token is needed
+    """
+
+    token: str | None = None
+
+    def refusal(self, path: str, headers: Any) -> str | None:
+        """Why a request is turned away, or None."""
+        host = headers.get("Host", "")
+        if self.token is None and not is_loopback(_hostname(host)):
+            # A page of another site whose name was made to point here.
+            return "this page is served on this machine only: use http://localhost"
+        origin = headers.get("Origin")
+        if _is_websocket(headers) and origin is not None and urlsplit(origin).netloc.lower() != host.lower():
+            return "a page of another site may not control this simulation"
+        if self.token is not None and not (self.holds_token(path) or self._has_cookie(headers)):
+            return "the address needs its token (?token=...), as the terminal shows it"
+        return None
+
+    def holds_token(self, path: str) -> bool:
+        """Whether the address holds the token."""
+        return any(self._is_token(each) for each in parse_qs(urlsplit(path).query).get("token", []))
+
+    def cookie(self, headers: Any) -> str | None:
+        """The cookie by which the browser shows the token from now on, also when it opens the websocket."""
+        if self.token is None:
+            return None
+        return f"{_cookie_name(headers)}={self.token}; HttpOnly; SameSite=Strict; Path=/"
+
+    def _has_cookie(self, headers: Any) -> bool:
+        for line in headers.get_all("Cookie"):
+            for pair in line.split(";"):
+                name, _, value = pair.strip().partition("=")
+                if name == _cookie_name(headers) and self._is_token(value):
+                    return True
+        return False
+
+    def _is_token(self, value: str) -> bool:
+        return self.token is not None and hmac.compare_digest(value.encode(), self.token.encode())
+
+
+def _cookie_name(headers: Any) -> str:
+    # Browsers send cookies to every port of a host: each server knows its own by the port.
+    return f"supple-{urlsplit('//' + headers.get('Host', '')).port or 80}"
+
+
+def _hostname(host: str) -> str:
+    try:
+        return urlsplit("//" + host).hostname or ""
+    except ValueError:
+        return ""
+
+
+def _is_websocket(headers: Any) -> bool:
+    return headers.get("Upgrade", "").lower() == "websocket"
+
+
+@contextmanager
+def gate(host: str, token: str | None = None) -> Iterator[None]:
+    """Start viser's server within this block: it gets a doorkeeper, and limits for what comes in.
+
+    Parameters
+    ----------
+    host : where it will listen; beyond this machine, a token is needed.
+
+    Raises
+    ------
+    OutputError : where a token is missing, or the server that was started cannot be guarded.
+    """
+    if token is None and not is_loopback(host):
+        raise OutputError(f"a page at {host} can be reached from other machines; it needs a token")
+    import websockets.asyncio.server as websockets_server
+
+    keeper, taken_over = Doorkeeper(token), False
+    clients: set[Any] = set()
+
+    def serve(handler: Any, *arguments: Any, process_request: Any = None, **options: Any) -> Any:
+        nonlocal taken_over
+        taken_over = True
+        # Who floods the server does not answer a farewell: it is not waited for.
+        options |= {"max_size": limits.LARGEST_PICTURE, "max_queue": 16, "close_timeout": 1.0}
+        options["create_connection"] = bounded_connections(limits.MOST_CONNECTIONS)
+        asyncio.get_running_loop().set_exception_handler(_log_quietly)
+        answer = _guarded(process_request, keeper)
+        return original(_watched(handler, clients), *arguments, process_request=answer, **options)
+
+    with _one_at_a_time:
+        original = websockets_server.serve
+        websockets_server.serve = serve  # pyright: ignore[reportAttributeAccessIssue]
+        try:
+            yield
+        finally:
+            websockets_server.serve = original
+    if not taken_over:
+        raise OutputError("this version of viser cannot be guarded; install viser 1.1")
+
+
+def _guarded(process_request: Any, keeper: Doorkeeper) -> Callable[[Any, Any], Any]:
+    """The server's answer to HTTP requests, after the doorkeeper's."""
+
+    def answer(connection: Any, request: Any) -> Any:
+        why = keeper.refusal(request.path, request.headers)
+        if why is not None:
+            logger.info("turned away: %s", why)
+            return connection.respond(http.HTTPStatus.FORBIDDEN, f"Supple: {why}\n")
+        response = None if process_request is None else process_request(connection, request)
+        cookie = keeper.cookie(request.headers)
+        if response is not None and cookie is not None and keeper.holds_token(request.path):
+            response.headers["Set-Cookie"] = cookie
+        if response is not None:
+            response.headers["Referrer-Policy"] = "no-referrer"  # the address holds a secret
+            response.headers["X-Content-Type-Options"] = "nosniff"
+        return response
+
+    return answer
+
+
+def _watched(handler: Callable[[Any], Awaitable[None]], clients: set[Any]) -> Callable[[Any], Awaitable[None]]:
+    """viser's handler of one connection, which gets well-formed messages only, and no more than a person can send."""
+
+    async def watch(connection: Any) -> None:
+        if len(clients) >= limits.MOST_CLIENTS:
+            await connection.close(_TRY_LATER, "too many pages are open")
+            return
+        clients.add(connection)
+        connection.recv = _checked(connection.recv)
+        try:
+            await handler(connection)
+        except Malformed as error:
+            logger.info("a browser was disconnected, its message was malformed: %s", error)
+            await connection.close(_POLICY, "malformed message")
+        except Exception as error:
+            logger.warning("a browser was disconnected: %s: %s", type(error).__name__, error)
+            await connection.close(_ERROR, "a mistake of the server")
+        finally:
+            clients.discard(connection)
+
+    return watch
+
+
+def _checked(receive: Callable[[], Awaitable[Any]]) -> Callable[[], Awaitable[bytes]]:
+    """The next message that is well-formed and wanted.
+
+    Raises
+    ------
+    Malformed : at a message that is not, or where messages come faster than any page sends them.
+    """
+    allowance = Allowance(limits.MESSAGES_PER_SECOND, limits.MESSAGES_AT_ONCE)
+
+    async def checked() -> bytes:
+        while True:
+            raw = await receive()
+            if not allowance.take(time.monotonic()):
+                raise Malformed("more messages than a page sends")
+            if len(raw) > limits.LARGEST_MESSAGE:
+                # Who sends much is read slowly; the others do not notice.
+                await asyncio.sleep(len(raw) / limits.LARGE_MESSAGES_PER_SECOND)
+            if is_wanted(raw):
+                return raw
+
+    return checked
+
+
+class Allowance:
+    """So many at once, refilled at a rate per second: a token bucket."""
+
+    def __init__(self, rate: float, most: float) -> None:
+        self.rate, self.most = rate, most
+        self._left = most
+        self._when: float | None = None
+
+    def take(self, now: float) -> bool:
+        """Use one up; False where none is left at the time `now` [s]."""
+        if self._when is not None:
+            self._left = min(self.most, self._left + (now - self._when) * self.rate)
+        self._when = now
+        if self._left < 1.0:
+            return False
+        self._left -= 1.0
+        return True
+
+
+def _log_quietly(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """What goes wrong in the handling of one message is a line in the log, not a stack trace in the terminal."""
+    error = context.get("exception")
+    logger.warning("the page: %s", f"{type(error).__name__}: {error}" if error else context.get("message"))

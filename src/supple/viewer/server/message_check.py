@@ -1,0 +1,156 @@
+"""Whether a message of a browser is one that viser's client sends: its kind, its fields, their types, its numbers."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import typing
+from functools import cache
+from types import UnionType
+from typing import Any
+
+from supple.viewer.protocol import limits
+
+# What a page needs. What viser knows beside these is passed over: a request to share the page through a public server,
+# for one.
+KINDS = frozenset(
+    {
+        "CommandTriggerMessage",
+        "FileTransferPart",
+        "FileTransferStartUpload",
+        "GetRenderResponseMessage",
+        "GuiButtonHoldMessage",
+        "GuiFormDirtyMessage",
+        "GuiFormSubmitMessage",
+        "GuiUpdateMessage",
+        "LocalStorageGetItemResponseMessage",
+        "SceneNodeClickMessage",
+        "SceneNodeDragMessage",
+        "ScenePointerMessage",
+        "TransformControlsDragEndMessage",
+        "TransformControlsDragStartMessage",
+        "TransformControlsUpdateMessage",
+        "ViewerCameraMessage",
+    }
+)
+# What may be larger than `limits.LARGEST_MESSAGE` [bytes]: pictures that the page was asked for, and parts of files.
+# Whether a file is taken, `supple.viewer.server.uploads.transfers` decides.
+LARGE_KINDS = {
+    "GetRenderResponseMessage": limits.LARGEST_PICTURE,
+    "FileTransferPart": limits.UPLOAD_PART + limits.LARGEST_MESSAGE,
+}
+DEEPEST = 8
+
+
+class Malformed(Exception):
+    """A message that no page sends."""
+
+
+def is_wanted(raw: object) -> bool:
+    """Whether to pass a message on; False for what viser knows and a page of ours does not need.
+
+    Raises
+    ------
+    Malformed : where it is no message at all.
+    """
+    if not isinstance(raw, bytes):
+        raise Malformed("text instead of binary data")
+    import msgspec
+
+    try:
+        message = msgspec.msgpack.decode(raw)
+    except (msgspec.DecodeError, RecursionError, ValueError):
+        raise Malformed("no MessagePack") from None
+    if not isinstance(message, dict) or not isinstance(kind := message.pop("type", None), str):
+        raise Malformed("no kind of message")
+    if kind not in _known():
+        raise Malformed("an unknown kind of message")
+    if kind not in KINDS:
+        return False
+    if len(raw) > LARGE_KINDS.get(kind, limits.LARGEST_MESSAGE):
+        raise Malformed(f"{len(raw)} bytes")
+    _check_fields(kind, message)
+    if kind == "GuiUpdateMessage" and set(message["updates"]) != {"value"}:
+        # viser would set any attribute of its own that a message names.
+        raise Malformed("an update of something else than a value")
+    return True
+
+
+@cache
+def _known() -> dict[str, type]:
+    from viser._messages import Message
+
+    return {kind.__name__: kind for kind in Message.get_subclasses()}
+
+
+@cache
+def _fields(kind: str) -> tuple[dict[str, Any], frozenset[str]]:
+    """Types of the fields of a kind of message by name, and the names of those that must be there."""
+    described = _known()[kind]
+    hints = typing.get_type_hints(described)
+    fields = dataclasses.fields(described)
+    needed = {
+        field.name
+        for field in fields
+        if field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
+    }
+    return {field.name: hints[field.name] for field in fields}, frozenset(needed)
+
+
+def _check_fields(kind: str, message: dict[Any, Any]) -> None:
+    types, needed = _fields(kind)
+    if not needed <= message.keys() <= types.keys():
+        raise Malformed(f"other fields than those of {kind}")
+    for name, value in message.items():
+        if not _fits(value, types[name], 0):
+            raise Malformed(f"{name} of {kind} is of another type")
+
+
+def _fits(value: object, wanted: Any, depth: int) -> bool:
+    """Whether a value is of an annotated type. JavaScript knows one kind of number: 1.0 arrives as an integer."""
+    if depth > DEEPEST:
+        return False
+    origin, arguments = typing.get_origin(wanted), typing.get_args(wanted)
+    if wanted in (float, int):
+        return _is_number(value)
+    if wanted is bool:
+        return isinstance(value, bool)
+    if wanted is str:
+        return isinstance(value, str)
+    if wanted is bytes:
+        return isinstance(value, bytes)
+    if origin is typing.Literal:
+        return isinstance(value, str | int | None) and value in arguments
+    if origin in (typing.Union, UnionType):
+        return any(_fits(value, each, depth + 1) for each in arguments)
+    if wanted is type(None):
+        return value is None
+    if origin is tuple:
+        if not isinstance(value, list):
+            return False
+        if len(arguments) == 2 and arguments[1] is ...:
+            return all(_fits(each, arguments[0], depth + 1) for each in value)
+        return len(value) == len(arguments) and all(
+            _fits(each, one, depth + 1) for each, one in zip(value, arguments, strict=True)
+        )
+    return _is_plain(value, depth + 1) and (origin is not dict or isinstance(value, dict))
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _is_plain(value: object, depth: int) -> bool:
+    """Whether a value is made of texts, finite numbers, lists and dictionaries by text."""
+    if depth > DEEPEST:
+        return False
+    match value:
+        case None | bool() | str() | bytes():
+            return True
+        case int() | float():
+            return _is_number(value)
+        case list():
+            return all(_is_plain(each, depth + 1) for each in value)
+        case dict():
+            return all(isinstance(key, str) and _is_plain(each, depth + 1) for key, each in value.items())
+    return False

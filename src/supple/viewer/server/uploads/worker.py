@@ -1,0 +1,81 @@
+"""The child process that reads an uploaded file and fills it with tets: what the file does to it, it does to no other.
+
+Job, file and answer are in one private folder, which is the current one. The parent keeps a pipe to the standard input
+open; when that ends, so does this process, and the mesher that it has started.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+JOB, ANSWER, MESH = "job.json", "answer.json", "tets.npz"
+
+
+def main() -> int:
+    """Do the job of the current folder; returns the exit code: 0, or 1 where `answer.json` says what is wrong."""
+    from supple.errors import SuppleError
+    from supple.mesh.meshing.mesher_worker import limit_process
+
+    job: dict[str, Any] = json.loads(Path(JOB).read_text("utf-8"))
+    limit_process(job["seconds"] + 10.0, job["memory"])
+    try:
+        _mesh(job)
+    except SuppleError as error:
+        said = str(error)
+    except MemoryError:
+        said = f"{job['file']}: it needs more memory than an upload may have"
+    else:
+        return 0
+    Path(ANSWER).write_text(json.dumps({"error": " ".join(said.split())}), "utf-8")
+    return 1
+
+
+def _mesh(job: dict[str, Any]) -> None:
+    """Read, check and fill the surface, scaled to the size that is asked for."""
+    import numpy as np
+
+    from supple.errors import MeshError
+    from supple.mesh.meshing.tetrahedralize import tetrahedralize
+    from supple.mesh.surface import SurfaceMesh
+
+    file, most = job["file"], job["triangles"]
+    surface = SurfaceMesh.load(file)
+    if len(surface.triangles) > most:
+        raise MeshError(f"{file}: {len(surface.triangles)} triangles; an upload may have {most}: make it coarser")
+    low, high = surface.bounds
+    extent = float((high - low).max())
+    if not 0.0 < extent < np.inf:
+        raise MeshError(f"{file}: all its vertices are in one place")
+    surface = surface.transformed(1.0, None, -0.5 * (low + high)).transformed(job["size"] / extent)
+    report = surface.check()
+    if not (report.watertight and report.consistently_oriented) or report.self_intersecting:
+        faults = "; ".join(report.problems)
+        raise MeshError(f"{file}: {faults}; mend it with `supple mesh --repair` or in a modelling program")
+    mesh = tetrahedralize(surface, mesher="tetgen", time_limit=job["seconds"], memory_limit=job["memory"])
+    with Path(MESH).open("wb") as out:
+        np.savez(out, vertices=mesh.vertices, tets=mesh.tets)
+
+
+def _end_with_parent() -> None:
+    """Wait for the end of the standard input."""
+    while os.read(0, 1):
+        pass
+    if hasattr(os, "killpg") and os.getpid() == os.getpgrp():
+        os.killpg(0, signal.SIGKILL)
+    os._exit(1)
+
+
+if __name__ == "__main__":
+    with contextlib.suppress(AttributeError, OSError):
+        os.nice(5)  # the simulation that runs comes first
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    exit_code = main()
+    sys.stdout.flush()
+    os._exit(exit_code)

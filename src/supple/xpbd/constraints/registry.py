@@ -1,0 +1,106 @@
+"""What a constraint set is, and which material has which one.
+
+A new constraint set is one file with one class, and one line in `CONSTRAINT_SETS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.errors import SolverError
+from supple.materials.edges_and_volume import EdgesAndVolume
+from supple.materials.material import Material
+from supple.materials.regions import Regions
+from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.system import BodyRange, System
+from supple.xpbd.constraints.edges_and_volume import EdgeConstraints, VolumeConstraints
+from supple.xpbd.constraints.stable_neo_hookean import StableNeoHookeanConstraints
+from supple.xpbd.sweeps.ordering import Layout
+
+
+class ConstraintSet(Protocol):
+    """All constraints of one kind in a scene, sorted for projection."""
+
+    count: int
+    work: int  # what a sweep costs, in edges or volumes
+    damped: bool
+
+    def project(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:
+        """Project every constraint once, in place.
+
+        Parameters
+        ----------
+        points : (n, 4) positions [m] and inverse masses [1/kg], solver's numbering.
+        h : length of the substep [s].
+        parallel : whether independent chunks run on several threads.
+        """
+        ...
+
+    def damp(self, points: NDArray[np.float64], previous: NDArray[np.float64], h: float, parallel: bool) -> None:
+        """Take from a motion previous -> points what Kelvin-Voigt damping takes in a substep, in place.
+
+        Forth and back over all constraints, half of it each time: only a symmetric operator takes energy from every
+        mode.
+
+        Parameters
+        ----------
+        points : (n, 4) as in `project`, moved on with the velocities of the beginning of the substep.
+        previous : (n, 3) positions at the beginning of the substep [m].
+        h, parallel : as in `project`.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class _Entry:
+    material: type[Material]
+    sets: tuple[Callable[[System, list[BodyRange], Layout], ConstraintSet], ...]
+
+    def takes(self, material: Material) -> bool:
+        """Whether a body of this material is handled here: of this kind, or of regions that all are."""
+        if isinstance(material, Regions):
+            return all(type(each) is self.material for each in material.materials)
+        return type(material) is self.material
+
+
+CONSTRAINT_SETS = (
+    _Entry(EdgesAndVolume, (EdgeConstraints, VolumeConstraints)),
+    _Entry(StableNeoHookean, (StableNeoHookeanConstraints,)),
+)
+
+
+def build_constraint_sets(system: System, layout: Layout) -> list[ConstraintSet]:
+    """The constraint sets of all bodies, each kind once, however many bodies share it.
+
+    Parameters
+    ----------
+    system : in the solver's numbering (`supple.xpbd.sweeps.ordering.reordered`).
+    layout : the same numbering.
+
+    Raises
+    ------
+    SolverError : where a body's material has no constraints; the text names the body.
+    """
+    for part in system.bodies:
+        material = part.body.material
+        if not any(entry.takes(material) for entry in CONSTRAINT_SETS):
+            known = sorted(entry.material.__name__ for entry in CONSTRAINT_SETS)
+            given = [material, *getattr(material, "materials", [])]
+            unknown = ", ".join(
+                dict.fromkeys(type(each).__name__ for each in given if type(each).__name__ not in known)
+            )
+            raise SolverError(
+                f"XPBD: body {part.name!r} is made of {unknown}, and XPBD has no constraints for that; "
+                f"give it {' or '.join(known)}, or simulate with Implicit"
+            )
+    sets = []
+    for entry in CONSTRAINT_SETS:
+        parts = [part for part in system.bodies if entry.takes(part.body.material)]
+        if parts:
+            sets += [build(system, parts, layout) for build in entry.sets]
+    return [made for made in sets if made.count > 0]

@@ -1,0 +1,1 @@
+"""How XPBD answers a contact: push-out and friction."""

@@ -1,0 +1,125 @@
+"""All collisions of a scene: bodies against obstacles, against each other and against themselves."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.contact.obstacle_poses import ObstaclePoses
+from supple.contact.search.reach import outran, reach_from_velocities
+from supple.contact.search.surfaces import build_surfaces
+from supple.scene.contact_pairs import pair_table
+from supple.system import System
+from supple.xpbd.contact.obstacle_contacts import ObstacleContacts
+from supple.xpbd.contact.obstacle_shapes import build_shapes
+from supple.xpbd.contact.settings import XPBDContact
+from supple.xpbd.contact.surface_collisions import SurfaceCollisions
+
+# Of the mean surface edge: what a vertex at rest may move before lists are made anew.
+LEAST_REACH = 0.1
+# Of the mean surface edge: how much of an old overlap is mended in one frame (faster, and bodies would jump apart);
+# up to which gaps distances are reported.
+MENDED_PER_FRAME, NEAR = 0.05, 1.0
+# Of the mean surface edge.
+DEFAULT_THICKNESS = 0.05
+
+
+class Collisions:
+    """Contact for the substeps of a frame. Positions are projected in place.
+
+    Parameters
+    ----------
+    system : what moves, in the numbering that `project` gets.
+    settings : None switches contact of bodies with each other and with themselves off; obstacles act in any case.
+
+    Attributes
+    ----------
+    min_distance : smallest gap at the beginnings of the frame's substeps [m], below zero where surfaces overlapped;
+        None when nothing was nearer than about one edge length.
+    contacts : number of contacts in the last substep.
+    """
+
+    def __init__(self, system: System, settings: XPBDContact | None) -> None:
+        self.system = system
+        self.settings = settings
+        self.edge_length = mean_edge_length(system)
+        self.poses = ObstaclePoses(system.obstacles)
+        table = pair_table(system.scene)
+        self.obstacles = ObstacleContacts(build_shapes(system.obstacles), self.poses, system, table)
+        thickness = settings.thickness if settings is not None else None
+        self.thickness = thickness if thickness is not None else DEFAULT_THICKNESS * self.edge_length
+        surfaces = build_surfaces(system, table, settings, self.thickness, self.edge_length)
+        self.surfaces = (
+            SurfaceCollisions(system, surfaces, self.poses, self.edge_length) if surfaces.is_needed else None
+        )
+        self.contacts = 0
+        self._smallest = math.inf
+        self._dt = 0.0
+        count = len(system.masses)
+        self._reach = np.zeros(count)
+        self._gathered = np.zeros((count, 3))
+
+    def __bool__(self) -> bool:
+        """Whether there is anything to collide with."""
+        return bool(self.obstacles) or self.surfaces is not None
+
+    @property
+    def min_distance(self) -> float | None:
+        return self._smallest if math.isfinite(self._smallest) else None
+
+    def begin_step(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float, dt: float) -> None:
+        """Look for what may touch within the frame.
+
+        Parameters
+        ----------
+        x, v : (n, 3) positions [m] and velocities [m/s] at the beginning of the frame.
+        time : beginning of the frame [s]; dt : its length [s].
+        """
+        self._smallest = math.inf
+        self._dt = dt
+        if self.surfaces is not None:
+            self.surfaces.begin_step(x, v, time, dt)
+        if self.obstacles:
+            self._gather_obstacles(x, v, time)
+
+    def project(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], time: float, h: float) -> int:
+        """Resolve all contacts of one substep, in place. Returns how many there were.
+
+        Overlaps that were there when the substep began are mended in `x` and `x_prev` alike, so that no velocity
+        (x - x_prev) / h comes of them: take both over.
+
+        Parameters
+        ----------
+        x : (n, 3) positions at the end of the substep, after all other constraints [m]
+        x_prev : (n, 3) positions at its beginning [m]
+        time : end of the substep [s]; h : its length [s].
+        """
+        self.contacts = 0
+        limit = MENDED_PER_FRAME * self.edge_length * min(1.0, h / self._dt)
+        if self.surfaces is not None:
+            self._count(self.surfaces.project(x, x_prev, (time - h, time), limit))
+        if self.obstacles:
+            if outran(x, self._gathered, self._reach):
+                self._gather_obstacles(x, (x - x_prev) / h, time)
+            self._count(self.obstacles.project(x, x_prev, (time - h, time), limit, NEAR * self.edge_length))
+        if self.surfaces is not None:
+            self.surfaces.remember(x)
+        return self.contacts
+
+    def _gather_obstacles(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float) -> None:
+        falling = 0.5 * float(np.linalg.norm(self.system.gravity)) * self._dt**2
+        reach_from_velocities(v, self._dt, LEAST_REACH * self.edge_length + falling, self._reach)
+        self._gathered[:] = x
+        self.obstacles.gather(x, self._reach, time)
+
+    def _count(self, found: tuple[int, float]) -> None:
+        self.contacts += found[0]
+        self._smallest = min(self._smallest, found[1])
+
+
+def mean_edge_length(system: System) -> float:
+    """Mean edge length of all the bodies' surfaces at rest [m]."""
+    a, b, c = system.rest_positions[system.triangles].transpose(1, 0, 2)
+    return float(np.mean([np.linalg.norm(a - b, axis=1), np.linalg.norm(b - c, axis=1), np.linalg.norm(c - a, axis=1)]))

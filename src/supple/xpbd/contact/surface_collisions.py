@@ -1,0 +1,135 @@
+"""Surfaces of bodies and of triangle obstacles, followed through the substeps of a frame."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.contact.obstacle_poses import ObstaclePoses
+from supple.contact.search.excluded_pairs import excluded_pairs
+from supple.contact.search.point_inside import bounds_of_pieces, depths_inside
+from supple.contact.search.reach import looking_out, mean_motions, outran_pieces
+from supple.contact.search.spatial_hash import PairFinder
+from supple.contact.search.stitch_masks import stitched_points
+from supple.contact.search.surfaces import ContactSurfaces
+from supple.system import System
+from supple.xpbd.contact.surface_contacts import project_surfaces
+
+# Of the mean surface edge: what a point may move at least, and at most, before lists are made anew, and up to which
+# gaps distances are reported.
+LEAST_REACH, MOST_REACH, NEAR = 0.1, 0.5, 1.0
+
+
+class SurfaceCollisions:
+    """Points against triangles, with lists of candidates that are renewed when something has moved too far."""
+
+    def __init__(self, system: System, surfaces: ContactSurfaces, poses: ObstaclePoses, edge_length: float) -> None:
+        self.surfaces = s = surfaces
+        self.poses = poses
+        self.edge_length = edge_length
+        n, pieces = len(s.point_piece), len(s.closed)
+        rest = np.concatenate([system.rest_positions[s.rows], s.fixed_points])
+        widest = float(np.diagonal(s.gaps).max(initial=0.0))
+        excluded = excluded_pairs(s, rest, 2.0 * min(widest, 0.5 * edge_length))
+        self._stitched = stitched_points(system, s, poses)
+        self._rules = (s.allowed, *excluded)
+        self._finder = PairFinder(n, pieces, edge_length)
+        self._x, self._before, self._gathered = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
+        self._shapes = (self._x, s.point_piece, s.triangles, s.triangle_piece)
+        self._described = (
+            s.inverse_masses,
+            s.point_piece,
+            s.triangles,
+            s.triangle_piece,
+            s.closed,
+            s.gaps,
+            s.friction,
+        )
+        self._far, self._near = np.zeros((n, 3)), np.zeros((n, 3))
+        self._drifts = np.zeros((pieces + 1, 3))
+        # What stands still keeps everything else from sharing a motion.
+        self._all_share = len(s.fixed_points) == 0
+        self._excursions = np.zeros(n)
+        # How deep a point is inside a body, and inside an obstacle.
+        self._depth = np.zeros((2, n))
+        self._entered = np.full(n, -1, dtype=np.int32)
+        self._complete = np.zeros(n)
+        self._gap = np.where(s.allowed, s.gaps, 0.0).max(axis=1)[s.point_piece]
+        self._known = np.zeros((len(s.rows), 3))
+        self._has_past = False
+        self._dt = 0.0
+
+    def begin_step(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float, dt: float) -> None:
+        """See `Collisions.begin_step`."""
+        bodies = len(self.surfaces.rows)
+        self._dt = dt
+        np.take(x, self.surfaces.rows, axis=0, out=self._x[:bodies])
+        self.surfaces.place_obstacles(self.poses, time, self._x)
+        motions = np.zeros_like(self._x)
+        self.surfaces.place_obstacles(self.poses, time + dt, motions)
+        motions[bodies:] -= self._x[bodies:]
+        motions[:bodies] = v[self.surfaces.rows] * dt
+        self._before[:] = self._x
+        moved = np.abs(self._x[:bodies] - self._known).max()
+        if not (self._has_past and moved <= LEAST_REACH * self.edge_length):
+            self._look_for_overlaps()
+        self._gather(motions)
+        self._excursions[:] = 0.0
+
+    def project(
+        self, x: NDArray[np.float64], x_prev: NDArray[np.float64], times: tuple[float, float], limit: float
+    ) -> tuple[int, float]:
+        """Keep surfaces apart over the substep `times` = (beginning, end) [s]; returns what `project_surfaces` does."""
+        s, finder = self.surfaces, self._finder
+        bodies = len(s.rows)
+        np.take(x, s.rows, axis=0, out=self._x[:bodies])
+        np.take(x_prev, s.rows, axis=0, out=self._before[:bodies])
+        s.place_obstacles(self.poses, times[1], self._x)
+        s.place_obstacles(self.poses, times[0], self._before)
+        allowed = (self._far, self._near, s.point_piece, self._all_share, self._drifts)
+        if outran_pieces(self._x, self._before, self._gathered, *allowed, self._excursions):
+            self._gather((self._x - self._before) * (self._dt / (times[1] - times[0])))
+        lists = (finder.n_active, finder.active, finder.starts, finder.triangles)
+        scales = (limit, NEAR * self.edge_length)
+        contacts, smallest = 0, np.inf
+        # Obstacles last: they do not give way.
+        for kind, meant in enumerate(((0, s.body_triangles), (s.body_triangles, len(s.triangles)))):
+            if meant[0] < meant[1] and finder.n_active:
+                memory = (self._depth[kind], self._entered, self._complete)
+                found = project_surfaces(
+                    self._x, self._before, lists, self._described, memory, scales, meant, self._stitched
+                )
+                contacts, smallest = contacts + found[0], min(smallest, found[1])
+        x[s.rows] = self._x[:bodies]
+        x_prev[s.rows] = self._before[:bodies]
+        return contacts, smallest
+
+    def remember(self, x: NDArray[np.float64]) -> None:
+        """Take note of where everything is (n, 3) [m] after all contacts: whoever goes on from there knows its past."""
+        np.take(x, self.surfaces.rows, axis=0, out=self._known)
+        self._has_past = True
+
+    def _gather(self, motions: NDArray[np.float64]) -> None:
+        """List what may touch while nothing gets further than it would in a frame of these motions (n, 3) [m]."""
+        s = self.surfaces
+        mean_motions(motions, s.point_piece, self._all_share, self._drifts)
+        scales = (LEAST_REACH * self.edge_length, MOST_REACH * self.edge_length)
+        come = self._x - self._before
+        points = (come, self._excursions, s.point_piece)
+        looking_out(motions, *points, self._drifts, scales, self._far, self._near)
+        self._complete[:] = self._gap + LEAST_REACH * self.edge_length + self._depth.max(axis=0)
+        self._far[:, 0] += self._complete
+        self._near[:, 0] += self._complete
+        self._finder.gather(self._shapes, (self._far, self._near), self._rules)
+        self._gathered[:] = self._x
+
+    def _look_for_overlaps(self) -> None:
+        s = self.surfaces
+        boxes = bounds_of_pieces(self._x, s.point_piece, len(s.closed))
+        found = np.zeros(len(self._x))
+        self._depth[:] = 0.0
+        for kind, meant in enumerate((slice(0, s.body_triangles), slice(s.body_triangles, None))):
+            shapes = (self._x, s.point_piece, s.triangles[meant], s.triangle_piece[meant])
+            depths_inside(shapes, s.closed, s.allowed, boxes, found)
+            self._depth[kind] = found
+        self._entered[:] = -1

@@ -1,0 +1,1 @@
+"""Numbering, coloring and compilation of Gauss-Seidel sweeps."""

@@ -1,0 +1,43 @@
+"""The direct path: the factorizations solve, and a step by either of them is the step by conjugate gradients."""
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.implicit.newton import direct_solver
+from supple.numerics.sparse.block_csr import build_pattern
+
+
+def _step(linear_solver: str) -> np.ndarray:
+    mesh = sp.shapes.box(size=(0.4, 0.1, 0.1), divisions=(4, 1, 1))
+    body = sp.Body("bar", mesh, sp.StableNeoHookean(youngs=1e5, poisson=0.4))
+    held = sp.Pin("bar", sp.InBox((-0.21, -1, -1), (-0.19, 1, 1)))
+    scene = sp.Scene([body], pins=[held])
+    frame = list(sp.simulate(scene, sp.Implicit(linear_solver=linear_solver), dt=1 / 60, steps=3))[-1]
+    assert frame.report.status == "converged"
+    return frame.positions["bar"]
+
+
+def test_superlu_and_conjugate_gradients_agree(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(direct_solver, "_pardiso", lambda: None)
+    np.testing.assert_allclose(_step("direct"), _step("pcg"), atol=1e-7)
+
+
+def test_pardiso_and_superlu_agree(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pypardiso")
+    with_pardiso = _step("direct")
+    monkeypatch.setattr(direct_solver, "_pardiso", lambda: None)
+    np.testing.assert_allclose(with_pardiso, _step("direct"), atol=1e-9)
+
+
+def test_pardiso_answers_as_superlu_on_one_system(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pypardiso")
+    pattern = build_pattern(np.array([[0, 1, 2, 3]], dtype=np.int32), 4)
+    root = np.random.default_rng(3).normal(size=(12, 12))
+    dense = root @ root.T + 12.0 * np.eye(12)
+    rows = np.repeat(np.arange(4), np.diff(pattern.row_start))
+    data = np.stack([dense[3 * i : 3 * i + 3, 3 * j : 3 * j + 3] for i, j in zip(rows, pattern.columns, strict=True)])
+    b = np.arange(12.0).reshape(4, 3)
+    solved = direct_solver.solve_directly(pattern, np.ascontiguousarray(data), b)
+    assert solved is not None
+    np.testing.assert_allclose(dense @ solved.ravel(), b.ravel(), atol=1e-10)

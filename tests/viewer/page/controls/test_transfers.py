@@ -1,0 +1,224 @@
+"""Files over the line to the server: what the button asks for gets through, and nothing else."""
+
+import html
+import threading
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.errors import MeshError
+from supple.viewer.controls import upload_controls
+from supple.viewer.controls.upload_controls import body_name
+from supple.viewer.protocol import limits
+from supple.viewer.protocol.messages import AddMesh
+from supple.viewer.server.plain_markdown import plain
+from supple.viewer.server.uploads.meshing import TetArrays
+from supple.viewer.server.uploads.transfers import shown_name
+
+PART = limits.UPLOAD_PART
+
+
+@pytest.fixture
+def heard(live, server, visitor, monkeypatch):
+    """The lines that the visitor is shown."""
+    lines = []
+    client = next(iter(server.get_clients().values()))
+    monkeypatch.setattr(client, "add_notification", lambda title, text, **_: lines.append(text))
+    return lines
+
+
+@pytest.fixture
+def meshed(monkeypatch):
+    """The files that get as far as the mesher, of which there is none here."""
+    files = []
+    box = sp.shapes.box(divisions=(1, 1, 1))
+
+    def mesh(upload, tell, stop):
+        files.append(upload)
+        return TetArrays(box.vertices, box.tets)
+
+    monkeypatch.setattr(upload_controls, "mesh_of_upload", mesh)
+    return files
+
+
+def announce(visitor, live, content, name="ball.stl", **changes):
+    fields = {
+        "source_component_uuid": live.panel.upload.button._impl.uuid,
+        "transfer_uuid": "one",
+        "filename": name,
+        "mime_type": "",
+        "part_count": -(-len(content) // PART),
+        "size_bytes": len(content),
+    }
+    visitor.say("FileTransferStartUpload", **fields | changes)
+
+
+def give(visitor, live, content, index=0, **changes):
+    fields = {
+        "source_component_uuid": live.panel.upload.button._impl.uuid,
+        "transfer_uuid": "one",
+        "part_index": index,
+        "content": content[index * PART : (index + 1) * PART],
+    }
+    visitor.say("FileTransferPart", **fields | changes)
+
+
+def test_a_file_becomes_a_command(live, made_up, visitor, meshed, heard, until):
+    visitor.set(live.panel.bodies.size, 0.75)
+    visitor.set(live.panel.bodies.youngs, 6.0)
+    content = bytes(range(256)) * 5000  # three parts
+    announce(visitor, live, content, "C:\\things\\my ball.STL")
+    for k in range(3):
+        give(visitor, live, content, k)
+    until(lambda: made_up.told)
+    [upload], [command] = meshed, made_up.told
+    assert (upload.name, upload.suffix, upload.size) == ("my ball.STL", ".stl", 0.75)
+    assert upload.content == content
+    assert isinstance(command, AddMesh)
+    assert (command.name, command.youngs) == ("my ball", pytest.approx(1e6))
+    assert len(command.tets) == 6
+    assert heard == []
+    until(lambda: not live.panel.upload._busy.locked())
+
+
+def test_what_is_wrong_with_it_is_said_and_the_page_goes_on(live, made_up, visitor, meshed, heard, until, monkeypatch):
+    working, go_on = threading.Event(), threading.Event()
+
+    def mesh(upload, tell, stop):
+        tell(3.0)
+        working.set()
+        go_on.wait(20.0)
+        raise MeshError("ball.stl: <script>it has a hole</script>")
+
+    monkeypatch.setattr(upload_controls, "mesh_of_upload", mesh)
+    announce(visitor, live, b"abc")
+    give(visitor, live, b"abc")
+    assert working.wait(20.0)
+    assert "filled with tets, 3 s" in live.panel.upload._said.content
+    # Meanwhile everything else works, but for a second file.
+    announce(visitor, live, b"abc", transfer_uuid="two")
+    give(visitor, live, b"abc", transfer_uuid="two")
+    until(lambda: heard and "another file is being read" in heard[0])
+    visitor.press(live.panel.time.play)
+    made_up.show(paused=False)
+    until(lambda: made_up.told)
+    go_on.set()
+    until(lambda: len(heard) == 2)
+    assert heard[1] == "ball.stl: <script>it has a hole</script>"  # a notification is text, and Markdown is not
+    until(lambda: not live.panel.upload._said.visible)
+    assert all(not isinstance(command, AddMesh) for command in made_up.told)
+
+
+REFUSED = {
+    "another format": ({"filename": "ball.exe"}, "give a surface as"),
+    "no format": ({"filename": "ball"}, "give a surface as"),
+    "nothing": ({"size_bytes": 0, "part_count": 0}, "empty"),
+    "less than nothing": ({"size_bytes": -5, "part_count": 0}, "empty"),
+    "too large": ({"size_bytes": limits.LARGEST_UPLOAD + 1, "part_count": 33}, "may have 16 MiB"),
+    "other parts": ({"part_count": 2}, "parts"),
+    "parts without end": ({"part_count": 2**40}, "parts"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_is_announced_is_checked(live, made_up, visitor, meshed, heard, until, name):
+    changes, said = REFUSED[name]
+    announce(visitor, live, b"abc", **changes)
+    until(lambda: heard and said in heard[0])
+    give(visitor, live, b"abc")  # what comes all the same is passed over
+    visitor.press(live.panel.time.play)
+    until(lambda: made_up.told)
+    assert meshed == []
+
+
+@pytest.mark.parametrize("changes", [{"part_index": 1}, {"content": b"abcd"}, {"content": b""}, {"part_index": -1}])
+def test_parts_that_do_not_fit_end_the_transfer(live, made_up, visitor, meshed, heard, until, changes):
+    announce(visitor, live, b"abc")
+    give(visitor, live, **{"content": b"abc"} | changes)
+    until(lambda: heard and "damaged" in heard[0])
+    give(visitor, live, b"abc")
+    visitor.press(live.panel.time.play)
+    until(lambda: made_up.told)
+    assert meshed == []
+
+
+def test_other_inputs_take_no_files_and_nothing_is_kept(live, server, made_up, visitor, meshed, until):
+    speed = live.panel.time.speed
+    announce(visitor, live, b"abc", source_component_uuid=speed._impl.uuid)
+    give(visitor, live, b"abc", source_component_uuid=speed._impl.uuid)
+    for k in range(100):
+        announce(visitor, live, b"abc", transfer_uuid=f"{k}")
+    visitor.press(live.panel.time.play)
+    until(lambda: made_up.told)
+    assert speed.value == 1.0
+    assert server.gui._current_file_upload_states == {}
+    assert len(live.panel.upload.transfers._running) == 1
+    # Who leaves takes it along.
+    visitor.leave()
+    until(lambda: not live.panel.upload.transfers._running)
+    assert meshed == []
+
+
+def test_only_so_many_come_in_at_once(live, server, visit, meshed, until, monkeypatch):
+    monkeypatch.setattr(limits, "MOST_UPLOADS", 2)
+    visitors = [visit(server.get_port()) for _ in range(3)]
+    until(lambda: len(server.get_clients()) == 3)
+    said = []
+    for client in server.get_clients().values():
+        monkeypatch.setattr(client, "add_notification", lambda title, text, **_: said.append(text))
+    for visitor in visitors:
+        announce(visitor, live, b"abc")
+    until(lambda: said)
+    assert "2 files are coming in already" in said[0]
+    # One that gets no further makes room.
+    monkeypatch.setattr(limits, "UPLOAD_PATIENCE", -1.0)
+    announce(visitors[2], live, b"abc")
+    give(visitors[2], live, b"abc")
+    until(lambda: meshed)
+    for visitor in visitors:
+        visitor.leave()
+
+
+def test_a_page_that_is_closed_ends_what_it_reads(live, visitor, until, monkeypatch):
+    ended = threading.Event()
+
+    def mesh(upload, tell, stop):
+        stop.wait(20.0)
+        ended.set()
+        raise MeshError("closed")
+
+    monkeypatch.setattr(upload_controls, "mesh_of_upload", mesh)
+    announce(visitor, live, b"abc")
+    give(visitor, live, b"abc")
+    until(lambda: live.panel.upload._busy.locked())
+    live.panel.stop()
+    assert ended.is_set()
+
+
+@pytest.mark.parametrize(
+    ("file", "shown", "body"),
+    [
+        ("bunny.stl", "bunny.stl", "bunny"),
+        ("../../etc/passwd.stl", "passwd.stl", "passwd"),
+        ("..\\x.obj", "x.obj", "x"),
+        ("a:b*c?.ply", "a:b*c?.ply", "a_b_c_"),
+        ("\x1b[31m\n.off", "?[31m?.off", "_[31m_"),
+        ("...stl", "...stl", "mesh"),
+        ("x" * 300 + ".stl", "x" * 56 + ".stl", "x" * 40),
+    ],
+)
+def test_names_of_files_and_bodies(file, shown, body):
+    assert shown_name(file) == shown
+    assert body_name(shown) == body
+    AddMesh(np.zeros((4, 3)), np.array([[0, 1, 2, 3]], dtype=np.int32), name=body_name(shown))
+
+
+@pytest.mark.parametrize(
+    "text", ["<script>alert(1)</script>", "{1 + 1}", "![x](http://a.example/x.png)", "**a** `b` | # c"]
+)
+def test_text_from_elsewhere_is_text(text):
+    marked = plain(text)
+    assert html.unescape(marked) == text
+    assert not set(marked) & set('<>{}[]!*`|"\\_~')
+    assert "&#35;" in marked or "#" not in text

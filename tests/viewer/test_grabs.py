@@ -1,0 +1,196 @@
+"""What hands do to a running scene (grab, pin, push, squash), judged by the simulation's state."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.errors import CommandError
+from supple.viewer.engine.measurement.describe import describe, measures
+from supple.viewer.engine.scene.changes import change, flattened
+from supple.viewer.engine.scene.live_scene import LiveScene
+from supple.viewer.protocol import limits
+from supple.viewer.protocol.messages import (
+    Grab,
+    MoveGrab,
+    MovePusher,
+    Pin,
+    ReleaseGrab,
+    RemovePusher,
+    Reset,
+    SetParameter,
+    Squash,
+    Unpin,
+)
+
+from .conftest import corner_grab, free_source, run, small_source
+
+
+class TestGrabs:
+    def test_a_body_hangs_on_its_spring_as_hookes_law_says(self):
+        live = LiveScene(small_source(obstacles=[]))
+        change(corner_grab((-0.2, 1.5, -0.2)), live)
+        spring = live.setup.grabs[7]
+        for _ in range(600):
+            live.step()
+            live.state = dataclasses.replace(live.state, velocities=0.97 * live.state.velocities)
+        weight = describe(live).body("cube").mass * 9.81
+        stretch = spring.target - spring.point(live.body_positions("cube"))
+        assert spring.stiffness * stretch == pytest.approx([0.0, weight, 0.0], abs=0.02 * weight)
+
+    def test_let_go_a_body_keeps_its_velocity(self):
+        live = LiveScene(free_source())
+        change(corner_grab((-0.2, -0.2, -0.2)), live)
+        for k in range(40):
+            change(MoveGrab(7, (-0.2 + 0.05 * k, -0.2, -0.2)), live)
+            live.step()
+        momentum = live.system.masses @ live.state.velocities
+        speed = momentum[0] / live.system.masses.sum()
+        assert speed > 1.0  # the hand moves at 3 m/s
+        change(ReleaseGrab(7), live)
+        assert live.system.masses @ live.state.velocities == pytest.approx(momentum, rel=1e-12)
+        run(live, 30)
+        assert live.system.masses @ live.state.velocities == pytest.approx(momentum, rel=1e-9)
+
+    def test_a_spring_brings_no_torque_about_its_own_point(self):
+        live = LiveScene(free_source())
+        change(Grab(1, "cube", tuple(live.system.tets[0].tolist()), (0.25,) * 4, (0.0, 0.0, 0.0)), live)
+        spring = live.setup.grabs[1]
+        point = spring.point(live.body_positions("cube"))
+        change(MoveGrab(1, tuple((point + np.array([0, 0.3, 0])).tolist())), live)
+        assert len(spring.patch) >= 4
+        spring.pull(live.body_positions("cube"), live.state.positions[spring.patch])
+        forces = spring._motion(0.0)
+        assert np.ptp(forces, axis=0) == pytest.approx([0, 0, 0], abs=1e-12)
+        assert forces[0] == pytest.approx([0, 0.3, 0])
+
+    @pytest.mark.parametrize("stiffness", [limits.WEAKEST_GRAB, limits.STRONGEST_GRAB])
+    def test_no_hand_is_strong_or_far_enough_to_break_the_simulation(self, live, stiffness):
+        change(corner_grab((9e3, 9e3, 9e3), stiffness=stiffness), live)
+        for k in range(60):
+            change(MoveGrab(7, (9e3 * (-1) ** k, 9e3, 0.0)), live)
+            live.step()
+        assert live.report.status == "converged"
+        assert np.isfinite(live.state.positions).all()
+
+    def test_the_barycentric_point_is_what_moves(self):
+        live = LiveScene(free_source())
+        a, b, c = describe(live).body("cube").triangles[5].tolist()
+        change(Grab(1, "cube", (a, b, c), (0.2, 0.3, 0.5), (1.0, 0.0, 0.0)), live)
+        for _ in range(400):
+            live.step()
+            live.state = dataclasses.replace(live.state, velocities=0.9 * live.state.velocities)
+        point = np.array([0.2, 0.3, 0.5]) @ live.body_positions("cube")[[a, b, c]]
+        assert point == pytest.approx([1.0, 0.0, 0.0], abs=1e-3)
+
+    def test_vertices_that_are_not_there_and_too_many_hands_are_refused(self, live):
+        with pytest.raises(CommandError, match="has no vertex 1000"):
+            change(Grab(1, "cube", (1000,), (1.0,), (0, 0, 0)), live)
+        with pytest.raises(CommandError, match="no body 'ghost'"):
+            change(Grab(1, "ghost", (0,), (1.0,), (0, 0, 0)), live)
+        for number in range(limits.MOST_GRABS):
+            change(Grab(number, "cube", (number,), (1.0,), (0, 1, 0)), live)
+        with pytest.raises(CommandError, match="let one go"):
+            change(Grab(99, "cube", (0,), (1.0,), (0, 1, 0)), live)
+        change(Grab(3, "cube", (0,), (1.0,), (0, 1, 0)), live)
+        assert len(live.setup.grabs) == limits.MOST_GRABS
+
+
+class TestPins:
+    def test_a_pinned_vertex_stays_where_it_is_through_every_other_change(self, live):
+        run(live, 10)
+        place = live.body_positions("cube")[5].copy()
+        change(Pin("cube", 5), live)
+        for k in range(10):
+            change(SetParameter("youngs", 1e5 + k, "cube"), live)
+            run(live, 2)
+        assert live.body_positions("cube")[5] == pytest.approx(place, abs=1e-12)
+        assert live.system.pinned_vertices.tolist().count(5) == 1
+        change(Unpin("cube", 5), live)
+        run(live, 10)
+        assert live.body_positions("cube")[5, 1] < place[1] - 0.01
+
+    def test_a_vertex_of_the_scenes_own_pin_can_be_let_go_and_comes_back_with_a_reset(self, live):
+        before = live.system.pinned_vertices.tolist()
+        start = live.system.bodies[1].vertices.start
+        vertex = before[0] - start
+        anchors = live.system.pins[0].anchors[1:].copy()
+        run(live, 5)
+        change(Unpin("block", vertex), live)
+        assert live.system.pinned_vertices.tolist() == before[1:]
+        assert np.array_equal(live.system.pins[0].anchors, anchors)
+        change(Reset(), live)
+        assert live.system.pinned_vertices.tolist() == before
+
+    def test_unpin_alone_lets_go_of_what_was_pinned_by_hand_only(self, live):
+        before = live.system.pinned_vertices.tolist()
+        change(Pin("cube", 1), live)
+        change(Pin("cube", 2), live)
+        change(Pin("cube", 2), live)
+        assert len(live.system.pinned_vertices) == len(before) + 2
+        change(Unpin(), live)
+        assert live.system.pinned_vertices.tolist() == before
+
+
+class TestPusher:
+    def test_it_pushes_a_body_without_passing_through(self):
+        live = LiveScene(free_source())
+        change(MovePusher((-0.6, 0.0, 0.0), 0.2), live)
+        for k in range(60):
+            change(MovePusher((-0.6 + 0.02 * k, 0.0, 0.0), 0.2), live)
+            run(live, 1)
+        center = live.setup.pusher.center
+        assert center[0] == pytest.approx(0.58, abs=0.05)
+        assert live.system.masses @ live.state.positions[:, 0] > 0.3 * live.system.masses.sum()
+        distance = np.linalg.norm(live.state.positions - center, axis=1)
+        assert distance.min() > 0.2 - 0.02
+
+    def test_it_never_moves_farther_than_a_stride_in_one_step(self):
+        live = LiveScene(free_source())
+        change(MovePusher((-5.0, 0.0, 0.0), 0.2), live)
+        change(MovePusher((5.0, 0.0, 0.0), 0.2), live)
+        run(live, 1)
+        assert live.setup.pusher.center == pytest.approx([-4.95, 0.0, 0.0])
+
+    def test_it_can_be_taken_away(self, live):
+        change(MovePusher((0.0, 2.0, 0.0), 0.2), live)
+        assert [obstacle.name for obstacle in live.system.obstacles] == ["floor", "pusher"]
+        generation = live.generation
+        change(RemovePusher(), live)
+        assert [obstacle.name for obstacle in live.system.obstacles] == ["floor"]
+        assert live.generation == generation + 1
+
+
+class TestSquash:
+    def test_no_tet_changes_its_volume_and_the_lowest_point_stays(self, live):
+        low = live.body_positions("cube")[:, 1].min()
+        pinned = live.body_positions("block").copy()
+        change(Squash(0.5), live)
+        cube = live.body_positions("cube")
+        assert np.ptp(cube[:, 1]) == pytest.approx(0.2)
+        assert np.ptp(cube[:, 0]) == pytest.approx(0.4 * np.sqrt(2))
+        assert cube[:, 1].min() == pytest.approx(low)
+        assert np.array_equal(live.body_positions("block"), pinned)
+        assert measures(live).min_det_F == pytest.approx(1.0)
+
+    @pytest.mark.parametrize("factor", [0.3, 0.5, 2.0])
+    def test_the_body_recovers(self, factor):
+        live = LiveScene(free_source())
+        change(Squash(factor), live)
+        assert measures(live).elastic_energy > 100.0
+        run(live, 60)
+        a, b = live.state.positions[live.system.edges].transpose(1, 0, 2)
+        assert np.linalg.norm(a - b, axis=1) == pytest.approx(live.system.rest_lengths, rel=1e-4)
+        assert measures(live).elastic_energy < 1e-6
+
+    def test_flattened_is_one_linear_map_of_determinant_one(self):
+        up = np.array([0.6, 0.8, 0.0])
+        a, b, c, d = (flattened(np.vstack([np.zeros(3), np.eye(3), [[0.2, 0.3, -1.0]]]), up, 0.4))[:4]
+        assert np.linalg.det(np.array([b - a, c - a, d - a])) == pytest.approx(1.0)
+
+    def test_pinned_bodies_cannot_be_squashed(self):
+        source = small_source()
+        live = LiveScene(dataclasses.replace(source, scene=sp.Scene([source.scene.bodies[1]], pins=source.scene.pins)))
+        with pytest.raises(CommandError, match="unpin"):
+            change(Squash(0.5), live)

@@ -1,0 +1,103 @@
+"""Collisions as a whole: settings, same bits, restarts, and what is reported."""
+
+import numba
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.errors import SolverError
+from supple.system import build_system, initial_state
+from supple.xpbd.contact.collisions import Collisions
+from supple.xpbd.contact.settings import XPBDContact
+from supple.xpbd.solver import XPBD
+
+SOFT = sp.StableNeoHookean(youngs=5e4, poisson=0.4, density=1000)
+
+
+def pile():
+    mesh = sp.shapes.box((0.2, 0.1, 0.2), (2, 1, 2))
+    bodies = [
+        sp.Body(f"b{k}", mesh, SOFT, position=(0.02 * k, 0.07 + 0.13 * k, 0), rotation=(0, 0.3 * k, 0), friction=0.3)
+        for k in range(3)
+    ]
+    return sp.Scene(bodies, [sp.HalfSpace(friction=0.5), sp.Sphere(center=(0.05, 0, 0), radius=0.04)])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "says"),
+    [
+        ({"thickness": 0.0}, "thickness is 0.0"),
+        ({"thickness": -1e-3}, "thickness"),
+        ({"thickness": float("nan")}, "thickness"),
+        ({"thickness": "thin"}, "'thin'"),
+        ({"thickness": True}, "thickness"),
+        ({"self_collision": 1}, "self_collision is 1"),
+        ({"body_collision": None}, "body_collision"),
+    ],
+)
+def test_wrong_settings_are_named(wrong, says):
+    with pytest.raises(SolverError, match=says) as caught:
+        XPBDContact(**wrong)
+    assert "\n" not in str(caught.value)
+
+
+def test_same_bits_whatever_the_number_of_threads():
+    def run(threads):
+        return [f.state.positions for f in sp.simulate(pile(), XPBD(substeps=10, threads=threads), 1 / 60, 20)][-1]
+
+    more = min(2, numba.config.NUMBA_NUM_THREADS)
+    assert (run(1) == run(1)).all()
+    assert (run(1) == run(more)).all()
+
+
+def test_going_on_from_a_frame_is_almost_the_same_as_never_stopping():
+    whole = list(sp.simulate(pile(), XPBD(substeps=10), 1 / 60, 40))
+    again = list(sp.simulate(pile(), XPBD(substeps=10), 1 / 60, 20, start=whole[19]))
+    assert np.abs(again[-1].state.positions - whole[39].state.positions).max() < 1e-9
+
+
+def test_nothing_to_collide_with_is_nothing():
+    scene = sp.Scene(pile().bodies[:1])
+    assert not Collisions(build_system(scene), None)
+    assert Collisions(build_system(scene), XPBDContact())
+    assert Collisions(build_system(pile()), None)
+    frame = next(iter(sp.simulate(scene, XPBD(substeps=2, contact=None), 1 / 60, 1)))
+    assert frame.report.min_distance is None
+
+
+def test_gap_and_thickness_are_what_was_asked_for():
+    """Two boxes without gravity, driven together: they stop at the gap, which the report says."""
+    mesh = sp.shapes.box((0.1, 0.1, 0.1), (1, 1, 1))
+    for thickness in (2e-3, 8e-3):
+        scene = sp.Scene(
+            [sp.Body("a", mesh, SOFT), sp.Body("b", mesh, SOFT, position=(0.01, 0.12, 0.01), velocity=(0, -0.2, 0))],
+            gravity=(0, 0, 0),
+        )
+        solver = XPBD(substeps=10, contact=XPBDContact(thickness=thickness))
+        gaps = [f.report.min_distance for f in sp.simulate(scene, solver, 1 / 60, 20)]
+        assert min(gaps) == pytest.approx(thickness, rel=0.02)
+        assert gaps[0] == pytest.approx(0.02, abs=0.004)
+
+
+def test_positions_that_are_not_finite_do_no_harm():
+    scene = pile()
+    system, state = build_system(scene), initial_state(scene)
+    collisions = Collisions(system, XPBDContact())
+    x, before = state.positions.copy(), state.positions.copy()
+    collisions.begin_step(x, state.velocities, 0.0, 1 / 60)
+    x[3] = np.nan
+    x[40] = 1e200
+    collisions.project(x, before, 1 / 600, 1 / 600)
+    collisions.begin_step(x, np.full_like(x, np.inf), 0.0, 1 / 60)
+    assert np.isnan(x[3]).all()
+
+
+def test_far_from_the_origin_contacts_are_the_same():
+    def drop(shift):
+        body = sp.Body("b", sp.shapes.box((0.1, 0.1, 0.1), (2, 2, 2)), SOFT, position=np.array([0, 0.06, 0]) + shift)
+        under = sp.Body("u", sp.shapes.box((0.3, 0.1, 0.3), (2, 2, 2)), SOFT, position=np.array([0, -0.05, 0]) + shift)
+        floor = sp.HalfSpace(point=np.array([0, -0.1, 0]) + shift)
+        frames = list(sp.simulate(sp.Scene([body, under], [floor]), XPBD(substeps=10), 1 / 60, 15))
+        return frames[-1].state.positions - shift
+
+    assert np.abs(drop(np.array([1000.0, 0.0, -2000.0])) - drop(np.zeros(3))).max() < 1e-5

@@ -1,0 +1,100 @@
+"""Levels, chunks and colors: what may run side by side really is independent."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import supple as sp
+from supple.numerics.coloring import breadth_first_order, greedy_colors
+from supple.system import build_system
+from supple.xpbd.sweeps import ordering
+from supple.xpbd.sweeps.ordering import make_layout, reordered
+
+
+@st.composite
+def constraint_lists(draw):
+    n = draw(st.integers(4, 40))
+    rows = draw(st.lists(st.lists(st.integers(0, n - 1), min_size=4, max_size=4, unique=True), max_size=60))
+    return n, np.array(rows, dtype=np.int32).reshape(-1, 4)
+
+
+@settings(max_examples=50, deadline=None)
+@given(constraint_lists())
+def test_constraints_span_at_most_two_levels(case):
+    n, constraints = case
+    order, levels = breadth_first_order([constraints], n)
+    assert sorted(order) == list(range(n))
+    assert (np.diff(levels[order]) >= 0).all()
+    assert (np.diff(levels[order]) <= 1).all()
+    if len(constraints):
+        assert np.ptp(levels[constraints], axis=1).max() <= 1
+
+
+@settings(max_examples=50, deadline=None)
+@given(constraint_lists(), st.integers(1, 70))
+def test_equal_colors_of_a_run_share_no_vertex(case, run):
+    n, constraints = case
+    colors = greedy_colors(constraints, n, run)
+    for first in range(0, len(constraints), run):
+        rows = constraints[first : first + run]
+        for color in np.unique(colors[first : first + run]):
+            vertices = rows[colors[first : first + run] == color].ravel()
+            assert len(np.unique(vertices)) == len(vertices)
+
+
+def test_a_vertex_of_more_than_64_constraints_gets_as_many_colors():
+    star = np.array([[0, k] for k in range(1, 151)], dtype=np.int32)
+    assert sorted(greedy_colors(star, 151, 1000)) == list(range(150))
+
+
+@pytest.fixture
+def two_bodies():
+    mesh = sp.shapes.box((1.0, 1.0, 2.0), (5, 5, 10))
+    material = sp.EdgesAndVolume()
+    rng = np.random.default_rng(3)
+    shuffled = rng.permutation(len(mesh.vertices))
+    vertices = np.empty_like(mesh.vertices)
+    vertices[shuffled] = mesh.vertices
+    bodies = [
+        sp.Body("plain", mesh, material),
+        sp.Body("shuffled", sp.TetMesh(vertices, shuffled[mesh.tets]), material, position=(3, 0, 0)),
+    ]
+    pin = sp.Pin("shuffled", vertices=[0, 7])
+    return build_system(sp.Scene(bodies=bodies, pins=[pin]))
+
+
+def test_chunks_of_one_parity_share_no_vertex(two_bodies, monkeypatch):
+    monkeypatch.setattr(ordering, "SMALLEST_CHUNK", 200)
+    layout = make_layout(two_bodies)
+    inner = reordered(two_bodies, layout)
+    assert layout.n_chunks > 8
+    for constraints in (inner.tets, inner.edges):
+        order, chunks = layout.sort(constraints, np.zeros(len(constraints), dtype=np.int64))
+        assert sorted(order) == list(range(len(constraints)))
+        assert (np.diff(chunks) >= 0).all()
+        for parity in (0, 1):
+            owner = np.full(len(inner.masses), -1)
+            for chunk in range(parity, layout.n_chunks, 2):
+                vertices = np.unique(constraints[order[chunks == chunk]])
+                assert (owner[vertices] == -1).all(), "a vertex in two chunks that run at the same time"
+                owner[vertices] = chunk
+
+
+def test_the_reordered_system_is_the_same_system(two_bodies):
+    layout = make_layout(two_bodies)
+    inner = reordered(two_bodies, layout)
+    old = layout.old_from_new
+    np.testing.assert_array_equal(layout.new_from_old[old], np.arange(len(old)))
+    for part in two_bodies.bodies:
+        assert set(old[part.vertices]) == set(range(part.vertices.start, part.vertices.stop))
+    np.testing.assert_array_equal(old[inner.tets], two_bodies.tets)
+    np.testing.assert_array_equal(inner.masses, two_bodies.masses[old])
+    np.testing.assert_array_equal(old[inner.pinned_vertices], two_bodies.pinned_vertices)
+    np.testing.assert_array_equal(inner.pin_targets(0.0), two_bodies.pin_targets(0.0))
+
+
+def test_the_order_brings_neighbours_near(two_bodies):
+    inner = reordered(two_bodies, make_layout(two_bodies))
+    part = two_bodies.bodies[1]
+    assert np.ptp(inner.tets[part.tets], axis=1).mean() < 0.3 * np.ptp(two_bodies.tets[part.tets], axis=1).mean()
