@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.material import Elastic
+from supple.numerics.kernel_cache import njit
 from supple.scene.stitches.measures import largest_stitch_stretch, stitch_energy
 from supple.state import State
 from supple.system import BodyRange, System

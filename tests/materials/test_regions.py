@@ -8,10 +8,10 @@ import pytest
 import supple as sp
 from supple.errors import SceneError
 from supple.materials.edges_and_volume import EdgesAndVolume
+from supple.materials.kinds import needs_positive_volume
 from supple.materials.neo_hookean import NeoHookean
 from supple.materials.per_tet import NOT_ELASTIC
 from supple.materials.regions import Regions
-from supple.materials.registry import kind_of, needs_positive_volume
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.system import build_system
 
@@ -25,7 +25,7 @@ def test_each_tet_has_its_own_material():
     np.testing.assert_array_equal(tet.density, [900.0, 2000.0, 2000.0, 900.0])
     np.testing.assert_array_equal(tet.damping, [0.01, 0.0, 0.0, 0.01])
     np.testing.assert_array_equal(
-        tet.kind, [kind_of(StableNeoHookean), *[kind_of(NeoHookean)] * 2, kind_of(StableNeoHookean)]
+        tet.kind, [StableNeoHookean.kind(), *[NeoHookean.kind()] * 2, StableNeoHookean.kind()]
     )
     assert (tet.mu[0], tet.lam[0]) == SOFT.lame_parameters()
     assert (tet.mu[1], tet.lam[1]) == HARD.lame_parameters()

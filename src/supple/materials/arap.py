@@ -1,39 +1,11 @@
-"""As-rigid-as-possible elasticity: psi = mu sum (s_i - 1)^2 = mu |F - R|^2.
-
-Sources: Sorkine, Alexa, "As-Rigid-As-Possible Surface Modeling" (2007); Kim, Eberle, "Dynamic Deformables" (2022),
-chapter 5.
-"""
+"""As-rigid-as-possible elasticity as a material; the energy is in `stretch_energies/arap.py`."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from numba import njit
-
 from supple.materials.material import Elastic
-from supple.materials.stretches import StretchFunctions, distance_from_rotations, rotation_quotients
-
-
-@njit(error_model="numpy")
-def _density(s, mu, lam):
-    return mu * distance_from_rotations(s)
-
-
-@njit(error_model="numpy")
-def _gradient(s, mu, lam):
-    return (2.0 * mu * (s[0] - 1.0), 2.0 * mu * (s[1] - 1.0), 2.0 * mu * (s[2] - 1.0))
-
-
-@njit(error_model="numpy")
-def _curvature(s, mu, lam):
-    return (2.0 * mu, 2.0 * mu, 2.0 * mu, 0.0, 0.0, 0.0)
-
-
-@njit(error_model="numpy")
-def _quotients(s, mu, lam):
-    """d_ij = 2 mu;  t_ij = 2 mu (1 - 2 / (s_i + s_j))"""
-    q = rotation_quotients(s)
-    return (2.0 * mu, 2.0 * mu, 2.0 * mu, 2.0 * mu * q[0], 2.0 * mu * q[1], 2.0 * mu * q[2])
+from supple.materials.stretch_energies import arap
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -44,4 +16,4 @@ class ARAP(Elastic):
     ratio 0 and Young's modulus 2 mu.
     """
 
-    stretch_functions = StretchFunctions(_density, _gradient, _curvature, _quotients)
+    stretch_functions = arap.FUNCTIONS

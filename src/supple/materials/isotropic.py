@@ -19,29 +19,24 @@ Sources: Stomakhin et al., "Energetically Consistent Invertible Elasticity" (201
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Callable
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.materials.registry import ELASTIC_MATERIALS
+from supple.materials.kinds import STRETCH_ENERGIES
+from supple.materials.per_tet import TetMaterial
 from supple.materials.stretches import UNKNOWN_ONE, UNKNOWN_SIX, UNKNOWN_THREE, dispatch
-from supple.numerics import mat3, svd3
-from supple.numerics.kernel_cache import fingerprint
-from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed, symmetric_eigen
+from supple.numerics.kernel_cache import njit, prange
+from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed, store_mat, symmetric_eigen
 from supple.numerics.svd3 import svd3 as decompose
 from supple.numerics.threads import threads_for
 
-if TYPE_CHECKING:
-    from supple.materials.material import Elastic
-
-density = dispatch("density", [kind.stretch_functions.density for kind in ELASTIC_MATERIALS], UNKNOWN_ONE)
-gradient = dispatch("gradient", [kind.stretch_functions.gradient for kind in ELASTIC_MATERIALS], UNKNOWN_THREE)
-curvature = dispatch("curvature", [kind.stretch_functions.curvature for kind in ELASTIC_MATERIALS], UNKNOWN_SIX)
-quotients = dispatch("quotients", [kind.stretch_functions.quotients for kind in ELASTIC_MATERIALS], UNKNOWN_SIX)
+density = dispatch("density", [energy.density for energy in STRETCH_ENERGIES], UNKNOWN_ONE)
+gradient = dispatch("gradient", [energy.gradient for energy in STRETCH_ENERGIES], UNKNOWN_THREE)
+curvature = dispatch("curvature", [energy.curvature for energy in STRETCH_ENERGIES], UNKNOWN_SIX)
+quotients = dispatch("quotients", [energy.quotients for energy in STRETCH_ENERGIES], UNKNOWN_SIX)
 
 
 @njit(error_model="numpy")
@@ -136,76 +131,63 @@ def hessian_block(U, A, alpha, beta, g, h):
     return mat_mul_transposed(mat_mul(U, K), U)
 
 
-class _Kernels(NamedTuple):
-    densities: Any
-    piolas: Any
-    hessians: Any
+@njit(parallel=True, cache=True, error_model="numpy")
+def _densities(F, kind, mu, lam, out):
+    for e in prange(len(F)):
+        out[e] = energy_density(load_mat(F, e), kind[e], mu[e], lam[e])
 
 
-def _build_kernels(version: int) -> _Kernels:
-    """The compiled loops. `version` is in their closures, so that no cached kernel outlives a change of a material."""
-
-    @njit(parallel=True, cache=True, error_model="numpy")
-    def densities(F, kind, mu, lam, out):
-        _ = version
-        for e in prange(len(F)):
-            out[e] = energy_density(load_mat(F, e), kind[e], mu[e], lam[e])
-
-    @njit(cache=True, error_model="numpy")
-    def piolas(F, kind, mu, lam, out):
-        _ = version
-        for e in range(len(F)):
-            mat3.store_mat(first_piola(load_mat(F, e), kind[e], mu[e], lam[e]), out, e)
-
-    @njit(cache=True, error_model="numpy")
-    def hessians(F, kind, mu, lam, project, out):
-        _ = version
-        for e in range(len(F)):
-            U, s, V = decompose(load_mat(F, e))
-            A, alpha, beta = principal_hessian(s, kind[e], mu[e], lam[e], project)
-            for j in range(3):
-                g = (V[3 * j], V[3 * j + 1], V[3 * j + 2])
-                for k in range(j + 1):
-                    K = hessian_block(U, A, alpha, beta, g, (V[3 * k], V[3 * k + 1], V[3 * k + 2]))
-                    for i in range(3):
-                        for n in range(3):
-                            out[e, 3 * i + j, 3 * n + k] = K[3 * i + n]
-                            out[e, 3 * n + k, 3 * i + j] = K[3 * i + n]
-
-    return _Kernels(densities, piolas, hessians)
+@njit(cache=True, error_model="numpy")
+def _piolas(F, kind, mu, lam, out):
+    for e in range(len(F)):
+        store_mat(first_piola(load_mat(F, e), kind[e], mu[e], lam[e]), out, e)
 
 
-_KERNELS = _build_kernels(fingerprint([*Path(__file__).parent.glob("*.py"), Path(mat3.__file__), Path(svd3.__file__)]))
+@njit(cache=True, error_model="numpy")
+def _hessians(F, kind, mu, lam, project, out):
+    for e in range(len(F)):
+        U, s, V = decompose(load_mat(F, e))
+        A, alpha, beta = principal_hessian(s, kind[e], mu[e], lam[e], project)
+        for j in range(3):
+            g = (V[3 * j], V[3 * j + 1], V[3 * j + 2])
+            for k in range(j + 1):
+                K = hessian_block(U, A, alpha, beta, g, (V[3 * k], V[3 * k + 1], V[3 * k + 2]))
+                for i in range(3):
+                    for n in range(3):
+                        out[e, 3 * i + j, 3 * n + k] = K[3 * i + n]
+                        out[e, 3 * n + k, 3 * i + j] = K[3 * i + n]
 
 
-def _flat(material: Elastic, F: ArrayLike) -> tuple[NDArray[np.float64], tuple[int, ...], Any]:
+def _flat(F: ArrayLike) -> tuple[NDArray[np.float64], tuple[int, ...]]:
     F = np.asarray(F, dtype=np.float64)
     if F.shape[-2:] != (3, 3):
         raise SceneError(f"F has shape {F.shape}; its last two axes must be (3, 3)")
-    flat = np.ascontiguousarray(F.reshape(-1, 3, 3))
-    return flat, F.shape[:-2], material.per_tet(len(flat))
+    return np.ascontiguousarray(F.reshape(-1, 3, 3)), F.shape[:-2]
 
 
-def batch_energy_densities(material: Elastic, F: ArrayLike) -> NDArray[np.float64]:
-    """See `Elastic.energy_density`."""
-    flat, shape, tet = _flat(material, F)
+def batch_energy_densities(F: ArrayLike, per_tet: Callable[[int], TetMaterial]) -> NDArray[np.float64]:
+    """See `Elastic.energy_density`; `per_tet` gives the material of so many F."""
+    flat, shape = _flat(F)
+    tet = per_tet(len(flat))
     out = np.empty(len(flat))
     with threads_for(len(flat), 5_000):
-        _KERNELS.densities(flat, tet.kind, tet.mu, tet.lam, out)
+        _densities(flat, tet.kind, tet.mu, tet.lam, out)
     return out.reshape(shape)
 
 
-def batch_first_piolas(material: Elastic, F: ArrayLike) -> NDArray[np.float64]:
-    """See `Elastic.first_piola`."""
-    flat, shape, tet = _flat(material, F)
+def batch_first_piolas(F: ArrayLike, per_tet: Callable[[int], TetMaterial]) -> NDArray[np.float64]:
+    """See `Elastic.first_piola` and `batch_energy_densities`."""
+    flat, shape = _flat(F)
+    tet = per_tet(len(flat))
     out = np.empty_like(flat)
-    _KERNELS.piolas(flat, tet.kind, tet.mu, tet.lam, out)
+    _piolas(flat, tet.kind, tet.mu, tet.lam, out)
     return out.reshape(*shape, 3, 3)
 
 
-def batch_hessians(material: Elastic, F: ArrayLike, project: bool) -> NDArray[np.float64]:
-    """See `Elastic.hessian`."""
-    flat, shape, tet = _flat(material, F)
+def batch_hessians(F: ArrayLike, per_tet: Callable[[int], TetMaterial], project: bool) -> NDArray[np.float64]:
+    """See `Elastic.hessian` and `batch_energy_densities`."""
+    flat, shape = _flat(F)
+    tet = per_tet(len(flat))
     out = np.empty((len(flat), 9, 9))
-    _KERNELS.hessians(flat, tet.kind, tet.mu, tet.lam, bool(project), out)
+    _hessians(flat, tet.kind, tet.mu, tet.lam, bool(project), out)
     return out.reshape(*shape, 9, 9)

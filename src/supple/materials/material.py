@@ -1,20 +1,20 @@
-"""What every material says of itself: its density, its damping, and the checks of what a user typed."""
+"""Base classes of materials: density, damping, engineering constants, and the checks of what a user gives."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.materials.isotropic import batch_energy_densities, batch_first_piolas, batch_hessians
+from supple.materials.kinds import STRETCH_ENERGIES
 from supple.materials.lame import lame_from_engineering
 from supple.materials.per_tet import TetMaterial, one_per_tet
-
-if TYPE_CHECKING:
-    from supple.materials.stretches import StretchFunctions
+from supple.materials.stretches import StretchFunctions
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -91,7 +91,6 @@ class Elastic(Material):
     """
 
     stretch_functions: ClassVar[StretchFunctions]
-    needs_positive_volume: ClassVar[bool] = False
 
     youngs: float | NDArray[np.float64]
     poisson: float | NDArray[np.float64]
@@ -110,17 +109,30 @@ class Elastic(Material):
                 f"{kind}: poisson is {nu[bad][0]:g}; it must be above -1 and below 0.5 (0.49 is nearly incompressible)"
             )
 
+    @classmethod
+    def kind(cls) -> int:
+        """The number by which kernels know the energy of this class.
+
+        Raises
+        ------
+        SceneError : where the energy is not among those that the kernels are compiled for.
+        """
+        for kind, energy in enumerate(STRETCH_ENERGIES):
+            if energy is cls.stretch_functions:
+                return kind
+        raise SceneError(
+            f"{cls.__name__}: its energy is not registered; add it to STRETCH_ENERGIES of supple.materials.kinds"
+        )
+
     def lame_parameters(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The mu and lam [Pa] that stand in this material's own energy density (scalars or per tet)."""
         return lame_from_engineering(self.youngs, self.poisson)
 
     def per_tet(self, n_tets: int) -> TetMaterial:
-        from supple.materials.registry import kind_of
-
         name = type(self).__name__
         one_per_tet(self.youngs, n_tets, f"{name}: youngs")
         one_per_tet(self.poisson, n_tets, f"{name}: poisson")
-        return self._tet_material(n_tets, kind_of(type(self)), *self.lame_parameters())
+        return self._tet_material(n_tets, self.kind(), *self.lame_parameters())
 
     def energy_density(self, F: ArrayLike) -> NDArray[np.float64]:
         """Strain energy per rest volume, zero at rest.
@@ -133,9 +145,7 @@ class Elastic(Material):
         -------
         (...) energy densities [Pa].
         """
-        from supple.materials.isotropic import batch_energy_densities
-
-        return batch_energy_densities(self, F)
+        return batch_energy_densities(F, self.per_tet)
 
     def total_energy(self, F: NDArray[np.float64], J: NDArray[np.float64], volumes: NDArray[np.float64]) -> float:
         """Strain energy of all tets of a body, zero at rest [J].
@@ -157,9 +167,7 @@ class Elastic(Material):
         -------
         (..., 3, 3) stresses [Pa].
         """
-        from supple.materials.isotropic import batch_first_piolas
-
-        return batch_first_piolas(self, F)
+        return batch_first_piolas(F, self.per_tet)
 
     def hessian(self, F: ArrayLike, project: bool = False) -> NDArray[np.float64]:
         """Second derivative of the energy density, H[3 i + j, 3 k + l] = d^2 psi / (dF_ij dF_kl).
@@ -173,6 +181,4 @@ class Elastic(Material):
         -------
         (..., 9, 9) symmetric [Pa].
         """
-        from supple.materials.isotropic import batch_hessians
-
-        return batch_hessians(self, F, project)
+        return batch_hessians(F, self.per_tet, project)

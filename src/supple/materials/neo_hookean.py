@@ -1,72 +1,11 @@
-"""Neo-Hookean elasticity with a logarithmic barrier: psi = mu/2 (Ic - 3) - mu ln J + lam/2 (ln J)^2, +inf for J <= 0.
-
-Source: Bonet, Wood, "Nonlinear Continuum Mechanics for Finite Element Analysis", section 6.4.3; Li, Jiang, Luo,
-"Physics-Based Simulation", chapter "Strain Energy".
-"""
+"""Neo-Hookean elasticity with a logarithm as a material; the energy is in `stretch_energies/neo_hookean.py`."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
-import numpy as np
-from numba import njit
-
 from supple.materials.material import Elastic
-from supple.materials.stretches import StretchFunctions, shape_energy, volume_change
-
-
-@njit(error_model="numpy")
-def _log_J(s):
-    """ln J, accurate near the rest state and near collapse."""
-    j = volume_change(s)
-    return math.log1p(j) if j > -0.5 else math.log(s[0] * s[1] * s[2])
-
-
-@njit(error_model="numpy")
-def _density(s, mu, lam):
-    if s[2] <= 0.0:
-        return np.inf
-    log_J = _log_J(s)
-    return mu * (shape_energy(s) + (volume_change(s) - log_J)) + 0.5 * lam * log_J * log_J
-
-
-@njit(error_model="numpy")
-def _tension(s, mu, lam):
-    """c = lam ln J - mu, which stands with 1 / s_i in the stress; not-a-number for J <= 0, where there is no stress."""
-    if s[2] <= 0.0:
-        return np.nan
-    return lam * _log_J(s) - mu
-
-
-@njit(error_model="numpy")
-def _gradient(s, mu, lam):
-    """psi_i = mu s_i + c / s_i"""
-    c = _tension(s, mu, lam)
-    return (mu * s[0] + c / s[0], mu * s[1] + c / s[1], mu * s[2] + c / s[2])
-
-
-@njit(error_model="numpy")
-def _curvature(s, mu, lam):
-    """psi_ii = mu + (lam - c) / s_i^2;  psi_ij = lam / (s_i s_j)"""
-    c = _tension(s, mu, lam)
-    a, b, d = 1.0 / s[0], 1.0 / s[1], 1.0 / s[2]
-    return (
-        mu + (lam - c) * a * a,
-        mu + (lam - c) * b * b,
-        mu + (lam - c) * d * d,
-        lam * b * d,
-        lam * a * d,
-        lam * a * b,
-    )
-
-
-@njit(error_model="numpy")
-def _quotients(s, mu, lam):
-    """d_ij = mu - c / (s_i s_j);  t_ij = mu + c / (s_i s_j)"""
-    c = _tension(s, mu, lam)
-    p, q, r = c / (s[1] * s[2]), c / (s[0] * s[2]), c / (s[0] * s[1])
-    return (mu - p, mu - q, mu - r, mu + p, mu + q, mu + r)
+from supple.materials.stretch_energies import neo_hookean
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -76,5 +15,4 @@ class NeoHookean(Elastic):
     `energy_density` is +inf for J <= 0; stress and Hessian do not exist there and are not-a-number.
     """
 
-    stretch_functions = StretchFunctions(_density, _gradient, _curvature, _quotients)
-    needs_positive_volume = True
+    stretch_functions = neo_hookean.FUNCTIONS

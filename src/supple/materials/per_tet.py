@@ -19,7 +19,7 @@ class TetMaterial:
     Attributes
     ----------
     density : (m,) [kg/m^3]; damping : (m,) Kelvin-Voigt time [s]
-    kind : (m,) int32, the row of `registry.ELASTIC_MATERIALS`, or `NOT_ELASTIC`
+    kind : (m,) int32, the row of `kinds.STRETCH_ENERGIES`, or `NOT_ELASTIC`
     mu, lam : (m,) as they stand in each material's own energy density [Pa]
     """
 

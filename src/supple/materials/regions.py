@@ -79,11 +79,9 @@ class Regions(Elastic):
         return self._chosen([mu for mu, _ in pairs], "mu"), self._chosen([lam for _, lam in pairs], "lam")
 
     def per_tet(self, n_tets: int) -> TetMaterial:
-        from supple.materials.registry import kind_of
-
         index = np.asarray(self.index)
         if len(index) != n_tets:
             raise SceneError(f"Regions: index has {len(index)} values for {n_tets} tets; give one per tet")
-        kinds = np.array([kind_of(type(material)) for material in self.materials], dtype=np.int32)
+        kinds = np.array([material.kind() for material in self.materials], dtype=np.int32)
         mu, lam = self.lame_parameters()
         return TetMaterial(density=self.density, damping=self.damping, kind=kinds[index], mu=mu, lam=lam)

@@ -1,15 +1,16 @@
-"""What a material tells of itself in principal stretches, and how kernels pick the right material by its number."""
+"""An elastic energy in principal stretches, and how kernels choose the energy of a material by its kind."""
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+
+from supple.numerics.kernel_cache import njit
 
 
 class StretchFunctions(NamedTuple):
-    """A material as four compiled functions of (s, mu, lam).
+    """An elastic energy as four compiled functions of (s, mu, lam).
 
     s : the principal stretches (s0, s1, s2), s2 with the sign of J.
 
@@ -23,12 +24,14 @@ class StretchFunctions(NamedTuple):
     curvature : -> (psi_00, psi_11, psi_22, psi_12, psi_02, psi_01)
     quotients : -> (d_12, d_02, d_01, t_12, t_02, t_01) with d_ij = (psi_i - psi_j) / (s_i - s_j), the stiffness against
         a symmetric in-plane change, and t_ij = (psi_i + psi_j) / (s_i + s_j), the stiffness against an in-plane twist
+    needs_positive_volume : whether the energy is infinite for J <= 0
     """
 
     density: Any
     gradient: Any
     curvature: Any
     quotients: Any
+    needs_positive_volume: bool = False
 
 
 @njit(error_model="numpy")
@@ -41,7 +44,7 @@ def volume_change(s):
 @njit(error_model="numpy")
 def shape_energy(s):
     """(Ic - 3) / 2 - (J - 1), without cancellation where all stretches are near 1: the part of the neo-Hookean energies
-    that stands with mu."""
+    multiplied by mu."""
     a, b, c = s[0] - 1.0, s[1] - 1.0, s[2] - 1.0
     return 0.5 * (a * a + b * b + c * c) - (a * b + b * c + c * a) - a * b * c
 
@@ -57,8 +60,8 @@ def distance_from_rotations(s):
 def rotation_quotients(s):
     """t_ij of sum (s_i - 1)^2 / 2: 1 - 2 / (s_i + s_j).
 
-    The density has a kink where s_i + s_j = 0 (the nearest rotation is not unique there): the quotient tends to minus
-    infinity, and is cut off at a size that no double-precision state can tell from it.
+    The density has a kink where s_i + s_j = 0, because the nearest rotation is not unique there. The quotient tends to
+    minus infinity. The sum is kept above 1e-12, which no state in double precision distinguishes from zero.
     """
     return (
         1.0 - 2.0 / max(s[1] + s[2], 1e-12),
@@ -72,21 +75,21 @@ def dispatch(name: str, functions: list[Any], unknown: Any) -> Any:
 
     Parameters
     ----------
-    name : unique. Every link of the chain is named after it: the linker takes compiled functions of one name for one
-        function, and would confuse the links of kernels that were cached by different processes.
+    name : unique. Every function of the chain is named after it. The linker takes compiled functions of one name for
+        the same function, and would confuse those of kernels that different processes have cached.
     """
-    chosen = _otherwise(name, unknown)
+    chosen = _constant(name, unknown)
     for kind in reversed(range(len(functions))):
         chosen = _first_or_rest(f"{name}_{kind}", kind, functions[kind], chosen)
     return chosen
 
 
-def _otherwise(name: str, unknown: Any) -> Any:
-    def otherwise(kind, s, mu, lam):
+def _constant(name: str, unknown: Any) -> Any:
+    def constant(kind, s, mu, lam):
         return unknown
 
-    otherwise.__qualname__ = otherwise.__name__ = f"{name}_of_unknown"
-    return njit(error_model="numpy")(otherwise)
+    constant.__qualname__ = constant.__name__ = f"{name}_of_unknown"
+    return njit(error_model="numpy")(constant)
 
 
 def _first_or_rest(name: str, own_kind: int, first: Any, rest: Any) -> Any:

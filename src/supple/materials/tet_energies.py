@@ -6,15 +6,9 @@ contracted with the shape gradients, block by block (formulas per F: `isotropic.
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any, NamedTuple
-
-from numba import njit, prange
-
 from supple.materials.isotropic import density, energy_density, first_piola, hessian_block, principal_hessian, stress
-from supple.numerics import mat3, svd3
-from supple.numerics.kernel_cache import fingerprint
-from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed
+from supple.numerics.kernel_cache import njit, prange
+from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed, transpose
 from supple.numerics.svd3 import svd3 as decompose
 
 
@@ -104,8 +98,8 @@ def _put_hessian(U, s, V, B, volume, kind, mu, lam, project, out, e):
     H23 = hessian_block(U, A, alpha, beta, g2, g3)
     H33 = _symmetric(hessian_block(U, A, alpha, beta, g3, g3))
     # Shape gradients sum to zero, hence the blocks of every row do: translations cost nothing, exactly.
-    H01 = _minus_sum(H11, mat3.transpose(H12), mat3.transpose(H13))
-    H02 = _minus_sum(H12, H22, mat3.transpose(H23))
+    H01 = _minus_sum(H11, transpose(H12), transpose(H13))
+    H02 = _minus_sum(H12, H22, transpose(H23))
     H03 = _minus_sum(H13, H23, H33)
     _put_pair(out, e, 0, 0, _symmetric(_minus_sum(H01, H02, H03)))
     _put_pair(out, e, 0, 1, H01)
@@ -119,55 +113,8 @@ def _put_hessian(U, s, V, B, volume, kind, mu, lam, project, out, e):
     _put_pair(out, e, 3, 3, H33)
 
 
-class _Kernels(NamedTuple):
-    element_models: Any
-    element_energies: Any
-    element_gradients: Any
-    element_hessians: Any
-
-
-def _build_kernels(version: int) -> _Kernels:
-    """The compiled loops. `version` is in their closures, so that no cached kernel outlives a change of a material."""
-
-    @njit(parallel=True, cache=True, error_model="numpy")
-    def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, energies, gradients, hessians):
-        _ = version
-        for e in prange(len(tets)):
-            U, s, V = decompose(deformation_gradient(x, tets, Dm_inv, e))
-            B = load_mat(Dm_inv, e)
-            energies[e] = volumes[e] * density(kind[e], s, mu[e], lam[e])
-            put_gradient(stress(U, s, V, kind[e], mu[e], lam[e]), B, volumes[e], gradients, e)
-            if second:
-                _put_hessian(U, s, V, B, volumes[e], kind[e], mu[e], lam[e], project, hessians, e)
-
-    @njit(parallel=True, cache=True, error_model="numpy")
-    def element_energies(x, tets, Dm_inv, volumes, kind, mu, lam, out):
-        _ = version
-        for e in prange(len(tets)):
-            F = deformation_gradient(x, tets, Dm_inv, e)
-            out[e] = volumes[e] * energy_density(F, kind[e], mu[e], lam[e])
-
-    @njit(parallel=True, cache=True, error_model="numpy")
-    def element_gradients(x, tets, Dm_inv, volumes, kind, mu, lam, out):
-        _ = version
-        for e in prange(len(tets)):
-            P = first_piola(deformation_gradient(x, tets, Dm_inv, e), kind[e], mu[e], lam[e])
-            put_gradient(P, load_mat(Dm_inv, e), volumes[e], out, e)
-
-    @njit(parallel=True, cache=True, error_model="numpy")
-    def element_hessians(x, tets, Dm_inv, volumes, kind, mu, lam, project, out):
-        _ = version
-        for e in prange(len(tets)):
-            U, s, V = decompose(deformation_gradient(x, tets, Dm_inv, e))
-            _put_hessian(U, s, V, load_mat(Dm_inv, e), volumes[e], kind[e], mu[e], lam[e], project, out, e)
-
-    return _Kernels(element_models, element_energies, element_gradients, element_hessians)
-
-
-_KERNELS = _build_kernels(fingerprint([*Path(__file__).parent.glob("*.py"), Path(mat3.__file__), Path(svd3.__file__)]))
-
-
-def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, energies, gradients, hessians) -> None:
+@njit(parallel=True, cache=True, error_model="numpy")
+def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, energies, gradients, hessians):
     """Energies (m,), gradients (m, 4, 3) and, with `second`, Hessians (m, 12, 12) of all tets at once: one
     decomposition of each F serves all three.
 
@@ -177,10 +124,17 @@ def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, ene
     second : whether Hessians are wanted; if not, `hessians` is left as it is
     project : see `element_hessians`
     """
-    _KERNELS.element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, energies, gradients, hessians)
+    for e in prange(len(tets)):
+        U, s, V = decompose(deformation_gradient(x, tets, Dm_inv, e))
+        B = load_mat(Dm_inv, e)
+        energies[e] = volumes[e] * density(kind[e], s, mu[e], lam[e])
+        put_gradient(stress(U, s, V, kind[e], mu[e], lam[e]), B, volumes[e], gradients, e)
+        if second:
+            _put_hessian(U, s, V, B, volumes[e], kind[e], mu[e], lam[e], project, hessians, e)
 
 
-def element_energies(x, tets, Dm_inv, volumes, kind, mu, lam, out) -> None:
+@njit(parallel=True, cache=True, error_model="numpy")
+def element_energies(x, tets, Dm_inv, volumes, kind, mu, lam, out):
     """Elastic energy of every tet [J], zero at rest, into out (m,).
 
     Parameters
@@ -188,21 +142,29 @@ def element_energies(x, tets, Dm_inv, volumes, kind, mu, lam, out) -> None:
     x : (n, 3) positions [m]; tets : (m, 4) int32; Dm_inv : (m, 3, 3) rest shape inverse [1/m]; volumes : (m,) [m^3];
     kind, mu, lam : (m,) of `TetMaterial`. All C-contiguous; float64, but int32 for tets and kind.
     """
-    _KERNELS.element_energies(x, tets, Dm_inv, volumes, kind, mu, lam, out)
+    for e in prange(len(tets)):
+        F = deformation_gradient(x, tets, Dm_inv, e)
+        out[e] = volumes[e] * energy_density(F, kind[e], mu[e], lam[e])
 
 
-def element_gradients(x, tets, Dm_inv, volumes, kind, mu, lam, out) -> None:
+@njit(parallel=True, cache=True, error_model="numpy")
+def element_gradients(x, tets, Dm_inv, volumes, kind, mu, lam, out):
     """Gradient of every tet's energy by its four nodes [N] (minus the elastic forces), into out (m, 4, 3).
 
     Parameters as of `element_energies`.
     """
-    _KERNELS.element_gradients(x, tets, Dm_inv, volumes, kind, mu, lam, out)
+    for e in prange(len(tets)):
+        P = first_piola(deformation_gradient(x, tets, Dm_inv, e), kind[e], mu[e], lam[e])
+        put_gradient(P, load_mat(Dm_inv, e), volumes[e], out, e)
 
 
-def element_hessians(x, tets, Dm_inv, volumes, kind, mu, lam, project, out) -> None:
+@njit(parallel=True, cache=True, error_model="numpy")
+def element_hessians(x, tets, Dm_inv, volumes, kind, mu, lam, project, out):
     """Hessian of every tet's energy [N/m] into out (m, 12, 12): entry (3 p + i, 3 q + k) for coordinate i of node p and
     coordinate k of node q. With `project`, of the nearest convex energy: eigenvalues of d^2 psi / dF^2 are clamped.
 
     Other parameters as of `element_energies`.
     """
-    _KERNELS.element_hessians(x, tets, Dm_inv, volumes, kind, mu, lam, project, out)
+    for e in prange(len(tets)):
+        U, s, V = decompose(deformation_gradient(x, tets, Dm_inv, e))
+        _put_hessian(U, s, V, load_mat(Dm_inv, e), volumes[e], kind[e], mu[e], lam[e], project, out, e)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import MeshError
 from supple.mesh.checked_arrays import frozen, vertex_array
 from supple.mesh.tetmesh import TetMesh
+from supple.numerics.kernel_cache import njit
 
 # How many tets, nearest by centre, are tried for every point; in even meshes nearly all lie in one of them.
 NEAREST = 16

@@ -8,8 +8,9 @@ near each other.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from supple.numerics.kernel_cache import njit
 
 MAX_COLORS = 256
 

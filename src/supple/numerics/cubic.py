@@ -11,11 +11,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SolverError
 from supple.numerics.geometry.double_double import product_error, sum_error
+from supple.numerics.kernel_cache import njit
 
 # Bounds on what is lost, relative to the sum of the terms' sizes: by Horner's rule, and by its compensated form.
 _ROUND_OFF = 2e-15

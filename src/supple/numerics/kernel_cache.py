@@ -1,21 +1,103 @@
-"""Keeping compiled kernels honest: a cached kernel must be compiled anew when anything that it calls has changed."""
+"""`njit` as of Numba, with a cache that is renewed when a function that the kernel calls has changed, in any file.
+
+Numba compares a cached kernel with the text of the file that the kernel stands in. It does not look at the functions
+that the kernel calls: when one of them changes in another file, Numba loads the old machine code. Here the index of
+the cache also holds a digest of the code of everything that the kernel reaches.
+"""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
-from pathlib import Path
+import pickle
+from collections.abc import Iterator
+from functools import cached_property, partial
+from types import CodeType, FunctionType, ModuleType
+from typing import Any
+
+import numba
+import numpy as np
+from numba import prange
+from numba.core.caching import FunctionCache
+from numba.core.dispatcher import Dispatcher
+
+__all__ = ["KernelCache", "njit", "prange", "reached_code"]
 
 
-def fingerprint(sources: Iterable[Path]) -> int:
-    """A number that changes with the text of the source files.
+def njit(function: FunctionType | None = None, *, cache: bool = False, **options: Any) -> Any:
+    """Compile a function in Numba's nopython mode: `numba.njit`, with the cache of this module.
 
-    Numba compares only the file that a kernel stands in with its cache, not the files of the functions that it calls. A
-    kernel with this number in its closure has it in its cache key.
+    Parameters
+    ----------
+    cache : whether the machine code is kept on disk, see `KernelCache`.
+    options : as of `numba.njit`.
     """
+    if function is None:
+        return partial(njit, cache=cache, **options)
+    compiled = numba.njit(**options)(function)
+    if cache and isinstance(compiled, Dispatcher):  # a plain function where NUMBA_DISABLE_JIT is set
+        compiled._cache = KernelCache(function)
+    return compiled
+
+
+class KernelCache(FunctionCache):
+    """Numba's cache of one kernel, with the code that the kernel reaches in its stamp.
+
+    The code is that in memory, not that of the files: a file that is edited after its import cannot be mistaken for
+    what is compiled.
+    """
+
+    def load_overload(self, sig, target_context):
+        # A kernel may call what is defined below it, so the stamp waits for the first call. Numba loads, then saves.
+        self._cache_file._source_stamp = self._stamp
+        return super().load_overload(sig, target_context)
+
+    @cached_property
+    def _stamp(self) -> tuple[Any, bytes]:
+        return self._impl.locator.get_source_stamp(), reached_code(self._py_func)
+
+
+def reached_code(kernel: FunctionType) -> bytes:
+    """A digest of the bytecode, constants and compiler options of a kernel and of all compiled functions it reaches."""
     digest = hashlib.sha256()
-    for path in sorted(sources):
-        if path.is_file():
-            digest.update(path.name.encode())
-            digest.update(path.read_bytes())
-    return int.from_bytes(digest.digest()[:7], "big")
+    visited: set[FunctionType] = set()
+    pending: list[Any] = [kernel]
+    while pending:
+        value = pending.pop()
+        if isinstance(value, Dispatcher):
+            # Sets of options have no order of their own.
+            options = {k: sorted(v) if isinstance(v, (set, frozenset)) else v for k, v in value.targetoptions.items()}
+            digest.update(repr(sorted(options.items())).encode())
+            value = value.py_func
+        if isinstance(value, tuple):
+            pending += value
+        elif isinstance(value, (int, float, complex, str, bytes, np.generic, np.ndarray)):
+            digest.update(pickle.dumps(value))
+        elif isinstance(value, FunctionType) and value not in visited:
+            visited.add(value)
+            codes = list(_nested_codes(value.__code__))
+            for code in codes:
+                constants = [constant for constant in code.co_consts if not isinstance(constant, CodeType)]
+                digest.update(repr((code.co_code, code.co_names, code.co_varnames, constants)).encode())
+            pending += _used_values(value, codes)
+    return digest.digest()
+
+
+def _nested_codes(code: CodeType) -> Iterator[CodeType]:
+    yield code
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _nested_codes(constant)
+
+
+def _used_values(function: FunctionType, codes: list[CodeType]) -> Iterator[Any]:
+    """What the names in a function mean, in an order that every process agrees on.
+
+    Plain functions are left out: compiled code cannot call them.
+    """
+    cells = (cell.cell_contents for cell in function.__closure__ or ())
+    closure = dict(zip(function.__code__.co_freevars, cells, strict=True))
+    names = list(dict.fromkeys([*closure, *(name for code in codes for name in code.co_names)]))
+    for name in names:
+        value = closure.get(name, function.__globals__.get(name))
+        values = [getattr(value, member, None) for member in names] if isinstance(value, ModuleType) else [value]
+        yield from (value for value in values if not isinstance(value, FunctionType))

@@ -5,7 +5,7 @@ A vector is (x, y, z). A matrix is nine numbers, row after row: M = (m00, m01, m
 
 from __future__ import annotations
 
-from numba import njit
+from supple.numerics.kernel_cache import njit
 
 
 @njit(error_model="numpy")

@@ -13,10 +13,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SolverError
+from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import cross, dot, load_mat, store_mat
 
 # What a sweep mixes into each other is below round-off where its rotations were all below 1e-8 and all cosines of

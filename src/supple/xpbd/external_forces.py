@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from supple.numerics.kernel_cache import njit
 from supple.system import System
 
 

@@ -8,8 +8,8 @@ substep of 0.2 ms turns the round-off of a position into 7e-11 m/s.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
 
+from supple.numerics.kernel_cache import njit, prange
 from supple.xpbd.sweeps.compilation import serial_and_parallel
 
 BLOCK = 4096

@@ -19,9 +19,9 @@ Sums run over blocks of vertices that depend on the mesh only, so that they have
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import NDArray
 
+from supple.numerics.kernel_cache import njit, prange
 from supple.system import System
 from supple.xpbd.sweeps.compilation import serial_and_parallel
 

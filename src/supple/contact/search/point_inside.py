@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from supple.numerics.geometry.closest_point import closest_on_triangle, combine
+from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import dot, row, subtract
 
 

@@ -13,10 +13,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from supple.numerics.geometry.closest_point import closest_on_triangle, combine
+from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import dot, row, subtract
 
 # Cells along the longest side of everything: beyond this, cells grow. Three cell numbers then fit into 63 bits.

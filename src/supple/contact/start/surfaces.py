@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from supple.contact.obstacle_vertices import with_obstacles
+from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.scene.obstacles import Box, HalfSpace, Sphere
 from supple.system import System

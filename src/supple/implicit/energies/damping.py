@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import NDArray
 
 from supple.implicit.energies.elasticity import SERIAL_TETS, Elasticity, gather_gradients
@@ -24,6 +23,7 @@ from supple.implicit.energies.potential import HessianBlocks, Potential
 from supple.materials.lame import lame_from_engineering
 from supple.materials.material import Elastic
 from supple.materials.tet_energies import deformation_gradient, edge_matrix, put_gradient
+from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed, transpose
 from supple.numerics.threads import threads_for
 from supple.system import System

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import NDArray
 
 from supple.errors import SolverError
@@ -13,6 +12,7 @@ from supple.implicit.energies.potential import HessianBlocks, Potential
 from supple.materials.material import Elastic
 from supple.materials.per_tet import TetMaterial
 from supple.materials.tet_energies import element_energies, element_gradients, element_hessians, element_models
+from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.sparse.block_csr import incidences
 from supple.numerics.threads import threads_for
 from supple.system import System

@@ -17,12 +17,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import NDArray
 
 from supple.implicit.energies.elasticity import SERIAL_TETS, Elasticity, gather_gradients
 from supple.implicit.energies.potential import HessianBlocks, Potential
-from supple.materials.registry import needs_positive_volume
+from supple.materials.kinds import needs_positive_volume
+from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.threads import threads_for
 
 ONSET = 0.1

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from supple.implicit.energies.elasticity import SERIAL_TETS, gather_gradients
 from supple.implicit.energies.potential import HessianBlocks, Potential
 from supple.implicit.energies.stitch_springs import spring_energies, spring_gradients, spring_hessians
-from supple.materials.registry import kind_of
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.materials.tet_energies import element_energies, element_gradients, element_hessians
 from supple.numerics.sparse.block_csr import incidences
@@ -76,5 +75,5 @@ class StitchEnergy(Potential):
     @cached_property
     def _tets(self) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray, NDArray]:
         tets = self.stitching.tets
-        kind = np.full(len(tets), kind_of(StableNeoHookean), dtype=np.int32)
+        kind = np.full(len(tets), StableNeoHookean.kind(), dtype=np.int32)
         return tets.vertices, tets.rest_shape_inverse, tets.rest_volumes, kind, tets.mu, tets.lam

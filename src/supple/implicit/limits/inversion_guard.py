@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from supple.errors import SolverError
 from supple.implicit.energies.elasticity import SERIAL_TETS
 from supple.implicit.limits.step_filter import KEEP, min_det, noninverting_step
+from supple.materials.kinds import needs_positive_volume
 from supple.materials.per_tet import TetMaterial
-from supple.materials.registry import needs_positive_volume
+from supple.numerics.kernel_cache import njit
 from supple.numerics.threads import threads_for
 from supple.system import System
 

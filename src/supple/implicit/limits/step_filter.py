@@ -20,12 +20,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SolverError
 from supple.numerics.cubic import last_positive_before_root, positive_on_unit_interval
 from supple.numerics.geometry import double_double as dd
+from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import cross, det, dot, load_mat, mat_mul, row, subtract
 
 # How much of a step a solver lets the volume of one tet lose by default: down to one fifth.

@@ -5,8 +5,7 @@ Source: Ericson, "Real-Time Collision Detection" (2005), section 5.1.5.
 
 from __future__ import annotations
 
-from numba import njit
-
+from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import cross, dot, subtract
 
 

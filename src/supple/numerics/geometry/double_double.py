@@ -6,7 +6,7 @@ for Double-Double and Quad-Double Arithmetic" (2007).
 
 from __future__ import annotations
 
-from numba import njit
+from supple.numerics.kernel_cache import njit
 
 
 @njit(error_model="numpy")

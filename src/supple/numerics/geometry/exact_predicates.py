@@ -8,7 +8,8 @@ that products of three of them neither overflow nor underflow.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from supple.numerics.kernel_cache import njit
 
 # (7 + 56 u) u with u = 2^-53: bound of the rounding error, relative to the sum of the products' magnitudes.
 _ERROR = (7.0 + 56.0 * 2.0**-53) * 2.0**-53

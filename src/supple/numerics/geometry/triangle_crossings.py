@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from supple.numerics.geometry.exact_predicates import side_of_line, side_of_plane
+from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import cross, row, subtract
 
 APART, TOUCHING, CROSSING = 0, 1, 2

@@ -10,10 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import NDArray
 from scipy.sparse import bsr_matrix
 
+from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.threads import threads_for
 
 # Fewer blocks than this are worked on by one thread.

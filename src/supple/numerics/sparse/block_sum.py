@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.sparse import bsr_matrix
 
+from supple.numerics.kernel_cache import njit
 from supple.numerics.sparse.block_csr import BlockRows
 
 

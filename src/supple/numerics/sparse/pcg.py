@@ -12,9 +12,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import NDArray
 
+from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.sparse.preconditioner import TwoLevel
 from supple.numerics.sparse.skyline_cholesky import solve
 from supple.numerics.threads import threads_for

@@ -19,11 +19,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
+from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.sparse.block_csr import SERIAL_BLOCKS, BlockRows
 from supple.numerics.sparse.partition import bisected_groups
 from supple.numerics.sparse.skyline_cholesky import factorize

@@ -7,7 +7,8 @@ does not promise.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+
+from supple.numerics.kernel_cache import njit, prange
 
 SIZE = 12
 

@@ -16,10 +16,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import NDArray
 
 from supple.errors import SolverError
+from supple.numerics.kernel_cache import njit, prange
 from supple.system import BodyRange, System
 from supple.xpbd.sweeps.compilation import FLAGS, serial_and_parallel
 from supple.xpbd.sweeps.ordering import Layout

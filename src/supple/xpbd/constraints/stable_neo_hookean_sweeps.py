@@ -6,8 +6,7 @@ length, 3 curvatures (`constraints_stable_neo_hookean.py`; derivation: docs/xpbd
 
 from __future__ import annotations
 
-from numba import njit, prange
-
+from supple.numerics.kernel_cache import njit, prange
 from supple.xpbd.sweeps.compilation import FLAGS, serial_and_parallel
 
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from supple.numerics.kernel_cache import njit
 from supple.scene.stitches.elements import StitchTets
 from supple.system import System
 from supple.xpbd.constraints.stable_neo_hookean import BlocksOfTwo

@@ -12,8 +12,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import dot
 
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from supple.contact.obstacle_poses import ObstaclePoses
+from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import dot, row
 from supple.scene.contact_pairs import PairTable
 from supple.system import System

@@ -10,7 +10,7 @@ Source: the pre-stabilization of Macklin et al., "Unified Particle Physics" (201
 
 from __future__ import annotations
 
-from numba import njit
+from supple.numerics.kernel_cache import njit
 
 
 @njit

@@ -17,10 +17,9 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from supple.contact.search.spatial_hash import is_excluded
 from supple.numerics.geometry.closest_point import area_normal, between, closest_on_triangle, combine
+from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import dot, row, subtract
 from supple.xpbd.contact.friction import friction_correction
 from supple.xpbd.contact.overlap import split_overlap

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from types import FunctionType
 from typing import Any, NamedTuple
 
-from numba import njit
+from supple.numerics.kernel_cache import njit
 
 # No flag that assumes finite numbers (NaN must be seen) and none that reorders sums (same bits for any thread count).
 FLAGS = {"contract", "arcp", "nsz"}

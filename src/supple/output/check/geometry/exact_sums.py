@@ -9,7 +9,7 @@ Source: Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust 
 
 from __future__ import annotations
 
-from numba import njit
+from supple.numerics.kernel_cache import njit
 
 _SPLITTER = 134217729.0  # 2^27 + 1
 # Coordinates within these, or zero, have differences, and threefold products of them, that float64 can hold exactly:

@@ -11,8 +11,9 @@ from __future__ import annotations
 from fractions import Fraction
 
 import numpy as np
-from numba import njit, objmode
+from numba import objmode
 
+from supple.numerics.kernel_cache import njit
 from supple.output.check.geometry.exact_sums import add_product2, add_product3, in_range, sign_of, two_sum
 
 _EPSILON = 2.0**-53

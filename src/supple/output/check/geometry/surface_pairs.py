@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from supple.numerics.kernel_cache import njit
 from supple.output.check.geometry.box_tree import boxes_apart, boxes_meet
 from supple.output.check.geometry.triangle_distance import triangles_apart
 from supple.output.check.geometry.triangle_pairs import triangles_meet

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from supple.numerics.kernel_cache import njit
 
 
 @njit(error_model="numpy")

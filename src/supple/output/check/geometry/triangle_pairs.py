@@ -9,8 +9,7 @@ A triangle without area is no surface; what is left of it here is its sides. Its
 
 from __future__ import annotations
 
-from numba import njit
-
+from supple.numerics.kernel_cache import njit
 from supple.output.check.geometry.orientation import area_sign, volume_sign
 
 

@@ -1,0 +1,32 @@
+"""The energies of all elastic materials, and the number by which kernels know each.
+
+A new material is one file in `stretch_energies/` and one line here, its class and one line in `registry.py`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.materials.stretch_energies import (
+    arap,
+    fixed_corotated,
+    neo_hookean,
+    st_venant_kirchhoff,
+    stable_neo_hookean,
+)
+from supple.materials.stretches import StretchFunctions
+
+STRETCH_ENERGIES: tuple[StretchFunctions, ...] = (
+    stable_neo_hookean.FUNCTIONS,
+    neo_hookean.FUNCTIONS,
+    fixed_corotated.FUNCTIONS,
+    arap.FUNCTIONS,
+    st_venant_kirchhoff.FUNCTIONS,
+)
+
+
+def needs_positive_volume(kind: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """(m,) whether the energy of each tet's material is infinite for J <= 0, from its kind (m,)."""
+    wanted = [k for k, energy in enumerate(STRETCH_ENERGIES) if energy.needs_positive_volume]
+    return np.isin(kind, wanted)

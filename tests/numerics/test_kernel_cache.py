@@ -1,0 +1,112 @@
+"""The cache of compiled kernels: kept between processes, renewed when something that a kernel reaches has changed."""
+
+import importlib
+import os
+import pkgutil
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+from numba.core.caching import NullCache
+from numba.core.dispatcher import Dispatcher
+
+import supple
+from supple.numerics.kernel_cache import KernelCache, njit, reached_code
+
+SOURCES = Path(supple.__file__).parent
+# Prints the result of a kernel of svd3.py, and how often the cache had it.
+RUN_KERNEL = """
+import numpy as np
+from supple.numerics import svd3
+print(svd3.rotation_variant_svd(np.diag([3.0, 2.0, 1.0]))[1].tolist(), sum(svd3._svd_batch.stats.cache_hits.values()))
+"""
+
+
+@pytest.fixture
+def copied_package(tmp_path):
+    """A function that runs the kernel in a new process, on a copy of the package."""
+    package = tmp_path / "supple"
+    shutil.copytree(SOURCES, package, ignore=shutil.ignore_patterns("__pycache__"))
+
+    def run():
+        environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+        done = subprocess.run(
+            [sys.executable, "-c", RUN_KERNEL], capture_output=True, text=True, env=environment, cwd=tmp_path
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout.strip()
+
+    return package, run
+
+
+def replace_in(path, old, new):
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new), encoding="utf-8")
+
+
+def test_a_kernel_is_compiled_again_when_a_function_of_another_file_changes(copied_package):
+    package, run = copied_package
+    assert run() == "[3.0, 2.0, 1.0] 0"
+    assert run().endswith(" 1"), "unchanged, it is loaded"
+    replace_in(package / "numerics" / "mat3.py", "        array[e, 0, 0],", "        2.0 * array[e, 0, 0],")
+    assert run() == "[6.0, 2.0, 1.0] 0"
+    assert run().endswith(" 1")
+
+
+def test_every_cached_kernel_of_the_package_uses_this_cache():
+    kernels = 0
+    for module in pkgutil.walk_packages(supple.__path__, "supple."):
+        if module.name.endswith("__main__"):
+            continue
+        for value in vars(importlib.import_module(module.name)).values():
+            for kernel in value if isinstance(value, tuple) else (value,):
+                if isinstance(kernel, Dispatcher) and not isinstance(kernel._cache, NullCache):
+                    assert isinstance(kernel._cache, KernelCache), kernel
+                    kernels += 1
+    assert kernels > 50
+
+
+def kernel_with(factor=2.0, constant=1.0, fastmath=False):
+    """A kernel that calls a function that calls another."""
+
+    @njit(fastmath=fastmath)
+    def inner(x):
+        return factor * x
+
+    def middle(x):
+        return inner(x) + constant
+
+    middle = numba.njit(middle)
+
+    def outer(x):
+        return middle(x) + 1.0
+
+    return outer
+
+
+def test_what_the_digest_depends_on():
+    same = reached_code(kernel_with())
+    assert reached_code(kernel_with()) == same
+    assert reached_code(kernel_with(factor=3.0)) != same
+    assert reached_code(kernel_with(constant=np.ones(2))) != same
+    assert reached_code(kernel_with(fastmath=True)) != same
+    assert reached_code(kernel_with(fastmath={"nsz", "arcp"})) == reached_code(kernel_with(fastmath={"arcp", "nsz"}))
+
+
+def test_names_of_a_module_and_constants_count(monkeypatch):
+    from supple.numerics import coloring, mat3
+
+    def calls_through_a_module(a):
+        return mat3.dot(a, a)
+
+    before = reached_code(calls_through_a_module)
+    monkeypatch.setattr(mat3, "dot", njit(lambda a, b: 0.0))
+    assert reached_code(calls_through_a_module) != before
+    before = reached_code(coloring.greedy_colors.py_func)
+    monkeypatch.setattr(coloring, "MAX_COLORS", 128)
+    assert reached_code(coloring.greedy_colors.py_func) != before
