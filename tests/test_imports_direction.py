@@ -1,6 +1,7 @@
-"""Imports run in one direction: every floor of the house knows only those below it."""
+"""Imports run in one direction: every layer of the package imports only from the layers below it."""
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -8,8 +9,9 @@ import pytest
 import supple
 
 ROOT = Path(supple.__file__).parent
-# From the roof down. What stands on one floor does not know its neighbours; the last one holds up all others.
-FLOORS = (
+# From the top down. Parts of one layer do not import each other; those of the last one may. CONTRIBUTING.md shows
+# this list.
+LAYERS = (
     ("__main__",),
     ("cli",),
     ("demos",),
@@ -19,13 +21,14 @@ FLOORS = (
     ("diagnostics",),
     ("xpbd", "implicit"),
     ("solver",),
+    ("contact",),
     ("system",),
     ("scene",),
     ("mesh", "materials"),
     ("numerics", "state", "contact_points", "replacing", "errors"),
 )
-LEVEL = {part: -k for k, floor in enumerate(FLOORS) for part in floor}
-GROUND = FLOORS[-1]
+LEVEL = {part: -k for k, layer in enumerate(LAYERS) for part in layer}
+LOWEST = LAYERS[-1]
 
 
 def part_of(path):
@@ -54,26 +57,33 @@ FILES = sorted(path for path in ROOT.rglob("*.py") if path != ROOT / "__init__.p
 
 
 @pytest.mark.parametrize("part", sorted({part_of(path) for path in FILES}))
-def test_every_part_knows_only_the_floors_below(part):
-    assert part in LEVEL, f"{part} stands on no floor; give it one in this test"
+def test_every_part_imports_only_from_the_layers_below(part):
+    assert part in LEVEL, f"{part} is in no layer; add it to LAYERS"
     upward = [
         f"{path.relative_to(ROOT)}:{line} imports {other}"
         for path in FILES
         if part_of(path) == part
         for line, other in imports(path)
-        if other != part and other not in GROUND and LEVEL[other] >= LEVEL[part]
+        if other != part and other not in LOWEST and LEVEL[other] >= LEVEL[part]
     ]
     assert upward == []
 
 
-@pytest.mark.parametrize("part", GROUND)
-def test_the_ground_floor_knows_nothing_above_it(part):
-    known = {other for path in FILES if part_of(path) == part for _, other in imports(path)}
-    assert known <= set(GROUND)
+@pytest.mark.parametrize("part", LOWEST)
+def test_the_lowest_layer_imports_nothing_above_it(part):
+    imported = {other for path in FILES if part_of(path) == part for _, other in imports(path)}
+    assert imported <= set(LOWEST)
 
 
-def test_solvers_know_no_files_viewers_or_shell():
+def test_solvers_import_no_files_viewers_or_shell():
     for path in FILES:
         if part_of(path) in ("xpbd", "implicit"):
-            known = {other for _, other in imports(path)}
-            assert not known & {"scene_file", "output", "viewer", "cli", "demos", "simulate"}, path
+            imported = {other for _, other in imports(path)}
+            assert not imported & {"scene_file", "output", "viewer", "cli", "demos", "simulate"}, path
+
+
+def test_contributing_shows_the_layers():
+    text = (Path(__file__).parents[1] / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"^## Layers\n.*?\n\n((?: {4}[^\n]*\n)+)", text, flags=re.S | re.M)
+    rows = [re.split(r"\s{2,}", line.strip())[0] for line in block.splitlines()]
+    assert [tuple(row.replace(".py", "").split(", ")) for row in rows] == list(LAYERS[1:])
