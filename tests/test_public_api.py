@@ -48,7 +48,7 @@ def test_every_public_name_is_there(name):
 
 
 def test_unknown_names_are_attribute_errors():
-    with pytest.raises(AttributeError, match="no attribute 'Bodyy'"):
+    with pytest.raises(AttributeError, match="No supple attribute Bodyy"):
         sp.Bodyy  # noqa: B018  # pyright: ignore[reportAttributeAccessIssue]
 
 

@@ -33,7 +33,7 @@ def njit(function: FunctionType | None = None, *, cache: bool = False, **options
     """
     if function is None:
         return partial(njit, cache=cache, **options)
-    compiled = numba.njit(**options)(function)
+    compiled: Any = numba.njit(**options)(function)
     if cache and isinstance(compiled, Dispatcher):  # a plain function where NUMBA_DISABLE_JIT is set
         compiled._cache = KernelCache(function)
     return compiled
