@@ -83,7 +83,8 @@ class Elastic(Material):
     Parameters
     ----------
     youngs : Young's modulus E of small strains [Pa]; one number, or one per tetrahedron of the body.
-    poisson : Poisson's ratio nu [-], from above -1 to below 0.5; one number, or one per tetrahedron.
+    poisson : Poisson's ratio nu [-], above -1 and below 0.5; one number, or one per tetrahedron. Below 0
+        (auxetic), some energies have no lower bound at large strains; see docs/materials.md.
 
     Raises
     ------
@@ -102,7 +103,7 @@ class Elastic(Material):
         try:
             nu = np.atleast_1d(np.asarray(self.poisson, dtype=np.float64))
         except (TypeError, ValueError):
-            raise SceneError(f"{kind}: poisson is {self.poisson!r}; give a number from 0 to below 0.5") from None
+            raise SceneError(f"{kind}: poisson is {self.poisson!r}; give a number above -1 and below 0.5") from None
         bad = ~((nu > -1.0) & (nu < 0.5))
         if bad.any():
             raise SceneError(

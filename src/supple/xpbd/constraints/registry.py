@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from supple.errors import SolverError
 from supple.materials.edges_and_volume import EdgesAndVolume
-from supple.materials.material import Material
+from supple.materials.material import Elastic, Material
 from supple.materials.regions import Regions
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.system import BodyRange, System
@@ -89,18 +89,20 @@ def build_constraint_sets(system: System, layout: Layout) -> list[ConstraintSet]
     for part in system.bodies:
         material = part.body.material
         if not any(entry.takes(material) for entry in CONSTRAINT_SETS):
-            known = sorted(entry.material.__name__ for entry in CONSTRAINT_SETS)
-            given = [material, *getattr(material, "materials", [])]
-            unknown = ", ".join(
-                dict.fromkeys(type(each).__name__ for each in given if type(each).__name__ not in known)
-            )
-            raise SolverError(
-                f"XPBD: body {part.name!r} is made of {unknown}, and XPBD has no constraints for that; "
-                f"give it {' or '.join(known)}, or simulate with Implicit"
-            )
+            raise SolverError(f"XPBD: {_why_not(part.name, material)}, or simulate with Implicit")
     sets = []
     for entry in CONSTRAINT_SETS:
         parts = [part for part in system.bodies if entry.takes(part.body.material)]
         if parts:
             sets += [build(system, parts, layout) for build in entry.sets]
     return [made for made in sets if made.count > 0]
+
+
+def _why_not(body: str, material: Material) -> str:
+    known = [entry.material for entry in CONSTRAINT_SETS]
+    if not isinstance(material, Regions):
+        names = " or ".join(kind.__name__ for kind in known)
+        return f"body {body!r} has the material {type(material).__name__}, which XPBD cannot simulate; use {names}"
+    unknown = dict.fromkeys(type(each).__name__ for each in material.materials if type(each) not in known)
+    names = " or ".join(kind.__name__ for kind in known if issubclass(kind, Elastic))
+    return f"body {body!r} has regions of {', '.join(unknown)}, which XPBD cannot simulate; use regions of {names}"
