@@ -99,6 +99,7 @@ def test_a_deformed_start_is_where_the_recording_begins(folder):
         assert np.ptp(recording[0].positions["cube"], axis=0) == pytest.approx([1, 0.5, 1])
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")  # such numbers must not overflow on the way to the message
 def test_a_solver_that_cannot_go_on_is_exit_3_with_the_recording_up_to_there(folder, capfd):
     (folder / "scene.yaml").write_text(SCENE + "gravity: [0, -1.0e+290, 0]\n")
     assert main(["run", "scene.yaml", "-q", "--no-page", "--no-plot", "--dt", "1e20"]) == ExitCode.SOLVER

@@ -109,7 +109,7 @@ class Collisions:
         return self.contacts
 
     def _gather_obstacles(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float) -> None:
-        falling = 0.5 * float(np.linalg.norm(self.system.gravity)) * self._dt**2
+        falling = 0.5 * math.hypot(*self.system.gravity) * self._dt**2
         reach_from_velocities(v, self._dt, LEAST_REACH * self.edge_length + falling, self._reach)
         self._gathered[:] = x
         self.obstacles.gather(x, self._reach, time)
