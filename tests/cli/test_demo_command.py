@@ -1,9 +1,14 @@
 """`supple demo`: lists, runs, records, and prints what was measured."""
 
+import re
+from dataclasses import replace
+from pathlib import Path
+
 import pytest
 
 from supple.cli.app import main
 from supple.cli.exit_codes import ExitCode
+from supple.demos.demo import Measurement
 from supple.demos.registry import DEMOS
 from supple.output.recording.reader import read_recording
 
@@ -19,7 +24,7 @@ def test_lists_the_demos(arguments, capsys):
 
 def test_runs_a_demo_and_judges_its_claims(tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
-    assert main(["demo", "stretch", "--steps", "2", "--no-page", "--no-plot"]) == ExitCode.OK
+    assert main(["demo", "stretch", "--steps", "2", "--no-page", "--no-plot"]) == ExitCode.FAILED
     out, _ = capfd.readouterr()
     assert DEMOS["stretch"].explanation in out
     with read_recording("out/stretch/recording.vtkhdf") as recording:
@@ -33,8 +38,30 @@ def test_runs_a_demo_and_judges_its_claims(tmp_path, monkeypatch, capfd):
 
 def test_quiet_prints_only_what_was_measured(tmp_path, capfd):
     arguments = ["demo", "squash", "-q", "--steps", "2", "--no-page", "--no-plot", "-o", str(tmp_path / "here")]
-    assert main(arguments) == ExitCode.OK
+    assert main(arguments) == ExitCode.FAILED
     out, err = capfd.readouterr()
     assert all(line.startswith(("holds: ", "does not hold: ")) for line in out.splitlines())
     assert err == ""
     assert [path.name for path in (tmp_path / "here").iterdir()] == ["recording.vtkhdf"]
+
+
+def test_a_demo_whose_claims_all_hold_exits_0(tmp_path, monkeypatch, capfd):
+    short = replace(DEMOS["stretch"], measurement=WithoutClaims, steps=1)
+    monkeypatch.setitem(DEMOS, "stretch", short)
+    assert main(["demo", "stretch", "-q", "--no-page", "--no-plot", "-o", str(tmp_path)]) == ExitCode.OK
+    assert capfd.readouterr().out == ""
+
+
+class WithoutClaims(Measurement):
+    def claims(self):
+        return []
+
+
+def test_the_demos_of_the_readme_and_of_make_run_at_their_full_length():
+    """So that CI, which runs these commands and stops at an exit code above 0, judges all of their claims."""
+    root = Path(__file__).parents[2]
+    text = (root / "README.md").read_text(encoding="utf-8") + (root / "Makefile").read_text(encoding="utf-8")
+    commands = re.findall(r"^.*supple demo [a-z].*$", text, flags=re.M)
+    named = {name for command in commands for name in re.findall(r"supple demo ([a-z]\w*)", command)}
+    assert {"squash", "bears", "stretch", "cantilever"} <= named <= set(DEMOS)
+    assert not [command for command in commands if "--steps" in command or "||" in command]

@@ -5,6 +5,8 @@ import logging
 import numpy as np
 import pytest
 
+from supple.cli.app import main
+from supple.cli.exit_codes import ExitCode
 from supple.demos import cantilever, quilt, stitch
 from supple.demos.demo import Claim, Demo, Measurement
 from supple.demos.registry import DEMOS, find_demo
@@ -135,14 +137,12 @@ def made_up(scene, solver: Solver) -> Demo:
     return Demo("made up", "for a test", "A test.", scene, {"xpbd": lambda: solver}, Nothing, 1 / 60, 1)
 
 
-def test_a_claim_that_does_not_hold_is_reported_as_such(monkeypatch, capfd, tmp_path):
-    from supple.cli.app import main
-
+def test_a_claim_that_does_not_hold_is_reported_and_exits_1(monkeypatch, capfd, tmp_path):
     demo = made_up(DEMOS["stretch"].scene, XPBD(substeps=2))
     assert [claim.holds for claim in run(demo, "xpbd")[1]] == [True, False]
     monkeypatch.setitem(DEMOS, "made", demo)
     code = main(["demo", "made", "-q", "--no-page", "--no-plot", "-o", str(tmp_path)])
-    assert code == 0, "the run was good; what it showed is in the text"
+    assert code == ExitCode.FAILED
     assert capfd.readouterr().out.splitlines() == [
         "holds: one frame passes (1)",
         "does not hold: ten frames pass (1)",

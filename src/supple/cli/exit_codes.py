@@ -1,4 +1,4 @@
-"""What the shell's exit code says."""
+"""The exit codes of the shell."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ class ExitCode(IntEnum):
 
     OK = 0
     FAILED = 1
-    """A check of a recording failed."""
+    """A check of a recording failed, or a claim of a demo does not hold."""
     INPUT = 2
-    """The input, the options or the place for the output cannot be used: one line on stderr says why."""
+    """The input, the options or the place for the output cannot be used: one line on stderr tells why."""
     SOLVER = 3
     """The solver could not go on: what was recorded up to there is whole."""
     INTERRUPTED = 130
     """Ctrl-C: what was recorded up to there is whole."""
     BROKEN_PIPE = 141
-    """Whoever read our output has gone, as in `supple info mesh.stl | head -1`."""
+    """The reader of the output has ended, as in `supple info mesh.stl | head -1`."""
