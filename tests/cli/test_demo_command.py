@@ -1,4 +1,4 @@
-"""`supple demo`: lists, runs, records, and prints what was measured."""
+"""`supple demo`: lists, runs and records demos, prints the measured claims, and exits with 1 where one fails."""
 
 import re
 from dataclasses import replace
@@ -22,7 +22,7 @@ def test_lists_the_demos(arguments, capsys):
         assert demo.summary in out
 
 
-def test_runs_a_demo_and_judges_its_claims(tmp_path, monkeypatch, capfd):
+def test_runs_a_demo_and_prints_its_claims(tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
     assert main(["demo", "stretch", "--steps", "2", "--no-page", "--no-plot"]) == ExitCode.FAILED
     out, _ = capfd.readouterr()
@@ -31,12 +31,12 @@ def test_runs_a_demo_and_judges_its_claims(tmp_path, monkeypatch, capfd):
         assert len(recording) == 3
     verdicts = [line for line in out.splitlines() if line.startswith(("holds: ", "does not hold: "))]
     assert len(verdicts) == 3
-    # in two frames nothing inverts, and nothing is stretched to twice its length yet
+    # After two frames no tet is inverted, and the ball is not yet stretched to twice its length.
     assert any(line.startswith("holds: no tetrahedron inverts") for line in verdicts)
     assert any(line.startswith("does not hold: stretched to twice its length") for line in verdicts)
 
 
-def test_quiet_prints_only_what_was_measured(tmp_path, capfd):
+def test_quiet_prints_only_the_claims(tmp_path, capfd):
     arguments = ["demo", "squash", "-q", "--steps", "2", "--no-page", "--no-plot", "-o", str(tmp_path / "here")]
     assert main(arguments) == ExitCode.FAILED
     out, err = capfd.readouterr()
@@ -58,7 +58,7 @@ class WithoutClaims(Measurement):
 
 
 def test_the_demos_of_the_readme_and_of_make_run_at_their_full_length():
-    """So that CI, which runs these commands and stops at an exit code above 0, judges all of their claims."""
+    """CI runs these commands and fails at an exit code above 0, so all of their claims must hold there."""
     root = Path(__file__).parents[2]
     text = (root / "README.md").read_text(encoding="utf-8") + (root / "Makefile").read_text(encoding="utf-8")
     commands = re.findall(r"^.*supple demo [a-z].*$", text, flags=re.M)

@@ -1,4 +1,4 @@
-"""Demos: each builds on every solver it has, the quick ones run and keep what they claim, and claims can fail."""
+"""Demos: each can be built for each of its solvers, the claims of the quick ones hold, and claims can fail."""
 
 import logging
 
@@ -18,7 +18,7 @@ from supple.state import Status
 from supple.system import build_system, initial_state
 from supple.xpbd.solver import XPBD
 
-# Those of contact are tortured in test_torture.py.
+# Torture scenes are tested in test_torture.py.
 EVERY = [(name, kind) for name, demo in DEMOS.items() for kind in demo.kinds if not name.startswith("torture-")]
 SOLVERS = {"xpbd": XPBD, "implicit": Implicit}
 
@@ -30,7 +30,7 @@ def run(demo, kind, steps=None):
     return frames, measurement.claims()
 
 
-def test_there_are_eight_and_both_solvers_have_some():
+def test_the_names_and_solvers_of_the_demos():
     names = {"squash", "stretch", "compliance", "bears", "cantilever", "twist", "stitch", "quilt"}
     assert {name for name, _ in EVERY} == names
     assert {kind for _, kind in EVERY} == set(SOLVERS)
@@ -38,7 +38,7 @@ def test_there_are_eight_and_both_solvers_have_some():
 
 
 @pytest.mark.parametrize(("name", "kind"), EVERY)
-def test_builds_with_a_solver_of_that_kind_that_accepts_it(name, kind):
+def test_the_solver_of_each_kind_accepts_the_scene(name, kind):
     demo = find_demo(name).on(kind)
     assert demo.name == name
     solver = demo.solver(kind)
@@ -50,16 +50,16 @@ def test_builds_with_a_solver_of_that_kind_that_accepts_it(name, kind):
 
 
 @pytest.mark.parametrize(("name", "kind"), [pair for pair in EVERY if pair not in {("cantilever", "implicit")}])
-def test_begins_well_and_judges_every_claim(name, kind):
+def test_two_frames_converge_and_every_claim_is_measured(name, kind):
     frames, claims = run(DEMOS[name], kind, steps=2)
     assert [frame.report.status for frame in frames] == [Status.CONVERGED] * 2
     assert all(frame.report.min_det_F > 0.0 for frame in frames)
     assert len(claims) >= 3
     assert all(claim.text and claim.measured for claim in claims)
-    assert not all(claim.holds for claim in claims), "two frames cannot have shown everything"
+    assert not all(claim.holds for claim in claims), "two frames are too few for all claims"
 
 
-def test_cantilever_on_coarser_meshes_approaches_but_is_not_there_yet(monkeypatch):
+def test_cantilever_on_coarser_meshes_bends_less_than_theory(monkeypatch):
     monkeypatch.setattr(cantilever, "MESHES", {"coarse": (16, 3, 1), "medium": (32, 6, 2), "fine": (64, 12, 4)})
     assert cantilever.beam_theory() == pytest.approx(4.031e-4, rel=1e-4)
     frames, (below, finest, _) = run(DEMOS["cantilever"], "implicit")
@@ -68,13 +68,13 @@ def test_cantilever_on_coarser_meshes_approaches_but_is_not_there_yet(monkeypatc
     assert not finest.holds, "64 x 12 x 4 cells are 6 % too stiff"
 
 
-def test_a_cantilever_that_bends_otherwise_does_not_pass(monkeypatch):
+def test_cantilever_claims_fail_with_another_theory(monkeypatch):
     monkeypatch.setattr(cantilever, "MESHES", {"coarse": (8, 2, 1), "medium": (16, 3, 1), "fine": (32, 6, 2)})
     monkeypatch.setattr(cantilever, "beam_theory", lambda: 1e-4)
     assert not any(claim.holds for claim in run(DEMOS["cantilever"], "implicit")[1])
 
 
-def test_stretch_draws_the_ball_on_both_solvers_to_the_same_shape():
+def test_both_solvers_stretch_the_ball_to_the_same_shape():
     lengths = {}
     for kind in ("xpbd", "implicit"):
         frames, _ = run(DEMOS["stretch"], kind, steps=30)
@@ -82,7 +82,7 @@ def test_stretch_draws_the_ball_on_both_solvers_to_the_same_shape():
     assert lengths["implicit"] == pytest.approx(lengths["xpbd"], rel=0.02)
 
 
-def test_the_hat_is_sewn_on_and_flies_with_the_bear_on_both_solvers():
+def test_the_hat_stays_on_the_flying_bear_with_both_solvers():
     for kind in ("xpbd", "implicit"):
         frames, _ = run(DEMOS["stitch"], kind, steps=6)
         stitching = frames[-1].system.stitching
@@ -110,7 +110,7 @@ def test_every_claim_of_the_whole_demo_holds(name, kind):
     assert [claim for claim in claims if not claim.holds] == []
 
 
-def test_an_unknown_demo_and_a_solver_it_has_not_are_refused():
+def test_an_unknown_demo_and_an_unknown_solver_are_errors():
     with pytest.raises(SceneError, match=r"there is no demo 'squish'; there are squash, stretch"):
         find_demo("squish")
     with pytest.raises(SolverError, match=r"demo 'bears': there is no solver 'implicit' for it; it has xpbd"):
@@ -119,13 +119,13 @@ def test_an_unknown_demo_and_a_solver_it_has_not_are_refused():
         DEMOS["twist"].solver("xpbd")
 
 
-def test_a_material_of_xpbd_is_refused_by_implicit_in_one_line():
-    with pytest.raises(SolverError, match=r"body 'ball': EdgesAndVolume is a material for XPBD only") as refused:
+def test_implicit_rejects_an_xpbd_material_in_one_line():
+    with pytest.raises(SolverError, match=r"body 'ball': EdgesAndVolume is a material for XPBD only") as error:
         simulate(DEMOS["squash"].scene(), Implicit(), 1 / 60, 1)
-    assert "\n" not in str(refused.value)
+    assert "\n" not in str(error.value)
 
 
-class Nothing(Measurement):
+class OneFrame(Measurement):
     """Claims two things, of which one is false."""
 
     def claims(self):
@@ -133,12 +133,12 @@ class Nothing(Measurement):
         return [Claim("one frame passes", str(moved), moved == 1), Claim("ten frames pass", str(moved), moved == 10)]
 
 
-def made_up(scene, solver: Solver) -> Demo:
-    return Demo("made up", "for a test", "A test.", scene, {"xpbd": lambda: solver}, Nothing, 1 / 60, 1)
+def demo_of(scene, solver: Solver) -> Demo:
+    return Demo("made up", "for a test", "A test.", scene, {"xpbd": lambda: solver}, OneFrame, 1 / 60, 1)
 
 
 def test_a_claim_that_does_not_hold_is_reported_and_exits_1(monkeypatch, capfd, tmp_path):
-    demo = made_up(DEMOS["stretch"].scene, XPBD(substeps=2))
+    demo = demo_of(DEMOS["stretch"].scene, XPBD(substeps=2))
     assert [claim.holds for claim in run(demo, "xpbd")[1]] == [True, False]
     monkeypatch.setitem(DEMOS, "made", demo)
     code = main(["demo", "made", "-q", "--no-page", "--no-plot", "-o", str(tmp_path)])

@@ -46,7 +46,7 @@ def scene() -> Scene:
     )
 
 
-class _Watch(Measurement):
+class _Measurement(Measurement):
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         self.names = [part.name for part in first.system.bodies]
         self.rest = {name: volume(first, name) for name in self.names}
@@ -86,11 +86,11 @@ BEARS = Demo(
     summary="a heap of gummy bears falling into a bowl",
     explanation=(
         "Twelve gummy bears (E = 30 kPa, nu = 0.45) fall into a bowl and on each other: body against body and "
-        "bowl, with friction. What is drawn is a finer skin, embedded in the coarse tetrahedra that are simulated."
+        "bowl, with friction. The page draws a finer skin, embedded in the coarse tetrahedra that are simulated."
     ),
     scene=scene,
     solvers={"xpbd": lambda: XPBD(substeps=40)},
-    measurement=_Watch,
+    measurement=_Measurement,
     dt=1 / 60,
     steps=180,
 )

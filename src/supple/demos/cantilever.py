@@ -29,7 +29,8 @@ def beam_theory() -> float:
 
 
 def scene() -> Scene:
-    """Beams of 1 x 0.1 x 0.1 m side by side, held at one end, 0.01 N down at the other; each mesh halves the last's."""
+    """Beams of 1 x 0.1 x 0.1 m side by side, held at one end, 0.01 N down at the other; each mesh has cells
+    half as large as the mesh before."""
     bodies, pins, forces = [], [], []
     for k, (name, divisions) in enumerate(MESHES.items()):
         z = 3.0 * SIDE * (k - 1)
@@ -41,7 +42,7 @@ def scene() -> Scene:
     return Scene(bodies=bodies, pins=pins, forces=forces, gravity=(0, 0, 0))
 
 
-class _Watch(Measurement):
+class _Measurement(Measurement):
     def claims(self) -> list[Claim]:
         expected = beam_theory()
         deflections = []
@@ -50,12 +51,14 @@ class _Watch(Measurement):
             end = at_start[:, 0] > LENGTH - 1e-9
             deflections.append(float(np.mean((at_start - self.last.positions[name])[end, 1])))
         ratios = [deflection / expected for deflection in deflections]
-        said = ", ".join(f"{name} {100 * ratio:.1f} %" for name, ratio in zip(MESHES, ratios, strict=True))
-        limit = deflections[2] + (deflections[2] - deflections[1]) / 3.0  # errors fall with the square of the mesh size
+        measured = ", ".join(f"{name} {100 * ratio:.1f} %" for name, ratio in zip(MESHES, ratios, strict=True))
+        limit = (
+            deflections[2] + (deflections[2] - deflections[1]) / 3.0
+        )  # errors are proportional to the square of the mesh size
         return [
             Claim(
                 f"refined meshes approach Timoshenko's {expected:.4g} m from below",
-                said,
+                measured,
                 ratios[0] < ratios[1] < ratios[2] < 1.0,
             ),
             Claim(
@@ -76,12 +79,12 @@ CANTILEVER = Demo(
     summary="a beam bent by a load at its tip, against beam theory",
     explanation=(
         "The same beam (E = 1 MPa, nu = 0.3) three times, each mesh twice as fine as the one before, bent by 0.01 N "
-        "at its tip. Linear tetrahedra are too stiff in bending, so that coarse meshes bend too little; how much, "
-        "is measured."
+        "at its tip. Linear tetrahedra are too stiff in bending, so coarse meshes bend too little. The demo measures "
+        "by how much."
     ),
     scene=scene,
     solvers={"implicit": lambda: Implicit(integrator="static")},
-    measurement=_Watch,
+    measurement=_Measurement,
     dt=1.0,
     steps=1,
 )

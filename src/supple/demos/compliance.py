@@ -22,7 +22,7 @@ KINDS = {
 
 
 def scene() -> Scene:
-    """Three spheres of radius 0.4 m, alike but for the compliance of their edges, dropped from 0.6 m."""
+    """Three spheres of radius 0.4 m, dropped from 0.6 m; only the compliance of their edges differs."""
     mesh = shapes.sphere(radius=RADIUS, edge_length=0.11)
     bodies = [
         Body(name, mesh, material, position=(1.3 * (i - 1), RADIUS + 0.6, 0.0), friction=0.3)
@@ -31,7 +31,7 @@ def scene() -> Scene:
     return Scene(bodies=bodies, obstacles=[HalfSpace(name="floor", friction=0.5)])
 
 
-class _Watch(Measurement):
+class _Measurement(Measurement):
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         self.heights: dict[str, list[float]] = {name: [] for name in KINDS}
         self.last = first
@@ -70,7 +70,7 @@ COMPLIANCE = Demo(
     ),
     scene=scene,
     solvers={"xpbd": lambda: XPBD(substeps=40)},
-    measurement=_Watch,
+    measurement=_Measurement,
     dt=1 / 60,
     steps=300,
 )

@@ -1,4 +1,4 @@
-"""What a demo is: a scene, a solver for it, and claims that are measured while it runs."""
+"""A demo: a scene, a solver for it, and claims that are measured while it runs."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from supple.solver import Solver
 
 @dataclass(frozen=True)
 class Claim:
-    """One sentence that the run has put to the test.
+    """One sentence that the run tests.
 
     Attributes
     ----------
-    text : what is claimed, with its limit; measured : what came out; holds : whether it is so.
+    text : the claim, with its limit; measured : the measured values; holds : whether the claim is true.
     """
 
     text: str
@@ -27,7 +27,7 @@ class Claim:
 
 
 class Measurement(ABC):
-    """A sink that watches a demo and says at the end which of its claims hold.
+    """A sink that measures a demo and returns at the end which of its claims hold.
 
     Attributes
     ----------
@@ -45,12 +45,12 @@ class Measurement(ABC):
         """Called with every frame."""
         self.last = frame
 
-    def end(self) -> None:  # noqa: B027 - most demos have nothing to close
+    def end(self) -> None:  # noqa: B027 - most demos have nothing to do here
         """Called when the run is over."""
 
     @abstractmethod
     def claims(self) -> list[Claim]:
-        """What was claimed, and what was measured."""
+        """The claims, with what was measured for each."""
 
 
 @dataclass(frozen=True)
@@ -59,11 +59,11 @@ class Demo:
 
     Attributes
     ----------
-    name, summary : for the list of demos; explanation : a paragraph on what to look at
-    scene : builds the scene; measurement : builds the sink that judges the claims
+    name, summary : for the list of demos; explanation : a paragraph on what the demo shows
+    scene : builds the scene; measurement : builds the sink that measures the claims
     solvers : by kind ("xpbd", "implicit"), each builds the solver; the first is the default
     dt : time from frame to frame [s]; steps : how many frames
-    variants : by kind of solver, the whole demo for solvers that need a scene of their own
+    variants : by kind of solver, a separate demo for a solver that needs another scene
     """
 
     name: str
@@ -78,15 +78,15 @@ class Demo:
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """The kinds of solver this demo runs on; the first is the default."""
+        """The kinds of solver that this demo runs on; the first is the default."""
         return (*self.solvers, *self.variants)
 
     def on(self, kind: str) -> Demo:
-        """The demo for that kind of solver: this one, or the variant that has it.
+        """The demo for that kind of solver: this one, or its variant.
 
         Raises
         ------
-        SolverError : where this demo does not run on it.
+        SolverError : where this demo has no solver of that kind.
         """
         if kind not in self.kinds:
             raise SolverError(f"demo {self.name!r}: there is no solver {kind!r} for it; it has {', '.join(self.kinds)}")
@@ -97,7 +97,7 @@ class Demo:
 
         Raises
         ------
-        SolverError : where this demo does not run on it.
+        SolverError : where this demo has no solver of that kind.
         """
         kind = self.kinds[0] if kind is None else kind
         return self.on(kind).solvers[kind]()

@@ -9,7 +9,7 @@ from supple.system import BodyRange
 
 
 def body_range(frame: Frame, name: str) -> BodyRange:
-    """Which rows of the frame's flat arrays belong to that body."""
+    """The rows of the frame's flat arrays that belong to that body."""
     return next(part for part in frame.system.bodies if part.name == name)
 
 

@@ -1,4 +1,4 @@
-"""A soft patch sewn on a stiff bar, and the bar bent: both solvers against the static equilibrium."""
+"""A soft patch stitched to a stiff bar that is bent: both solvers against the static equilibrium."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ GAP = 0.005  # between bar and patch
 
 
 def load(time: float) -> NDArray[np.float64]:
-    """The force on the bar's end [N]: it grows within `RAMP` seconds, without a jump in its second derivative."""
+    """The force on the bar's end [N]: it grows during `RAMP` seconds; its second derivative is continuous."""
     s = min(time / RAMP, 1.0)
     return np.array([0.0, -LOAD * s**3 * (10.0 - 15.0 * s + 6.0 * s * s), 0.0])
 
 
 def scene() -> Scene:
-    """A bar of 2 MPa, held at one end, drawn down at the other; on top of it, a patch of 0.2 MPa."""
+    """A bar of 2 MPa, held at one end, pulled down at the other; on top of it, a patch of 0.2 MPa."""
     bar = Body(
         "bar",
         shapes.box((LENGTH, 0.06, 0.12), BAR_DIVISIONS),
@@ -55,16 +55,16 @@ def scene() -> Scene:
 
 
 def static_shape() -> NDArray[np.float64]:
-    """(n, 3) where everything comes to rest under the whole load, by the implicit solver [m]."""
+    """(n, 3) positions at rest under the whole load, computed by the implicit solver [m]."""
     *_, frame = simulate(scene(), Implicit(integrator="static"), 2.0 * RAMP, 1)
     return frame.state.positions
 
 
-class _Watch(Measurement):
+class _Measurement(Measurement):
     def claims(self) -> list[Claim]:
-        start, end, wanted = self.first.state.positions, self.last.state.positions, static_shape()
-        deflection = float(np.linalg.norm(wanted - start, axis=1).max())
-        off = float(np.linalg.norm(end - wanted, axis=1).max())
+        start, end, exact = self.first.state.positions, self.last.state.positions, static_shape()
+        deflection = float(np.linalg.norm(exact - start, axis=1).max())
+        off = float(np.linalg.norm(end - exact, axis=1).max())
         stitching = self.first.system.stitching
         nodes = stitching.tets.vertices
         before, after = (np.linalg.norm(x[nodes[:, 0]] - x[nodes[:, 1:]].mean(axis=1), axis=1) for x in (start, end))
@@ -77,12 +77,12 @@ class _Watch(Measurement):
                 off <= 0.02 * deflection,
             ),
             Claim(
-                "the seam holds: the patch stays within 2 mm of where it was sewn",
+                "the stitches hold: the patch stays within 2 mm of where it was stitched",
                 f"at most {1e3 * apart:.2f} mm, largest stretch of a stitch {report.largest_stitch_stretch:.3f}",
                 apart <= 2e-3 and end[:, 1].min() < -0.5 * deflection,
             ),
             Claim(
-                "stitches carry what the patch needs: their energy is above zero, and below 5 % of the bodies'",
+                "the energy of the stitches is above zero and below 5 % of the bodies'",
                 f"{1e3 * report.stitch_energy:.3g} mJ of {1e3 * report.elastic_energy:.3g} mJ",
                 0.0 < report.stitch_energy < 0.05 * report.elastic_energy,
             ),
@@ -91,15 +91,15 @@ class _Watch(Measurement):
 
 QUILT = Demo(
     name="quilt",
-    summary="a soft patch sewn on a stiff bar, which is bent",
+    summary="a soft patch stitched to a stiff bar, which is bent",
     explanation=(
-        "A patch (E = 0.2 MPa) is sewn on a bar ten times as stiff by tetrahedra between its lower vertices and the "
-        "bar's upper triangles. The bar is drawn down by 16 N at its end. Whichever solver bends it, the shape that it "
-        "comes to rest in is measured against the static equilibrium."
+        "A patch (E = 0.2 MPa) is stitched to a bar that is ten times as stiff, by tetrahedra between its lower "
+        "vertices and the bar's upper triangles. A force of 16 N pulls the end of the bar down. For either solver, "
+        "the shape at rest is compared with the static equilibrium."
     ),
     scene=scene,
     solvers={"xpbd": lambda: XPBD(substeps=80), "implicit": Implicit},
-    measurement=_Watch,
+    measurement=_Measurement,
     dt=1 / 60,
     steps=240,
 )

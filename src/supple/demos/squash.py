@@ -1,4 +1,4 @@
-"""A sphere squeezed in an invisible box and released."""
+"""A sphere squeezed in a box and released."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ PRESSED, RELEASED = 1.4, 1.9
 
 
 def scene() -> Scene:
-    """A sphere of radius 0.5 m on a floor, a lid that comes down to 0.55 m, and four walls; all but the floor leave."""
+    """A sphere of radius 0.5 m on a floor, a lid that moves down to 0.55 m, and four walls; all but the floor move
+    away."""
     ball = Body(
         "ball",
         shapes.sphere(radius=RADIUS, edge_length=0.11),
@@ -52,8 +53,8 @@ def scene() -> Scene:
     )
 
 
-def held_scene() -> Scene:
-    """A sphere of radius 0.5 m whose bottom cap is pinned and whose top cap follows springs, down and up again."""
+def pinned_scene() -> Scene:
+    """A sphere of radius 0.5 m with a pinned bottom cap; springs move its top cap down and up again."""
     mesh = shapes.sphere(radius=RADIUS, edge_length=0.13)
     skin = np.unique(mesh.surface.triangles)
     height = mesh.vertices[skin, 1]
@@ -74,7 +75,7 @@ def held_scene() -> Scene:
     )
 
 
-class _Watch(Measurement):
+class _Measurement(Measurement):
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         super().begin(first, dt, steps)
         self.rest_volume = float(first.system.rest_volumes.sum())
@@ -109,14 +110,14 @@ class _Watch(Measurement):
                 self.lowest_height <= 1.2 * RADIUS and height >= 1.8 * RADIUS,
             ),
             Claim(
-                "it does not spin up: never more than 1e-9 rad/s about the vertical",
+                "it does not start to spin: at most 1e-9 rad/s about the vertical in every frame",
                 f"at most {self.fastest_spin:.1e} rad/s in {self.last.time:.1f} s",
                 self.fastest_spin <= 1e-9,
             ),
         ]
 
 
-class _HeldWatch(Measurement):
+class _PinnedMeasurement(Measurement):
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         super().begin(first, dt, steps)
         self.rest_volume = float(first.system.rest_volumes.sum())
@@ -145,7 +146,7 @@ class _HeldWatch(Measurement):
                 self.lowest_height <= 1.2 * RADIUS and self.worst_volume <= 0.05,
             ),
             Claim(
-                "let go, it recovers its height within 1 %",
+                "released, it recovers its height within 1 %",
                 f"at the end {height:.4f} m of {2 * RADIUS:.1f} m",
                 abs(height / (2 * RADIUS) - 1.0) <= 0.01,
             ),
@@ -156,28 +157,28 @@ _IMPLICIT = Demo(
     name="squash",
     summary="a sphere squeezed between its caps and released",
     explanation=(
-        "The same ball on the implicit solver, held by itself, without obstacles: a pin holds its bottom cap in "
-        "place of a floor, and springs press its top cap down to 55 % of the ball's height, then let it come back. "
-        "Stable Neo-Hookean rubber (E = 50 kPa, nu = 0.49) in place of edges and volumes; no tetrahedron ever inverts."
+        "The same ball with the implicit solver, without obstacles: a pin holds its bottom cap instead of a floor. "
+        "Springs press its top cap down to 55 % of the ball's height, then move back. The material is stable "
+        "Neo-Hookean rubber (E = 50 kPa, nu = 0.49) instead of edges and volumes. No tetrahedron inverts."
     ),
-    scene=held_scene,
+    scene=pinned_scene,
     solvers={"implicit": Implicit},
-    measurement=_HeldWatch,
+    measurement=_PinnedMeasurement,
     dt=1 / 60,
     steps=210,
 )
 
 SQUASH = Demo(
     name="squash",
-    summary="a sphere squeezed in an invisible box and released",
+    summary="a sphere squeezed in a box and released",
     explanation=(
-        "A lid presses the ball to 55 % of its height between four walls, then all of them leave. Tetrahedra resist "
-        "every change of volume; edges are springs. Plain XPBD would set the ball spinning, faster and faster; "
-        "momentum restore keeps it still."
+        "A lid presses the ball to 55 % of its height between four walls, then lid and walls move away. Tetrahedra "
+        "resist every change of volume; edges are springs. With plain XPBD the ball would spin faster and faster; "
+        "restoring the momentum prevents that."
     ),
     scene=scene,
     solvers={"xpbd": lambda: XPBD(substeps=40)},
-    measurement=_Watch,
+    measurement=_Measurement,
     dt=1 / 60,
     steps=240,
     variants={"implicit": _IMPLICIT},

@@ -1,4 +1,4 @@
-"""A hat sewn on a gummy bear, which is then thrown."""
+"""A hat stitched to a gummy bear, which is then thrown."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ GRAVITY = np.array([0.0, -9.81, 0.0])
 
 
 def scene() -> Scene:
-    """A bear of 10 cm with a round hat, sewn on between its ears, thrown up and forward over a floor."""
+    """A bear of 10 cm with a round hat stitched on between its ears, thrown up and forward over a floor."""
     bear = Body(
         "bear",
         shapes.gummy_bear(height=HEIGHT, edge_length=0.012),
@@ -38,7 +38,7 @@ def scene() -> Scene:
     mesh = shapes.cylinder(radius=0.006, height=0.014, edge_length=0.004)
     placed = bear.place(bear.mesh.vertices)
     center = _just_above(TriangleTree.of(placed, bear.mesh.surface.triangles), mesh.vertices)
-    # The hat moves as a part of the bear would.
+    # At the start the hat moves with the bear, as one rigid body.
     volumes = bear.mesh.volumes
     middle = volumes @ placed[bear.mesh.tets].mean(axis=1) / volumes.sum()
     hat = Body(
@@ -62,7 +62,7 @@ def scene() -> Scene:
 
 
 def _just_above(surface: TriangleTree, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Where a mesh comes to a stop that is let down over the middle of a surface to a distance of `GAP`."""
+    """The position of a mesh above the middle of a surface, at a distance of `GAP` from it."""
     center = np.array([0.0, 3.0 * HEIGHT, 0.0])
     for _ in range(100):
         center[1] -= float(surface.nearest(vertices + center)[1].min()) - GAP
@@ -70,18 +70,18 @@ def _just_above(surface: TriangleTree, vertices: NDArray[np.float64]) -> NDArray
 
 
 def lengths(frame: Frame) -> NDArray[np.float64]:
-    """(k,) from the hat's vertices to the middles of the triangles that they are sewn to [m]."""
+    """(k,) distances from the hat's vertices to the centers of the triangles that they are stitched to [m]."""
     x, nodes = frame.state.positions, frame.system.stitching.tets.vertices
     return np.linalg.norm(x[nodes[:, 0]] - x[nodes[:, 1:]].mean(axis=1), axis=1)
 
 
 def center_of_mass(frame: Frame) -> NDArray[np.float64]:
-    """(3,) of everything [m]."""
+    """(3,) of all bodies together [m]."""
     m = frame.system.masses
     return m @ frame.state.positions / m.sum()
 
 
-class _Watch(Measurement):
+class _Measurement(Measurement):
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         super().begin(first, dt, steps)
         self.longer, self.off, self.flight, self.lowest = 0.0, 0.0, 0.0, 0.0
@@ -111,12 +111,12 @@ class _Watch(Measurement):
                 self.longer <= 3e-3 and self.landed,
             ),
             Claim(
-                "until they land, their common center of mass follows the parabola of the throw within 3 mm",
-                f"at most {1e3 * self.off:.2f} mm beside it in {self.flight:.2f} s",
+                "until they land, their common center of mass follows the parabola of free flight within 3 mm",
+                f"at most {1e3 * self.off:.2f} mm off in {self.flight:.2f} s",
                 self.off <= 3e-3 and self.flight > 0.15,
             ),
             Claim(
-                "they land on the floor, and not in it",
+                "they land on the floor and do not sink into it by 1 mm",
                 f"lowest point {1e3 * self.lowest:.3f} mm",
                 self.landed and self.lowest > -1e-3,
             ),
@@ -125,14 +125,14 @@ class _Watch(Measurement):
 
 STITCH = Demo(
     name="stitch",
-    summary="a hat sewn on a gummy bear, which is then thrown",
+    summary="a hat stitched to a gummy bear, which is then thrown",
     explanation=(
         "Hat and bear are two meshes that share no vertex. Soft tetrahedra between the hat's vertices and the "
-        "triangles of the bear's head keep them together, in the air and when they hit the floor."
+        "triangles of the bear's head hold them together, in the air and when they hit the floor."
     ),
     scene=scene,
     solvers={"xpbd": lambda: XPBD(substeps=60), "implicit": lambda: Implicit(integrator="bdf2")},
-    measurement=_Watch,
+    measurement=_Measurement,
     dt=1 / 60,
     steps=60,
 )

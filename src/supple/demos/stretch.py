@@ -1,4 +1,4 @@
-"""A sphere pulled apart by two pins, and let go."""
+"""A sphere stretched by two pins and brought back."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ RADIUS, PULL = 0.5, 0.5
 
 
 def scene() -> Scene:
-    """A sphere of radius 0.5 m; its two caps are drawn 0.5 m apart each, held, and brought back."""
+    """A sphere of radius 0.5 m; two pins move its caps outward by 0.5 m each, hold them, and bring them back."""
     ball = Body(
         "ball",
         shapes.sphere(radius=RADIUS, edge_length=0.1),
@@ -39,7 +39,7 @@ def scene() -> Scene:
     )
 
 
-class _Watch(Measurement):
+class _Measurement(Measurement):
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         super().begin(first, dt, steps)
         self.rest_volume = float(first.system.rest_volumes.sum())
@@ -62,7 +62,7 @@ class _Watch(Measurement):
             ),
             Claim("no tetrahedron inverts", f"smallest J {self.min_J:.3f}", self.min_J > 0.0),
             Claim(
-                "let go, every vertex comes back to within 1 % of the diameter",
+                "at the end every vertex is back to within 1 % of the diameter",
                 f"largest distance {off:.4f} m",
                 off <= 0.02 * RADIUS,
             ),
@@ -71,14 +71,14 @@ class _Watch(Measurement):
 
 STRETCH = Demo(
     name="stretch",
-    summary="a sphere pulled apart by two pins",
+    summary="a sphere stretched by two pins",
     explanation=(
-        "Two pins draw the caps of a rubber ball (E = 50 kPa, nu = 0.45) apart to twice its diameter, hold it, and "
-        "bring it back. The waist thins so that the volume is nearly kept, and the ball returns to its rest shape."
+        "Two pins move the caps of a rubber ball (E = 50 kPa, nu = 0.45) apart to twice its diameter, hold them, and "
+        "bring them back. The middle becomes thinner, so the volume changes little. The ball returns to its rest shape."
     ),
     scene=scene,
     solvers={"xpbd": lambda: XPBD(substeps=20), "implicit": Implicit},
-    measurement=_Watch,
+    measurement=_Measurement,
     dt=1 / 60,
     steps=300,
 )

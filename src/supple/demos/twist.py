@@ -1,4 +1,4 @@
-"""A bar twisted by four turns without one inverted tetrahedron."""
+"""A bar twisted by four turns without an inverted tetrahedron."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def scene() -> Scene:
     )
 
     def turning(sign: float) -> Keyframes:
-        """Of one end, which does half of all turns."""
+        """The motion of one end, which makes half of all turns."""
         return Keyframes([0.0, SECONDS], angles=[0.0, sign * np.pi * TURNS], axis=(1, 0, 0))
 
     half = LENGTH / 2 - 1e-9
@@ -42,13 +42,13 @@ def scene() -> Scene:
     )
 
 
-class _Watch(Measurement):
+class _Measurement(Measurement):
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         super().begin(first, dt, steps)
         self.min_J, self.min_J_time = np.inf, 0.0
         self.statuses: dict[Status, int] = {}
         self.iterations = 0
-        self.off_script = 0.0
+        self.pin_error = 0.0
 
     def write(self, frame: Frame) -> None:
         super().write(frame)
@@ -56,9 +56,9 @@ class _Watch(Measurement):
         self.iterations += frame.report.iterations
         if frame.report.min_det_F < self.min_J:
             self.min_J, self.min_J_time = frame.report.min_det_F, frame.time
-        scripted = frame.system.pin_targets(frame.time)
-        off = np.abs(frame.state.positions[frame.system.pinned_vertices] - scripted)
-        self.off_script = max(self.off_script, float(off.max()))
+        targets = frame.system.pin_targets(frame.time)
+        off = np.abs(frame.state.positions[frame.system.pinned_vertices] - targets)
+        self.pin_error = max(self.pin_error, float(off.max()))
 
     def claims(self) -> list[Claim]:
         ends = ", ".join(f"{count} {status}" for status, count in self.statuses.items())
@@ -74,9 +74,9 @@ class _Watch(Measurement):
                 self.min_J > 0.0,
             ),
             Claim(
-                "in every frame both ends are exactly where their script says",
-                f"at most {self.off_script:.1e} m off",
-                self.off_script <= 1e-12,
+                "in every frame both ends are exactly where their motion puts them",
+                f"at most {self.pin_error:.1e} m off",
+                self.pin_error <= 1e-12,
             ),
         ]
 
@@ -86,13 +86,12 @@ TWIST = Demo(
     summary="a bar twisted by four turns",
     explanation=(
         "Scripted pins turn the ends of a nearly incompressible bar (Neo-Hookean, E = 100 kPa, nu = 0.45) against each "
-        "other, by four turns in four seconds. Its energy is infinite where a tetrahedron has no volume left; the step "
-        "filter keeps every step of Newton's method on the near side of that. Contact "
-        "keeps the bar from passing through itself."
+        "other, by four turns in four seconds. Its energy is infinite where a tetrahedron has no volume; the step "
+        "filter stops every step of Newton's method before that. Contact keeps the bar from passing through itself."
     ),
     scene=scene,
     solvers={"implicit": Implicit},
-    measurement=_Watch,
+    measurement=_Measurement,
     dt=1 / 60,
     steps=240,
 )

@@ -1,4 +1,4 @@
-"""Eight cubes, exactly aligned, that fly at each other: faces, edges and corners meet all at once."""
+"""Eight exactly aligned cubes collide: faces, edges and corners meet at the same time."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from supple.demos.demo import Claim, Demo
-from supple.demos.torture.watch import ContactWatch, Torture, center, mass, mechanical_energy
+from supple.demos.torture.watch import ContactMeasurement, Torture, center, mass, mechanical_energy
 from supple.implicit.solver import Implicit
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
@@ -18,7 +18,7 @@ SIDE, GAP, SPEED = 0.1, 1e-3, 0.5
 
 
 def scene(cells: int) -> Scene:
-    """Two by two by two cubes around the origin, every one on its way there, without gravity."""
+    """Two by two by two cubes around the origin; each moves towards it, without gravity."""
     mesh = shapes.box((SIDE,) * 3, (cells,) * 3)
     material = StableNeoHookean(youngs=1e5, poisson=0.4, density=1000.0)
     bodies = []
@@ -29,7 +29,7 @@ def scene(cells: int) -> Scene:
     return Scene(bodies=bodies, gravity=(0, 0, 0))
 
 
-class _Watch(ContactWatch):
+class _Measurement(ContactMeasurement):
     def own_claims(self) -> list[Claim]:
         names = list(self.first.positions)
         each = SPEED * np.sqrt(3.0) * mass(self.first, names[0])
@@ -39,7 +39,7 @@ class _Watch(ContactWatch):
         before, after = mechanical_energy(self.first), mechanical_energy(self.last)
         return [
             Claim(
-                "they bounce off: each flies away on the side that it came from",
+                "they bounce off: each moves away on the side that it came from",
                 f"centers now {1e3 * spread:.1f} mm from the middle",
                 away > 0.0 and spread > np.sqrt(0.75) * (SIDE + GAP),
             ),
@@ -48,21 +48,21 @@ class _Watch(ContactWatch):
                 f"{total / each:.1e} of it",
                 total <= 1e-9 * each,
             ),
-            Claim("no energy is won", f"{before:.4g} J before, {after:.4g} J after", after <= before),
+            Claim("the energy does not grow", f"{before:.4g} J before, {after:.4g} J after", after <= before),
         ]
 
 
 def _demo(cells: int, steps: int) -> Demo:
     return Demo(
         name="torture-aligned",
-        summary="eight aligned cubes fly at each other and bounce off",
+        summary="eight aligned cubes collide and bounce off",
         explanation=(
             "Two by two by two soft cubes (E = 100 kPa), exactly aligned, collide in the middle at 0.5 m/s along each "
-            "axis: vertices meet vertices, edges meet parallel edges, faces meet faces, all in the same instant."
+            "axis: vertices meet vertices, edges meet parallel edges, faces meet faces, all at the same time."
         ),
         scene=partial(scene, cells),
         solvers={"implicit": Implicit},
-        measurement=_Watch,
+        measurement=_Measurement,
         dt=1 / 200,
         steps=steps,
     )

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from supple.demos.demo import Claim, Demo
-from supple.demos.torture.watch import ContactWatch, Torture, center, mass
+from supple.demos.torture.watch import ContactMeasurement, Torture, center, mass
 from supple.implicit.contact.settings import IPCContact
 from supple.implicit.solver import Implicit
 from supple.materials.stable_neo_hookean import StableNeoHookean
@@ -25,12 +25,12 @@ GRAVITY = 9.81
 
 
 def voussoir(k: int, cells: int) -> TetMesh:
-    """The k-th block of a semicircle from the right end to the left; half a joint is missing on either side."""
+    """The k-th block of a semicircle, counted from its right end; on each side half of a joint is left out."""
     half = np.pi / BLOCKS / 2 - JOINT / 2 / RADIUS
     middle = np.pi * (k + 0.5) / BLOCKS
     mesh = shapes.box((THICKNESS, 2 * half, DEPTH), (cells, cells, cells))
     r, angle = RADIUS + mesh.vertices[:, 0], middle + mesh.vertices[:, 1]
-    # The faces between blocks are planes through the axis: all blocks are alike.
+    # The faces between blocks are planes through the axis, so all blocks have the same shape.
     return TetMesh(np.column_stack([r * np.cos(angle), r * np.sin(angle), mesh.vertices[:, 2]]), mesh.tets)
 
 
@@ -43,7 +43,7 @@ def scene(cells: int) -> Scene:
     return Scene(bodies=bodies, obstacles=[HalfSpace(name="floor", friction=MU)], gravity=(0, -GRAVITY, 0))
 
 
-class _Watch(ContactWatch):
+class _Measurement(ContactMeasurement):
     def own_claims(self) -> list[Claim]:
         names = list(self.first.positions)
         moved = {name: float(np.linalg.norm(center(self.last, name) - center(self.first, name))) for name in names}
@@ -68,11 +68,11 @@ def _demo(cells: int, dt: float) -> Demo:
         summary="an arch of 25 loose blocks stands for 20 s on friction alone",
         explanation=(
             "A semicircle of 25 wedge-shaped blocks (E = 1 GPa, mu = 0.5), 2 m wide and 25 cm thick, without mortar. A "
-            "line of thrust fits within its thickness: it stands."
+            "line of thrust fits within its thickness, so it stands."
         ),
         scene=partial(scene, cells),
         solvers={"implicit": lambda: Implicit(contact=IPCContact(dhat=DHAT, friction_velocity=SLOW))},
-        measurement=_Watch,
+        measurement=_Measurement,
         dt=dt,
         steps=round(SECONDS / dt),
     )

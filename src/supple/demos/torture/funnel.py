@@ -1,4 +1,4 @@
-"""A gummy bear that is pulled through a funnel much narrower than itself."""
+"""A gummy bear is pulled through a funnel that is much narrower than the bear."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from supple.demos.demo import Claim, Demo
 from supple.demos.motion_measures import volume
-from supple.demos.torture.watch import ContactWatch, Torture
+from supple.demos.torture.watch import ContactMeasurement, Torture
 from supple.implicit.solver import Implicit
 from supple.materials.neo_hookean import NeoHookean
 from supple.mesh import shapes
@@ -41,14 +41,14 @@ def funnel(neck: float) -> SurfaceMesh:
 
 
 def grip(mesh: TetMesh) -> np.ndarray:
-    """The vertices at the bottom of the belly."""
+    """The lowest vertices near the axis, which the pin holds."""
     x = mesh.vertices
     middle = np.hypot(x[:, 0], x[:, 2]) < 0.1 * HEIGHT
     return np.flatnonzero(middle & (x[:, 1] < x[middle, 1].min() + 0.08 * HEIGHT))
 
 
 def scene(edge_length: float, neck: float) -> Scene:
-    """A bear above the funnel; a grip under its belly pulls it down the axis."""
+    """A bear above the funnel; a pin at its lower end pulls it down along the axis."""
     mesh = shapes.gummy_bear(height=HEIGHT, edge_length=edge_length)
     bear = Body("bear", mesh, NeoHookean(youngs=3e4, poisson=0.4, density=1100.0, damping=0.01), position=(0, START, 0))
     pull = Keyframes([0.0, SECONDS], displacements=[(0, 0, 0), (0, -WAY, 0)])
@@ -59,7 +59,7 @@ def scene(edge_length: float, neck: float) -> Scene:
     )
 
 
-class _Watch(ContactWatch):
+class _Measurement(ContactMeasurement):
     def own_claims(self) -> list[Claim]:
         ratio = volume(self.last, "bear") / volume(self.first, "bear")
         highest = float(self.last.positions["bear"][:, 1].max()) - BOTTOM
@@ -69,25 +69,25 @@ class _Watch(ContactWatch):
         width = max(float(np.ptp(x[:, 0])), float(np.ptp(x[:, 2])))
         return [
             Claim(
-                f"the bear, {1e3 * width:.0f} mm wide, is through the neck, {2e3 * neck:.0f} mm wide",
+                f"the bear, {1e3 * width:.0f} mm wide, has passed through the neck, {2e3 * neck:.0f} mm wide",
                 f"highest vertex {1e3 * highest:+.1f} mm from its end",
                 highest < 0.0,
             ),
-            Claim("its volume is what it was, within 5 %", f"{100 * ratio:.2f} %", abs(ratio - 1) <= 0.05),
+            Claim("its volume is the initial one within 5 %", f"{100 * ratio:.2f} %", abs(ratio - 1) <= 0.05),
         ]
 
 
 def _demo(edge_length: float, neck: float, dt: float, steps: int | None = None) -> Demo:
     return Demo(
         name="torture-funnel",
-        summary="a gummy bear is pulled through a funnel narrower than itself",
+        summary="a gummy bear is pulled through a funnel that is narrower than the bear",
         explanation=(
-            "A grip under the belly of a gummy bear (E = 30 kPa), 10 cm tall and 5 cm wide, pulls it through a funnel, "
-            "an open sheet of triangles, whose neck is 36 mm wide."
+            "A pin at the lower end of a gummy bear (E = 30 kPa), 10 cm tall and 5 cm wide, pulls it through a funnel, "
+            "an open sheet of triangles with a neck of 36 mm."
         ),
         scene=partial(scene, edge_length, neck),
         solvers={"implicit": Implicit},
-        measurement=_Watch,
+        measurement=_Measurement,
         dt=dt,
         steps=round(SECONDS / dt) if steps is None else steps,
     )

@@ -1,11 +1,11 @@
-"""A heavy cube on a light one: ten times its size, ten thousand times its density, ten million times its mass."""
+"""A heavy cube on a light one: ten times the size, ten thousand times the density, ten million times the mass."""
 
 from __future__ import annotations
 
 from functools import partial
 
 from supple.demos.demo import Claim, Demo
-from supple.demos.torture.watch import ContactWatch, Torture, mass
+from supple.demos.torture.watch import ContactMeasurement, Torture, mass
 from supple.implicit.solver import Implicit
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
@@ -20,7 +20,7 @@ GRAVITY = 9.81
 def scene(cells: int) -> Scene:
     """A cube of 1 g on a floor, and 1 mm above it one of 10 t."""
     small = shapes.box((SIDE,) * 3, (cells,) * 3)
-    # Five cells on either side, so that the light cube stands under a whole one.
+    # Five cells along each edge, so that the light cube stands under the middle cell.
     large = shapes.box((10 * SIDE,) * 3, (5,) * 3)
     light = StableNeoHookean(youngs=2e9, poisson=0.3, density=DENSITY, damping=0.02)
     heavy = StableNeoHookean(youngs=2e9, poisson=0.3, density=1e4 * DENSITY, damping=0.02)
@@ -34,7 +34,7 @@ def scene(cells: int) -> Scene:
     )
 
 
-class _Watch(ContactWatch):
+class _Measurement(ContactMeasurement):
     def own_claims(self) -> list[Claim]:
         contacts = self.last.contacts
         heavy, light = GRAVITY * mass(self.last, "heavy"), GRAVITY * mass(self.last, "light")
@@ -61,11 +61,11 @@ def _demo(cells: int, steps: int) -> Demo:
         summary="ten tonnes on a cube of one gram",
         explanation=(
             "A cube of 1 m and 10,000 kg/m^3 falls by a millimetre on a cube of 10 cm and 1 kg/m^3 (both E = 2 GPa): "
-            "ten million times its mass."
+            "ten million times the mass."
         ),
         scene=partial(scene, cells),
         solvers={"implicit": Implicit},
-        measurement=_Watch,
+        measurement=_Measurement,
         dt=1 / 100,
         steps=steps,
     )

@@ -1,4 +1,4 @@
-"""A soft mat that falls on knives: triangles without thickness, edge up."""
+"""A soft mat falls on knives: upright triangles without thickness."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from supple.demos.demo import Claim, Demo
-from supple.demos.torture.watch import ContactWatch, Torture, mass, mechanical_energy
+from supple.demos.torture.watch import ContactMeasurement, Torture, mass, mechanical_energy
 from supple.implicit.solver import Implicit
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
@@ -39,7 +39,7 @@ def scene(cells: int) -> Scene:
     )
 
 
-class _Watch(ContactWatch):
+class _Measurement(ContactMeasurement):
     def own_claims(self) -> list[Claim]:
         contacts, weight = self.last.contacts, GRAVITY * mass(self.last, "mat")
         forces = [
@@ -55,7 +55,7 @@ class _Watch(ContactWatch):
                 ", ".join(f"{force:.2f} N" for force in forces) + f"; {100 * carried:.2f} % of its weight",
                 abs(carried - 1) <= 0.02 and min(forces) > 0,
             ),
-            Claim("no energy is won", f"{before:.4g} J before, {after:.4g} J after", after <= before),
+            Claim("the energy does not grow", f"{before:.4g} J before, {after:.4g} J after", after <= before),
         ]
 
 
@@ -64,12 +64,12 @@ def _demo(cells: int, steps: int) -> Demo:
         name="torture-knives",
         summary="a soft mat falls on three blades without thickness",
         explanation=(
-            "A mat (E = 30 kPa) of 60 x 30 x 3 cm falls by 5 cm on three upright sheets of two triangles each, that "
-            "have an edge but no thickness, and hangs over them."
+            "A mat (E = 30 kPa) of 60 x 30 x 3 cm falls by 5 cm on three upright sheets of two triangles each, which "
+            "have no thickness, and hangs over their edges."
         ),
         scene=partial(scene, cells),
         solvers={"implicit": Implicit},
-        measurement=_Watch,
+        measurement=_Measurement,
         dt=1 / 100,
         steps=steps,
     )

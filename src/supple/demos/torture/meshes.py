@@ -1,4 +1,4 @@
-"""A box whose tets are mirror images of each other across its middle planes: what is symmetric stays so."""
+"""A box whose tets are mirror images across its middle planes, so that symmetric problems stay symmetric."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from supple.mesh.tetmesh import TetMesh
 
 
 def mirrored_box(size: Sequence[float], cells: int) -> TetMesh:
-    """A box of cells^3 cells of six tets, neighbouring cells being mirror images.
+    """A box of cells^3 cells of six tets; neighbouring cells are mirror images.
 
     Parameters
     ----------

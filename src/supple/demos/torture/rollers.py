@@ -1,4 +1,4 @@
-"""A soft ball that two turning rollers pull through a gap narrower than itself."""
+"""Two turning rollers pull a soft ball through a gap that is narrower than the ball."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from supple.demos.demo import Claim, Demo
 from supple.demos.motion_measures import volume
-from supple.demos.torture.watch import ContactWatch, Torture
+from supple.demos.torture.watch import ContactMeasurement, Torture
 from supple.implicit.solver import Implicit
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
@@ -63,7 +63,7 @@ def scene(edge_length: float) -> Scene:
     return Scene(bodies=[Body("ball", mesh, ball, position=(0, height, 0))], obstacles=obstacles)
 
 
-class _Watch(ContactWatch):
+class _Measurement(ContactMeasurement):
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         super().begin(first, dt, steps)
         self.narrowest = np.inf
@@ -77,11 +77,11 @@ class _Watch(ContactWatch):
         ratio = volume(self.last, "ball") / volume(self.first, "ball")
         return [
             Claim(
-                "the ball is through: all of it is below the axes of the rollers",
+                "the whole ball is below the axes of the rollers",
                 f"highest vertex at {1e3 * highest:+.0f} mm",
                 highest < 0.0,
             ),
-            Claim("its volume is what it was, within 1 %", f"{100 * ratio:.2f} %", abs(ratio - 1) <= 0.01),
+            Claim("its volume is the initial one within 1 %", f"{100 * ratio:.2f} %", abs(ratio - 1) <= 0.01),
         ]
 
 
@@ -95,7 +95,7 @@ def _demo(edge_length: float, dt: float, seconds: float) -> Demo:
         ),
         scene=partial(scene, edge_length),
         solvers={"implicit": Implicit},
-        measurement=_Watch,
+        measurement=_Measurement,
         dt=dt,
         steps=round(seconds / dt),
     )

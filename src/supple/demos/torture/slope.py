@@ -1,4 +1,4 @@
-"""A block on a slope: it stays, or slides as far as Coulomb's law says."""
+"""Two blocks on a slope: one stays, one slides as far as Coulomb's law predicts."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from supple.demos.demo import Claim, Demo
-from supple.demos.torture.watch import ContactWatch, Torture, center
+from supple.demos.torture.watch import ContactMeasurement, Torture, center
 from supple.implicit.contact.settings import IPCContact
 from supple.implicit.solver import Implicit
 from supple.materials.stable_neo_hookean import StableNeoHookean
@@ -30,9 +30,9 @@ DOWN = np.array([1.0, 0.0, 0.0])
 
 
 def resting_gap() -> float:
-    """The distance [m] from which the barrier's pressure carries a block.
+    """The distance [m] at which the barrier's pressure carries a block.
 
-    At exactly the friction that it takes, nothing would stop a block that has landed with the slightest speed.
+    Friction with mu = tan(angle) only just balances gravity: it would never stop a block that lands with some speed.
     """
     pressure = DENSITY * GRAVITY * np.cos(ANGLE) * SIZE[1]
 
@@ -45,7 +45,7 @@ def resting_gap() -> float:
 
 
 def scene(cells: int) -> Scene:
-    """Two blocks side by side at rest on the slope; the slope is level, and gravity tilted by 26.565 degrees."""
+    """Two blocks at rest side by side; the slope is horizontal, and gravity is tilted by 26.565 degrees."""
     mesh = shapes.box(SIZE, (2 * cells, cells, 2 * cells))
     material = StableNeoHookean(youngs=1e9, poisson=0.3, density=DENSITY)
     bodies = [
@@ -60,7 +60,7 @@ def scene(cells: int) -> Scene:
     )
 
 
-class _Watch(ContactWatch):
+class _Measurement(ContactMeasurement):
     def own_claims(self) -> list[Claim]:
         time = self.last.time
         ways = {name: center(self.last, name) - center(self.first, name) for name in COEFFICIENTS}
@@ -88,14 +88,14 @@ def _solver() -> Implicit:
 def _demo(cells: int, dt: float) -> Demo:
     return Demo(
         name="torture-slope",
-        summary="a block sticks to a slope at mu = 0.5, and slides at 0.49 as far as Coulomb says",
+        summary="a block sticks to a slope at mu = 0.5, and slides at 0.49 as far as Coulomb's law predicts",
         explanation=(
             "Two stiff blocks (E = 1 GPa) on a slope of 26.565 degrees, whose tangent is 0.5. One has the friction "
             "coefficient 0.5, the other 0.49."
         ),
         scene=partial(scene, cells),
         solvers={"implicit": _solver},
-        measurement=_Watch,
+        measurement=_Measurement,
         dt=dt,
         steps=round(SECONDS / dt),
     )

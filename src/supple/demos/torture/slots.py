@@ -1,4 +1,4 @@
-"""Tetrahedra and cubes that fall through slots one micrometre wider on either side than they are."""
+"""Tetrahedra and a cube fall through a slot that is wider than they are by one micrometre on either side."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from supple.demos.demo import Claim, Demo
-from supple.demos.torture.watch import ContactWatch, Torture, center
+from supple.demos.torture.watch import ContactMeasurement, Torture, center
 from supple.implicit.contact.settings import IPCContact
 from supple.implicit.solver import Implicit
 from supple.materials.stable_neo_hookean import StableNeoHookean
@@ -31,7 +31,7 @@ def tetrahedron(width: float) -> TetMesh:
 
 
 def wall(side: float) -> SurfaceMesh:
-    """A closed prism along z whose upper inner edge is bevelled, as a mouth of the slot."""
+    """A closed prism along z; its upper inner edge is bevelled, so that the slot is wider at the top."""
     inner, outer = WIDTH / 2, WIDTH / 2 + 0.1
     profile = np.array([(inner, -DEPTH), (inner, -BEVEL), (inner + BEVEL, 0), (outer, 0), (outer, -DEPTH)])
     n = len(profile)
@@ -48,7 +48,7 @@ def wall(side: float) -> SurfaceMesh:
 
 
 def scene(names: tuple[str, ...]) -> Scene:
-    """Two walls along z, and above it some of two tets and a cube, all of them a micrometre from either wall."""
+    """Two walls along z, and above their gap the bodies of these names, one micrometre from either wall."""
     material = StableNeoHookean(youngs=1e6, poisson=0.3, density=1000.0)
     width = WIDTH - 2 * CLEARANCE
     box = shapes.box((width, WIDTH, WIDTH), (2, 2, 2))
@@ -64,10 +64,10 @@ def scene(names: tuple[str, ...]) -> Scene:
     return Scene(bodies=[body for body in bodies if body.name in names], obstacles=walls, gravity=(0, -GRAVITY, 0))
 
 
-class _Watch(ContactWatch):
+class _Measurement(ContactMeasurement):
     def own_claims(self) -> list[Claim]:
         n = self.frames
-        fall = GRAVITY * self.dt**2 * n * (n + 1) / 2  # backward Euler in the open
+        fall = GRAVITY * self.dt**2 * n * (n + 1) / 2  # backward Euler in free fall
         behind = {
             name: 1 - float((center(self.first, name) - center(self.last, name))[1]) / fall
             for name in self.last.positions
@@ -81,7 +81,7 @@ class _Watch(ContactWatch):
                 highest < BOTTOM,
             ),
             Claim(
-                "without friction they fall as in the open, within 1 %",
+                "without friction they fall as in free fall, within 1 %",
                 f"{slowest} is furthest off, {100 * behind[slowest]:.2g} % behind",
                 abs(behind[slowest]) <= 0.01,
             ),
@@ -91,14 +91,14 @@ class _Watch(ContactWatch):
 def _demo(names: tuple[str, ...], dt: float, steps: int) -> Demo:
     return Demo(
         name="torture-slots",
-        summary="tets and a cube fall through a slot a micrometre wider than they are",
+        summary="tets and a cube fall through a slot that leaves one micrometre on either side",
         explanation=(
             "Two single tetrahedra and a cube, 10 cm wide, fall through a slot that leaves them one micrometre on "
             "either side: they neither touch its walls nor get stuck."
         ),
         scene=partial(scene, names),
         solvers={"implicit": lambda: Implicit(contact=IPCContact(dhat=CLEARANCE / 2))},
-        measurement=_Watch,
+        measurement=_Measurement,
         dt=dt,
         steps=steps,
     )

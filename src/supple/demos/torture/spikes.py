@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from supple.demos.demo import Claim, Demo
-from supple.demos.torture.watch import ContactWatch, Torture, mechanical_energy
+from supple.demos.torture.watch import ContactMeasurement, Torture, mechanical_energy
 from supple.implicit.solver import Implicit
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh.tetmesh import TetMesh
@@ -27,7 +27,7 @@ def pyramid(height: float, half: float) -> TetMesh:
 
 
 def wedge(height: float, half: float, length: float) -> TetMesh:
-    """A roof: its ridge along z through the origin."""
+    """A roof with its ridge along z, through the origin."""
     h, b, z = -height, half, length / 2
     points = [[0, 0, -z], [0, 0, z], [-b, h, -z], [b, h, -z], [-b, h, z], [b, h, z]]
     return TetMesh(np.array(points), np.array([[0, 2, 3, 4], [0, 3, 5, 4], [0, 5, 1, 4]]))
@@ -58,7 +58,7 @@ def scene() -> Scene:
     return Scene(bodies=bodies, pins=pins, obstacles=[HalfSpace(name="floor", friction=1.0)], gravity=(0, -9.81, 0))
 
 
-class _Watch(ContactWatch):
+class _Measurement(ContactMeasurement):
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         super().begin(first, dt, steps)
         self.most = self.start = mechanical_energy(first)
@@ -77,7 +77,7 @@ class _Watch(ContactWatch):
         lowest = float(self.last.state.positions[:, 1].min())
         return [
             Claim(
-                "each catches its like, and nothing leaves the floor below itself",
+                "each pair touches, and nothing sinks below the floor",
                 ", ".join(f"{name} {force:.3g} N" for name, force in self.caught.items())
                 + f"; lowest vertex {1e3 * lowest:.3g} mm above the floor",
                 min(self.caught.values()) > 0.0 and lowest > 0.0,
@@ -95,12 +95,12 @@ def _demo(dt: float, steps: int) -> Demo:
         name="torture-spikes",
         summary="spike on spike, point on point, edge on edge, with friction 1",
         explanation=(
-            "Pyramids and roofs fall upside down on their like, tip exactly on tip, ridge along ridge and ridge across "
+            "Pyramids and roofs fall upside down on equal ones, tip exactly on tip, ridge along ridge and ridge across "
             "ridge, with a friction coefficient of 1. They balance, or topple and slide to the floor."
         ),
         scene=scene,
         solvers={"implicit": Implicit},
-        measurement=_Watch,
+        measurement=_Measurement,
         dt=dt,
         steps=steps,
     )

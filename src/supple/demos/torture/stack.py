@@ -1,7 +1,7 @@
-"""Five equal cubes, one per cent of their size apart, that fall on each other and rest, without friction.
+"""Five equal cubes, one per cent of their size apart, fall on each other and rest, without friction.
 
-Where they have less than four cells along an edge, every cube is one per cent smaller than the one below it: outlines
-that lie above each other repel each other, and in coarse meshes nothing else outweighs that.
+With less than four cells along an edge, every cube is one per cent smaller than the one below it. Outlines that lie
+above each other repel each other, and in coarse meshes no other force is large enough to balance that.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 
 from supple.demos.demo import Claim, Demo
 from supple.demos.torture.meshes import mirrored_box
-from supple.demos.torture.watch import ContactWatch, Torture, center, mass
+from supple.demos.torture.watch import ContactMeasurement, Torture, center, mass
 from supple.implicit.solver import Implicit
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.scene.body import Body
@@ -23,8 +23,8 @@ from supple.simulate import Frame
 COUNT, SIDE, GAP, YOUNGS = 5, 0.1, 1e-3, 1e7
 SMALLER, COARSE = 0.01, 4
 GRAVITY = 9.81
-TOLERANCE = 1e-8  # what drifts so slowly must not be lost in Newton's errors
-SETTLED = 0.5  # [s] from then on the stack rests
+TOLERANCE = 1e-8  # so that Newton's errors are smaller than the drift that is measured
+SETTLED = 0.5  # [s] after this time the stack rests
 
 
 def scene(cells: int, scale: float = 1.0) -> Scene:
@@ -44,7 +44,7 @@ def scene(cells: int, scale: float = 1.0) -> Scene:
     return Scene(bodies=bodies, obstacles=[HalfSpace(name="floor")], gravity=(0, -GRAVITY * scale, 0))
 
 
-class _Watch(ContactWatch):
+class _Measurement(ContactMeasurement):
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         super().begin(first, dt, steps)
         self.names = [part.name for part in first.system.bodies]
@@ -88,12 +88,12 @@ def _demo(cells: int, steps: int) -> Demo:
         name="torture-stack",
         summary="five cubes without friction fall on each other, rest, and do not creep",
         explanation=(
-            "Five cubes (E = 10 MPa) one per cent of their size apart fall on each other and on a floor, without any "
-            "friction. What each of them carries is compared with the weight above it."
+            "Five cubes (E = 10 MPa), one per cent of their size apart, fall on each other and on a floor, without any "
+            "friction. The load on each of them is compared with the weight above it."
         ),
         scene=partial(scene, cells),
         solvers={"implicit": lambda: Implicit(tolerance=TOLERANCE)},
-        measurement=_Watch,
+        measurement=_Measurement,
         dt=1 / 50,
         steps=steps,
     )

@@ -1,4 +1,4 @@
-"""A rod twisted by eight turns, its ends pushed together: it folds and lies against itself."""
+"""A rod is twisted by eight turns while its ends move together: it folds and touches itself."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from supple.demos.demo import Claim, Demo
-from supple.demos.torture.watch import ContactWatch, Torture
+from supple.demos.torture.watch import ContactMeasurement, Torture
 from supple.implicit.solver import Implicit
 from supple.materials.neo_hookean import NeoHookean
 from supple.mesh import shapes
@@ -24,7 +24,7 @@ TURNS, SECONDS, CLOSER = 8.0, 20.0, 0.5
 def scene(cells: tuple[int, int], turns: float = TURNS) -> Scene:
     """A square rod along x, of cells[0] by cells[1] by cells[1] cells.
 
-    Its ends turn against each other, each by half of the turns, and come closer by half a metre.
+    Its ends turn in opposite directions, each by half of the turns, and move closer by half a metre.
     """
     mesh = shapes.box((LENGTH, SIDE, SIDE), (cells[0], cells[1], cells[1]))
     rod = Body("rod", mesh, NeoHookean(youngs=1e5, poisson=0.4, density=1000.0))
@@ -48,27 +48,27 @@ def scene(cells: tuple[int, int], turns: float = TURNS) -> Scene:
     )
 
 
-class _Watch(ContactWatch):
+class _Measurement(ContactMeasurement):
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         super().begin(first, dt, steps)
         self.most = 0
-        self.off_script = 0.0
+        self.pin_error = 0.0
 
     def write(self, frame: Frame) -> None:
         super().write(frame)
         self.most = max(self.most, frame.report.details.get("contact_count", 0))
-        scripted = frame.system.pin_targets(frame.time)
-        off = np.abs(frame.state.positions[frame.system.pinned_vertices] - scripted)
-        self.off_script = max(self.off_script, float(off.max()))
+        targets = frame.system.pin_targets(frame.time)
+        off = np.abs(frame.state.positions[frame.system.pinned_vertices] - targets)
+        self.pin_error = max(self.pin_error, float(off.max()))
 
     def own_claims(self) -> list[Claim]:
         return [
             Claim(
-                "both ends do all of their turns, exactly as their script says",
-                f"up to t = {self.last.time:.2f} s, at most {self.off_script:.1e} m off",
-                self.last.time >= self.steps * self.dt - 1e-9 and self.off_script <= 1e-12,
+                "both ends make all of their turns and are exactly where their motion puts them",
+                f"up to t = {self.last.time:.2f} s, at most {self.pin_error:.1e} m off",
+                self.last.time >= self.steps * self.dt - 1e-9 and self.pin_error <= 1e-12,
             ),
-            Claim("the rod comes to lie against itself", f"up to {self.most} contacts in a frame", self.most > 0),
+            Claim("the rod touches itself", f"up to {self.most} contacts in a frame", self.most > 0),
         ]
 
 
@@ -76,7 +76,7 @@ def demo(cells: tuple[int, int], dt: float, turns: float = TURNS, steps: int | N
     """The twist in steps of dt [s]."""
     return Demo(
         name="torture-twist8",
-        summary="a rod twisted by eight turns folds and lies against itself",
+        summary="a rod twisted by eight turns folds and touches itself",
         explanation=(
             "Scripted pins turn the ends of a square rod (Neo-Hookean, E = 100 kPa) against each other, by eight turns "
             "in twenty seconds, and push them together to half their distance. The rod buckles, folds and winds around "
@@ -84,7 +84,7 @@ def demo(cells: tuple[int, int], dt: float, turns: float = TURNS, steps: int | N
         ),
         scene=partial(scene, cells, turns),
         solvers={"implicit": Implicit},
-        measurement=_Watch,
+        measurement=_Measurement,
         dt=dt,
         steps=round(SECONDS * turns / TURNS / dt) if steps is None else steps,
     )

@@ -1,4 +1,4 @@
-"""What all torture scenes claim, and what a torture scene is."""
+"""A torture scene in several sizes, and the claims that all torture scenes share."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ class Torture:
 
     Attributes
     ----------
-    small : for tests that run always; full : the demo
-    large : about 20,000 tets, for benchmarks; None where size is not the point
+    small : for `make test`; full : the demo
+    large : about 20,000 tets, for benchmarks; None where no benchmark uses the scene
     """
 
     small: Demo
@@ -26,8 +26,8 @@ class Torture:
     large: Demo | None = None
 
 
-class ContactWatch(Measurement):
-    """Every step converges, nothing inverts, nothing touches; and what the scene itself claims.
+class ContactMeasurement(Measurement):
+    """Claims that every step converges, no tet inverts and no surfaces touch, and what the scene itself claims.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class ContactWatch(Measurement):
         self.min_J = self.nearest = np.inf
         self.statuses: dict[Status, int] = {}
         self.iterations = 0
-        self.complaint = ""
+        self.problem = ""
 
     def write(self, frame: Frame) -> None:
         super().write(frame)
@@ -52,15 +52,19 @@ class ContactWatch(Measurement):
         if report.min_distance is not None:
             self.nearest = min(self.nearest, report.min_distance)
         if report.status is not Status.CONVERGED:
-            self.complaint = f"; at {frame.time:.4g} s: {report.message}"
+            self.problem = f"; at {frame.time:.4g} s: {report.message}"
 
     def claims(self) -> list[Claim]:
-        gap = f"smallest distance {1e3 * self.nearest:.3g} mm" if np.isfinite(self.nearest) else "nothing came near"
+        gap = (
+            f"smallest distance {1e3 * self.nearest:.3g} mm"
+            if np.isfinite(self.nearest)
+            else "no surfaces came near each other"
+        )
         ends = ", ".join(f"{count} {status}" for status, count in self.statuses.items())
         return [
             Claim(
                 f"all {self.steps} steps converge",
-                f"{ends}, {self.iterations / max(self.frames, 1):.1f} iterations each{self.complaint}",
+                f"{ends}, {self.iterations / max(self.frames, 1):.1f} iterations each{self.problem}",
                 self.frames == self.steps and set(self.statuses) == {Status.CONVERGED},
             ),
             Claim("no tetrahedron inverts", f"smallest det F {self.min_J:.3g}", self.min_J > 0.0),
@@ -69,12 +73,12 @@ class ContactWatch(Measurement):
         ]
 
     def own_claims(self) -> list[Claim]:
-        """What only this scene claims."""
+        """The claims of this scene only."""
         return []
 
 
 def mechanical_energy(frame: Frame) -> float:
-    """Kinetic, elastic and potential energy [J]; that of barriers, which is never negative, is left out."""
+    """Kinetic, elastic and potential energy [J]. The energy of barriers, which is never negative, is left out."""
     report = frame.report
     return report.kinetic_energy + report.elastic_energy + report.potential_energy
 
@@ -87,6 +91,6 @@ def center(frame: Frame, name: str) -> np.ndarray:
 
 
 def mass(frame: Frame, name: str) -> float:
-    """[kg]"""
+    """The mass of a body [kg]."""
     part = next(part for part in frame.system.bodies if part.name == name)
     return float(frame.system.masses[part.vertices].sum())
