@@ -56,8 +56,14 @@ def test_what_is_read_is_not_replaced(place, capsys, arguments):
 @pytest.mark.parametrize(
     ("in_the_way", "says"),
     [
-        ("out/index.html/", "out/index.html: is a folder, where a file is to be written; choose another --output"),
-        ("out/plot.png/", "out/plot.png: is a folder, where a file is to be written; choose another --output"),
+        (
+            "out/index.html/",
+            "out/index.html: this is a folder, and a file of that name must be written; choose another --output",
+        ),
+        (
+            "out/plot.png/",
+            "out/plot.png: this is a folder, and a file of that name must be written; choose another --output",
+        ),
         ("out/recording.vtkhdf/", "out/recording.vtkhdf: is a folder"),
         ("out", "out: is no folder, and must be one to hold recording.vtkhdf; give another"),
     ],

@@ -5,7 +5,7 @@ import pytest
 
 import supple as sp
 from supple.errors import SolverError
-from supple.numerics.thread_tuning import Pace
+from supple.numerics.thread_tuning import ThreadTuner
 from supple.state import State
 from supple.system import build_system, initial_state
 from supple.xpbd.contact.settings import XPBDContact
@@ -179,17 +179,19 @@ def clocked(pace, seconds, count=4000):
 
 
 def test_the_pace_takes_the_faster_way():
-    assert sum(clocked(Pace(True, True), lambda k, way: 1.0 if way else 2.0)) > 3980
-    assert sum(clocked(Pace(True, True), lambda k, way: 9.0 if way else 2.0)) < 20
+    assert sum(clocked(ThreadTuner(True, True), lambda k, way: 1.0 if way else 2.0)) > 3980
+    assert sum(clocked(ThreadTuner(True, True), lambda k, way: 9.0 if way else 2.0)) < 20
 
 
 def test_the_pace_follows_a_machine_that_becomes_busy_and_quiet_again():
-    choices = clocked(Pace(True, True), lambda k, way: (30.0 if 1000 <= k < 2000 else 1.0) if way else 2.0, 20_000)
+    choices = clocked(
+        ThreadTuner(True, True), lambda k, way: (30.0 if 1000 <= k < 2000 else 1.0) if way else 2.0, 20_000
+    )
     assert sum(choices[:1000]) > 990
     assert sum(choices[1000:2000]) < 30
     assert sum(choices[10_000:]) > 9900
 
 
 def test_the_pace_has_no_say_where_there_is_no_choice():
-    assert all(clocked(Pace(False, True), lambda k, way: 9.0 if way else 1.0))
-    assert not any(clocked(Pace(False, False), lambda k, way: 9.0 if way else 1.0))
+    assert all(clocked(ThreadTuner(False, True), lambda k, way: 9.0 if way else 1.0))
+    assert not any(clocked(ThreadTuner(False, False), lambda k, way: 9.0 if way else 1.0))

@@ -1,4 +1,4 @@
-"""The command `supple`: finds the command, and turns every foreseeable error into one line and an exit code."""
+"""The command `supple`: runs a subcommand, and reports every expected error as one line and an exit code."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cyclopts import App
 from cyclopts.exceptions import CycloptsError
 
 from supple import __version__
-from supple.cli.complain import complain
+from supple.cli.complain import print_error
 from supple.cli.console import ShellConsole
 from supple.cli.exit_codes import ExitCode
 from supple.errors import SuppleError
@@ -32,7 +32,7 @@ app = App(
     result_action="return_value",
 )
 
-# Import paths: a command's module is loaded when it is called for.
+# Import paths: a command's module is imported when the command is used.
 COMMANDS = {
     "demo": "supple.cli.commands.demo:demo",
     "run": "supple.cli.commands.run:run",
@@ -49,12 +49,12 @@ for _order, (_name, _path) in enumerate(COMMANDS.items()):
 
 
 def _log_level() -> int:
-    """Warnings, or what the environment variable SUPPLE_LOG says: DEBUG, INFO, ERROR."""
+    """The level in the environment variable SUPPLE_LOG (DEBUG, INFO, ERROR), or WARNING."""
     return logging.getLevelNamesMapping().get(os.environ.get("SUPPLE_LOG", "").upper(), logging.WARNING)
 
 
 def _flush(stream: TextIO | None) -> None:
-    if stream is not None:  # else closed by the caller: there is nobody to tell
+    if stream is not None:  # None where the caller has closed it
         stream.flush()
 
 
@@ -64,30 +64,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = sys.argv[1:] if arguments is None else list(arguments)
     if not given or given[0] not in COMMANDS:
         for name in COMMANDS:
-            _ = app[name]  # loads it, so that the list of commands can say what each of them does
+            _ = app[name]  # imports it, so that the list of commands shows their descriptions
     try:
         code = app(given)
         _flush(sys.stdout)
     except SuppleError as error:
-        complain(str(error))
+        print_error(str(error))
         return ExitCode.INPUT
     except CycloptsError as error:
         command = f" {error.command_chain[0]}" if error.command_chain else ""
-        complain(f"{str(error).rstrip(' .')}; see supple{command} --help")
+        print_error(f"{str(error).rstrip(' .')}; see supple{command} --help")
         return ExitCode.INPUT
     except KeyboardInterrupt:
-        complain("interrupted")
+        print_error("interrupted")
         return ExitCode.INTERRUPTED
     except BrokenPipeError:
-        # Python flushes stdout once more when it exits; let that go nowhere.
+        # Python flushes stdout once more when it exits; redirect that to nowhere.
         with contextlib.suppress(OSError, ValueError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return ExitCode.BROKEN_PIPE
     except MemoryError as error:
-        complain(f"there is not enough memory for this: {error or 'make the meshes coarser'}")
+        print_error(f"there is not enough memory for this: {error or 'make the meshes coarser'}")
         return ExitCode.INPUT
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
-        complain(f"{where}{error.strerror or error}")
+        print_error(f"{where}{error.strerror or error}")
         return ExitCode.INPUT
     return ExitCode.OK if code is None else int(code)

@@ -1,4 +1,4 @@
-"""One line on stderr, whatever an error's text holds."""
+"""Error messages on stderr, always on one line."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import sys
 
 
 def one_line(message: str) -> str:
-    """A text on one line, without characters that a terminal would act upon."""
+    """A text on one line, without control characters of terminals."""
     words = " ".join(message.split())
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in words)
 
 
-def complain(message: str) -> None:
+def print_error(message: str) -> None:
     """Write `supple: message` to stderr, on one line."""
     if sys.stderr is None:  # closed by the caller
         return

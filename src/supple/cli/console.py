@@ -1,4 +1,4 @@
-"""Where the shell's tables and texts go: standard output, at whatever width it has."""
+"""The console for the shell's tables and texts on standard output."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from rich.console import Console
 
 
 class ShellConsole(Console):
-    """A rich console that leaves a reader that has gone to `main`, instead of ending the process itself."""
+    """A rich console that raises an error where the reader has ended, instead of ending the process; see `main`."""
 
     def on_broken_pipe(self) -> None:
         raise BrokenPipeError
 
 
 def shell_console() -> Console:
-    """For what commands print: no colors for numbers, no wrapping of paths."""
+    """The console for the output of commands: numbers are not colored, and long lines are not wrapped."""
     return ShellConsole(highlight=False, soft_wrap=True)

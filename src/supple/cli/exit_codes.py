@@ -14,8 +14,8 @@ class ExitCode(IntEnum):
     INPUT = 2
     """The input, the options or the place for the output cannot be used: one line on stderr tells why."""
     SOLVER = 3
-    """The solver could not go on: what was recorded up to there is whole."""
+    """The solver could not go on. The recording up to there is complete."""
     INTERRUPTED = 130
-    """Ctrl-C: what was recorded up to there is whole."""
+    """Ctrl-C. The recording up to there is complete."""
     BROKEN_PIPE = 141
     """The reader of the output has ended, as in `supple info mesh.stl | head -1`."""

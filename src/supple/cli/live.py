@@ -1,4 +1,4 @@
-"""A live page from the shell: where it is served, and to whom."""
+"""Serving a page from the shell: address, port and access."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ Open = Annotated[bool, Parameter(name="--open")]
 def serve_page(source: LiveSource | Path, host: str, port: int | None, open_browser: bool) -> None:
     """Serve a live scene, or the recording at a path, until Ctrl-C.
 
-    Beyond this machine, the page's address holds a secret. A port that was asked for must be free; without one, 8080 or
-    the next free one above it is used.
+    If other machines can reach the page, its address contains a secret. A given port must be free; without one, 8080 or
+    the next free port above it is used.
 
     Raises
     ------
-    SuppleError : where the source cannot be shown, or nothing can be served there.
+    SuppleError : where the source cannot be shown, or the address cannot be used.
     """
     from supple.errors import OutputError
     from supple.viewer.app import Address, serve

@@ -1,4 +1,4 @@
-"""Numbers on the command line, read as strictly as those of a scene file."""
+"""Numbers on the command line, parsed as strictly as those of a scene file."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from cyclopts import Parameter, Token
 
 
 def whole_number(_: Any, tokens: Sequence[Token]) -> int:
-    """A count. Nothing is rounded: 1.5 is no number of frames."""
+    """A count. Nothing is rounded: 1.5 is an error."""
     text = tokens[0].value
     try:
         return int(text)
@@ -18,7 +18,7 @@ def whole_number(_: Any, tokens: Sequence[Token]) -> int:
 
 
 def seconds(_: Any, tokens: Sequence[Token]) -> float:
-    """A time [s], also as a fraction: 1/60."""
+    """A time [s], as a number or a fraction such as 1/60."""
     from supple.scene_file.fraction import number_or_fraction
 
     text = tokens[0].value

@@ -1,4 +1,4 @@
-"""`--separate`: bodies that intersect at the start are moved apart, and it is said which, and how far."""
+"""`--separate`: bodies that intersect at the start are moved apart, and the moves are printed."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from supple.scene_file.loader import Run
 
 
 def moved_apart(described: Run) -> Run:
-    """The run with its bodies apart; prints each move, also where the shell is told to be quiet.
+    """The run with its bodies moved apart; prints each move, also with --quiet.
 
     Raises
     ------
-    SceneError : where a small translation does not separate them.
+    SceneError : where small translations do not separate the bodies.
     """
     from rich.markup import escape
 
@@ -21,13 +21,13 @@ def moved_apart(described: Run) -> Run:
 
     console = shell_console()
     separation = separate(described.scene, initial_positions=described.initial_positions)
-    said = [
+    moves = [
         "moved body {!r} by ({:.6g}, {:.6g}, {:.6g}) m".format(move.body, *(move.shift + 0.0))
         for move in separation.moves
     ]
-    for line in said or ["nothing was moved: no surfaces intersect"]:
+    for line in moves or ["nothing was moved: no surfaces intersect"]:
         console.print(escape(line))
     text = described.text
-    if said and text is not None:
-        text = text.rstrip("\n") + "\n" + "".join(f"# supple run --separate {line}\n" for line in said)
+    if moves and text is not None:
+        text = text.rstrip("\n") + "\n" + "".join(f"# supple run --separate {line}\n" for line in moves)
     return replace(described, scene=separation.scene, initial_positions=separation.initial_positions, text=text)

@@ -1,4 +1,4 @@
-"""One simulation in the shell: recorded, with progress, then a page, a plot, and where they are."""
+"""One simulation in the shell: recording and progress, then a page, a plot and a summary."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from supple.cli.complain import complain
+from supple.cli.complain import print_error
 from supple.cli.exit_codes import ExitCode
 from supple.errors import OutputError
 from supple.scene.scene import Scene
@@ -20,12 +20,12 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Products:
-    """What a session writes, and how much it says.
+    """What a session writes and prints.
 
     Attributes
     ----------
     folder : for recording.vtkhdf, index.html and plot.png
-    page, plot : whether to write the last two; compress : the recording, once it is whole
+    page, plot : whether to write the last two; compress : whether to compress the complete recording
     quiet : print neither progress nor summary
     scene_text : the scene file's text, kept in the recording
     """
@@ -45,7 +45,7 @@ class Outcome:
     Attributes
     ----------
     code : the shell's exit code
-    frames : how many were simulated; last : the last of them; worst_J : the smallest J in any of them
+    frames : number of simulated frames; last : the last frame; worst_J : the smallest J of all frames
     """
 
     code: ExitCode = ExitCode.OK
@@ -64,18 +64,20 @@ def run_session(
     start: Mapping[str, Any] | None = None,
     sinks: Sequence[Sink] = (),
 ) -> Outcome:
-    """Simulate, record, and tell.
+    """Simulate, record, and print a summary.
 
     Raises
     ------
-    SuppleError : where the input, or the place for the output, cannot be used. Whole frames recorded before stay.
+    SuppleError : where the input or the output folder cannot be used. Frames recorded before are kept.
     """
     from supple.output.recording.recorder import Recorder
 
     recording = products.folder / "recording.vtkhdf"
-    for path in _wanted(products):
-        if path.is_dir():  # told before the simulation, not after
-            raise OutputError(f"{path}: is a folder, where a file is to be written; choose another --output")
+    for path in _product_paths(products):
+        if path.is_dir():  # reported before the simulation
+            raise OutputError(
+                f"{path}: this is a folder, and a file of that name must be written; choose another --output"
+            )
     recorder = Recorder(recording, scene_text=products.scene_text, solver=solver, compress=products.compress)
     all_sinks: list[Sink] = [recorder, *sinks]
     if not products.quiet:
@@ -90,29 +92,31 @@ def run_session(
             outcome.worst_J = min(outcome.worst_J, frame.report.min_det_F)
     except KeyboardInterrupt:
         frames.close()
-        _tell_of_older(replace(products, page=False, plot=False))
-        complain(f"interrupted; {recording} holds the {outcome.frames} frames up to here")
+        _warn_of_older_files(replace(products, page=False, plot=False))
+        print_error(f"interrupted; {recording} holds the {outcome.frames} frames up to here")
         outcome.code = ExitCode.INTERRUPTED
         return outcome
     if outcome.last is not None and not outcome.last.report.status.can_go_on:
         report = outcome.last.report
         outcome.code = ExitCode.SOLVER
-        complain(f"stopped at frame {outcome.last.index} ({report.status}): {report.message}; {recording} is whole")
-    _tell_of_older(products)
+        print_error(
+            f"stopped at frame {outcome.last.index} ({report.status}): {report.message}; {recording} is complete"
+        )
+    _warn_of_older_files(products)
     _write_products(recording, products)
     if not products.quiet:
-        _tell(outcome, recording, products)
+        _print_summary(outcome, recording, products)
     return outcome
 
 
-def _wanted(products: Products) -> list[Path]:
-    """What is written beside the recording."""
+def _product_paths(products: Products) -> list[Path]:
+    """The files that are written beside the recording."""
     wanted = {"index.html": products.page, "plot.png": products.plot}
     return [products.folder / name for name, is_wanted in wanted.items() if is_wanted]
 
 
-def _tell_of_older(products: Products) -> None:
-    """Say which files beside the new recording show another one."""
+def _warn_of_older_files(products: Products) -> None:
+    """Warn of files beside the new recording that show an earlier one."""
     for wanted, name in ((products.page, "index.html"), (products.plot, "plot.png")):
         path = products.folder / name
         if not wanted and path.exists():
@@ -130,7 +134,7 @@ def _write_products(recording: Path, products: Products) -> None:
         plot_recording(recording, products.folder / "plot.png")
 
 
-def _tell(outcome: Outcome, recording: Path, products: Products) -> None:
+def _print_summary(outcome: Outcome, recording: Path, products: Products) -> None:
     from rich.markup import escape
 
     from supple.cli.console import shell_console

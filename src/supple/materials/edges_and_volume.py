@@ -12,8 +12,8 @@ from supple.materials.per_tet import NOT_ELASTIC, TetMaterial
 class EdgesAndVolume(Material):
     """Edges of a given length and tetrahedra of a given volume, each with a compliance (inverse stiffness).
 
-    A material for XPBD only: it has no energy density per unit of volume, and its stiffness depends on the mesh. Use
-    `StableNeoHookean` where a Young's modulus is meant.
+    A material for XPBD only: it has no energy density per unit of volume, and its stiffness depends on the mesh. To
+    specify a Young's modulus, use `StableNeoHookean`.
 
     Parameters
     ----------

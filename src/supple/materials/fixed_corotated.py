@@ -10,6 +10,6 @@ from supple.materials.stretch_energies import fixed_corotated
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FixedCorotated(Elastic):
-    """Fixed corotated: linear in the stretches, with a volume term that stays finite for inverted elements."""
+    """Fixed corotated: stress linear in the stretches, with a volume term that is finite for inverted elements."""
 
     stretch_functions = fixed_corotated.FUNCTIONS

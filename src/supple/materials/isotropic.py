@@ -9,7 +9,7 @@ With F = U diag(s) V^T (rotations U, V) and psi(s):
         d_ij = (psi_i - psi_j)/(s_i - s_j),  t_ij = (psi_i + psi_j)/(s_i + s_j).
 
 The nine eigenvalues are those of psi_ij, the three d_ij and the three t_ij: projection to the nearest positive
-semi-definite matrix clamps them at zero. In this frame the Hessian is so sparse that contracting it with the shape
+semi-definite matrix clamps them at zero. In this frame the Hessian is so sparse that its contraction with the shape
 gradients costs less than writing the result.
 
 Sources: Stomakhin et al., "Energetically Consistent Invertible Elasticity" (2012), section 4; Smith, de Goes, Kim,
@@ -78,7 +78,7 @@ def _nearest_semidefinite(A):
     scale = abs(a00) + abs(a11) + abs(a22)
     minor = a00 * a11 - a01 * a01
     full = a22 * minor - a12 * (a00 * a12 - a01 * a02) + a02 * (a01 * a12 - a11 * a02)
-    # Sylvester's criterion, with a margin far above round-off: nothing to clamp.
+    # Sylvester's criterion, with a margin far above round-off: no eigenvalue is negative.
     if a00 > 1e-9 * scale and minor > 1e-9 * scale * scale and full > 1e-9 * scale * scale * scale:
         return A
     w, Q = symmetric_eigen(a00, a11, a22, a12, a02, a01)
@@ -166,7 +166,7 @@ def _flat(F: ArrayLike) -> tuple[NDArray[np.float64], tuple[int, ...]]:
 
 
 def batch_energy_densities(F: ArrayLike, per_tet: Callable[[int], TetMaterial]) -> NDArray[np.float64]:
-    """See `Elastic.energy_density`; `per_tet` gives the material of so many F."""
+    """See `Elastic.energy_density`; `per_tet(n)` returns the parameters for n gradients."""
     flat, shape = _flat(F)
     tet = per_tet(len(flat))
     out = np.empty(len(flat))

@@ -54,7 +54,7 @@ class Material(ABC):
 
     @abstractmethod
     def per_tet(self, n_tets: int) -> TetMaterial:
-        """This material as one row per tet of a body.
+        """The parameters of this material, one row per tet of a body.
 
         Parameters
         ----------
@@ -126,7 +126,7 @@ class Elastic(Material):
         )
 
     def lame_parameters(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """The mu and lam [Pa] that stand in this material's own energy density (scalars or per tet)."""
+        """The mu and lam [Pa] of this material's energy density (scalars or per tet)."""
         return lame_from_engineering(self.youngs, self.poisson)
 
     def per_tet(self, n_tets: int) -> TetMaterial:

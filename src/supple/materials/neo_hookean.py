@@ -10,7 +10,7 @@ from supple.materials.stretch_energies import neo_hookean
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class NeoHookean(Elastic):
-    """Neo-Hookean with a logarithm: infinite energy where an element inverts, so a body must start un-inverted.
+    """Neo-Hookean with a logarithm: the energy of an inverted element is infinite, so a body must start without any.
 
     `energy_density` is +inf for J <= 0; stress and Hessian do not exist there and are not-a-number.
     """

@@ -1,4 +1,4 @@
-"""A body's material as arrays with one row per tetrahedron: what solvers read, however many materials a body has."""
+"""A body's material as arrays with one row per tetrahedron, as solvers read it, for one material or several."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class TetMaterial:
     ----------
     density : (m,) [kg/m^3]; damping : (m,) Kelvin-Voigt time [s]
     kind : (m,) int32, the row of `kinds.STRETCH_ENERGIES`, or `NOT_ELASTIC`
-    mu, lam : (m,) as they stand in each material's own energy density [Pa]
+    mu, lam : (m,) parameters of each material's energy density [Pa]
     """
 
     density: NDArray[np.float64]

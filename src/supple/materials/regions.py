@@ -15,7 +15,7 @@ from supple.materials.per_tet import TetMaterial
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Regions(Elastic):
-    """A body of several elastic materials: each tet names one of them.
+    """A body of several elastic materials: each tet has one of them.
 
     Parameters
     ----------
@@ -24,11 +24,11 @@ class Regions(Elastic):
 
     Attributes
     ----------
-    youngs, poisson, density, damping : (n_tets,) of each tet's own material, as any material has them.
+    youngs, poisson, density, damping : (n_tets,) of each tet's material, as for any material.
 
     Raises
     ------
-    SceneError : where a material is not elastic, is itself a `Regions`, or `index` names one that is not there.
+    SceneError : where a material is not elastic or is itself a `Regions`, or `index` is out of range.
     """
 
     materials: Sequence[Elastic]
@@ -56,10 +56,12 @@ class Regions(Elastic):
         object.__setattr__(self, "materials", materials)
         object.__setattr__(self, "index", index.astype(np.int32))
         for name in ("youngs", "poisson", "density", "damping"):
-            object.__setattr__(self, name, self._chosen([getattr(material, name) for material in materials], name))
+            object.__setattr__(
+                self, name, self._values_per_tet([getattr(material, name) for material in materials], name)
+            )
         super().__post_init__()
 
-    def _chosen(self, values: Sequence[ArrayLike], name: str) -> NDArray[np.float64]:
+    def _values_per_tet(self, values: Sequence[ArrayLike], name: str) -> NDArray[np.float64]:
         index = np.asarray(self.index)
         out = np.empty(len(index))
         for k, value in enumerate(values):
@@ -74,9 +76,11 @@ class Regions(Elastic):
         return out
 
     def lame_parameters(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """(n_tets,) mu and lam [Pa] as they stand in each tet's own energy density."""
+        """(n_tets,) mu and lam [Pa] of the energy density of each tet's material."""
         pairs = [material.lame_parameters() for material in self.materials]
-        return self._chosen([mu for mu, _ in pairs], "mu"), self._chosen([lam for _, lam in pairs], "lam")
+        return self._values_per_tet([mu for mu, _ in pairs], "mu"), self._values_per_tet(
+            [lam for _, lam in pairs], "lam"
+        )
 
     def per_tet(self, n_tets: int) -> TetMaterial:
         index = np.asarray(self.index)

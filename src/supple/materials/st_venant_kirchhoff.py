@@ -10,6 +10,6 @@ from supple.materials.stretch_energies import st_venant_kirchhoff
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StVenantKirchhoff(Elastic):
-    """St. Venant-Kirchhoff: quadratic in the Green strain. Weakens, and at last collapses, under strong compression."""
+    """St. Venant-Kirchhoff: quadratic in the Green strain. Under strong compression it becomes softer and collapses."""
 
     stretch_functions = st_venant_kirchhoff.FUNCTIONS

@@ -14,10 +14,10 @@ from supple.materials.stretch_energies import stable_neo_hookean
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StableNeoHookean(Elastic):
-    """Stable Neo-Hookean: finite for inverted elements, which it can recover.
+    """Stable Neo-Hookean: finite for inverted elements, which can recover.
 
-    Its linearization at rest has the first Lamé parameter lam - mu, so lam = lam_L + mu_L is what makes small strains
-    follow the Young's modulus and Poisson's ratio that were typed.
+    Its linearization at rest has the first Lamé parameter lam - mu, so lam = lam_L + mu_L gives small strains the
+    Young's modulus and Poisson's ratio of the user.
     """
 
     stretch_functions = stable_neo_hookean.FUNCTIONS
@@ -29,6 +29,6 @@ class StableNeoHookean(Elastic):
     def total_energy(self, F: NDArray[np.float64], J: NDArray[np.float64], volumes: NDArray[np.float64]) -> float:
         """Strain energy of all tets of a body, zero at rest [J], from invariants: no decomposition needed."""
         mu, lam = self.lame_parameters()
-        grown = J - 1.0
-        shape = 0.5 * (np.einsum("tij,tij->t", F, F) - 3.0) - grown
-        return float((mu * shape + 0.5 * lam * grown * grown) @ volumes)
+        change = J - 1.0
+        shape = 0.5 * (np.einsum("tij,tij->t", F, F) - 3.0) - change
+        return float((mu * shape + 0.5 * lam * change * change) @ volumes)

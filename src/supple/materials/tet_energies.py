@@ -97,7 +97,7 @@ def _put_hessian(U, s, V, B, volume, kind, mu, lam, project, out, e):
     H22 = _symmetric(hessian_block(U, A, alpha, beta, g2, g2))
     H23 = hessian_block(U, A, alpha, beta, g2, g3)
     H33 = _symmetric(hessian_block(U, A, alpha, beta, g3, g3))
-    # Shape gradients sum to zero, hence the blocks of every row do: translations cost nothing, exactly.
+    # Shape gradients sum to zero, so the blocks of every row do: a translation has exactly zero energy.
     H01 = _minus_sum(H11, transpose(H12), transpose(H13))
     H02 = _minus_sum(H12, H22, transpose(H23))
     H03 = _minus_sum(H13, H23, H33)

@@ -1,8 +1,8 @@
-"""Which constraints may be projected at the same time, and in which order one thread should take them.
+"""Which constraints may be projected at the same time, and in which order one thread should project them.
 
-Two constraints are independent where they share no vertex. `breadth_first_order` puts the vertices of a mesh in
-levels such that a constraint touches at most two neighbouring ones; `greedy_colors` finds independent constraints
-near each other.
+Two constraints are independent where they share no vertex. `breadth_first_order` divides the vertices of a mesh
+into levels such that a constraint has vertices of at most two neighbouring levels; `greedy_colors` finds independent
+constraints near each other.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ MAX_COLORS = 256
 def breadth_first_order(constraints: list[NDArray[np.int32]], n_vertices: int) -> tuple[NDArray, NDArray]:
     """Number the vertices along breadth-first levels, one connected piece after the other.
 
-    Every constraint joins vertices of one level, or of two neighbouring levels: were a vertex two levels away, the
-    constraint itself would make it a neighbour. Each piece is begun at a vertex far from the rest of it (the last one
-    that a first search reaches), so that there are many small levels instead of few large ones.
+    Every constraint joins vertices of one level or of two neighbouring levels, because all its vertices are neighbours
+    of each other. The numbering of each piece starts at the vertex that a first search reaches last, so that there are
+    many small levels instead of a few large ones.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def _breadth_first(pointers, neighbours):
             continue
         start = seed
         for search in range(2):
-            # The first search only finds a far vertex to begin from; the second one numbers.
+            # The first search finds a distant vertex to start from; the second one numbers.
             if search == 1:
                 start = order[done + count - 1]
                 for k in range(done, done + count):
@@ -95,10 +95,10 @@ def _breadth_first(pointers, neighbours):
 
 @njit(cache=True)
 def greedy_colors(constraints, n_vertices, block):
-    """Color each run of `block` constraints for itself, such that equal colors share no vertex.
+    """Color each run of `block` constraints separately, such that constraints of one color share no vertex.
 
-    Every constraint takes the first color that none of its vertices has in its block. Beyond `MAX_COLORS` the last
-    color is shared, which is why these colors order constraints and do not license parallel work.
+    Every constraint gets the first color that none of its vertices has in its block. Beyond `MAX_COLORS` the last color
+    is shared. Therefore these colors only order constraints; they do not guarantee independence.
 
     Parameters
     ----------

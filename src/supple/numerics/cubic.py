@@ -1,9 +1,9 @@
-"""The smallest positive root of a cubic, never beyond the true one.
+"""The smallest positive root of a cubic; the result is never beyond the true root.
 
-The closed form (Cardano in complex numbers, imaginary parts below a tolerance dropped) loses or misplaces roots when
-the leading coefficient is small beside the others, as for directions that move a tetrahedron's nodes almost in a plane.
-Here the cubic is split at its extrema into monotone pieces, and the first piece that changes sign is bisected from the
-side where the cubic still has the sign of its constant term.
+The closed form (Cardano in complex numbers, without imaginary parts below a tolerance) loses or misplaces roots when
+the leading coefficient is small compared with the others. This happens for directions that move a tetrahedron's nodes
+almost in a plane. Here the cubic is split at its extrema into monotone pieces. The first piece that changes sign is
+bisected from the side where the cubic has the sign of its constant term.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from supple.errors import SolverError
 from supple.numerics.geometry.double_double import product_error, sum_error
 from supple.numerics.kernel_cache import njit
 
-# Bounds on what is lost, relative to the sum of the terms' sizes: by Horner's rule, and by its compensated form.
+# Bounds on the rounding error of Horner's rule and of its compensated form, relative to the sum of the terms' sizes.
 _ROUND_OFF = 2e-15
 _COMPENSATED_ROUND_OFF = 2e-30
 
 
 @njit(error_model="numpy")
 def _is_positive(a, b, c, d, t):
-    """Whether a t^3 + b t^2 + c t + d, t >= 0, is above zero for certain, round-off considered.
+    """Whether a t^3 + b t^2 + c t + d, t >= 0, is certainly above zero, with round-off taken into account.
 
     Source of the compensated Horner rule: Graillat, Langlois, Louvet (2005).
     """
@@ -45,7 +45,7 @@ def _is_positive(a, b, c, d, t):
 
 @njit(error_model="numpy")
 def positive_on_unit_interval(a, b, c, d):
-    """Whether all Bernstein coefficients on [0, 1] are above zero: then the cubic is, on the whole interval.
+    """Whether all Bernstein coefficients on [0, 1] are above zero; then the cubic is above zero on the whole interval.
 
     Source: Farouki, "The Bernstein polynomial basis: a centennial retrospective" (2012), section 3.
     """
@@ -54,7 +54,7 @@ def positive_on_unit_interval(a, b, c, d):
 
 @njit(error_model="numpy")
 def _extrema(a, b, c):
-    """Real roots p <= q of the derivative 3 a t^2 + 2 b t + c; infinity for each one that there is not."""
+    """Real roots p <= q of the derivative 3 a t^2 + 2 b t + c; infinity for each one that does not exist."""
     A, B = 3.0 * a, 2.0 * b
     size = max(max(abs(A), abs(B)), abs(c))
     if size == 0.0:
@@ -62,12 +62,12 @@ def _extrema(a, b, c):
     A, B, C = A / size, B / size, c / size
     square = B * B - 4.0 * A * C
     if not square > 0.0:
-        # No extremum, or a stationary point where the cubic does not turn.
+        # No extremum, or a stationary point that is not an extremum.
         return math.inf, math.inf
     h = -0.5 * (B + math.copysign(math.sqrt(square), B))
     p = h / A if A != 0.0 else math.inf
     q = C / h if h != 0.0 else math.inf
-    # A root that overflows lies nowhere that matters.
+    # A root that overflows lies outside every interval of interest.
     p = p if abs(p) < math.inf else math.inf
     q = q if abs(q) < math.inf else math.inf
     return (p, q) if p <= q else (q, p)
@@ -75,9 +75,9 @@ def _extrema(a, b, c):
 
 @njit(error_model="numpy")
 def _bisect(a, b, c, d, low, high):
-    """The last number in [low, high] where the cubic is positive for certain, as it is at low and not at high."""
+    """The last number in [low, high] where the cubic is certainly positive; it is so at low and not at high."""
     for _ in range(1100):
-        # Far from zero halve the interval; where low is nothing beside high, its logarithm.
+        # Halve the interval, or its logarithm where low is much smaller than high.
         middle = math.sqrt(low) * math.sqrt(high) if low > 0.0 and low < 0.01 * high else 0.5 * (low + high)
         if middle <= low or middle >= high:
             break
@@ -99,7 +99,7 @@ def last_positive_before_root(a, b, c, d, end):
 
     Returns
     -------
-    t : the cubic is above zero on [0, t] and not at the next numbers after t, as far as double precision can tell.
+    t : the cubic is above zero on [0, t] and not at the next numbers after t, as far as double precision resolves it.
         Minus one where there is no root in (0, end]. A root that is touched but not crossed counts.
     """
     p, q = _extrema(a, b, c)
@@ -119,7 +119,7 @@ def last_positive_before_root(a, b, c, d, end):
 
 @njit(error_model="numpy")
 def _root_bound(a, b, c, d):
-    """No root is larger than this. Source: Fujiwara (1916)."""
+    """An upper bound of all roots. Source: Fujiwara (1916)."""
     if a != 0.0:
         bound = 2.0 * max(max(abs(b / a), abs(c / a) ** 0.5), abs(0.5 * d / a) ** (1.0 / 3.0))
     elif b != 0.0:
@@ -162,7 +162,7 @@ def _first_root(a, b, c, d, tol):
                 c = 0.0
     far = _first_root_below_bound(a, b, c, d)
     if 0.0 <= far <= 1.0:
-        # The small coefficients keep this root out of the unit interval: it lies just beyond, or nowhere.
+        # The complete cubic has no root in the unit interval: this root lies just beyond it, or does not exist.
         far = _first_root_below_bound(full_a, full_b, full_c, d)
     return far
 
@@ -180,8 +180,8 @@ def smallest_positive_cubic_root(
 
     Scale the coefficients by the constant term first: d = 1 for the first inversion of a tetrahedron, d = 0.8 for the
     first loss of 80 % of its volume. Beyond t = 1 leading coefficients of at most `tol` count as zero, so that the
-    cubic degenerates to a quadratic, linear or constant one. Up to t = 1, where a step filter looks, every
-    coefficient counts as it is.
+    cubic degenerates to a quadratic, linear or constant one. Up to t = 1, the
+    range of a step filter, every coefficient counts as it is.
 
     Parameters
     ----------

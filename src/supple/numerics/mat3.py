@@ -1,4 +1,4 @@
-"""3-vectors and 3x3 matrices as tuples, for use inside kernels: no allocation, everything stays in registers.
+"""3-vectors and 3x3 matrices as tuples, for use inside kernels: no memory is allocated, values stay in registers.
 
 A vector is (x, y, z). A matrix is nine numbers, row after row: M = (m00, m01, m02, m10, m11, m12, m20, m21, m22).
 """

@@ -1,8 +1,8 @@
 """Rotation-variant singular value decomposition of 3x3 matrices: F = U diag(s) V^T with det U = det V = +1.
 
-The sign of det F goes into the smallest singular value, so that an inverted element has one negative stretch.
-One-sided Jacobi (Hestenes): columns of F are rotated until they are orthogonal. Unlike the eigenvectors of F^T F this
-does not square the condition number, so that F is reproduced to round-off whatever its rank.
+The smallest singular value has the sign of det F, so that an inverted element has one negative stretch.
+Method: one-sided Jacobi (Hestenes), which rotates the columns of F until they are orthogonal. Unlike an
+eigendecomposition of F^T F it does not square the condition number: F is reproduced to round-off for any rank.
 
 Sources: Golub, Van Loan, "Matrix Computations", section 8.6.3; Irving, Teran, Fedkiw, "Invertible Finite Elements"
 (2004), section 5, for the sign convention.
@@ -19,9 +19,9 @@ from supple.errors import SolverError
 from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import cross, dot, load_mat, store_mat
 
-# What a sweep mixes into each other is below round-off where its rotations were all below 1e-8 and all cosines of
-# columns below 1e-9. (One alone would not do: nearly equal lengths turn a small cosine into a large angle, very
-# different lengths a large cosine into a small one.)
+# The remaining error is below round-off after a sweep whose rotation angles are all below 1e-8 and whose cosines
+# between columns are all below 1e-9. (Both are needed: a small cosine needs a large angle where the lengths are nearly
+# equal, and a large cosine needs only a small one where they are very different.) The constants are squares.
 _SMALL_ANGLE = 1e-16
 _SMALL_COSINE = 1e-18
 _ORTHOGONAL = 1e-31
@@ -49,7 +49,7 @@ def svd3(F):
     if largest == 0.0:
         identity = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
         return identity, (0.0, 0.0, 0.0), identity
-    # A power of two changes no digit; squares of the scaled entries can neither overflow nor vanish.
+    # Scaling by a power of two is exact; squares of the scaled entries can neither overflow nor underflow.
     e = math.frexp(largest)[1] if largest < math.inf else 0
     U, s, V = _svd_of_scaled(
         (
@@ -69,7 +69,7 @@ def svd3(F):
 
 @njit(error_model="numpy")
 def _orthogonalize(p, q, vp, vq, done):
-    """Rotate columns p, q of F V (and of V) until orthogonal; `done` turns False where another sweep is needed."""
+    """Rotate columns p, q of F V (and of V) until orthogonal; `done` becomes False where another sweep is needed."""
     app = dot(p, p)
     aqq = dot(q, q)
     apq = dot(p, q)
@@ -116,7 +116,7 @@ def _svd_of_scaled(F):
         if done:
             break
 
-    # Longest column first; an exchange with one change of sign keeps det V = +1.
+    # Longest column first. Each exchange changes one sign, so that det V stays +1.
     n0, n1, n2 = dot(b0, b0), dot(b1, b1), dot(b2, b2)
     if n0 < n1:
         b0, b1, v0, v1, n0, n1 = b1, _negated(b0), v1, _negated(v0), n1, n0
@@ -138,12 +138,12 @@ def _svd_of_scaled(F):
 
 @njit(error_model="numpy")
 def _unit_orthogonal(b, u):
-    """The unit vector nearest to the direction of b that is orthogonal to the unit vector u; any, where b has none."""
+    """The unit vector orthogonal to the unit vector u that is nearest to the direction of b (any for parallel b)."""
     along = dot(b, u)
     r = (b[0] - along * u[0], b[1] - along * u[1], b[2] - along * u[2])
     square = dot(r, r)
     if not square > 1e-200 or square < 1e-8 * along * along:
-        # b is null or parallel to u to round-off: take the axis that u has least of.
+        # b is zero or parallel to u to round-off: use the axis along which u is smallest.
         if abs(u[0]) <= abs(u[1]) and abs(u[0]) <= abs(u[2]):
             r = (1.0 - u[0] * u[0], -u[0] * u[1], -u[0] * u[2])
         elif abs(u[1]) <= abs(u[2]):
@@ -173,7 +173,7 @@ def _svd_batch(F, U, s, V):
 def rotation_variant_svd(
     F: ArrayLike,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """F = U diag(s) V^T with rotations U and V; the sign of det F is that of the last singular value.
+    """F = U diag(s) V^T with rotations U and V; the last singular value has the sign of det F.
 
     Parameters
     ----------

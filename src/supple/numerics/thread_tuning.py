@@ -1,67 +1,67 @@
-"""Choosing between one thread and several, by the clock.
+"""Choosing between one thread and several by measured time.
 
-Threads that must meet forty times a frame help on a quiet machine, and hurt where another process has one of the
-cores: a frame can then take ten times as long. Nobody can know beforehand; both ways give the same bits, so the
-faster one is used. What is timed is called a turn here: a substep of XPBD, a linear system of Newton's method.
+Threads that synchronize forty times a frame are faster on an idle machine. Where another process uses one of the
+cores, a frame can take ten times as long. This cannot be predicted. Both modes give the same bits, so the faster one
+is used. The unit that is timed is called a task here: a substep of XPBD, or a linear system of Newton's method.
 """
 
 from __future__ import annotations
 
-# How many turns the slower way rests before it is tried again, for one turn; twice as many each time that it loses, up
-# to so many times the shortest rest.
-SHORTEST_REST, LONGEST = 400, 32
-# Weight of a new measurement in the average of its way.
+# After how many tasks the slower mode is measured again, for one task. The interval is doubled each time that the mode
+# is still slower, up to a multiple of the shortest interval.
+SHORTEST_INTERVAL, LARGEST_MULTIPLE = 400, 32
+# Weight of a new measurement in the average of its mode.
 WEIGHT = 0.1
-# How much slower than the other way was the present one may become before they change places.
-PATIENCE = 1.2
+# The present mode is changed where it becomes slower than the last measurement of the other mode by this factor.
+TOLERATED_SLOWDOWN = 1.2
 
 
-class Pace:
-    """Remembers how long turns took either way.
+class ThreadTuner:
+    """Chooses the faster of two modes, one thread or several, from measured times.
 
     Parameters
     ----------
-    choice : whether there is anything to choose; without it, `parallel` is always the answer.
-    parallel : the way to begin with; rest : the shortest one of the slower way, in turns
+    choice : whether there are two modes to choose from; otherwise `parallel` is always used.
+    parallel : the mode to start with; interval : the shortest one between measurements of the slower mode, in tasks
     """
 
-    def __init__(self, choice: bool, parallel: bool, rest: int = SHORTEST_REST) -> None:
+    def __init__(self, choice: bool, parallel: bool, interval: int = SHORTEST_INTERVAL) -> None:
         self.choice = choice
         self.parallel = parallel
         self._seconds: dict[bool, float] = {}
-        self._started: set[bool] = set()
-        self._shortest = self._rest = rest
-        self._rested = 0
+        self._compiled: set[bool] = set()
+        self._shortest = self._interval = interval
+        self._tasks = 0
 
     def choose(self) -> bool:
-        """Whether the next turn should run on several threads."""
+        """Whether the next task should run on several threads."""
         if not self.choice or self.parallel not in self._seconds:
             return self.parallel
         other = not self.parallel
-        return other if other not in self._seconds or self._rested >= self._rest else self.parallel
+        return other if other not in self._seconds or self._tasks >= self._interval else self.parallel
 
     def note(self, parallel: bool, seconds: float) -> None:
-        """Learn how long a turn took."""
+        """Take the measured time of a task into account."""
         if not self.choice:
             return
-        if parallel not in self._started:
-            self._started.add(parallel)  # the first one of a way may have waited for the compiler
+        if parallel not in self._compiled:
+            self._compiled.add(parallel)  # the first task of a mode may include the compilation
             return
         other = not self.parallel
         if parallel == other:
-            self._rested = 0
+            self._tasks = 0
             self._seconds[other] = seconds
             if seconds < self._seconds[self.parallel]:
                 self._change(self._shortest)
             else:
-                self._rest = min(2 * self._rest, LONGEST * self._shortest)
+                self._interval = min(2 * self._interval, LARGEST_MULTIPLE * self._shortest)
             return
         before = self._seconds.get(parallel, seconds)
         self._seconds[parallel] = (1.0 - WEIGHT) * before + WEIGHT * seconds
-        self._rested += 1
-        if self._seconds[parallel] > PATIENCE * self._seconds.get(other, float("inf")):
-            self._change(self._rest)
+        self._tasks += 1
+        if self._seconds[parallel] > TOLERATED_SLOWDOWN * self._seconds.get(other, float("inf")):
+            self._change(self._interval)
 
-    def _change(self, rest: int) -> None:
+    def _change(self, interval: int) -> None:
         self.parallel = not self.parallel
-        self._rest, self._rested = rest, 0
+        self._interval, self._tasks = interval, 0

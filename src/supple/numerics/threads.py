@@ -1,4 +1,4 @@
-"""How many threads a parallel kernel may use: one where the work is too small to share."""
+"""How many threads a parallel kernel may use: one where the work is too small to be divided."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import numba
 def threads_for(work: int, least: int) -> Iterator[None]:
     """Run Numba's parallel kernels on one thread where `work` is below `least`.
 
-    A small pass takes a fraction of a millisecond; where another process has the second core, waiting for it costs many
-    times that. Kernels here give the same bits on any number of threads.
+    A small pass takes a fraction of a millisecond. Where another process uses the second core, waiting for a thread
+    there takes many times longer. Kernels here give the same bits on any number of threads.
     """
     with one_thread(work < least):
         yield

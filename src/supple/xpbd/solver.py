@@ -16,7 +16,7 @@ from numba.core import config
 from numpy.typing import NDArray
 
 from supple.errors import SolverError
-from supple.numerics.thread_tuning import Pace
+from supple.numerics.thread_tuning import ThreadTuner
 from supple.solver import Solver
 from supple.state import State, Status, StepReport
 from supple.system import System
@@ -62,7 +62,7 @@ class XPBDWorkspace:
     momentum: MomentumRestore | None
     external: ExternalForces
     collisions: Collisions
-    pace: Pace
+    pace: ThreadTuner
     anchors: StitchAnchors
     extended: NDArray[np.float64]
     extended_previous: NDArray[np.float64] = field(init=False)
@@ -140,7 +140,7 @@ class XPBD(Solver):
             momentum=MomentumRestore(inner) if self.momentum_restore else None,
             external=ExternalForces(inner),
             collisions=Collisions(inner, self.contact),
-            pace=Pace(choice=parallel and self.threads is None, parallel=parallel),
+            pace=ThreadTuner(choice=parallel and self.threads is None, parallel=parallel),
             anchors=StitchAnchors(inner),
             extended=extended,
         )

@@ -29,29 +29,29 @@ def check(
     json: Path | None = None,
     quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
 ) -> ExitCode:
-    """Verify a recording, independently of the solver that made it. Exit code 0: all passed, 1: something failed.
+    """Verify a recording, independently of the solver that wrote it. Exit code 0: all checks passed, 1: one failed.
 
     Parameters
     ----------
     recording
         The recording (.vtkhdf).
     every
-        Check every k-th frame, and the last.
+        Check every k-th frame and the last one.
     only
-        Make only the check of this name; may be given several times.
+        Run only the check of this name; may be given several times.
     skip
-        Leave out the check of this name; may be given several times.
+        Omit the check of this name; may be given several times.
     max_volume_change
-        How far a body's volume may change, as a share of it. Without it: 0.5 where Poisson's ratio is 0.45 or more,
-        else any.
+        Largest relative change of a body's volume. Without it: 0.5 where Poisson's ratio is 0.45 or more, otherwise
+        unlimited.
     max_energy_gain
-        How far the energy may grow where nothing does work, as a share of what is moved about; 0.05 without it.
+        Largest relative growth of the energy where no external work is done; 0.05 without it.
     max_momentum_change
-        How far momenta may change without a cause, as a share of themselves; 1e-6 without it.
+        Largest relative change of momenta without an external force; 1e-6 without it.
     json
         Write the results to this file.
     quiet
-        Print nothing but what failed.
+        Print only failed checks.
     """
     from supple.output.check.checker import check_recording
     from supple.output.check.settings import CheckSettings
@@ -84,8 +84,8 @@ def _print(report: CheckReport, *, only_failures: bool) -> None:
     from supple.output.check.report import Verdict
 
     colors = {Verdict.PASS: "green", Verdict.FAIL: "bold red", Verdict.SKIPPED: "dim"}
-    looked = "all" if report.frames == report.frames_checked else f"{report.frames_checked} of"
-    title = escape(f"{report.path}: {looked} {report.frames} frames checked")
+    checked = "all" if report.frames == report.frames_checked else f"{report.frames_checked} of"
+    title = escape(f"{report.path}: {checked} {report.frames} frames checked")
     table = Table(title=title, title_justify="left", box=None, pad_edge=False)
     table.add_column("check", style="bold", no_wrap=True)
     table.add_column("verdict", no_wrap=True)

@@ -34,7 +34,7 @@ def demo(
     Parameters
     ----------
     name
-        Which demo; without it, the demos are listed.
+        Name of the demo; without it, the demos are listed.
     list_
         List the demos.
     output
@@ -42,19 +42,20 @@ def demo(
     steps
         Number of frames, instead of the demo's own. Claims that need more frames do not hold then.
     solver
-        Kind of solver: xpbd or implicit, where the demo has both.
+        Kind of solver, xpbd or implicit, for a demo that has both.
     trace
-        CSV file for every iteration of Newton's method; for the implicit solver.
+        CSV file with every iteration of Newton's method; for the implicit solver.
     page
         Write index.html, which plays the recording in a browser.
     plot
         Write plot.png: energies, momentum, volume ratio and smallest J over time.
     quiet
-        Print no progress; only what was measured.
+        Print only the claims and what was measured.
     live
-        Nothing is recorded: show the scene in a browser while it runs, to be dragged and tuned, until Ctrl-C.
+        Show the scene in a browser while it runs, until Ctrl-C, so that it can be dragged and tuned. Nothing is
+        recorded.
     host
-        With --live: address to serve at; 0.0.0.0 is all of this machine's.
+        With --live: address to serve at; 0.0.0.0 is all addresses of this machine.
     port
         With --live: port to serve at; without it, 8080 or the next free one.
     open_

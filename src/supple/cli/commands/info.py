@@ -19,7 +19,7 @@ EXTRAS = ("pytetwild", "pymeshfix", "usd-core", "pyvista")
 
 
 def info(file: Path | None = None, /) -> None:
-    """Say what is in a file: counts, sizes, quality, problems. Without a file: versions, platform and threads.
+    """Print what a file contains: counts, sizes, quality, problems. Without a file: versions, platform and threads.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ def _recording(file: Path) -> None:
             ("tets", str(len(recording.tets))),
             ("volume", f"{recording.rest_volumes.sum():.6g} m^3 at rest"),
             ("mass", f"{recording.masses.sum():.6g} kg"),
-            ("solver", recording.solver or "not said"),
+            ("solver", recording.solver or "unknown"),
             ("smallest J", f"{J.min():.6g} at t = {recording.times[int(np.argmin(J))]:.6g} s"),
             ("ended", str(recording.statuses[-1])),
             ("scene file", "inside" if recording.scene_text else "none"),

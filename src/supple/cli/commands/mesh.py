@@ -44,19 +44,19 @@ def mesh(
     quality
         TetGen's bound on circumradius over shortest edge, above 1: smaller is better shaped, and more tets.
     min_dihedral
-        TetGen's aim for the smallest dihedral angle [degrees]; much above 18 it may not end.
+        Smallest dihedral angle that TetGen tries to reach [degrees]; with values much above 18 it may not end.
     keep_surface
         Add no vertices on the surface.
     mesher
-        "auto" takes TetGen for a clean surface and fTetWild, an extra, for any other.
+        "auto" uses TetGen for a clean surface, and fTetWild (an extra) for any other.
     repair
-        Mend a surface that is not clean first, and say what that changed.
+        First repair a surface that is not clean, and print what the repair changed.
     envelope
-        How far fTetWild may move the surface, as a part of the bounding box's diagonal.
+        How far fTetWild may move the surface, as a fraction of the bounding box's diagonal.
     time_limit
-        Seconds that the mesher may take.
+        Time limit of the mesher [s].
     memory_limit
-        GiB of address space that the mesher may take.
+        Limit on the mesher's address space [GiB].
     base_index
         Number of the first vertex in TetGen's files.
     """
@@ -68,7 +68,7 @@ def mesh(
     from supple.mesh.surface import SurfaceMesh
     from supple.output.files.atomic import refuse_to_replace
 
-    # Before minutes of meshing, not after.
+    # Checked before the meshing, which can take minutes.
     if output.suffix.lower() not in TET_EXTENSIONS:
         raise MeshError(f"{output}: the extension must be one of {', '.join(TET_EXTENSIONS)}")
     if not output.absolute().parent.is_dir():
@@ -131,6 +131,6 @@ def _summarize(tets: TetMesh, report: MeshingReport, files: list[Path]) -> None:
     table.add_column(style="bold")
     table.add_column(overflow="fold")
     for name, value in rows.items():
-        # Text is not searched for markup: a file may be called [bold].
+        # Text is not parsed as markup: a file may be called [bold].
         table.add_row(name, Text(value))
     Console().print(table)

@@ -14,7 +14,7 @@ def plot(
     *,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
 ) -> None:
-    """Draw what a recording measured: energies, momenta, volumes, smallest J, and time per step.
+    """Plot the measurements of a recording: energies, momenta, volumes, smallest J, and time per step.
 
     Parameters
     ----------

@@ -26,14 +26,14 @@ def run(
 ) -> int:
     """Simulate a scene file and record it.
 
-    The recording is written while the scene runs and is readable up to the last whole frame, whatever happens.
+    The recording is written while the scene runs, and is always readable up to the last complete frame.
 
     Parameters
     ----------
     scene
         The scene file (.yaml); `supple schema` describes it.
     output
-        Folder for recording.vtkhdf, index.html and plot.png; it is made where it is missing.
+        Folder for recording.vtkhdf, index.html and plot.png; it is created where it does not exist.
     steps
         Number of frames, instead of the file's.
     dt
@@ -41,13 +41,13 @@ def run(
     solver
         Kind of solver, instead of the file's, with its default parameters.
     trace
-        CSV file for every iteration of Newton's method; for the implicit solver.
+        CSV file with every iteration of Newton's method; for the implicit solver.
     separate
-        Move bodies apart that intersect at the start, where a small translation does it, and say which and how far.
+        Move bodies apart that intersect at the start, where a small translation separates them, and print the moves.
     page
-        Write index.html, which plays the recording in a browser; as the file says without this.
+        Write index.html, which plays the recording in a browser; without this, as the scene file specifies.
     plot
-        Write plot.png; as the file says without this.
+        Write plot.png; without this, as the scene file specifies.
     quiet
         Print neither progress nor summary.
     """

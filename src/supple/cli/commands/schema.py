@@ -10,12 +10,12 @@ from cyclopts import Parameter
 
 
 def schema(*, output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None) -> None:
-    """Write the JSON Schema of scene files, for editors that complete and check them.
+    """Write the JSON Schema of scene files, for editors with completion and validation.
 
     Parameters
     ----------
     output
-        File to write; without it, the schema goes to the screen.
+        File to write; without it, the schema is printed.
     """
     import json
 

@@ -19,10 +19,10 @@ def view(
     port: Port = None,
     open_: Open = True,
 ) -> None:
-    """Show a scene while it is simulated, to be dragged and tuned, or a recording, in a browser.
+    """Show a recording, or a scene that is simulated live and can be dragged and tuned, in a browser.
 
-    Runs until Ctrl-C. The page is served to this machine only, unless --host says otherwise; then its address holds a
-    secret, and only who has the address gets in. A scene's meshes must be in its file's folder.
+    Runs until Ctrl-C. Without --host, only this machine can open the page. With it, the address of the page contains a
+    secret, and only browsers with that address are accepted. A scene's meshes must be in the folder of its file.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def view(
     solver
         Kind of solver, instead of the file's, with its default parameters.
     host
-        Address to serve at; 0.0.0.0 is all of this machine's.
+        Address to serve at; 0.0.0.0 is all addresses of this machine.
     port
         Port to serve at; without it, 8080 or the next free one.
     open_
@@ -44,7 +44,7 @@ def view(
         if solver is not None:
             from supple.errors import OutputError
 
-            raise OutputError(f"{found} is a recording, which no solver changes; leave --solver out")
+            raise OutputError(f"{found} is a recording, which uses no solver; remove --solver")
         serve_page(found, host, port, open_)
         return
 
@@ -60,11 +60,11 @@ def view(
 
 
 def find_source(path: Path) -> Path:
-    """The scene file or recording that is meant.
+    """The scene file or recording at a path, which may be a folder.
 
     Raises
     ------
-    OutputError : where there is none.
+    OutputError : where there is no such file.
     """
     from supple.errors import OutputError
 

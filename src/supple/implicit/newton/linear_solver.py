@@ -18,7 +18,7 @@ from supple.numerics.sparse.block_csr import SERIAL_BLOCKS, BlockPattern, BlockR
 from supple.numerics.sparse.block_sum import JointPattern, join
 from supple.numerics.sparse.pcg import conjugate_gradients
 from supple.numerics.sparse.preconditioner import RowOrder, TwoLevel, order_rows, two_level
-from supple.numerics.thread_tuning import Pace
+from supple.numerics.thread_tuning import ThreadTuner
 from supple.numerics.threads import one_thread
 from supple.system import System
 
@@ -27,7 +27,7 @@ logger = logging.getLogger(__name__)
 # Where CG has not converged after so many iterations, factorizing is likely faster.
 _STALLED = 400
 
-# After so many systems the slower number of threads is tried again (see `Pace`); a system is as much work as its
+# After so many systems the slower number of threads is tried again (see `ThreadTuner`); a system is as much work as its
 # iterations, and its assembly as much as so many of them.
 _REST = 40
 _ASSEMBLY = 10
@@ -66,7 +66,7 @@ class LinearSolver:
     joined: tuple[NDArray[np.int32], NDArray[np.int32]] | None = None
     age: int = -1
     fresh_iterations: int = 0
-    pace: Pace = field(init=False)
+    pace: ThreadTuner = field(init=False)
     parallel: bool = True
     spent: float = 0.0
 
@@ -85,7 +85,7 @@ class LinearSolver:
     def __post_init__(self) -> None:
         self.matrix, self.preconditioner = self.elements, self.elements_only
         choice = numba.get_num_threads() > 1 and self.pattern.blocks >= SERIAL_BLOCKS
-        self.pace = Pace(choice, choice, _REST)
+        self.pace = ThreadTuner(choice, choice, _REST)
 
     def begin_step(self) -> None:
         """Forget what earlier steps left behind, so that a step depends on its state alone."""
