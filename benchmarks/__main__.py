@@ -1,4 +1,4 @@
-"""All benchmarks after each other: `make bench`, or `python -m benchmarks`."""
+"""All benchmarks in sequence: `make bench`, or `python -m benchmarks`."""
 
 from benchmarks import contact_scenes, hanging_beam, implicit_scaling, live, projections, startup, work_precision
 

@@ -1,4 +1,4 @@
-"""Cost of a step with contact, and where it goes: the torture scenes, and some of them with about 20,000 tets.
+"""Cost of a step with contact, and of its parts: the torture scenes, and some of them with about 20,000 tets.
 
 usage: python -m benchmarks.contact_scenes [SCENE ...] [--quick]
 
@@ -17,7 +17,7 @@ import supple as sp
 from supple.demos.demo import Demo
 from supple.demos.torture.registry import TORTURE
 
-MOST_STEPS = 100
+MAX_STEPS = 100
 PARTS = ("contact", "elasticity", "linear_solve")
 
 
@@ -26,7 +26,7 @@ def measured(demo: Demo) -> dict[str, float]:
     tets = most = touching = iterations = 0
     seconds, parts = 0.0, dict.fromkeys(PARTS, 0.0)
     converged, loaded = True, False
-    for frame in sp.simulate(demo.scene(), demo.solver(), demo.dt, min(demo.steps, MOST_STEPS)):
+    for frame in sp.simulate(demo.scene(), demo.solver(), demo.dt, min(demo.steps, MAX_STEPS)):
         report, details = frame.report, frame.report.details
         tets = len(frame.system.tets)
         converged &= report.status == "converged"
@@ -65,11 +65,11 @@ def main(names: Sequence[str] = (), quick: bool = False) -> None:
             raise SystemExit(
                 f"there is no scene {item!r}; there are {', '.join(TORTURE)}, with :small, :full, some :large"
             )
-        said = measured(demo)
+        result = measured(demo)
         print(
-            f"{item:<16}{said['tets']:7.0f}{said['contacts']:10.0f}{said['iterations']:8.1f}{said['seconds']:9.3f}"
-            f"{said['contact']:9.0%}{said['elasticity']:9.0%}{said['linear_solve']:7.0%}"
-            f"{'' if said['converged'] else '  not every step converged'}",
+            f"{item:<16}{result['tets']:7.0f}{result['contacts']:10.0f}{result['iterations']:8.1f}{result['seconds']:9.3f}"
+            f"{result['contact']:9.0%}{result['elasticity']:9.0%}{result['linear_solve']:7.0%}"
+            f"{'' if result['converged'] else '  not every step converged'}",
             flush=True,
         )
 

@@ -1,4 +1,4 @@
-"""The hanging beam in Supple, Newton and MuJoCo flex, in turns in one run: ms per frame of 1/60 s, and ratios.
+"""The hanging beam in Supple, Newton and MuJoCo flex, alternately in one run: ms per frame of 1/60 s, and ratios.
 
 usage: python -m benchmarks.hanging_beam [--busy]
 """
@@ -10,7 +10,7 @@ import sys
 from functools import partial
 from pathlib import Path
 
-from benchmarks.measuring import PEERS_PYTHON, busy_core, in_turns, peers_installed, run_json
+from benchmarks.measuring import PEERS_PYTHON, alternate, busy_core, peers_installed, run_json
 
 HERE = Path(__file__).parent
 OURS = "Supple XPBD, 20 substeps"
@@ -19,12 +19,12 @@ OURS_WITH_CONTACT = "Supple XPBD, 20 substeps, self-collision"
 
 def main(busy: bool = False, rounds: int = 3, frames: int = 20) -> None:
     if not peers_installed():
-        sys.exit("the peers are not installed; run `make bench`, which does it")
+        sys.exit("the other programs are not installed; run `make bench`, which installs them")
     ours = partial(run_json, sys.executable, HERE / "our_beam.py")
     newton = partial(run_json, PEERS_PYTHON, HERE / "peers" / "newton_beam.py")
     mujoco = partial(run_json, PEERS_PYTHON, HERE / "peers" / "mujoco_beam.py")
-    contenders = {
-        # None of the peers' beams looks for collisions with itself, so ours is shown without and with it.
+    programs = {
+        # The other programs do not detect collisions of the beam with itself, so Supple runs without and with it.
         OURS: partial(ours, "xpbd_without_contact", 2, 20, frames),
         OURS_WITH_CONTACT: partial(ours, "xpbd", 2, 20, frames),
         "Newton XPBD, 20 substeps x 1 iteration": partial(newton, "xpbd", 2, 20, 1, frames),
@@ -34,10 +34,10 @@ def main(busy: bool = False, rounds: int = 3, frames: int = 20) -> None:
         "MuJoCo flex, discrete, 1/60 s": partial(mujoco, 2, 1 / 60, "discrete", frames),
     }
     with busy_core(busy):
-        best = in_turns(contenders, rounds)
+        best = alternate(programs, rounds)
     # Tet counts differ by mesh generator (5 or 6 tets a cell), so the ratio compares time per tet.
     our_cost = best[OURS]["ms_per_frame"] / best[OURS]["tets"]
-    print(f"\nHanging beam 1.2 x 0.4 x 0.4 m, {'one core busy' if busy else 'quiet machine'}, best of {rounds} rounds")
+    print(f"\nHanging beam 1.2 x 0.4 x 0.4 m, {'one core busy' if busy else 'idle machine'}, best of {rounds} rounds")
     print(f"{'solver':44}{'tets':>8}{'ms/frame':>11}{'us/tet':>9}{'ratio/tet':>11}{'ratio':>8}  {'finite':6}")
     for name, r in best.items():
         cost = r["ms_per_frame"] / r["tets"]
@@ -49,5 +49,5 @@ def main(busy: bool = False, rounds: int = 3, frames: int = 20) -> None:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--busy", action="store_true", help="let another process spin on one core meanwhile")
+    parser.add_argument("--busy", action="store_true", help="keep one core busy with another process")
     main(busy=parser.parse_args().busy)

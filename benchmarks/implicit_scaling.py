@@ -2,7 +2,7 @@
 
 usage: python -m benchmarks.implicit_scaling [--quick] [--threads N]
 
-The hanging beam of `our_beam.py` in backward Euler steps of 1/60 s, each size in a process of its own.
+The hanging beam of `our_beam.py` in backward Euler steps of 1/60 s, each size in a separate process.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ def main(quick: bool = False, threads: int | None = None) -> None:
     print(f"{'tets':>9}{'ms/step':>10}{'Newton/step':>13}{'us/tet':>9}{'MB':>8}  statuses")
     sizes, times = [], []
     for scale in SCALES[: 3 if quick else None]:
-        said = run_json(
+        result = run_json(
             sys.executable,
             HERE / "our_beam.py",
             *("implicit", scale, 1 / 60, "backward_euler", 0, FRAMES),
             threads=threads,
         )
-        sizes.append(said["tets"])
-        times.append(said["ms_per_step"])
-        peak = "?" if said["peak_MB"] is None else f"{said['peak_MB']:.0f}"
+        sizes.append(result["tets"])
+        times.append(result["ms_per_step"])
+        peak = "?" if result["peak_MB"] is None else f"{result['peak_MB']:.0f}"
         print(
-            f"{sizes[-1]:9d}{times[-1]:10.1f}{said['iterations_per_step']:13.1f}{1e3 * times[-1] / sizes[-1]:9.2f}"
-            f"{peak:>8}  {', '.join(said['statuses'])}",
+            f"{sizes[-1]:9d}{times[-1]:10.1f}{result['iterations_per_step']:13.1f}{1e3 * times[-1] / sizes[-1]:9.2f}"
+            f"{peak:>8}  {', '.join(result['statuses'])}",
             flush=True,
         )
     exponent = np.polyfit(np.log(sizes), np.log(times), 1)[0]

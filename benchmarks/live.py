@@ -1,4 +1,4 @@
-"""The live page's cost: the same frames without it, in its own process, and with the page served, in turns.
+"""The cost of the live page: the same frames without it, in its process, and with the page served, alternately.
 
 A ball of 5k tets falls on a floor. Each round simulates the same frames in all three ways, as fast as they can; ratios
 are taken within a round, and their median over the rounds, so that a machine that is busy now and then does not matter
@@ -58,7 +58,7 @@ def headless(live: LiveSource, frames: int) -> float:
 
 
 def behind(engine: Engine, frames: int, look: float) -> float:
-    """The same in the engine's process, from the command to the last frame as this process sees it [ms]."""
+    """The same in the engine's process, from the command until this process receives the last frame [ms]."""
     began = time.perf_counter()
     engine.send(Reset())
     number = engine.send(Step(frames))
@@ -70,7 +70,7 @@ def behind(engine: Engine, frames: int, look: float) -> float:
 
 
 def played(engine: Engine, seconds: float) -> str:
-    """How a simulation does against the clock."""
+    """The simulated time per wall-clock time of a simulation in real time."""
     engine.send(Reset())
     engine.send(Play())
     end = time.perf_counter() + seconds
@@ -85,7 +85,7 @@ def played(engine: Engine, seconds: float) -> str:
 
 @contextlib.contextmanager
 def listening(url: str) -> Iterator[None]:
-    """A process with a websocket that takes what a browser would get."""
+    """A process with a websocket that receives what a browser would receive."""
     listener = subprocess.Popen(
         [sys.executable, "-c", LISTEN, url.replace("http", "ws", 1)], stdout=subprocess.PIPE, text=True
     )
@@ -99,27 +99,27 @@ def listening(url: str) -> Iterator[None]:
 
 
 def load() -> str:
-    """How busy the machine was in the last minute."""
+    """The load of the machine in the last minute."""
     return f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
 
 
 def main(rounds: int = 15, frames: int = 90, edge_length: float = 0.1, seconds: float = 10.0) -> dict[str, list[float]]:
-    """Run all ways in turns and print them side by side. Returns the times of each, by round [ms/frame]."""
+    """Run all programs alternately and print their times. Returns the times of each, by round [ms/frame]."""
     live = source(edge_length)
     at_start = load()
     with Engine(live) as engine, opened_page(live, Address(port=0)) as page, listening(page.url):
         behind_page = page.shown.desk.simulation
         assert isinstance(behind_page, Engine)
-        contenders: dict[str, Callable[[], float]] = {
+        programs: dict[str, Callable[[], float]] = {
             "headless": lambda: headless(live, frames),
             "engine": lambda: behind(engine, frames, 1 / 60),
             "page": lambda: behind(behind_page, frames, 0.005),
         }
-        for warm_up in contenders.values():
+        for warm_up in programs.values():
             warm_up()
         times: dict[str, list[float]] = {way: [] for way in WAYS}
         for _ in range(rounds):
-            for way, run in contenders.items():
+            for way, run in programs.items():
                 times[way].append(run())
         clocks = {"engine": played(engine, seconds), "page": played(behind_page, seconds)}
         tets = engine.description.n_tets

@@ -1,4 +1,4 @@
-"""How benchmarks measure: contenders take turns, the fastest of several rounds counts; and a busy core on request."""
+"""How benchmarks measure: programs run alternately, and the fastest round counts; optionally with a busy core."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ _SCRIPTS = "Scripts" if os.name == "nt" else "bin"
 PEERS_PYTHON = ROOT / ".venv-peers" / _SCRIPTS / "python"
 
 
-def in_turns(contenders: dict[str, Callable[[], dict]], rounds: int) -> dict[str, dict]:
-    """Run every contender once a round; keep each one's fastest round, by `ms_per_frame`."""
+def alternate(programs: dict[str, Callable[[], dict]], rounds: int) -> dict[str, dict]:
+    """Run every program once per round; return the fastest round of each, by `ms_per_frame`."""
     best: dict[str, dict] = {}
     for _ in range(rounds):
-        for name, run in contenders.items():
+        for name, run in programs.items():
             result = run()
             if name not in best or result["ms_per_frame"] < best[name]["ms_per_frame"]:
                 best[name] = result
@@ -40,9 +40,9 @@ def run_json(python: str | Path, script: Path, *arguments: object, threads: int 
 
 
 @contextlib.contextmanager
-def busy_core(wanted: bool) -> Iterator[None]:
-    """Another process that spins on one core for as long as the block lasts, if wanted."""
-    spinner = subprocess.Popen([sys.executable, "-c", "while True: pass"]) if wanted else None
+def busy_core(enabled: bool) -> Iterator[None]:
+    """Keep one core busy with another process during the block, if enabled."""
+    spinner = subprocess.Popen([sys.executable, "-c", "while True: pass"]) if enabled else None
     try:
         yield
     finally:
@@ -52,5 +52,5 @@ def busy_core(wanted: bool) -> Iterator[None]:
 
 
 def peers_installed() -> bool:
-    """Whether the environment of the peers is there (see the Makefile's `bench`)."""
+    """Whether the environment of the other programs exists (see the Makefile's `bench`)."""
     return PEERS_PYTHON.exists()

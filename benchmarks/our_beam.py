@@ -28,7 +28,7 @@ def beam_scene(scale: int) -> sp.Scene:
 
 
 def peak_megabytes() -> float | None:
-    """The most memory this process has held; None where the system does not tell (Windows)."""
+    """Peak memory of this process; None where the system does not report it (Windows)."""
     try:
         import resource
     except ImportError:

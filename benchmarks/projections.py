@@ -1,6 +1,6 @@
-"""Constraint projections per second beside plain C Gauss-Seidel: `python -m benchmarks.projections [--busy] [--quick]`.
+"""Constraint projections per second, compared with plain C: `python -m benchmarks.projections [--busy] [--quick]`.
 
-The contenders take turns on the same mesh and the fastest round counts. C is compiled in the same run. Columns:
+The programs run alternately on the same mesh, and the fastest round counts. C is compiled in the same run. Columns:
 
     tets         size of the box mesh
     C            edges + volume in plain C, one thread                       [million projections / s]
@@ -80,20 +80,20 @@ def our_sweep(system: System, threads: int) -> Callable[[], None]:
 
 
 def our_substep(system: System, threads: int, substeps: int) -> Callable[[], None]:
-    """`substeps` whole substeps, momentum restore included."""
+    """`substeps` whole substeps, including the restoring of momentum."""
     solver = XPBD(threads=threads, contact=None, substeps=substeps)
     workspace = solver.prepare(system)
     state = initial_state(system.scene)
     return lambda: (solver.step(system, state, substeps * H, workspace), None)[1]
 
 
-def fastest(contenders: dict[str, Callable[[], None]], repeats: int, rounds: int) -> dict[str, float]:
-    """Seconds of one call of each contender: they take turns, and the fastest round counts."""
-    for run in contenders.values():
+def fastest(programs: dict[str, Callable[[], None]], repeats: int, rounds: int) -> dict[str, float]:
+    """Seconds of one call of each program; they run alternately, and the fastest round counts."""
+    for run in programs.values():
         run()
-    best = dict.fromkeys(contenders, np.inf)
+    best = dict.fromkeys(programs, np.inf)
     for _ in range(rounds):
-        for name, run in contenders.items():
+        for name, run in programs.items():
             start = time.perf_counter()
             for _ in range(repeats):
                 run()
@@ -109,14 +109,14 @@ def measure(divisions: int, reference: ctypes.CDLL | None, rounds: int) -> dict[
     count = len(mesh.edges) + len(mesh.tets)
     repeats = max(1, round(2e6 / count))
     substeps = max(2, min(20, repeats))
-    contenders: dict[str, Callable[[], None]] = {}
+    programs: dict[str, Callable[[], None]] = {}
     if reference is not None:
-        contenders["C"] = reference_sweep(reference, classic)
+        programs["C"] = reference_sweep(reference, classic)
     for threads in thread_counts():
-        contenders[f"{threads}"] = our_sweep(classic, threads)
-        contenders[f"snh {threads}"] = our_sweep(neo_hookean, threads)
-        contenders[f"step {threads}"] = our_substep(classic, threads, substeps)
-    seconds = fastest(contenders, repeats, rounds)
+        programs[f"{threads}"] = our_sweep(classic, threads)
+        programs[f"snh {threads}"] = our_sweep(neo_hookean, threads)
+        programs[f"step {threads}"] = our_substep(classic, threads, substeps)
+    seconds = fastest(programs, repeats, rounds)
     rates = {name: count / s / 1e6 for name, s in seconds.items()}
     for threads in thread_counts():
         rates[f"snh {threads}"] = len(mesh.tets) / seconds[f"snh {threads}"] / 1e6
@@ -126,7 +126,7 @@ def measure(divisions: int, reference: ctypes.CDLL | None, rounds: int) -> dict[
 
 
 def thread_counts() -> list[int]:
-    """One thread, and two where there are two."""
+    """One thread, and two where the machine has them."""
     return [1, 2] if config.NUMBA_NUM_THREADS > 1 else [1]  # pyright: ignore[reportAttributeAccessIssue]
 
 

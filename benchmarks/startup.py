@@ -1,4 +1,4 @@
-"""What a person waits for: `import supple`, and the time from typing a command to the first step, first and second run.
+"""Start-up times: `import supple`, and the time to the first step of a simulation, first and second run.
 
 usage: python -m benchmarks.startup
 """

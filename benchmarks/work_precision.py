@@ -2,7 +2,7 @@
 
 usage: python -m benchmarks.work_precision [--quick] [--scale SCALE] [--threads N]
 
-Every solver has a mesh and a material model of its own, so that comparing positions between them would measure those.
+Every solver has its own mesh and material model, so a comparison of positions between solvers would measure those.
 Here each is held against itself in the limit of small steps: positions at t = 1/3 s, RMS over all vertices, relative to
 the mean displacement of the free end. Nobody looks for contacts of the beam with itself. Supple's two solvers share
 mesh and material: their limits are compared too.
@@ -20,27 +20,27 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.measuring import PEERS_PYTHON, in_turns, peers_installed, run_json
+from benchmarks.measuring import PEERS_PYTHON, alternate, peers_installed, run_json
 
 HERE = Path(__file__).parent
 FRAMES = 20
 
-# A run takes the file for its positions and returns what the script printed.
+# A run receives the path of the file for its positions, and returns what the script printed.
 Run = Callable[[Path], dict]
 
 
 @dataclass(frozen=True)
 class Family:
-    """One method: the run that stands for its limit, and runs that people would make."""
+    """One method: its reference run, and typical runs."""
 
     name: str
     reference: tuple[str, Run]
-    contenders: dict[str, Run]
+    programs: dict[str, Run]
 
 
 @dataclass(frozen=True)
 class Row:
-    """What one contender took [s], and how far it ended from its family's reference."""
+    """The time of one program [s], and its error relative to the reference of its family."""
 
     family: str
     name: str
@@ -54,7 +54,7 @@ class Row:
 
 
 def families(scale: int, quick: bool, threads: int | None) -> list[Family]:
-    """All contenders on the beam of that scale."""
+    """All programs, on the beam of that scale."""
 
     def ours(*arguments: object) -> Run:
         return lambda file: run_json(sys.executable, HERE / "our_beam.py", *arguments, FRAMES, file, threads=threads)
@@ -96,7 +96,7 @@ def families(scale: int, quick: bool, threads: int | None) -> list[Family]:
         ),
         Family(
             "Newton VBD",
-            # With more substeps it leaves its own limit: 80 x 20 ends 4 % away from 40 x 20, which 20 x 20 is near.
+            # With more substeps it does not converge: 80 x 20 differs from 40 x 20 by 4 %, 20 x 20 by much less.
             ("40 x 20", newton("vbd", 40, 20)),
             {f"{n} substeps x {k} iterations": newton("vbd", n, k) for n, k in ((5, 5), (10, 10), (20, 10), (20, 20))},
         ),
@@ -129,29 +129,29 @@ def relative_error(found: NDArray[np.float64], reference: NDArray[np.float64]) -
 
 
 def measure(family: Family, rounds: int, folder: Path) -> tuple[list[Row], NDArray[np.float64]]:
-    """Every contender's fastest round, and the reference's positions."""
+    """The fastest round of every program, and the positions of the reference."""
     file = folder / "positions.npy"
     name, run = family.reference
-    said = run(file)
+    result = run(file)
     reference = np.load(file)
     rows = []
-    for label, contender in family.contenders.items():
-        rounds_said = [contender(file) for _ in range(rounds)]
+    for label, program in family.programs.items():
+        rounds_said = [program(file) for _ in range(rounds)]
         seconds = min(r["ms_per_frame"] for r in rounds_said) * FRAMES / 1e3
         statuses = [status for status in rounds_said[0].get("statuses", []) if status != "converged"]
         rows.append(Row(family.name, label, seconds, relative_error(np.load(file), reference), ", ".join(statuses)))
-    note = f"reference: {name}, {said['ms_per_frame'] * FRAMES / 1e3:.1f} s"
+    note = f"reference: {name}, {result['ms_per_frame'] * FRAMES / 1e3:.1f} s"
     return [Row(family.name, note, float("nan"), 0.0), *rows], reference
 
 
 def converged_step(scale: int, threads: int | None) -> None:
-    """A converged step of 1/60 s beside MuJoCo's `discrete` one."""
+    """A converged step of 1/60 s, compared with MuJoCo's `discrete` one."""
     implicit = ("implicit", scale, 1 / 60, "backward_euler", 0, FRAMES)
-    contenders = {
+    programs = {
         "ours": lambda: run_json(sys.executable, HERE / "our_beam.py", *implicit, threads=threads),
         "theirs": lambda: run_json(PEERS_PYTHON, HERE / "peers" / "mujoco_beam.py", scale, 1 / 60, "discrete", FRAMES),
     }
-    best = in_turns(contenders, 3)
+    best = alternate(programs, 3)
     ours, theirs = best["ours"], best["theirs"]
     a, b = ours["ms_per_step"], theirs["ms_per_frame"]
     print(
@@ -162,7 +162,7 @@ def converged_step(scale: int, threads: int | None) -> None:
 
 
 def verdict(rows: list[Row]) -> None:
-    """Who is beaten at equal wall time, and the factor over VBD with 10 x 10."""
+    """Which programs are less accurate at equal wall time, and the factor over VBD with 10 x 10."""
     rows = [row for row in rows if np.isfinite(row.seconds)]
     ours = [row for row in rows if row.ours]
     for peer in (row for row in rows if not row.ours):

@@ -21,7 +21,7 @@ def main() -> dict[str, float]:
     for frame in sp.simulate(scene, sp.XPBD(substeps=20), dt=1 / 60, steps=60):
         x = frame.positions["ball"]
         heights.append(float(np.ptp(x[:, 1])))
-        if x[:, 1].min() > 0.02 and len(drop) == len(heights) - 1:  # still falling: only gravity acts
+        if x[:, 1].min() > 0.02 and len(drop) == len(heights) - 1:  # free fall: only gravity acts
             drop.append(1.0 - float(np.average(x[:, 1], weights=frame.system.masses)) - 0.5 * 9.81 * frame.time**2)
     lowest = min(heights)
     rebound = max(heights[heights.index(lowest) :])

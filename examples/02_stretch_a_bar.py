@@ -1,7 +1,7 @@
-"""A rubber bar is drawn to one and a half times its length: how thin does it become?
+"""A rubber bar is stretched to one and a half times its length. How thin does it become?
 
-Stable Neo-Hookean rubber of E = 100 kPa and nu = 0.4, stretched by 1.5 with free sides, thins to 0.84327 (the root of
-P22 = 0). Near the clamps it cannot; in the middle of a long bar it does.
+Stable Neo-Hookean rubber of E = 100 kPa and nu = 0.4, stretched by 1.5 with free sides, has the lateral
+stretch 0.84327 (the root of P22 = 0). Near the clamps it cannot contract; in the middle of a long bar it does.
 
 Run it:  python examples/02_stretch_a_bar.py
 """

@@ -19,7 +19,7 @@ def main() -> float:
     frames = list(sp.simulate(scene, sp.XPBD(substeps=20), dt=1 / 60, steps=60))
     first, last = (np.asarray(frame.report.angular_momentum) for frame in (frames[0], frames[-1]))
     change = float(np.linalg.norm(last - first) / np.linalg.norm(first))
-    print(f"after {frames[-1].time:.0f} s the angular momentum has changed by {change:.1e} of itself")
+    print(f"after {frames[-1].time:.0f} s the angular momentum has a relative change of {change:.1e}")
     return change
 
 

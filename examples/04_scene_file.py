@@ -1,4 +1,4 @@
-"""A scene file is loaded and simulated: a block slides down a slope of 30 degrees, held back by friction.
+"""A scene file is loaded and simulated: a block slides down a slope of 30 degrees with friction.
 
 Run it:  python examples/04_scene_file.py
 """
@@ -20,7 +20,7 @@ def main() -> float:
     slid = float(np.mean(last.positions["block"][:, 0]) - np.mean(block.mesh.vertices[:, 0]))
     angle = math.radians(30)
     expected = 0.5 * 9.81 * (math.sin(angle) - 0.3 * math.cos(angle)) * last.time**2
-    print(f"slid {slid:.4f} m in {last.time:.2f} s; Coulomb says {expected:.4f} m")
+    print(f"slid {slid:.4f} m in {last.time:.2f} s; Coulomb's law predicts {expected:.4f} m")
     return slid / expected
 
 

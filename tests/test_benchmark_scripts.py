@@ -1,4 +1,4 @@
-"""The benchmarks' own beam runs on both solvers, and errors are measured as they say."""
+"""The beam of the benchmarks runs with both solvers, and the benchmarks' measures are correct."""
 
 import json
 import sys
@@ -30,10 +30,10 @@ def test_the_beam_falls_and_its_positions_are_kept(arguments, monkeypatch, capsy
     file = tmp_path / "positions.npy"
     monkeypatch.setattr(sys, "argv", ["our_beam.py", *arguments, str(file)])
     our_beam.main()
-    said = json.loads(capsys.readouterr().out)
-    assert said["tets"] == 1152
-    assert said["finite"]
-    assert said["statuses"] == ["converged"]
+    result = json.loads(capsys.readouterr().out)
+    assert result["tets"] == 1152
+    assert result["finite"]
+    assert result["statuses"] == ["converged"]
     kept = np.load(file)
     drop = (kept[:, 1] - kept[:, 4])[kept[:, 0] > 0.59].mean()
     assert drop == pytest.approx(0.5 * 9.81 * (2 / 60) ** 2, rel=0.3)  # as in free fall: the wall is not felt yet
@@ -59,17 +59,17 @@ def test_the_live_ball_is_simulated_with_and_without_its_page(capsys):
     assert "of real time" in capsys.readouterr().out
 
 
-def test_the_time_of_steps_with_contact_is_told_apart():
+def test_times_of_the_parts_of_steps_with_contact():
     from dataclasses import replace
 
     from benchmarks.contact_scenes import PARTS, measured
 
     from supple.demos.torture.registry import TORTURE
 
-    said = measured(replace(TORTURE["knives"].small, steps=14))
-    assert said["tets"] == 300
-    assert said["contacts"] > 0
-    assert said["converged"]
-    assert said["iterations"] >= 1.0
-    assert all(0.0 < said[part] < 1.0 for part in PARTS)
-    assert sum(said[part] for part in PARTS) <= 1.0
+    result = measured(replace(TORTURE["knives"].small, steps=14))
+    assert result["tets"] == 300
+    assert result["contacts"] > 0
+    assert result["converged"]
+    assert result["iterations"] >= 1.0
+    assert all(0.0 < result[part] < 1.0 for part in PARTS)
+    assert sum(result[part] for part in PARTS) <= 1.0

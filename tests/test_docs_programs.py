@@ -1,4 +1,4 @@
-"""The Python blocks of documentation pages that are complete programs, in their order, as a reader would type them."""
+"""The Python blocks of documentation pages with complete programs run, in their order."""
 
 import re
 from pathlib import Path

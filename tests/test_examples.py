@@ -1,4 +1,4 @@
-"""Every example runs, and gets one physical number right."""
+"""Every example runs, and its physical number is correct."""
 
 import importlib.util
 from pathlib import Path
@@ -26,7 +26,7 @@ def test_01_a_ball_falls_freely_is_squashed_and_springs_back():
     assert found["rebound"] > 0.95
 
 
-def test_02_a_stretched_bar_thins_as_its_material_says():
+def test_02_a_stretched_bar_has_the_lateral_stretch_of_its_material():
     assert run_example("02") == pytest.approx(0.84327, rel=0.01)
 
 
@@ -34,11 +34,11 @@ def test_03_a_free_spin_keeps_its_angular_momentum():
     assert run_example("03") < 1e-10
 
 
-def test_04_a_block_slides_as_coulomb_says():
+def test_04_a_block_slides_as_coulombs_law_predicts():
     assert run_example("04") == pytest.approx(1.0, rel=0.02)
 
 
-def test_05_a_cantilever_bends_as_beam_theory_says():
+def test_05_a_cantilever_bends_as_beam_theory_predicts():
     found = run_example("05")
     assert found["theory"] == pytest.approx(4.031e-4, rel=1e-4)
     assert found["coarse"] < 0.85 * found["theory"] < 0.92 * found["theory"] < found["fine"] < found["theory"]
@@ -51,7 +51,7 @@ def test_every_example_is_run_by_a_test_of_this_file():
     assert numbers == tested
 
 
-def test_the_patch_stays_on_the_bar_that_swings():
+def test_the_patch_stays_on_the_swinging_bar():
     run = load_run(EXAMPLES / "scenes" / "patch.yaml")
     (seam,) = run.scene.stitching.ranges
     assert len(seam.pairs.rows) == 28

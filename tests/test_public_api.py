@@ -1,4 +1,4 @@
-"""What `import supple` promises: it is quick, every name is there, and nothing needs a POSIX system."""
+"""`import supple`: it is quick, every public name exists, and no module needs a POSIX system."""
 
 import json
 import subprocess
@@ -29,7 +29,7 @@ def test_importing_supple_loads_nothing_heavy():
     assert [name for name in HEAVY if name in loaded] == []
 
 
-def test_the_shell_starts_without_the_numerics():
+def test_help_loads_nothing_heavy():
     code = """
         import json, sys
         from supple.cli.app import main
@@ -42,7 +42,7 @@ def test_the_shell_starts_without_the_numerics():
 
 
 @pytest.mark.parametrize("name", sp.__all__)
-def test_every_public_name_is_there(name):
+def test_every_public_name_exists(name):
     assert getattr(sp, name) is not None
     assert name in dir(sp)
 
@@ -68,8 +68,8 @@ POSIX_NAMES = {
 }
 
 
-def test_every_module_imports_without_what_only_posix_has():
-    # What the libraries below us import is loaded first: they have their own ways on other systems.
+def test_every_module_imports_without_posix_modules():
+    # Libraries are imported first: they handle other systems themselves.
     code = """
         import importlib, json, os, pkgutil, signal, sys
         import asyncio, multiprocessing, socket, subprocess, tempfile
@@ -98,7 +98,7 @@ def test_every_module_imports_without_what_only_posix_has():
     } <= set(found)
 
 
-def test_what_works_without_the_ipc_toolkit_which_has_no_wheels_for_linux_on_arm():
+def test_features_without_the_ipc_toolkit():
     code = """
         import sys
         sys.modules["ipctk"] = None
@@ -120,6 +120,6 @@ def test_what_works_without_the_ipc_toolkit_which_has_no_wheels_for_linux_on_arm
         except sp.SolverError as error:
             print(error)
     """
-    *said, refusal = python(code).splitlines()
-    assert said == [*["converged"] * 4, "True"]
-    assert refusal.startswith("Implicit: contact needs the package ipctk, which is not installed")
+    *output, error = python(code).splitlines()
+    assert output == [*["converged"] * 4, "True"]
+    assert error.startswith("Implicit: contact needs the package ipctk, which is not installed")

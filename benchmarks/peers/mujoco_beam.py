@@ -1,4 +1,4 @@
-"""Hanging beam in MuJoCo flex. Prints one JSON line. Runs in the peers' own environment.
+"""Hanging beam in MuJoCo flex. Prints one JSON line. Runs in a separate environment.
 
 usage: mujoco_beam.py SCALE STEP Euler|discrete FRAMES [POSITIONS.npy]     (SCALE 1 -> 1,152 tets, 2 -> 9,216)
 """

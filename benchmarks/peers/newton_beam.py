@@ -1,4 +1,4 @@
-"""Hanging beam in Newton on the CPU. Prints one JSON line. Runs in the peers' own environment.
+"""Hanging beam in Newton on the CPU. Prints one JSON line. Runs in a separate environment.
 
 usage: newton_beam.py vbd|xpbd SCALE SUBSTEPS ITERATIONS FRAMES [POSITIONS.npy]     (SCALE 1 -> 960 tets, 2 -> 7,680)
 """

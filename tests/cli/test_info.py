@@ -10,11 +10,11 @@ from supple.output.recording.recorder import Recorder
 
 
 @pytest.fixture
-def told(tmp_path, monkeypatch, capsys):
+def rows_of(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
 
-    def tell(file):
+    def rows(file):
         assert main(["info", file]) == ExitCode.OK
         lines = capsys.readouterr().out.splitlines()[1:]
         rows = {}
@@ -23,13 +23,13 @@ def told(tmp_path, monkeypatch, capsys):
             rows[name] = value.strip()
         return rows
 
-    return tell
+    return rows
 
 
-def test_a_surface_with_a_hole(told):
+def test_a_surface_with_a_hole(rows_of):
     box = sp.shapes.box_surface((1, 2, 3), (1, 1, 1))
     sp.SurfaceMesh(box.vertices, box.triangles[1:]).save("open.stl")
-    rows = told("open.stl")
+    rows = rows_of("open.stl")
     assert (rows["kind"], rows["vertices"], rows["triangles"]) == ("surface", "8", "11")
     assert rows["size"] == "1 x 2 x 3 m"
     assert rows["volume"] == "none, the surface is open"
@@ -37,26 +37,26 @@ def test_a_surface_with_a_hole(told):
 
 
 @pytest.mark.parametrize("name", ["box.1.node", "box.msh", "box.vtu", "box.vtk"])
-def test_a_tet_mesh(told, name):
+def test_a_tet_mesh(rows_of, name):
     sp.shapes.box((1, 2, 3), (1, 1, 1)).save(name)
-    rows = told(name)
+    rows = rows_of(name)
     assert (rows["kind"], rows["vertices"], rows["tets"]) == ("tetrahedral mesh", "8", "6")
     assert rows["volume"] == "6 m^3"
 
 
-def test_a_surface_in_a_file_that_may_hold_tets(told):
+def test_a_surface_in_a_file_that_may_hold_tets(rows_of):
     sp.shapes.sphere_surface(0.5, 0.2).save("ball.vtk")
-    assert told("ball.vtk")["kind"] == "surface"
+    assert rows_of("ball.vtk")["kind"] == "surface"
 
 
-def test_a_scene(told, tmp_path):
+def test_a_scene(rows_of, tmp_path):
     (tmp_path / "s.yaml").write_text(
         "bodies: [{name: cube, shape: {kind: box, size: [1, 1, 2]}, "
         "material: {kind: arap, youngs: 1e4, poisson: 0.2, density: 500}}]\n"
         "obstacles: [{kind: half_space, name: floor}]\npins: [{body: cube, vertices: [0, 1]}]\n"
         "solver: {kind: xpbd, substeps: 3}\ndt: 0.5\nsteps: 4\n"
     )
-    rows = told("s.yaml")
+    rows = rows_of("s.yaml")
     assert rows["kind"] == "scene"
     assert rows["body cube"] == "ARAP, 384 tets, 2 m^3, 1000 kg"
     assert rows["obstacles"] == "floor (HalfSpace)"
@@ -64,10 +64,10 @@ def test_a_scene(told, tmp_path):
     assert rows["time"] == "4 steps of 0.5 s: 2 s"
 
 
-def test_a_recording(told):
+def test_a_recording(rows_of):
     cube = sp.Body("cube", sp.shapes.box((1, 1, 1), (1, 1, 1)), sp.StableNeoHookean(youngs=1e5, poisson=0.3))
     frames = list(sp.simulate(sp.Scene([cube]), sp.XPBD(substeps=2), 0.01, 3, sinks=[Recorder("r.vtkhdf")]))
-    rows = told("r.vtkhdf")
+    rows = rows_of("r.vtkhdf")
     assert rows["kind"] == "recording"
     assert rows["frames"] == "4 to t = 0.03 s, dt = 0.01 s"
     assert (rows["vertices"], rows["tets"], rows["mass"]) == ("8", "6", "1000 kg")
@@ -76,7 +76,7 @@ def test_a_recording(told):
     assert np.isfinite(frames[-1].time)
 
 
-def test_stitches_of_a_scene(told, tmp_path):
+def test_stitches_of_a_scene(rows_of, tmp_path):
     body = (
         "shape: {kind: box, size: [1, 1, 1], divisions: [1, 1, 1]}, material: {kind: arap, youngs: 1e4, poisson: 0.3}"
     )
@@ -87,7 +87,7 @@ def test_stitches_of_a_scene(told, tmp_path):
         " min_separate_distance: 0.5}\n"
         "  - {kind: vertex_vertex, name: thread, first: b, second: a, pairs: [[0, 0], [0, 1]], stiffness: 1}\n"
     )
-    rows = told("scene.yaml")
+    rows = rows_of("scene.yaml")
     soft, thread = rows["stitch of 'b' to 'a'"], rows["stitch 'thread'"]
     assert soft == "SoftVertexTriangleStitch, 4 pairs, 0.25 to 0.25 m apart, 4 rest vertices offset"
     assert thread.startswith("VertexVertexStitch, 2 pairs, 1.25 to ")

@@ -1,4 +1,4 @@
-"""Whatever a user feeds to the shell: one clear line on stderr, exit code 2, no traceback, and nothing left behind."""
+"""Malformed inputs of the shell: one clear line on stderr, exit code 2, no traceback, and no files left."""
 
 import struct
 
@@ -201,7 +201,7 @@ def listing(folder):
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_one_line_exit_2_and_nothing_left(case, tmp_path, monkeypatch, capfd, caplog):
+def test_a_malformed_input_is_one_line_with_exit_code_2_and_no_files(case, tmp_path, monkeypatch, capfd, caplog):
     files, arguments = CASES[case]
     for name, content in files.items():
         path = tmp_path / name
@@ -234,7 +234,7 @@ def test_one_tet_is_a_mesh(tmp_path, monkeypatch, capfd):
     assert "0.166667 m^3" in capfd.readouterr().out
 
 
-def test_inverted_tets_are_turned(tmp_path, monkeypatch, capfd):
+def test_inverted_tets_are_reoriented(tmp_path, monkeypatch, capfd):
     for name, content in tets(ele=b"1 4 0\n1 1 2 4 3\n").items():
         (tmp_path / name).write_bytes(content)
     monkeypatch.chdir(tmp_path)

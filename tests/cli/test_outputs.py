@@ -1,4 +1,4 @@
-"""Where commands write: never over what they read, and no simulation for a place that cannot be written."""
+"""Output paths: commands never replace their input, and check the output path before a simulation."""
 
 import pytest
 
@@ -44,17 +44,17 @@ def contents(place):
     ],
     ids=lambda arguments: arguments[0],
 )
-def test_what_is_read_is_not_replaced(place, capsys, arguments):
+def test_an_input_file_is_not_replaced(place, capsys, arguments):
     before = contents(place)
     assert main(arguments) == ExitCode.INPUT
-    said = capsys.readouterr().err
-    assert "itself, which is read; give another name" in said
-    assert said.count("\n") == 1
+    error = capsys.readouterr().err
+    assert "itself, which is read; give another name" in error
+    assert error.count("\n") == 1
     assert contents(place) == before
 
 
 @pytest.mark.parametrize(
-    ("in_the_way", "says"),
+    ("existing", "message"),
     [
         (
             "out/index.html/",
@@ -68,14 +68,14 @@ def test_what_is_read_is_not_replaced(place, capsys, arguments):
         ("out", "out: is no folder, and must be one to hold recording.vtkhdf; give another"),
     ],
 )
-def test_what_stands_in_the_way_is_said_before_the_simulation(place, capsys, in_the_way, says):
-    if in_the_way.endswith("/"):
-        (place / in_the_way).mkdir(parents=True)
+def test_an_output_path_in_use_is_reported_before_the_simulation(place, capsys, existing, message):
+    if existing.endswith("/"):
+        (place / existing).mkdir(parents=True)
     else:
-        (place / in_the_way).write_text("mine")
+        (place / existing).write_text("mine")
     before = contents(place)
     assert main(["run", "scene.yaml", "-o", "out"]) == ExitCode.INPUT
-    assert f"supple: {says}" in capsys.readouterr().err
+    assert f"supple: {message}" in capsys.readouterr().err
     assert contents(place) == before
 
 

@@ -1,4 +1,4 @@
-"""`supple run`: what it writes, and how it ends."""
+"""`supple run`: outputs and exit codes."""
 
 import os
 import signal
@@ -40,7 +40,7 @@ def listing(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_writes_recording_page_and_plot_and_says_where(folder, capfd):
+def test_writes_recording_page_and_plot_and_prints_their_paths(folder, capfd):
     assert main(["run", "scene.yaml", "-o", "out/first"]) == ExitCode.OK
     assert listing(folder / "out" / "first") == ["index.html", "plot.png", "recording.vtkhdf"]
     out, err = capfd.readouterr()
@@ -68,7 +68,7 @@ def test_quiet_without_page_and_plot(folder, capfd):
         assert "XPBD(substeps=20" in recording.solver
 
 
-def test_the_file_may_turn_page_and_plot_off_and_options_win(folder):
+def test_options_override_page_and_plot_of_the_file(folder):
     (folder / "scene.yaml").write_text(SCENE + "output: {page: false, plot: false, compress: true}\n")
     assert main(["run", "scene.yaml", "-q", "--steps", "1", "--plot"]) == ExitCode.OK
     assert listing(folder / "out") == ["plot.png", "recording.vtkhdf"]
@@ -82,7 +82,7 @@ def test_a_second_run_replaces_the_first(folder):
         assert len(recording) == 3
 
 
-def test_a_page_of_an_earlier_run_is_pointed_out(folder, caplog):
+def test_a_page_of_an_earlier_run_is_a_warning(folder, caplog):
     (folder / "out").mkdir()
     (folder / "out" / "index.html").write_text("older")
     assert main(["run", "scene.yaml", "-q", "--no-page", "--no-plot", "--steps", "1"]) == ExitCode.OK
@@ -163,7 +163,7 @@ def test_a_full_disk_keeps_the_frames_before_it(folder, capfd, monkeypatch):
         ("--dt", "5e-324", "between"),
     ],
 )
-def test_numbers_are_read_strictly(folder, capfd, option, text, reason):
+def test_numbers_are_parsed_strictly(folder, capfd, option, text, reason):
     assert main(["run", "scene.yaml", "-q", option, text]) == ExitCode.INPUT
     err = capfd.readouterr().err
     assert reason in err
@@ -178,7 +178,7 @@ def test_dt_may_be_a_fraction(folder):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="SIGINT is sent otherwise elsewhere")
-def test_a_real_ctrl_c(folder):
+def test_ctrl_c_of_a_process(folder):
     arguments = [sys.executable, "-m", "supple", "run", "scene.yaml", "--steps", "1000000", "-q"]
     # Whoever runs the tests in the background may have had SIGINT ignored; a person at a terminal has not.
     heard = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731

@@ -1,4 +1,4 @@
-"""`supple run --separate`: says what it moved, records the moved scene, and refuses what it cannot mend."""
+"""`supple run --separate`: prints the moves, records the moved scene, and fails where it cannot separate bodies."""
 
 import pytest
 
@@ -29,7 +29,7 @@ steps: 1
 
 
 @pytest.mark.parametrize("solver", ["xpbd", "implicit"])
-def test_overlapping_cubes_are_moved_apart_and_recorded_so(scene, capfd, solver):
+def test_overlapping_cubes_are_moved_apart_and_recorded(scene, capfd, solver):
     text = scene(1.5, solver)
     command = ["run", "scene.yaml", "--no-page", "--no-plot", "--quiet"]
     assert main([*command, "--separate"]) == ExitCode.OK
@@ -43,7 +43,7 @@ def test_overlapping_cubes_are_moved_apart_and_recorded_so(scene, capfd, solver)
         assert "# supple run --separate moved body 'high' by (0, 0.10569, 0) m" in recording.scene_text
 
 
-def test_nothing_to_move_is_said_too(scene, capfd):
+def test_no_move_is_reported(scene, capfd):
     text = scene(2.0)
     assert main(["run", "scene.yaml", "--no-page", "--no-plot", "-q", "--separate"]) == ExitCode.OK
     assert capfd.readouterr().out == "nothing was moved: no surfaces intersect\n"
@@ -51,7 +51,7 @@ def test_nothing_to_move_is_said_too(scene, capfd):
         assert recording.scene_text == text
 
 
-def test_a_hopeless_scene_is_bad_input(scene, capfd, tmp_path):
+def test_a_scene_that_cannot_be_separated_is_an_input_error(scene, capfd, tmp_path):
     scene(0.6)
     assert main(["run", "scene.yaml", "--separate"]) == ExitCode.INPUT
     _, err = capfd.readouterr()

@@ -1,4 +1,4 @@
-"""The command line itself: help, versions, exit codes, pipes and what the system refuses."""
+"""The command line: help, versions, exit codes, pipes and errors of the operating system."""
 
 import json
 import os
@@ -28,7 +28,7 @@ def test_help_lists_every_command(capsys):
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_explains_itself(command, capsys):
+def test_every_command_has_a_help_text(command, capsys):
     assert main([command, "--help"]) == ExitCode.OK
     out = capsys.readouterr().out
     assert f"supple {command}" in out
@@ -40,14 +40,14 @@ def test_no_arguments_show_the_help(capsys):
     assert "run" in capsys.readouterr().out
 
 
-def test_info_without_a_file_says_versions(capsys):
+def test_info_without_a_file_prints_versions(capsys):
     assert main(["info"]) == ExitCode.OK
     out = capsys.readouterr().out
     for word in ("supple", "python", "platform", "threads", "numba"):
         assert word in out
 
 
-def test_schema_to_the_screen_and_to_a_file(tmp_path, capsys):
+def test_schema_is_printed_or_written_to_a_file(tmp_path, capsys):
     assert main(["schema"]) == ExitCode.OK
     schema = json.loads(capsys.readouterr().out)
     Draft202012Validator.check_schema(schema)
@@ -55,12 +55,12 @@ def test_schema_to_the_screen_and_to_a_file(tmp_path, capsys):
     assert json.loads((tmp_path / "new" / "scene.json").read_text(encoding="utf-8")) == schema
 
 
-def test_a_near_miss_is_met_with_a_suggestion(capsys):
+def test_a_misspelt_command_gets_a_suggestion(capsys):
     assert main(["shema"]) == ExitCode.INPUT
     assert "schema" in capsys.readouterr().err
 
 
-FORESEEABLE = [
+EXPECTED = [
     (PermissionError(13, "Permission denied", "out/x"), ExitCode.INPUT, "supple: out/x: Permission denied\n"),
     (OSError(28, "No space left on device"), ExitCode.INPUT, "supple: No space left on device\n"),
     (MemoryError("Unable to allocate 9 TiB"), ExitCode.INPUT, "not enough memory for this: Unable to allocate 9 TiB"),
@@ -70,19 +70,19 @@ FORESEEABLE = [
 ]
 
 
-@pytest.mark.parametrize(("error", "code", "said"), FORESEEABLE, ids=lambda value: type(value).__name__)
-def test_what_the_system_refuses_is_one_line(error, code, said, monkeypatch, capsys):
+@pytest.mark.parametrize(("error", "code", "message"), EXPECTED, ids=lambda value: type(value).__name__)
+def test_an_error_of_the_system_is_one_line(error, code, message, monkeypatch, capsys):
     def fail(*arguments):
         raise error
 
     monkeypatch.setattr(shell, "app", fail)
     assert main(["run"]) == code
     err = capsys.readouterr().err
-    assert said in err
-    assert err.count("\n") == (1 if said else 0)
+    assert message in err
+    assert err.count("\n") == (1 if message else 0)
 
 
-def test_bugs_are_not_hidden(monkeypatch):
+def test_unexpected_errors_are_not_caught(monkeypatch):
     def fail(*arguments):
         raise ZeroDivisionError
 
@@ -97,7 +97,7 @@ def supple(*arguments, **options):
     )
 
 
-def test_as_a_process():
+def test_the_installed_command():
     done = supple("--version")
     assert (done.returncode, done.stdout.strip(), done.stderr) == (0, sp.__version__, "")
     done = supple("info", "absent.stl")
@@ -116,7 +116,7 @@ def test_closed_outputs_are_no_error(monkeypatch, arguments, code):
 
 @pytest.mark.skipif(os.name != "posix", reason="pipes end otherwise elsewhere")
 @pytest.mark.parametrize("arguments", [["--help"], ["schema"]])
-def test_a_reader_that_leaves_is_no_error(arguments):
+def test_a_closed_pipe_is_no_error(arguments):
     reading, writing = os.pipe()
     os.close(reading)
     done = subprocess.run(

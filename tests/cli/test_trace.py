@@ -1,4 +1,4 @@
-"""`--trace`: every iteration of Newton's method in a CSV file, whole or not at all."""
+"""`--trace`: every iteration of Newton's method in a CSV file, complete or not written."""
 
 import csv
 from itertools import pairwise
@@ -51,7 +51,7 @@ def test_run_writes_every_iteration(scene, tmp_path):
     assert [path.name for path in table.parent.iterdir()] == ["newton.csv"]
 
 
-def test_demo_writes_the_way_of_the_pins_as_well(tmp_path):
+def test_demo_traces_the_motion_of_pins(tmp_path):
     table = tmp_path / "newton.csv"
     arguments = ["demo", "twist", "--steps", "1", "-q", "--no-page", "--no-plot", "-o", str(tmp_path / "out")]
     assert main([*arguments, "--trace", str(table)]) == ExitCode.FAILED  # one step is too few for the claims
@@ -59,7 +59,7 @@ def test_demo_writes_the_way_of_the_pins_as_well(tmp_path):
 
 
 @pytest.mark.parametrize("command", [["run", "{scene}", "--solver", "xpbd"], ["demo", "stretch"]])
-def test_xpbd_has_none_and_nothing_is_written(command, scene, tmp_path, capfd):
+def test_a_trace_of_xpbd_is_an_error_and_nothing_is_written(command, scene, tmp_path, capfd):
     table = tmp_path / "newton.csv"
     arguments = [part.format(scene=scene) for part in command]
     code = main([*arguments, "-o", str(tmp_path / "out"), "--trace", str(table)])
@@ -71,7 +71,7 @@ def test_xpbd_has_none_and_nothing_is_written(command, scene, tmp_path, capfd):
     assert not (tmp_path / "out").exists()
 
 
-def test_a_place_that_cannot_be_written_is_said_in_one_line(scene, tmp_path, capfd):
+def test_a_path_that_cannot_be_written_is_one_line(scene, tmp_path, capfd):
     (tmp_path / "file").write_text("")
     arguments = ["run", str(scene), "-q", "--no-page", "--no-plot", "-o", str(tmp_path / "out")]
     assert main([*arguments, "--trace", str(tmp_path / "file" / "newton.csv")]) == ExitCode.INPUT

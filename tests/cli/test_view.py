@@ -1,4 +1,4 @@
-"""`supple view` and `supple demo --live`: what is shown, where, and to whom."""
+"""`supple view` and `supple demo --live`: sources, address and access."""
 
 import os
 import signal
@@ -63,7 +63,7 @@ def test_another_solver_can_be_chosen(scene, served):
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::"])
-def test_beyond_this_machine_the_address_holds_a_secret_each_time_another(scene, served, host):
+def test_the_address_for_other_machines_has_a_new_secret_each_time(scene, served, host):
     if host == "::" and not socket.has_ipv6:
         pytest.skip("no IPv6")
     for _ in range(2):
@@ -73,7 +73,7 @@ def test_beyond_this_machine_the_address_holds_a_secret_each_time_another(scene,
     assert all(token is not None and len(token) >= 24 for token in tokens)
 
 
-def test_recordings_are_found_by_file_or_folder(tmp_path, served):
+def test_a_recording_is_found_by_its_file_or_folder(tmp_path, served):
     (tmp_path / "recording.vtkhdf").write_bytes(b"")
     for path in (tmp_path, tmp_path / "recording.vtkhdf"):
         assert main(["view", str(path)]) == ExitCode.OK
@@ -112,7 +112,7 @@ def test_the_shell_serves_a_page_until_ctrl_c(scene):
     assert (shell.returncode, out, err) == (ExitCode.OK, "", "")
 
 
-def test_what_cannot_be_shown_or_served_is_one_line(tmp_path, scene, served, capfd):
+def test_a_source_or_address_that_cannot_be_used_is_one_line(tmp_path, scene, served, capfd):
     (tmp_path / "mesh.stl").write_text("solid")
     outside = tmp_path / "inner" / "outside.yaml"
     outside.parent.mkdir()

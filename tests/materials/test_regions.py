@@ -36,14 +36,14 @@ def test_each_tet_has_its_own_material():
         np.testing.assert_array_equal(body.hessian(F)[k], material.hessian(F[k]))
 
 
-def test_materials_may_themselves_vary():
+def test_materials_of_regions_may_vary_per_tet():
     graded = StableNeoHookean(youngs=np.array([1e4, 2e4, 3e4]), poisson=0.3)
     body = Regions(materials=[graded, HARD], index=np.array([0, 1, 0]))
     np.testing.assert_array_equal(body.youngs, [1e4, 1e7, 3e4])
     assert body.per_tet(3).mu[2] == graded.lame_parameters()[0][2]
 
 
-def test_one_material_answers_the_same_question():
+def test_a_single_material_per_tet():
     tet = SOFT.per_tet(3)
     assert tet.kind.tolist() == [0, 0, 0]
     assert tet.density.tolist() == [900.0] * 3
@@ -72,12 +72,12 @@ def test_errors(materials, index, text):
         Regions(materials=materials, index=index)
 
 
-def test_length_must_fit_the_mesh():
+def test_the_index_must_have_the_length_of_the_mesh():
     with pytest.raises(SceneError, match="index has 2 values for 5 tets"):
         Regions(materials=[SOFT], index=[0, 0]).per_tet(5)
 
 
-def test_a_body_of_two_materials_moves_in_a_system():
+def test_masses_of_a_body_of_two_materials():
     mesh = sp.shapes.box(size=(2.0, 1.0, 1.0), divisions=(4, 2, 2))
     centers = mesh.vertices[mesh.tets].mean(axis=1)
     index = (centers[:, 0] > centers[:, 0].mean()).astype(int)

@@ -1,4 +1,4 @@
-"""The energy of a whole stable Neo-Hookean body, from invariants, is that from principal stretches."""
+"""The energy of a stable Neo-Hookean body from invariants equals that from principal stretches."""
 
 import numpy as np
 

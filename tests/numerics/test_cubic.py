@@ -59,7 +59,7 @@ def roots_in(coefficients, low, high):
 def check(a, b, c, d):
     t = smallest_positive_cubic_root(a, b, c, d, tol=0.0)
     if t < 0:
-        # A root that is touched, or lies beyond all numbers, may be lost; a crossing may not.
+        # A double root, or one that overflows, may be missed; a sign change may not.
         assert roots_in((a, b, c, d), 0, 10**12) == 0
     else:
         assert roots_in((a, b, c, d), 0, Fraction(t) * (1 - Fraction(1, 10**9))) == 0

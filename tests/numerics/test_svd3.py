@@ -52,13 +52,13 @@ def check(F, tolerance=1e-14):
     ],
 )
 @pytest.mark.parametrize("scale", [1.0, 1e-150, 1e-300, 1e150, 1e300])
-def test_given_stretches_are_found(stretches, scale):
+def test_known_stretches_are_found(stretches, scale):
     rng = np.random.default_rng(5)
     n = 300
     s = check(rotations(rng, n) * np.array(stretches) @ rotations(rng, n) * scale)
     expected = sorted(stretches, reverse=True, key=abs)
     if abs(expected[2]) > 1e-12:
-        # Two stretches of the same size: the sign may only stand on the last.
+        # With two stretches of equal size, only the last one may be negative.
         expected = [abs(expected[0]), abs(expected[1]), np.prod(np.sign(stretches)) * abs(expected[2])]
         np.testing.assert_allclose(s / scale, np.broadcast_to(expected, s.shape), atol=1e-14 * abs(expected[0]))
     else:
@@ -94,5 +94,5 @@ def test_shapes_and_errors():
         rotation_variant_svd(np.zeros((3, 2)))
 
 
-def test_not_finite_is_not_hidden():
+def test_values_that_are_not_finite_give_not_a_number():
     assert np.isnan(rotation_variant_svd(np.full((3, 3), np.nan))[1]).all()
