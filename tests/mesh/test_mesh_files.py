@@ -233,7 +233,7 @@ def test_vertices_in_the_same_place_are_merged(tmp_path, caplog):
             loaded = SurfaceMesh.load(tmp_path / name)
         assert len(loaded.vertices) == len(BALL.vertices)
         assert loaded.check().ok
-        assert f"{len(soup.vertices) - len(BALL.vertices)} vertices in the place of others" in caplog.text
+        assert f"{len(soup.vertices) - len(BALL.vertices)} vertices at the place of others" in caplog.text
     apart = SurfaceMesh(soup.vertices + generator.uniform(-1e-5, 1e-5, soup.vertices.shape), soup.triangles)
     apart.save(tmp_path / "apart.ply")
     assert len(SurfaceMesh.load(tmp_path / "apart.ply").vertices) == len(soup.vertices)

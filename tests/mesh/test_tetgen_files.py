@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from supple.errors import MeshError
-from supple.mesh.io.tetgen_files import read_tetgen, read_tetgen_family, write_tetgen
+from supple.mesh.io.tetgen_family import read_tetgen_family
+from supple.mesh.io.tetgen_files import read_tetgen, write_tetgen
 from supple.mesh.tetmesh import TetMesh
 
 # Two tets glued at the face 1 2 3 (counted from 0).

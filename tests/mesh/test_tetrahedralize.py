@@ -21,7 +21,8 @@ from supple.mesh.meshing.tetgen_mesher import mesh_with_tetgen
 from supple.mesh.meshing.tetrahedralize import tetrahedralize as fill
 from supple.mesh.meshing.tetrahedralize import tetrahedralize_reported
 from supple.mesh.primitives.gummy_bear import gummy_bear_surface
-from supple.mesh.primitives.surfaces import box_surface, sphere_surface, torus_surface
+from supple.mesh.primitives.surfaces import sphere_surface, torus_surface
+from supple.mesh.shapes import box_surface
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from supple.mesh.primitives.gummy_bear import gummy_bear, gummy_bear_surface
 from supple.mesh.primitives.isosurface_stuffing import stuff
 from supple.mesh.primitives.sizes import check_torus, counts, fits, lengths, not_too_many, positive
-from supple.mesh.primitives.surfaces import box_surface, cylinder_surface, sphere_surface, torus_surface
+from supple.mesh.primitives.surfaces import sphere_surface, torus_surface
+from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 
 __all__ = [
@@ -51,6 +52,11 @@ def box(size: Sequence[float] = (1.0, 1.0, 1.0), divisions: Sequence[int] = (4, 
     paths = [(0, 4, 6, 7), (0, 6, 2, 7), (0, 2, 3, 7), (0, 3, 1, 7), (0, 1, 5, 7), (0, 5, 4, 7)]
     tets = np.stack([np.column_stack([cell[c] for c in path]) for path in paths], axis=1).reshape(-1, 4)
     return TetMesh(points * extent, tets)
+
+
+def box_surface(size: Sequence[float] = (1.0, 1.0, 1.0), divisions: Sequence[int] = (4, 4, 4)) -> SurfaceMesh:
+    """The surface of `box`, with the same parameters."""
+    return box(size, divisions).surface.compact()
 
 
 def sphere(radius: float = 0.5, edge_length: float = 0.1) -> TetMesh:
@@ -121,6 +127,11 @@ def cylinder(radius: float = 0.5, height: float = 1.0, edge_length: float = 0.1)
     layer = np.concatenate([np.column_stack(t) for t in ((a0, a1, a2, b2), (a0, a1, b1, b2), (a0, b0, b1, b2))])
     tets = layer[None] + n * np.arange(layers)[:, None, None]
     return TetMesh(points.reshape(-1, 3), tets.reshape(-1, 4))
+
+
+def cylinder_surface(radius: float = 0.5, height: float = 1.0, edge_length: float = 0.1) -> SurfaceMesh:
+    """The surface of `cylinder`, with the same parameters."""
+    return cylinder(radius, height, edge_length).surface.compact()
 
 
 def _disk(rings: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import MeshError
 from supple.mesh.checked_arrays import frozen, index_array, vertex_array
+from supple.mesh.io.mesh_files import read_surface, write_surface
 from supple.mesh.topology import Components, connected_components, unique_edges
 
 if TYPE_CHECKING:
@@ -64,9 +65,7 @@ class SurfaceMesh:
         MeshError : where the file is missing, broken, of another kind, or holds no surface; the text starts with
             the path.
         """
-        from supple.mesh.io.mesh_files import load_surface
-
-        return load_surface(path)
+        return cls(*read_surface(path))
 
     def save(self, path: str | Path) -> None:
         """Write the surface as STL (binary), OBJ, PLY, OFF, VTP, VTK or VTU, by the extension of `path`.
@@ -75,9 +74,8 @@ class SurfaceMesh:
         ------
         MeshError : where the extension is none of these, or the file cannot be written. No partial file is left.
         """
-        from supple.mesh.io.mesh_files import save_surface
-
-        save_surface(self, path)
+        alone = self.compact() if self.shares_vertices else self
+        write_surface(path, alone.vertices, alone.triangles)
 
     @cached_property
     def edges(self) -> NDArray[np.int32]:
@@ -126,7 +124,7 @@ class SurfaceMesh:
 
     def check(self) -> SurfaceReport:
         """Look for everything that would keep a mesher or a contact solver from using this surface."""
-        from supple.mesh.surface_checks import check_surface
+        from supple.mesh.surface_checks import check_surface  # loads numba, which reading a file does not need
 
         return check_surface(self)
 

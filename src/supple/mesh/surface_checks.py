@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.mesh.checked_arrays import frozen, place
-from supple.mesh.surface import SurfaceMesh
-from supple.mesh.topology import edge_keys, facet_keys
+from supple.mesh.topology import Components, edge_keys, facet_keys
 from supple.numerics.geometry.triangle_crossings import crossing_triangles
 
 # Intersections are listed one by one; a soup of triangles has millions, and nobody reads more than a few.
@@ -18,6 +18,25 @@ MAX_INTERSECTIONS = 100
 # Neighbours that enclose less than this angle [rad] lie on each other as far as round-off can tell.
 FOLD_ANGLE = 1e-7
 ROUND_OFF_UNITS = 64.0
+
+
+class CheckedSurface(Protocol):
+    """What a check reads of a surface; see `SurfaceMesh`, which has all of this."""
+
+    @property
+    def vertices(self) -> NDArray[np.float64]: ...
+    @property
+    def triangles(self) -> NDArray[np.int32]: ...
+    @property
+    def shares_vertices(self) -> bool: ...
+    @property
+    def area_vectors(self) -> NDArray[np.float64]: ...
+    @property
+    def volume(self) -> float: ...
+    @property
+    def used_vertices(self) -> NDArray[np.int32]: ...
+    @property
+    def components(self) -> Components: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +61,7 @@ class SurfaceReport:
     component_count : number of connected pieces
     """
 
-    surface: SurfaceMesh
+    surface: CheckedSurface
     open_edges: NDArray[np.int32]
     non_manifold_edges: NDArray[np.int32]
     inconsistent_edges: NDArray[np.int32]
@@ -141,7 +160,7 @@ class SurfaceReport:
         )
 
 
-def check_surface(surface: SurfaceMesh) -> SurfaceReport:
+def check_surface(surface: CheckedSurface) -> SurfaceReport:
     """Check a surface; see `SurfaceReport` for what is looked for."""
     n = len(surface.vertices)
     keys = edge_keys(surface.triangles, n)
@@ -190,14 +209,14 @@ def _first(rows: NDArray[np.int32]) -> str:
     return "" if len(rows) == 1 else "the first is "
 
 
-def _duplicate_triangles(surface: SurfaceMesh) -> NDArray[np.int32]:
+def _duplicate_triangles(surface: CheckedSurface) -> NDArray[np.int32]:
     keys = facet_keys(surface.triangles, len(surface.vertices))
     order = np.argsort(keys, kind="stable")
     same = keys[order][1:] == keys[order][:-1]
     return np.column_stack([order[:-1][same], order[1:][same]]).astype(np.int32)
 
 
-def _degenerate_triangles(surface: SurfaceMesh) -> NDArray[np.int32]:
+def _degenerate_triangles(surface: CheckedSurface) -> NDArray[np.int32]:
     corners = surface.vertices[surface.triangles]
     sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
     longest = sides.max(axis=1)
@@ -208,7 +227,7 @@ def _degenerate_triangles(surface: SurfaceMesh) -> NDArray[np.int32]:
 
 
 def _folded_triangles(
-    surface: SurfaceMesh, edge_of_side: NDArray[np.int64], counts: NDArray[np.int64], sound: NDArray[np.bool_]
+    surface: CheckedSurface, edge_of_side: NDArray[np.int64], counts: NDArray[np.int64], sound: NDArray[np.bool_]
 ) -> NDArray[np.int32]:
     """Neighbours across an edge (of exactly two triangles) that enclose no angle."""
     sides = edge_of_side.ravel()
@@ -234,7 +253,7 @@ def _folded_triangles(
     return np.column_stack([a[folded], b[folded]]).astype(np.int32)
 
 
-def _intersecting_triangles(surface: SurfaceMesh, sound: NDArray[np.bool_]) -> NDArray[np.int32]:
+def _intersecting_triangles(surface: CheckedSurface, sound: NDArray[np.bool_]) -> NDArray[np.int32]:
     """Pairs of triangles, at most `MAX_INTERSECTIONS`, that meet in more than the vertices they share; exact."""
     rows = np.flatnonzero(sound)
     if len(rows) < 2:
@@ -248,7 +267,7 @@ def _intersecting_triangles(surface: SurfaceMesh, sound: NDArray[np.bool_]) -> N
     return rows[pairs].astype(np.int32)
 
 
-def _wrong_facing(surface: SurfaceMesh, nested: bool) -> NDArray[np.int32]:
+def _wrong_facing(surface: CheckedSurface, nested: bool) -> NDArray[np.int32]:
     """Components whose signed volume has not the sign that their depth inside other components asks for.
 
     Where components intersect, none is clearly inside another (`nested` is False), and all should face outward.

@@ -12,6 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import MeshError
 from supple.mesh.checked_arrays import frozen, index_array, place, vertex_array
+from supple.mesh.io.mesh_files import read_tets, write_tets
+from supple.mesh.io.tetgen_family import is_tetgen_path, write_tetgen_family
+from supple.mesh.quality import min_dihedrals, radius_ratios
 from supple.mesh.surface import SurfaceMesh, linear_map
 from supple.mesh.topology import TET_EDGES, TET_FACETS, Components, connected_components, facet_keys, unique_edges
 
@@ -88,9 +91,16 @@ class TetMesh:
         MeshError : where the file is missing, broken, of another kind, or holds no usable tets; the text starts
             with the path.
         """
-        from supple.mesh.io.mesh_files import load_tetmesh
-
-        return load_tetmesh(path)
+        file = read_tets(path)
+        try:
+            mesh = cls.dropping_unused(file.points, file.tets)
+        except MeshError as error:
+            raise MeshError(f"{file.path}: {str(error).removeprefix('TetMesh: ')} (counted from 0)") from None
+        if mesh.turned:
+            logger.info(
+                "%s: %d of %d tets had negative winding and were turned", file.path, mesh.turned, len(mesh.tets)
+            )
+        return mesh
 
     def save(self, path: str | Path) -> None:
         """Write the mesh as TetGen's four files (.node, .ele, .edge or .face), .msh, .vtu or .vtk, by the extension.
@@ -99,9 +109,10 @@ class TetMesh:
         ------
         MeshError : where the extension is none of these, or the file cannot be written. No partial file is left.
         """
-        from supple.mesh.io.mesh_files import save_tetmesh
-
-        save_tetmesh(self, path)
+        if is_tetgen_path(path):
+            write_tetgen_family(path, self.vertices, self.tets, self.edges, self.surface.triangles)
+        else:
+            write_tets(path, self.vertices, self.tets)
 
     @cached_property
     def edges(self) -> NDArray[np.int32]:
@@ -150,15 +161,11 @@ class TetMesh:
     @cached_property
     def min_dihedrals(self) -> NDArray[np.float64]:
         """Smallest dihedral angle of each tet (m,) [degrees]; 70.5 in the regular one."""
-        from supple.mesh.quality import min_dihedrals
-
         return frozen(min_dihedrals(self.vertices, self.tets))
 
     @cached_property
     def radius_ratios(self) -> NDArray[np.float64]:
         """Three times inscribed over circumscribed radius of each tet (m,): 1 in the regular one, 0 in a flat one."""
-        from supple.mesh.quality import radius_ratios
-
         return frozen(radius_ratios(self.vertices, self.tets))
 
     def transformed(

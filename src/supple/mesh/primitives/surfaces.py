@@ -1,29 +1,14 @@
-"""Surfaces of the ready-made bodies, to be meshed, shown, or collided with."""
+"""Surfaces of ready-made bodies that do not come from a tet mesh: sphere and torus."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
 from supple.mesh.merge import merge_map
 from supple.mesh.primitives.sizes import check_torus, fits, not_too_many, positive
 from supple.mesh.surface import SurfaceMesh
-
-
-def box_surface(size: Sequence[float] = (1.0, 1.0, 1.0), divisions: Sequence[int] = (4, 4, 4)) -> SurfaceMesh:
-    """The surface of `box`, with the same parameters."""
-    from supple.mesh.shapes import box
-
-    return box(size, divisions).surface.compact()
-
-
-def cylinder_surface(radius: float = 0.5, height: float = 1.0, edge_length: float = 0.1) -> SurfaceMesh:
-    """The surface of `cylinder`, with the same parameters."""
-    from supple.mesh.shapes import cylinder
-
-    return cylinder(radius, height, edge_length).surface.compact()
 
 
 def sphere_surface(radius: float = 0.5, edge_length: float = 0.1) -> SurfaceMesh:
