@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import logging
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from supple.errors import MeshingError
 from supple.mesh.meshing import repair
 from supple.mesh.meshing.repair import repair_surface
-from supple.mesh.meshing.tetrahedralize import tetrahedralize_reported
+from supple.mesh.meshing.tetrahedralize import tetrahedralize, tetrahedralize_reported
 from supple.mesh.primitives.surfaces import sphere_surface
 from supple.mesh.surface import SurfaceMesh
 
@@ -104,7 +105,7 @@ def test_a_lost_component_is_an_error_unless_allowed() -> None:
 
 @needs_meshfix
 def test_components_that_cut_each_other_are_beyond_repair() -> None:
-    with pytest.raises(MeshingError, match=r"could not mend the surface: .*intersecting.*ftetwild"):
+    with pytest.raises(MeshingError, match=r"could not fix the surface: .*intersecting.*ftetwild"):
         repair_surface(both(BALL, BALL.transformed(translation=(0.4, 0.01, 0.02))))
 
 
@@ -126,3 +127,60 @@ def test_repair_comes_before_meshing(caplog: pytest.LogCaptureFixture) -> None:
     assert report.repair is not None
     assert mesh.volume == pytest.approx(BALL.volume, rel=0.03)
     assert "repaired the surface" in caplog.text
+
+
+def _with_seam(gap: float) -> SurfaceMesh:
+    """The ball, its upper part a component of its own, `gap` [m] above the lower part."""
+    up = BALL.vertices[BALL.triangles].mean(axis=1)[:, 2] > 0
+    upper = SurfaceMesh(BALL.vertices, BALL.triangles[up]).compact().transformed(translation=(0, 0, gap))
+    return both(SurfaceMesh(BALL.vertices, BALL.triangles[~up]).compact(), upper)
+
+
+FLAKE = SurfaceMesh([[0.0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]], [[0, 1, 2]])
+BEYOND_REPAIR = {
+    "two balls that overlap": (both(BALL, BALL.transformed(translation=(0.4, 0.01, 0.0))), 0.777),
+    "an open seam": (_with_seam(1e-4), BALL.volume),
+    "a single triangle inside": (both(BALL, FLAKE), BALL.volume),
+}
+
+
+@needs_meshfix
+@pytest.mark.skipif(importlib.util.find_spec("pytetwild") is None, reason="needs pytetwild")
+@pytest.mark.parametrize(
+    ("case", "mesher"), [*((case, "auto") for case in BEYOND_REPAIR), ("two balls that overlap", "ftetwild")]
+)
+def test_what_meshes_without_repair_meshes_with_it(case: str, mesher, caplog: pytest.LogCaptureFixture) -> None:
+    """MeshFix cannot repair these surfaces; fTetWild needs no repair."""
+    surface, volume = BEYOND_REPAIR[case]
+    with caplog.at_level(logging.WARNING):
+        mesh, report = tetrahedralize_reported(surface, repair=True, mesher=mesher)
+    assert mesh.volume == pytest.approx(volume, rel=2e-3)
+    assert report.mesher == "ftetwild"
+    assert report.repair is None
+    assert "meshing the surface without repair" in caplog.text
+
+
+@needs_meshfix
+@pytest.mark.parametrize("demand", [{"mesher": "tetgen"}, {"keep_surface": True}, {"min_dihedral": 10.0}], ids=str)
+def test_a_failed_repair_is_an_error_where_only_tetgen_can_do_the_rest(demand: dict) -> None:
+    with pytest.raises(MeshingError, match=r"repair could not fix the surface: .*intersecting"):
+        tetrahedralize(BEYOND_REPAIR["two balls that overlap"][0], repair=True, **demand)
+
+
+@needs_meshfix
+def test_a_failed_repair_is_an_error_without_ftetwild(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("supple.mesh.meshing.tetrahedralize.ftetwild_installed", lambda: False)
+    with pytest.raises(MeshingError, match=r"repair could not fix the surface: .*intersecting"):
+        tetrahedralize(BEYOND_REPAIR["two balls that overlap"][0], repair=True)
+
+
+SOUP = SurfaceMesh(BALL.vertices[BALL.triangles].reshape(-1, 3), np.arange(BALL.triangles.size).reshape(-1, 3))
+
+
+@pytest.mark.parametrize("surface", [SOUP, both(BALL, BALL), _with_seam(0.0)], ids=["soup", "two hulls", "seam"])
+def test_vertices_at_the_same_place_are_merged(surface: SurfaceMesh) -> None:
+    repaired, report = repair_surface(surface)
+    assert len(repaired.vertices) == len(BALL.vertices)
+    assert repaired.volume == pytest.approx(BALL.volume, rel=1e-12)
+    merged = len(surface.vertices) - len(BALL.vertices)
+    assert report.steps[0] == f"merged {merged} vertices with others at the same place"

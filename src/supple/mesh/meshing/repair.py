@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshingError
+from supple.mesh.merge import merge_map
 from supple.mesh.meshing.child_process import Limits, run_mesher
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.surface_checks import SurfaceReport
@@ -89,7 +90,7 @@ def repair_surface(
         after = mended.check()
     if not after.ok:
         raise MeshingError(
-            f'repair could not mend the surface: {"; ".join(after.problems)}; use mesher="ftetwild" or mend it in a '
+            f'repair could not fix the surface: {"; ".join(after.problems)}; use mesher="ftetwild" or mend it in a '
             "modelling program"
         )
     report = RepairReport(tuple(steps), before, after)
@@ -99,10 +100,14 @@ def repair_surface(
 
 
 def _drop_useless(surface: SurfaceMesh, steps: list[str]) -> SurfaceMesh:
-    """Without triangles that have no area or repeat others, and without vertices that no triangle uses.
+    """Merge vertices at the same place, and drop triangles with a vertex twice, repeated triangles and unused vertices.
 
-    A triangle without area leaves no hole only where it has a vertex twice; others are left for the later steps.
+    Other triangles without area stay for the later steps: without them the surface would have holes.
     """
+    keep, index = merge_map(surface.vertices, 0.0)
+    if len(keep) < len(surface.vertices):
+        steps.append(f"merged {len(surface.vertices) - len(keep)} vertices with others at the same place")
+        surface = SurfaceMesh(surface.vertices[keep], index[surface.triangles])
     triangles = surface.triangles
     collapsed = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
     _, first = np.unique(facet_keys(triangles, len(surface.vertices)), return_index=True)
@@ -114,7 +119,7 @@ def _drop_useless(surface: SurfaceMesh, steps: list[str]) -> SurfaceMesh:
             steps.append(f"dropped {np.count_nonzero(rows)} triangles that {what}")
     keep = ~(collapsed | repeats)
     if not keep.any():
-        raise MeshingError("repair could not mend the surface: none of its triangles has an area")
+        raise MeshingError("repair could not fix the surface: none of its triangles has an area")
     unused = len(surface.vertices) - len(np.unique(triangles[keep]))
     if keep.all() and unused == 0:
         return surface
@@ -204,7 +209,7 @@ def _meshfix_components(surface: SurfaceMesh, steps: list[str], allow_lost: bool
             steps.append(_change(f"MeshFix mended component {k} of {count}", piece, fixed))
             kept.append(fixed)
     if not kept:
-        raise MeshingError("repair could not mend the surface: no component remains")
+        raise MeshingError("repair could not fix the surface: no component remains")
     offsets = np.cumsum([0, *(len(p.vertices) for p in kept[:-1])])
     return SurfaceMesh(
         np.concatenate([p.vertices for p in kept]),

@@ -69,7 +69,8 @@ def tetrahedralize(
     mesher : "auto", "tetgen" or "ftetwild"
         "auto" takes TetGen for a clean surface, and fTetWild, an extra, for any other; the log says so.
     repair : bool
-        Mend a surface that is not clean first, see `repair_surface`.
+        Repair a surface that is not clean first, see `repair_surface`. Where that fails, "auto" and "ftetwild" mesh the
+        surface as it is with fTetWild, if that is installed; the log says so.
     envelope : float
         How far fTetWild may move the surface, as a part of the bounding box's diagonal.
     time_limit : float [s]
@@ -121,15 +122,17 @@ def tetrahedralize_reported(
     limits = Limits(time_limit, None if memory_limit is None else int(memory_limit))
 
     repaired = None
-    report = surface.check()
+    surface, report = _facing_outward(surface)
     if repair and not report.ok:
-        surface, repaired = repair_surface(surface, time_limit=time_limit, memory_limit=limits.memory)
-        report = surface.check()
-    if len(report.unused_vertices):
-        logger.info("left out %d vertices that no triangle uses", len(report.unused_vertices))
-        surface = surface.compact()
-        report = surface.check()
-    surface, report = _facing_outward(surface, report)
+        try:
+            fixed, repaired = repair_surface(surface, time_limit=time_limit, memory_limit=limits.memory)
+        except MeshingError as failure:
+            # fTetWild needs no repair, and meshes much that MeshFix cannot repair: components that cut each other.
+            if mesher == "tetgen" or not ftetwild_installed() or keep_surface or min_dihedral is not None:
+                raise
+            logger.warning("%s; meshing the surface without repair", failure)
+        else:
+            surface, report = _facing_outward(fixed)
     chosen = _choose(mesher, report, repair)
     if chosen == "tetgen":
         options = {
@@ -167,8 +170,13 @@ def _in_range(name: str, value: float | None, low: float, high: float) -> None:
         raise MeshingError(f"{name} must be a number {span}, not {value!r}")
 
 
-def _facing_outward(surface: SurfaceMesh, report: SurfaceReport) -> tuple[SurfaceMesh, SurfaceReport]:
-    """Turn bodies that face inward. A body inside a body is left as it is, for it may be a cavity or a mistake."""
+def _facing_outward(surface: SurfaceMesh) -> tuple[SurfaceMesh, SurfaceReport]:
+    """Drop unused vertices, and turn bodies that face inward. A body inside a body is unchanged: is it a cavity?"""
+    report = surface.check()
+    if len(report.unused_vertices):
+        logger.info("dropped %d vertices that no triangle uses", len(report.unused_vertices))
+        surface = surface.compact()
+        report = surface.check()
     wrong = report.wrong_facing_components
     if len(wrong) == 0 or report.self_intersecting:
         return surface, report
