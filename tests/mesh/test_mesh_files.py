@@ -220,6 +220,29 @@ def test_concave_polygons_are_cut_inside(tmp_path):
     assert (loaded.area_vectors[:, 2] > 0).all()
 
 
+@pytest.mark.parametrize("turn", [1, -1])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_concave_polygon_with_thousands_of_corners(tmp_path, axis, turn):
+    """A star in a plane across each axis, seen from either side; the time for it must not grow with the cube."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 3000, endpoint=False)
+    radius = np.where(np.arange(3000) % 2, 1.0, 0.5)
+    points = np.roll(np.column_stack([radius * np.cos(angle), radius * np.sin(angle), 0.0 * angle]), axis, axis=1)
+    lines = ["v {!r} {!r} {!r}".format(*p) for p in points.tolist()]
+    lines.append("f " + " ".join(map(str, range(1, 3001)[::turn])))
+    loaded = SurfaceMesh.load(write(tmp_path / "a.obj", "\n".join(lines)))
+    normals = loaded.area_vectors[:, (2 + axis) % 3]
+    assert len(loaded.triangles) == 2998
+    assert (turn * normals > 0).all()
+    assert loaded.area == pytest.approx(0.5 * 3000 * 0.5 * np.sin(2.0 * np.pi / 3000))
+    assert loaded.area_vectors.sum() == pytest.approx(turn * loaded.area)
+
+
+def test_a_polygon_that_crosses_itself_is_still_cut(tmp_path):
+    """It has no inside: any triangles between its corners will do."""
+    loaded = SurfaceMesh.load(write(tmp_path / "a.off", "OFF\n5 1 0\n0 0 0\n2 0 0\n0 1 0\n2 1 0\n1 3 0\n5 0 1 2 3 4\n"))
+    assert len(loaded.triangles) == 3
+
+
 # What loading mends
 
 
