@@ -21,7 +21,7 @@ ROUND_OFF_UNITS = 64.0
 
 
 class CheckedSurface(Protocol):
-    """What a check reads of a surface; see `SurfaceMesh`, which has all of this."""
+    """What a check reads of a `SurfaceMesh`, which itself imports this module."""
 
     @property
     def vertices(self) -> NDArray[np.float64]: ...
@@ -29,14 +29,11 @@ class CheckedSurface(Protocol):
     def triangles(self) -> NDArray[np.int32]: ...
     @property
     def shares_vertices(self) -> bool: ...
-    @property
-    def area_vectors(self) -> NDArray[np.float64]: ...
-    @property
-    def volume(self) -> float: ...
-    @property
-    def used_vertices(self) -> NDArray[np.int32]: ...
-    @property
-    def components(self) -> Components: ...
+
+    area_vectors: cached_property[NDArray[np.float64]]
+    volume: cached_property[float]
+    used_vertices: cached_property[NDArray[np.int32]]
+    components: cached_property[Components]
 
 
 @dataclass(frozen=True, eq=False)
