@@ -28,16 +28,16 @@ def test_every_kind_of_output_reads_back(ball: Path, name: str, capsys: pytest.C
     mesh = TetMesh.load(output)
     assert mesh.volume == pytest.approx(BALL.volume, rel=1e-4)
     assert mesh.volumes.max() <= 5e-3 * (1 + 1e-6)
-    said = capsys.readouterr().out
-    assert "tetgen" in said
-    assert str(len(mesh.tets)) in said
+    output = capsys.readouterr().out
+    assert "tetgen" in output
+    assert str(len(mesh.tets)) in output
     quartet = {f"ball.1.{s}" for s in ("node", "ele", "edge", "face")}
     assert {p.name for p in ball.parent.iterdir()} == {ball.name} | (quartet if ".1." in name else {name})
 
 
-def test_base_index_and_wishes_reach_the_mesher(ball: Path) -> None:
-    wishes = ["--base-index", "0", "--keep-surface", "--quality", "1.2", "--min-dihedral", "10"]
-    assert main(["mesh", str(ball), "--output", str(ball.with_name("b.node")), *wishes]) == 0
+def test_base_index_and_options_reach_the_mesher(ball: Path) -> None:
+    options = ["--base-index", "0", "--keep-surface", "--quality", "1.2", "--min-dihedral", "10"]
+    assert main(["mesh", str(ball), "--output", str(ball.with_name("b.node")), *options]) == 0
     assert ball.with_name("b.node").read_text().splitlines()[1].startswith("0 ")
     mesh = TetMesh.load(ball.with_name("b.ele"))
     assert len(mesh.surface.used_vertices) == len(BALL.vertices)
@@ -72,7 +72,7 @@ def test_errors_are_one_line_and_leave_no_file(ball: Path, monkeypatch, capsys, 
     monkeypatch.chdir(ball.parent)
     Path("taken.1.face").mkdir()
     assert main(["mesh", *arguments]) == 2
-    said = capsys.readouterr().err
-    assert message in said
-    assert said.count("\n") == 1
+    output = capsys.readouterr().err
+    assert message in output
+    assert output.count("\n") == 1
     assert {p.name for p in ball.parent.iterdir()} == {"ball.stl", "taken.1.face"}

@@ -164,7 +164,7 @@ CASES = {
     ),
     "a sphere of dust": ({"s.yaml": scene(mesh="shape: {kind: sphere, edge_length: 1e-9}")}, ["run", "s.yaml"]),
     "a pin beyond the mesh": ({"s.yaml": scene(top="pins: [{body: a, vertices: [99]}]\n")}, ["run", "s.yaml"]),
-    "a pin of nobody": ({"s.yaml": scene(top="pins: [{body: b, vertices: [0]}]\n")}, ["run", "s.yaml"]),
+    "a pin of an unknown body": ({"s.yaml": scene(top="pins: [{body: b, vertices: [0]}]\n")}, ["run", "s.yaml"]),
     "keyframes that go back": (
         {"s.yaml": scene(top="pins: [{body: a, vertices: [0], motion: {times: [1, 0], angles: [0, 1]}}]\n")},
         ["run", "s.yaml"],

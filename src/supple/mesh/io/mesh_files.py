@@ -1,4 +1,4 @@
-"""Reading and writing surfaces and tet meshes as arrays: selects the format by the extension, and words the errors."""
+"""Reading and writing surfaces and tet meshes as arrays: selects the format by the extension."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from supple.errors import MeshError
 from supple.mesh.checked_arrays import vertex_array
+from supple.mesh.file_contents import file_contents
 from supple.mesh.io import msh, obj, off, ply, stl, vtk_legacy, vtk_xml
 from supple.mesh.io.cells import CellSoup, FormatError, tets_of
 from supple.mesh.io.polygons import triangles_of
@@ -50,7 +51,7 @@ MERGE_TOLERANCE = 2e-7
 
 
 class TetFile(NamedTuple):
-    """Vertices (n, 3) and tets (m, 4) as a file gives them, and the file that lists the tets."""
+    """Vertices (n, 3) and tets (m, 4) as read from a file, and the file that lists the tets."""
 
     points: NDArray[np.float64]
     tets: NDArray[np.integer]
@@ -83,7 +84,7 @@ def read_surface(path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.int6
     if len(keep) < len(points):
         logger.info("%s: %d vertices at the place of others were merged", path, len(points) - len(keep))
     if collapsed.any():
-        logger.warning("%s: %d triangles with a vertex twice were dropped", path, np.count_nonzero(collapsed))
+        logger.warning("%s: %d triangles that have a vertex twice were dropped", path, np.count_nonzero(collapsed))
     points, triangles = points[keep], triangles[~collapsed]
     used = np.zeros(len(points), dtype=bool)
     used[triangles] = True
@@ -139,26 +140,14 @@ def write_tets(path: str | Path, vertices: NDArray[np.float64], tets: NDArray[np
 
 
 def _contents(path: Path) -> bytes:
-    """All bytes of an ordinary, non-empty file."""
-    if path.is_dir():
-        raise MeshError(f"{path}: it is a folder; give the path of a mesh file")
-    if not path.exists():
-        raise MeshError(f"{path}: there is no such file")
-    if not path.is_file():
-        raise MeshError(f"{path}: it is not an ordinary file")
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise MeshError(f"{path}: it cannot be read: {error.strerror or error}") from None
-    except MemoryError:
-        raise MeshError(f"{path}: it is too large for the memory of this machine") from None
+    data = file_contents(path)
     if not data.strip():
         raise MeshError(f"{path}: it is empty")
     return data
 
 
 def _write_whole(path: Path, write: Callable[[Path], object]) -> None:
-    """Write under a temporary name in the same folder, then rename: either the whole file is there or none of it."""
+    """Write under a temporary name in the same folder, then rename: the file is either complete or absent."""
     temporary = temporary_name(path)
     try:
         write(temporary)

@@ -22,16 +22,16 @@ SURFACE_TYPES = (TRIANGLE, TRIANGLE_STRIP, POLYGON, PIXEL, QUAD)
 
 
 def triangles_of(soup: CellSoup) -> NDArray[np.int64]:
-    """Triangles (m, 3) of the surface cells; points and lines are passed over, solid cells refused.
+    """Triangles (m, 3) of the surface cells; points and lines are ignored, solid cells are errors.
 
-    Convex polygons become fans, concave ones are cut by their ears.
+    Convex polygons are cut as fans, concave ones by their ears.
     """
     soup = checked(soup)
     solid = np.unique(soup.types[soup.types > QUAD])
     if len(solid):
         name = CELL_NAMES.get(int(solid[0]), f"type {solid[0]}")
         hint = "; load it with TetMesh.load, whose .surface is the boundary" if name == "tetrahedron" else ""
-        raise FormatError(f"it holds {name} cells, which are no surface{hint}")
+        raise FormatError(f"it holds {name} cells, which are not a surface{hint}")
     cells = np.flatnonzero(np.isin(soup.types, SURFACE_TYPES))
     if len(cells) == 0:
         raise FormatError("it holds no triangles or polygons")
@@ -74,7 +74,7 @@ def _with_concave_cut(
 ) -> NDArray[np.int64]:
     """The triangles, with ears instead of the fan where a polygon is concave."""
     a, b, c = points[triangles].transpose(1, 0, 2)
-    with np.errstate(all="ignore"):  # what is not finite is reported later, by vertex
+    with np.errstate(all="ignore"):  # coordinates that are not finite are reported later, with their vertex
         normals = np.cross(b - a, c - a)
         total = np.zeros((len(is_polygon), 3))
         np.add.at(total, cell, normals)

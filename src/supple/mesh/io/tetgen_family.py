@@ -1,7 +1,7 @@
 """TetGen's own files: .node (vertices), .ele (tets), .edge and .face, all of one name.
 
 Layout: https://wias-berlin.de/software/tetgen/fformats.html. Each file has a header line, then one numbered row per
-line; all numbers start at 0 or all at 1, as the first vertex says; `#` starts a comment.
+line. The number of the first vertex, 0 or 1, is the start of all numbering. `#` starts a comment.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ def _family_text(
 
 
 def _lines(pattern: str, *blocks: NDArray) -> Iterator[str]:
-    """Rows of numbers as text, some ten thousand lines at a time: one `%` on many rows is far faster than many."""
+    """Rows of numbers as text, 16384 lines at a time: one `%` for many rows is far faster than one for each."""
     for start in range(0, len(blocks[0]), 16384):
         parts = [block[start : start + 16384] for block in blocks]
         columns = [c.tolist() for part in parts for c in (part.T if part.ndim == 2 else [part])]
@@ -119,7 +119,7 @@ def _lines(pattern: str, *blocks: NDArray) -> Iterator[str]:
 
 
 def is_tetgen_path(path: str | Path) -> bool:
-    """Whether a name ends like one of TetGen's files."""
+    """Whether a name has the suffix of one of TetGen's files."""
     return Path(path).suffix.lower() in SUFFIXES
 
 
@@ -129,7 +129,7 @@ def family_paths(path: str | Path) -> dict[str, Path]:
 
 
 def _member(path: Path, suffix: str) -> Path:
-    # "bear.1" without one of the suffixes is the family's own name: with_suffix would cut the ".1" off.
+    # "bear.1" without one of the suffixes is the family's own name; with_suffix would remove its ".1".
     stem = path.with_suffix("") if is_tetgen_path(path) else path
     return stem.with_name(stem.name + suffix)
 
@@ -140,10 +140,10 @@ def _require(member: Path, given: Path) -> None:
     hint = ""
     stem = member.with_suffix("")
     if member != given and (iteration := stem.with_name(stem.name + ".1" + member.suffix)).exists():
-        hint = f"; {iteration.name} is there: give that name"
+        hint = f"; {iteration.name} exists: give that name"
     elif member != given:
         hint = f"; it belongs to {given.name}, and a tet mesh needs both .node and .ele"
-    raise MeshError(f"{member}: no such file{hint}")
+    raise MeshError(f"{member}: there is no such file{hint}")
 
 
 def _read_nodes(
@@ -203,7 +203,7 @@ def _read_simplices(
     _check_numbering(table, base, what)
     corners = np.ascontiguousarray(_corners(table, on_line, n_points, base)[:, :width])
     of_tets = tets[:, TET_EDGES if width == 2 else TET_FACETS].reshape(-1, width)
-    # Keys of one call can be compared with each other only, hence one call for both.
+    # Only keys of one call can be compared, so both go into one call.
     keys = facet_keys(_as_triangles(np.concatenate([corners, of_tets])), n_points)
     own, known = keys[:count], np.sort(keys[count:])
     found = known[np.minimum(np.searchsorted(known, own), len(known) - 1)] == own

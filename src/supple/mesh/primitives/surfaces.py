@@ -17,11 +17,11 @@ def sphere_surface(radius: float = 0.5, edge_length: float = 0.1) -> SurfaceMesh
     Parameters
     ----------
     radius : [m]
-    edge_length : about the length of edges [m], at most `radius`
+    edge_length : approximate length of edges [m], at most `radius`
 
     Raises
     ------
-    MeshError : where a length is not positive, or the edge too long or too short for the radius.
+    MeshError : where a length is not positive, or the edge is too long or too short for the radius.
     """
     positive("sphere_surface", radius=radius, edge_length=edge_length)
     fits("sphere_surface", edge_length, "radius", radius)
@@ -36,7 +36,7 @@ def sphere_surface(radius: float = 0.5, edge_length: float = 0.1) -> SurfaceMesh
     faces = [
         (i, j, k) for i in range(12) for j in range(i) for k in range(j) if near[i, j] and near[j, k] and near[k, i]
     ]
-    # A face holds rows of points i, j with i + j <= n; row i begins where the shorter rows before it end.
+    # A face has rows of points i, j with i + j <= n; row i begins where the longer rows before it end.
     grid = np.array([(i, j) for i in range(n + 1) for j in range(n + 1 - i)])
     begin = np.cumsum([0] + [n + 1 - i for i in range(n + 1)])
     up = [(begin[i] + j, begin[i + 1] + j, begin[i] + j + 1) for i in range(n) for j in range(n - i)]
