@@ -1,4 +1,4 @@
-"""Whatever a user feeds to the shell: one clear line on stderr, exit code 2, no traceback, and nothing left behind."""
+"""Malformed input to the shell: one clear line on stderr, exit code 2, no traceback, and no files left."""
 
 import struct
 
@@ -17,7 +17,7 @@ def scene(body_changes="", top="", mesh="shape: {kind: box, divisions: [1, 1, 1]
 
 
 def stl(triangles, count=None):
-    """A binary STL file; its header may lie about the number of triangles."""
+    """A binary STL file; its header may have a false number of triangles."""
     triangles = np.asarray(triangles, dtype=np.float32)
     rows = b"".join(struct.pack("<12fH", 0, 0, 0, *t.ravel(), 0) for t in triangles)
     return b"\0" * 80 + struct.pack("<I", len(triangles) if count is None else count) + rows
