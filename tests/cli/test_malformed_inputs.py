@@ -1,4 +1,4 @@
-"""Malformed inputs of the shell: one clear line on stderr, exit code 2, no traceback, and no files left."""
+"""Malformed input to the shell: one clear line on stderr, exit code 2, no traceback, and no files left."""
 
 import struct
 
@@ -17,7 +17,7 @@ def scene(body_changes="", top="", mesh="shape: {kind: box, divisions: [1, 1, 1]
 
 
 def stl(triangles, count=None):
-    """A binary STL file; its header may lie about the number of triangles."""
+    """A binary STL file; its header may have a false number of triangles."""
     triangles = np.asarray(triangles, dtype=np.float32)
     rows = b"".join(struct.pack("<12fH", 0, 0, 0, *t.ravel(), 0) for t in triangles)
     return b"\0" * 80 + struct.pack("<I", len(triangles) if count is None else count) + rows
@@ -164,7 +164,7 @@ CASES = {
     ),
     "a sphere of dust": ({"s.yaml": scene(mesh="shape: {kind: sphere, edge_length: 1e-9}")}, ["run", "s.yaml"]),
     "a pin beyond the mesh": ({"s.yaml": scene(top="pins: [{body: a, vertices: [99]}]\n")}, ["run", "s.yaml"]),
-    "a pin of nobody": ({"s.yaml": scene(top="pins: [{body: b, vertices: [0]}]\n")}, ["run", "s.yaml"]),
+    "a pin of an unknown body": ({"s.yaml": scene(top="pins: [{body: b, vertices: [0]}]\n")}, ["run", "s.yaml"]),
     "keyframes that go back": (
         {"s.yaml": scene(top="pins: [{body: a, vertices: [0], motion: {times: [1, 0], angles: [0, 1]}}]\n")},
         ["run", "s.yaml"],

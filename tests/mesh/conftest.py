@@ -1,4 +1,4 @@
-"""A surface, a body, and how files of them are written and their errors read."""
+"""A surface, a body, and helpers that write files and read errors."""
 
 from supple.mesh import shapes
 

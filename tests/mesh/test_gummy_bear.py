@@ -1,4 +1,4 @@
-"""The gummy bear: whole, well-shaped, the right way round, as tets and as a skin."""
+"""The gummy bear as tets and as a surface: closed, well shaped, and oriented."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def test_tets(edge_length):
 
 
 @pytest.mark.parametrize("resolution", [16, 32, 48])
-def test_skin(resolution):
+def test_surface(resolution):
     skin = gummy_bear_surface(1.0, resolution)
     report = skin.check()
     assert report.ok, report
@@ -28,7 +28,7 @@ def test_skin(resolution):
     corners = skin.vertices[skin.triangles]
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
     heights = 2 * np.linalg.norm(skin.area_vectors, axis=1) / sides.max(axis=1)
-    assert (heights / sides.max(axis=1)).min() > 0.15  # no slivers: meshers like it
+    assert (heights / sides.max(axis=1)).min() > 0.15  # no slivers
 
 
 def test_height_and_place():
@@ -38,7 +38,7 @@ def test_height_and_place():
     assert gummy_bear(0.02, 0.0016).volume == pytest.approx(0.02**3 * gummy_bear(1.0, 0.08).volume)
 
 
-def test_left_and_right_are_alike_and_it_looks_along_z():
+def test_it_is_symmetric_and_looks_along_z():
     points = np.random.default_rng(0).uniform((-0.3, 0, -0.3), (0.3, 1, 0.4), (500, 3))
     assert np.array_equal(bear_distance(points), bear_distance(points * (-1, 1, 1)))
     nose, back_of_head = bear_distance(np.array([[0, 0.713, 0.29], [0, 0.713, -0.2]]))
@@ -47,8 +47,8 @@ def test_left_and_right_are_alike_and_it_looks_along_z():
     assert ear < 0 < between
 
 
-def test_the_tets_and_the_skin_are_one_bear():
-    # Vertices of the tets' surface lie on the skin's implicit surface.
+def test_tets_and_surface_have_the_same_shape():
+    # Vertices of the tets' surface lie on the implicit surface of the bear.
     bear = gummy_bear(1.0, 0.08)
     skin = gummy_bear_surface(1.0, 48)
     middle = np.array([0.0, 0.5, 0.07])  # the bear of height 1 stands on y = 0
@@ -68,6 +68,6 @@ def test_the_tets_and_the_skin_are_one_bear():
         (lambda: gummy_bear_surface(float("nan")), "height is nan"),
     ],
 )
-def test_impossible_bears_are_refused(make, words):
+def test_impossible_sizes_are_errors(make, words):
     with pytest.raises(MeshError, match=words):
         make()

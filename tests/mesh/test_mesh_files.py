@@ -1,4 +1,4 @@
-"""Mesh files: round trips, other programs' files, and what loading mends."""
+"""Mesh files: round trips, other programs' files, and what loading corrects."""
 
 import logging
 import struct
@@ -127,7 +127,7 @@ def test_legacy_polydata_written_by_vtk(tmp_path, version, file_type, strips):
     assert loaded.check().ok
 
 
-def test_vtk_reads_what_we_write(tmp_path):
+def test_vtk_reads_saved_files(tmp_path):
     vtk = pytest.importorskip("vtk")
     BALL.save(tmp_path / "a.vtp")
     BODY.save(tmp_path / "a.vtu")
@@ -159,7 +159,7 @@ def test_binary_stl_that_begins_with_solid(tmp_path):
     assert len(loaded.triangles) == len(BALL.triangles)
 
 
-def test_obj_with_everything(tmp_path):
+def test_obj_with_all_kinds_of_lines(tmp_path):
     text = "mtllib a.mtl\no cube\nv 0 0 0 1\nv 1 0 0\nv 1 1 0\n# a comment\nv 0 1 0\nvt 0 0\nvn 0 0 1\ns off\n"
     loaded = SurfaceMesh.load(write(tmp_path / "a.obj", text + "usemtl m\nf 1/1/1 2//1 3/1 4\nf -4 \\\n-3 -1\n"))
     assert loaded.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [0, 1, 3]]
@@ -192,7 +192,7 @@ def test_byte_order_marks_and_line_ends_of_other_systems(tmp_path, name):
         ]
         text = "solid\n" + "".join(rows)
     elif name in ("a.ply", "a.vtk"):
-        # What meshio writes as text.
+        # Text as meshio writes it.
         meshio.write(tmp_path / name, meshio.Mesh(BALL.vertices, [("triangle", BALL.triangles)]), binary=False)
         text = (tmp_path / name).read_text()
     else:
@@ -220,10 +220,33 @@ def test_concave_polygons_are_cut_inside(tmp_path):
     assert (loaded.area_vectors[:, 2] > 0).all()
 
 
-# What loading mends
+@pytest.mark.parametrize("turn", [1, -1])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_concave_polygon_with_thousands_of_corners(tmp_path, axis, turn):
+    """A star in a plane across each axis, seen from either side; an algorithm of cubic time would take hours."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 3000, endpoint=False)
+    radius = np.where(np.arange(3000) % 2, 1.0, 0.5)
+    points = np.roll(np.column_stack([radius * np.cos(angle), radius * np.sin(angle), 0.0 * angle]), axis, axis=1)
+    lines = ["v {!r} {!r} {!r}".format(*p) for p in points.tolist()]
+    lines.append("f " + " ".join(map(str, range(1, 3001)[::turn])))
+    loaded = SurfaceMesh.load(write(tmp_path / "a.obj", "\n".join(lines)))
+    normals = loaded.area_vectors[:, (2 + axis) % 3]
+    assert len(loaded.triangles) == 2998
+    assert (turn * normals > 0).all()
+    assert loaded.area == pytest.approx(0.5 * 3000 * 0.5 * np.sin(2.0 * np.pi / 3000))
+    assert loaded.area_vectors.sum() == pytest.approx(turn * loaded.area)
 
 
-def test_vertices_in_the_same_place_are_merged(tmp_path, caplog):
+def test_a_polygon_that_crosses_itself_is_still_cut(tmp_path):
+    """It has no inside, so any triangles between its corners are valid."""
+    loaded = SurfaceMesh.load(write(tmp_path / "a.off", "OFF\n5 1 0\n0 0 0\n2 0 0\n0 1 0\n2 1 0\n1 3 0\n5 0 1 2 3 4\n"))
+    assert len(loaded.triangles) == 3
+
+
+# What loading corrects
+
+
+def test_vertices_at_the_same_place_are_merged(tmp_path, caplog):
     soup = SurfaceMesh(BALL.vertices[BALL.triangles].reshape(-1, 3), np.arange(3 * len(BALL.triangles)).reshape(-1, 3))
     generator = np.random.default_rng(0)
     noisy = SurfaceMesh(soup.vertices + generator.uniform(-2e-8, 2e-8, soup.vertices.shape), soup.triangles)
@@ -233,18 +256,18 @@ def test_vertices_in_the_same_place_are_merged(tmp_path, caplog):
             loaded = SurfaceMesh.load(tmp_path / name)
         assert len(loaded.vertices) == len(BALL.vertices)
         assert loaded.check().ok
-        assert f"{len(soup.vertices) - len(BALL.vertices)} vertices in the place of others" in caplog.text
+        assert f"{len(soup.vertices) - len(BALL.vertices)} vertices at the place of others" in caplog.text
     apart = SurfaceMesh(soup.vertices + generator.uniform(-1e-5, 1e-5, soup.vertices.shape), soup.triangles)
     apart.save(tmp_path / "apart.ply")
     assert len(SurfaceMesh.load(tmp_path / "apart.ply").vertices) == len(soup.vertices)
 
 
-def test_collapsed_triangles_and_unused_vertices_are_dropped_and_told(tmp_path, caplog):
+def test_collapsed_triangles_and_unused_vertices_are_dropped_and_logged(tmp_path, caplog):
     text = "OFF\n6 3 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n1 0 0\n9 9 9\n3 0 1 2\n3 0 2 3\n3 1 4 2\n"
     loaded = SurfaceMesh.load(write(tmp_path / "a.off", text))
     assert len(loaded.vertices) == 4
     assert loaded.triangles.tolist() == [[0, 1, 2], [0, 2, 3]]
-    assert "1 triangles with a vertex twice" in caplog.text
+    assert "1 triangles that have a vertex twice" in caplog.text
     assert "1 vertices that belong to no triangle" in caplog.text
 
 

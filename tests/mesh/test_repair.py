@@ -1,8 +1,9 @@
-"""Repair: what it mends, that it says so, and that it drops nothing silently."""
+"""Repair: what it changes, that it reports each change, and that it drops nothing silently."""
 
 from __future__ import annotations
 
 import importlib.util
+import logging
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from supple.errors import MeshingError
 from supple.mesh.meshing import repair
 from supple.mesh.meshing.repair import repair_surface
-from supple.mesh.meshing.tetrahedralize import tetrahedralize_reported
+from supple.mesh.meshing.tetrahedralize import tetrahedralize, tetrahedralize_reported
 from supple.mesh.primitives.surfaces import sphere_surface
 from supple.mesh.surface import SurfaceMesh
 
@@ -27,18 +28,18 @@ def both(first: SurfaceMesh, second: SurfaceMesh) -> SurfaceMesh:
     )
 
 
-def test_a_clean_surface_is_left_alone(caplog: pytest.LogCaptureFixture) -> None:
-    mended, report = repair_surface(BALL)
-    assert mended is BALL
+def test_a_clean_surface_is_unchanged(caplog: pytest.LogCaptureFixture) -> None:
+    repaired, report = repair_surface(BALL)
+    assert repaired is BALL
     assert report.steps == ()
     assert caplog.text == ""
 
 
 def test_duplicates_and_collapsed_triangles_are_dropped() -> None:
     triangles = np.vstack([BALL.triangles, BALL.triangles[:2, [1, 2, 0]], [[4, 4, 7], [3, 3, 3]]])
-    mended, report = repair_surface(SurfaceMesh(np.vstack([BALL.vertices, [[5, 5, 5]]]), triangles))
-    np.testing.assert_array_equal(mended.vertices, BALL.vertices)
-    assert len(mended.triangles) == len(BALL.triangles)
+    repaired, report = repair_surface(SurfaceMesh(np.vstack([BALL.vertices, [[5, 5, 5]]]), triangles))
+    np.testing.assert_array_equal(repaired.vertices, BALL.vertices)
+    assert len(repaired.triangles) == len(BALL.triangles)
     assert report.after.ok
     assert report.steps[0] == "dropped 2 triangles that had a vertex twice"
     assert report.steps[1] == "dropped 2 triangles that repeated others"
@@ -50,21 +51,21 @@ def test_mixed_orientation_is_made_to_agree(seed: int, caplog: pytest.LogCapture
     surface = both(BALL, FAR)
     turned = np.random.default_rng(seed).random(len(surface.triangles)) < 0.4
     triangles = np.where(turned[:, None], surface.triangles[:, ::-1], surface.triangles)
-    mended, report = repair_surface(SurfaceMesh(surface.vertices, triangles))
-    assert mended.volume == pytest.approx(2 * BALL.volume, rel=1e-12)
+    repaired, report = repair_surface(SurfaceMesh(surface.vertices, triangles))
+    assert repaired.volume == pytest.approx(2 * BALL.volume, rel=1e-12)
     assert report.after.ok
     assert "to agree with their neighbours" in caplog.text
     assert report.volume_change > 0
 
 
 def test_an_inward_surface_is_turned() -> None:
-    mended, report = repair_surface(BALL.flipped())
-    assert mended.volume == pytest.approx(BALL.volume)
+    repaired, report = repair_surface(BALL.flipped())
+    assert repaired.volume == pytest.approx(BALL.volume)
     assert report.steps == ("turned 1 components that faced the wrong way",)
 
 
 def test_a_one_sided_surface_cannot_be_oriented() -> None:
-    """A Moebius strip: whichever way one goes round, its triangles disagree somewhere."""
+    """A Moebius strip: some neighbours disagree however its triangles are turned."""
     n = 12
     angle = np.linspace(0, 2 * np.pi, n, endpoint=False)
     middle = np.stack([np.cos(angle), np.sin(angle), np.zeros(n)], axis=1)
@@ -79,32 +80,32 @@ def test_a_one_sided_surface_cannot_be_oriented() -> None:
 
 @needs_meshfix
 def test_holes_are_filled_and_other_components_kept() -> None:
-    """MeshFix by itself keeps the largest component only."""
+    """MeshFix alone keeps only the largest component."""
     holed = SurfaceMesh(BALL.vertices, BALL.triangles[4:])
-    mended, report = repair_surface(both(holed, FAR))
+    repaired, report = repair_surface(both(holed, FAR))
     assert report.before.component_count == report.after.component_count == 2
     assert report.after.ok
-    assert mended.volume == pytest.approx(2 * BALL.volume, rel=0.02)
-    assert any("MeshFix mended component 0 of 2" in step for step in report.steps)
+    assert repaired.volume == pytest.approx(2 * BALL.volume, rel=0.02)
+    assert any("MeshFix repaired component 0 of 2" in step for step in report.steps)
     assert "2 -> 2 components" in str(report)
 
 
 @needs_meshfix
 def test_a_lost_component_is_an_error_unless_allowed() -> None:
-    """A single triangle has no inside: MeshFix makes nothing of it."""
-    flake = SurfaceMesh([[3, 0, 0], [3.1, 0, 0], [3, 0.1, 0]], [[0, 1, 2]])
-    surface = both(BALL, flake)
+    """A single triangle has no inside: MeshFix keeps nothing of it."""
+    single = SurfaceMesh([[3, 0, 0], [3.1, 0, 0], [3, 0.1, 0]], [[0, 1, 2]])
+    surface = both(BALL, single)
     with pytest.raises(MeshingError, match=r"would drop all of component 1 of 2 \(1 triangles;.*allow_lost_components"):
         repair_surface(surface)
-    mended, report = repair_surface(surface, allow_lost_components=True)
-    assert len(mended.triangles) == len(BALL.triangles)
+    repaired, report = repair_surface(surface, allow_lost_components=True)
+    assert len(repaired.triangles) == len(BALL.triangles)
     assert any(step.startswith("dropped component 1 of 2") for step in report.steps)
     assert report.after.component_count == 1
 
 
 @needs_meshfix
-def test_components_that_cut_each_other_are_beyond_repair() -> None:
-    with pytest.raises(MeshingError, match=r"could not mend the surface: .*intersecting.*ftetwild"):
+def test_components_that_cut_each_other_cannot_be_repaired() -> None:
+    with pytest.raises(MeshingError, match=r"could not fix the surface: .*intersecting.*ftetwild"):
         repair_surface(both(BALL, BALL.transformed(translation=(0.4, 0.01, 0.02))))
 
 
@@ -114,7 +115,7 @@ def test_without_meshfix_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> 
         repair_surface(SurfaceMesh(BALL.vertices, BALL.triangles[4:]))
 
 
-def test_only_collapsed_triangles_are_no_surface() -> None:
+def test_collapsed_triangles_alone_are_an_error() -> None:
     with pytest.raises(MeshingError, match="none of its triangles"):
         repair_surface(SurfaceMesh(np.eye(3), [[0, 0, 1], [1, 1, 2]]))
 
@@ -126,3 +127,60 @@ def test_repair_comes_before_meshing(caplog: pytest.LogCaptureFixture) -> None:
     assert report.repair is not None
     assert mesh.volume == pytest.approx(BALL.volume, rel=0.03)
     assert "repaired the surface" in caplog.text
+
+
+def _with_seam(gap: float) -> SurfaceMesh:
+    """The ball, its upper part a component of its own, `gap` [m] above the lower part."""
+    up = BALL.vertices[BALL.triangles].mean(axis=1)[:, 2] > 0
+    upper = SurfaceMesh(BALL.vertices, BALL.triangles[up]).compact().transformed(translation=(0, 0, gap))
+    return both(SurfaceMesh(BALL.vertices, BALL.triangles[~up]).compact(), upper)
+
+
+SINGLE_TRIANGLE = SurfaceMesh([[0.0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]], [[0, 1, 2]])
+BEYOND_REPAIR = {
+    "two balls that overlap": (both(BALL, BALL.transformed(translation=(0.4, 0.01, 0.0))), 0.777),
+    "an open seam": (_with_seam(1e-4), BALL.volume),
+    "a single triangle inside": (both(BALL, SINGLE_TRIANGLE), BALL.volume),
+}
+
+
+@needs_meshfix
+@pytest.mark.skipif(importlib.util.find_spec("pytetwild") is None, reason="needs pytetwild")
+@pytest.mark.parametrize(
+    ("case", "mesher"), [*((case, "auto") for case in BEYOND_REPAIR), ("two balls that overlap", "ftetwild")]
+)
+def test_what_meshes_without_repair_meshes_with_it(case: str, mesher, caplog: pytest.LogCaptureFixture) -> None:
+    """MeshFix cannot repair these surfaces; fTetWild needs no repair."""
+    surface, volume = BEYOND_REPAIR[case]
+    with caplog.at_level(logging.WARNING):
+        mesh, report = tetrahedralize_reported(surface, repair=True, mesher=mesher)
+    assert mesh.volume == pytest.approx(volume, rel=2e-3)
+    assert report.mesher == "ftetwild"
+    assert report.repair is None
+    assert "meshing the surface without repair" in caplog.text
+
+
+@needs_meshfix
+@pytest.mark.parametrize("demand", [{"mesher": "tetgen"}, {"keep_surface": True}, {"min_dihedral": 10.0}], ids=str)
+def test_a_failed_repair_is_an_error_where_the_options_need_tetgen(demand: dict) -> None:
+    with pytest.raises(MeshingError, match=r"repair could not fix the surface: .*intersecting"):
+        tetrahedralize(BEYOND_REPAIR["two balls that overlap"][0], repair=True, **demand)
+
+
+@needs_meshfix
+def test_a_failed_repair_is_an_error_without_ftetwild(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("supple.mesh.meshing.tetrahedralize.ftetwild_installed", lambda: False)
+    with pytest.raises(MeshingError, match=r"repair could not fix the surface: .*intersecting"):
+        tetrahedralize(BEYOND_REPAIR["two balls that overlap"][0], repair=True)
+
+
+SOUP = SurfaceMesh(BALL.vertices[BALL.triangles].reshape(-1, 3), np.arange(BALL.triangles.size).reshape(-1, 3))
+
+
+@pytest.mark.parametrize("surface", [SOUP, both(BALL, BALL), _with_seam(0.0)], ids=["soup", "two hulls", "seam"])
+def test_vertices_at_the_same_place_are_merged(surface: SurfaceMesh) -> None:
+    repaired, report = repair_surface(surface)
+    assert len(repaired.vertices) == len(BALL.vertices)
+    assert repaired.volume == pytest.approx(BALL.volume, rel=1e-12)
+    merged = len(surface.vertices) - len(BALL.vertices)
+    assert report.steps[0] == f"merged {merged} vertices with others at the same place"

@@ -60,7 +60,7 @@ def test_points_outside_follow_a_tet_nearby():
     centers = BALL.vertices[embedding.corners].mean(axis=1)
     assert np.linalg.norm(centers - points, axis=1).max() < 0.25  # edges are 0.2
     assert embedding.weights.min() > -1.5
-    # A bump of the mesh moves skin near it only.
+    # A local displacement of the mesh moves only points near it.
     bumped = BALL.vertices.copy()
     bumped[np.argmax(bumped[:, 0])] += (0.1, 0, 0)
     moved = np.linalg.norm(embedding.apply(bumped) - points, axis=1)
@@ -74,7 +74,7 @@ def test_one_tet_and_one_point():
     assert Embedding.of(mesh, [[5.0, 0, 0]]).outside.tolist() == [True]
 
 
-def test_a_bear_wears_its_skin():
+def test_the_surface_of_a_bear_follows_its_tets():
     bear, skin = shapes.gummy_bear(1.0, 0.1), shapes.gummy_bear_surface(1.0, 24)
     embedding = Embedding.of(bear, skin.vertices)
     twisted = bear.vertices.copy()
@@ -87,12 +87,12 @@ def test_a_bear_wears_its_skin():
 
 
 @pytest.mark.parametrize("points", [np.zeros((2, 2)), [[0, 0, np.nan]], np.empty((0, 3)), "bear"])
-def test_bad_points_are_refused(points):
+def test_bad_points_are_errors(points):
     with pytest.raises(MeshError, match="Embedding"):
         Embedding.of(BALL, points)
 
 
-def test_positions_of_another_mesh_are_refused():
+def test_positions_of_another_mesh_are_errors():
     embedding = Embedding.of(BALL, [[0, 0, 0]])
     with pytest.raises(MeshError, match="must have shape"):
         embedding.apply(BALL.vertices[:-1])

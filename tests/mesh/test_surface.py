@@ -1,4 +1,4 @@
-"""SurfaceMesh: what it accepts, refuses, and measures."""
+"""SurfaceMesh: what it accepts, what it rejects, and what it measures."""
 
 import numpy as np
 import pytest
@@ -75,7 +75,7 @@ def test_mirroring_keeps_triangles_outward():
         ({"translation": (1, np.inf, 0)}, "finite"),
     ],
 )
-def test_bad_transforms_are_refused(arguments, words):
+def test_bad_transforms_are_errors(arguments, words):
     with pytest.raises(MeshError, match=words):
         SurfaceMesh(CORNERS, TETRAHEDRON).transformed(**arguments)
 
@@ -105,7 +105,7 @@ def test_bad_transforms_are_refused(arguments, words):
         (CORNERS, [[True, False, True]], "integers"),
     ],
 )
-def test_malformed_arrays_are_refused_in_one_line(vertices, triangles, words):
+def test_malformed_arrays_are_errors_of_one_line(vertices, triangles, words):
     with pytest.raises(MeshError, match=words) as caught:
         SurfaceMesh(vertices, triangles)
     assert "\n" not in str(caught.value)

@@ -23,7 +23,7 @@ def joined(*surfaces):
     "surface",
     [BALL, shapes.box_surface(), shapes.torus_surface(), shapes.cylinder_surface(), shapes.sphere().surface],
 )
-def test_sound_surfaces_have_no_problems(surface):
+def test_surfaces_without_faults_have_no_problems(surface):
     report = surface.check()
     assert report.ok
     assert report.problems == []
@@ -35,7 +35,7 @@ def test_sound_surfaces_have_no_problems(surface):
     assert "nothing wrong" in str(report)
 
 
-def test_a_hole_is_named_by_its_edges():
+def test_a_hole_is_reported_by_its_edges():
     report = SurfaceMesh(BALL.vertices, BALL.triangles[1:]).check()
     assert not report.watertight
     assert not report.ok
@@ -82,14 +82,14 @@ def test_cavities_face_inward_and_bodies_in_them_outward():
     assert joined(BALL, BALL.transformed(translation=(5, 0, 0))).check().ok
 
 
-def test_duplicate_degenerate_and_unused_are_named():
+def test_duplicate_degenerate_and_unused_are_reported():
     a, b, c = (int(i) for i in BALL.triangles[3])
     vertices = np.vstack([BALL.vertices, [[9, 9, 9]]])
     report = SurfaceMesh(vertices, np.vstack([BALL.triangles, [[b, c, a], [a, b, b]]])).check()
     assert report.duplicate_triangles.tolist() == [[3, len(BALL.triangles)]]
     assert report.degenerate_triangles.tolist() == [len(BALL.triangles) + 1]
     assert report.unused_vertices.tolist() == [len(BALL.vertices)]
-    assert len(report.open_edges) == 0  # a side from a vertex to itself is none
+    assert len(report.open_edges) == 0  # a side from a vertex to itself is not an edge
     text = str(report)
     assert "1 duplicate triangle pair" in text
     assert f"vertex {len(BALL.vertices)} at (9, 9, 9)" in text
@@ -100,7 +100,7 @@ def test_a_needle_is_degenerate():
     assert report.degenerate_triangles.tolist() == [0]
 
 
-def test_overlapping_balls_intersect_where_they_do():
+def test_intersections_of_overlapping_balls_are_located():
     surface = joined(BALL, BALL.transformed(translation=(1.0, 0.2, 0.1)))
     report = surface.check()
     assert report.self_intersecting
@@ -116,7 +116,7 @@ def test_overlapping_balls_intersect_where_they_do():
     assert any("intersecting triangle pairs" in line for line in report.problems)
 
 
-def test_soup_lists_a_bounded_number_of_intersections():
+def test_the_number_of_listed_intersections_is_bounded():
     points = np.random.default_rng(3).random((300, 3))
     report = SurfaceMesh(points, np.arange(300).reshape(-1, 3)).check()
     assert len(report.intersecting_triangles) == MAX_INTERSECTIONS
@@ -141,14 +141,14 @@ def test_folded_neighbours_are_found():
     assert not SurfaceMesh(vertices, [[0, 1, 2], [1, 0, 4]]).check().self_intersecting
 
 
-def test_surface_of_a_tet_mesh_may_leave_vertices_out():
+def test_the_surface_of_a_tet_mesh_may_have_unused_vertices():
     mesh = shapes.sphere(1.0, 0.5)
     assert len(mesh.surface.used_vertices) < len(mesh.vertices)
     assert len(mesh.surface.check().unused_vertices) == 0
     assert len(SurfaceMesh(mesh.vertices, mesh.surface.triangles).check().unused_vertices) > 0
 
 
-def test_winding_number_tells_inside_from_outside():
+def test_winding_number_inside_and_outside():
     corners = BALL.vertices[BALL.triangles]
     assert winding_number(corners, np.array([0.1, 0.2, 0.3])) == pytest.approx(1)
     assert winding_number(corners, np.array([1.1, 0.2, 0.3])) == pytest.approx(0, abs=1e-12)

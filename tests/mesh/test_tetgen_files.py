@@ -1,4 +1,4 @@
-"""TetGen's .node/.ele/.edge/.face: round trips, every way of spelling them, and every way of breaking them."""
+"""TetGen's .node/.ele/.edge/.face: round trips, every spelling, and every fault."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from supple.errors import MeshError
-from supple.mesh.io.tetgen_files import read_tetgen, read_tetgen_family, write_tetgen
+from supple.mesh.io.tetgen_family import read_tetgen_family
+from supple.mesh.io.tetgen_files import read_tetgen, write_tetgen
 from supple.mesh.tetmesh import TetMesh
 
-# Two tets glued at the face 1 2 3 (counted from 0).
+# Two tets that share the face 1 2 3 (counted from 0).
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]], dtype=float)
 TETS = np.array([[0, 1, 2, 3], [1, 2, 3, 4]])
 
@@ -32,7 +33,7 @@ def write_family(folder: Path, **texts: str | bytes) -> Path:
 
 
 def strip(n: int, jitter: np.ndarray) -> TetMesh:
-    """A row of 6n tets in n cubes, jittered by less than what could flip one."""
+    """A row of 6n tets in n cubes, with noise too small to invert one."""
     grid = np.stack(np.meshgrid(np.arange(n + 1), (0, 1), (0, 1), indexing="ij"), axis=-1).reshape(-1, 3).astype(float)
     corner = np.arange(len(grid)).reshape(n + 1, 2, 2)
     cube = np.stack([corner[a : a + n, b, c].ravel() for a in (0, 1) for b in (0, 1) for c in (0, 1)], axis=1)
@@ -41,7 +42,7 @@ def strip(n: int, jitter: np.ndarray) -> TetMesh:
 
 
 @pytest.mark.parametrize("member", ["two.1.node", "two.1.ele", "two.1.edge", "two.1.face", "two.1"])
-def test_any_member_names_the_family(tmp_path: Path, member: str) -> None:
+def test_each_file_stands_for_the_family(tmp_path: Path, member: str) -> None:
     write_family(tmp_path, edge=EDGE, face=FACE)
     mesh = read_tetgen(tmp_path / member)
     np.testing.assert_array_equal(mesh.vertices, POINTS)
@@ -75,7 +76,7 @@ def test_round_trip_keeps_every_bit(tmp_path_factory, n: int, base: int, jitter:
     assert (family.face_markers == 1).all()
 
 
-def test_boundary_markers_tell_inside_from_outside(tmp_path: Path) -> None:
+def test_markers_are_1_on_the_boundary_and_0_inside(tmp_path: Path) -> None:
     points = np.vstack([POINTS[:4] * 4, [[0.8, 0.8, 0.8]]])
     mesh = TetMesh(points, [[4, 1, 2, 3], [0, 4, 2, 3], [0, 1, 4, 3], [0, 1, 2, 4]])
     family = read_tetgen_family(write_tetgen(mesh, tmp_path / "in.node")[".ele"])
@@ -104,8 +105,8 @@ def test_comments_blank_lines_attributes_and_markers(tmp_path: Path) -> None:
     assert family.faces is None
 
 
-def test_a_byte_order_mark_and_dos_line_ends_are_read_over(tmp_path: Path) -> None:
-    """What Windows' editors leave behind."""
+def test_a_byte_order_mark_and_dos_line_ends_are_ignored(tmp_path: Path) -> None:
+    """As editors on Windows write them."""
     dos = {"node": b"\xef\xbb\xbf" + NODE.replace("\n", "\r\n").encode(), "ele": b"\xef\xbb\xbf" + ELE.strip().encode()}
     mesh = read_tetgen(write_family(tmp_path, **dos))
     np.testing.assert_array_equal(mesh.vertices, POINTS)
@@ -147,13 +148,13 @@ def test_unused_vertices_are_dropped_and_negative_tets_turned(tmp_path: Path, ca
     assert "dropped 1 of 5 vertices" in caplog.text
 
 
-# (files to write, what the message must say); None removes a file.
+# (files to write, what the message must contain); None removes a file.
 MALFORMED = {
     "empty node": ({"node": ""}, "two.1.node: is empty"),
     "only comments": ({"node": "# nothing\n\n"}, "two.1.node: is empty"),
     "empty ele": ({"ele": ""}, "two.1.ele: is empty"),
-    "no ele": ({"ele": None}, "two.1.ele: no such file"),
-    "no node": ({"node": None}, "two.1.node: no such file"),
+    "no ele": ({"ele": None}, "two.1.ele: there is no such file"),
+    "no node": ({"node": None}, "two.1.node: there is no such file"),
     "two dimensions": ({"node": "3 2 0 0\n1 0 0\n2 1 0\n3 0 1\n"}, "two.1.node:1: dimension 2"),
     "header in words": ({"node": "five 3 0 0\n"}, "two.1.node:1: the header"),
     "header of fractions": ({"node": NODE.replace("5 3", "5.5 3", 1)}, "two.1.node:1: the header"),
@@ -175,8 +176,8 @@ MALFORMED = {
     "negative attributes": ({"ele": ELE.replace("4 0", "4 -1")}, "two.1.ele:1: -1 attributes"),
     "marker count": ({"node": NODE.replace("3 0 0", "3 0 2", 1)}, "two.1.node:1: the header's boundary markers"),
     "one count too many": ({"node": NODE.replace("5 3", "6 3", 1)}, "two.1.node:6: the file ends after 5 of the 6"),
-    "one count too few": ({"node": NODE.replace("5 3", "4 3", 1)}, "two.1.node:6: a line too many: line 1 announces 4"),
-    "extra line": ({"ele": ELE + "\n# done\n3 1 2 3 5\n"}, "two.1.ele:6: a line too many"),
+    "one count too few": ({"node": NODE.replace("5 3", "4 3", 1)}, "node:6: one line too many: line 1 announces 4"),
+    "extra line": ({"ele": ELE + "\n# done\n3 1 2 3 5\n"}, "two.1.ele:6: one line too many"),
     "truncated line": ({"node": NODE[:-5]}, "two.1.node:6: has 2 values where the header (line 1) announces 4"),
     "truncated at a line": ({"ele": "2 4 0\n1 1 2 3 4\n"}, "two.1.ele:2: the file ends after 1 of the 2"),
     "missing marker": ({"node": NODE.replace("3 0 0", "3 0 1", 1)}, "two.1.node:2: has 4 values"),
@@ -239,36 +240,36 @@ def test_malformed_files_are_named_with_their_line(tmp_path: Path, case: str) ->
     assert "\n" not in str(error.value)
 
 
-def test_the_name_without_its_number_is_hinted_at(tmp_path: Path) -> None:
+def test_a_name_without_its_number_gives_a_hint(tmp_path: Path) -> None:
     path = write_family(tmp_path)
     (tmp_path / "two.node").write_text(NODE)
-    with pytest.raises(MeshError, match=r"two\.ele: no such file; two\.1\.ele is there"):
+    with pytest.raises(MeshError, match=r"two\.ele: there is no such file; two\.1\.ele exists"):
         read_tetgen(path.with_name("two.node"))
 
 
-def test_a_directory_is_refused(tmp_path: Path) -> None:
+def test_a_folder_is_an_error(tmp_path: Path) -> None:
     write_family(tmp_path)
     (tmp_path / "two.1.face").mkdir()
-    with pytest.raises(MeshError, match=r"two\.1\.face: is a directory"):
+    with pytest.raises(MeshError, match=r"two\.1\.face: it is a folder"):
         read_tetgen(tmp_path / "two.1.node")
 
 
 @pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="needs a user whom file permissions bind")
-def test_a_forbidden_file_is_refused(tmp_path: Path) -> None:
+def test_a_file_without_permission_is_an_error(tmp_path: Path) -> None:
     path = write_family(tmp_path)
     path.chmod(0)
-    with pytest.raises(MeshError, match=r"two\.1\.node: cannot be read"):
+    with pytest.raises(MeshError, match=r"two\.1\.node: it cannot be read"):
         read_tetgen(path)
 
 
-def test_an_unreadable_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unreadable_file_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write_family(tmp_path)
 
     def forbidden(_: Path) -> bytes:
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(Path, "read_bytes", forbidden)
-    with pytest.raises(MeshError, match=r"two\.1\.node: cannot be read: Permission denied"):
+    with pytest.raises(MeshError, match=r"two\.1\.node: it cannot be read: Permission denied"):
         read_tetgen(path)
 
 
@@ -277,7 +278,7 @@ def test_an_unreadable_file_is_refused(tmp_path: Path, monkeypatch: pytest.Monke
     edits=st.lists(st.tuples(st.floats(0, 0.999), st.integers(0, 255), st.integers(0, 2)), min_size=1, max_size=4),
 )
 @settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_any_mutation_is_a_mesh_or_a_mesh_error(
+def test_any_damaged_file_loads_or_raises_a_mesh_error(
     tmp_path: Path, which: str, edits: list[tuple[float, int, int]]
 ) -> None:
     texts = {"node": NODE, "ele": ELE, "edge": EDGE, "face": FACE}
@@ -294,7 +295,7 @@ def test_any_mutation_is_a_mesh_or_a_mesh_error(
     try:
         mesh = read_tetgen(path)
     except MeshError as error:
-        assert str(error).startswith(str(tmp_path))  # noqa: PT017 - either outcome is right
+        assert str(error).startswith(str(tmp_path))  # noqa: PT017 - either outcome is correct
     else:
         assert (mesh.volumes > 0).all()
 
@@ -320,7 +321,7 @@ def test_a_failed_write_leaves_the_old_family(tmp_path: Path, monkeypatch: pytes
         real(source, target)
 
     monkeypatch.setattr(os, "replace", fail_on_the_last)
-    with pytest.raises(MeshError, match=r"a\.1\.face: cannot be written: No space left"):
+    with pytest.raises(MeshError, match=r"a\.1\.face: it cannot be written: No space left"):
         write_tetgen(new, tmp_path / "a.1.node")
     assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == before
     monkeypatch.undo()
@@ -329,9 +330,9 @@ def test_a_failed_write_leaves_the_old_family(tmp_path: Path, monkeypatch: pytes
     assert len(list(tmp_path.iterdir())) == 4
 
 
-def test_a_directory_in_the_way_leaves_nothing(tmp_path: Path) -> None:
+def test_a_folder_of_the_same_name_leaves_no_file(tmp_path: Path) -> None:
     (tmp_path / "a.1.ele").mkdir()
-    with pytest.raises(MeshError, match=r"a\.1\.ele: cannot be written: is a directory"):
+    with pytest.raises(MeshError, match=r"a\.1\.ele: it cannot be written: is a directory"):
         write_tetgen(TetMesh(POINTS, TETS), tmp_path / "a.1.node")
     assert [p.name for p in tmp_path.iterdir()] == ["a.1.ele"]
     with pytest.raises(MeshError, match=r"cannot be written"):

@@ -1,4 +1,4 @@
-"""TetMesh: normalization, refusals, and what it derives."""
+"""TetMesh: normalization, errors, and derived quantities."""
 
 import logging
 
@@ -142,14 +142,14 @@ def test_transformed_body():
 
 
 @pytest.mark.parametrize("scale", [1e-9, 1.0, 1e3])
-def test_thin_tets_are_refused_only_below_round_off(scale):
+def test_thin_tets_are_errors_only_below_round_off(scale):
     def tet(thickness):
         return np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.3, 0.3, thickness]]) * scale
 
     assert TetMesh(tet(1e-12), [[0, 1, 2, 3]]).volume > 0
     with pytest.raises(MeshError, match=r"tet 0 .* is flat"):
         TetMesh(tet(1e-15), [[0, 1, 2, 3]])
-    # Far from the origin the same thickness drowns in the coordinates' own round-off.
+    # Far from the origin the same thickness is below the round-off of the coordinates.
     with pytest.raises(MeshError, match="flat"):
         TetMesh(tet(1e-12) + 1e3 * scale, [[0, 1, 2, 3]])
 
@@ -174,14 +174,14 @@ def test_thin_tets_are_refused_only_below_round_off(scale):
         (np.vstack([CORNERS, [[2, 2, 2]]]), [*TWO, [1, 2, 3, 5]], r"tets 0, 1 and 2 all share the facet \[1, 2, 3\]"),
     ],
 )
-def test_malformed_meshes_are_refused_in_one_line(vertices, tets, words):
+def test_malformed_meshes_are_errors_of_one_line(vertices, tets, words):
     with pytest.raises(MeshError, match=words) as caught:
         TetMesh(vertices, tets)
     assert "\n" not in str(caught.value)
 
 
 def test_packed_keys_also_work_beyond_two_million_vertices():
-    # Three indices of a facet do not fit into 63 bits any more; the numbering takes another way there.
+    # Three indices of a facet do not fit into 63 bits there, so the keys are made in another way.
     from supple.mesh.topology import facet_keys
 
     n = 3_000_000

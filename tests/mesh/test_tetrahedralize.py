@@ -1,4 +1,4 @@
-"""From surfaces to tets: real shapes, cavities, wishes kept, and every way in which a mesher can fail."""
+"""From surfaces to tets: real shapes, cavities, options that are met, and every way in which a mesher can fail."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ from supple.mesh.meshing.tetgen_mesher import mesh_with_tetgen
 from supple.mesh.meshing.tetrahedralize import tetrahedralize as fill
 from supple.mesh.meshing.tetrahedralize import tetrahedralize_reported
 from supple.mesh.primitives.gummy_bear import gummy_bear_surface
-from supple.mesh.primitives.surfaces import box_surface, sphere_surface, torus_surface
+from supple.mesh.primitives.surfaces import sphere_surface, torus_surface
+from supple.mesh.shapes import box_surface
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 
@@ -71,7 +72,7 @@ def test_shapes_are_filled_and_no_tet_is_too_large(surface: SurfaceMesh, max_vol
 
 
 def test_scale_does_not_matter() -> None:
-    """The same mesh at nanometres, but for the unit: only powers of two are exact, hence 2^-30."""
+    """The same mesh at nanometres; the factor is 2^-30, because only powers of two are exact."""
     scale = 2.0**-30
     mesh = fill(SPHERE, max_volume=2e-3)
     small = fill(SurfaceMesh(SPHERE.vertices * scale, SPHERE.triangles), max_volume=2e-3 * scale**3)
@@ -87,7 +88,7 @@ def test_keep_surface_adds_no_vertex_there() -> None:
     assert len(mesh.vertices) > len(rows)
 
 
-def test_quality_and_dihedral_ask_for_more_tets() -> None:
+def test_stricter_quality_and_dihedral_give_more_tets() -> None:
     counts = [
         len(fill(SPHERE, quality=quality, min_dihedral=angle).tets)
         for quality, angle in ((2.0, None), (1.2, None), (1.2, 15.0))
@@ -112,7 +113,7 @@ def test_inward_surfaces_are_turned(caplog: pytest.LogCaptureFixture) -> None:
     assert_fills(fill(one_of_two), one_of_two, SPHERE.volume + SMALL.volume)
 
 
-def test_unused_vertices_are_left_out() -> None:
+def test_unused_vertices_are_dropped() -> None:
     surface = SurfaceMesh(np.vstack([SPHERE.vertices, [[9.0, 9.0, 9.0]]]), SPHERE.triangles)
     assert_fills(fill(surface), SPHERE)
 
@@ -132,7 +133,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("case", BROKEN)
-def test_dirty_surfaces_are_refused_with_place_and_mend(case: str) -> None:
+def test_surfaces_with_faults_are_errors_with_place_and_remedy(case: str) -> None:
     surface, fault = BROKEN[case]
     with pytest.raises(MeshingError, match=fault) as error:
         fill(surface, mesher="tetgen")
@@ -141,7 +142,7 @@ def test_dirty_surfaces_are_refused_with_place_and_mend(case: str) -> None:
     assert "\n" not in str(error.value)
 
 
-def test_auto_says_how_to_install_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_auto_names_the_missing_package(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tetrahedralize, "ftetwild_installed", lambda: False)
     with pytest.raises(MeshingError, match=r'pip install "supple\[dirty\]"'):
         fill(BROKEN["open"][0])
@@ -149,7 +150,7 @@ def test_auto_says_how_to_install_what_is_missing(monkeypatch: pytest.MonkeyPatc
         fill(SPHERE, mesher="ftetwild")
 
 
-def test_auto_takes_ftetwild_for_dirty_surfaces(caplog: pytest.LogCaptureFixture) -> None:
+def test_auto_uses_ftetwild_for_surfaces_with_faults(caplog: pytest.LogCaptureFixture) -> None:
     pytest.importorskip("pytetwild")
     ball = sphere_surface(radius=0.5, edge_length=0.35)
     surface = joined(ball, moved(ball, 0.5, 0.01, 0.02))
@@ -163,16 +164,16 @@ def test_auto_takes_ftetwild_for_dirty_surfaces(caplog: pytest.LogCaptureFixture
     assert 1.2 * ball.volume < mesh.volume < 1.9 * ball.volume
 
 
-@pytest.mark.parametrize("wish", [{"min_dihedral": 10.0}, {"keep_surface": True}])
-def test_ftetwild_refuses_what_it_cannot_do(wish: dict) -> None:
+@pytest.mark.parametrize("options", [{"min_dihedral": 10.0}, {"keep_surface": True}])
+def test_options_without_support_in_ftetwild_are_errors(options: dict) -> None:
     if not ftetwild.ftetwild_installed():
         pytest.skip("needs pytetwild")
     with pytest.raises(MeshingError, match="fTetWild has no"):
-        fill(SPHERE, mesher="ftetwild", **wish)
+        fill(SPHERE, mesher="ftetwild", **options)
 
 
 @pytest.mark.parametrize(
-    "wish",
+    "options",
     [
         {"max_volume": 0.0},
         {"max_volume": -1.0},
@@ -188,9 +189,9 @@ def test_ftetwild_refuses_what_it_cannot_do(wish: dict) -> None:
     ],
     ids=str,
 )
-def test_parameters_out_of_range_are_named(wish: dict) -> None:
-    with pytest.raises(MeshingError, match=next(iter(wish))):
-        fill(SPHERE, **wish)
+def test_parameters_out_of_range_are_named(options: dict) -> None:
+    with pytest.raises(MeshingError, match=next(iter(options))):
+        fill(SPHERE, **options)
 
 
 def test_only_surfaces_are_filled() -> None:
@@ -198,9 +199,9 @@ def test_only_surfaces_are_filled() -> None:
         fill("bear.stl")  # type: ignore[arg-type]
 
 
-def test_an_unreachable_max_volume_is_said() -> None:
+def test_an_unreachable_max_volume_is_an_error() -> None:
     """TetGen finds no place for a vertex inside twelve large triangles that it may not split."""
-    with pytest.raises(MeshingError, match=r"left a tet of .* larger than max_volume=0\.0001; leave keep_surface out"):
+    with pytest.raises(MeshingError, match=r"left a tet of .* larger than max_volume=0\.0001; omit keep_surface"):
         fill(box_surface(size=(1, 1, 1), divisions=(1, 1, 1)), max_volume=1e-4, keep_surface=True)
 
 
@@ -215,32 +216,32 @@ def test_time_limit_ends_the_mesher() -> None:
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="address space is bounded on Linux only")
 @pytest.mark.parametrize("mebibytes", [40, 200])
 def test_memory_limit_ends_the_mesher(mebibytes: int) -> None:
-    """At 40 MiB not even NumPy can be loaded; at 200 TetGen runs dry."""
+    """At 40 MiB NumPy cannot be loaded; at 200 MiB TetGen runs out of memory."""
     with pytest.raises(MesherFailure, match=rf"ran out of memory within the memory limit of {mebibytes} MiB") as error:
         fill(SPHERE, max_volume=1e-8, memory_limit=mebibytes * 2**20)
     assert error.value.kind == "memory"
 
 
 @pytest.mark.parametrize("shift", [(0.4, 0.01, 0.0), (0.4, 0.0, 0.0), (1e-9, 0.0, 0.0)], ids=str)
-def test_this_process_outlives_what_kills_tetgen(shift: tuple[float, float, float], tmp_path, monkeypatch) -> None:
-    """Overlapping spheres, past the check: TetGen gives up, aborts or segfaults, as it likes."""
+def test_a_crash_of_tetgen_is_an_error_here(shift: tuple[float, float, float], tmp_path, monkeypatch) -> None:
+    """Overlapping spheres without the check before: TetGen fails, aborts or segfaults."""
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(MesherFailure, match=r"gave up|crashed|stopped at the time limit") as error:
+    with pytest.raises(MesherFailure, match=r"failed|crashed|stopped at the time limit") as error:
         mesh_with_tetgen(joined(SPHERE, moved(SPHERE, *shift)), OPTIONS, Limits(4.0, 2**30))
     assert error.value.kind in ("refused", "crash", "time")
     assert "\n" not in str(error.value)
-    # TetGen writes `_skipped.node` and others into the current folder, which is not to be this one.
+    # TetGen writes `_skipped.node` and other files into its current folder, which must not be the one of this process.
     assert list(tmp_path.iterdir()) == []
 
 
-def test_this_process_outlives_jittered_soup() -> None:
+def test_a_surface_of_noise_is_an_error_here() -> None:
     noise = np.random.default_rng(6).normal(size=SPHERE.vertices.shape) * 0.1
     with pytest.raises(MesherFailure):
         mesh_with_tetgen(SurfaceMesh(SPHERE.vertices + noise, SPHERE.triangles), OPTIONS, Limits(4.0, 2**30))
 
 
 def worker(monkeypatch: pytest.MonkeyPatch, folder: Path, code: str) -> None:
-    """Put a script in the place of the mesher."""
+    """Replace the mesher by a script."""
     script = folder / "worker.py"
     script.write_text(code)
     monkeypatch.setattr(mesher_worker, "__file__", str(script))
@@ -254,7 +255,7 @@ def worker(monkeypatch: pytest.MonkeyPatch, folder: Path, code: str) -> None:
         ("import sys; print('terminate: std::bad_alloc', file=sys.stderr); raise SystemExit(134)", "memory", "ran out"),
     ],
 )
-def test_the_end_of_the_child_is_told(tmp_path, monkeypatch, code: str, kind: str, text: str) -> None:
+def test_the_end_of_the_child_is_reported(tmp_path, monkeypatch, code: str, kind: str, text: str) -> None:
     worker(monkeypatch, tmp_path, code)
     with pytest.raises(MesherFailure) as error:
         fill(SPHERE)
@@ -269,7 +270,7 @@ def test_a_signal_is_named(tmp_path, monkeypatch) -> None:
         fill(SPHERE)
 
 
-def test_a_python_that_cannot_start_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_python_that_cannot_start_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "executable", "/no/such/python")
     with pytest.raises(MesherFailure, match="cannot start Python"):
         fill(SPHERE)
@@ -294,7 +295,7 @@ def test_an_interrupt_ends_the_child(tmp_path: Path) -> None:
         [sys.executable, "-c", program],
         env=os.environ | {"TMPDIR": str(scratch)},
         stderr=subprocess.PIPE,
-        # Whoever runs the tests in the background may have had SIGINT ignored; a person at a terminal has not.
+        # Tests in the background may run with SIGINT ignored; at a terminal it is not.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     pid_file = tmp_path / "pid"
@@ -303,8 +304,8 @@ def test_an_interrupt_ends_the_child(tmp_path: Path) -> None:
         time.sleep(0.05)
     child = int(pid_file.read_text())
     parent.send_signal(signal.SIGINT)
-    _, said = parent.communicate(timeout=30)
-    assert b"KeyboardInterrupt" in said
+    _, output = parent.communicate(timeout=30)
+    assert b"KeyboardInterrupt" in output
     with pytest.raises(ProcessLookupError):
         os.kill(child, 0)
     assert list(scratch.iterdir()) == []

@@ -1,4 +1,4 @@
-"""The tree finds what a look at every triangle finds."""
+"""The tree finds the same triangles as a search through all of them."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from supple.numerics.geometry.triangle_tree import TriangleTree, pair_distances
 
 def soup(count, seed):
     rng = np.random.default_rng(seed)
-    centers = rng.uniform(-1, 1, (count, 1, 3)) ** 3  # crowded in the middle
+    centers = rng.uniform(-1, 1, (count, 1, 3)) ** 3  # dense in the middle
     sizes = 10.0 ** rng.uniform(-3, 0, (count, 1, 1))
     corners = centers + sizes * rng.normal(size=(count, 3, 3))
     return corners.reshape(-1, 3), np.arange(3 * count, dtype=np.int32).reshape(-1, 3)
@@ -21,7 +21,7 @@ def every_distance(queries, points, triangles):
 
 @pytest.mark.parametrize("count", [1, 2, 5, 64, 300])
 @pytest.mark.parametrize("collapse", [0, 1, 2], ids=["triangles", "edges", "points"])
-def test_agrees_with_looking_at_all(count, collapse):
+def test_agrees_with_a_search_through_all_triangles(count, collapse):
     points, triangles = soup(count, 7 * count)
     triangles[:, 3 - collapse :] = triangles[:, [2 - collapse]]
     queries = np.random.default_rng(1).normal(size=(40, 3))
@@ -76,7 +76,7 @@ def test_of_equally_near_triangles_the_one_that_faces_the_point_wins():
 
 
 def test_a_hundred_thousand_against_a_hundred_thousand():
-    """In seconds, not asserted: without an index, these ten thousand million pairs would take a quarter of an hour."""
+    """Takes seconds (not asserted); a search through all 10^10 pairs would take a quarter of an hour."""
     n = 223
     grid = np.stack(np.meshgrid(np.linspace(0, 1, n + 1), np.linspace(0, 1, n + 1), indexing="ij"), -1).reshape(-1, 2)
     heights = 0.1 * np.sin(7 * grid[:, 0]) * np.cos(5 * grid[:, 1])

@@ -1,4 +1,4 @@
-"""What is wrong with a scene file is said in one line: where, what, and the mend."""
+"""An error in a scene file is one line: the place, the fault, and the remedy."""
 
 import pytest
 
@@ -22,7 +22,7 @@ dt: 1/60
 steps: 5
 """
 
-# what to replace, by what, the line and key of the complaint, its words
+# text to replace, its replacement, and the start of the error: line, key, words
 CASES = [
     ("youngs: 1e5", "yungs: 1e5", "6: bodies[0].material.yungs: unknown key; did you mean `youngs`?"),
     ("position:", "postion:", "8: bodies[0].postion: unknown key; did you mean `position`?"),
@@ -79,7 +79,7 @@ CASES = [
     (
         "shape: {kind: box, divisions: [1, 1, 1]}",
         "mesh: {file: a.msh, quality: 2}",
-        "3: bodies[0].mesh.quality: a.msh holds tetrahedra",
+        "3: bodies[0].mesh.quality: a.msh already holds tetrahedra",
     ),
     ("name: cube", "name: a/b", "2: bodies[0].name: body 'a/b': a name is at most"),
     ("name: cube", "name: ''", "2: bodies[0].name: is an empty text"),
@@ -141,7 +141,7 @@ CASES = [
     (
         "vertices: [0]}",
         "vertices: [0]}\n  - {body: cube, vertices: [0]}",
-        "13: pins[1].vertices: pin of body 'cube': vertex 0 is held by another pin",
+        "13: pins[1].vertices: pin of body 'cube': vertex 0 is already held by another pin",
     ),
     (
         "dt: 1/60",
@@ -161,7 +161,7 @@ CASES = [
     (
         "dt: 1/60",
         "contact_pairs: [{first: cube, second: cube}]",
-        "13: contact_pairs[0]: this rule says nothing; give `friction`, or `collide: false`",
+        "13: contact_pairs[0]: this rule has no effect; give `friction`, or `collide: false`",
     ),
     (
         "dt: 1/60",
@@ -208,7 +208,7 @@ CASES = [
     (
         "    position: [0, 1, 0]",
         "    copies: {grid: [2, 2, 2]}",
-        "8: bodies[0].copies: `grid` and `spacing` go together",
+        "8: bodies[0].copies: `grid` needs `spacing`",
     ),
     (
         "    position: [0, 1, 0]",
@@ -227,23 +227,23 @@ def scene_file(tmp_path):
     return tmp_path / "scene.yaml"
 
 
-def test_the_unchanged_file_is_good(scene_file):
+def test_the_unchanged_file_is_valid(scene_file):
     scene_file.write_text(GOOD)
     assert len(load_run(scene_file).scene.bodies) == 1
 
 
-@pytest.mark.parametrize(("old", "new", "said"), CASES, ids=[said[:60] for _, _, said in CASES])
-def test_one_line_says_where_and_what(scene_file, old, new, said):
+@pytest.mark.parametrize(("old", "new", "expected"), CASES, ids=[expected[:60] for _, _, expected in CASES])
+def test_errors_are_one_line_with_place_and_fault(scene_file, old, new, expected):
     assert GOOD.count(old) == 1
     scene_file.write_text(GOOD.replace(old, new))
     with pytest.raises(sp.SceneError) as caught:
         load_run(scene_file)
     message = str(caught.value)
-    assert message.startswith(f"{scene_file}:{said}")
+    assert message.startswith(f"{scene_file}:{expected}")
     assert "\n" not in message
 
 
-def test_the_first_of_several_problems_is_told_and_the_others_are_counted(scene_file):
+def test_the_first_of_several_problems_is_reported_and_the_others_are_counted(scene_file):
     scene_file.write_text(GOOD.replace("youngs: 1e5", "youngs: -1").replace("steps: 5", "steps: x"))
     with pytest.raises(sp.SceneError, match=r":6: bodies\[0\]\.material\.youngs: .* \(and 1 more\)$"):
         load_run(scene_file)

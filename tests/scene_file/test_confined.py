@@ -1,4 +1,4 @@
-"""Scene files of a live page read nothing outside their folder, and run nothing."""
+"""Scene files of a live page read nothing outside their folder, and run no code."""
 
 import os
 
@@ -40,7 +40,7 @@ def load(home, source):
 @pytest.mark.parametrize(
     "file", ["meshes/inside.msh", "./meshes/../meshes/inside.msh", "family.1.ele", "family.1.node"]
 )
-def test_what_is_inside_is_read(place, file):
+def test_files_inside_are_read(place, file):
     assert len(load(place, f"mesh: {{file: {file}}}").scene.body("cube").mesh.tets) == 6
 
 
@@ -53,7 +53,7 @@ def outward(place):
         "../outside.msh",
         "meshes/../../outside.msh",
         str(place.parent / "outside.msh"),
-        str(place / "meshes" / "inside.msh"),  # no absolute path, wherever it leads
+        str(place / "meshes" / "inside.msh"),  # no absolute path, not even to the folder
         "link.msh",
         "folder/outside.msh",
         "half.1.ele",
@@ -65,7 +65,7 @@ def outward(place):
     ]
 
 
-def test_what_is_outside_is_not(place):
+def test_files_outside_are_not_read(place):
     for file in outward(place):
         with pytest.raises(SceneError) as caught:
             load(place, f'mesh: {{file: "{file}"}}')
@@ -75,16 +75,16 @@ def test_what_is_outside_is_not(place):
             load(place, f'shape: {{kind: box}}\n    skin: {{file: "{file}"}}')
 
 
-def test_an_ordinary_run_reads_what_its_owner_names(place):
+def test_a_run_from_the_shell_reads_any_file(place):
     path = place / "scene.yaml"
     path.write_text(SCENE.format(source="mesh: {file: ../outside.msh}"))
     assert load_run(path).scene.body("cube")
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
-def test_a_pipe_is_no_mesh_and_nobody_waits_for_it(place):
+def test_a_pipe_is_an_error_without_waiting_for_it(place):
     os.mkfifo(place / "pipe.msh")
-    with pytest.raises(SceneError, match="no plain file"):
+    with pytest.raises(SceneError, match="not a regular file"):
         load(place, "mesh: {file: pipe.msh}")
 
 
@@ -104,7 +104,7 @@ def test_a_pipe_is_no_mesh_and_nobody_waits_for_it(place):
         "\0\1\2",
     ],
 )
-def test_hostile_files_are_an_error_and_run_nothing(tmp_path, text):
+def test_hostile_files_are_errors_and_run_no_code(tmp_path, text):
     marker, path = tmp_path / "marker", tmp_path / "scene.yaml"
     path.write_text(text.replace("{marker}", str(marker)))
     with pytest.raises(SuppleError) as caught:

@@ -1,4 +1,4 @@
-"""Damaged scene files end in a SceneError of one line, or are still scenes; never in another exception."""
+"""Damaged scene files are still valid or end in a SceneError of one line; never in another exception."""
 
 import re
 from pathlib import Path

@@ -67,7 +67,7 @@ output: {{page: false}}
 """
 
 
-def test_a_scene_file_says_all_that_the_api_can(load):
+def test_a_scene_file_covers_the_whole_api(load):
     run = load(EVERYTHING)
     scene = run.scene
     peas = [f"pea{k:02d}" for k in range(1, 7)]
@@ -104,14 +104,14 @@ def test_a_scene_file_says_all_that_the_api_can(load):
     assert (run.output.page, run.output.plot) == (False, True)
 
 
-def test_a_squeezed_start_keeps_its_center_and_its_widths(load):
+def test_a_compressed_start_keeps_its_center_and_its_widths(load):
     run = load(EVERYTHING)
     placed = run.scene.body("block").place(run.scene.body("block").mesh.vertices)
     np.testing.assert_allclose(run.start["initial_positions"]["block"] - [3, 1, 0], (placed - [3, 1, 0]) * [1, 0.5, 1])
     assert sorted(run.initial_positions) == ["block"]
 
 
-def test_both_solvers_take_their_parameters(load):
+def test_parameters_of_both_solvers(load):
     solver = load(
         f"bodies: [{BODY}]\nsolver: {{kind: xpbd, contact: {{thickness: 0.01, self_collision: false}}}}\n"
     ).solver
@@ -133,11 +133,11 @@ def test_defaults(load):
     assert run.start == {}
 
 
-def test_load_scene_says_what_it_leaves_out(load, caplog):
+def test_load_scene_warns_of_what_it_does_not_return(load, caplog):
     with caplog.at_level(logging.WARNING):
         scene = load(EVERYTHING, load_scene)
     assert isinstance(scene, sp.Scene)
-    assert "the deformed start of 'block' is no part of the scene" in caplog.text
+    assert "the deformed start of 'block' is not a part of the scene" in caplog.text
 
 
 def test_mesh_files_are_found_beside_the_scene_file(load, tmp_path, monkeypatch):
@@ -186,7 +186,7 @@ def test_the_schema_is_valid_and_accepts_what_the_loader_accepts(load, tmp_path)
 
 
 @pytest.mark.parametrize("case", ["unknown", "kind", "missing", "type", "range"])
-def test_the_schema_refuses_what_the_loader_refuses(case):
+def test_the_schema_rejects_what_the_loader_rejects(case):
     data = {
         "bodies": [{"name": "a", "shape": {"kind": "box"}, "material": {"kind": "arap", "youngs": 1.0, "poisson": 0.1}}]
     }
@@ -221,7 +221,7 @@ def test_the_scene_of_the_manual_is_valid(load, tmp_path):
 
 
 @pytest.mark.parametrize("kinds", ["material", "shape", "obstacle", "solver", "stitch"])
-def test_the_manual_names_every_kind(kinds):
+def test_the_manual_lists_every_kind(kinds):
     manual = (Path(__file__).parents[2] / "docs" / "scene_files.md").read_text(encoding="utf-8")
     row = next(line for line in manual.splitlines() if line.startswith(f"| {kinds} |"))
     known = {
@@ -269,7 +269,7 @@ def test_stitches(load, tmp_path, line):
 
 
 @pytest.mark.parametrize(
-    ("line", "says"),
+    ("line", "message"),
     [
         (
             "kind: vertex_vertex, first: hihg, second: low, max_distance: 1, stiffness: 1",
@@ -282,16 +282,16 @@ def test_stitches(load, tmp_path, line):
         ("kind: soft_vertex_triangle, first: high, second: low, max_distance: 1, youngs: 1", "youngs and poisson"),
     ],
 )
-def test_stitches_that_are_refused_are_refused_in_their_line(load, tmp_path, line, says):
+def test_errors_in_stitches_name_their_line(load, tmp_path, line, message):
     sp.shapes.box_surface((4, 1, 4), (1, 1, 1)).save(tmp_path / "roof.obj")
-    with pytest.raises(sp.SceneError) as refused:
+    with pytest.raises(sp.SceneError) as caught:
         load(STITCHED + f"  - {{{line}}}\n")
-    assert re.search(r"scene.yaml:8:", str(refused.value))
-    assert says in str(refused.value)
-    assert "\n" not in str(refused.value)
+    assert re.search(r"scene.yaml:8:", str(caught.value))
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
 
 
-def test_pairs_are_found_once_and_by_the_names_that_the_scene_gives(load, tmp_path, monkeypatch):
+def test_pairs_are_found_once_by_the_names_in_the_scene(load, tmp_path, monkeypatch):
     from supple.scene.stitches.stitch import Stitch
     from supple.system import build_system
 
@@ -310,16 +310,16 @@ def test_pairs_are_found_once_and_by_the_names_that_the_scene_gives(load, tmp_pa
 @pytest.mark.parametrize(
     "pairs", ["[[0, 1, 2]]", "[[0]]", "[]", "[[0, 1.5]]", "[[0, -1]]", "[[0, 99]]", "[[0, 1], [0, 1]]", "7"]
 )
-def test_pairs_that_are_none_are_refused_in_their_line(load, tmp_path, pairs):
+def test_wrong_pairs_are_errors_that_name_their_line(load, tmp_path, pairs):
     sp.shapes.box_surface((4, 1, 4), (1, 1, 1)).save(tmp_path / "roof.obj")
     line = f"first: high, second: low, pairs: {pairs}, youngs: 1, poisson: 0.3"
-    with pytest.raises(sp.SceneError) as refused:
+    with pytest.raises(sp.SceneError) as caught:
         load(
             STITCHED + "  - {kind: vertex_vertex, first: high, second: low, pairs: [[0, 0]], stiffness: 1}\n"
             f"  - {{kind: soft_vertex_triangle, {line}}}\n"
         )
-    assert re.search(r"scene.yaml:9:", str(refused.value))
-    assert "\n" not in str(refused.value)
+    assert re.search(r"scene.yaml:9:", str(caught.value))
+    assert "\n" not in str(caught.value)
 
 
 def test_contact_of_the_implicit_solver(load):
@@ -343,7 +343,7 @@ def test_contact_of_the_implicit_solver(load):
         ("dhatt: 1", "solver.contact.dhatt: unknown key; did you mean `dhat`?"),
     ],
 )
-def test_complaints_about_contact_of_the_implicit_solver(load, words, complaint):
+def test_errors_in_contact_of_the_implicit_solver(load, words, complaint):
     with pytest.raises(sp.SceneError) as caught:
         load(f"bodies: [{BODY}]\nsolver: {{kind: implicit, contact: {{{words}}}}}\n")
     assert complaint in str(caught.value)

@@ -43,7 +43,7 @@ def test_regions_of_a_body_have_materials_of_their_own(load, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "says"),
+    ("old", "new", "message"),
     [
         ("low: [0, -9, -9]", "low: [1.99, 8, 8]", r"scene.yaml:9: bodies\[0\].regions\[0\].box: no tet has its center"),
         ("low: [0, -9, -9]", "low: [3, -9, -9]", r"scene.yaml:9: bodies\[0\].regions\[0\].box.low: .*swap them"),
@@ -62,11 +62,11 @@ def test_regions_of_a_body_have_materials_of_their_own(load, tmp_path):
         (
             "{kind: stable_neo_hookean, youngs: 1e4, poisson: 0.4, density: 1000}",
             "{kind: edges_and_volume}",
-            r"bodies\[0\].regions: .*elastic material beside them, which EdgesAndVolume is not",
+            r"bodies\[0\].regions: .*elastic material, which EdgesAndVolume is not",
         ),
     ],
 )
-def test_regions_that_are_refused_are_refused_in_their_line(load, old, new, says):
+def test_errors_in_regions_name_their_line(load, old, new, message):
     assert REGIONS.count(old) == 1
-    with pytest.raises(sp.SceneError, match=says):
+    with pytest.raises(sp.SceneError, match=message):
         load(REGIONS.replace(old, new))

@@ -1,4 +1,4 @@
-"""YAML without surprises, and lines for every value."""
+"""YAML 1.2, and the line of each value."""
 
 import math
 
@@ -78,14 +78,14 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
 )
 
 BAD = [
-    ("a: 1\na: 2\n", 2, "the key `a` stands on line 1 too"),
+    ("a: 1\na: 2\n", 2, "the key `a` is also on line 1"),
     ("a: {b: 1, c: 2, b: 3}\n", 1, "the key `b`"),
     ("a:\n\t- 1\n", 2, "indent with spaces"),
     ("a: [1, 2\n", 2, "not valid YAML"),
     ("a: 'open\n", 2, "not valid YAML"),
-    ("a: b: c\n", 1, "a `:` stands where no key is expected"),
+    ("a: b: c\n", 1, "a `:` is not allowed here"),
     ("a: *nothing\n", 1, "undefined alias"),
-    ("a: &a [*a]\n", 1, "an alias stands inside what it is an alias of"),
+    ("a: &a [*a]\n", 1, "an alias is inside the value that it refers to"),
     ("a: !!python/object/apply:os.system ['true']\n", 1, "tag .* is not allowed"),
     ("a: !!python/name:os.system\n", 1, "tag .* is not allowed"),
     ("a: !mine 1\n", 1, "the tag !mine is not allowed"),
@@ -108,7 +108,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("text", "line", "words"), BAD, ids=range(len(BAD)))
-def test_bad_yaml_is_one_line_with_its_place(read, tmp_path, text, line, words):
+def test_bad_yaml_is_an_error_of_one_line_with_its_place(read, tmp_path, text, line, words):
     with pytest.raises(sp.SceneError, match=words) as caught:
         read(text)
     message = str(caught.value)

@@ -1,4 +1,4 @@
-"""Turning what a user gives as vertices and elements into checked, read-only arrays."""
+"""Vertices and elements from a user as checked, read-only arrays."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def frozen(array: NDArray[Any]) -> NDArray[Any]:
 
 
 def vertex_array(value: ArrayLike, owner: str) -> NDArray[np.float64]:
-    """Vertices (n, 3) as read-only, C-contiguous float64, or a `MeshError` that names the row at fault."""
+    """Vertices (n, 3) as read-only, C-contiguous float64, or a `MeshError` that names the wrong row."""
     try:
         given = np.asarray(value)
         if given.dtype.kind == "c":
@@ -30,13 +30,13 @@ def vertex_array(value: ArrayLike, owner: str) -> NDArray[np.float64]:
     if array.ndim != 2 or array.shape[1] != 3:
         raise MeshError(f"{owner}: vertices have shape {array.shape}; they must have shape (n, 3), one x y z per row")
     if len(array) == 0:
-        raise MeshError(f"{owner}: there are no vertices; give at least one element's worth")
+        raise MeshError(f"{owner}: there are no vertices; give those of at least one element")
     if len(array) > MAX_VERTICES:
         raise MeshError(f"{owner}: {len(array)} vertices are more than 32-bit indices can count")
     if not np.isfinite(array).all():
         row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
-        raise MeshError(f"{owner}: vertex {row} is {place(array[row])}, which is not finite; mend or remove it")
-    # Beyond this, squared lengths and determinants overflow or vanish without a word.
+        raise MeshError(f"{owner}: vertex {row} is {place(array[row])}, which is not finite; correct or remove it")
+    # Beyond this, squared lengths and determinants overflow without an error.
     largest = float(np.abs(array).max())
     if largest > 1e90:
         row = int(np.abs(array).max(axis=1).argmax())
@@ -45,7 +45,7 @@ def vertex_array(value: ArrayLike, owner: str) -> NDArray[np.float64]:
 
 
 def index_array(value: ArrayLike, width: int, n_vertices: int, owner: str, name: str) -> NDArray[np.int32]:
-    """Elements (m, width) as read-only, C-contiguous int32, or a `MeshError` that names the row at fault.
+    """Elements (m, width) as read-only, C-contiguous int32, or a `MeshError` that names the wrong row.
 
     `name` is the singular of what a row is: "triangle" or "tet".
     """

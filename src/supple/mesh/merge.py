@@ -1,4 +1,4 @@
-"""Making one vertex of several that lie in the same place."""
+"""Merging vertices at the same place."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 
 def merge_map(points: NDArray[np.float64], tolerance: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Which points to keep, and for each point the row among the kept ones that stands for it.
+    """Which points to keep, and for each point the row among the kept ones that replaces it.
 
     Points are joined when they are equal, or within `tolerance` [m] of each other (also over a chain of such
-    neighbours); the first of each group stays where it is.
+    neighbours). The first of each group keeps its place.
     """
     keep, index = _equal(points)
     if tolerance <= 0.0 or len(keep) < 2:
@@ -31,7 +31,7 @@ def merge_map(points: NDArray[np.float64], tolerance: float) -> tuple[NDArray[np
 
 
 def _equal(points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    points = points + 0.0  # makes 0 of -0
+    points = points + 0.0  # turns -0 into 0
     order = np.lexsort(points.T)
     new = np.ones(len(points), dtype=bool)
     new[1:] = (points[order][1:] != points[order][:-1]).any(axis=1)
@@ -41,7 +41,7 @@ def _equal(points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.i
 
 
 def _first_of_each(group: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """First row of each group, in the order of rows; and for each row the place of its group in that order."""
+    """First row of each group, in the order of rows; and for each row the position of its group in that order."""
     _, first, inverse = np.unique(group, return_index=True, return_inverse=True)
     order = np.argsort(first)
     rank = np.empty(len(first), dtype=np.int64)

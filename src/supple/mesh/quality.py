@@ -1,4 +1,4 @@
-"""How well shaped tets are."""
+"""Measures of the shape of tets."""
 
 from __future__ import annotations
 

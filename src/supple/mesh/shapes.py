@@ -1,4 +1,4 @@
-"""Ready-made bodies, all about the origin with y up: tet meshes here, surfaces from `shape_surfaces`."""
+"""Ready-made bodies, centred at the origin, with y up."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from supple.mesh.primitives.gummy_bear import gummy_bear, gummy_bear_surface
 from supple.mesh.primitives.isosurface_stuffing import stuff
 from supple.mesh.primitives.sizes import check_torus, counts, fits, lengths, not_too_many, positive
-from supple.mesh.primitives.surfaces import box_surface, cylinder_surface, sphere_surface, torus_surface
+from supple.mesh.primitives.surfaces import sphere_surface, torus_surface
+from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 
 __all__ = [
@@ -47,14 +48,19 @@ def box(size: Sequence[float] = (1.0, 1.0, 1.0), divisions: Sequence[int] = (4, 
     index = np.arange(len(points)).reshape(n[0] + 1, n[1] + 1, n[2] + 1)
     # Corner 4 i + 2 j + k of each cell.
     cell = [index[i : n[0] + i, j : n[1] + j, k : n[2] + k].ravel() for i in (0, 1) for j in (0, 1) for k in (0, 1)]
-    # Every path from corner 0 to corner 7 along the axes is one tet; for half of them two corners are swapped.
+    # Each path from corner 0 to corner 7 along the axes is one tet. In half of them two corners are swapped.
     paths = [(0, 4, 6, 7), (0, 6, 2, 7), (0, 2, 3, 7), (0, 3, 1, 7), (0, 1, 5, 7), (0, 5, 4, 7)]
     tets = np.stack([np.column_stack([cell[c] for c in path]) for path in paths], axis=1).reshape(-1, 4)
     return TetMesh(points * extent, tets)
 
 
+def box_surface(size: Sequence[float] = (1.0, 1.0, 1.0), divisions: Sequence[int] = (4, 4, 4)) -> SurfaceMesh:
+    """The surface of `box`, with the same parameters."""
+    return box(size, divisions).surface.compact()
+
+
 def sphere(radius: float = 0.5, edge_length: float = 0.1) -> TetMesh:
-    """A ball of well-shaped tets, its surface vertices exactly on the sphere.
+    """A ball of well-shaped tets, with its surface vertices exactly on the sphere.
 
     Parameters
     ----------
@@ -63,7 +69,7 @@ def sphere(radius: float = 0.5, edge_length: float = 0.1) -> TetMesh:
 
     Raises
     ------
-    MeshError : where a length is not positive, or the edge too long or too short for the radius.
+    MeshError : where a length is not positive, or the edge is too long or too short for the radius.
     """
     positive("sphere", radius=radius, edge_length=edge_length)
     fits("sphere", edge_length, "radius", radius)
@@ -82,7 +88,7 @@ def torus(radius: float = 0.5, tube_radius: float = 0.2, edge_length: float = 0.
 
     Raises
     ------
-    MeshError : where a length is not positive, the tube closes the ring, or the edge does not suit.
+    MeshError : where a length is not positive, the tube closes the ring, or the edge is too long or too short.
     """
     check_torus("torus", radius, tube_radius, edge_length)
     reach = np.array([radius + tube_radius, tube_radius, radius + tube_radius])
@@ -99,11 +105,11 @@ def cylinder(radius: float = 0.5, height: float = 1.0, edge_length: float = 0.1)
     Parameters
     ----------
     radius, height : [m]
-    edge_length : about the length of edges [m], at most `radius` and `height`
+    edge_length : approximate length of edges [m], at most `radius` and `height`
 
     Raises
     ------
-    MeshError : where a length is not positive, or the edge too long or too short.
+    MeshError : where a length is not positive, or the edge is too long or too short.
     """
     positive("cylinder", radius=radius, height=height, edge_length=edge_length)
     fits("cylinder", edge_length, "radius", radius)
@@ -115,12 +121,17 @@ def cylinder(radius: float = 0.5, height: float = 1.0, edge_length: float = 0.1)
     points = np.empty((layers + 1, n, 3))
     points[:, :, 0], points[:, :, 2] = radius * disk[:, 0], radius * disk[:, 1]
     points[:, :, 1] = np.linspace(-0.5 * height, 0.5 * height, layers + 1)[:, None]
-    # A quad of two columns is cut from the bottom of the lower-numbered one: neighbours agree on that.
+    # The quad between two columns is cut from the bottom of the lower-numbered one, so that neighbours agree.
     a0, a1, a2 = np.sort(triangles, axis=1).T
     b0, b1, b2 = a0 + n, a1 + n, a2 + n
     layer = np.concatenate([np.column_stack(t) for t in ((a0, a1, a2, b2), (a0, a1, b1, b2), (a0, b0, b1, b2))])
     tets = layer[None] + n * np.arange(layers)[:, None, None]
     return TetMesh(points.reshape(-1, 3), tets.reshape(-1, 4))
+
+
+def cylinder_surface(radius: float = 0.5, height: float = 1.0, edge_length: float = 0.1) -> SurfaceMesh:
+    """The surface of `cylinder`, with the same parameters."""
+    return cylinder(radius, height, edge_length).surface.compact()
 
 
 def _disk(rings: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -131,7 +142,7 @@ def _disk(rings: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         points.append(k / rings * np.column_stack([np.cos(angle), np.sin(angle)]))
     triangles = []
     for k in range(1, rings + 1):
-        # Ring k begins after 1 + 6 + ... + 6 (k - 1) points; the centre stands for ring 0.
+        # Ring k begins after 1 + 6 + ... + 6 (k - 1) points; the centre is ring 0.
         outer, inner = 1 + 3 * k * (k - 1), 1 + 3 * (k - 1) * (k - 2)
         for sector in range(6):
             out = [outer + (sector * k + j) % (6 * k) for j in range(k + 1)]

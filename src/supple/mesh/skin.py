@@ -12,20 +12,21 @@ from supple.mesh.checked_arrays import frozen, vertex_array
 from supple.mesh.tetmesh import TetMesh
 from supple.numerics.kernel_cache import njit
 
-# How many tets, nearest by centre, are tried for every point; in even meshes nearly all lie in one of them.
+# How many tets, nearest by centre, are tried for each point. In even meshes nearly every point lies in one of them.
 NEAREST = 16
 # How far below 0 a barycentric coordinate may be for the point still to count as inside.
 SLACK = 1e-9
-# Pairs of points and tets looked at together; bounds the memory needed.
+# Pairs of points and tets processed at once; bounds the memory needed.
 BLOCK = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
 class Embedding:
-    """Where points lie in a tet mesh, so that they can be carried along when it deforms.
+    """Where points lie in a tet mesh, so that they can follow its deformation.
 
-    A point inside the mesh is tied to the tet that holds it; one outside to the tet whose planes it lies least far out
-    of, among those around, by extrapolation. Affine motions of the mesh are reproduced exactly, up to round-off.
+    A point inside the mesh is tied to the tet that contains it. A point outside is extrapolated from the tet, among
+    those around it, for which its largest distance outside the four planes is smallest. Affine motions of the mesh are
+    reproduced exactly, up to round-off.
 
     Attributes
     ----------
@@ -51,7 +52,7 @@ class Embedding:
 
         Raises
         ------
-        MeshError : where points are no (k, 3) array of finite numbers.
+        MeshError : where `points` is not a (k, 3) array of finite numbers.
         """
         places = vertex_array(points, "Embedding")
         tets = _containing_tets(mesh, places)
@@ -68,7 +69,7 @@ class Embedding:
 
         Raises
         ------
-        MeshError : where `positions` has not one row for each vertex of the mesh.
+        MeshError : where `positions` does not have one row for each vertex of the mesh.
         """
         x = np.asarray(positions, dtype=np.float64)
         if x.shape != (self.vertex_count, 3):
@@ -78,7 +79,7 @@ class Embedding:
 
 @njit(cache=True, error_model="numpy")
 def mixed(corners, weights, x):
-    """Points (k, 3), each the mixture by `weights` (k, 4) of the rows `corners` (k, 4) of x (n, 3)."""
+    """Points (k, 3), each the sum of the rows `corners` (k, 4) of x (n, 3), weighted by `weights` (k, 4)."""
     out = np.empty((len(corners), 3))
     for i in range(len(corners)):
         a, b, c, d = corners[i]
@@ -90,7 +91,7 @@ def mixed(corners, weights, x):
 
 
 def _containing_tets(mesh: TetMesh, points: NDArray[np.float64]) -> NDArray[np.int64]:
-    """The tet that holds each point, or else the one that it lies least far out of."""
+    """The tet that contains each point, or the one from which it is least far outside."""
     from scipy.spatial import KDTree
 
     corners = mesh.vertices[mesh.tets]
@@ -100,8 +101,8 @@ def _containing_tets(mesh: TetMesh, points: NDArray[np.float64]) -> NDArray[np.i
     near = KDTree(centers).query(points, k=count, workers=-1)[1]
     search.offer(np.repeat(np.arange(len(points)), count), np.ravel(near))
 
-    # A tet reaches no farther than `reach` from its centre. Where tets differ much in size, the one that holds a point
-    # need not be among the nearest by centre: look through every tet within reach, by classes of size.
+    # A tet reaches no farther than `reach` from its centre. Where tets differ much in size, the one that contains a
+    # point need not be among the nearest by centre: try every tet within reach, by classes of size.
     left = np.flatnonzero(search.distance > search.slack)
     if len(left) == 0:
         return search.tet
@@ -118,7 +119,7 @@ def _containing_tets(mesh: TetMesh, points: NDArray[np.float64]) -> NDArray[np.i
 
 
 class _Search:
-    """The best tet so far of each point: where the largest distance out of its four planes is smallest."""
+    """The best tet so far for each point: the one with the smallest largest distance outside its four planes."""
 
     def __init__(self, mesh: TetMesh, points: NDArray[np.float64]) -> None:
         self.mesh, self.points = mesh, points
@@ -131,13 +132,13 @@ class _Search:
         self.slack = SLACK * float(self.heights.min())
 
     def offer(self, rows: NDArray[np.int64], tets: NDArray[np.int64]) -> None:
-        """Try tets[k] for the point rows[k]."""
+        """Try tets[k] for point rows[k]."""
         for start in range(0, len(rows), BLOCK):
             row, tet = rows[start : start + BLOCK], tets[start : start + BLOCK]
             out = (-_barycentric(self.mesh, self.points[row], tet) * self.heights[tet]).max(axis=1)
             before = self.distance[row]
             np.minimum.at(self.distance, row, out)
-            # Of tets that are equally good (the point lies on a shared facet) the lowest is taken.
+            # Of equally good tets (the point lies on a shared facet) the one of lowest number wins.
             better = (out == self.distance[row]) & (out < before)
             self.tet[row[better]] = len(self.mesh.tets)
             np.minimum.at(self.tet, row[better], tet[better])

@@ -1,4 +1,4 @@
-"""A triangle surface: what a soft body is made from, and what it looks like."""
+"""Triangle surfaces, from which soft bodies are made and with which they are drawn."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import MeshError
 from supple.mesh.checked_arrays import frozen, index_array, vertex_array
+from supple.mesh.io.mesh_files import read_surface, write_surface
 from supple.mesh.topology import Components, connected_components, unique_edges
 
 if TYPE_CHECKING:
@@ -22,8 +23,8 @@ if TYPE_CHECKING:
 class SurfaceMesh:
     """Triangles in space, counter-clockwise seen from outside.
 
-    The arrays are checked for what no program could use (wrong shapes, indices out of range, coordinates that are
-    not finite). Holes, self-intersections and the like are allowed here; `check` reports them.
+    Wrong shapes of arrays, indices out of range and coordinates that are not finite are errors. Holes,
+    self-intersections and similar faults are allowed here; `check` reports them.
 
     Parameters
     ----------
@@ -31,11 +32,11 @@ class SurfaceMesh:
     triangles : (m, 3) int, rows of `vertices`
     shares_vertices : bool
         True where `vertices` belong to a larger mesh (the surface of a `TetMesh`), so that vertices that no
-        triangle uses are no fault.
+        triangle uses are not a fault.
 
     Raises
     ------
-    MeshError : naming the row at fault.
+    MeshError : naming the wrong row.
     """
 
     vertices: NDArray[np.float64]
@@ -53,20 +54,18 @@ class SurfaceMesh:
 
     @classmethod
     def load(cls, path: str | Path) -> SurfaceMesh:
-        """Read a surface from an STL, OBJ, PLY, OFF, VTP, VTK or VTU file, known by its extension.
+        """Read a surface from an STL, OBJ, PLY, OFF, VTP, VTK or VTU file, selected by its extension.
 
         Polygons are cut into triangles. Vertices closer than 2e-7 of the bounding box's diagonal (two units in the
         last place of the single precision that most files are written in) become one; triangles that collapse by
-        this, and vertices that no triangle uses, are dropped. The log says how many.
+        this, and vertices that no triangle uses, are dropped. The log gives their numbers.
 
         Raises
         ------
-        MeshError : where the file is missing, broken, of another kind, or holds no surface; the text starts with
+        MeshError : where the file is missing, malformed, of another kind, or holds no surface; the text starts with
             the path.
         """
-        from supple.mesh.io.mesh_files import load_surface
-
-        return load_surface(path)
+        return cls(*read_surface(path))
 
     def save(self, path: str | Path) -> None:
         """Write the surface as STL (binary), OBJ, PLY, OFF, VTP, VTK or VTU, by the extension of `path`.
@@ -75,9 +74,8 @@ class SurfaceMesh:
         ------
         MeshError : where the extension is none of these, or the file cannot be written. No partial file is left.
         """
-        from supple.mesh.io.mesh_files import save_surface
-
-        save_surface(self, path)
+        alone = self.compact() if self.shares_vertices else self
+        write_surface(path, alone.vertices, alone.triangles)
 
     @cached_property
     def edges(self) -> NDArray[np.int32]:
@@ -99,7 +97,7 @@ class SurfaceMesh:
     def volume(self) -> float:
         """Enclosed volume [m^3] by the divergence theorem; negative where triangles face inward.
 
-        Means little unless the surface is watertight.
+        Without meaning unless the surface is watertight.
         """
         low, high = self.bounds
         a = self.vertices[self.triangles[:, 0]] - 0.5 * (low + high)
@@ -120,13 +118,13 @@ class SurfaceMesh:
 
     @cached_property
     def components(self) -> Components:
-        """How many connected pieces there are, and which one each triangle (m,) belongs to."""
+        """The number of connected pieces, and the piece of each triangle (m,)."""
         count, labels = connected_components(self.triangles, len(self.vertices))
         return Components(count, frozen(labels))
 
     def check(self) -> SurfaceReport:
-        """Look for everything that would keep a mesher or a contact solver from using this surface."""
-        from supple.mesh.surface_checks import check_surface
+        """Find all faults that prevent a mesher or a contact solver from using this surface."""
+        from supple.mesh.surface_checks import check_surface  # loads numba, which reading a file does not need
 
         return check_surface(self)
 
@@ -146,9 +144,9 @@ class SurfaceMesh:
         rotation: ArrayLike | None = None,
         translation: ArrayLike = (0.0, 0.0, 0.0),
     ) -> SurfaceMesh:
-        """The surface scaled, then turned by a matrix (3, 3), then moved by a vector (3,) [m].
+        """The surface scaled, then rotated by a matrix (3, 3), then moved by a vector (3,) [m].
 
-        A map that mirrors also turns the triangles, so that they still face outward.
+        A map that mirrors also reverses the triangles, so that they still face outward.
         """
         linear, shift = linear_map(scale, rotation, translation, "SurfaceMesh.transformed")
         triangles = self.triangles[:, ::-1] if np.linalg.det(linear) < 0.0 else self.triangles

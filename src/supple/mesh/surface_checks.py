@@ -4,25 +4,41 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.mesh.checked_arrays import frozen, place
-from supple.mesh.surface import SurfaceMesh
-from supple.mesh.topology import edge_keys, facet_keys
+from supple.mesh.topology import Components, edge_keys, facet_keys
 from supple.numerics.geometry.triangle_crossings import crossing_triangles
 
-# Intersections are listed one by one; a soup of triangles has millions, and nobody reads more than a few.
+# Unconnected triangles can have millions of intersections; a few are enough to find the fault.
 MAX_INTERSECTIONS = 100
-# Neighbours that enclose less than this angle [rad] lie on each other as far as round-off can tell.
+# Neighbours that enclose less than this angle [rad] lie on each other, within round-off.
 FOLD_ANGLE = 1e-7
 ROUND_OFF_UNITS = 64.0
 
 
+class CheckedSurface(Protocol):
+    """What a check reads of a `SurfaceMesh`, which itself imports this module."""
+
+    @property
+    def vertices(self) -> NDArray[np.float64]: ...
+    @property
+    def triangles(self) -> NDArray[np.int32]: ...
+    @property
+    def shares_vertices(self) -> bool: ...
+
+    area_vectors: cached_property[NDArray[np.float64]]
+    volume: cached_property[float]
+    used_vertices: cached_property[NDArray[np.int32]]
+    components: cached_property[Components]
+
+
 @dataclass(frozen=True, eq=False)
 class SurfaceReport:
-    """Everything found to be wrong with a surface.
+    """All faults of a surface.
 
     Indices are rows of the surface's `triangles` and `vertices`.
 
@@ -33,16 +49,16 @@ class SurfaceReport:
     non_manifold_edges : (k, 2) vertex pairs that three or more triangles share
     inconsistent_edges : (k, 2) vertex pairs whose two triangles run along them in the same direction
     duplicate_triangles : (k, 2) triangles with the same three vertices
-    degenerate_triangles : (k,) triangles without area, as far as round-off can tell
+    degenerate_triangles : (k,) triangles without area, within round-off
     folded_triangles : (k, 2) neighbours that lie on each other
     intersecting_triangles : (k, 2) triangles that cross or touch without sharing a vertex there; at most 100 are listed
     unused_vertices : (k,) vertices that no triangle has (none where the surface shares its vertices with a tet mesh)
-    wrong_facing_components : components that face inward, or cavities of others that face outward; only looked
+    wrong_facing_components : components that face inward, or cavities of others that face outward; only searched
         for where the surface is watertight and consistently oriented
     component_count : number of connected pieces
     """
 
-    surface: SurfaceMesh
+    surface: CheckedSurface
     open_edges: NDArray[np.int32]
     non_manifold_edges: NDArray[np.int32]
     inconsistent_edges: NDArray[np.int32]
@@ -81,7 +97,7 @@ class SurfaceReport:
 
     @cached_property
     def problems(self) -> list[str]:
-        """One line for each kind of fault: what, how often, and where the first one is."""
+        """One line for each kind of fault: its name, how many there are, and where the first one is."""
         found = [
             self._edges(self.open_edges, "open boundary edge", "the surface has a hole there"),
             self._edges(self.non_manifold_edges, "non-manifold edge", "three or more triangles share it"),
@@ -141,8 +157,8 @@ class SurfaceReport:
         )
 
 
-def check_surface(surface: SurfaceMesh) -> SurfaceReport:
-    """Check a surface; see `SurfaceReport` for what is looked for."""
+def check_surface(surface: CheckedSurface) -> SurfaceReport:
+    """Check a surface; see `SurfaceReport` for the faults that are searched for."""
     n = len(surface.vertices)
     keys = edge_keys(surface.triangles, n)
     unique, inverse, counts = np.unique(keys.ravel(), return_inverse=True, return_counts=True)
@@ -152,29 +168,29 @@ def check_surface(surface: SurfaceMesh) -> SurfaceReport:
     direction = np.where(starts < np.roll(starts, -1, axis=1), 1, -1).ravel()
     balance = np.zeros(len(unique), dtype=np.int64)
     np.add.at(balance, inverse.ravel(), direction)
-    # A triangle with a vertex twice is reported as degenerate; its side from there to there is no edge.
+    # A triangle with a vertex twice is reported as degenerate; its side from that vertex to itself is not an edge.
     real = pairs[:, 0] != pairs[:, 1]
-    open_edges, crowded = pairs[real & (counts == 1)], pairs[real & (counts > 2)]
+    open_edges, shared_by_many = pairs[real & (counts == 1)], pairs[real & (counts > 2)]
     inconsistent = pairs[real & (counts == 2) & (balance != 0)]
     degenerate = _degenerate_triangles(surface)
-    sound = np.ones(len(surface.triangles), dtype=bool)
-    sound[degenerate] = False
-    closed = len(open_edges) == 0 and len(crowded) == 0 and len(inconsistent) == 0
+    regular = np.ones(len(surface.triangles), dtype=bool)
+    regular[degenerate] = False
+    closed = len(open_edges) == 0 and len(shared_by_many) == 0 and len(inconsistent) == 0
     unused = np.empty(0, dtype=np.int32)
     if not surface.shares_vertices:
         unused = np.setdiff1d(np.arange(n, dtype=np.int32), surface.used_vertices)
-    intersecting = _intersecting_triangles(surface, sound)
+    intersecting = _intersecting_triangles(surface, regular)
     wrong_facing = np.empty(0, dtype=np.int32)
     if closed:
         wrong_facing = _wrong_facing(surface, nested=len(intersecting) == 0)
     return SurfaceReport(
         surface=surface,
         open_edges=frozen(open_edges),
-        non_manifold_edges=frozen(crowded),
+        non_manifold_edges=frozen(shared_by_many),
         inconsistent_edges=frozen(inconsistent),
         duplicate_triangles=frozen(_duplicate_triangles(surface)),
         degenerate_triangles=frozen(degenerate),
-        folded_triangles=frozen(_folded_triangles(surface, inverse.reshape(-1, 3), counts, sound)),
+        folded_triangles=frozen(_folded_triangles(surface, inverse.reshape(-1, 3), counts, regular)),
         intersecting_triangles=frozen(intersecting),
         unused_vertices=frozen(unused),
         wrong_facing_components=frozen(wrong_facing),
@@ -190,14 +206,14 @@ def _first(rows: NDArray[np.int32]) -> str:
     return "" if len(rows) == 1 else "the first is "
 
 
-def _duplicate_triangles(surface: SurfaceMesh) -> NDArray[np.int32]:
+def _duplicate_triangles(surface: CheckedSurface) -> NDArray[np.int32]:
     keys = facet_keys(surface.triangles, len(surface.vertices))
     order = np.argsort(keys, kind="stable")
     same = keys[order][1:] == keys[order][:-1]
     return np.column_stack([order[:-1][same], order[1:][same]]).astype(np.int32)
 
 
-def _degenerate_triangles(surface: SurfaceMesh) -> NDArray[np.int32]:
+def _degenerate_triangles(surface: CheckedSurface) -> NDArray[np.int32]:
     corners = surface.vertices[surface.triangles]
     sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
     longest = sides.max(axis=1)
@@ -208,7 +224,7 @@ def _degenerate_triangles(surface: SurfaceMesh) -> NDArray[np.int32]:
 
 
 def _folded_triangles(
-    surface: SurfaceMesh, edge_of_side: NDArray[np.int64], counts: NDArray[np.int64], sound: NDArray[np.bool_]
+    surface: CheckedSurface, edge_of_side: NDArray[np.int64], counts: NDArray[np.int64], regular: NDArray[np.bool_]
 ) -> NDArray[np.int32]:
     """Neighbours across an edge (of exactly two triangles) that enclose no angle."""
     sides = edge_of_side.ravel()
@@ -216,7 +232,7 @@ def _folded_triangles(
     order = order[(counts[sides[order]] == 2)]
     first, second = order[0::2], order[1::2]
     a, b = first // 3, second // 3
-    keep = sound[a] & sound[b]
+    keep = regular[a] & regular[b]
     first, second, a, b = first[keep], second[keep], a[keep], b[keep]
     start = surface.triangles[a, first % 3]
     end = surface.triangles[a, (first + 1) % 3]
@@ -234,24 +250,25 @@ def _folded_triangles(
     return np.column_stack([a[folded], b[folded]]).astype(np.int32)
 
 
-def _intersecting_triangles(surface: SurfaceMesh, sound: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """Pairs of triangles, at most `MAX_INTERSECTIONS`, that meet in more than the vertices they share; exact."""
-    rows = np.flatnonzero(sound)
+def _intersecting_triangles(surface: CheckedSurface, regular: NDArray[np.bool_]) -> NDArray[np.int32]:
+    """Pairs of triangles, at most `MAX_INTERSECTIONS`, with common points other than shared vertices; exact."""
+    rows = np.flatnonzero(regular)
     if len(rows) < 2:
         return np.empty((0, 2), dtype=np.int32)
-    # Scaled by a power of two, which rounds nothing, so that products of three coordinates neither over- nor underflow.
+    # Scaled by a power of two, which is exact, so that products of three coordinates neither overflow nor underflow.
     _, power = np.frexp(np.abs(surface.vertices).max())
-    one_thing = np.zeros(len(rows), dtype=np.int32)
+    one_owner = np.zeros(len(rows), dtype=np.int32)
     pairs, _ = crossing_triangles(
-        np.ldexp(surface.vertices, -power), surface.triangles[rows], one_thing, np.array([[True]]), MAX_INTERSECTIONS
+        np.ldexp(surface.vertices, -power), surface.triangles[rows], one_owner, np.array([[True]]), MAX_INTERSECTIONS
     )
     return rows[pairs].astype(np.int32)
 
 
-def _wrong_facing(surface: SurfaceMesh, nested: bool) -> NDArray[np.int32]:
-    """Components whose signed volume has not the sign that their depth inside other components asks for.
+def _wrong_facing(surface: CheckedSurface, nested: bool) -> NDArray[np.int32]:
+    """Components whose signed volume has the wrong sign for their depth inside other components.
 
-    Where components intersect, none is clearly inside another (`nested` is False), and all should face outward.
+    At even depth a component must face outward, at odd depth (a cavity) inward. Where components intersect, none is
+    clearly inside another (`nested` is False), and all must face outward.
     """
     count, labels = surface.components
     corners = surface.vertices[surface.triangles]
@@ -274,7 +291,7 @@ def _wrong_facing(surface: SurfaceMesh, nested: bool) -> NDArray[np.int32]:
 
 
 def winding_number(triangles: NDArray[np.float64], point: NDArray[np.float64]) -> float:
-    """How often closed triangles (m, 3, 3) wind around a point: 1 inside, 0 outside, -1 inside an inward surface.
+    """How many times closed triangles (m, 3, 3) wind around a point: 1 inside, 0 outside, -1 inside an inward surface.
 
     Sum of signed solid angles (Van Oosterom & Strackee 1983, eq. 8) over 4 pi.
     """

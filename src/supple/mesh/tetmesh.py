@@ -12,12 +12,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import MeshError
 from supple.mesh.checked_arrays import frozen, index_array, place, vertex_array
+from supple.mesh.io.mesh_files import read_tets, write_tets
+from supple.mesh.io.tetgen_family import is_tetgen_path, write_tetgen_family
+from supple.mesh.quality import min_dihedrals, radius_ratios
 from supple.mesh.surface import SurfaceMesh, linear_map
 from supple.mesh.topology import TET_EDGES, TET_FACETS, Components, connected_components, facet_keys, unique_edges
 
 logger = logging.getLogger(__name__)
 
-# A determinant is wrong by a few units of round-off of its largest terms; below this many it says nothing.
+# A determinant is wrong by a few units of round-off of its largest terms; below this many its sign is unknown.
 ROUND_OFF_UNITS = 64.0
 
 
@@ -25,10 +28,10 @@ ROUND_OFF_UNITS = 64.0
 class TetMesh:
     """Tetrahedra in space, each with det[x1-x0, x2-x0, x3-x0] > 0.
 
-    Tets given with the other winding are turned by swapping their last two vertices; `turned` says how many.
+    Tets given with the other winding are turned by swapping their last two vertices; `turned` is their number.
 
-    A tet is refused as flat when its thickness |det| / L^2, with L its longest edge, is at most 64 eps times the
-    larger of L and its largest coordinate (eps = 2.2e-16): then round-off alone decides on its sign.
+    A tet is rejected as flat when its thickness |det| / L^2, with L its longest edge, is at most 64 eps times the
+    larger of L and its largest coordinate (eps = 2.2e-16): then round-off alone decides its sign.
 
     Parameters
     ----------
@@ -38,7 +41,7 @@ class TetMesh:
     Attributes
     ----------
     turned : int
-        How many tets were given with negative winding.
+        Number of tets that were given with negative winding.
 
     Raises
     ------
@@ -60,14 +63,14 @@ class TetMesh:
         object.__setattr__(self, "vertices", points)
         object.__setattr__(self, "tets", frozen(positive))
         object.__setattr__(self, "turned", turned)
-        _ = self.adjacency  # refuses facets that three or more tets claim
+        _ = self.adjacency  # raises for facets that three or more tets share
 
     def __repr__(self) -> str:
         return f"TetMesh({len(self.vertices)} vertices, {len(self.tets)} tets)"
 
     @classmethod
     def dropping_unused(cls, vertices: ArrayLike, tets: ArrayLike) -> TetMesh:
-        """A `TetMesh` of the vertices that some tet uses, in their order; the log says how many were dropped."""
+        """A `TetMesh` of the vertices that some tet uses, in their order; the log gives the number of the others."""
         points = vertex_array(vertices, "TetMesh")
         given = index_array(tets, 4, len(points), "TetMesh", "tet")
         used = np.zeros(len(points), dtype=bool)
@@ -79,18 +82,25 @@ class TetMesh:
 
     @classmethod
     def load(cls, path: str | Path) -> TetMesh:
-        """Read a tet mesh from TetGen's .node/.ele/.edge/.face, Gmsh .msh, .vtu or .vtk, known by the extension.
+        """Read a tet mesh from TetGen's .node/.ele/.edge/.face, Gmsh .msh, .vtu or .vtk, selected by the extension.
 
-        Vertices that belong to no tet are dropped, and negative tets turned; the log says how many.
+        Vertices that belong to no tet are dropped, and negative tets are turned; the log gives their numbers.
 
         Raises
         ------
-        MeshError : where the file is missing, broken, of another kind, or holds no usable tets; the text starts
+        MeshError : where the file is missing, malformed, of another kind, or holds no usable tets; the text starts
             with the path.
         """
-        from supple.mesh.io.mesh_files import load_tetmesh
-
-        return load_tetmesh(path)
+        file = read_tets(path)
+        try:
+            mesh = cls.dropping_unused(file.points, file.tets)
+        except MeshError as error:
+            raise MeshError(f"{file.path}: {str(error).removeprefix('TetMesh: ')} (counted from 0)") from None
+        if mesh.turned:
+            logger.info(
+                "%s: %d of %d tets had negative winding and were turned", file.path, mesh.turned, len(mesh.tets)
+            )
+        return mesh
 
     def save(self, path: str | Path) -> None:
         """Write the mesh as TetGen's four files (.node, .ele, .edge or .face), .msh, .vtu or .vtk, by the extension.
@@ -99,9 +109,10 @@ class TetMesh:
         ------
         MeshError : where the extension is none of these, or the file cannot be written. No partial file is left.
         """
-        from supple.mesh.io.mesh_files import save_tetmesh
-
-        save_tetmesh(self, path)
+        if is_tetgen_path(path):
+            write_tetgen_family(path, self.vertices, self.tets, self.edges, self.surface.triangles)
+        else:
+            write_tets(path, self.vertices, self.tets)
 
     @cached_property
     def edges(self) -> NDArray[np.int32]:
@@ -150,15 +161,11 @@ class TetMesh:
     @cached_property
     def min_dihedrals(self) -> NDArray[np.float64]:
         """Smallest dihedral angle of each tet (m,) [degrees]; 70.5 in the regular one."""
-        from supple.mesh.quality import min_dihedrals
-
         return frozen(min_dihedrals(self.vertices, self.tets))
 
     @cached_property
     def radius_ratios(self) -> NDArray[np.float64]:
         """Three times inscribed over circumscribed radius of each tet (m,): 1 in the regular one, 0 in a flat one."""
-        from supple.mesh.quality import radius_ratios
-
         return frozen(radius_ratios(self.vertices, self.tets))
 
     def transformed(
@@ -178,7 +185,7 @@ def _determinants(vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> NDA
 
 
 def _positive_winding(vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> tuple[NDArray[np.int32], int]:
-    """Tets with positive determinants, and how many were turned; refuses flat ones."""
+    """Tets with positive determinants, and how many were turned; raises for flat ones."""
     det = _determinants(vertices, tets)
     corners = vertices[tets]
     longest = np.zeros(len(tets))
@@ -228,7 +235,7 @@ def _refuse_unused(vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> No
 def _refuse_duplicates(tets: NDArray[np.int32], n_vertices: int) -> None:
     corners = np.sort(tets, axis=1).astype(np.int64)
     first, second = corners[:, 0] * n_vertices + corners[:, 1], corners[:, 2] * n_vertices + corners[:, 3]
-    # Equal tets have equal sums of keys; only where two sums agree is the dearer exact comparison needed.
+    # Equal tets have equal sums of keys. The slower exact comparison is needed only where two sums agree.
     sums = np.sort(first.astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15) + second.astype(np.uint64))
     if not (sums[1:] == sums[:-1]).any():
         return
@@ -248,10 +255,10 @@ def _neighbours(tets: NDArray[np.int32], n_vertices: int) -> NDArray[np.int32]:
     order = np.argsort(keys, kind="stable")
     ordered = keys[order]
     same = ordered[1:] == ordered[:-1]
-    crowded = same[1:] & same[:-1]
+    overlapping = same[1:] & same[:-1]
     m = len(tets)
-    if crowded.any():
-        k = int(np.flatnonzero(crowded)[0])
+    if overlapping.any():
+        k = int(np.flatnonzero(overlapping)[0])
         facet, tet = divmod(int(order[k]), m)
         owners = sorted(int(t) % m for t in order[k : k + 3])
         corners = sorted(tets[tet, TET_FACETS[facet]].tolist())

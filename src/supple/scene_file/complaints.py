@@ -1,4 +1,4 @@
-"""One clear line for what is wrong with a scene file: pydantic's findings, said to someone who writes YAML."""
+"""pydantic's errors as errors of one line, in terms of the YAML file."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from pydantic import ValidationError
 
 from supple.errors import SceneError
 from supple.scene_file.model import UNKNOWN_KEY
-from supple.scene_file.yaml_reader import Key, YamlDocument, shown
+from supple.scene_file.yaml_reader import Key, YamlDocument, printable
 
 
-def complaint(document: YamlDocument, error: ValidationError) -> SceneError:
-    """The problem that stands first in the file, as an error of one line; it says how many more there are."""
+def scene_error(document: YamlDocument, error: ValidationError) -> SceneError:
+    """The first problem of the file as an error of one line, with the number of the others."""
     found = []
     for item in error.errors(include_url=False):
         keys, absent = _keys_in(document.data, item["loc"])
@@ -27,7 +27,7 @@ def complaint(document: YamlDocument, error: ValidationError) -> SceneError:
 
 
 def _keys_in(data: Any, loc: Sequence[int | str]) -> tuple[tuple[Key, ...], str | None]:
-    """The keys of `loc` that are in the data, without pydantic's names of kinds; and the last where it is absent."""
+    """The keys of `loc` that are in the data, without pydantic's names of kinds; and the last key if it is absent."""
     keys: list[Key] = []
     for i, part in enumerate(loc):
         in_list = isinstance(data, list) and isinstance(part, int) and part < len(data)
@@ -47,10 +47,11 @@ def _describe(keys: tuple[Key, ...], absent: str | None, item: Any) -> tuple[tup
         return keys, f"the key `{absent}` is missing; add it"
     if kind == "union_tag_not_found":
         missing = "the key `kind` is missing; add it"
-        return keys, missing if isinstance(value, dict) else _wanted("keys and values", value)
+        return keys, missing if isinstance(value, dict) else _give("keys and values", value)
     if kind == "union_tag_invalid":
         known = [tag.strip().strip("'") for tag in context["expected_tags"].split(",")]
-        return (*keys, "kind"), f"unknown kind {shown(str(context['tag']))!r}; {suggestion(str(context['tag']), known)}"
+        tag = str(context["tag"])
+        return (*keys, "kind"), f"unknown kind {printable(tag)!r}; {suggestion(tag, known)}"
     if kind == "literal_error":
         known = [tag.strip().strip("'") for tag in context["expected"].replace(" or ", ",").split(",")]
         return keys, f"is {_value(value)}; {suggestion(str(value), known)}"
@@ -63,7 +64,7 @@ def _describe(keys: tuple[Key, ...], absent: str | None, item: Any) -> tuple[tup
 
 
 def suggestion(given: str, known: Iterable[str]) -> str:
-    """Did you mean the nearest of the known words; or all of them."""
+    """The most similar of the known words, or all of them where none is similar."""
     known = list(known)
     near = difflib.get_close_matches(given.lower().replace("-", "_").replace(" ", "_"), known, n=1, cutoff=0.6)
     return f"did you mean `{near[0]}`?" if near else f"known here: {', '.join(known)}"
@@ -73,17 +74,17 @@ def _value(value: Any) -> str:
     if value is None:
         return "empty"
     if isinstance(value, str):
-        return f"the text {shown(value)!r}"
+        return f"the text {printable(value)!r}"
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, dict):
         return "a mapping"
     if isinstance(value, list):
         return f"a list of {len(value)}"
-    return shown(str(value))
+    return printable(str(value))
 
 
-def _wanted(what: str, value: Any) -> str:
+def _give(what: str, value: Any) -> str:
     if isinstance(value, str) and what in ("a number", "a whole number"):
         try:
             float(value)
@@ -94,8 +95,8 @@ def _wanted(what: str, value: Any) -> str:
     return f"is {_value(value)}; give {what}"
 
 
-def _want(what: str) -> Callable[[Any, dict], str]:
-    return lambda value, context: _wanted(what, value)
+def _expects(what: str) -> Callable[[Any, dict], str]:
+    return lambda value, context: _give(what, value)
 
 
 def _bound(word: str, key: str) -> Callable[[Any, dict], str]:
@@ -103,18 +104,18 @@ def _bound(word: str, key: str) -> Callable[[Any, dict], str]:
 
 
 _TEXTS: dict[str, Callable[[Any, dict], str]] = {
-    "float_type": _want("a number"),
-    "float_parsing": _want("a number"),
+    "float_type": _expects("a number"),
+    "float_parsing": _expects("a number"),
     "finite_number": lambda value, context: f"is {_value(value)}; it must be finite",
-    "int_type": _want("a whole number"),
-    "int_from_float": _want("a whole number"),
+    "int_type": _expects("a whole number"),
+    "int_from_float": _expects("a whole number"),
     "int_parsing_size": lambda value, context: f"is {_value(value)}; the number is too large",
-    "string_type": _want("a text"),
-    "bool_type": _want("true or false"),
-    "list_type": _want("a list, such as [1, 2, 3]"),
-    "model_type": _want("keys and values"),
-    "dict_type": _want("keys and values"),
-    "model_attributes_type": _want("keys and values"),
+    "string_type": _expects("a text"),
+    "bool_type": _expects("true or false"),
+    "list_type": _expects("a list, such as [1, 2, 3]"),
+    "model_type": _expects("keys and values"),
+    "dict_type": _expects("keys and values"),
+    "model_attributes_type": _expects("keys and values"),
     "greater_than": _bound("above", "gt"),
     "greater_than_equal": _bound("at least", "ge"),
     "less_than": _bound("below", "lt"),

@@ -1,4 +1,4 @@
-"""Meshes of scene files from elsewhere: nothing outside the file's own folder is read."""
+"""Meshes of scene files that are not trusted: nothing outside the file's own folder is read."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ from pathlib import Path
 
 from supple.errors import SceneError
 from supple.scene_file.entries.mesh_sources import MeshStore
-from supple.scene_file.yaml_reader import shown
+from supple.scene_file.yaml_reader import printable
 
 LARGEST_FILE = 256 * 1024 * 1024
 
 
 class ConfinedMeshStore(MeshStore):
-    """Reads mesh files from one folder and those below it: no absolute path, no `..`, no link that leads out of it.
+    """Reads mesh files from one folder and those below it: no absolute path, no `..`, no link to another place.
 
-    No file may be larger than `LARGEST_FILE` bytes, or be anything but a plain file.
+    No file may be larger than `LARGEST_FILE` bytes, or be anything but a regular file.
     """
 
     def located(self, file: str) -> Path:
         path = self.folder / file
         self._require_inside(path, file)
-        # A TetGen mesh is several files of one stem, of which the scene names one.
+        # A TetGen mesh consists of several files of one stem; the scene gives one of them.
         for sibling in path.parent.glob(f"{_literal(path.stem)}.*") if path.parent.is_dir() else ():
             self._require_inside(sibling, file)
         return path
@@ -30,13 +30,13 @@ class ConfinedMeshStore(MeshStore):
             folder, real = self.folder.resolve(), path.resolve()
             inside = real.is_relative_to(folder)
             exists = real.exists()
-            plain = real.is_file() and real.stat().st_size <= LARGEST_FILE
+            regular = real.is_file() and real.stat().st_size <= LARGEST_FILE
         except (OSError, ValueError, RuntimeError):
-            raise SceneError(f"{shown(file)} cannot be read") from None
+            raise SceneError(f"{printable(file)} cannot be read") from None
         if not inside or Path(file).is_absolute():
-            raise SceneError(f"{shown(file)} is outside the scene file's folder, where a live page reads nothing")
-        if exists and not plain:
-            raise SceneError(f"{shown(file)} is no plain file of at most {LARGEST_FILE // 2**20} MiB")
+            raise SceneError(f"{printable(file)} is outside the scene file's folder; a live page reads no files there")
+        if exists and not regular:
+            raise SceneError(f"{printable(file)} is not a regular file of at most {LARGEST_FILE // 2**20} MiB")
 
 
 def _literal(stem: str) -> str:

@@ -19,7 +19,7 @@ MAX_STEPS = 10_000_000
 
 
 def _seconds(value: Any) -> Any:
-    """A time [s], also as a fraction: `1/60`."""
+    """A time [s], or a fraction such as `1/60`."""
     if isinstance(value, str) and "/" in value:
         try:
             return number_or_fraction(value)
@@ -44,7 +44,7 @@ Seconds = Annotated[
 
 
 class OutputModel(Model):
-    """What `supple run` writes beside the recording."""
+    """Files that `supple run` writes in addition to the recording."""
 
     page: bool = Field(default=True, description="index.html, which plays the recording in a browser")
     compress: bool = Field(default=False, description="store the recording compressed: smaller, and slower to write")
@@ -64,7 +64,7 @@ class SceneFileModel(Model):
     stitches: list[StitchModel] = Field(default=[], max_length=10_000)
     gravity: Vector = Field(default=[0.0, -9.81, 0.0], description="[m/s^2]")
     solver: SolverModel = Field(default_factory=lambda: XPBDModel(kind="xpbd"))
-    dt: Seconds = Field(default=1.0 / 60.0, description="time from frame to frame [s]; 1/60 may be written as such")
+    dt: Seconds = Field(default=1.0 / 60.0, description="time from frame to frame [s], or a fraction such as 1/60")
     steps: int = Field(default=300, ge=0, le=MAX_STEPS, description="number of frames")
     output: OutputModel = Field(default_factory=OutputModel)
 

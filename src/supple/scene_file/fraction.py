@@ -1,10 +1,10 @@
-"""Times as people write them: 0.02, or 1/60."""
+"""Times as numbers or fractions: 0.02, or 1/60."""
 
 from __future__ import annotations
 
 
 def number_or_fraction(text: str) -> float:
-    """The value of a number, or of one number over another.
+    """The value of a number, or of a fraction of two numbers.
 
     Raises
     ------

@@ -22,7 +22,7 @@ from supple.scene.scene import Scene
 from supple.scene.selection import InBox
 from supple.scene.stitches.stitch import Stitch
 from supple.scene.stitches.stitching import StitchError
-from supple.scene_file.complaints import complaint, suggestion
+from supple.scene_file.complaints import scene_error, suggestion
 from supple.scene_file.document import OutputModel, SceneFileModel
 from supple.scene_file.entries.contact_pairs import built_pairs
 from supple.scene_file.entries.mesh_sources import MeshStore
@@ -37,7 +37,7 @@ Selecting = TypeVar("Selecting", Pin, Force, SoftTarget)
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """All that a scene file says: `simulate(run.scene, run.solver, run.dt, run.steps, **run.start)`.
+    """The contents of a scene file: `simulate(run.scene, run.solver, run.dt, run.steps, **run.start)`.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class Run:
     dt : time from frame to frame [s]; steps : number of frames
     initial_positions : by body name, (n, 3) [m], of bodies that start deformed
     output : what to write beside the recording
-    text : of the file, for the recording to keep
+    text : of the file, stored in the recording
     """
 
     scene: Scene
@@ -58,22 +58,22 @@ class Run:
 
     @property
     def start(self) -> dict[str, dict[str, NDArray[np.float64]]]:
-        """The keywords of `simulate` that say how bodies start."""
+        """The keywords of `simulate` for the start of the bodies."""
         return {"initial_positions": self.initial_positions} if self.initial_positions else {}
 
 
 def load_scene(path: str | Path) -> Scene:
     """The scene of a scene file (YAML). Paths in it are relative to the file. The format: `supple schema`.
 
-    What the file says of solver, timing and deformed starts is checked too, but only `load_run` returns it.
+    Solver, timing and deformed starts in the file are checked too, but only `load_run` returns them.
 
     Raises
     ------
-    SceneError : where the file cannot be read or says something impossible; one line that begins with `file:line:`.
+    SceneError : where the file cannot be read or is not a valid scene; one line that begins with `file:line:`.
     """
     run = load_run(path)
     for name in run.initial_positions:
-        logger.warning("%s: the deformed start of %r is no part of the scene; load_run returns it", path, name)
+        logger.warning("%s: the deformed start of %r is not a part of the scene; load_run returns it", path, name)
     return run.scene
 
 
@@ -82,21 +82,21 @@ def load_run(path: str | Path, meshes: Callable[[Path], MeshStore] = MeshStore) 
 
     Parameters
     ----------
-    meshes : makes the store that reads the meshes, from the file's folder; `ConfinedMeshStore` reads nothing outside.
+    meshes : makes the store of meshes from the file's folder; `ConfinedMeshStore` reads only files in this folder.
 
     Raises
     ------
-    SceneError : where the file cannot be read or says something impossible; one line that begins with `file:line:`.
+    SceneError : where the file cannot be read or is not a valid scene; one line that begins with `file:line:`.
     """
     document = read_yaml(path)
     try:
         model = SceneFileModel.model_validate(document.data)
     except ValidationError as error:
-        raise complaint(document, error) from None
+        raise scene_error(document, error) from None
     try:
         return replace(_built(model, meshes(Path(path).parent)), text=document.text)
     except LocatedError as error:
-        raise document.error(_blamed(document.data, error.keys, str(error)), str(error)) from None
+        raise document.error(_keys_of_message(document.data, error.keys, str(error)), str(error)) from None
 
 
 def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
@@ -106,7 +106,7 @@ def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
         with at("bodies", i):
             for built in described.build(meshes):
                 if built.body.name in bodies:
-                    raise SceneError(f"another body has the name {built.body.name!r}; give each a name of its own")
+                    raise SceneError(f"another body has the name {built.body.name!r}; give each a different name")
                 bodies[built.body.name] = built.body
                 if built.initial_positions is not None:
                     starts[built.body.name] = built.initial_positions
@@ -115,7 +115,7 @@ def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
         with at("obstacles", i):
             obstacle = described.build(meshes)
             if obstacle.name is not None and any(obstacle.name == other.name for other in obstacles):
-                raise SceneError(f"another obstacle has the name {obstacle.name!r}; give each a name of its own")
+                raise SceneError(f"another obstacle has the name {obstacle.name!r}; give each a different name")
             obstacles.append(obstacle)
     pins: list[Pin] = []
     held: dict[str, set[int]] = {}
@@ -141,7 +141,7 @@ def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
             scene = Scene(list(bodies.values()), obstacles, pins, model.gravity, forces, targets, stitches)
             if model.contact_pairs:
                 scene = replace(scene, contact_pairs=built_pairs(model.contact_pairs, scene))
-            # Found here, where an error's place in the file is known; the scene keeps them.
+            # The pairs are found here, where an error's place in the file is known; the scene caches them.
             logger.debug("%d stitched pairs", len(scene.stitching))
         except StitchError as error:
             raise LocatedError(("stitches", error.number), str(error)) from None
@@ -149,7 +149,7 @@ def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
 
 
 def _fits(item: Selecting, bodies: dict[str, Body]) -> Selecting:
-    """The item, if its body and vertices exist: checked here, where its place in the file is known."""
+    """The item, after a check that its body and vertices exist; here its place in the file is known."""
     if item.body not in bodies:
         with at("body"):
             raise SceneError(f"there is no body {item.body!r}; {suggestion(item.body, bodies)}")
@@ -160,19 +160,19 @@ def _fits(item: Selecting, bodies: dict[str, Body]) -> Selecting:
 
 
 def _free(pin: Pin, bodies: dict[str, Body], held: dict[str, set[int]]) -> Pin:
-    """The pin, if no other pin holds its vertices."""
+    """The pin, after a check that no other pin holds its vertices."""
     body = bodies[pin.body]
     chosen = set(pin.select(body.place(body.mesh.vertices)).tolist())
     twice = chosen & held.setdefault(pin.body, set())
     if twice:
         with at("box" if isinstance(pin.vertices, InBox) else "vertices"):
-            raise SceneError(f"{pin.label}: vertex {min(twice)} is held by another pin already; hold it once")
+            raise SceneError(f"{pin.label}: vertex {min(twice)} is already held by another pin; hold it once")
     held[pin.body] |= chosen
     return pin
 
 
-def _blamed(data: Any, keys: tuple[Key, ...], message: str) -> tuple[Key, ...]:
-    """`keys`, and the key below them that the message begins with, after the name of what it speaks of."""
+def _keys_of_message(data: Any, keys: tuple[Key, ...], message: str) -> tuple[Key, ...]:
+    """`keys`, and the first key below them that the message names after its subject."""
     for key in keys:
         if not (isinstance(data, list) and isinstance(key, int)) and not (isinstance(data, dict) and key in data):
             return keys

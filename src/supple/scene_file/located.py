@@ -1,4 +1,4 @@
-"""Errors that know at which keys of the scene file they arose."""
+"""Errors with the keys of the scene file at which they occurred."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from supple.scene_file.yaml_reader import Key
 
 
 class LocatedError(SceneError):
-    """An error in building what stands at `keys` of a scene file."""
+    """An error in the part of a scene file at `keys`."""
 
     def __init__(self, keys: tuple[Key, ...], message: str) -> None:
         super().__init__(message)
@@ -19,7 +19,7 @@ class LocatedError(SceneError):
 
 @contextmanager
 def at(*keys: Key) -> Iterator[None]:
-    """Puts `keys` before those of an error that comes out of the block."""
+    """Prepend `keys` to those of an error raised in the block."""
     try:
         yield
     except LocatedError as error:

@@ -1,4 +1,4 @@
-"""What all parts of a scene file share: strict values, no unknown keys, and errors that know the known ones."""
+"""Common to all parts of a scene file: strict values, no unknown keys, and errors that list the known keys."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class Model(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _refuse_unknown_keys(cls, data: Any) -> Any:
-        """Before pydantic does: here the known keys are at hand, for a suggestion."""
+    def _reject_unknown_keys(cls, data: Any) -> Any:
+        """Before pydantic's own check, because here the known keys are available for a suggestion."""
         if isinstance(data, dict):
             for key in data:
                 if key not in cls.model_fields:

@@ -1,7 +1,7 @@
-"""Reading YAML without surprises: 1e5 is a number, `no` is a text, a key twice is an error, every value has a line.
+"""Reading YAML by the rules of version 1.2, with the line of each value; a repeated key is an error.
 
 PyYAML follows YAML 1.1, where `1e5` is a text, `no` is false and `1:30` is ninety. Here scalars follow the core schema
-of YAML 1.2.2 (section 10.3.2). Only plain data is built, never an object of any other kind.
+of YAML 1.2.2 (section 10.3.2). Only plain data is built, never any other object.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ for _kind, _pattern in (("null", _NULL), ("bool", _BOOL), ("int", _INT), ("float
 
 @dataclass(frozen=True, eq=False)
 class YamlDocument:
-    """The data of a YAML file, and where in the file each value stands."""
+    """The data of a YAML file, and the place of each value in the file."""
 
     path: Path
     text: str
@@ -51,7 +51,7 @@ class YamlDocument:
     root: yaml.Node
 
     def line(self, keys: Sequence[Key]) -> int:
-        """Line (from 1) of the value at `keys`, of its key where it has one, or of the nearest one above it."""
+        """Line (from 1) of the value at `keys`, or of its key; of the nearest enclosing value if it is absent."""
         node, line = self.root, self.root.start_mark.line + 1
         for key in keys:
             if isinstance(node, yaml.MappingNode):
@@ -67,7 +67,7 @@ class YamlDocument:
         return line
 
     def error(self, keys: Sequence[Key], message: str) -> SceneError:
-        """A `SceneError` that says file, line and key before `message`."""
+        """A `SceneError` with file, line and key before `message`."""
         where = key_text(keys)
         return SceneError(f"{self.path}:{self.line(keys)}: {where}{': ' if where else ''}{message}")
 
@@ -76,12 +76,12 @@ def key_text(keys: Sequence[Key]) -> str:
     """`("bodies", 0, "name")` as `bodies[0].name`."""
     text = ""
     for key in keys:
-        text += f"[{key}]" if isinstance(key, int) else f"{'.' if text else ''}{shown(key)}"
+        text += f"[{key}]" if isinstance(key, int) else f"{'.' if text else ''}{printable(key)}"
     return text
 
 
-def shown(text: str, limit: int = 60) -> str:
-    """A text from a file, fit to stand in a message of one line."""
+def printable(text: str, limit: int = 60) -> str:
+    """A text from a file as printable text of limited length, for a message of one line."""
     text = text if len(text) <= limit else text[: limit - 3] + "..."
     return text if text.isprintable() else ascii(text)[1:-1]
 
@@ -91,7 +91,7 @@ def read_yaml(path: str | Path) -> YamlDocument:
 
     Raises
     ------
-    SceneError : where the file cannot be read or is no valid YAML; one line that begins with `file:line:`.
+    SceneError : where the file cannot be read or is not valid YAML; one line that begins with `file:line:`.
     """
     path = Path(path)
     text = _read_text(path)
@@ -100,7 +100,7 @@ def read_yaml(path: str | Path) -> YamlDocument:
         loader = _Loader(text)
         root = loader.get_single_node()
     except yaml.MarkedYAMLError as error:
-        raise SceneError(f"{path}:{_line_of(error)}: {_complaint(error)}") from None
+        raise SceneError(f"{path}:{_line_of(error)}: {_explanation(error)}") from None
     except yaml.reader.ReaderError as error:
         line = text.count("\n", 0, error.position) + 1
         raise SceneError(f"{path}:{line}: character {error.character:#x} is not allowed in YAML; remove it") from None
@@ -121,14 +121,14 @@ def _read_text(path: Path) -> str:
     except FileNotFoundError:
         raise SceneError(f"{path}: there is no such file") from None
     except IsADirectoryError:
-        raise SceneError(f"{path}: this is a folder; give the scene file inside it") from None
+        raise SceneError(f"{path}: this is a folder; give the scene file in it") from None
     except (OSError, ValueError) as error:
-        if path.is_dir():  # Windows says "permission denied" here
-            raise SceneError(f"{path}: this is a folder; give the scene file inside it") from None
+        if path.is_dir():  # Windows reports "permission denied" for a folder
+            raise SceneError(f"{path}: this is a folder; give the scene file in it") from None
         reason = error.strerror if isinstance(error, OSError) and error.strerror else error
-        raise SceneError(f"{shown(str(path), 200)}: cannot be read: {reason}") from None
+        raise SceneError(f"{printable(str(path), 200)}: cannot be read: {reason}") from None
     if len(raw) > MAX_BYTES:
-        raise SceneError(f"{path}: larger than {MAX_BYTES // 1024**2} MiB; put meshes into files of their own")
+        raise SceneError(f"{path}: larger than {MAX_BYTES // 1024**2} MiB; move meshes into separate files")
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -142,22 +142,22 @@ def _line_of(error: yaml.MarkedYAMLError) -> int:
     return mark.line + 1 if mark is not None else 1
 
 
-def _complaint(error: yaml.MarkedYAMLError) -> str:
+def _explanation(error: yaml.MarkedYAMLError) -> str:
     problem = " ".join((error.problem or error.context or "not valid YAML").split())
     if "'\\t'" in problem:
-        return "a tab stands where YAML wants spaces; indent with spaces"
+        return "a tab is not allowed here; indent with spaces"
     if "but found another document" in problem:
-        return "a second document begins here; a scene file holds one, so remove the `---`"
+        return "a second document begins here; a scene file has one document, so remove the `---`"
     if "undefined alias" in problem:
-        return f"{shown(problem, 120)}; define it with `&` before this line"
+        return f"{printable(problem, 120)}; define it with `&` before this line"
     if "mapping values are not allowed" in problem:
-        return "a `:` stands where no key is expected; check the indentation, or put the text in quotes"
+        return "a `:` is not allowed here; check the indentation, or put the text in quotes"
     context = f" ({' '.join(error.context.split())})" if error.context and error.problem else ""
-    return shown(f"not valid YAML: {problem}{context}", 200) + "; check indentation, quotes and brackets"
+    return printable(f"not valid YAML: {problem}{context}", 200) + "; check indentation, quotes and brackets"
 
 
 class _Builder:
-    """Plain data from YAML nodes. An alias is built again at each use, and all that is built is counted."""
+    """Plain data from YAML nodes. An alias is built again at each use, and the number of all values is limited."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -170,11 +170,11 @@ class _Builder:
     def build(self, node: yaml.Node, depth: int) -> Any:
         self.count += 1
         if self.count > MAX_VALUES:
-            raise self.fail(node, f"the file describes more than {MAX_VALUES} values; use fewer aliases, or mesh files")
+            raise self.fail(node, f"the file contains more than {MAX_VALUES} values; use fewer aliases, or mesh files")
         if depth > MAX_DEPTH:
             raise self.fail(node, f"values are nested too deeply; at most {MAX_DEPTH} levels are allowed")
         if id(node) in self.open:
-            raise self.fail(node, "an alias stands inside what it is an alias of; write the value out")
+            raise self.fail(node, "an alias is inside the value that it refers to; write the value instead")
         if isinstance(node, yaml.ScalarNode):
             return self.scalar(node)
         self.open.add(id(node))
@@ -189,7 +189,7 @@ class _Builder:
 
     def check_tag(self, node: yaml.Node, kind: str) -> None:
         if node.tag != _PREFIX + kind:
-            tag = shown(node.tag.replace(_PREFIX, "!!"))
+            tag = printable(node.tag.replace(_PREFIX, "!!"))
             raise self.fail(node, f"the tag {tag} is not allowed; write plain values without tags")
 
     def mapping(self, node: yaml.Node, depth: int) -> dict[str, Any]:
@@ -197,11 +197,11 @@ class _Builder:
         lines: dict[str, int] = {}
         for key_node, value_node in node.value:
             if not isinstance(key_node, yaml.ScalarNode) or key_node.tag != _PREFIX + "str":
-                text = f" {shown(key_node.value)}" if isinstance(key_node, yaml.ScalarNode) else ""
-                raise self.fail(key_node, f"the key{text} is not a text; keys are words such as `bodies`")
+                text = f" {printable(key_node.value)}" if isinstance(key_node, yaml.ScalarNode) else ""
+                raise self.fail(key_node, f"the key{text} is not a text; keys are texts such as `bodies`")
             key = key_node.value
             if key in result:
-                raise self.fail(key_node, f"the key `{shown(key)}` stands on line {lines[key]} too; keep one")
+                raise self.fail(key_node, f"the key `{printable(key)}` is also on line {lines[key]}; keep one")
             lines[key] = key_node.start_mark.line + 1
             result[key] = self.build(value_node, depth + 1)
         return result
@@ -216,7 +216,7 @@ class _Builder:
             return text.lower() == "true"
         if kind == "int" and _INT.fullmatch(text):
             if len(text) > 400:
-                raise self.fail(node, f"the number {shown(text)} has {len(text)} digits; give a smaller one")
+                raise self.fail(node, f"the number {printable(text)} has {len(text)} digits; give a smaller one")
             return int(text, 0) if text[:2] in ("0o", "0x") else int(text)
         if kind == "float" and (_FLOAT.fullmatch(text) or _INT.fullmatch(text)):
             return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))

@@ -227,7 +227,7 @@ def upload_two_files(resting, spot, tmp_path):
     data = bytearray((tmp_path / "my ball.stl").read_bytes())
     (tmp_path / "half.stl").write_bytes(data[: len(data) // 2])
     files.set_input_files(tmp_path / "half.stl")
-    line = screen.tab.get_by_text("half.stl: its header promises")
+    line = screen.tab.get_by_text("half.stl: its header announces")
     screen.wait(lambda: line.count() == 1, "why the file is refused")
     frame = resting.snapshot().frame
     screen.wait(lambda: resting.snapshot().frame > frame + 5, "the simulation to go on")

@@ -68,8 +68,8 @@ def open_box(text=b"0 0 0"):
 HOSTILE = {
     "nothing": (".stl", b"", "empty"),
     "noise": (".stl", bytes(range(256)) * 40, "truncated|neither"),
-    "cut short": (".stl", bytes(80) + struct.pack("<I", 1000) + bytes(50 * 7), "promises 1000 triangles"),
-    "a count of billions": (".stl", bytes(80) + struct.pack("<I", 2**32 - 1) + bytes(500), "promises 4294967295"),
+    "cut short": (".stl", bytes(80) + struct.pack("<I", 1000) + bytes(50 * 7), "announces 1000 triangles"),
+    "a count of billions": (".stl", bytes(80) + struct.pack("<I", 2**32 - 1) + bytes(500), "announces 4294967295"),
     "a count of billions in text": (".off", b"OFF\n4000000000 4000000000 0\n0 0 0\n", ""),
     "points by the billion": (
         ".vtk",

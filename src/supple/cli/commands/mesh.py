@@ -63,7 +63,8 @@ def mesh(
     from rich.console import Console
 
     from supple.mesh.io.mesh_files import TET_EXTENSIONS
-    from supple.mesh.io.tetgen_files import family_paths, is_tetgen_path, write_tetgen
+    from supple.mesh.io.tetgen_family import family_paths, is_tetgen_path
+    from supple.mesh.io.tetgen_files import write_tetgen
     from supple.mesh.meshing.tetrahedralize import tetrahedralize_reported
     from supple.mesh.surface import SurfaceMesh
     from supple.output.files.atomic import refuse_to_replace

@@ -1,4 +1,4 @@
-"""What a mesh file holds before anything is made of it: points, and cells of any kind."""
+"""The contents of a mesh file before conversion: points, and cells of any kind."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ CELL_NAMES = {
 
 
 class FormatError(Exception):
-    """A file breaks its format: why, and in which line (1-based) where lines are known."""
+    """A file does not follow its format: the reason, and the line (1-based) where lines are known."""
 
     def __init__(self, reason: str, line: int | None = None) -> None:
         super().__init__(reason)
@@ -27,7 +27,7 @@ class FormatError(Exception):
 
 
 class CellSoup(NamedTuple):
-    """Points (n, 3), and for cell k its VTK type and the points connectivity[offsets[k] : offsets[k + 1]]."""
+    """Points (n, 3), and for each cell k its VTK type and its points connectivity[offsets[k] : offsets[k + 1]]."""
 
     points: NDArray[np.float64]
     types: NDArray[np.uint8]
@@ -43,7 +43,7 @@ class CellSoup(NamedTuple):
 
     @classmethod
     def of_sizes(cls, points: NDArray[np.float64], sizes: NDArray[np.int64], flat: NDArray[np.int64]) -> CellSoup:
-        """Soup of polygons, given as the size of each and all their point indices in a row."""
+        """Soup of polygons, given as the size of each, and the point indices of all in one array."""
         offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
         return cls(points, np.full(len(sizes), POLYGON, dtype=np.uint8), offsets, flat.astype(np.int64))
 
@@ -90,7 +90,7 @@ def checked(soup: CellSoup) -> CellSoup:
 
 
 def tets_of(soup: CellSoup) -> NDArray[np.int64]:
-    """The tets (m, 4) of a soup; points, lines and surface cells are passed over, other cells refused."""
+    """The tets (m, 4) of a soup; points, lines and surface cells are ignored, other cells are errors."""
     soup = checked(soup)
     others = np.unique(soup.types[(soup.types != TETRA) & (soup.types > QUAD)])
     if len(others):

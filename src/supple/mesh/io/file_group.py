@@ -1,4 +1,4 @@
-"""Writing several files that belong together: all of them, or none."""
+"""Writing several files that belong together: all of them or none."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from supple.replacing import put_in_place, remove_abandoned, temporary_name
 def write_together(texts: Mapping[Path, Iterable[str]]) -> None:
     """Write each text (in pieces) to its path; where one cannot be written, all files stay as they were.
 
-    Everything is first written under temporary names in the same folder. Only then are all old files moved aside and
-    the new ones moved in, and moved back if that fails halfway. Where the process is killed halfway, files are missing;
-    old and new ones never stand side by side.
+    All texts are first written under temporary names in the same folder. Then all old files are renamed, and the new
+    ones get their names. If this fails halfway, the old files get their names back. If the process is killed halfway,
+    files are missing, but old and new files are never mixed.
 
     Raises
     ------
@@ -41,14 +41,14 @@ def write_together(texts: Mapping[Path, Iterable[str]]) -> None:
             put_in_place(fresh[current], current)
             moved_in.append(current)
     except BaseException as error:
-        # A KeyboardInterrupt must not leave half a family either.
+        # BaseException: a KeyboardInterrupt must not leave a part of the files either.
         for path in moved_in:
             if path not in moved_aside:
                 path.unlink(missing_ok=True)
         for path in moved_aside:
             os.replace(saved[path], path)
         if isinstance(error, OSError):
-            raise MeshError(f"{current}: cannot be written: {error.strerror or error}") from None
+            raise MeshError(f"{current}: it cannot be written: {error.strerror or error}") from None
         raise
     finally:
         for path in (*fresh.values(), *saved.values()):

@@ -1,21 +1,23 @@
-"""Reading and writing surfaces and tet meshes: picks the format by the extension, and words the errors."""
+"""Reading and writing surfaces and tet meshes as arrays: selects the format by the extension."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from supple.errors import MeshError
 from supple.mesh.checked_arrays import vertex_array
+from supple.mesh.file_contents import file_contents
 from supple.mesh.io import msh, obj, off, ply, stl, vtk_legacy, vtk_xml
 from supple.mesh.io.cells import CellSoup, FormatError, tets_of
 from supple.mesh.io.polygons import triangles_of
+from supple.mesh.io.tetgen_family import SUFFIXES, family_paths, is_tetgen_path, read_tetgen_family
 from supple.mesh.merge import merge_map
-from supple.mesh.surface import SurfaceMesh
-from supple.mesh.tetmesh import TetMesh
 from supple.replacing import put_in_place, remove_abandoned, temporary_name
 
 logger = logging.getLogger(__name__)
@@ -43,14 +45,21 @@ TET_READERS: dict[str, Callable[[bytes], CellSoup]] = {
     ".vtu": vtk_xml.read,
     ".vtk": vtk_legacy.read,
 }
-TETGEN_EXTENSIONS = (".node", ".ele", ".edge", ".face")
-TET_EXTENSIONS = (*TETGEN_EXTENSIONS, *TET_READERS)
+TET_EXTENSIONS = (*SUFFIXES, *TET_READERS)
 # Two units in the last place of single precision, relative to the bounding box.
 MERGE_TOLERANCE = 2e-7
 
 
-def load_surface(path: str | Path) -> SurfaceMesh:
-    """Read a surface; see `SurfaceMesh.load`."""
+class TetFile(NamedTuple):
+    """Vertices (n, 3) and tets (m, 4) as read from a file, and the file that lists the tets."""
+
+    points: NDArray[np.float64]
+    tets: NDArray[np.integer]
+    path: Path
+
+
+def read_surface(path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices (n, 3) and triangles (m, 3) of a surface file; see `SurfaceMesh.load`."""
     path = Path(path)
     extension = path.suffix.lower()
     if extension not in SURFACE_READERS:
@@ -73,96 +82,72 @@ def load_surface(path: str | Path) -> SurfaceMesh:
     if collapsed.all():
         raise MeshError(f"{path}: all {len(triangles)} triangles are degenerate; it holds no surface")
     if len(keep) < len(points):
-        logger.info("%s: %d vertices in the place of others were merged", path, len(points) - len(keep))
+        logger.info("%s: %d vertices at the place of others were merged", path, len(points) - len(keep))
     if collapsed.any():
-        logger.warning("%s: %d triangles with a vertex twice were dropped", path, np.count_nonzero(collapsed))
-    try:
-        surface = SurfaceMesh(points[keep], triangles[~collapsed])
-    except MeshError as error:
-        raise MeshError(_renamed(path, error, "SurfaceMesh")) from None
-    unused = len(surface.vertices) - len(surface.used_vertices)
-    if unused:
+        logger.warning("%s: %d triangles that have a vertex twice were dropped", path, np.count_nonzero(collapsed))
+    points, triangles = points[keep], triangles[~collapsed]
+    used = np.zeros(len(points), dtype=bool)
+    used[triangles] = True
+    if not used.all():
+        unused = np.count_nonzero(~used)
         logger.warning("%s: %d vertices that belong to no triangle were dropped", path, unused)
-        surface = surface.compact()
-    return surface
+        points, triangles = points[used], (np.cumsum(used) - 1)[triangles]
+    return points, triangles
 
 
-def save_surface(surface: SurfaceMesh, path: str | Path) -> None:
+def write_surface(path: str | Path, vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> None:
     """Write a surface; see `SurfaceMesh.save`."""
     path = Path(path)
     writer = SURFACE_WRITERS.get(path.suffix.lower())
     if writer is None:
         raise _unknown_extension(path, tuple(SURFACE_WRITERS), "")
-    if surface.shares_vertices:
-        surface = surface.compact()
-    data = writer(surface.vertices, surface.triangles)
+    data = writer(vertices, triangles)
     _write_whole(path, lambda temporary: temporary.write_bytes(data))
 
 
-def load_tetmesh(path: str | Path) -> TetMesh:
-    """Read a tet mesh; see `TetMesh.load`."""
+def read_tets(path: str | Path) -> TetFile:
+    """Vertices and tets of a file, unchecked beyond the format; see `TetMesh.load`."""
     path = Path(path)
     extension = path.suffix.lower()
-    if extension in TETGEN_EXTENSIONS:
-        from supple.mesh.io.tetgen_files import read_tetgen
-
-        return read_tetgen(path)
+    if is_tetgen_path(path):
+        family = read_tetgen_family(path)
+        ele = family_paths(path)[".ele"]
+        if family.order == 2:
+            logger.warning("%s: ten-node tets: only their four corners are used", ele)
+        return TetFile(family.points, family.tets, ele)
     if extension not in TET_EXTENSIONS:
         hint = "; a surface is loaded with SurfaceMesh.load" if extension in SURFACE_READERS else ""
         raise _unknown_extension(path, TET_EXTENSIONS, hint)
     data = _contents(path)
     try:
         soup = TET_READERS[extension](data)
-        tets = tets_of(soup)
-        mesh = TetMesh.dropping_unused(soup.points, tets)
+        return TetFile(soup.points, tets_of(soup), path)
     except FormatError as error:
         raise _located(path, error) from None
-    except MeshError as error:
-        raise MeshError(_renamed(path, error, "TetMesh")) from None
-    if mesh.turned:
-        logger.info("%s: %d of %d tets had negative winding and were turned", path, mesh.turned, len(mesh.tets))
-    return mesh
 
 
-def save_tetmesh(mesh: TetMesh, path: str | Path) -> None:
-    """Write a tet mesh; see `TetMesh.save`."""
+def write_tets(path: str | Path, vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> None:
+    """Write tets to a `.msh`, `.vtu` or `.vtk` file; see `TetMesh.save`."""
     path = Path(path)
     extension = path.suffix.lower()
-    if extension in TETGEN_EXTENSIONS:
-        from supple.mesh.io.tetgen_files import write_tetgen
-
-        write_tetgen(mesh, path)
-    elif extension == ".msh":
-        _write_whole(path, lambda temporary: msh.write(temporary, mesh.vertices, mesh.tets))
-    elif extension in TET_EXTENSIONS:
-        writer = vtk_xml.written_cells if extension == ".vtu" else vtk_legacy.written_cells
-        data = writer(mesh.vertices, mesh.tets)
+    if extension == ".msh":
+        _write_whole(path, lambda temporary: msh.write(temporary, vertices, tets))
+    elif extension in TET_READERS:
+        data = (vtk_xml if extension == ".vtu" else vtk_legacy).written_cells(vertices, tets)
         _write_whole(path, lambda temporary: temporary.write_bytes(data))
     else:
         raise _unknown_extension(path, TET_EXTENSIONS, "")
 
 
 def _contents(path: Path) -> bytes:
-    """All bytes of an ordinary, non-empty file."""
-    if path.is_dir():
-        raise MeshError(f"{path}: it is a folder; give the path of a mesh file")
-    if not path.exists():
-        raise MeshError(f"{path}: there is no such file")
-    if not path.is_file():
-        raise MeshError(f"{path}: it is not an ordinary file")
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise MeshError(f"{path}: it cannot be read: {error.strerror or error}") from None
-    except MemoryError:
-        raise MeshError(f"{path}: it is too large for the memory of this machine") from None
+    data = file_contents(path)
     if not data.strip():
         raise MeshError(f"{path}: it is empty")
     return data
 
 
 def _write_whole(path: Path, write: Callable[[Path], object]) -> None:
-    """Write under a temporary name in the same folder, then rename: either the whole file is there or none of it."""
+    """Write under a temporary name in the same folder, then rename: the file is either complete or absent."""
     temporary = temporary_name(path)
     try:
         write(temporary)
@@ -176,14 +161,10 @@ def _write_whole(path: Path, write: Callable[[Path], object]) -> None:
 
 def _unknown_extension(path: Path, known: tuple[str, ...], hint: str) -> MeshError:
     listed = ", ".join(sorted(known))
-    shown = f"the extension '{path.suffix}' is not one of" if path.suffix else "it has no extension; use one of"
-    return MeshError(f"{path}: {shown} {listed}{hint}")
+    found = f"the extension '{path.suffix}' is not one of" if path.suffix else "it has no extension; use one of"
+    return MeshError(f"{path}: {found} {listed}{hint}")
 
 
 def _located(path: Path, error: FormatError) -> MeshError:
     where = f"{path}:{error.line}" if error.line is not None else f"{path}"
     return MeshError(f"{where}: {error.reason}")
-
-
-def _renamed(path: Path, error: MeshError, owner: str) -> str:
-    return f"{path}: " + str(error).removeprefix(f"{owner}: ")

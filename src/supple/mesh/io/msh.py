@@ -1,7 +1,7 @@
 """Gmsh's .msh: reads versions 2, 4.0 and 4.1, text and binary; writes 4.1 through meshio.
 
-Source: the Gmsh reference manual, "MSH file format". Node tags may be any numbers in any order, so they are looked up
-by sorting: memory depends on what the file holds, never on what it claims.
+Source: the Gmsh reference manual, "MSH file format". Node tags may be any numbers in any order, so they are found
+by sorting: memory depends on the size of the file, never on the numbers in it.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class _Form(NamedTuple):
 
 
 class _Section:
-    """The numbers between $Name and $EndName, taken one group after another."""
+    """The numbers between $Name and $EndName, read one group after another."""
 
     def __init__(self, data: bytes, name: str, form: _Form) -> None:
         self.name, self.form, self.data = name, form, data
@@ -66,7 +66,7 @@ class _Section:
     def _short(self, count: int) -> FormatError:
         line = self.line if self.form.is_text else None
         return FormatError(
-            f"${self.name} does not hold the {count} numbers its counts ask for: it is truncated, or they are wrong",
+            f"${self.name} does not hold the {count} numbers that its counts announce: it is truncated or damaged",
             line,
         )
 
@@ -84,7 +84,7 @@ class _Section:
         return values
 
     def first_count(self) -> int:
-        """The count on a line of its own that version 2 begins its sections with, in binary files too."""
+        """The count on the first line of a section of version 2, which is text in binary files too."""
         if self.form.is_text:
             return int(self.integers(1)[0])
         end = self.data.find(b"\n", self.at)
@@ -100,7 +100,7 @@ class _Section:
             return self._binary(np.dtype(f"{self.form.order}i{size}"), count).astype(np.int64)
         values = self._taken(count)
         if not (np.abs(values) < 2.0**53).all() or (values != np.floor(values)).any():
-            raise FormatError(f"${self.name} holds a number where a whole one should be")
+            raise FormatError(f"${self.name} holds a number that should be a whole number")
         return values.astype(np.int64)
 
     def floats(self, count: int) -> NDArray[np.float64]:
@@ -138,7 +138,7 @@ class _Section:
 
 
 def read(data: bytes) -> CellSoup:
-    """Points and cells of a .msh file; physical groups and data are passed over."""
+    """Points and cells of a .msh file; physical groups and data are ignored."""
     data = without_mark(data)
     form = _form(data)
     tags, points = (_nodes_2 if form.version == "2" else _nodes_4)(_Section(data, "Nodes", form))
@@ -171,8 +171,8 @@ def _form(data: bytes) -> _Form:
     given = head.group(1).decode("latin-1")
     version = {"4": "4.1", "4.1": "4.1", "4.0": "4.0"}.get(given, "2" if given in ("2", "2.0", "2.1", "2.2") else "")
     if not version:
-        shown = given if given.isprintable() else "?"
-        raise FormatError(f"version '{shown[:20]}' is not supported; save it as version 4.1 or 2.2")
+        text = given if given.isprintable() else "?"
+        raise FormatError(f"version '{text[:20]}' is not supported; save it as version 4.1 or 2.2")
     size = head.group(3)
     if size not in (b"4", b"8"):
         raise FormatError("the size of its numbers is neither 4 nor 8 bytes")

@@ -1,4 +1,4 @@
-"""Wavefront OBJ: positions and faces; normals, texture coordinates, materials and groups are passed over."""
+"""Wavefront OBJ: positions and faces; normals, texture coordinates, materials and groups are ignored."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def read(data: bytes) -> CellSoup:
     """Polygons of an OBJ file; indices may be negative (counted from the last vertex)."""
     points: list[list[float]] = []
     polygons: list[list[int]] = []
-    # A backslash at a line's end continues it; joining with spaces keeps later line numbers nearly right.
+    # A backslash at a line's end continues the line. Later line numbers are too small by the number of joins.
     text = decoded(data).replace("\r\n", "\n").replace("\\\n", " ")
     for line, words in meaningful_lines(text):
         if words[0] == "v":
@@ -34,12 +34,12 @@ def read(data: bytes) -> CellSoup:
 
 def _face(words: list[str], count: int, line: int) -> list[int]:
     if len(words) < 3:
-        raise FormatError(f"face has {len(words)} corners; it needs three at least", line)
+        raise FormatError(f"face has {len(words)} corners; it needs at least three", line)
     corners = []
     for word in words:
         index = integer(word.split("/", 1)[0], line, "face index")
         if index == 0 or index < -count:
-            raise FormatError(f"face names vertex {index}; indices start at 1, or go back from -1 to -{count}", line)
+            raise FormatError(f"face names vertex {index}; indices start at 1, or run from -1 back to -{count}", line)
         corners.append(index - 1 if index > 0 else count + index)
     return corners
 

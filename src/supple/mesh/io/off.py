@@ -42,7 +42,7 @@ def read(data: bytes) -> CellSoup:
 def _face(words: list[str], n: int, line: int) -> list[int]:
     size = integer(words[0], line, "number of corners")
     if size < 3 or len(words) < size + 1:
-        raise FormatError(f"face announces {size} corners and lists {len(words) - 1}; it needs three at least", line)
+        raise FormatError(f"face announces {size} corners and lists {len(words) - 1}; it needs at least three", line)
     corners = [integer(word, line, "face index") for word in words[1 : size + 1]]
     if min(corners) < 0 or max(corners) >= n:
         raise FormatError(

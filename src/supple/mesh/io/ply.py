@@ -35,12 +35,12 @@ class Element(NamedTuple):
 
     @property
     def smallest_row(self) -> int:
-        """Bytes that a binary row takes at least."""
+        """Smallest size of a binary row [bytes]."""
         return sum(np.dtype(p.length or p.kind).itemsize for p in self.properties)
 
 
 def read(data: bytes) -> CellSoup:
-    """Polygons of a PLY file; other elements and columns are passed over."""
+    """Polygons of a PLY file; other elements and columns are ignored."""
     data = without_mark(data)
     order, elements, start, line = _header(data)
     body = _Text(data, start, line) if order == "" else _Binary(data, start, order)
@@ -82,7 +82,7 @@ def _header(data: bytes) -> tuple[str, list[Element], int, int]:
         elif words[0] == "property" and elements and len(words) in (3, 5):
             elements[-1].properties.append(_property(words, line))
         else:
-            raise FormatError(f"'{shortened(words)}' does not belong into a PLY header", line)
+            raise FormatError(f"'{shortened(words)}' does not belong in a PLY header", line)
     if order is None:
         raise FormatError("the format is none of ascii, binary_little_endian, binary_big_endian", 2)
     return order, elements, stop + 1, len(lines)
@@ -92,7 +92,7 @@ def _property(words: list[str], line: int) -> Property:
     is_list = words[1] == "list"
     kinds = words[2:4] if is_list else words[1:2]
     if len(words) != (5 if is_list else 3) or any(kind not in SCALARS for kind in kinds):
-        raise FormatError(f"'{shortened(words)}' is no property that is known", line)
+        raise FormatError(f"'{shortened(words)}' is an unknown property", line)
     length = SCALARS[kinds[0]] if is_list else None
     if length is not None and length.startswith("f"):
         raise FormatError("the length of a list must be an integer", line)
@@ -109,7 +109,7 @@ def _columns(element: Element) -> list[int]:
 
 
 def _which_list(element: Element) -> int:
-    """Which column holds the corners of the faces; -1 where the element is no face."""
+    """The column with the corners of the faces; -1 where the element is not a face."""
     found = [k for k, p in enumerate(element.properties) if p.length and p.name in FACE_LISTS]
     if element.name == "face" and not found:
         raise FormatError("its faces have no list 'vertex_indices' or 'vertex_index'")
@@ -118,7 +118,7 @@ def _which_list(element: Element) -> int:
 
 def _truncated(element: Element, left: str) -> FormatError:
     return FormatError(
-        f"its header promises {element.count} rows of '{element.name}', but only {left} are left: it is truncated"
+        f"its header announces {element.count} rows of '{element.name}', but only {left} are left: it is truncated"
     )
 
 
@@ -144,7 +144,7 @@ class _Binary:
         return self._any_lists(element, wanted) if fast is None else fast
 
     def _equal_lists(self, element: Element, wanted: int) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
-        """All rows at once, where every list is as long as in the first row; None where they differ."""
+        """All rows at once, where each list is as long as in the first row; None where lengths differ."""
         columns, at = [], self.at
         lengths = {}
         for k, p in enumerate(element.properties):

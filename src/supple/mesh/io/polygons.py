@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mapbox_earcut
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,16 +22,16 @@ SURFACE_TYPES = (TRIANGLE, TRIANGLE_STRIP, POLYGON, PIXEL, QUAD)
 
 
 def triangles_of(soup: CellSoup) -> NDArray[np.int64]:
-    """Triangles (m, 3) of the surface cells; points and lines are passed over, solid cells refused.
+    """Triangles (m, 3) of the surface cells; points and lines are ignored, solid cells are errors.
 
-    Convex polygons become fans, concave ones are cut by their ears.
+    Convex polygons are cut as fans, concave ones by their ears.
     """
     soup = checked(soup)
     solid = np.unique(soup.types[soup.types > QUAD])
     if len(solid):
         name = CELL_NAMES.get(int(solid[0]), f"type {solid[0]}")
         hint = "; load it with TetMesh.load, whose .surface is the boundary" if name == "tetrahedron" else ""
-        raise FormatError(f"it holds {name} cells, which are no surface{hint}")
+        raise FormatError(f"it holds {name} cells, which are not a surface{hint}")
     cells = np.flatnonzero(np.isin(soup.types, SURFACE_TYPES))
     if len(cells) == 0:
         raise FormatError("it holds no triangles or polygons")
@@ -50,7 +51,9 @@ def triangles_of(soup: CellSoup) -> NDArray[np.int64]:
     odd = strip & (j % 2 == 1)
     second, third = starts[cell] + j + 1, starts[cell] + j + 2
     triangles = flat[np.column_stack([first, np.where(odd, third, second), np.where(odd, second, third)])]
-    return _mend_concave(soup.points, triangles, cell, (counts > 1) & (types != TRIANGLE_STRIP), (starts, sizes, flat))
+    return _with_concave_cut(
+        soup.points, triangles, cell, (counts > 1) & (types != TRIANGLE_STRIP), (starts, sizes, flat)
+    )
 
 
 def _pixels_as_quads(flat: NDArray[np.int64], starts: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -62,55 +65,41 @@ def _pixels_as_quads(flat: NDArray[np.int64], starts: NDArray[np.int64]) -> NDAr
     return flat
 
 
-def _mend_concave(
+def _with_concave_cut(
     points: NDArray[np.float64],
     triangles: NDArray[np.int64],
     cell: NDArray[np.int64],
     is_polygon: NDArray[np.bool_],
     cells: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]],
 ) -> NDArray[np.int64]:
-    """Replace the fans of polygons that a fan does not fit."""
+    """The triangles, with ears instead of the fan where a polygon is concave."""
     a, b, c = points[triangles].transpose(1, 0, 2)
-    with np.errstate(all="ignore"):  # what is not finite is reported later, by vertex
+    with np.errstate(all="ignore"):  # coordinates that are not finite are reported later, with their vertex
         normals = np.cross(b - a, c - a)
         total = np.zeros((len(is_polygon), 3))
         np.add.at(total, cell, normals)
         wrong = is_polygon[cell] & (np.einsum("ij,ij->i", normals, total[cell]) < 0.0)
     starts, sizes, flat = cells
     for k in np.unique(cell[wrong]):
-        rows = np.flatnonzero(cell == k)
         corners = flat[starts[k] : starts[k] + sizes[k]]
-        triangles[rows] = corners[ear_clipped(points[corners], total[k])]
+        cut = ear_clipped(points[corners], total[k])
+        if cut is not None:
+            first = np.searchsorted(cell, k)
+            triangles[first : first + len(cut)] = corners[cut]
     return triangles
 
 
-def ear_clipped(polygon: NDArray[np.float64], normal: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Triangles (k - 2, 3) of a simple, nearly flat polygon (k, 3), by cutting off ears (Meisters 1975)."""
+def ear_clipped(polygon: NDArray[np.float64], normal: NDArray[np.float64]) -> NDArray[np.int64] | None:
+    """Triangles (k - 2, 3) of a simple, nearly flat polygon (k, 3); None where it crosses itself.
+
+    Source: ear clipping (Meisters 1975), by mapbox-earcut.
+    """
     drop = int(np.abs(normal).argmax())
-    keep = [(drop + 1) % 3, (drop + 2) % 3]
-    plane = polygon[:, keep] * (1.0 if normal[drop] > 0.0 else -1.0, 1.0)
-
-    def turn(i: int, j: int, k: int) -> float:
-        (ax, ay), (bx, by), (cx, cy) = plane[i], plane[j], plane[k]
-        return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-
-    left = list(range(len(polygon)))
-    triangles = []
-    while len(left) > 3:
-        best, best_at = None, 0
-        for at in range(len(left)):
-            i, j, k = left[at - 1], left[at], left[(at + 1) % len(left)]
-            area = turn(i, j, k)
-            inside = any(
-                turn(i, j, p) >= 0.0 and turn(j, k, p) >= 0.0 and turn(k, i, p) >= 0.0
-                for p in left
-                if p not in (i, j, k)
-            )
-            # Among ears the largest; without any (a polygon that crosses itself) the least bad corner.
-            score = (area > 0.0 and not inside, area)
-            if best is None or score > best:
-                best, best_at = score, at
-        triangles.append((left[best_at - 1], left[best_at], left[(best_at + 1) % len(left)]))
-        left.pop(best_at)
-    triangles.append((left[0], left[1], left[2]))
-    return np.array(triangles, dtype=np.int64)
+    plane = polygon[:, [(drop + 1) % 3, (drop + 2) % 3]]
+    plane = plane / (np.abs(plane).max() or 1.0)  # products of coordinates must not overflow
+    flat = mapbox_earcut.triangulate_float64(plane, np.array([len(plane)], dtype=np.uint32))
+    triangles = flat.reshape(-1, 3).astype(np.int64)
+    if len(triangles) != len(polygon) - 2:
+        return None
+    a, b, c = polygon[triangles].transpose(1, 0, 2)
+    return triangles[:, ::-1] if (np.cross(b - a, c - a) @ normal).sum() < 0.0 else triangles

@@ -17,7 +17,7 @@ RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute
 
 
 def read(data: bytes) -> CellSoup:
-    """Triangles of an STL file. Whether it is text is decided by its length, not by the word `solid` alone."""
+    """Triangles of an STL file. Binary files may begin with `solid` too: the length decides first."""
     if len(data) >= 84 and len(data) == 84 + 50 * struct.unpack_from("<I", data, 80)[0]:
         return _read_binary(data)
     if without_mark(data).lstrip()[:5].lower() == b"solid" and b"\0" not in data[:512]:
@@ -36,7 +36,7 @@ def _read_binary(data: bytes) -> CellSoup:
     (count,) = struct.unpack_from("<I", data, 80)
     if 84 + 50 * count > len(data):
         raise FormatError(
-            f"its header promises {count} triangles, but there are bytes for {(len(data) - 84) // 50}: "
+            f"its header announces {count} triangles, but there are bytes for {(len(data) - 84) // 50}: "
             "it is truncated, or not an STL file"
         )
     if 84 + 50 * count < len(data):
@@ -56,16 +56,16 @@ def _read_text(data: bytes) -> CellSoup:
             corners.append(numbers(words[1:], 3, line, "vertex"))
         elif keyword == "endloop":
             if len(corners) == 0 or len(corners) % 3:
-                raise FormatError("the loop that ends here has not three vertices", line)
+                raise FormatError("the loop that ends here does not have three vertices", line)
         elif keyword not in ("solid", "facet", "outer", "endfacet", "endsolid", "end"):
-            raise FormatError(f"'{shortened(words)}' does not belong into an STL file", line)
+            raise FormatError(f"'{shortened(words)}' does not belong in an STL file", line)
     if len(corners) % 3:
         raise FormatError("the file ends inside a triangle: it is truncated", line)
     return _soup(np.array(corners, dtype=np.float64).reshape(-1, 3))
 
 
 def written(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> bytes:
-    """Binary STL, in single precision, as the format demands."""
+    """Binary STL, in single precision, the only one of the format."""
     corners = vertices[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)

@@ -1,111 +1,37 @@
-"""TetGen's own files: .node (vertices), .ele (tets), .edge and .face, all of one name.
-
-Layout: https://wias-berlin.de/software/tetgen/fformats.html. Each file has a header line, then one numbered row per
-line; all numbers start at 0 or all at 1, as the first vertex says; `#` starts a comment.
-"""
+"""Tet meshes from and to TetGen's own files; `tetgen_family` has the layout of these files."""
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from itertools import chain
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
-from supple.errors import MeshError
-from supple.mesh.io.file_group import write_together
-from supple.mesh.io.tetgen_table import Columns, Table, read_header, read_rows, read_text
+from supple.mesh.io.tetgen_family import family_paths, is_tetgen_path, write_tetgen_family
 from supple.mesh.tetmesh import TetMesh
-from supple.mesh.topology import TET_EDGES, TET_FACETS, edge_keys, facet_keys
-
-logger = logging.getLogger(__name__)
-
-SUFFIXES = (".node", ".ele", ".edge", ".face")
-
-
-@dataclass(frozen=True, eq=False)
-class TetgenFamily:
-    """What a family of TetGen files says, before anything is dropped or turned. Indices start at 0.
-
-    Attributes
-    ----------
-    points : (n, 3) float [m], with `point_attributes` (n, a) and `point_markers` (n,) or None
-    tets : (m, 4) int32, the corners as in the file, with `tet_attributes` (m, b), mostly regions
-    edges, faces : (e, 2) and (f, 3) int32 or None where there is no such file, with `edge_markers` and `face_markers`
-    base_index : 0 or 1, as in the files
-    order : 1, or 2 where the file holds ten-node tets, of which the four corners are kept here
-    """
-
-    points: NDArray[np.float64]
-    tets: NDArray[np.int32]
-    point_attributes: NDArray[np.float64]
-    tet_attributes: NDArray[np.float64]
-    point_markers: NDArray[np.int32] | None
-    edges: NDArray[np.int32] | None
-    edge_markers: NDArray[np.int32] | None
-    faces: NDArray[np.int32] | None
-    face_markers: NDArray[np.int32] | None
-    base_index: int
-    order: int
 
 
 def read_tetgen(path: str | Path) -> TetMesh:
-    """The tet mesh of a TetGen family, from the name of any one of its files.
+    """The tet mesh of a TetGen family, from the name of any one of its files or of the family ("bear.1").
 
-    `.node` and `.ele` must be there; `.edge` and `.face` are checked where they are, and derived from the tets where
-    they are not. Vertices that no tet uses (the middles of ten-node tets, say) are dropped, negative tets turned.
-
-    Raises
-    ------
-    MeshError : `file:line: reason`, or the name of the file that is missing.
-    """
-    family = read_tetgen_family(path)
-    ele = _member(Path(path), ".ele")
-    if family.order == 2:
-        logger.warning("%s: ten-node tets: only their four corners are used", ele)
-    try:
-        mesh = TetMesh.dropping_unused(family.points, family.tets)
-    except MeshError as error:
-        raise MeshError(f"{ele}: {str(error).removeprefix('TetMesh: ')} (counted from 0)") from None
-    if mesh.turned:
-        logger.info("%s: %d of %d tets had negative winding and were turned", ele, mesh.turned, len(mesh.tets))
-    return mesh
-
-
-def read_tetgen_family(path: str | Path) -> TetgenFamily:
-    """All that a TetGen family says, attributes and markers included, from the name of any one of its files.
+    `.node` and `.ele` must exist. `.edge` and `.face` are checked where they exist, and derived from the tets
+    otherwise. Vertices that no tet uses (for example the middle nodes of ten-node tets) are dropped, and negative tets
+    are turned.
 
     Raises
     ------
     MeshError : `file:line: reason`, or the name of the file that is missing.
     """
-    path = Path(path)
-    node, ele, edge, face = (_member(path, suffix) for suffix in SUFFIXES)
-    _require(node, path)
-    _require(ele, path)
-    points, point_attributes, point_markers, base = _read_nodes(node)
-    tets, tet_attributes, order = _read_tets(ele, len(points), base)
-    edges, edge_markers = _read_simplices(edge, tets, len(points), base, (2, order + 1), "edge")
-    faces, face_markers = _read_simplices(face, tets, len(points), base, (3, 3 * order), "face")
-    return TetgenFamily(
-        points, tets, point_attributes, tet_attributes, point_markers,
-        edges, edge_markers, faces, face_markers, base, order,
-    )  # fmt: skip
+    return TetMesh.load(path if is_tetgen_path(path) else family_paths(path)[".ele"])
 
 
 def write_tetgen(mesh: TetMesh, path: str | Path, base_index: int = 1) -> dict[str, Path]:
     """Write `.node`, `.ele`, `.edge` (all edges) and `.face` (the boundary, counter-clockwise from outside).
 
-    Vertices and edges of the boundary carry the marker 1, others 0. Coordinates are written in full, so that they
-    read back to the last bit.
+    Vertices and edges of the boundary have the marker 1, others 0. Coordinates are written with every digit, so that
+    they read back bit for bit.
 
     Parameters
     ----------
     path : the name of one of the four files, or of the family ("bear.1")
-    base_index : 1 (TetGen's own habit) or 0
+    base_index : 1 (TetGen's default) or 0
 
     Returns
     -------
@@ -113,173 +39,6 @@ def write_tetgen(mesh: TetMesh, path: str | Path, base_index: int = 1) -> dict[s
 
     Raises
     ------
-    MeshError : where a file cannot be written. Then none of the four is new: files of before are as they were.
+    MeshError : where a file cannot be written. Then none of the four is new, and existing files are unchanged.
     """
-    if base_index not in (0, 1):
-        raise MeshError(f"{path}: base_index must be 0 or 1, not {base_index!r}")
-    paths = family_paths(path)
-    write_together({paths[suffix]: text for suffix, text in _family_text(mesh, base_index).items()})
-    return paths
-
-
-def _family_text(mesh: TetMesh, base: int) -> dict[str, Iterable[str]]:
-    triangles = mesh.surface.triangles
-    n, edges = len(mesh.vertices), mesh.edges
-    on_boundary = np.zeros(n, dtype=np.int64)
-    on_boundary[triangles] = 1
-    keys = edges[:, 0].astype(np.int64) * n + edges[:, 1]
-    edge_marker = np.isin(keys, edge_keys(triangles, n)).astype(np.int64)
-    face_marker = np.ones(len(triangles), dtype=np.int64)
-    numbers = [np.arange(base, base + len(a)) for a in (mesh.vertices, mesh.tets, edges, triangles)]
-    return {
-        ".node": chain([f"{n} 3 0 1\n"], _lines("%d %r %r %r %d\n", numbers[0], mesh.vertices, on_boundary)),
-        ".ele": chain([f"{len(mesh.tets)} 4 0\n"], _lines("%d %d %d %d %d\n", numbers[1], mesh.tets + base)),
-        ".edge": chain([f"{len(edges)} 1\n"], _lines("%d %d %d %d\n", numbers[2], edges + base, edge_marker)),
-        ".face": chain(
-            [f"{len(triangles)} 1\n"], _lines("%d %d %d %d %d\n", numbers[3], triangles + base, face_marker)
-        ),
-    }
-
-
-def _lines(pattern: str, *blocks: NDArray) -> Iterator[str]:
-    """Rows of numbers as text, some ten thousand lines at a time: one `%` on many rows is far faster than many."""
-    for start in range(0, len(blocks[0]), 16384):
-        parts = [block[start : start + 16384] for block in blocks]
-        columns = [c.tolist() for part in parts for c in (part.T if part.ndim == 2 else [part])]
-        yield pattern * len(parts[0]) % tuple(chain.from_iterable(zip(*columns, strict=True)))
-
-
-def is_tetgen_path(path: str | Path) -> bool:
-    """Whether a name ends like one of TetGen's files."""
-    return Path(path).suffix.lower() in SUFFIXES
-
-
-def family_paths(path: str | Path) -> dict[str, Path]:
-    """The four files {suffix: path} of the family that a name belongs to."""
-    return {suffix: _member(Path(path), suffix) for suffix in SUFFIXES}
-
-
-def _member(path: Path, suffix: str) -> Path:
-    # "bear.1" without one of the suffixes is the family's own name: with_suffix would cut the ".1" off.
-    stem = path.with_suffix("") if is_tetgen_path(path) else path
-    return stem.with_name(stem.name + suffix)
-
-
-def _require(member: Path, given: Path) -> None:
-    if member.exists() or member.is_symlink():
-        return
-    hint = ""
-    stem = member.with_suffix("")
-    if member != given and (iteration := stem.with_name(stem.name + ".1" + member.suffix)).exists():
-        hint = f"; {iteration.name} is there: give that name"
-    elif member != given:
-        hint = f"; it belongs to {given.name}, and a tet mesh needs both .node and .ele"
-    raise MeshError(f"{member}: no such file{hint}")
-
-
-def _read_nodes(
-    path: Path,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32] | None, int]:
-    text = read_text(path)
-    names = ("number of vertices", "dimension", "attributes", "boundary markers (0 or 1)")
-    (count, dimension, n_attributes, n_markers), line = read_header(path, text, names, (3, 0, 0))
-    if dimension != 3:
-        raise MeshError(f"{path}:{line}: dimension {dimension}; only meshes of dimension 3 can be read")
-    _check_header(path, line, n_attributes, n_markers)
-    if count == 0:
-        raise MeshError(f"{path}:{line}: the header announces no vertices")
-    meaning = "index x y z" + _columns_text(n_attributes, n_markers)
-    table = read_rows(path, text, line, Columns(count, 4 + n_attributes + n_markers, meaning))
-    base = table.rows[0, 0]
-    if base not in (0.0, 1.0):
-        raise table.error(0, f"the first vertex has the number {base:.17g}; numbering must start at 0 or 1")
-    _check_numbering(table, int(base), "vertex")
-    markers = _markers(table, slice(4 + n_attributes, None)) if n_markers else None
-    points = np.ascontiguousarray(table.rows[:, 1:4])
-    return points, np.ascontiguousarray(table.rows[:, 4 : 4 + n_attributes]), markers, int(base)
-
-
-def _read_tets(path: Path, n_points: int, base: int) -> tuple[NDArray[np.int32], NDArray[np.float64], int]:
-    text = read_text(path)
-    names = ("number of tets", "nodes per tet", "attributes")
-    (count, nodes, n_attributes), line = read_header(path, text, names, (4, 0))
-    if nodes not in (4, 10):
-        raise MeshError(f"{path}:{line}: {nodes} nodes per tet; only 4 and 10 can be read")
-    _check_header(path, line, n_attributes, 0)
-    if count == 0:
-        raise MeshError(f"{path}:{line}: the header announces no tets")
-    meaning = f"index and {nodes} vertices" + _columns_text(n_attributes, 0)
-    table = read_rows(path, text, line, Columns(count, 1 + nodes + n_attributes, meaning))
-    _check_numbering(table, base, "tet")
-    corners = _corners(table, nodes, n_points, base)[:, :4]
-    ordered = np.sort(corners, axis=1)
-    table.refuse((ordered[:, 1:] == ordered[:, :-1]).any(axis=1), "the tet has the same vertex twice")
-    return np.ascontiguousarray(corners), np.ascontiguousarray(table.rows[:, 1 + nodes :]), 1 if nodes == 4 else 2
-
-
-def _read_simplices(
-    path: Path, tets: NDArray[np.int32], n_points: int, base: int, nodes: tuple[int, int], what: str
-) -> tuple[NDArray[np.int32] | None, NDArray[np.int32] | None]:
-    """Edges or faces with their markers; each must belong to a tet. `nodes`: corners, and nodes on a line."""
-    if not (path.exists() or path.is_symlink()):
-        return None, None
-    width, on_line = nodes
-    text = read_text(path)
-    (count, n_markers), line = read_header(path, text, (f"number of {what}s", "boundary markers (0 or 1)"), (0,))
-    _check_header(path, line, 0, n_markers)
-    meaning = f"index and {on_line} vertices" + _columns_text(0, n_markers)
-    table = read_rows(path, text, line, Columns(count, 1 + on_line + n_markers, meaning, extra=width - 1))
-    if count == 0:
-        return np.empty((0, width), np.int32), np.empty(0, np.int32) if n_markers else None
-    _check_numbering(table, base, what)
-    corners = np.ascontiguousarray(_corners(table, on_line, n_points, base)[:, :width])
-    of_tets = tets[:, TET_EDGES if width == 2 else TET_FACETS].reshape(-1, width)
-    # Keys of one call can be compared with each other only, hence one call for both.
-    keys = facet_keys(_as_triangles(np.concatenate([corners, of_tets])), n_points)
-    own, known = keys[:count], np.sort(keys[count:])
-    found = known[np.minimum(np.searchsorted(known, own), len(known) - 1)] == own
-    table.refuse(~found, f"the {what} belongs to no tet")
-    order = np.argsort(own, kind="stable")
-    again = np.zeros(count, dtype=bool)
-    again[order[1:]] = own[order][1:] == own[order][:-1]
-    table.refuse(again, f"the {what} is given a second time")
-    return corners, _markers(table, slice(1 + on_line, 2 + on_line)) if n_markers else None
-
-
-def _as_triangles(simplices: NDArray[np.int32]) -> NDArray[np.int32]:
-    # An edge (a, b), a < b, as (a, b, b), so that one key function serves both.
-    return simplices if simplices.shape[1] == 3 else np.sort(simplices, axis=1)[:, [0, 1, 1]]
-
-
-def _check_header(path: Path, line: int, n_attributes: int, n_markers: int) -> None:
-    if n_markers not in (0, 1):
-        raise MeshError(f"{path}:{line}: the header's boundary markers must be 0 or 1, not {n_markers}")
-    if not 0 <= n_attributes < 10**6:
-        raise MeshError(f"{path}:{line}: {n_attributes} attributes")
-
-
-def _columns_text(n_attributes: int, n_markers: int) -> str:
-    return (f", {n_attributes} attributes" if n_attributes else "") + (", a marker" if n_markers else "")
-
-
-def _check_numbering(table: Table, base: int, what: str) -> None:
-    given = table.rows[:, 0]
-    wrong = given != np.arange(base, base + len(given))
-    if wrong.any():
-        row = int(np.flatnonzero(wrong)[0])
-        raise table.error(
-            row,
-            f"{what} number {given[row]:.17g} where {base + row} must come; numbers run on from {base}, as in .node",
-        )
-
-
-def _corners(table: Table, width: int, n_points: int, base: int) -> NDArray[np.int32]:
-    corners = table.whole_numbers(slice(1, 1 + width), "vertex")
-    for column in corners.T:
-        bad = (column < base) | (column >= n_points + base)
-        table.refuse(bad, f"vertex {{}} does not exist: they run from {base} to {n_points + base - 1}", column)
-    return (corners - base).astype(np.int32)
-
-
-def _markers(table: Table, column: slice) -> NDArray[np.int32]:
-    return table.whole_numbers(column, "marker")[:, 0].astype(np.int32)
+    return write_tetgen_family(path, mesh.vertices, mesh.tets, mesh.edges, mesh.surface.triangles, base_index)

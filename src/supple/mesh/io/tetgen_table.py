@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshError
+from supple.mesh.file_contents import file_contents
 
 _COMMENT = re.compile(rb"#[^\n]*")
 _WHOLE_NUMBER = re.compile(r"[+-]?[0-9]+")
@@ -21,9 +22,9 @@ _TEXT = bytes(range(32, 127)) + b"\t\n\v\f"
 
 
 class Columns(NamedTuple):
-    """What the header of a file says of the lines below it.
+    """What the header of a file announces: number, width and meaning of the rows below it.
 
-    `extra` more columns at the end are read over: TetGen's -nn appends neighbouring tets to faces and edges.
+    Up to `extra` more columns at the end are ignored: TetGen's -nn appends neighbouring tets to faces and edges.
     """
 
     count: int
@@ -34,7 +35,7 @@ class Columns(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """The rows (n, width) of one file, and where each of them stands in it."""
+    """The rows (n, width) of one file, and the file's text, in which the line of a row can be found."""
 
     path: Path
     rows: NDArray[np.float64]
@@ -64,21 +65,8 @@ class Table:
 
 
 def read_text(path: Path) -> bytes:
-    """A file's bytes with unix line ends, comments blanked; `MeshError` where it cannot be read or is not text."""
-    try:
-        if path.is_dir():
-            raise MeshError(f"{path}: is a directory; give one of TetGen's files, such as bear.1.node")
-        if path.exists() and not path.is_file():
-            raise MeshError(f"{path}: is not a regular file")
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise MeshError(f"{path}: no such file") from None
-    except MemoryError:
-        raise MeshError(f"{path}: is too large for the memory of this machine") from None
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
-        raise MeshError(f"{path}: cannot be read: {reason}") from None
-    data = data.removeprefix(codecs.BOM_UTF8)
+    """A file's bytes with unix line ends, without comments; `MeshError` where it cannot be read or is not text."""
+    data = file_contents(path).removeprefix(codecs.BOM_UTF8)
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     if b"#" in data:
@@ -86,14 +74,14 @@ def read_text(path: Path) -> bytes:
     if data.translate(None, _TEXT):
         for number, line in enumerate(data.split(b"\n"), start=1):
             if odd := line.translate(None, _TEXT):
-                raise MeshError(f"{path}:{number}: holds the byte 0x{odd[0]:02x}; this is no text file of TetGen's")
+                raise MeshError(f"{path}:{number}: holds the byte 0x{odd[0]:02x}; this is not a text file of TetGen")
     return data
 
 
 def read_header(path: Path, text: bytes, names: tuple[str, ...], defaults: tuple[int, ...]) -> tuple[list[int], int]:
     """The whole numbers of the first filled line, missing ones set to TetGen's defaults, and that line's number.
 
-    `names` names them all; the first one, the count, has no default.
+    `names` are the names of all of them. The first one, the count, has no default.
     """
     number, line = next(_filled_lines(text), (0, b""))
     if not number:
@@ -108,11 +96,11 @@ def read_header(path: Path, text: bytes, names: tuple[str, ...], defaults: tuple
 
 
 def read_rows(path: Path, text: bytes, header_line: int, columns: Columns) -> Table:
-    """The lines below the header as a table, each of them checked; memory is taken only for what the file holds."""
+    """The lines below the header as a table, each of them checked; memory is allocated only for what the file holds."""
     start = _offset_after(text, header_line)
     held = text.count(b"\n", start) + 1
     if columns.count > held:
-        # No need to parse what cannot be whole, and no trust in its count.
+        # The file is incomplete: report the line without parsing the numbers.
         _refuse_bad_lines(path, text, header_line, columns)
     try:
         body = text[start:]
@@ -129,13 +117,13 @@ def read_rows(path: Path, text: bytes, header_line: int, columns: Columns) -> Ta
 
 
 def _refuse_bad_lines(path: Path, text: bytes, header_line: int, columns: Columns) -> None:
-    """Line by line: raise for the first one that does not fit the header. Only run when something is known wrong."""
+    """Raise for the first line that does not fit the header. Slow, so it is only called when something is wrong."""
     width = None
     rows, last = 0, header_line
     for last, line in _filled_lines(text, after=header_line):
         words = line.decode("ascii").split()
         if rows == columns.count:
-            raise MeshError(f"{path}:{last}: a line too many: line {header_line} announces {columns.count} in all")
+            raise MeshError(f"{path}:{last}: one line too many: line {header_line} announces {columns.count} in total")
         for word in words:
             if not _is_number(word):
                 raise MeshError(f"{path}:{last}: {_short(word)} is not a number")
@@ -154,7 +142,7 @@ def _refuse_bad_lines(path: Path, text: bytes, header_line: int, columns: Column
 
 
 def _filled_lines(text: bytes, after: int = 0) -> Iterator[tuple[int, bytes]]:
-    """Number and content of each line that is not blank, from the line following number `after`."""
+    """Number and content of each line that is not blank, after line number `after`."""
     for number, line in enumerate(io.BytesIO(text), start=1):
         if number > after and (content := line.strip()):
             yield number, content

@@ -9,8 +9,10 @@ from supple.mesh.io.cells import FormatError
 
 
 def without_mark(data: bytes) -> bytes:
-    """What follows the byte order mark that some editors put at the start. Taken for a letter, it would hide the word
-    after it, and an OBJ file's first vertex with that."""
+    """The data after the byte order mark that some editors write at the start.
+
+    As a part of the first word, the mark would hide an OBJ file's first vertex.
+    """
     return data.removeprefix(codecs.BOM_UTF8)
 
 
@@ -49,7 +51,7 @@ def integer(word: str, line: int, what: str) -> int:
             raise ValueError
         return value
     except ValueError:
-        raise FormatError(f"{what} is '{shortened([word])}', which is no integer in range", line) from None
+        raise FormatError(f"{what} is '{shortened([word])}', which is not an integer in range", line) from None
 
 
 def shortened(words: Sequence[str]) -> str:

@@ -15,12 +15,12 @@ SCALARS = {
     "char": "i1", "unsigned_char": "u1", "short": "i2", "unsigned_short": "u2", "int": "i4", "unsigned_int": "u4",
     "long": "i8", "unsigned_long": "u8", "vtktypeint64": "i8", "vtkidtype": "i8", "float": "f4", "double": "f8",
 }  # fmt: skip
-# Cell types that the sections of PolyData stand for.
+# Cell type of each section of PolyData.
 POLYDATA_SECTIONS = {"VERTICES": 2, "LINES": 4, "POLYGONS": POLYGON, "TRIANGLE_STRIPS": TRIANGLE_STRIP}
 
 
 class _Cursor:
-    """Walks through the file line by line, or takes arrays from it."""
+    """A position in the file, from which lines or arrays are read."""
 
     def __init__(self, data: bytes) -> None:
         self.data, self.at, self.line, self.text = data, 0, 0, True
@@ -62,7 +62,7 @@ class _Cursor:
 
 
 def read(data: bytes) -> CellSoup:
-    """Points and cells of a legacy VTK file; data on points and cells is passed over."""
+    """Points and cells of a legacy VTK file; data on points and cells is ignored."""
     cursor = _Cursor(without_mark(data))
     first = cursor.next_line() or ""
     if not first.startswith("# vtk DataFile"):
@@ -106,7 +106,7 @@ def _body(cursor: _Cursor) -> CellSoup:
         elif section == "FIELD":
             _skip_field(cursor, words)
         else:
-            raise FormatError(f"'{shortened(words)}' is no section that is known here", cursor.line)
+            raise FormatError(f"'{shortened(words)}' is an unknown section", cursor.line)
     return _soup(points, blocks, types)
 
 
@@ -133,7 +133,7 @@ def _cells(cursor: _Cursor, words: list[str]) -> tuple[NDArray[np.int64], NDArra
     """Offsets and connectivity of a block of cells, in either of the two layouts."""
     what = f"the section {words[0].upper()}"
     if len(words) < 3:
-        raise FormatError(f"'{shortened(words)}' lacks its two counts", cursor.line)
+        raise FormatError(f"'{shortened(words)}' has fewer than two counts", cursor.line)
     n, size = integer(words[1], cursor.line, "cell count"), integer(words[2], cursor.line, "cell size")
     before, line_before = cursor.at, cursor.line
     following = (cursor.next_line() or "").split()
@@ -157,7 +157,7 @@ def _cells(cursor: _Cursor, words: list[str]) -> tuple[NDArray[np.int64], NDArra
 def _counted_cells(packed: NDArray[np.int64], n: int, what: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Cells written one after the other, each as its size and its points."""
     if n > len(packed) or n < 0:
-        raise FormatError(f"{what} promises {n} cells in {len(packed)} numbers")
+        raise FormatError(f"{what} announces {n} cells in {len(packed)} numbers")
     sizes = np.empty(n, dtype=np.int64)
     if n and len(packed) == n * (packed[0] + 1) and (packed[:: packed[0] + 1] == packed[0]).all():
         sizes[:] = packed[0]
@@ -178,7 +178,7 @@ def _counted_cells(packed: NDArray[np.int64], n: int, what: str) -> tuple[NDArra
 def _kind(words: list[str], cursor: _Cursor) -> str:
     kind = SCALARS.get(words[1].lower()) if len(words) > 1 else None
     if kind is None or kind.startswith("f"):
-        raise FormatError(f"'{shortened(words)}' names no integer type", cursor.line)
+        raise FormatError(f"'{shortened(words)}' is not an integer type", cursor.line)
     return kind
 
 
@@ -198,7 +198,7 @@ def _skip_field(cursor: _Cursor, words: list[str]) -> None:
 
 
 def written_surface(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> bytes:
-    """PolyData as binary legacy VTK 3.0, which every reader knows."""
+    """PolyData as binary legacy VTK 3.0, which all readers support."""
     cells = np.column_stack([np.full(len(triangles), 3), triangles]).astype(">i4")
     return b"".join(
         [

@@ -24,7 +24,7 @@ SCALARS = {
     "UInt64": "u8", "Float32": "f4", "Float64": "f8",
 }  # fmt: skip
 POLYDATA_TAGS = {"Verts": 2, "Lines": 4, "Strips": TRIANGLE_STRIP, "Polys": POLYGON}
-# What a compressed block may swell to; writers use 32 KiB.
+# Largest size of a decompressed block [bytes]; writers use 32 KiB.
 MAX_BLOCK = 2**30
 
 
@@ -37,12 +37,12 @@ class _Encoding(NamedTuple):
 
 
 def read(data: bytes) -> CellSoup:
-    """Points and cells of a .vtp or .vtu file, all its pieces together; other data is passed over."""
+    """Points and cells of a .vtp or .vtu file, all its pieces together; other data is ignored."""
     root, appended, appended_is_text = _parsed(data)
     kind = root.get("type", "")
     if root.tag != "VTKFile" or kind not in ("PolyData", "UnstructuredGrid"):
         raise FormatError(
-            f"it is no VTK file of type PolyData or UnstructuredGrid, but '{shortened([kind or root.tag])}'"
+            f"it is not a VTK file of type PolyData or UnstructuredGrid, but '{shortened([kind or root.tag])}'"
         )
     header = SCALARS.get(root.get("header_type", "UInt32"), "")
     order = ">" if root.get("byte_order") == "BigEndian" else "<"
@@ -75,7 +75,7 @@ def _parsed(data: bytes) -> tuple[ElementTree.Element, bytes, bool]:
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         position = getattr(error, "position", None)
         raise FormatError(
-            "it is not well-formed XML: truncated, or no VTK XML file", position and position[0]
+            "it is not well-formed XML: truncated, or not a VTK XML file", position and position[0]
         ) from None
 
 
@@ -83,7 +83,7 @@ def _piece(piece: ElementTree.Element, encoding: _Encoding) -> CellSoup:
     array = piece.find("Points/DataArray")
     points = np.empty((0, 3)) if array is None else _values(array, encoding).astype(np.float64)
     if points.size % 3 or points.size != 3 * _count(piece, "NumberOfPoints"):
-        raise FormatError(f"it promises {piece.get('NumberOfPoints')} points and holds {points.size} coordinates")
+        raise FormatError(f"it announces {piece.get('NumberOfPoints')} points and holds {points.size} coordinates")
     points = points.reshape(-1, 3)
     blocks = []
     for tag, cell_type in (*POLYDATA_TAGS.items(), ("Cells", 0)):
@@ -123,10 +123,10 @@ def _count(piece: ElementTree.Element, name: str) -> int:
 
 
 def _values(array: ElementTree.Element, encoding: _Encoding) -> NDArray:
-    """The numbers of a DataArray in whatever way they are encoded."""
+    """The numbers of a DataArray in any of the encodings."""
     name, kind = array.get("Name", "points"), SCALARS.get(array.get("type", ""))
     if kind is None:
-        raise FormatError(f"array '{shortened([name])}' has no type that is known")
+        raise FormatError(f"array '{shortened([name])}' has an unknown type")
     dtype = np.dtype(encoding.order + kind)
     form = array.get("format", "ascii")
     try:

@@ -1,4 +1,4 @@
-"""Running a mesher in a child process: whatever it does to itself, this process lives on and says what happened."""
+"""Running a mesher in a child process, so that a crash of the mesher does not end this process."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from supple.mesh.surface import SurfaceMesh
 
 logger = logging.getLogger(__name__)
 
-# A crash at more than this part of the allowed address space is taken for lack of memory.
+# A crash while more than this fraction of the allowed address space is used counts as lack of memory.
 STARVED = 0.8
-# How TetGen, C++, NumPy and the loader of shared libraries say it, in lower case.
+# How TetGen, C++, NumPy and the loader of shared libraries report it, in lower case.
 OUT_OF_MEMORY = (
     "out of memory",
     "bad_alloc",
@@ -56,7 +56,7 @@ class MesherResult:
 
 
 class MesherFailure(MeshingError):
-    """The child ended without a mesh; `kind` is "time", "memory", "crash" or "refused"."""
+    """The child returned no mesh; `kind` is "time", "memory", "crash" or "refused"."""
 
     def __init__(self, kind: str, text: str) -> None:
         super().__init__(text)
@@ -64,11 +64,11 @@ class MesherFailure(MeshingError):
 
 
 def run_mesher(mesher: str, surface: SurfaceMesh, options: dict[str, Any], limits: Limits) -> MesherResult:
-    """Give a surface to "tetgen", "ftetwild" (elements are tets) or "meshfix" (triangles) in a child process.
+    """Run "tetgen", "ftetwild" (elements are tets) or "meshfix" (triangles) on a surface, in a child process.
 
     Raises
     ------
-    MesherFailure : where the child ran out of time or memory, crashed, or gave up; the child is gone by then.
+    MesherFailure : where the child ran out of time or memory, crashed, or failed; it has ended by then.
     """
     with tempfile.TemporaryDirectory(prefix="supple-mesh-", ignore_cleanup_errors=True) as name:
         folder = Path(name)
@@ -90,18 +90,18 @@ def run_mesher(mesher: str, surface: SurfaceMesh, options: dict[str, Any], limit
             with np.load(folder / "mesh.npz") as mesh:
                 return MesherResult(mesh["vertices"], mesh["elements"], mesh["labels"], float(answer["seconds"]))
         starved = limits.memory is not None and peak > STARVED * limits.memory
-        raise _failure(mesher, code, answer.get("error", ""), _last_words(folder), limits, starved)
+        raise _failure(mesher, code, answer.get("error", ""), _last_line(folder), limits, starved)
 
 
 def _run_child(mesher: str, folder: Path, limits: Limits) -> tuple[int, int]:
-    """Exit code of the child and its largest address space [bytes], 0 where the platform does not tell.
+    """Exit code of the child and its largest address space [bytes], 0 where the platform does not report it.
 
-    The child is ended when time is up, and when this process is interrupted.
+    The child is killed at the time limit, and when this process is interrupted.
     """
     environment = os.environ | {
-        # The child finds the same packages as this process, however this one found them.
+        # The child must find the same packages as this process.
         "PYTHONPATH": os.pathsep.join(os.path.abspath(entry) for entry in sys.path if entry),
-        # Idle threads of linear algebra would use up the address space.
+        # Each thread of the linear algebra library would reserve address space.
         "OPENBLAS_NUM_THREADS": "1",
         "MALLOC_ARENA_MAX": "2",
         "PYTHONIOENCODING": "utf-8",
@@ -142,7 +142,7 @@ def _run_child(mesher: str, folder: Path, limits: Limits) -> tuple[int, int]:
 
 
 def _address_space(pid: int) -> int:
-    """Address space [bytes] of a running process, 0 where only a platform other than Linux could tell."""
+    """Address space [bytes] of a running process, 0 on platforms other than Linux."""
     try:
         pages = int(Path(f"/proc/{pid}/statm").read_text().split()[0])
     except (OSError, ValueError, IndexError):
@@ -150,18 +150,18 @@ def _address_space(pid: int) -> int:
     return pages * mmap.PAGESIZE
 
 
-def _failure(mesher: str, code: int, error: str, words: str, limits: Limits, starved: bool) -> MesherFailure:
-    said = (error or words).lower()
-    # A program that was refused memory may well crash over it without a word.
-    if any(sign in said for sign in OUT_OF_MEMORY) or (starved and not error):
+def _failure(mesher: str, code: int, error: str, last: str, limits: Limits, starved: bool) -> MesherFailure:
+    report = (error or last).lower()
+    # A program may crash without any message when it gets no memory.
+    if any(sign in report for sign in OUT_OF_MEMORY) or (starved and not error):
         limit = "" if limits.memory is None else f" within the memory limit of {limits.memory / 2**20:.0f} MiB"
         return MesherFailure(
             "memory", f"{mesher} ran out of memory{limit}; ask for less (a larger max_volume) or raise memory_limit"
         )
     if error:
-        return MesherFailure("refused", f"{mesher} gave up: {error.rstrip('.')}")
+        return MesherFailure("refused", f"{mesher} failed: {error.rstrip('.')}")
     how = f"exit code {code}" if code >= 0 else _signal_name(-code)
-    return MesherFailure("crash", f"{mesher} crashed ({how})" + (f", its last words: {words}" if words else ""))
+    return MesherFailure("crash", f"{mesher} crashed ({how})" + (f", its last output: {last}" if last else ""))
 
 
 def _signal_name(number: int) -> str:
@@ -171,7 +171,7 @@ def _signal_name(number: int) -> str:
         return f"signal {number}"
 
 
-def _last_words(folder: Path) -> str:
+def _last_line(folder: Path) -> str:
     """The last line that the child wrote, shortened."""
     try:
         with (folder / "output.txt").open("rb") as file:

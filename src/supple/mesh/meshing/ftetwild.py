@@ -1,4 +1,4 @@
-"""Dirty surfaces to tets by fTetWild (Hu et al. 2020, "Fast tetrahedral meshing in the wild")."""
+"""Surfaces with faults to tets by fTetWild (Hu et al. 2020, "Fast tetrahedral meshing in the wild")."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ def ftetwild_installed() -> bool:
 def mesh_with_ftetwild(
     surface: SurfaceMesh, max_volume: float | None, envelope: float, limits: Limits, threads: int = 0
 ) -> MesherResult:
-    """Tets inside whatever a surface most plausibly encloses: holes are closed, overlaps become a union.
+    """Tets inside what a surface most plausibly encloses: holes are closed, and overlaps become a union.
 
     Parameters
     ----------
     max_volume : [m^3], or None for edges of a twentieth of the bounding box's diagonal
-    envelope : how far the boundary may move, as a part of the bounding box's diagonal
+    envelope : how far the boundary may move, as a fraction of the bounding box's diagonal
     threads : 0 for all cores
 
     Raises
@@ -51,7 +51,7 @@ def mesh_with_ftetwild(
         result = run_mesher("ftetwild", unit, options, limits)
     except MesherFailure as failure:
         if failure.kind in ("crash", "refused"):
-            raise MesherFailure(failure.kind, f"{failure}; mend the surface in a modelling program") from None
+            raise MesherFailure(failure.kind, f"{failure}; fix the surface in a modelling program") from None
         raise
     if len(result.elements) == 0:
         raise MeshingError("fTetWild found nothing that the surface encloses; close its holes, or give another surface")
@@ -61,7 +61,7 @@ def mesh_with_ftetwild(
 
 
 def _warn_of_lost_pieces(surface: SurfaceMesh, result: MesherResult, reach: float) -> None:
-    """Say which components of the surface have no tet anywhere near them."""
+    """Log which components of the surface have no tet near them."""
     from scipy.spatial import KDTree
 
     tree = KDTree(result.vertices)
@@ -72,5 +72,5 @@ def _warn_of_lost_pieces(surface: SurfaceMesh, result: MesherResult, reach: floa
         if not np.isfinite(distance).any():
             where = ", ".join(f"{x:.4g}" for x in surface.vertices[triangles[0, 0]])
             logger.warning(
-                "fTetWild left out component %d of %d (%d triangles) at (%s)", k, count, len(triangles), where
+                "fTetWild dropped component %d of %d (%d triangles) at (%s)", k, count, len(triangles), where
             )

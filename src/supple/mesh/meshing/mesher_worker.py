@@ -1,7 +1,7 @@
-"""What runs in the child process: TetGen, fTetWild or MeshFix on arrays from a file, within limits.
+"""The program of the child process: TetGen, fTetWild or MeshFix on arrays from a file, within limits.
 
-Started by its path, not imported: it must need nothing but NumPy and the mesher, so that it starts quickly and so
-that nothing of the parent's program runs a second time. Job and answer are `.npz` and `.json` files in a folder.
+It is started by its path, not imported. It uses only NumPy and the mesher, so that it starts quickly and so that no
+part of the parent's program runs a second time. Job and answer are `.npz` and `.json` files in a folder.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ VOLUME_ATTEMPTS = 5
 
 
 def main(folder: Path) -> int:
-    """Run the job in `folder`; returns the exit code: 0, or 1 where `answer.json` says what failed."""
+    """Run the job in `folder`; returns the exit code: 0, or 1 where `answer.json` has the error."""
     job: dict[str, Any] = json.loads((folder / "job.json").read_text("utf-8"))
     answer: dict[str, Any] = {"notes": limit_process(job["cpu_seconds"], job["memory_limit"])}
     started = time.perf_counter()
@@ -44,9 +44,9 @@ def main(folder: Path) -> int:
 
 
 def limit_process(cpu_seconds: float, memory_limit: int | None) -> list[str]:
-    """Bound this process's memory and CPU time where the platform can; says where it cannot.
+    """Limit this process's memory and CPU time where the platform can; returns a note where it cannot.
 
-    The CPU bound is there for the day the parent dies without having time to end its child.
+    The limit on CPU time ends this process if the parent was killed before it could end its child.
     """
     try:
         import resource
@@ -61,7 +61,7 @@ def limit_process(cpu_seconds: float, memory_limit: int | None) -> list[str]:
         try:
             resource.setrlimit(kind, (soft, hard))
         except (ValueError, OSError) as error:
-            notes.append(f"the system refuses a limit of {soft} for the mesher: {error}")
+            notes.append(f"the system does not allow a limit of {soft} for the mesher: {error}")
     return notes
 
 
@@ -79,7 +79,7 @@ def _run_tetgen(vertices: Any, triangles: Any, options: dict[str, Any], notes: l
             nobisect=options["keep_surface"],
             fixedvolume=bound is not None,
             maxvolume=-1.0 if bound is None else bound,
-            # Time and memory bound the work. TetGen's own bound of 100 000 points would end it without a word.
+            # Time and memory limit the work. TetGen's own limit of 100 000 points would end it without a message.
             steinerleft=-1,
             regionattrib=True,
             quiet=True,
@@ -108,13 +108,13 @@ def _run_ftetwild(vertices: Any, triangles: Any, options: dict[str, Any], notes:
         )
         return points, tets, np.ones(len(tets))
 
-    # The edge length is an aim for the mean: the largest tets have up to twice the volume.
+    # The edge length is a target for the mean: the largest tets have up to twice the volume.
     max_volume = options["max_volume"]
     return _below_volume(run, max_volume, None if max_volume is None else 0.5 * max_volume, notes)
 
 
 def _run_meshfix(vertices: Any, triangles: Any, options: dict[str, Any], notes: list[str]) -> tuple[Any, Any, Any]:
-    """Each component in `options["faulty"]` on its own; nothing comes back of one that MeshFix leaves nothing of."""
+    """Each component in `options["faulty"]` alone; no triangles for one of which MeshFix keeps nothing."""
     import numpy as np
     import pymeshfix
 
@@ -123,7 +123,7 @@ def _run_meshfix(vertices: Any, triangles: Any, options: dict[str, Any], notes: 
     for k in options["faulty"]:
         used, local = np.unique(triangles[component == k], return_inverse=True)
         fixer = pymeshfix.MeshFix(vertices[used], local.reshape(-1, 3).astype(np.int32), verbose=False)
-        # Of one component there is no smaller one to drop, except for what repair itself cuts off.
+        # One component has no smaller one to drop, except for what the repair itself cuts off.
         fixer.repair(joincomp=False, remove_smallest_components=False)
         points.append(np.asarray(fixer.points, dtype=np.float64).reshape(-1, 3))
         faces.append(np.asarray(fixer.faces, dtype=np.int32).reshape(-1, 3) + start)
@@ -135,7 +135,7 @@ def _run_meshfix(vertices: Any, triangles: Any, options: dict[str, Any], notes: 
 def _below_volume(
     run: Callable[[float | None], tuple[Any, Any, Any]], max_volume: float | None, bound: float | None, notes: list[str]
 ) -> tuple[Any, Any, Any]:
-    """The mesher's answer, asked again with a tighter bound while its largest tet exceeds `max_volume`."""
+    """The mesher's result; it runs again with a tighter bound while its largest tet exceeds `max_volume`."""
     import numpy as np
 
     answer = run(bound)
@@ -156,5 +156,5 @@ if __name__ == "__main__":
     exit_code = main(Path(sys.argv[1]))
     sys.stdout.flush()
     sys.stderr.flush()
-    # Meshers' global destructors have nothing to add, and have been known to crash after the work was done.
+    # Without the meshers' global destructors, which are known to crash after the work is done.
     os._exit(exit_code)

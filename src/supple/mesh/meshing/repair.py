@@ -1,4 +1,4 @@
-"""Mending triangle surfaces, and saying what that changed."""
+"""Repair of triangle surfaces, with a report of what changed."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshingError
+from supple.mesh.merge import merge_map
 from supple.mesh.meshing.child_process import Limits, run_mesher
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.surface_checks import SurfaceReport
@@ -17,17 +18,18 @@ from supple.mesh.topology import facet_keys
 
 logger = logging.getLogger(__name__)
 
-# MeshFix cuts away what intersects; when it takes more than this part of a component's area, it cut the wrong thing.
+# MeshFix removes triangles that intersect. If a component loses more than this fraction of its area, MeshFix removed
+# the wrong part.
 LARGEST_LOSS = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class RepairReport:
-    """What a repair found and changed.
+    """The result of a repair.
 
     Attributes
     ----------
-    steps : one line for each thing that was done
+    steps : one line for each change
     before, after : the checks of the surface before and after
     """
 
@@ -37,7 +39,7 @@ class RepairReport:
 
     @property
     def volume_change(self) -> float:
-        """Volume after minus volume before [m^3]; the one before means little where the surface was open."""
+        """Volume after minus volume before [m^3]; the volume before has no meaning where the surface was open."""
         return self.after.surface.volume - self.before.surface.volume
 
     def __str__(self) -> str:
@@ -56,19 +58,19 @@ def repair_surface(
     time_limit: float = 120.0,
     memory_limit: int | None = 4 * 2**30,
 ) -> tuple[SurfaceMesh, RepairReport]:
-    """Mend a surface: duplicates, slivers without area, mixed orientation, then holes and self-intersections.
+    """Repair a surface: duplicates, mixed orientation, then holes, self-intersections and triangles without area.
 
-    The first steps are exact and done here. What then is still wrong goes through MeshFix (Attene 2010, "A lightweight
+    The first two are exact and done here. The remaining faults are left to MeshFix (Attene 2010, "A lightweight
     approach to repairing digitized polygon meshes"; the extra `dirty`), in a child process and one component at a
-    time, so that none is taken for dirt and dropped. The log tells what was done.
+    time, so that it drops none of them. The log lists the changes.
 
     Parameters
     ----------
     surface : SurfaceMesh
     allow_lost_components : bool
-        Whether a component may lose more than half of its area, or vanish.
+        Whether a component may lose more than half of its area, or all of it.
     time_limit, memory_limit : float [s], int [bytes]
-        Of MeshFix's process.
+        Limits of MeshFix's process.
 
     Returns
     -------
@@ -76,33 +78,37 @@ def repair_surface(
 
     Raises
     ------
-    MeshingError : where MeshFix is needed and not there, a component would vanish, or the surface is beyond repair.
+    MeshingError : where MeshFix is needed and not installed, a component would be lost, or faults remain.
     """
     before = surface.check()
     steps: list[str] = []
-    mended = _drop_useless(surface, steps)
-    mended = _orient(mended, steps)
-    after = mended.check()
+    repaired = _drop_useless(surface, steps)
+    repaired = _orient(repaired, steps)
+    after = repaired.check()
     if not after.ok:
-        mended = _meshfix_components(mended, steps, allow_lost_components, Limits(time_limit, memory_limit))
-        mended = _orient(mended, steps)
-        after = mended.check()
+        repaired = _meshfix_components(repaired, steps, allow_lost_components, Limits(time_limit, memory_limit))
+        repaired = _orient(repaired, steps)
+        after = repaired.check()
     if not after.ok:
         raise MeshingError(
-            f'repair could not mend the surface: {"; ".join(after.problems)}; use mesher="ftetwild" or mend it in a '
+            f'repair could not fix the surface: {"; ".join(after.problems)}; use mesher="ftetwild" or fix it in a '
             "modelling program"
         )
     report = RepairReport(tuple(steps), before, after)
     if steps:
         logger.warning("repaired the surface: %s", report)
-    return mended, report
+    return repaired, report
 
 
 def _drop_useless(surface: SurfaceMesh, steps: list[str]) -> SurfaceMesh:
-    """Without triangles that have no area or repeat others, and without vertices that no triangle uses.
+    """Merge vertices at the same place; drop triangles with a vertex twice, repeated triangles and unused vertices.
 
-    A triangle without area leaves no hole only where it has a vertex twice; others are left for the later steps.
+    Other triangles without area stay for the later steps: without them the surface would have holes.
     """
+    keep, index = merge_map(surface.vertices, 0.0)
+    if len(keep) < len(surface.vertices):
+        steps.append(f"merged {len(surface.vertices) - len(keep)} vertices with others at the same place")
+        surface = SurfaceMesh(surface.vertices[keep], index[surface.triangles])
     triangles = surface.triangles
     collapsed = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
     _, first = np.unique(facet_keys(triangles, len(surface.vertices)), return_index=True)
@@ -114,7 +120,7 @@ def _drop_useless(surface: SurfaceMesh, steps: list[str]) -> SurfaceMesh:
             steps.append(f"dropped {np.count_nonzero(rows)} triangles that {what}")
     keep = ~(collapsed | repeats)
     if not keep.any():
-        raise MeshingError("repair could not mend the surface: none of its triangles has an area")
+        raise MeshingError("repair could not fix the surface: none of its triangles has an area")
     unused = len(surface.vertices) - len(np.unique(triangles[keep]))
     if keep.all() and unused == 0:
         return surface
@@ -124,7 +130,7 @@ def _drop_useless(surface: SurfaceMesh, steps: list[str]) -> SurfaceMesh:
 
 
 def _orient(surface: SurfaceMesh, steps: list[str]) -> SurfaceMesh:
-    """Neighbours turned to agree, then whole components turned to face outward."""
+    """Turn triangles to agree with their neighbours, then whole components to face outward."""
     report = surface.check()
     triangles = surface.triangles
     if len(report.inconsistent_edges) and len(report.non_manifold_edges) == 0:
@@ -142,9 +148,9 @@ def _orient(surface: SurfaceMesh, steps: list[str]) -> SurfaceMesh:
 
 
 def _disagreeing(triangles: NDArray[np.int32], n_vertices: int) -> NDArray[np.bool_] | None:
-    """Which triangles to turn so that neighbours agree (the fewer of each piece); None for a one-sided surface.
+    """Which triangles to turn so that neighbours agree (the smaller part of each piece); None if one-sided.
 
-    Each triangle gets a side 0 or 1; a walk over the double cover (triangle, side) tells both apart.
+    The nodes of a graph are (triangle, side 0 or 1). Two nodes are connected where neighbours with these sides agree.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -155,7 +161,7 @@ def _disagreeing(triangles: NDArray[np.int32], n_vertices: int) -> NDArray[np.bo
     same = np.flatnonzero(keys[order][1:] == keys[order][:-1])
     a, b = order[same], order[same + 1]
     m = len(triangles)
-    # Good neighbours run along their common edge in opposite directions.
+    # Neighbours that agree run along their common edge in opposite directions.
     agree = starts[a] != starts[b]
     ta, tb = a // 3, b // 3
     rows = np.concatenate([ta, ta + m])
@@ -164,7 +170,7 @@ def _disagreeing(triangles: NDArray[np.int32], n_vertices: int) -> NDArray[np.bo
     _, labels = connected_components(graph.tocsr(), directed=False)
     if (labels[:m] == labels[m:]).any():
         return None
-    # A piece appears twice in the double cover, as it is and turned; its lower label is one of its two sides.
+    # Each piece appears twice in the graph, as it is and turned; the lower label is one of the two.
     turned = labels[:m] > labels[m:]
     piece = np.minimum(labels[:m], labels[m:])
     share = np.bincount(piece, weights=turned) / np.maximum(np.bincount(piece), 1)
@@ -172,7 +178,7 @@ def _disagreeing(triangles: NDArray[np.int32], n_vertices: int) -> NDArray[np.bo
 
 
 def _meshfix_components(surface: SurfaceMesh, steps: list[str], allow_lost: bool, limits: Limits) -> SurfaceMesh:
-    """MeshFix on each component that has faults of its own; components that cut each other are beyond it."""
+    """Run MeshFix on each component that has faults of its own. It cannot separate components that cut each other."""
     if importlib.util.find_spec("pymeshfix") is None:
         faults = "; ".join(surface.check().problems)
         raise MeshingError(f'repair needs MeshFix for this surface ({faults}): pip install "supple[dirty]"')
@@ -201,10 +207,10 @@ def _meshfix_components(surface: SurfaceMesh, steps: list[str], allow_lost: bool
         if fixed is None or loss == 1.0:
             steps.append(f"dropped {what}")
         else:
-            steps.append(_change(f"MeshFix mended component {k} of {count}", piece, fixed))
+            steps.append(_change(f"MeshFix repaired component {k} of {count}", piece, fixed))
             kept.append(fixed)
     if not kept:
-        raise MeshingError("repair could not mend the surface: no component remains")
+        raise MeshingError("repair could not fix the surface: no component remains")
     offsets = np.cumsum([0, *(len(p.vertices) for p in kept[:-1])])
     return SurfaceMesh(
         np.concatenate([p.vertices for p in kept]),
@@ -213,7 +219,7 @@ def _meshfix_components(surface: SurfaceMesh, steps: list[str], allow_lost: bool
 
 
 def _own_faults(piece: SurfaceMesh) -> list[str]:
-    """What is wrong with a component taken by itself; which way a cavity faces cannot be judged so."""
+    """Faults of a component alone, without its facing: alone, a cavity cannot be recognized."""
     report = piece.check()
     return report.problems[: len(report.problems) - bool(len(report.wrong_facing_components))]
 

@@ -15,15 +15,15 @@ from supple.mesh.surface_checks import winding_number
 
 
 def mesh_with_tetgen(surface: SurfaceMesh, options: dict[str, Any], limits: Limits) -> MesherResult:
-    """Tets inside a surface that is taken to be clean; what lies in cavities is left out.
+    """Tets inside a clean surface, without those in its cavities.
 
     `options`: max_volume [m^3], quality, min_dihedral [degrees] (each may be None) and keep_surface.
 
     Raises
     ------
-    MesherFailure : with what TetGen said and the mend.
+    MesherFailure : with TetGen's message and the remedy.
     """
-    # By a power of two, so that not one bit of the coordinates changes; TetGen's tolerances fit a unit size best.
+    # Scaled by a power of two, so that no bit of the coordinates is lost; TetGen's tolerances suit a unit size best.
     low, high = surface.bounds
     scale = 2.0 ** -math.frexp(float((high - low).max()) or 1.0)[1]
     volume = options["max_volume"]
@@ -31,7 +31,7 @@ def mesh_with_tetgen(surface: SurfaceMesh, options: dict[str, Any], limits: Limi
     try:
         result = run_mesher("tetgen", SurfaceMesh(surface.vertices * scale, surface.triangles), scaled, limits)
     except MesherFailure as failure:
-        raise _with_mend(failure) from None
+        raise _with_remedy(failure) from None
     vertices = result.vertices / scale
     inside = _inside(surface, vertices, result)
     if inside.all():
@@ -42,7 +42,7 @@ def mesh_with_tetgen(surface: SurfaceMesh, options: dict[str, Any], limits: Limi
 
 
 def _inside(surface: SurfaceMesh, vertices: NDArray[np.float64], result: MesherResult) -> NDArray[np.bool_]:
-    """Which tets lie inside: TetGen fills all that the surface encloses, its cavities (each a region) included."""
+    """Which tets lie inside. TetGen fills everything that the surface encloses, also cavities (each is a region)."""
     inside = np.ones(len(result.elements), dtype=bool)
     regions = np.unique(result.labels)
     if len(regions) < 2:
@@ -58,11 +58,11 @@ def _inside(surface: SurfaceMesh, vertices: NDArray[np.float64], result: MesherR
     return inside
 
 
-def _with_mend(failure: MesherFailure) -> MesherFailure:
+def _with_remedy(failure: MesherFailure) -> MesherFailure:
     if failure.kind not in ("crash", "refused"):
         return failure
     return MesherFailure(
         failure.kind,
-        f"{failure}; the surface is most likely damaged or has details near round-off: mend it (repair=True) or use "
+        f"{failure}; the surface is most likely damaged or has details near round-off: fix it (repair=True) or use "
         'mesher="ftetwild" (pip install "supple[dirty]")',
     )

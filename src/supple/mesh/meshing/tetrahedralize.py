@@ -1,4 +1,4 @@
-"""From a surface to a tet mesh: checks, the choice of the mesher, and checks of what it made."""
+"""From a surface to a tet mesh: checks of the surface, the choice of the mesher, and checks of its result."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ logger = logging.getLogger(__name__)
 
 Mesher = Literal["auto", "tetgen", "ftetwild"]
 
-# TetGen's facets are planar to 0.1 degrees; more than this part of the volume is no effect of that.
+# TetGen's facets are planar to 0.1 degrees; a larger change of the volume has another cause.
 VOLUME_TOLERANCE = 1e-3
 DEFAULT_QUALITY = 1.4
 
 
 @dataclass(frozen=True)
 class MeshingReport:
-    """How a tet mesh came about: "tetgen" or "ftetwild", its seconds, and the repair before it, if any."""
+    """How a tet mesh was made: by "tetgen" or "ftetwild", in how many seconds, and after which repair, if any."""
 
     mesher: str
     seconds: float
@@ -50,37 +50,38 @@ def tetrahedralize(
 ) -> TetMesh:
     """Fill a surface with tets.
 
-    The mesher runs in a child process, so that neither its crash, its hunger nor its endless loop touches this one.
-    Components that face inward are turned; cavities (closed shells inside others, facing inward) stay empty.
+    The mesher runs in a child process: a crash, an endless loop or a lack of memory there does not affect this process.
+    Components that face inward are turned. Cavities (closed shells inside others, facing inward) stay empty.
 
     Parameters
     ----------
     surface : SurfaceMesh
         For TetGen watertight, oriented and free of self-intersections.
     max_volume : float [m^3], optional
-        No tet is larger.
+        Upper bound on the volume of each tet.
     quality : float, optional
-        TetGen's bound on circumradius over shortest edge of each tet, above 1: the smaller, the better shaped and
-        the more tets. Small angles of the surface itself may exceed it. None leaves the shapes to chance.
+        TetGen's upper bound on circumradius over shortest edge of each tet, above 1. A smaller bound gives more tets of
+        better shape. Tets at small angles of the surface may exceed it. None: no bound.
     min_dihedral : float [degrees], optional
-        TetGen's aim for the smallest dihedral angle, below 70; much above 18 it may not end.
+        TetGen's target for the smallest dihedral angle, below 70. Much above 18, TetGen may not end.
     keep_surface : bool
         Add no vertices on the surface.
     mesher : "auto", "tetgen" or "ftetwild"
-        "auto" takes TetGen for a clean surface, and fTetWild, an extra, for any other; the log says so.
+        "auto" uses TetGen for a clean surface. It warns and uses fTetWild (the extra `dirty`) for any other.
     repair : bool
-        Mend a surface that is not clean first, see `repair_surface`.
+        Repair a surface that is not clean first, see `repair_surface`. Where that fails, "auto" and "ftetwild" mesh the
+        surface as it is with fTetWild, if that is installed, with a warning in the log.
     envelope : float
-        How far fTetWild may move the surface, as a part of the bounding box's diagonal.
+        How far fTetWild may move the surface, as a fraction of the bounding box's diagonal.
     time_limit : float [s]
-        Of the mesher.
+        Wall-clock time of the mesher.
     memory_limit : int [bytes], optional
-        Address space of the mesher; left out, with a log line, where the platform has no such limit.
+        Address space of the mesher. Ignored, with a line in the log, where the platform has no such limit.
 
     Raises
     ------
-    MeshingError : for a surface that cannot be meshed (what is wrong, where, and the mend), a mesher that failed or
-        met a limit, a wish that the result does not fulfil, or a parameter out of its range.
+    MeshingError : for a surface that cannot be meshed (what is wrong, where, and the remedy), a mesher that failed or
+        reached a limit, a result that does not meet the demands, or a parameter out of its range.
     """
     return tetrahedralize_reported(
         surface,
@@ -109,7 +110,7 @@ def tetrahedralize_reported(
     time_limit: float = 120.0,
     memory_limit: int | None = 4 * 2**30,
 ) -> tuple[TetMesh, MeshingReport]:
-    """`tetrahedralize`, and how it went."""
+    """`tetrahedralize`, with a report."""
     if not isinstance(surface, SurfaceMesh):
         raise MeshingError(f"tetrahedralize needs a SurfaceMesh, not {type(surface).__name__}")
     _in_range("max_volume", max_volume, 0.0, np.inf)
@@ -121,15 +122,17 @@ def tetrahedralize_reported(
     limits = Limits(time_limit, None if memory_limit is None else int(memory_limit))
 
     repaired = None
-    report = surface.check()
+    surface, report = _facing_outward(surface)
     if repair and not report.ok:
-        surface, repaired = repair_surface(surface, time_limit=time_limit, memory_limit=limits.memory)
-        report = surface.check()
-    if len(report.unused_vertices):
-        logger.info("left out %d vertices that no triangle uses", len(report.unused_vertices))
-        surface = surface.compact()
-        report = surface.check()
-    surface, report = _facing_outward(surface, report)
+        try:
+            fixed, repaired = repair_surface(surface, time_limit=time_limit, memory_limit=limits.memory)
+        except MeshingError as failure:
+            # fTetWild needs no repair, and meshes much that MeshFix cannot repair: components that cut each other.
+            if mesher == "tetgen" or not ftetwild_installed() or keep_surface or min_dihedral is not None:
+                raise
+            logger.warning("%s; meshing the surface without repair", failure)
+        else:
+            surface, report = _facing_outward(fixed)
     chosen = _choose(mesher, report, repair)
     if chosen == "tetgen":
         options = {
@@ -140,14 +143,14 @@ def tetrahedralize_reported(
         }
         result = mesh_with_tetgen(surface, options, limits)
     else:
-        _refuse_tetgen_wishes(quality, min_dihedral, keep_surface)
+        _refuse_tetgen_options(quality, min_dihedral, keep_surface)
         result = mesh_with_ftetwild(surface, max_volume, envelope, limits)
     try:
         mesh = TetMesh.dropping_unused(result.vertices, result.elements)
     except MeshError as error:
         raise MeshingError(
-            f"{chosen} made an unusable mesh: {str(error).removeprefix('TetMesh: ')}; the surface has triangles that "
-            'are too thin or too close to each other: remesh it more evenly, or use mesher="ftetwild"'
+            f"{chosen} returned an unusable mesh: {str(error).removeprefix('TetMesh: ')}; the surface has triangles "
+            'that are too thin or too close to each other: remesh it more evenly, or use mesher="ftetwild"'
         ) from None
     _check_result(mesh, surface, chosen, max_volume, keep_surface)
     logger.info("%s: %d vertices, %d tets in %.2f s", chosen, len(mesh.vertices), len(mesh.tets), result.seconds)
@@ -155,7 +158,7 @@ def tetrahedralize_reported(
 
 
 def _in_range(name: str, value: float | None, low: float, high: float) -> None:
-    """Refuse a parameter that is not a number strictly between `low` and `high`."""
+    """Raise for a parameter that is not a number strictly between `low` and `high`."""
     if value is None:
         return
     if (
@@ -167,13 +170,18 @@ def _in_range(name: str, value: float | None, low: float, high: float) -> None:
         raise MeshingError(f"{name} must be a number {span}, not {value!r}")
 
 
-def _facing_outward(surface: SurfaceMesh, report: SurfaceReport) -> tuple[SurfaceMesh, SurfaceReport]:
-    """Turn bodies that face inward. A body inside a body is left as it is, for it may be a cavity or a mistake."""
+def _facing_outward(surface: SurfaceMesh) -> tuple[SurfaceMesh, SurfaceReport]:
+    """Drop unused vertices, and turn bodies that face inward. A body inside a body is unchanged: is it a cavity?"""
+    report = surface.check()
+    if len(report.unused_vertices):
+        logger.info("dropped %d vertices that no triangle uses", len(report.unused_vertices))
+        surface = surface.compact()
+        report = surface.check()
     wrong = report.wrong_facing_components
     if len(wrong) == 0 or report.self_intersecting:
         return surface, report
     flipped = np.isin(surface.components.labels, wrong)
-    # All of them wrong: the file is inside out. Otherwise only what should be a body can be turned without a guess.
+    # If all are wrong, the surface is inside out. Otherwise only bodies are turned: a cavity could be a mistake.
     if len(wrong) < report.component_count:
         for k in wrong:
             alone = SurfaceMesh(
@@ -203,29 +211,29 @@ def _choose(mesher: Mesher, report: SurfaceReport, repaired: bool) -> Literal["t
     if mesher == "auto" and ftetwild_installed():
         logger.warning("the surface is not clean (%s): meshing it with fTetWild, which may move it slightly", faults)
         return "ftetwild"
-    mends = ["mend it in a modelling program"] if repaired else ["mend it with repair=True"]
-    mends.append('use mesher="ftetwild"' + ("" if ftetwild_installed() else f" ({INSTALL})"))
+    remedies = ["fix it in a modelling program"] if repaired else ["fix it with repair=True"]
+    remedies.append('use mesher="ftetwild"' + ("" if ftetwild_installed() else f" ({INSTALL})"))
     still = "even after repair, " if repaired else ""
-    raise MeshingError(f"TetGen cannot mesh this surface: {still}{faults}; {' or '.join(mends)}")
+    raise MeshingError(f"TetGen cannot mesh this surface: {still}{faults}; {' or '.join(remedies)}")
 
 
-def _refuse_tetgen_wishes(quality: float | None, min_dihedral: float | None, keep_surface: bool) -> None:
-    """fTetWild cannot do these; better to say so than to let a wish do nothing."""
-    for name, wished in (("keep_surface", keep_surface), ("min_dihedral", min_dihedral is not None)):
-        if wished:
-            raise MeshingError(f"fTetWild has no {name}; leave it out, or clean the surface so that TetGen can mesh it")
+def _refuse_tetgen_options(quality: float | None, min_dihedral: float | None, keep_surface: bool) -> None:
+    """Raise for options that fTetWild does not have; warn of the one that it does not use."""
+    for name, given in (("keep_surface", keep_surface), ("min_dihedral", min_dihedral is not None)):
+        if given:
+            raise MeshingError(f"fTetWild has no {name}; omit it, or clean the surface so that TetGen can mesh it")
     if quality != DEFAULT_QUALITY:
-        logger.warning("fTetWild optimizes shapes in its own way: quality=%s is not used", quality)
+        logger.warning("fTetWild optimizes shapes by its own measure: quality=%s is not used", quality)
 
 
 def _check_result(
     mesh: TetMesh, surface: SurfaceMesh, mesher: str, max_volume: float | None, keep_surface: bool
 ) -> None:
     if max_volume is not None and (largest := float(mesh.volumes.max())) > max_volume * (1.0 + 1e-6):
-        mend = "leave keep_surface out, give a finer surface" if keep_surface else "give a finer surface"
+        remedy = "omit keep_surface, give a finer surface" if keep_surface else "give a finer surface"
         raise MeshingError(
-            f"{mesher} left a tet of {largest:.4g} m^3, larger than max_volume={max_volume:g}; {mend}, or allow larger "
-            "tets"
+            f"{mesher} left a tet of {largest:.4g} m^3, larger than max_volume={max_volume:g}; {remedy}, or allow "
+            "larger tets"
         )
     if mesher != "tetgen":
         return
@@ -235,4 +243,4 @@ def _check_result(
             "overlap or touch: separate or join them"
         )
     if keep_surface and len(mesh.surface.used_vertices) > len(surface.vertices):
-        raise MeshingError("TetGen had to add vertices on the surface; leave keep_surface out, or give a finer surface")
+        raise MeshingError("TetGen added vertices on the surface; omit keep_surface, or give a finer surface")

@@ -12,11 +12,11 @@ from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.mesh.topology import unique_edges
 
-# For a bear of height 1, feet at y = 0, looking along +z. Parts with x > 0 are mirrored. How far neighbouring parts
-# melt into each other [m] comes last.
+# For a bear of height 1, feet at y = 0, looking along +z. Parts with x > 0 are mirrored. The last number is the
+# width [m] of the blend with the parts before.
 BELLY = ((0.0, 0.34, 0.0), (0.235, 0.30, 0.20))  # centre and radii of an ellipsoid
 BALLS = (
-    ((0.0, 0.31, 0.10), 0.165, 0.06),  # tummy
+    ((0.0, 0.31, 0.10), 0.165, 0.06),  # front of the belly
     ((0.0, 0.72, 0.02), 0.195, 0.05),  # head
     ((0.0, 0.675, 0.2), 0.082, 0.035),  # muzzle
     ((0.0, 0.713, 0.276), 0.026, 0.012),  # nose
@@ -24,7 +24,7 @@ BALLS = (
     ((0.078, 0.785, 0.187), 0.021, 0.008),  # eyes
 )
 CAPSULES = (
-    ((0.185, 0.50, 0.06), (0.135, 0.435, 0.245), 0.068, 0.03),  # arms, held before the tummy
+    ((0.185, 0.50, 0.06), (0.135, 0.435, 0.245), 0.068, 0.03),  # arms, in front of the belly
     ((0.145, 0.13, 0.06), (0.15, 0.095, 0.25), 0.095, 0.03),  # legs
 )
 HOLLOWS = (((0.152, 0.93, 0.085), 0.045, 0.02),)  # inside of the ears
@@ -52,7 +52,7 @@ def gummy_bear(height: float = 1.0, edge_length: float = 0.08) -> TetMesh:
 
 
 def gummy_bear_surface(height: float = 1.0, resolution: int = 64) -> SurfaceMesh:
-    """The bear's skin, watertight: marching cubes, then vertices spread evenly over the surface.
+    """The bear's surface, watertight: marching cubes, then vertices spread evenly over the surface.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def gummy_bear_surface(height: float = 1.0, resolution: int = 64) -> SurfaceMesh
 
 
 def bear_distance(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """About the signed distance (k,) of points (k, 3) from the skin of the bear of height 1; negative inside."""
+    """Approximate signed distance (k,) of points (k, 3) from the surface of the bear of height 1; negative inside."""
     mirrored = points * (-1.0, 1.0, 1.0)
     x = np.where(points[:, :1] < 0.0, mirrored, points)
     center, radii = (np.array(v) for v in BELLY)
@@ -81,19 +81,19 @@ def bear_distance(points: NDArray[np.float64]) -> NDArray[np.float64]:
     scaled, steep = (x - center) / radii, (x - center) / radii**2
     length = np.linalg.norm(scaled, axis=1)
     distance = length * (length - 1.0) / np.maximum(np.linalg.norm(steep, axis=1), 1e-12)
-    for ball, radius, melt in BALLS:
-        distance = _blended(distance, np.linalg.norm(x - ball, axis=1) - radius, melt)
-    for start, end, radius, melt in CAPSULES:
-        distance = _blended(distance, _to_segment(x, np.array(start), np.array(end)) - radius, melt)
-    for ball, radius, melt in HOLLOWS:
-        distance = -_blended(-distance, np.linalg.norm(x - ball, axis=1) - radius, melt)
+    for ball, radius, blend_width in BALLS:
+        distance = _blended(distance, np.linalg.norm(x - ball, axis=1) - radius, blend_width)
+    for start, end, radius, blend_width in CAPSULES:
+        distance = _blended(distance, _to_segment(x, np.array(start), np.array(end)) - radius, blend_width)
+    for ball, radius, blend_width in HOLLOWS:
+        distance = -_blended(-distance, np.linalg.norm(x - ball, axis=1) - radius, blend_width)
     return distance
 
 
-def _blended(a: NDArray[np.float64], b: NDArray[np.float64], melt: float) -> NDArray[np.float64]:
-    """Smooth minimum: quadratic where the two differ by less than `melt`, the plain one elsewhere."""
-    overlap = np.maximum(melt - np.abs(a - b), 0.0)
-    return np.minimum(a, b) - overlap**2 / (4.0 * melt)
+def _blended(a: NDArray[np.float64], b: NDArray[np.float64], blend_width: float) -> NDArray[np.float64]:
+    """Smooth minimum: quadratic where the two differ by less than `blend_width`, the plain one elsewhere."""
+    overlap = np.maximum(blend_width - np.abs(a - b), 0.0)
+    return np.minimum(a, b) - overlap**2 / (4.0 * blend_width)
 
 
 def _to_segment(x: NDArray[np.float64], start: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.float64]:

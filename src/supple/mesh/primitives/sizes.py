@@ -1,4 +1,4 @@
-"""Checks of the numbers that shapes are made from."""
+"""Checks of the parameters of shapes."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from supple.errors import MeshError
 
-# A shape with more tets or triangles than this is a slip of the keyboard: it would fill the memory.
+# More tets or triangles than this would fill the memory; the sizes given are most likely a typing error.
 MAX_ELEMENTS = 50_000_000
 
 
 def positive(owner: str, **sizes: Any) -> None:
-    """Refuse lengths that are no positive, finite numbers."""
+    """Raise for lengths that are not positive, finite numbers."""
     for name, value in sizes.items():
         if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not 0.0 < value < math.inf:
             raise MeshError(f"{owner}: {name} is {value!r}; give a positive length in metres")
@@ -41,15 +41,15 @@ def counts(owner: str, name: str, value: Sequence[int]) -> tuple[int, int, int]:
     return int(array[0]), int(array[1]), int(array[2])
 
 
-def not_too_many(owner: str, elements: float, mend: str) -> None:
-    """Refuse shapes that would not fit into memory."""
+def not_too_many(owner: str, elements: float, remedy: str) -> None:
+    """Raise for shapes that would not fit into memory."""
     if elements > MAX_ELEMENTS:
-        raise MeshError(f"{owner}: that makes {elements:.3g} elements, more than {MAX_ELEMENTS}; {mend}")
+        raise MeshError(f"{owner}: this would be {elements:.3g} elements, more than {MAX_ELEMENTS}; {remedy}")
 
 
 def fits(owner: str, edge_length: float, name: str, length: float) -> None:
-    """Refuse edges that are longer than what they should resolve."""
-    # A hair of slack, so that 0.1 counts as no longer than 0.3 / 3.
+    """Raise for edges longer than the length that they should resolve."""
+    # With a tolerance, so that 0.1 is not longer than 0.3 / 3.
     if edge_length > length * (1.0 + 1e-9):
         raise MeshError(
             f"{owner}: edge_length = {edge_length:g} m is longer than {name} = {length:g} m; make it shorter"
@@ -57,7 +57,7 @@ def fits(owner: str, edge_length: float, name: str, length: float) -> None:
 
 
 def check_torus(owner: str, radius: float, tube_radius: float, edge_length: float) -> None:
-    """Refuse tori that have no hole, or edges that do not suit them."""
+    """Raise for tori without a hole, and for edges longer than the tube's radius."""
     positive(owner, radius=radius, tube_radius=tube_radius, edge_length=edge_length)
     if tube_radius >= radius:
         raise MeshError(

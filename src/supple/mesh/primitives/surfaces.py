@@ -1,9 +1,8 @@
-"""Surfaces of the ready-made bodies, to be meshed, shown, or collided with."""
+"""Surfaces of ready-made bodies that do not come from a tet mesh: sphere and torus."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -12,31 +11,17 @@ from supple.mesh.primitives.sizes import check_torus, fits, not_too_many, positi
 from supple.mesh.surface import SurfaceMesh
 
 
-def box_surface(size: Sequence[float] = (1.0, 1.0, 1.0), divisions: Sequence[int] = (4, 4, 4)) -> SurfaceMesh:
-    """The surface of `box`, with the same parameters."""
-    from supple.mesh.shapes import box
-
-    return box(size, divisions).surface.compact()
-
-
-def cylinder_surface(radius: float = 0.5, height: float = 1.0, edge_length: float = 0.1) -> SurfaceMesh:
-    """The surface of `cylinder`, with the same parameters."""
-    from supple.mesh.shapes import cylinder
-
-    return cylinder(radius, height, edge_length).surface.compact()
-
-
 def sphere_surface(radius: float = 0.5, edge_length: float = 0.1) -> SurfaceMesh:
     """A sphere of nearly equal triangles: an icosahedron with its faces cut into smaller ones.
 
     Parameters
     ----------
     radius : [m]
-    edge_length : about the length of edges [m], at most `radius`
+    edge_length : approximate length of edges [m], at most `radius`
 
     Raises
     ------
-    MeshError : where a length is not positive, or the edge too long or too short for the radius.
+    MeshError : where a length is not positive, or the edge is too long or too short for the radius.
     """
     positive("sphere_surface", radius=radius, edge_length=edge_length)
     fits("sphere_surface", edge_length, "radius", radius)
@@ -51,7 +36,7 @@ def sphere_surface(radius: float = 0.5, edge_length: float = 0.1) -> SurfaceMesh
     faces = [
         (i, j, k) for i in range(12) for j in range(i) for k in range(j) if near[i, j] and near[j, k] and near[k, i]
     ]
-    # A face holds rows of points i, j with i + j <= n; row i begins where the shorter rows before it end.
+    # A face has rows of points i, j with i + j <= n; row i begins where the longer rows before it end.
     grid = np.array([(i, j) for i in range(n + 1) for j in range(n + 1 - i)])
     begin = np.cumsum([0] + [n + 1 - i for i in range(n + 1)])
     up = [(begin[i] + j, begin[i + 1] + j, begin[i] + j + 1) for i in range(n) for j in range(n - i)]

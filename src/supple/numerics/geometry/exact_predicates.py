@@ -1,8 +1,8 @@
-"""On which side a point lies, without a wrong answer: a rounded determinant, and the exact one where that is in doubt.
+"""The side of a plane or line on which a point lies, always exact: a rounded determinant, then the exact one if needed.
 
 Source: Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates" (1997): the error
-bound of the first stage, then the whole determinant as a sum of numbers that do not overlap. Coordinates must be such
-that products of three of them neither overflow nor underflow.
+bound of the first stage, then the whole determinant as a sum of numbers that do not overlap. Products of three
+coordinates must neither overflow nor underflow.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def _two_product(a, b):
 
 @njit
 def _add(parts, n, value):
-    """Add a number to a sum of n numbers that do not overlap, exactly; returns how many there are now."""
+    """Add a number to a sum of n numbers that do not overlap, exactly; returns the new n."""
     kept = 0
     for i in range(n):
         value, low = _two_sum(value, parts[i])
@@ -83,7 +83,7 @@ def _exact_sign(a, b, c, d):
 
 @njit
 def side_of_plane(a, b, c, d):
-    """Sign of det[b - a, c - a, d - a]: 1 where d is where a, b, c are counter-clockwise seen from, 0 in the plane."""
+    """Sign of det[b - a, c - a, d - a]: 1 where a, b, c are counter-clockwise seen from d, 0 in the plane."""
     ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
     wx, wy, wz = d[0] - a[0], d[1] - a[1], d[2] - a[2]
@@ -95,7 +95,7 @@ def side_of_plane(a, b, c, d):
     if det < -_ERROR * size:
         return -1
     if size == 0.0:
-        # Every product is zero by itself: differences of float64 that are zero are so exactly.
+        # Each product is zero, because differences of float64 are zero only between equal numbers.
         return 0
     return _exact_sign(a, b, c, d)
 

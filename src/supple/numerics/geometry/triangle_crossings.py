@@ -1,4 +1,4 @@
-"""All pairs of triangles that have a point in common: a sweep along one axis, and exact tests of what it finds."""
+"""All pairs of triangles with a common point: a sweep along one axis, then exact tests of the pairs it finds."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ APART, TOUCHING, CROSSING = 0, 1, 2
 
 @njit
 def _flat(p, axis):
-    """Without one coordinate."""
+    """The point without one coordinate."""
     if axis == 0:
         return (p[1], p[2])
     if axis == 1:
@@ -46,7 +46,7 @@ def _in_triangle(p, a, b, c):
 def _coplanar_edge(p, q, a, b, c):
     """Whether the segment p q meets the triangle a b c in their common plane.
 
-    A triangle without area is apart from everything; its neighbours have its edges.
+    A triangle without area counts as apart from everything; its neighbours contain its edges.
     """
     n = cross(subtract(b, a), subtract(c, a))
     axis = 0
@@ -70,7 +70,7 @@ def _coplanar_edge(p, q, a, b, c):
 def edge_and_triangle(p, q, a, b, c, at_p, at_q):
     """Whether the segment p q and the triangle a b c, both with their boundaries, are apart, touch or cross.
 
-    `at_p`, `at_q`: on which sides of the triangle's plane the two ends are.
+    `at_p`, `at_q`: sides of the triangle's plane on which the two ends are.
     """
     if at_p * at_q > 0:
         return APART
@@ -86,7 +86,7 @@ def edge_and_triangle(p, q, a, b, c, at_p, at_q):
 
 @njit
 def _sides(x, one, other, out):
-    """Write on which side of the plane of `other` each corner of `one` is; returns whether all are on the same one."""
+    """Write the side of the plane of `other` on which each corner of `one` is; returns whether all sides are equal."""
     a, b, c = row(x, other[0]), row(x, other[1]), row(x, other[2])
     for k in range(3):
         i = one[k]
@@ -97,10 +97,10 @@ def _sides(x, one, other, out):
 
 @njit
 def _clearly_apart(x, first, second):
-    """Whether a plane across the line of the triangles' centers parts them, with room for rounding.
+    """Whether a plane normal to the line between the triangles' centers separates them, by more than round-off.
 
-    Where they share a vertex, the plane goes through it, and the others must be well on their sides. Nearly all
-    neighbours on a surface are told apart so, for a small part of what the exact test takes.
+    Where they share a vertex, the plane passes through it, and the other vertices must be clearly on their sides. This
+    separates nearly all neighbours on a surface, in a small part of the time of the exact test.
     """
     origin = row(x, first[0])
     shared = False
@@ -128,9 +128,9 @@ def _clearly_apart(x, first, second):
 
 @njit
 def triangles_meet(x, first, second, sides):
-    """Whether two triangles (3,) of indices into x (n, 3) are apart, touch or cross; what they share is left out.
+    """Whether two triangles (3,) of indices into x (n, 3) are apart, touch or cross; shared vertices do not count.
 
-    `sides` (2, 3) is scratch.
+    `sides` (2, 3) is work space.
     """
     shared = 0
     for k in range(3):
@@ -161,7 +161,7 @@ def triangles_meet(x, first, second, sides):
 
 @njit(cache=True, error_model="numpy")
 def _sweep(x, triangles, owner, collide, low, high, order, axis, most, pairs, kinds):
-    """Write as many pairs as fit; returns how many there are, `most` where there are more."""
+    """Write as many pairs as fit; returns the number of pairs, at most `most`."""
     count = 0
     sides = np.zeros((2, 3), dtype=np.int64)
     y, z = (axis + 1) % 3, (axis + 2) % 3
@@ -195,17 +195,17 @@ def crossing_triangles(
     collide: NDArray[np.bool_],
     most: int = -1,
 ) -> tuple[NDArray[np.int64], NDArray[np.int8]]:
-    """Pairs of triangles that have a point in common beside shared vertices, in ascending order, lower row first.
+    """Pairs of triangles with common points other than shared vertices, in ascending order, lower row first.
 
     Parameters
     ----------
-    x : (n, 3) [m]; triangles : (t, 3); owner : (t,) which thing a triangle is of
-    collide : (p, p) which things' triangles are looked at; the diagonal: those of one thing with each other
-    most : with that many found, the search ends; -1: with all
+    x : (n, 3) [m]; triangles : (t, 3); owner : (t,) number of the object of each triangle
+    collide : (p, p) which pairs of objects are tested; the diagonal: triangles of one object with each other
+    most : the search ends after this many pairs; -1: no limit
 
     Returns
     -------
-    pairs (k, 2), kinds (k,): TOUCHING, or CROSSING where an edge goes through a triangle's inside.
+    pairs (k, 2), kinds (k,): TOUCHING, or CROSSING where an edge passes through the inside of a triangle.
     """
     if len(triangles) == 0:
         return np.zeros((0, 2), dtype=np.int64), np.zeros(0, dtype=np.int8)
@@ -215,13 +215,13 @@ def crossing_triangles(
     extent = np.maximum(np.ptp(x[triangles.ravel()], axis=0), 1e-300)
     axis = int(((high - low).mean(axis=0) / extent).argmin())
     order = np.argsort(low[:, axis], kind="stable")
-    room = 4096
+    capacity = 4096
     while True:
-        pairs, kinds = np.zeros((room, 2), dtype=np.int64), np.zeros(room, dtype=np.int8)
+        pairs, kinds = np.zeros((capacity, 2), dtype=np.int64), np.zeros(capacity, dtype=np.int8)
         count = _sweep(x, triangles, owner, collide, low, high, order, axis, most, pairs, kinds)
-        if count <= room:
+        if count <= capacity:
             break
-        room = count
+        capacity = count
     pairs, kinds = pairs[:count], kinds[:count]
     ascending = np.lexsort((pairs[:, 1], pairs[:, 0]))
     return pairs[ascending], kinds[ascending]

@@ -1,6 +1,6 @@
 """Triangles near points: a tree of bounding boxes over triangles.
 
-Edges and vertices go in as triangles whose corners coincide, (a, b, b) and (a, a, a).
+Edges and vertices are triangles with equal corners, (a, b, b) and (a, a, a).
 
 Source: Ericson, "Real-Time Collision Detection" (2005), section 6.2.
 """
@@ -17,20 +17,21 @@ from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import cross, dot, row, subtract
 
 _LEAF = 4
-_DEPTH = 64  # of a tree that halves: more than any memory holds
-# Squared distances that agree to this share are equal, and distances that agree to this share of the coordinates: a
-# point above a common edge is as near to both triangles, also far from the origin.
+_DEPTH = 64  # of a balanced tree; more than any memory can hold
+# Squared distances that differ by less than the fraction TIE are equal. So are distances that differ by less than the
+# fraction ROUND_OFF of the coordinates. A point above a common edge is then equally near to both triangles, also far
+# from the origin.
 TIE, ROUND_OFF = 1e-12, 1e-14
 
 
 @dataclass(frozen=True, eq=False)
 class TriangleTree:
-    """A balanced tree; node i has the children 2 i + 1 and 2 i + 2, the last level are the leaves.
+    """A balanced tree. Node i has the children 2 i + 1 and 2 i + 2; the last level are the leaves.
 
     Attributes
     ----------
     points : (n, 3) [m]; triangles : (t, 3), at least one
-    order : (t,) the triangles, leaf after leaf; bounds : (nodes, 2) which part of `order` a node has
+    order : (t,) the triangles, leaf by leaf; bounds : (nodes, 2) first and last + 1 row of `order` of each node
     boxes : (nodes, 6) lowest and highest coordinates [m]
     """
 
@@ -51,10 +52,10 @@ class TriangleTree:
         return cls(points, triangles, *_build(boxes, levels))
 
     def nearest(self, queries: NDArray[np.float64], within: float = np.inf) -> tuple[NDArray, NDArray]:
-        """The nearest triangle of each point, up to a distance.
+        """The nearest triangle to each point, within a distance.
 
-        Where several are equally near (up to round-off), it is the one that faces the point most squarely, from which
-        the point is furthest in the direction of its normal; and of these the one of lowest number.
+        Among several equally near triangles (up to round-off), the one from whose plane the point is farthest wins: it
+        faces the point most directly. Among these, the lowest number wins.
 
         Parameters
         ----------
@@ -62,7 +63,7 @@ class TriangleTree:
 
         Returns
         -------
-        triangles : (q,) int64, -1 where none is near enough; distances : (q,) [m], inf there.
+        triangles : (q,) int64, -1 where none is within the distance; distances : (q,) [m], inf there.
         """
         found = np.full(len(queries), -1, dtype=np.int64)
         squares = np.full(len(queries), np.inf)
@@ -70,7 +71,7 @@ class TriangleTree:
         return found, np.sqrt(squares)
 
     def all_within(self, queries: NDArray[np.float64], within: float) -> tuple[NDArray, NDArray, NDArray]:
-        """Every triangle up to a distance of each point.
+        """All triangles within a distance of each point.
 
         Returns
         -------
@@ -141,7 +142,7 @@ def _square_to_triangle(p, points, triangles, t):
 def pair_distances(
     queries: NDArray[np.float64], points: NDArray[np.float64], triangles: NDArray[np.int32]
 ) -> NDArray[np.float64]:
-    """(k,) from the k-th of the queries (k, 3) to the k-th of the triangles (k, 3), rows of points (n, 3) [m]."""
+    """Distances (k,) [m] from the queries (k, 3) to the triangles (k, 3) of the same rows, indices of points (n, 3)."""
     out = np.empty(len(queries))
     _pair_distances(np.ascontiguousarray(queries), np.ascontiguousarray(points), np.ascontiguousarray(triangles), out)
     return out
@@ -150,7 +151,7 @@ def pair_distances(
 def closest_places(
     queries: NDArray[np.float64], points: NDArray[np.float64], triangles: NDArray[np.int32]
 ) -> NDArray[np.float64]:
-    """(k, 3) barycentric coordinates of the place on the k-th triangle that is nearest to the k-th of the queries."""
+    """(k, 3) barycentric coordinates of the point of the k-th triangle that is nearest to the k-th query."""
     out = np.empty((len(queries), 3))
     _closest_places(np.ascontiguousarray(queries), np.ascontiguousarray(points), np.ascontiguousarray(triangles), out)
     return out
@@ -171,7 +172,7 @@ def _pair_distances(queries, points, triangles, out):
 
 @njit(error_model="numpy")
 def _square_height(p, points, triangles, t):
-    """Of the distance from the triangle's plane; 0 where it has none."""
+    """Square of the distance from the triangle's plane; 0 for a triangle without area."""
     a, b, c = row(points, triangles[t, 0]), row(points, triangles[t, 1]), row(points, triangles[t, 2])
     n = cross(subtract(b, a), subtract(c, a))
     area = dot(n, n)
@@ -186,14 +187,14 @@ def _largest(boxes):
 
 @njit(error_model="numpy")
 def _slack(square, p, largest):
-    """By how much a squared distance from p is uncertain."""
+    """The uncertainty of a squared distance from p."""
     off = ROUND_OFF * max(largest, abs(p[0]), abs(p[1]), abs(p[2]))
     return TIE * square + off * (2.0 * np.sqrt(square) + off)
 
 
 @njit(error_model="numpy")
 def _comes_first(p, points, triangles, t, best, largest):
-    """Whether of two triangles that are equally near, t is the one to take."""
+    """Whether triangle t is preferred to `best`, which is equally near."""
     if best < 0:
         return True
     one, other = _square_height(p, points, triangles, t), _square_height(p, points, triangles, best)
@@ -239,7 +240,7 @@ def _nearest(queries, within, points, triangles, order, bounds, boxes, found, sq
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def _all_within(queries, within, points, triangles, order, bounds, boxes, counts, starts, found, squares):
-    """With `found` empty, count only."""
+    """With an empty `found`, only count."""
     largest = _largest(boxes)
     for q in prange(len(queries)):
         p = row(queries, q)

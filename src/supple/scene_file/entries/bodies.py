@@ -1,4 +1,4 @@
-"""Bodies of a scene file: what they are made of, where they start, and copies of them."""
+"""Bodies of a scene file: mesh, material, placement, and copies."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MAX_COPIES = 10_000
 
 
 class CopiesModel(Model):
-    """The body many times, named name01, name02, ...: at given offsets, or in a grid."""
+    """Copies of the body, named name01, name02, ...: at given offsets, or in a grid."""
 
     offsets: list[Vector] | None = Field(
         default=None, min_length=1, max_length=MAX_COPIES, description="from `position` [m]"
@@ -38,7 +38,7 @@ class CopiesModel(Model):
         if (self.offsets is None) == (self.grid is None):
             raise ValueError("copies need either `offsets` or `grid`; give one of them")
         if (self.grid is None) != (self.spacing is None):
-            raise ValueError("`grid` and `spacing` go together; give both or neither")
+            raise ValueError("`grid` needs `spacing`; give both or neither")
         if self.grid is not None and np.prod([float(n) for n in self.grid]) > MAX_COPIES:
             raise ValueError(f"grid {self.grid} makes more than {MAX_COPIES} copies; make it smaller")
         if self.rotations is not None and (self.offsets is None or len(self.rotations) != len(self.offsets)):
@@ -56,7 +56,7 @@ class CopiesModel(Model):
 
 
 class InitialModel(Model):
-    """How a body starts, if not at rest in its shape."""
+    """A deformed start of a body."""
 
     scale: Annotated[list[Positive], Field(min_length=3, max_length=3)] = Field(
         description="along the world's x, y and z about the center of volume; [1, 0.5, 1] squeezes to half the height"
@@ -65,7 +65,7 @@ class InitialModel(Model):
 
 @dataclass(frozen=True, eq=False)
 class BuiltBody:
-    """A body, and its vertices (n, 3) [m] at the start where they are not simply placed."""
+    """A body, and its vertices (n, 3) [m] at the start if it starts deformed."""
 
     body: Body
     initial_positions: NDArray[np.float64] | None
@@ -76,13 +76,13 @@ class BodyModel(Model):
 
     name: Name = Field(description="unique in the scene")
     mesh: MeshFileModel | None = Field(default=None, description="of tetrahedra, or a surface to fill with them")
-    shape: ShapeModel | None = Field(default=None, description="instead of `mesh`: one that Supple makes itself")
+    shape: ShapeModel | None = Field(default=None, description="instead of `mesh`: a ready-made shape")
     material: MaterialModel
     regions: list[RegionModel] | None = Field(
         default=None,
         min_length=1,
         max_length=1000,
-        description="parts of the body that are made of other materials; of two that overlap, the later one counts",
+        description="parts of the body with other materials; where two overlap, the later one counts",
     )
     position: Vector = Field(default=[0.0, 0.0, 0.0], description="where the mesh's origin is placed [m]")
     rotation: Vector = Field(default=[0.0, 0.0, 0.0], description="rotation vector about the mesh's origin [rad]")
@@ -94,7 +94,7 @@ class BodyModel(Model):
     skin: SurfaceModel | None = Field(
         default=None, description="a finer surface that follows the body in pages and exports"
     )
-    copies: CopiesModel | None = Field(default=None, description="the body many times")
+    copies: CopiesModel | None = Field(default=None, description="copies of the body")
     initial: InitialModel | None = Field(default=None, description="a deformed start")
 
     @model_validator(mode="after")

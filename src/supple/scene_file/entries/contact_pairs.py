@@ -15,7 +15,7 @@ _NAME = {"type": "string", "minLength": 1, "maxLength": 100}
 
 
 def _as_list(value: Any) -> Any:
-    """One name as a list of one, so that what is wrong with a list is said of its own entry."""
+    """One name as a list of one, so that an error in a list names its entry."""
     if isinstance(value, str):
         return [value]
     if not isinstance(value, list):
@@ -32,17 +32,20 @@ Names = Annotated[
 
 
 class ContactPairModel(Model):
-    """A rule for the contact of two things: other friction, or none of it. Groups are every pair of the two lists."""
+    """A rule for the contact of two bodies, or a body and an obstacle: other friction, or no contact.
 
-    first: Names = Field(description="name of a body or an obstacle, or a list of names; `*` stands for any letters")
-    second: Names = Field(description="the others; the same body again is its contact with itself")
+    It holds for each pair of a name of the first and a name of the second list.
+    """
+
+    first: Names = Field(description="name of a body or an obstacle, or a list of names; `*` matches any letters")
+    second: Names = Field(description="the second of the pair; the same body again: contact with itself")
     friction: NonNegative | None = Field(default=None, description="Coulomb coefficient of these pairs")
-    collide: bool = Field(default=True, description="false, and these pairs pass through each other")
+    collide: bool = Field(default=True, description="false: these pairs pass through each other")
 
     @model_validator(mode="after")
-    def _says_something(self) -> ContactPairModel:
+    def _has_an_effect(self) -> ContactPairModel:
         if self.friction is None and self.collide:
-            raise ValueError("this rule says nothing; give `friction`, or `collide: false`")
+            raise ValueError("this rule has no effect; give `friction`, or `collide: false`")
         return self
 
     def build(self) -> ContactPair:
@@ -50,7 +53,7 @@ class ContactPairModel(Model):
 
 
 def built_pairs(described: list[ContactPairModel], scene: Scene) -> list[ContactPair]:
-    """The contact pairs, checked one by one against the scene: here, where their places in the file are known."""
+    """The contact pairs, each checked against the scene; here their places in the file are known."""
     rules, pairs = PairRules(scene), []
     for i, model in enumerate(described):
         with at("contact_pairs", i):

@@ -1,4 +1,4 @@
-"""Where the meshes of a scene file come from, and the store that reads or makes each of them once."""
+"""The sources of the meshes of a scene file, and the store that reads or makes each mesh once."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MESHING_OPTIONS = ("max_volume", "quality", "min_dihedral", "keep_surface", "mes
 
 
 class MeshFileModel(Model):
-    """A mesh file. A surface is filled with tetrahedra as the meshing options say."""
+    """A mesh file. A surface is filled with tetrahedra according to the meshing options."""
 
     file: FilePath = Field(description="relative to the scene file")
     scale: Positive = Field(default=1.0, description="of all coordinates: 0.001 for a file in millimetres")
@@ -31,8 +31,8 @@ class MeshFileModel(Model):
     )
     min_dihedral: float | None = Field(default=None, ge=0.0, lt=70.0, description="[degrees]")
     keep_surface: bool | None = Field(default=None, description="true: no new vertices on the surface")
-    mesher: Literal["auto", "tetgen", "ftetwild"] | None = Field(default=None, description="who fills the surface")
-    repair: bool | None = Field(default=None, description="true: mend the surface first")
+    mesher: Literal["auto", "tetgen", "ftetwild"] | None = Field(default=None, description="program for the tetrahedra")
+    repair: bool | None = Field(default=None, description="true: repair the surface first, if it has faults")
     time_limit: Positive | None = Field(default=None, description="of the mesher [s]")
 
     @property
@@ -41,16 +41,16 @@ class MeshFileModel(Model):
         return {key: getattr(self, key) for key in MESHING_OPTIONS if getattr(self, key) is not None}
 
     def is_surface(self) -> bool:
-        """Whether the file is a surface to be filled: by its extension; where that says nothing, by the options."""
+        """Whether the file is a surface to be filled: by its extension; where it can be both, by the options."""
         suffix = Path(self.file).suffix.lower()
         if suffix in TET_FILES and self.meshing:
             with at(next(iter(self.meshing))):
-                raise MeshError(f"{self.file} holds tetrahedra already; remove this")
+                raise MeshError(f"{self.file} already holds tetrahedra; remove this")
         return suffix in SURFACE_FILES or (suffix not in TET_FILES and bool(self.meshing))
 
 
 class SurfaceModel(Model):
-    """A triangle surface: of a file or of a shape, scaled, then turned, then moved."""
+    """A triangle surface: of a file or of a shape, scaled, then rotated, then moved."""
 
     file: FilePath | None = Field(default=None, description="relative to the scene file")
     shape: SurfaceShapeModel | None = Field(default=None, description="instead of `file`")
@@ -70,7 +70,7 @@ class MeshStore:
 
     Parameters
     ----------
-    folder : what relative paths are relative to.
+    folder : the folder of relative paths.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -100,7 +100,7 @@ class MeshStore:
 
         Raises
         ------
-        SceneError : where it may not be read.
+        SceneError : where reading it is not allowed.
         """
         return self.folder / file
 

@@ -14,8 +14,8 @@ class KeyframesModel(Model):
     times: list[Number] = Field(min_length=1, description="strictly increasing [s]")
     displacements: list[Vector] | None = Field(default=None, description="one per time [m]")
     angles: list[Number] | None = Field(default=None, description="one per time [rad]")
-    axis: Vector = Field(default=[0.0, 0.0, 1.0], description="what the angles turn about")
-    pivot: Vector = Field(default=[0.0, 0.0, 0.0], description="a point of that axis [m]")
+    axis: Vector = Field(default=[0.0, 0.0, 1.0], description="axis of the angles")
+    pivot: Vector = Field(default=[0.0, 0.0, 0.0], description="a point on that axis [m]")
 
     def build(self) -> Keyframes:
         return Keyframes(self.times, self.displacements, self.angles, self.axis, self.pivot)

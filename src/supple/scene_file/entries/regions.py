@@ -1,4 +1,4 @@
-"""Parts of a body of a scene file that are made of other materials."""
+"""Regions of a body of a scene file with materials of their own."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class BoxOfMeshModel(Model):
 
 
 class RegionModel(Model):
-    """Tets of a body that are made of another elastic material than the body's."""
+    """Tets of a body with another elastic material than the body's."""
 
     material: ElasticMaterialModel
     box: BoxOfMeshModel | None = Field(default=None, description="all tets whose center is inside")
@@ -44,7 +44,7 @@ class RegionModel(Model):
         return self
 
     def select(self, mesh: TetMesh) -> NDArray[np.int64]:
-        """Numbers (k,) of the tets that are meant."""
+        """Numbers (k,) of the selected tets."""
         if self.box is not None:
             with at("box"):
                 centers = mesh.vertices[mesh.tets].mean(axis=1)
@@ -52,7 +52,7 @@ class RegionModel(Model):
                 if not len(inside):
                     low, high = (np.round(corner, 6).tolist() for corner in (centers.min(axis=0), centers.max(axis=0)))
                     raise SceneError(
-                        f"no tet has its center inside; they reach from {low} to {high} in the coordinates of the mesh"
+                        f"no tet has its center inside; in the mesh's coordinates, centers are from {low} to {high}"
                     )
                 return inside.astype(np.int64)
         chosen = np.array(self.tets)
@@ -63,14 +63,14 @@ class RegionModel(Model):
 
 
 def with_regions(material: Material, regions: list[RegionModel], mesh: TetMesh) -> Material:
-    """The body's material, but that of the last region that has it for each tet of a region.
+    """The body's material, replaced in each tet by that of the last region that contains the tet.
 
     Raises
     ------
     LocatedError : where a region is empty or not of this mesh, or the body's own material is not elastic.
     """
     if not isinstance(material, Elastic):
-        raise SceneError(f"regions need an elastic material beside them, which {type(material).__name__} is not")
+        raise SceneError(f"a body with regions needs an elastic material, which {type(material).__name__} is not")
     index = np.zeros(len(mesh.tets), dtype=np.int64)
     for k, region in enumerate(regions):
         with at(k):

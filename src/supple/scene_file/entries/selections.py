@@ -1,4 +1,4 @@
-"""Parts of a scene file that speak of some vertices of one body: pins, forces and soft targets."""
+"""Parts of a scene file that select vertices of one body: pins, forces and soft targets."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class InBoxModel(Model):
 class _SelectionModel(Model):
     body: Name = Field(description="name of the body")
     vertices: list[VertexIndex] | None = Field(default=None, min_length=1, description="vertex numbers, from 0")
-    box: InBoxModel | None = Field(default=None, description="instead of `vertices`: all that are inside")
-    name: Name | None = Field(default=None, description="stands in messages and reports")
+    box: InBoxModel | None = Field(default=None, description="instead of `vertices`: all vertices inside")
+    name: Name | None = Field(default=None, description="used in messages and reports")
 
     @model_validator(mode="after")
     def _one_selection(self) -> Self:
@@ -46,7 +46,7 @@ class _SelectionModel(Model):
 class PinModel(_SelectionModel):
     """Vertices of one body that are held, or moved by keyframes."""
 
-    motion: KeyframesModel | None = Field(default=None, description="from where they are at the start; held without it")
+    motion: KeyframesModel | None = Field(default=None, description="from the start; without it the vertices are held")
 
     def build(self) -> Pin:
         with at("motion"):
@@ -57,14 +57,14 @@ class PinModel(_SelectionModel):
 class ForceModel(_SelectionModel):
     """A load on vertices of one body that keeps its direction (implicit solver)."""
 
-    force: Vector = Field(description="in total, shared equally by the vertices [N]")
+    force: Vector = Field(description="total force, divided equally among the vertices [N]")
 
     def build(self) -> Force:
         return Force(self.body, self.selection(), self.force, name=self.name)
 
 
 class SoftTargetModel(_SelectionModel):
-    """Springs from vertices of one body to where they start, or are carried by keyframes (implicit solver)."""
+    """Springs from vertices of one body to their starts, or to points moved by keyframes (implicit solver)."""
 
     stiffness: Positive = Field(description="of each vertex's spring [N/m]")
     motion: KeyframesModel | None = Field(default=None, description="of the springs' other ends")

@@ -1,4 +1,4 @@
-"""Shapes of a scene file, by `kind`: the ones that Supple makes itself."""
+"""Shapes of a scene file, by `kind`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ EdgeLength = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
 
 class BoxShapeModel(Model):
-    """A box about the origin, cut into a grid."""
+    """A box, centred at the origin, divided into a grid."""
 
     kind: Literal["box"]
     size: Sizes = Field(default=[1.0, 1.0, 1.0], description="full edge lengths [m]")
@@ -31,11 +31,11 @@ class BoxShapeModel(Model):
 
 
 class SphereShapeModel(Model):
-    """A ball about the origin."""
+    """A ball, centred at the origin."""
 
     kind: Literal["sphere"]
     radius: Positive = Field(default=0.5, description="[m]")
-    edge_length: EdgeLength | None = Field(default=None, description="mean edge [m]; a fifth of the radius without it")
+    edge_length: EdgeLength | None = Field(default=None, description="mean edge [m]; default: a fifth of the radius")
 
     def build(self) -> TetMesh:
         return shapes.sphere(self.radius, self.edge_length or 0.2 * self.radius)
@@ -45,13 +45,13 @@ class SphereShapeModel(Model):
 
 
 class CylinderShapeModel(Model):
-    """A cylinder about the origin, along y."""
+    """A cylinder along y, centred at the origin."""
 
     kind: Literal["cylinder"]
     radius: Positive = Field(default=0.5, description="[m]")
     height: Positive = Field(default=1.0, description="[m]")
     edge_length: EdgeLength | None = Field(
-        default=None, description="mean edge [m]; a fifth of the smaller of radius and height without it"
+        default=None, description="mean edge [m]; default: a fifth of the smaller of radius and height"
     )
 
     def build(self) -> TetMesh:
@@ -69,9 +69,7 @@ class TorusShapeModel(Model):
     kind: Literal["torus"]
     radius: Positive = Field(default=0.5, description="of the circle in the middle of the tube [m]")
     tube_radius: Positive = Field(default=0.2, description="of the tube [m]")
-    edge_length: EdgeLength | None = Field(
-        default=None, description="mean edge [m]; 0.4 of the tube's radius without it"
-    )
+    edge_length: EdgeLength | None = Field(default=None, description="mean edge [m]; default: 0.4 of the tube's radius")
 
     def build(self) -> TetMesh:
         return shapes.torus(self.radius, self.tube_radius, self.edge_length or 0.4 * self.tube_radius)
@@ -85,7 +83,7 @@ class GummyBearShapeModel(Model):
 
     kind: Literal["gummy_bear"]
     height: Positive = Field(default=1.0, description="[m]")
-    edge_length: EdgeLength | None = Field(default=None, description="mean edge [m]; 0.08 of the height without it")
+    edge_length: EdgeLength | None = Field(default=None, description="mean edge [m]; default: 0.08 of the height")
 
     def build(self) -> TetMesh:
         return shapes.gummy_bear(self.height, self.edge_length or 0.08 * self.height)
@@ -98,7 +96,7 @@ ShapeModel = Annotated[
 
 
 class GummyBearSurfaceModel(Model):
-    """The surface of the gummy bear, as fine as wanted."""
+    """The surface of the gummy bear, at any resolution."""
 
     kind: Literal["gummy_bear"]
     height: Positive = Field(default=1.0, description="[m]")

@@ -15,10 +15,10 @@ Iterations = Annotated[int, Field(ge=1, le=100_000)]
 
 
 class XPBDContactModel(Model):
-    """Contact of bodies with each other and with themselves. Obstacles act with or without it."""
+    """Contact of bodies with each other and with themselves. Contact with obstacles does not depend on it."""
 
     thickness: Positive | None = Field(
-        default=None, description="gap between surfaces [m]; a twentieth of the mean surface edge without it"
+        default=None, description="gap between surfaces [m]; default: a twentieth of the mean surface edge"
     )
     body_collision: bool = Field(default=True, description="whether bodies collide with each other")
     self_collision: bool = Field(default=True, description="whether a body collides with itself")
@@ -29,11 +29,11 @@ class XPBDModel(Model):
 
     kind: Literal["xpbd"]
     substeps: Iterations = Field(default=20, description="per frame, each with one sweep over all constraints")
-    momentum_restore: bool = Field(default=True, description="false shows what XPBD does to momentum without")
+    momentum_restore: bool = Field(default=True, description="false: the momentum errors of XPBD are not corrected")
     contact: XPBDContactModel | None = Field(
         default_factory=XPBDContactModel, description="of bodies with each other and themselves; null turns it off"
     )
-    threads: int | None = Field(default=None, ge=1, le=1024, description="as the scene's size asks for, without it")
+    threads: int | None = Field(default=None, ge=1, le=1024, description="default: chosen by the size of the scene")
 
     def build(self) -> Solver:
         from supple.xpbd.contact.settings import XPBDContact
@@ -47,13 +47,13 @@ class ContactModel(Model):
     """Incremental potential contact: surfaces never intersect."""
 
     dhat: Positive | None = Field(
-        default=None, description="distance below which surfaces repel each other [m]; from the bodies without it"
+        default=None, description="distance below which surfaces repel each other [m]; default: from the bodies"
     )
     stiffness: Positive | Literal["adaptive"] = Field(
         default="adaptive", description="pressure scale of the barrier [Pa]; adaptive: from the bodies' moduli"
     )
     friction_velocity: Positive | None = Field(
-        default=None, description="relative velocity below which friction is static [m/s]; from the bodies without it"
+        default=None, description="relative velocity below which friction is static [m/s]; default: from the bodies"
     )
     friction_iterations: Iterations | None = Field(
         default=None, description="updates of friction's normal forces in a step; null: until they change by under 10 %"
@@ -70,7 +70,7 @@ class ImplicitModel(Model):
     )
     max_iterations: Iterations = Field(default=120, description="of Newton in one step")
     linear_solver: Literal["auto", "pcg", "direct"] = Field(default="auto")
-    max_substeps: Iterations = Field(default=64, description="a step that fails is halved until it would take more")
+    max_substeps: Iterations = Field(default=64, description="a failed step is halved, up to this number of substeps")
     contact: ContactModel | None = Field(
         default_factory=ContactModel, description="of bodies with all obstacles, each other and themselves; null: none"
     )
@@ -93,7 +93,7 @@ def solver_of_kind(kind: str) -> Solver:
 
     Raises
     ------
-    SolverError : where there is none.
+    SolverError : where there is no such kind.
     """
     if kind not in _KINDS:
         raise SolverError(f"there is no solver {kind!r}; {suggestion(kind, _KINDS)}")

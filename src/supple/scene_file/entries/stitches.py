@@ -20,13 +20,15 @@ Lengths = NonNegative | Annotated[list[NonNegative], Field(min_length=1)]
 
 class _StitchModel(Model):
     first: Name = Field(description="the body whose vertices are stitched")
-    second: Name = Field(description="what they are stitched to: a body, or an obstacle of triangles")
-    max_distance: Positive | None = Field(default=None, description="stitch what is nearer than this at the start [m]")
+    second: Name = Field(description="a body, or an obstacle of triangles")
+    max_distance: Positive | None = Field(
+        default=None, description="stitch all pairs nearer than this at the start [m]"
+    )
     pairing: Literal["closest", "all"] = Field(
-        default="closest", description="what a vertex is stitched to: the nearest one, or all within max_distance"
+        default="closest", description="partners of a vertex: the closest, or all within max_distance"
     )
     damping: NonNegative = Field(default=0.0, description="Kelvin-Voigt time [s]")
-    name: Name | None = Field(default=None, description="stands in messages")
+    name: Name | None = Field(default=None, description="used in messages")
 
     def shared(self) -> dict[str, Any]:
         return {key: getattr(self, key) for key in type(self).model_fields if key != "kind"}
@@ -40,9 +42,11 @@ class SoftVertexTriangleModel(_StitchModel):
     pairs: PairList | None = Field(default=None, description="[vertex of the first, surface triangle of the second]")
     youngs: PerPair | None = Field(default=None, description="Young's modulus [Pa]; one, or one per pair")
     poisson: PerPair | None = Field(default=None, description="Poisson's ratio, below 0.5; one, or one per pair")
-    mu: PerPair | None = Field(default=None, description="instead: as it stands in the energy [Pa]")
-    lam: PerPair | None = Field(default=None, description="as it stands in the energy [Pa]")
-    min_separate_distance: PerPair = Field(default=1e-3, description="least distance at rest [m]; one, or one per pair")
+    mu: PerPair | None = Field(default=None, description="instead of `youngs`: Lamé parameter mu [Pa]")
+    lam: PerPair | None = Field(default=None, description="instead of `poisson`: Lamé parameter lambda [Pa]")
+    min_separate_distance: PerPair = Field(
+        default=1e-3, description="smallest distance at rest [m]; one, or one per pair"
+    )
 
     def build(self) -> Stitch:
         return SoftVertexTriangleStitch(**self.shared())
@@ -50,7 +54,7 @@ class SoftVertexTriangleModel(_StitchModel):
 
 class _SpringModel(_StitchModel):
     stiffness: PerPair = Field(description="of each spring [N/m]; one, or one per pair")
-    rest_length: Lengths | None = Field(default=None, description="[m]; the distance at the start without it")
+    rest_length: Lengths | None = Field(default=None, description="[m]; default: the distance at the start")
 
 
 class VertexVertexModel(_SpringModel):

@@ -1,0 +1,78 @@
+"""Every package that the code imports is declared in pyproject.toml, and every declared package is imported."""
+
+import ast
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import supple
+
+SOURCES = Path(supple.__file__).parent
+TESTS = Path(__file__).parent
+# Packages that are imported under another name than they are installed with.
+IMPORT_NAMES = {
+    "imageio-ffmpeg": "imageio_ffmpeg",
+    "mapbox-earcut": "mapbox_earcut",
+    "pillow": "PIL",
+    "pydantic-core": "pydantic_core",
+    "pyyaml": "yaml",
+    "scikit-image": "skimage",
+    "usd-core": "pxr",
+}
+# Development tools that are run, or loaded by pytest; no test imports them.
+TOOLS = {"pyright", "pytest-benchmark", "pytest-xdist", "ruff"}
+OWN = {"supple", "tests", "benchmarks"}
+
+
+def imported_packages(folder):
+    """Import name of each package outside the standard library, and one place that imports it."""
+    found = {}
+    for path in sorted(folder.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom) and node.level == 0:
+                names = [node.module]
+            elif isinstance(node, ast.Call) and ast.unparse(node.func) in ("pytest.importorskip", "import_module"):
+                names = [argument.value for argument in node.args[:1] if isinstance(argument, ast.Constant)]
+            else:
+                continue
+            for name in names:
+                found.setdefault(name.partition(".")[0], f"{path.relative_to(folder)}:{node.lineno}")
+    return {name: place for name, place in found.items() if name not in sys.stdlib_module_names | OWN}
+
+
+def import_name(requirement):
+    """`"pyyaml>=6,<7; python_version > '3'"` as `yaml`."""
+    package = re.match(r"[A-Za-z0-9._-]+", requirement)[0].lower()
+    return IMPORT_NAMES.get(package, package)
+
+
+@pytest.fixture(scope="module")
+def project():
+    return tomllib.loads((TESTS.parent / "pyproject.toml").read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def runtime(project):
+    extras = project["project"]["optional-dependencies"].values()
+    return {import_name(r) for group in (project["project"]["dependencies"], *extras) for r in group}
+
+
+def test_every_package_that_the_library_imports_is_declared(runtime):
+    imported = imported_packages(SOURCES)
+    assert {name: imported[name] for name in imported.keys() - runtime} == {}
+
+
+def test_every_declared_package_is_imported(runtime):
+    assert runtime - imported_packages(SOURCES).keys() == set()
+
+
+def test_every_package_that_the_tests_import_is_declared(project, runtime):
+    development = {import_name(r) for r in project["dependency-groups"]["dev"]}
+    imported = imported_packages(TESTS)
+    assert {name: imported[name] for name in imported.keys() - runtime - development} == {}
+    assert development - imported.keys() - runtime == TOOLS
