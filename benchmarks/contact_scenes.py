@@ -16,6 +16,7 @@ from collections.abc import Sequence
 import supple as sp
 from supple.demos.demo import Demo
 from supple.demos.torture.registry import TORTURE
+from supple.implicit.details import ImplicitDetails
 
 MOST_STEPS = 100
 PARTS = ("contact", "elasticity", "linear_solve")
@@ -28,9 +29,10 @@ def measured(demo: Demo) -> dict[str, float]:
     converged, loaded = True, False
     for frame in sp.simulate(demo.scene(), demo.solver(), demo.dt, min(demo.steps, MOST_STEPS)):
         report, details = frame.report, frame.report.details
+        assert isinstance(details, ImplicitDetails)
         tets = len(frame.system.tets)
         converged &= report.status == "converged"
-        count = details.get("contact_count", 0)
+        count = details.contacts
         if count == 0 or not loaded:
             loaded = count > 0
             continue
@@ -38,7 +40,7 @@ def measured(demo: Demo) -> dict[str, float]:
         iterations += report.iterations
         seconds += report.wall_seconds
         for name in PARTS:
-            parts[name] += details["seconds"].get(name, 0.0)
+            parts[name] += details.seconds[name]
     steps = max(touching, 1)
     return {
         "tets": tets,
@@ -65,11 +67,11 @@ def main(names: Sequence[str] = (), quick: bool = False) -> None:
             raise SystemExit(
                 f"there is no scene {item!r}; there are {', '.join(TORTURE)}, with :small, :full, some :large"
             )
-        said = measured(demo)
+        measures = measured(demo)
         print(
-            f"{item:<16}{said['tets']:7.0f}{said['contacts']:10.0f}{said['iterations']:8.1f}{said['seconds']:9.3f}"
-            f"{said['contact']:9.0%}{said['elasticity']:9.0%}{said['linear_solve']:7.0%}"
-            f"{'' if said['converged'] else '  not every step converged'}",
+            f"{item:<16}{measures['tets']:7.0f}{measures['contacts']:10.0f}{measures['iterations']:8.1f}{measures['seconds']:9.3f}"
+            f"{measures['contact']:9.0%}{measures['elasticity']:9.0%}{measures['linear_solve']:7.0%}"
+            f"{'' if measures['converged'] else '  not every step converged'}",
             flush=True,
         )
 

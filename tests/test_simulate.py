@@ -7,9 +7,10 @@ import pytest
 
 import supple as sp
 from supple.diagnostics import measure
+from supple.implicit.contact.model import ContactModel
 from supple.simulate import NullSink
 from supple.solver import Solver
-from supple.state import State, Status, StepReport
+from supple.state import SolverDetails, State, Status, StepReport
 from supple.system import build_system, initial_state
 
 CUBE = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
@@ -34,7 +35,7 @@ class FreeFall(Solver):
         time = state.time + dt
         if len(system.pinned_vertices):
             x[system.pinned_vertices] = system.pin_targets(time)
-        return State(time, x, v), StepReport(Status.CONVERGED, 1, details={"calls": workspace["calls"]})
+        return State(time, x, v), StepReport(Status.CONVERGED, 1, details=SolverDetails(workspace["calls"]))
 
 
 class Diary:
@@ -84,7 +85,7 @@ def test_frames_carry_positions_by_body_and_a_full_report():
     np.testing.assert_allclose(report.linear_momentum, [1000.0, -9810.0, 0.0])
     np.testing.assert_allclose(report.angular_momentum, 0.0, atol=1e-9)
     assert report.wall_seconds >= 0.0
-    assert report.details == {"calls": 2}
+    assert report.details == SolverDetails(contacts=2)
 
 
 def test_sinks_see_the_start_every_frame_and_the_end():
@@ -128,6 +129,42 @@ def test_nothing_runs_before_the_first_frame_is_asked_for_but_input_is_checked()
     assert diary.log == []
 
 
+def test_a_start_that_the_solver_refuses_is_an_error_at_the_call():
+    class Picky(FreeFall):
+        def check(self, system, state, workspace):
+            raise sp.SolverError(f"refused at t = {state.time}")
+
+    with pytest.raises(sp.SolverError, match=r"refused at t = 0\.0"):
+        sp.simulate(scene(), Picky(), 0.1, 3)
+
+
+@pytest.mark.parametrize("case", ["overlap", "inverted"])
+def test_the_implicit_solver_refuses_a_start_before_any_sink_begins(case):
+    mesh = sp.TetMesh(CUBE, CUBE_TETS)
+    law = sp.NeoHookean(youngs=1e5, poisson=0.4)
+    second = {"overlap": (0.5, 0.5, 0.5), "inverted": (3, 0, 0)}[case]
+    setting = sp.Scene([sp.Body("cube", mesh, law), sp.Body("other", mesh, law, position=second)])
+    positions = {"cube": CUBE * [-1, 1, 1]} if case == "inverted" else None
+    diary = Diary()
+    with pytest.raises(sp.SuppleError, match={"overlap": "overlaps body", "inverted": "flat or inverted"}[case]):
+        sp.simulate(setting, sp.Implicit(), 0.01, 1, sinks=[diary], initial_positions=positions)
+    assert diary.log == []
+
+
+def test_a_start_is_checked_once(monkeypatch):
+    checked = []
+    plain = ContactModel.refuse_intersecting
+
+    def check(self, x, time):
+        checked.append(time)
+        plain(self, x, time)
+
+    monkeypatch.setattr(ContactModel, "refuse_intersecting", check)
+    frames = list(sp.simulate(scene(), sp.Implicit(), 0.01, 3))
+    assert [frame.report.status for frame in frames] == ["converged"] * 3
+    assert checked == [0.0]
+
+
 @pytest.mark.parametrize(
     "motion", [None, sp.Keyframes([0.0, 1.0], angles=[0.0, 3.0], axis=(1, 2, 3), pivot=(0.1, 0, 0))]
 )
@@ -148,6 +185,20 @@ def test_a_start_may_be_a_state():
     frame = next(sp.simulate(scene(gravity=(0, 0, 0)), FreeFall(), 0.5, 1, start=state))
     assert (frame.index, frame.time) == (1, 2.5)
     np.testing.assert_array_equal(frame.positions["cube"], CUBE + 1.0)
+
+
+@pytest.mark.parametrize("solver", [sp.XPBD(substeps=5), sp.Implicit()])
+def test_a_start_may_be_a_frame_of_a_recording(tmp_path, solver):
+    setting = scene(pins=[sp.Pin("cube", [0, 5])])
+    path = tmp_path / "first.vtkhdf"
+    frames = list(sp.simulate(setting, solver, 1 / 60, 3, sinks=[sp.Recorder(path)]))
+    with sp.read_recording(path) as recording:
+        again = list(sp.simulate(setting, solver, 1 / 60, 2, start=recording[-1]))
+    whole = list(sp.simulate(setting, solver, 1 / 60, 2, start=frames[-1].state))
+    assert [frame.index for frame in again] == [4, 5]
+    for one, other in zip(again, whole, strict=True):
+        assert one.time == other.time
+        assert np.array_equal(one.state.positions, other.state.positions)
 
 
 def test_initial_positions_and_velocities():

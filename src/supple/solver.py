@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import Any
 
-from supple.state import State, StepReport
+from supple.state import SolverDetails, State, StepReport
 from supple.system import System
 
 
@@ -20,6 +20,21 @@ class Solver(ABC):
         ------
         SolverError : where this solver cannot work with something in the scene; the text names it.
         """
+
+    def check(self, system: System, state: State, workspace: Any) -> None:
+        """Raise where this solver cannot start from `state`. `simulate` calls it before anything is written.
+
+        Solvers that start from any state do not override this method.
+
+        Raises
+        ------
+        SceneError, SolverError : the text names what is wrong with the state.
+        """
+        return
+
+    def initial_details(self, system: System, workspace: Any) -> SolverDetails:
+        """The details of the start, before any step: of the type and with the names that all steps have."""
+        return SolverDetails()
 
     @abstractmethod
     def step(self, system: System, state: State, dt: float, workspace: Any) -> tuple[State, StepReport]:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.implicit.details import ImplicitDetails
 from supple.output.recording.reader import Recording, read_recording
 from supple.output.recording.recorder import Recorder
 from supple.simulate import simulate
@@ -32,8 +33,18 @@ class Prescribed(Solver):
         x = path_of(state.positions, state.time, time)
         number = round(time / dt)
         status = Status.BLOCKED if number == self.stop_at else Status.CONVERGED
-        said = StepReport(status, number, self.message, 0.25 * number, {"residual": np.float64(0.5), "n": [number]})
-        return State(time, x, (x - state.positions) / dt), said
+        details = ImplicitDetails(
+            contacts=number,
+            dhat=1e-3 if number % 2 else None,
+            contact_forces={name: np.array([number, 0.5, -1.0]) for name in ("cube", "slab")} if number % 3 else {},
+            seconds={"contact": 0.25 * number, "other": 0.1},
+        )
+        report = StepReport(status, number, self.message, 0.25 * number, details)
+        return State(time, x, (x - state.positions) / dt), report
+
+    def initial_details(self, system, workspace):
+        zero = np.zeros(3)
+        return ImplicitDetails(contact_forces={"cube": zero, "slab": zero}, seconds={"contact": 0.0, "other": 0.0})
 
 
 def path_of(x: np.ndarray, before: float, after: float) -> np.ndarray:

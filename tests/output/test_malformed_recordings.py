@@ -88,7 +88,7 @@ DAMAGES = {
     "points of integers": (_set("VTKHDF/Points", np.zeros((25 * 54, 3), dtype=int)), "holds int64"),
     "times are not finite": (_set("supple/frames/time", np.full(25, np.nan)), "time is not finite"),
     "unknown status": (_set("supple/frames/status", np.full(25, 9, dtype=np.uint8)), "newer Supple"),
-    "newer format": (_newer, "format 99, this one reads 1"),
+    "newer format": (_newer, "format 99, this one reads 2"),
     "another program's": (_delete("supple"), "a VTKHDF UnstructuredGrid of another program"),
 }
 

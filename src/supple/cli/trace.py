@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from supple.errors import SolverError
+from supple.implicit.details import ImplicitDetails
 from supple.implicit.newton.trace import NewtonRow, trace_csv
 from supple.implicit.solver import Implicit
 from supple.output.files.atomic import parent_folder, whole_file
@@ -27,7 +29,7 @@ class NewtonTrace:
     def __init__(self, path: Path) -> None:
         parent_folder(path)
         self.path = path
-        self.frames: list[tuple[float, list[NewtonRow]]] = []
+        self.frames: list[tuple[float, Sequence[NewtonRow]]] = []
 
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         """Nothing has been iterated yet."""
@@ -35,7 +37,9 @@ class NewtonTrace:
 
     def write(self, frame: Frame) -> None:
         """Keep the rows of a frame."""
-        self.frames.append((frame.time, frame.report.details["newton"]))
+        details = frame.report.details
+        assert isinstance(details, ImplicitDetails)
+        self.frames.append((frame.time, details.newton))
 
     def end(self) -> None:
         """Write them all."""

@@ -56,7 +56,7 @@ class _Watch(ContactWatch):
 
     def write(self, frame: Frame) -> None:
         super().write(frame)
-        self.most = max(self.most, frame.report.details.get("contact_count", 0))
+        self.most = max(self.most, frame.report.details.contacts)
         scripted = frame.system.pin_targets(frame.time)
         off = np.abs(frame.state.positions[frame.system.pinned_vertices] - scripted)
         self.off_script = max(self.off_script, float(off.max()))

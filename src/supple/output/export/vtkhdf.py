@@ -18,10 +18,12 @@ def write_vtkhdf(recording: Recording, output: Path) -> None:
     ------
     OutputError : where the recording is damaged, or the file cannot be written.
     """
-    layout = frame_layout(len(recording.rest_positions), len(recording.tets), len(recording.obstacles))
+    layout = frame_layout(
+        len(recording.rest_positions), len(recording.tets), len(recording.obstacles), recording.details
+    )
     with whole_file(output) as fresh:
         try:
             rewrite(recording.path, fresh, layout, None, compress=True)
         except (KeyError, RuntimeError, TypeError, ValueError) as error:
-            said = " ".join(str(error).split())
-            raise OutputError(f"{recording.path}: is damaged: {said}; copy or record it again") from None
+            reason = " ".join(str(error).split())
+            raise OutputError(f"{recording.path}: is damaged: {reason}; copy or record it again") from None

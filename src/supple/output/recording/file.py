@@ -42,13 +42,12 @@ _SPARE_ROOM = 1 << 16  # for what HDF5 writes beside the numbers
 
 @dataclass(frozen=True)
 class Series:
-    """Something of which every frame has `rows` rows of one shape; or, as a heap, has room for them on average."""
+    """An array of which every frame has `rows` rows of one shape."""
 
     path: str
     rows: int
     row_shape: tuple[int, ...] = ()
     dtype: str = "<f8"
-    heap_end: str | None = None  # the series that says how many values of the heap are used after each frame
 
     @property
     def frame_bytes(self) -> int:
@@ -87,7 +86,6 @@ class RecordingFile:
             header = h5py.h5o.get_info(file["VTKHDF/Steps"].id).addr
             lengths = {h5py.h5o.get_info(item.id).addr for item in _step_datasets(file)}
             self._series = {s.path: s for s in layout.series}
-            self._rooms = {s.path: _dataset(file, s.path).nbytes for s in layout.series}
         self._file: BinaryIO = open(path, "r+b", buffering=0)  # noqa: SIM115
         self._steps = _place_of_mark(self._file, header)
         self._lengths = sorted(_place_of_length(self._file, address, capacity) for address in lengths)
@@ -99,14 +97,6 @@ class RecordingFile:
         if data.nbytes != series.frame_bytes:
             raise ValueError(f"{path}: a frame has {series.frame_bytes} bytes, not {data.nbytes}")
         self._write(self._places[path] + self.written * series.frame_bytes, data.tobytes())
-
-    def put_bytes(self, path: str, offset: int, data: bytes) -> None:
-        """Write bytes somewhere in the room of one series."""
-        self._write(self._places[path] + offset, data)
-
-    def room(self, path: str) -> int:
-        """Bytes of room of one series."""
-        return self._rooms[path]
 
     def commit(self) -> None:
         """Make the frame that was put count."""
@@ -171,16 +161,14 @@ def rewrite(source: Path, target: Path, layout: Layout, capacity: int | None, *,
     _require_room(target, fixed, length=fixed + layout.frame_bytes * (capacity or 0))
     with h5py.File(source, "r", locking=False) as old, h5py.File(target, "w", libver=("earliest", "v110")) as new:
         written = int(_dataset(old, WRITTEN)[()])
+        present = [series for series in layout.series if series.path in old]  # earlier versions wrote fewer
         _write_step_count(new, _STEPS_MARK if capacity else written)
-        _copy_static(old, new, "", {series.path for series in layout.series})
+        _copy_static(old, new, "", {series.path for series in present})
         new.create_dataset(WRITTEN, data=np.int64(written))
-        for series in layout.series:
+        for series in present:
             # VTK's copy of the times may be one frame short, where the writer was stopped between two writes.
             source_data = _dataset(old, _TIMES if series.path == STEP_TIMES else series.path)
             rows = written * series.rows
-            if series.heap_end is not None:
-                used = int(_dataset(old, series.heap_end)[written - 1])
-                rows = -(-used // int(np.prod(series.row_shape)))
             shape = (max(rows, (capacity or 0) * series.rows), *series.row_shape)
             if compress and 0 not in shape:
                 chunk = (series.rows if series.rows > 1 else min(rows, 1024), *series.row_shape)

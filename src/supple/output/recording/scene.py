@@ -20,7 +20,7 @@ from supple.simulate import Frame
 from supple.state import Status
 from supple.system import BodyRange
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 VTK_TETRA = 10
 
 
