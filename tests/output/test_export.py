@@ -286,8 +286,9 @@ def test_places_that_are_not_ours_are_left_alone(tmp_path, recorded):
     with pytest.raises(OutputError, match=r"thesis\.txt.*not ours to delete"):
         export(recorded[0], "obj", tmp_path / "mine")
     assert (tmp_path / "mine" / "thesis.txt").read_text() == "words"
+    (tmp_path / "mine.glb").mkdir()
     with pytest.raises(OutputError, match="is a folder"):
-        export(recorded[0], "glb", tmp_path / "mine")
+        export(recorded[0], "glb", tmp_path / "mine.glb")
     with pytest.raises(OutputError, match="is a file"):
         export(recorded[0], "pvd", tmp_path / "mine" / "thesis.txt")
     with pytest.raises(OutputError, match="itself, which is read"):
@@ -297,6 +298,31 @@ def test_places_that_are_not_ours_are_left_alone(tmp_path, recorded):
 def test_unknown_formats_are_refused(recorded):
     with pytest.raises(OutputError, match="no format 'stl'; take one of glb, obj, pvd"):
         export(recorded[0], "stl")
+
+
+@pytest.mark.parametrize(
+    ("to", "output", "text"),
+    [
+        ("glb", "x.obj", r"x\.obj: a file in format glb must end in \.glb; name it x\.glb"),
+        ("GLB", "x", r"x: a file in format glb must end in \.glb; name it x\.glb"),
+        ("usd", "x.html", r"must end in \.usdc or \.usda or \.usd; name it x\.usdc"),
+        ("vtkhdf", "x.vtu", r"must end in \.vtkhdf or "),
+        ("obj", "x.obj", r"x\.obj: format obj is a folder of files; name it x"),
+        ("pvd", "x.glb", r"x\.glb: format pvd is a folder of files; name it x"),
+    ],
+)
+def test_a_suffix_of_another_format_is_refused(tmp_path, recorded, to, output, text):
+    (tmp_path / "x.obj").write_text("mine")
+    with pytest.raises(OutputError, match=text) as caught:
+        export(recorded[0], to, tmp_path / output)
+    assert "\n" not in str(caught.value)
+    assert [path.name for path in tmp_path.iterdir()] == ["x.obj"]
+    assert (tmp_path / "x.obj").read_text() == "mine"
+
+
+def test_a_suffix_of_the_format_is_accepted_in_any_case(tmp_path, recorded):
+    assert export(recorded[0], "vtu", tmp_path / "last.VTU").is_file()
+    assert export(recorded[0], "obj", tmp_path / "frames.v2").is_dir()
 
 
 def test_every_format_has_its_writer():

@@ -17,8 +17,6 @@ from supple.output.drawing import OBSTACLE_COLOR, obstacle_pictures, pictures, v
 from supple.output.files.atomic import whole_file
 from supple.output.recording.reader import Recording
 
-_SUFFIXES = (".usd", ".usdc", ".usda")
-
 
 def write_usd(recording: Recording, output: Path) -> None:
     """Write bodies and obstacles to a .usdc (binary), .usda (text) or .usd file: metres, y up, one time code per frame.
@@ -29,8 +27,6 @@ def write_usd(recording: Recording, output: Path) -> None:
     """
     if find_spec("pxr") is None:
         raise OutputError("export to USD needs OpenUSD, which is not installed; pip install 'supple[usd]'")
-    if output.suffix.lower() not in _SUFFIXES:
-        raise OutputError(f"{output}: USD knows a file by its ending; name it {output.stem}.usdc")
     from pxr import Tf, Usd, UsdGeom
 
     with whole_file(output) as fresh:
