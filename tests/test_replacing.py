@@ -14,8 +14,7 @@ import pytest
 import supple as sp
 from supple import replacing
 from supple.errors import OutputError
-from supple.output.files.atomic import whole_file, whole_folder
-from supple.replacing import put_in_place, remove_abandoned, temporary_name
+from supple.replacing import put_in_place, remove_abandoned, temporary_name, whole_file, whole_folder
 
 posix = pytest.mark.skipif(os.name != "posix", reason="whether a process is gone is asked the POSIX way")
 
@@ -24,7 +23,7 @@ import os, sys
 from pathlib import Path
 import numpy as np
 import supple as sp
-from supple.output.files.atomic import whole_file, whole_folder
+from supple.replacing import whole_file, whole_folder
 from supple.replacing import temporary_name
 
 folder = Path(sys.argv[1])

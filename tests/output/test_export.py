@@ -283,7 +283,7 @@ def test_outputs_appear_whole_or_not_at_all(tmp_path, recorded, monkeypatch):
 def test_places_that_are_not_ours_are_left_alone(tmp_path, recorded):
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.txt").write_text("words")
-    with pytest.raises(OutputError, match=r"thesis\.txt.*not ours to delete"):
+    with pytest.raises(OutputError, match=r"thesis\.txt.*which Supple did not write"):
         export(recorded[0], "obj", tmp_path / "mine")
     assert (tmp_path / "mine" / "thesis.txt").read_text() == "words"
     (tmp_path / "mine.glb").mkdir()

@@ -9,7 +9,7 @@ from supple.errors import SolverError
 from supple.implicit.details import ImplicitDetails
 from supple.implicit.newton.trace import NewtonRow, trace_csv
 from supple.implicit.solver import Implicit
-from supple.output.files.atomic import parent_folder, whole_file
+from supple.replacing import parent_folder, whole_file
 from supple.simulate import Frame
 from supple.solver import Solver
 

@@ -22,9 +22,9 @@ from supple.output.drawing import (
     pictures,
     view_of,
 )
-from supple.output.files.atomic import whole_file
 from supple.output.recording.reader import Recording
 from supple.output.viser_server import server_for_a_moment
+from supple.replacing import whole_file
 
 # Bytes of moving vertices before compression, which halves them or better; longer recordings are shown with fewer
 # frames.

@@ -66,7 +66,7 @@ def mesh(
     from supple.mesh.io.tetgen_files import family_paths, is_tetgen_path, write_tetgen
     from supple.mesh.meshing.tetrahedralize import tetrahedralize_reported
     from supple.mesh.surface import SurfaceMesh
-    from supple.output.files.atomic import refuse_to_replace
+    from supple.replacing import refuse_to_replace
 
     # Before minutes of meshing, not after.
     if output.suffix.lower() not in TET_EXTENSIONS:

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshError
-from supple.mesh.io.file_group import write_together
 from supple.mesh.io.tetgen_table import Columns, Table, read_header, read_rows, read_text
 from supple.mesh.tetmesh import TetMesh
 from supple.mesh.topology import TET_EDGES, TET_FACETS, edge_keys, facet_keys
+from supple.replacing import whole_files
 
 logger = logging.getLogger(__name__)
 
@@ -118,7 +118,10 @@ def write_tetgen(mesh: TetMesh, path: str | Path, base_index: int = 1) -> dict[s
     if base_index not in (0, 1):
         raise MeshError(f"{path}: base_index must be 0 or 1, not {base_index!r}")
     paths = family_paths(path)
-    write_together({paths[suffix]: text for suffix, text in _family_text(mesh, base_index).items()})
+    with whole_files(*paths.values(), error=MeshError) as fresh:
+        for suffix, pieces in _family_text(mesh, base_index).items():
+            with fresh[paths[suffix]].open("w", encoding="ascii", newline="\n") as file:
+                file.writelines(pieces)
     return paths
 
 

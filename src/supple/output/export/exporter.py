@@ -9,9 +9,9 @@ from pathlib import Path
 
 from supple.errors import OutputError
 from supple.output.drawing import opened
-from supple.output.files.atomic import refuse_to_replace
 from supple.output.recording.reader import Recording
 from supple.output.recording.recorder import SUFFIXES as RECORDING_SUFFIXES
+from supple.replacing import refuse_to_replace
 
 Writer = Callable[[Recording, Path], None]
 

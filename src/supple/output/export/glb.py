@@ -23,8 +23,8 @@ from supple.output.drawing import (
     vertex_normals,
     view_of,
 )
-from supple.output.files.atomic import whole_file
 from supple.output.recording.reader import RecordedFrame, Recording
+from supple.replacing import whole_file
 
 logger = logging.getLogger(__name__)
 
