@@ -1,4 +1,4 @@
-"""The one loop. Whoever reads this file has seen the whole program."""
+"""The simulation loop. This file shows how the whole program works together."""
 
 from __future__ import annotations
 
@@ -75,12 +75,12 @@ class Frame:
 
     @cached_property
     def contacts(self) -> ContactPoints | None:
-        """All contacts, one by one, where the solver knows them (`Implicit`); else None."""
+        """All contacts, one by one, where the solver knows them (`Implicit`); otherwise None."""
         return None if self.find_contacts is None else self.find_contacts()
 
     @cached_property
     def det_F(self) -> NDArray[np.float64]:
-        """(m,) J of every tet, all bodies after each other."""
+        """(m,) J of every tet, in the order of the bodies."""
         F = deformation_gradients(self.state.positions, self.system.tets, self.system.rest_shape_inverse)
         return determinants(F)
 
@@ -100,7 +100,7 @@ class StartFrame(Protocol):
 
 
 class Sink(Protocol):
-    """Something that frames flow into: a recording, a progress bar, a page."""
+    """Something that receives frames: a recording, a progress bar, a page."""
 
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         """Called once, with the frame at the start."""
@@ -138,7 +138,7 @@ def simulate(
 ) -> Generator[Frame]:
     """Advance a scene and yield a frame after each step.
 
-    Ends early, after yielding the frame that says why, where the solver cannot go on.
+    Where the solver cannot continue, ends early; the report of the last frame gives the reason.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def simulate(
     solver : `XPBD(...)` or `Implicit(...)`.
     dt : time from frame to frame [s].
     steps : number of frames.
-    initial_positions, initial_velocities : by body name, (n, 3) [m], [m/s]; others start as the scene says.
+    initial_positions, initial_velocities : by body name, (n, 3) [m], [m/s]; the others start as the scene describes.
     start : a frame or state of this scene to continue from, of any solver or from a recording; excludes the two above.
     sinks : receive the start, every frame, and the end.
 

@@ -1,4 +1,4 @@
-"""What `simulate` asks of a solver."""
+"""The interface between `simulate` and solvers."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from supple.system import System
 
 
 class Solver(ABC):
-    """An immutable description of a method and its parameters; all that changes is in the State and the workspace."""
+    """An immutable description of a method and its parameters; what changes is in the State and the workspace."""
 
     @abstractmethod
     def prepare(self, system: System) -> Any:
-        """Everything that is computed once for a system: colorings, sparsity patterns, scratch arrays.
+        """What is computed once for a system: colorings, sparsity patterns, work arrays.
 
         Raises
         ------
@@ -38,4 +38,4 @@ class Solver(ABC):
 
     @abstractmethod
     def step(self, system: System, state: State, dt: float, workspace: Any) -> tuple[State, StepReport]:
-        """Advance `state` by `dt` [s]. Where that is impossible, the last good state and a named status."""
+        """Advance `state` by `dt` [s]. Where that is impossible, return the last good state and the reason."""

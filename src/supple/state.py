@@ -14,7 +14,7 @@ from supple.contact_points import ContactPoints
 
 
 class Status(StrEnum):
-    """How a step ended. Compares equal to its name as text: `report.status == "converged"`."""
+    """How a step ended. It equals its name as text: `report.status == "converged"`."""
 
     CONVERGED = "converged"
     ITERATION_LIMIT = "iteration_limit"

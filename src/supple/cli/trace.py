@@ -32,7 +32,7 @@ class NewtonTrace:
         self.frames: list[tuple[float, Sequence[NewtonRow]]] = []
 
     def begin(self, first: Frame, dt: float, steps: int) -> None:
-        """Nothing has been iterated yet."""
+        """Forget the frames of an earlier run."""
         self.frames.clear()
 
     def write(self, frame: Frame) -> None:
@@ -42,17 +42,17 @@ class NewtonTrace:
         self.frames.append((frame.time, details.newton))
 
     def end(self) -> None:
-        """Write them all."""
+        """Write all rows."""
         with whole_file(self.path) as fresh:
             fresh.write_text(trace_csv(self.frames), encoding="utf-8", newline="\n")
 
 
 def traces(path: Path | None, solver: Solver) -> list[NewtonTrace]:
-    """The sink that `--trace` asks for, if it does.
+    """The sink for `--trace`; none where the option is not given.
 
     Raises
     ------
-    SolverError : where the solver has no iterations of Newton's method to tell of.
+    SolverError : where the solver does not use Newton's method.
     """
     if path is None:
         return []

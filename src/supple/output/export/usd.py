@@ -55,9 +55,9 @@ def write_usd(recording: Recording, output: Path) -> None:
         try:
             stage.GetRootLayer().Save()
         except Tf.ErrorException as error:
-            # USD says which of its source lines failed, then why, then what it finds when it reads that back.
-            said = re.search(r"rror occurred writing file: ([^'\n]*)", str(error))
-            raise OSError(errno.EIO, said[1] if said else "USD could not write it") from None
+            # The text contains the line of USD's source, then the reason, then what USD reads back.
+            reason = re.search(r"rror occurred writing file: ([^'\n]*)", str(error))
+            raise OSError(errno.EIO, reason[1] if reason else "USD could not write it") from None
 
 
 def _define(stage, path: str, name: str, picture):
@@ -85,6 +85,6 @@ def _set_points(mesh, x, time: int | None) -> None:
 
 
 def _identifier(name: str, number: int) -> str:
-    """A name that USD allows, and that nothing else has."""
+    """A unique name that USD allows."""
     plain = "".join(c if c.isascii() and c.isalnum() else "_" for c in name)
     return f"_{number}_{plain}" if not plain or plain[0].isdigit() else f"{plain}_{number}"

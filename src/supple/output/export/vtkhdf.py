@@ -1,4 +1,4 @@
-"""A recording written again: compressed, without unused room, and whole for VTK where its writer was killed."""
+"""A copy of a recording: compressed, without unused room, and complete for VTK where its writer was killed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from supple.replacing import whole_file
 
 
 def write_vtkhdf(recording: Recording, output: Path) -> None:
-    """Copy every whole frame to a compressed VTKHDF file.
+    """Copy every complete frame to a compressed VTKHDF file.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Reading a recording back, frame by frame, without trusting what the file says of itself."""
+"""Reading a recording frame by frame. The contents of the file are checked before they are used."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class RecordedFrame:
 
     @cached_property
     def state(self) -> State:
-        """All bodies after each other."""
+        """All vertices, in the order of the bodies."""
         return State(self.time, self._rows("VTKHDF/Points"), self._rows("VTKHDF/PointData/velocities"))
 
     @cached_property
@@ -64,20 +64,20 @@ class RecordedFrame:
 
     @cached_property
     def det_F(self) -> NDArray[np.float64]:
-        """(m,) J of every tet, all bodies after each other."""
+        """(m,) J of every tet, in the order of the bodies."""
         return self._rows("VTKHDF/CellData/det_F")
 
     @cached_property
     def poses(self) -> NDArray[np.float64]:
-        """(obstacles, 3, 4) rotation and translation from where each obstacle is at time 0 to where it is now."""
+        """(obstacles, 3, 4) rotation and translation of each obstacle from its place at time 0 to this frame."""
         return self._rows("supple/frames/poses")
 
     @cached_property
     def report(self) -> Report:
         """How the step ended, and what was measured on its state.
 
-        `details` holds what `SolverDetails` says that a recording keeps; `message` is cut after 512 bytes. Both are
-        empty in recordings of version 0.1.
+        `details` contains the fields that a recording keeps (see `SolverDetails`); `message` is cut after 512 bytes.
+        Both are empty in recordings of version 0.1.
         """
         values = {name: float(self.recording.series(name)[self.number]) for name in REPORT_NUMBERS}
         vectors = {name: self.recording.series(name)[self.number] for name in REPORT_VECTORS}
@@ -103,12 +103,12 @@ class Recording(Sequence[RecordedFrame]):
     Attributes
     ----------
     path : of the file; times : (frames,) [s]
-    bodies, obstacles : what was simulated, and what it met; stitches : what joined them
+    bodies, obstacles, stitches : of the scene
     rest_positions : (n, 3) [m]; masses : (n,) [kg]; tets : (m, 4); triangles : (t, 3); rest_volumes : (m,) [m^3]
     gravity : (3,) [m/s^2]; dt : time from frame to frame [s]
     physics : the bodies' laws and what acts on them, or None where an older version wrote the recording
     details : which fields of the solver's details are kept
-    untouching : what the scene lets touch, or pass through each other
+    untouching : pairs that may touch or pass through each other
     scene_text : the scene file's text, or None; solver : its description, or None; supple_version : of the writer
     """
 
@@ -148,7 +148,7 @@ class Recording(Sequence[RecordedFrame]):
         self.scene_text = file.text("supple/scene") if "supple/scene" in file else None
         self._count = int(file.array(WRITTEN, "i", ()))
         if self._count < 1:
-            raise file.broken(f"it says that it holds {self._count} frames")
+            raise file.broken(f"its number of frames is {self._count}")
         for path, rows, shape, kind in (
             ("VTKHDF/Points", n, (3,), "f"),
             ("VTKHDF/PointData/velocities", n, (3,), "f"),
@@ -193,7 +193,7 @@ class Recording(Sequence[RecordedFrame]):
 
     @property
     def frames(self) -> Recording:
-        """The frames: the recording itself."""
+        """The recording itself, which is the sequence of its frames."""
         return self
 
     def body(self, name: str) -> RecordedBody:
@@ -222,7 +222,7 @@ class Recording(Sequence[RecordedFrame]):
         )
 
     def close(self) -> None:
-        """Close the file; frames that were not read yet cannot be read any more."""
+        """Close the file; frames that were not read before can then not be read."""
         self._file.close()
 
     def __enter__(self) -> Recording:
@@ -262,13 +262,13 @@ def _reason(error: Exception) -> str:
 
 
 def read_recording(path: str | Path) -> Recording:
-    """Open a recording: of a simulation that ended, was killed, or is running still.
+    """Open a recording, of a simulation that has ended, was killed, or is still running.
 
-    Frames are read when they are asked for. What was written after the recording was opened is not seen.
+    A frame is read when it is used. Frames that are written after the recording was opened are not in it.
 
     Raises
     ------
-    OutputError : where the file is missing, a folder, cut off, of another kind, of a newer version, or contradicts
-        itself; the text starts with the path.
+    OutputError : where the file is missing, a folder, cut off, of another kind, of a newer version, or contradictory;
+        the text starts with the path.
     """
     return Recording(path)

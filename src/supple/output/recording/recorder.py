@@ -64,20 +64,20 @@ def frame_layout(points: int, tets: int, obstacles: int, details: RecordedDetail
 class Recorder:
     """Records a simulation: `simulate(scene, solver, dt, steps, sinks=[Recorder("out/recording.vtkhdf")])`.
 
-    The file appears, in place of an older one, with the first frame in it, and holds every whole frame from then on,
-    also while it is being written and when the writer is killed.
+    The file replaces an older one when it contains the first frame. From then on it contains every complete frame, also
+    while it is being written and when the writer is killed.
 
     Parameters
     ----------
     path : of the file, ending in .vtkhdf (or .hdf, .hdf5, .h5). Its folder is made where it is missing.
     scene_text : the scene file's text, kept in the recording.
     solver : a description of the solver, kept in the recording.
-    compress : store the frames compressed once the simulation ends. Smaller, and slower to write.
+    compress : compress the frames when the simulation ends. The file is smaller and takes longer to write.
 
     Raises
     ------
-    OutputError : here for an unusable path; from `begin` and `write` where the system refuses (no permission, no
-        room). All whole frames stay readable then.
+    OutputError : from the constructor for an unusable path; from `begin` and `write` where the system reports an error
+        (no permission, no room). All complete frames stay readable.
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class Recorder:
     ) -> None:
         self.path = Path(path)
         if self.path.suffix.lower() not in SUFFIXES:
-            raise OutputError(f"{self.path}: ParaView knows a recording by its ending; name it {self.path.name}.vtkhdf")
+            raise OutputError(f"{self.path}: ParaView needs the suffix of a recording; name it {self.path.name}.vtkhdf")
         if self.path.is_dir():
             raise OutputError(f"{self.path}: is a folder; give the name of a file in it, such as recording.vtkhdf")
         self._scene_text = scene_text
@@ -96,7 +96,7 @@ class Recorder:
         self._wanted = 0
 
     def begin(self, first: Frame, dt: float, steps: int) -> None:
-        """Make the file, with the frame at the start."""
+        """Create the file, with the frame at the start."""
         from supple import __version__
 
         system = first.system
@@ -132,7 +132,7 @@ class Recorder:
             raise output_error(self.path, error) from None
 
     def end(self) -> None:
-        """Give room that was not used back, and close the file."""
+        """Release room that was not used, and close the file."""
         file, self._file = self._file, None
         if file is None:
             return
@@ -144,13 +144,13 @@ class Recorder:
             rewrite(self.path, fresh, file.layout, None, compress=self._compress)
             put_in_place(fresh, self.path)
         except (OSError, RuntimeError) as error:
-            # The recording is whole as it is; there is only unused room in it.
-            logger.warning("%s: stays larger than it must be: %s", self.path, " ".join(str(error).split()))
+            # The recording is complete; it only contains unused room.
+            logger.warning("%s: is larger than necessary: %s", self.path, " ".join(str(error).split()))
         finally:
             fresh.unlink(missing_ok=True)
 
     def _make_room(self, file: RecordingFile) -> RecordingFile:
-        """The same frames in a file with more room, which takes the place of this one."""
+        """Copy the frames to a file with more room, which replaces this one."""
         capacity = 2 * file.capacity
         if file.capacity < self._wanted:
             capacity = min(capacity, self._wanted)
@@ -175,7 +175,7 @@ class Recorder:
         file.put("VTKHDF/PointData/velocities", frame.state.velocities)
         file.put("VTKHDF/CellData/det_F", frame.det_F)
         file.put(STEP_TIMES, frame.time)
-        # VTK's own copy has its length changed a moment after the frame counts; ours does not.
+        # The length of VTK's copy of the times changes after the count of frames; this one has no length to change.
         file.put("supple/frames/time", frame.time)
         file.put("supple/frames/index", frame.index)
         file.put("supple/frames/status", list(Status).index(report.status))
