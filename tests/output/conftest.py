@@ -1,4 +1,4 @@
-"""A small scene, and a solver that moves it along known paths: what output is tested with, whatever solvers do."""
+"""A small scene, and a solver that moves it along known paths, so that tests of output do not depend on solvers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from supple.state import State, Status, StepReport
 
 @dataclass(frozen=True)
 class Prescribed(Solver):
-    """Every body swings up and down, and breathes: positions are known in closed form."""
+    """Every body is stretched and compressed along y: positions are known in closed form."""
 
     stop_at: int = -1
     message: str = ""
@@ -48,7 +48,7 @@ class Prescribed(Solver):
 
 
 def path_of(x: np.ndarray, before: float, after: float) -> np.ndarray:
-    """Positions at `after` of what is at x at `before`."""
+    """Positions at time `after` of the points that are at x at time `before`."""
     stretch = (1.0 + 0.3 * np.sin(4.0 * after)) / (1.0 + 0.3 * np.sin(4.0 * before))
     return x * [1.0, stretch, 1.0]
 
@@ -100,14 +100,14 @@ def small_scene(divisions: int = 2, material=None) -> sp.Scene:
 
 
 def record(path: Path, steps: int = 8, *, moved_by: Solver | None = None, divisions: int = 2, **options) -> list:
-    """Record the small scene; the frames that were simulated, the start not among them."""
+    """Record the small scene; returns the simulated frames, without the start."""
     sinks = [Recorder(path, **options)]
     return list(simulate(small_scene(divisions), moved_by or Prescribed(), 1 / 30, steps, sinks=sinks))
 
 
 @pytest.fixture(scope="session")
 def tools() -> SimpleNamespace:
-    """The names above, for tests: this file cannot be imported by them."""
+    """The names above: tests cannot import this file."""
     return SimpleNamespace(
         Prescribed=Prescribed, box=box, octahedron=octahedron, small_scene=small_scene, record=record
     )
@@ -115,7 +115,7 @@ def tools() -> SimpleNamespace:
 
 @pytest.fixture(scope="session")
 def recorded(tmp_path_factory) -> tuple[Path, list]:
-    """A recording of 24 steps, never to be changed, and the frames in it."""
+    """A recording of 24 steps, which tests must not change, and the frames in it."""
     path = tmp_path_factory.mktemp("recorded") / "recording.vtkhdf"
     return path, record(path, 24, scene_text="bodies: []\n", solver="Prescribed()")
 

@@ -35,12 +35,12 @@ def _set(path, value):
     return change
 
 
-def _promise(file):
+def _claim_many_values(file):
     del file["supple/masses"]
     file.create_dataset("supple/masses", (1 << 40,), "f8", chunks=(1 << 16,))
 
 
-def _promise_rows(file):
+def _claim_many_rows(file):
     del file["supple/rest_positions"]
     file.create_dataset("supple/rest_positions", (1 << 40, 3), "f8", chunks=(1 << 10, 3))
 
@@ -72,8 +72,8 @@ DAMAGES = {
     "no frames": (_set("supple/frames_written", np.int64(0)), "number of frames is 0"),
     "negative frames": (_set("supple/frames_written", np.int64(-3)), "number of frames is -3"),
     "huge count": (_set("supple/frames_written", np.int64(1 << 62)), "frames need"),
-    "huge array": (_promise, "has shape"),
-    "huge rest shape": (_promise_rows, "claims more data than the file can contain"),
+    "huge array": (_claim_many_values, "has shape"),
+    "huge rest shape": (_claim_many_rows, "claims more data than the file can contain"),
     "triangle out of range": (_far_triangle, "points to row 10000"),
     "rows out of range": (_swap_bodies, "outside of 54 vertices"),
     "no header": (_delete("supple/header"), "supple/header is missing"),
@@ -136,7 +136,7 @@ def test_folders_and_plain_hdf5(tmp_path):
         read_recording(tmp_path / "plain.h5")
 
 
-def test_files_cut_off_anywhere(tmp_path, recorded):
+def test_files_cut_at_any_position(tmp_path, recorded):
     whole = recorded[0].read_bytes()
     chance = random.Random(3)
     path = tmp_path / "cut.vtkhdf"
@@ -173,7 +173,7 @@ def _read_all(recording) -> None:
 
 
 @pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="the superuser may read everything")
-def test_files_that_may_not_be_read(tmp_path: Path, recorded):
+def test_files_without_permission_to_read(tmp_path: Path, recorded):
     path = tmp_path / "secret.vtkhdf"
     shutil.copy(recorded[0], path)
     path.chmod(0)
@@ -181,7 +181,7 @@ def test_files_that_may_not_be_read(tmp_path: Path, recorded):
         read_recording(path)
 
 
-def test_a_recording_whose_names_are_damaged_is_not_copied(tmp_path, recorded):
+def test_a_recording_with_damaged_names_is_not_copied(tmp_path, recorded):
     """The reader does not need this name, so that the file opens; HDF5 reads it when the whole file is copied."""
     data = recorded[0].read_bytes()
     name = b"NumberOfCells\0"

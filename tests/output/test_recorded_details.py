@@ -1,4 +1,4 @@
-"""What a recording keeps of a solver's details: typed, of fixed size for each frame, and equal when it is read back."""
+"""The solver's details in a recording: typed, of fixed size for each frame, and equal when they are read."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def touching_scene() -> sp.Scene:
 
 @pytest.mark.parametrize("solver", [sp.Implicit(), sp.Implicit(contact=None), sp.XPBD(substeps=4)])
 def test_details_of_a_real_run_read_back_equal(tmp_path, monkeypatch, solver):
-    """More frames than there is room for at first; the file grows only for them, not for what a step reports."""
+    """The file has room for fewer frames at first, so that it is copied to larger ones."""
     monkeypatch.setattr(recording_module, "_FIRST_FRAMES", 8)
     scene = touching_scene()
     if getattr(solver, "contact", 0) is None:
@@ -70,7 +70,7 @@ def test_details_of_a_real_run_read_back_equal(tmp_path, monkeypatch, solver):
 
 
 def test_a_recording_grows_only_with_its_frames(tmp_path):
-    """A step of many iterations takes as many bytes as one of few."""
+    """The size of a frame does not depend on the number of iterations."""
     path = tmp_path / "run.vtkhdf"
     scene = touching_scene()
     sizes = {}
@@ -82,7 +82,7 @@ def test_a_recording_grows_only_with_its_frames(tmp_path):
     assert sizes[40] - sizes[20] <= 20 * 8 * (6 * points + tets + 12 * 2 + numbers + recording_module.MESSAGE_BYTES / 8)
 
 
-def test_details_are_equal_where_what_a_recording_keeps_is_equal():
+def test_details_with_equal_recorded_fields_are_equal():
     details = ImplicitDetails(contacts=3, dhat=0.1, contact_forces={"a": np.ones(3)}, newton=("row",))
     assert details == replace(details, newton=(), reaction_forces_by_vertex={"pin": np.ones((2, 3))})
     assert details == replace(details, contact_forces={"a": np.ones(3)})
@@ -96,7 +96,7 @@ class ForeignDetails(XPBDDetails):
     temperature: float = 20.0
 
 
-def test_details_of_a_class_that_supple_does_not_know_are_kept_as_those_of_its_base(tmp_path, tools):
+def test_details_of_an_unknown_class_are_recorded_as_those_of_the_known_base(tmp_path, tools):
     @dataclass(frozen=True)
     class Foreign(tools.Prescribed):
         def initial_details(self, system, workspace):
