@@ -89,14 +89,9 @@ class StartFrame(Protocol):
     """A frame to start from: a `Frame`, or a frame of a recording."""
 
     @property
-    def index(self) -> int:
-        """Number of steps since the start."""
-        ...
-
+    def index(self) -> int: ...
     @property
-    def state(self) -> State:
-        """The state of all vertices."""
-        ...
+    def state(self) -> State: ...
 
 
 class Sink(Protocol):

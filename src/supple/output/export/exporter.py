@@ -22,15 +22,12 @@ class Format:
 
     Attributes
     ----------
-    about : what it is; home : the module in this package and the function that write it
-    suffixes : which files of it may have; none where it is a folder
-    ending : what the recording's name gets where no output is given
+    home : the module in this package, and its function that writes the format
+    suffixes : that a file of this format may have; none where the format is a folder
     """
 
-    about: str
     home: str
-    suffixes: tuple[str, ...]
-    ending: str
+    suffixes: tuple[str, ...] = ()
 
     def writer(self) -> Writer:
         module, _, name = self.home.partition(":")
@@ -38,27 +35,15 @@ class Format:
 
 
 FORMATS = {
-    "glb": Format(
-        "glTF 2.0 with morph targets: Blender, three.js, game engines", "export.glb:write_glb", (".glb",), ".glb"
-    ),
-    "obj": Format("a folder with one Wavefront OBJ for each frame", "export.obj:write_obj_folder", (), "_obj"),
-    "pvd": Format("a folder with a ParaView collection and one VTU for each frame", "export.pvd:write_pvd", (), "_pvd"),
-    "vtu": Format("the last frame as a VTK unstructured grid", "export.pvd:write_last_vtu", (".vtu",), ".vtu"),
-    "vtkhdf": Format(
-        "a recording again, compressed; repairs one whose writer was killed",
-        "export.vtkhdf:write_vtkhdf",
-        RECORDING_SUFFIXES,
-        ".small.vtkhdf",
-    ),
-    "usd": Format(
-        "Universal Scene Description, with time samples (extra: usd)",
-        "export.usd:write_usd",
-        (".usdc", ".usda", ".usd"),
-        ".usdc",
-    ),
-    "gif": Format("an animated picture (extra: video)", "export.video:write_gif", (".gif",), ".gif"),
-    "mp4": Format("a video (extra: video)", "export.video:write_mp4", (".mp4",), ".mp4"),
-    "html": Format("a page that plays it in a browser", "page:write_page", (".html", ".htm"), ".html"),
+    "glb": Format("export.glb:write_glb", (".glb",)),  # glTF 2.0 with morph targets
+    "obj": Format("export.obj:write_obj_folder"),  # one Wavefront OBJ for each frame
+    "pvd": Format("export.pvd:write_pvd"),  # a ParaView collection and one VTU for each frame
+    "vtu": Format("export.pvd:write_last_vtu", (".vtu",)),  # the last frame as a VTK unstructured grid
+    "vtkhdf": Format("export.vtkhdf:write_vtkhdf", RECORDING_SUFFIXES),  # a recording again, compressed and repaired
+    "usd": Format("export.usd:write_usd", (".usdc", ".usda", ".usd")),  # with time samples (extra: usd)
+    "gif": Format("export.video:write_gif", (".gif",)),  # (extra: video)
+    "mp4": Format("export.video:write_mp4", (".mp4",)),  # (extra: video)
+    "html": Format("page:write_page", (".html", ".htm")),  # plays the recording in a browser
 }
 
 
@@ -80,14 +65,20 @@ def export(recording: Recording | str | Path, to: str, output: str | Path | None
     name = to.lower().lstrip(".")
     if name not in FORMATS:
         raise OutputError(f"export: there is no format {to!r}; take one of {', '.join(FORMATS)}")
-    chosen = FORMATS[name]
     if output is not None:
         _require_suffix(name, Path(output))
     with opened(recording) as source:
-        path = Path(output) if output is not None else source.path.with_name(source.path.stem + chosen.ending)
+        path = Path(output) if output is not None else source.path.with_name(source.path.stem + _ending(name))
         refuse_to_replace(source.path, path)
-        chosen.writer()(source, path)
+        FORMATS[name].writer()(source, path)
     return path
+
+
+def _ending(name: str) -> str:
+    """What follows the stem of the recording in the name of the output."""
+    if not FORMATS[name].suffixes:
+        return f"_{name}"
+    return (".small" if name == "vtkhdf" else "") + FORMATS[name].suffixes[0]
 
 
 def _require_suffix(name: str, output: Path) -> None:
