@@ -16,6 +16,7 @@ from collections.abc import Sequence
 import supple as sp
 from supple.demos.demo import Demo
 from supple.demos.torture.registry import TORTURE
+from supple.implicit.details import ImplicitDetails
 
 MAX_STEPS = 100
 PARTS = ("contact", "elasticity", "linear_solve")
@@ -28,9 +29,10 @@ def measured(demo: Demo) -> dict[str, float]:
     converged, loaded = True, False
     for frame in sp.simulate(demo.scene(), demo.solver(), demo.dt, min(demo.steps, MAX_STEPS)):
         report, details = frame.report, frame.report.details
+        assert isinstance(details, ImplicitDetails)
         tets = len(frame.system.tets)
         converged &= report.status == "converged"
-        count = details.get("contact_count", 0)
+        count = details.contacts
         if count == 0 or not loaded:
             loaded = count > 0
             continue
@@ -38,7 +40,7 @@ def measured(demo: Demo) -> dict[str, float]:
         iterations += report.iterations
         seconds += report.wall_seconds
         for name in PARTS:
-            parts[name] += details["seconds"].get(name, 0.0)
+            parts[name] += details.seconds[name]
     steps = max(touching, 1)
     return {
         "tets": tets,

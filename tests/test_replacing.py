@@ -1,7 +1,8 @@
-"""Files that take each other's place, and what is left of writers that were killed."""
+"""Replacing files as a whole, and deleting what killed writers left."""
 
 from __future__ import annotations
 
+import itertools
 import os
 import subprocess
 import sys
@@ -14,18 +15,16 @@ import pytest
 import supple as sp
 from supple import replacing
 from supple.errors import OutputError
-from supple.output.files.atomic import whole_file, whole_folder
-from supple.replacing import put_in_place, remove_abandoned, temporary_name
+from supple.replacing import put_in_place, remove_abandoned, temporary_name, whole_file, whole_files, whole_folder
 
-posix = pytest.mark.skipif(os.name != "posix", reason="whether a process is gone is asked the POSIX way")
+posix = pytest.mark.skipif(os.name != "posix", reason="needs POSIX to know whether a process exists")
 
 DYING = """
 import os, sys
 from pathlib import Path
 import numpy as np
 import supple as sp
-from supple.output.files.atomic import whole_file, whole_folder
-from supple.replacing import temporary_name
+from supple.replacing import temporary_name, whole_file, whole_folder
 
 folder = Path(sys.argv[1])
 with whole_file(folder / "plot.png") as fresh, whole_folder(folder / "a_obj") as inside:
@@ -39,7 +38,7 @@ with whole_file(folder / "plot.png") as fresh, whole_folder(folder / "a_obj") as
 
 
 @posix
-def test_what_killed_writers_left_goes_with_the_next_file_that_is_whole(tmp_path):
+def test_the_next_writer_deletes_what_killed_writers_left(tmp_path):
     for _ in range(2):
         assert subprocess.run([sys.executable, "-c", DYING, str(tmp_path)], timeout=100).returncode == 9
     assert all(path.name.startswith(".") for path in tmp_path.iterdir())
@@ -62,7 +61,7 @@ def test_what_killed_writers_left_goes_with_the_next_file_that_is_whole(tmp_path
     assert names == {"plot.png", "a_obj", "ball.stl", "recording.vtkhdf", foreign.name} | tetgen
 
 
-def test_what_a_living_writer_or_another_machine_writes_is_left_alone(tmp_path, monkeypatch):
+def test_files_of_running_writers_and_of_other_machines_stay(tmp_path, monkeypatch):
     path = tmp_path / "plot.png"
     mine = temporary_name(path)
     mine.write_text("half")
@@ -78,16 +77,16 @@ def test_what_a_living_writer_or_another_machine_writes_is_left_alone(tmp_path, 
     assert {p.name for p in tmp_path.iterdir()} == {mine.name}
 
 
-def test_bytes_reach_the_disk_before_the_name_does(tmp_path, monkeypatch):
-    told = []
+def test_the_bytes_are_on_the_disk_before_the_name_changes(tmp_path, monkeypatch):
+    calls = []
     plain_sync, plain_replace = os.fsync, os.replace
 
     def sync(handle):
-        told.append("sync")
+        calls.append("sync")
         plain_sync(handle)
 
     def replace(source, target):
-        told.append(f"replace {Path(target).name}")
+        calls.append(f"replace {Path(target).name}")
         plain_replace(source, target)
 
     monkeypatch.setattr(os, "fsync", sync)
@@ -95,12 +94,50 @@ def test_bytes_reach_the_disk_before_the_name_does(tmp_path, monkeypatch):
     fresh = tmp_path / "fresh"
     fresh.write_text("x")
     put_in_place(fresh, tmp_path / "a")
-    assert told[:2] == ["sync", "replace a"]
+    assert calls[:2] == ["sync", "replace a"]
     assert (tmp_path / "a").read_text() == "x"
 
 
+def _write(fresh):
+    for path in fresh.values():
+        path.write_text("new")
+
+
+def _write_and_fail(fresh):
+    _write(fresh)
+    raise ZeroDivisionError
+
+
+@pytest.mark.parametrize("failure", [KeyboardInterrupt(), OSError(28, "No space left on device")])
+@pytest.mark.parametrize("at", range(1, 6))
+def test_a_group_is_replaced_together_or_not_at_all(tmp_path, monkeypatch, failure, at):
+    """Fail at each of the renames: two files that move aside, three that move in."""
+    paths = [tmp_path / name for name in ("a.node", "a.ele", "a.face")]
+    for path in paths[:2]:
+        path.write_text("old")
+    plain, count = os.replace, itertools.count(1)
+
+    def replace(source, target):
+        if next(count) == at:
+            raise failure
+        plain(source, target)
+
+    monkeypatch.setattr(os, "replace", replace)
+    expected = KeyboardInterrupt if isinstance(failure, KeyboardInterrupt) else sp.MeshError
+    with pytest.raises(expected), whole_files(*paths, error=sp.MeshError) as fresh:
+        _write(fresh)
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a.node": "old", "a.ele": "old"}
+
+
+def test_a_failed_block_leaves_the_old_files(tmp_path):
+    (tmp_path / "a").write_text("old")
+    with pytest.raises(ZeroDivisionError), whole_files(tmp_path / "a", tmp_path / "b") as fresh:
+        _write_and_fail(fresh)
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a": "old"}
+
+
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes with names here")
-def test_what_is_no_ordinary_file_is_not_replaced(tmp_path):
+def test_a_pipe_is_not_replaced(tmp_path):
     os.mkfifo(tmp_path / "pipe.png")
     with pytest.raises(OutputError, match=r"pipe\.png: is not an ordinary file"), whole_file(tmp_path / "pipe.png"):
         pass

@@ -1,4 +1,4 @@
-"""The one loop: what it yields, what its sinks see, and how it ends and goes on."""
+"""The simulation loop: its frames, the calls of its sinks, its end, and restarts."""
 
 from dataclasses import dataclass
 
@@ -7,9 +7,10 @@ import pytest
 
 import supple as sp
 from supple.diagnostics import measure
+from supple.implicit.contact.model import ContactModel
 from supple.simulate import NullSink
 from supple.solver import Solver
-from supple.state import State, Status, StepReport
+from supple.state import SolverDetails, State, Status, StepReport
 from supple.system import build_system, initial_state
 
 CUBE = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
@@ -18,7 +19,7 @@ CUBE_TETS = [[0, 4, 6, 7], [0, 6, 2, 7], [0, 2, 3, 7], [0, 3, 1, 7], [0, 1, 5, 7
 
 @dataclass(frozen=True)
 class FreeFall(Solver):
-    """Symplectic Euler under gravity, pins where they must be; stops at step `stops_at`."""
+    """Symplectic Euler under gravity, with pins at their targets; stops at step `stops_at`."""
 
     stops_at: int | None = None
 
@@ -34,10 +35,10 @@ class FreeFall(Solver):
         time = state.time + dt
         if len(system.pinned_vertices):
             x[system.pinned_vertices] = system.pin_targets(time)
-        return State(time, x, v), StepReport(Status.CONVERGED, 1, details={"calls": workspace["calls"]})
+        return State(time, x, v), StepReport(Status.CONVERGED, 1, details=SolverDetails(workspace["calls"]))
 
 
-class Diary:
+class CallLog:
     def __init__(self, log=None, name="", fails_at=None):
         self.log, self.name, self.fails_at = [] if log is None else log, name, fails_at
 
@@ -63,7 +64,7 @@ def scene(**changes):
 
 
 @pytest.mark.parametrize("steps", [0, 1, 7])
-def test_yields_exactly_as_many_frames_as_asked_for(steps):
+def test_yields_the_requested_number_of_frames(steps):
     frames = list(sp.simulate(scene(), FreeFall(), 0.1, steps))
     assert [frame.index for frame in frames] == list(range(1, steps + 1))
     assert [frame.time for frame in frames] == pytest.approx([0.1 * k for k in range(1, steps + 1)])
@@ -84,54 +85,90 @@ def test_frames_carry_positions_by_body_and_a_full_report():
     np.testing.assert_allclose(report.linear_momentum, [1000.0, -9810.0, 0.0])
     np.testing.assert_allclose(report.angular_momentum, 0.0, atol=1e-9)
     assert report.wall_seconds >= 0.0
-    assert report.details == {"calls": 2}
+    assert report.details == SolverDetails(contacts=2)
 
 
 def test_sinks_see_the_start_every_frame_and_the_end():
-    diary = Diary()
-    frames = list(sp.simulate(scene(), FreeFall(), 0.1, 3, sinks=[NullSink(), diary]))
-    assert diary.log == ["begin", "write 1", "write 2", "write 3", "end"]
-    assert (diary.dt, diary.steps, diary.first.index, diary.first.time) == (0.1, 3, 0, 0.0)
-    np.testing.assert_array_equal(diary.first.positions["cube"], CUBE)
+    log_sink = CallLog()
+    frames = list(sp.simulate(scene(), FreeFall(), 0.1, 3, sinks=[NullSink(), log_sink]))
+    assert log_sink.log == ["begin", "write 1", "write 2", "write 3", "end"]
+    assert (log_sink.dt, log_sink.steps, log_sink.first.index, log_sink.first.time) == (0.1, 3, 0, 0.0)
+    np.testing.assert_array_equal(log_sink.first.positions["cube"], CUBE)
     assert len(frames) == 3
 
 
-def test_a_solver_that_cannot_go_on_ends_the_loop_with_the_frame_that_says_why():
-    diary = Diary()
-    frames = list(sp.simulate(scene(), FreeFall(stops_at=3), 0.1, 10, sinks=[diary]))
+def test_a_failed_step_is_the_last_frame_and_has_the_reason():
+    log_sink = CallLog()
+    frames = list(sp.simulate(scene(), FreeFall(stops_at=3), 0.1, 10, sinks=[log_sink]))
     assert [frame.report.status for frame in frames] == ["converged", "converged", "not_finite"]
     assert frames[-1].report.message == "vertex 2 left for infinity"
-    assert diary.log == ["begin", "write 1", "write 2", "write 3", "end"]
+    assert log_sink.log == ["begin", "write 1", "write 2", "write 3", "end"]
 
 
 def test_sinks_are_ended_when_the_caller_stops_early():
-    diary = Diary()
-    frames = sp.simulate(scene(), FreeFall(), 0.1, 10, sinks=[diary])
+    log_sink = CallLog()
+    frames = sp.simulate(scene(), FreeFall(), 0.1, 10, sinks=[log_sink])
     next(frames)
     frames.close()
-    assert diary.log == ["begin", "write 1", "end"]
+    assert log_sink.log == ["begin", "write 1", "end"]
 
 
 @pytest.mark.parametrize("fails_at", ["begin", "write 2", "end"])
 def test_every_sink_is_ended_when_one_of_them_fails(fails_at):
     log = []
-    sinks = [Diary(log, "a "), Diary(log, "b ", fails_at), Diary(log, "c ")]
+    sinks = [CallLog(log, "a "), CallLog(log, "b ", fails_at), CallLog(log, "c ")]
     with pytest.raises(sp.OutputError, match=f"b : no room for {fails_at}"):
         list(sp.simulate(scene(), FreeFall(), 0.1, 2, sinks=sinks))
     begun = {line.split()[0] for line in log if line.endswith("begin")}
     assert {line.split()[0] for line in log if line.endswith("end")} == begun
 
 
-def test_nothing_runs_before_the_first_frame_is_asked_for_but_input_is_checked():
-    diary = Diary()
-    sp.simulate(scene(), FreeFall(), 0.1, 3, sinks=[diary])
-    assert diary.log == []
+def test_sinks_begin_with_the_first_frame():
+    log_sink = CallLog()
+    sp.simulate(scene(), FreeFall(), 0.1, 3, sinks=[log_sink])
+    assert log_sink.log == []
+
+
+def test_a_start_that_fails_the_check_of_the_solver_is_an_error_at_the_call():
+    class ChecksStart(FreeFall):
+        def check(self, system, state, workspace):
+            raise sp.SolverError(f"not possible at t = {state.time}")
+
+    with pytest.raises(sp.SolverError, match=r"not possible at t = 0\.0"):
+        sp.simulate(scene(), ChecksStart(), 0.1, 3)
+
+
+@pytest.mark.parametrize("case", ["overlap", "inverted"])
+def test_the_implicit_solver_checks_a_start_before_any_sink_begins(case):
+    mesh = sp.TetMesh(CUBE, CUBE_TETS)
+    law = sp.NeoHookean(youngs=1e5, poisson=0.4)
+    second = {"overlap": (0.5, 0.5, 0.5), "inverted": (3, 0, 0)}[case]
+    setting = sp.Scene([sp.Body("cube", mesh, law), sp.Body("other", mesh, law, position=second)])
+    positions = {"cube": CUBE * [-1, 1, 1]} if case == "inverted" else None
+    log_sink = CallLog()
+    with pytest.raises(sp.SuppleError, match={"overlap": "overlaps body", "inverted": "flat or inverted"}[case]):
+        sp.simulate(setting, sp.Implicit(), 0.01, 1, sinks=[log_sink], initial_positions=positions)
+    assert log_sink.log == []
+
+
+def test_a_start_is_checked_once(monkeypatch):
+    checked = []
+    plain = ContactModel.refuse_intersecting
+
+    def check(self, x, time):
+        checked.append(time)
+        plain(self, x, time)
+
+    monkeypatch.setattr(ContactModel, "refuse_intersecting", check)
+    frames = list(sp.simulate(scene(), sp.Implicit(), 0.01, 3))
+    assert [frame.report.status for frame in frames] == ["converged"] * 3
+    assert checked == [0.0]
 
 
 @pytest.mark.parametrize(
     "motion", [None, sp.Keyframes([0.0, 1.0], angles=[0.0, 3.0], axis=(1, 2, 3), pivot=(0.1, 0, 0))]
 )
-def test_a_restart_from_a_frame_goes_on_bit_for_bit(motion):
+def test_a_restart_from_a_frame_gives_the_same_bits(motion):
     setting = scene(pins=[sp.Pin("cube", [0, 5], motion)])
     whole = list(sp.simulate(setting, FreeFall(), 1 / 60, 20))
     first = list(sp.simulate(setting, FreeFall(), 1 / 60, 9))[-1]
@@ -148,6 +185,20 @@ def test_a_start_may_be_a_state():
     frame = next(sp.simulate(scene(gravity=(0, 0, 0)), FreeFall(), 0.5, 1, start=state))
     assert (frame.index, frame.time) == (1, 2.5)
     np.testing.assert_array_equal(frame.positions["cube"], CUBE + 1.0)
+
+
+@pytest.mark.parametrize("solver", [sp.XPBD(substeps=5), sp.Implicit()])
+def test_a_start_may_be_a_frame_of_a_recording(tmp_path, solver):
+    setting = scene(pins=[sp.Pin("cube", [0, 5])])
+    path = tmp_path / "first.vtkhdf"
+    frames = list(sp.simulate(setting, solver, 1 / 60, 3, sinks=[sp.Recorder(path)]))
+    with sp.read_recording(path) as recording:
+        again = list(sp.simulate(setting, solver, 1 / 60, 2, start=recording[-1]))
+    whole = list(sp.simulate(setting, solver, 1 / 60, 2, start=frames[-1].state))
+    assert [frame.index for frame in again] == [4, 5]
+    for one, other in zip(again, whole, strict=True):
+        assert one.time == other.time
+        assert np.array_equal(one.state.positions, other.state.positions)
 
 
 def test_initial_positions_and_velocities():
@@ -176,7 +227,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("changes", "error", "words"), WRONG)
-def test_what_cannot_be_simulated_is_refused_at_the_call(changes, error, words):
+def test_invalid_input_is_an_error_at_the_call(changes, error, words):
     call = {"scene": scene(), "solver": FreeFall(), "dt": 0.1, "steps": 3, **changes}
     with pytest.raises(error, match=words):
         sp.simulate(call.pop("scene"), call.pop("solver"), call.pop("dt"), call.pop("steps"), **call)

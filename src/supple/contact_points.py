@@ -1,4 +1,4 @@
-"""Where surfaces touch, as arrays: for whoever wants to draw contacts or sum their forces."""
+"""Contacts as arrays, to draw them or to add up their forces."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ class ContactPoints:
 
     Attributes
     ----------
-    points : (k, 3) in the middle between the two nearest points [m]
-    normals : (k, 3) unit vectors from the second thing to the first
-    forces : (k, 3) on the first thing, along the normal [N]; the second feels the opposite
+    points : (k, 3) midpoints between the two nearest points [m]
+    normals : (k, 3) unit vectors from the second to the first
+    forces : (k, 3) on the first, along the normal [N]; the force on the second is opposite
     distances : (k,) [m]
-    first, second : (k,) which bodies and obstacles they are: indices into `names`
+    first, second : (k,) the two bodies or obstacles: indices into `names`
     names : of all bodies, and after them of all obstacles
     """
 
@@ -34,7 +34,7 @@ class ContactPoints:
         return len(self.points)
 
     def force_between(self, on: str, by: str) -> NDArray[np.float64]:
-        """(3,) the total normal force on one thing by another [N]."""
+        """(3,) the total normal force on one body or obstacle by another [N]."""
         a, b = self.names.index(on), self.names.index(by)
         forward = self.forces[(self.first == a) & (self.second == b)].sum(axis=0)
         backward = self.forces[(self.first == b) & (self.second == a)].sum(axis=0)

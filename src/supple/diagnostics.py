@@ -1,4 +1,4 @@
-"""Numbers that say whether a state can be trusted: energies, momenta, and the worst tetrahedron."""
+"""Measurements on a state: energies, momenta, and the most compressed tetrahedron."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Diagnostics:
 
 @np.errstate(over="ignore", invalid="ignore")
 def measure(system: System, state: State) -> Diagnostics:
-    """Measure a state. Where its numbers are too large for double precision, what is measured is not finite."""
+    """Measure a state. Where its numbers are too large for double precision, the results are not finite."""
     m, x, v = system.masses, state.positions, state.velocities
     center = m @ x / m.sum()
     momentum = m @ v

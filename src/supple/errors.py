@@ -1,4 +1,4 @@
-"""The errors a user can meet. Each text names the thing, what is wrong with it, and the mend."""
+"""The errors that Supple raises. Each text names the thing, what is wrong with it, and the remedy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The one loop. Whoever reads this file has seen the whole program."""
+"""The simulation loop. This file shows how the whole program works together."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -18,7 +18,7 @@ from supple.diagnostics import Diagnostics, deformation_gradients, determinants,
 from supple.errors import SceneError, SolverError
 from supple.scene.scene import Scene
 from supple.solver import Solver
-from supple.state import State, Status, StepReport
+from supple.state import SolverDetails, State, Status, StepReport
 from supple.system import System, build_system, initial_state
 
 # Beyond these, dt^2 and 1 / dt^2 leave what float64 can hold.
@@ -27,7 +27,7 @@ _DT_RANGE = (1e-30, 1e30)
 
 @dataclass(frozen=True, eq=False)
 class Report(Diagnostics):
-    """What is known of one frame: how its step ended, and what was measured on its state.
+    """How the step of one frame ended, and what was measured on its state.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Report(Diagnostics):
     wall_seconds: float
     message: str = ""
     min_distance: float | None = None
-    details: dict[str, Any] = field(default_factory=dict)
+    details: SolverDetails = field(default_factory=SolverDetails)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,18 +75,27 @@ class Frame:
 
     @cached_property
     def contacts(self) -> ContactPoints | None:
-        """All contacts, one by one, where the solver knows them (`Implicit`); else None."""
+        """All contacts, one by one, where the solver knows them (`Implicit`); otherwise None."""
         return None if self.find_contacts is None else self.find_contacts()
 
     @cached_property
     def det_F(self) -> NDArray[np.float64]:
-        """(m,) J of every tet, all bodies after each other."""
+        """(m,) J of every tet, in the order of the bodies."""
         F = deformation_gradients(self.state.positions, self.system.tets, self.system.rest_shape_inverse)
         return determinants(F)
 
 
+class StartFrame(Protocol):
+    """A frame to start from: a `Frame`, or a frame of a recording."""
+
+    @property
+    def index(self) -> int: ...
+    @property
+    def state(self) -> State: ...
+
+
 class Sink(Protocol):
-    """Something that frames flow into: a recording, a progress bar, a page."""
+    """Something that receives frames: a recording, a progress bar, a page."""
 
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         """Called once, with the frame at the start."""
@@ -119,12 +128,12 @@ def simulate(
     *,
     initial_positions: Mapping[str, ArrayLike] | None = None,
     initial_velocities: Mapping[str, ArrayLike] | None = None,
-    start: Frame | State | None = None,
+    start: StartFrame | State | None = None,
     sinks: Sequence[Sink] = (),
 ) -> Generator[Frame]:
     """Advance a scene and yield a frame after each step.
 
-    Ends early, after yielding the frame that says why, where the solver cannot go on.
+    Where the solver cannot continue, ends early; the report of the last frame gives the reason.
 
     Parameters
     ----------
@@ -132,8 +141,8 @@ def simulate(
     solver : `XPBD(...)` or `Implicit(...)`.
     dt : time from frame to frame [s].
     steps : number of frames.
-    initial_positions, initial_velocities : by body name, (n, 3) [m], [m/s]; others start as the scene says.
-    start : a frame (of this scene, from either solver) to go on from; excludes the two above.
+    initial_positions, initial_velocities : by body name, (n, 3) [m], [m/s]; the others start as the scene describes.
+    start : a frame or state of this scene to continue from, of any solver or from a recording; excludes the two above.
     sinks : receive the start, every frame, and the end.
 
     Raises
@@ -156,15 +165,18 @@ def simulate(
         start = initial_state(scene, initial_positions, initial_velocities)
     first = first_frame(scene, start)
     workspace = solver.prepare(first.system)
+    solver.check(first.system, first.state, workspace)
+    details = solver.initial_details(first.system, workspace)
+    first = replace(first, report=replace(first.report, details=details))
     return _steps(first, solver, float(dt), int(steps), workspace, sinks)
 
 
-def first_frame(scene: Scene, start: Frame | State) -> Frame:
+def first_frame(scene: Scene, start: StartFrame | State) -> Frame:
     """The frame at the start: number 0 (or that of `start`), before any step."""
-    if not isinstance(start, (Frame, State)):
-        raise SceneError(f"simulate: start is a {type(start).__name__}; give a Frame, or a State")
-    state = start.state if isinstance(start, Frame) else start
-    index = start.index if isinstance(start, Frame) else 0
+    state = start if isinstance(start, State) else getattr(start, "state", None)
+    if not isinstance(state, State):
+        raise SceneError(f"simulate: start is a {type(start).__name__}; give a Frame, a recorded frame, or a State")
+    index = 0 if isinstance(start, State) else start.index
     if not all(np.isfinite(values).all() for values in (state.time, state.positions, state.velocities)):
         raise SceneError("simulate: start holds a value that is not finite")
     count = sum(len(body.mesh.vertices) for body in scene.bodies)
@@ -172,7 +184,7 @@ def first_frame(scene: Scene, start: Frame | State) -> Frame:
         raise SceneError(
             f"simulate: start has {len(state.positions)} vertices, the scene has {count}; give one of this scene"
         )
-    # A frame of this very scene brings the pins' anchors along, which could else be found again only up to round-off.
+    # A frame of this scene has the pins' anchors; computing them again would give them only up to round-off.
     if isinstance(start, Frame) and start.system.scene is scene:
         system = start.system
     else:
@@ -184,29 +196,29 @@ def _steps(
     first: Frame, solver: Solver, dt: float, steps: int, workspace: Any, sinks: Sequence[Sink]
 ) -> Generator[Frame]:
     system, state = first.system, first.state
-    with ExitStack() as ends:  # whatever happens, also in the end of another sink, each sink is ended
+    with ExitStack() as ends:  # ends every sink, also where another sink fails
         for sink in sinks:
             ends.callback(sink.end)
             sink.begin(first, dt, steps)
         for index in range(first.index + 1, first.index + steps + 1):
             began = time.perf_counter()
-            state, said = solver.step(system, state, dt, workspace)
+            state, step = solver.step(system, state, dt, workspace)
             seconds = time.perf_counter() - began
-            frame = Frame(index, state, system, _report(system, state, said, seconds), said.contacts)
+            frame = Frame(index, state, system, _report(system, state, step, seconds), step.contacts)
             for sink in sinks:
                 sink.write(frame)
             yield frame
-            if not said.status.can_go_on:
+            if not step.status.can_go_on:
                 break
 
 
-def _report(system: System, state: State, said: StepReport, seconds: float) -> Report:
+def _report(system: System, state: State, step: StepReport, seconds: float) -> Report:
     return Report(
         **vars(measure(system, state)),
-        status=said.status,
-        iterations=said.iterations,
+        status=step.status,
+        iterations=step.iterations,
         wall_seconds=seconds,
-        message=said.message,
-        min_distance=said.min_distance,
-        details=said.details,
+        message=step.message,
+        min_distance=step.min_distance,
+        details=step.details,
     )

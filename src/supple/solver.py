@@ -1,26 +1,41 @@
-"""What `simulate` asks of a solver."""
+"""The interface between `simulate` and solvers."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from typing import Any
 
-from supple.state import State, StepReport
+from supple.state import SolverDetails, State, StepReport
 from supple.system import System
 
 
 class Solver(ABC):
-    """An immutable description of a method and its parameters; all that changes is in the State and the workspace."""
+    """An immutable description of a method and its parameters; what changes is in the State and the workspace."""
 
     @abstractmethod
     def prepare(self, system: System) -> Any:
-        """Everything that is computed once for a system: colorings, sparsity patterns, scratch arrays.
+        """What is computed once for a system: colorings, sparsity patterns, work arrays.
 
         Raises
         ------
         SolverError : where this solver cannot work with something in the scene; the text names it.
         """
 
+    def check(self, system: System, state: State, workspace: Any) -> None:
+        """Raise where this solver cannot start from `state`. `simulate` calls it before anything is written.
+
+        Solvers that start from any state do not override this method.
+
+        Raises
+        ------
+        SceneError, SolverError : the text names what is wrong with the state.
+        """
+        return
+
+    def initial_details(self, system: System, workspace: Any) -> SolverDetails:
+        """The details of the start, before any step: of the type and with the names that all steps have."""
+        return SolverDetails()
+
     @abstractmethod
     def step(self, system: System, state: State, dt: float, workspace: Any) -> tuple[State, StepReport]:
-        """Advance `state` by `dt` [s]. Where that is impossible, the last good state and a named status."""
+        """Advance `state` by `dt` [s]. Where that is impossible, return the last good state and the reason."""

@@ -1,9 +1,9 @@
-"""What moves: the state of all vertices at one time. What a step says of itself."""
+"""The state of all vertices at one time, and the report of a step."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from typing import Any
 
@@ -14,7 +14,7 @@ from supple.contact_points import ContactPoints
 
 
 class Status(StrEnum):
-    """How a step ended. Compares equal to its name as text: `report.status == "converged"`."""
+    """How a step ended. It equals its name as text: `report.status == "converged"`."""
 
     CONVERGED = "converged"
     ITERATION_LIMIT = "iteration_limit"
@@ -46,16 +46,46 @@ class State:
 
 
 @dataclass(frozen=True, eq=False)
+class SolverDetails:
+    """What one solver reports of a step beyond what all solvers do. Each solver has a subclass of its own.
+
+    A field is an integer, a number, a number or None, or a mapping from names to numbers or to (3,) arrays; its keys
+    are the same in every frame, or it is empty. A recording keeps these fields. Two details are equal if these fields
+    are. Fields of any other kind have `compare=False`: a recording does not keep them.
+
+    Attributes
+    ----------
+    contacts : number of pairs in contact
+    """
+
+    contacts: int = 0
+
+    def __eq__(self, other: object) -> bool:
+        if type(self) is not type(other):
+            return NotImplemented
+        return all(
+            _are_equal(getattr(self, field.name), getattr(other, field.name)) for field in fields(self) if field.compare
+        )
+
+
+def _are_equal(one: Any, other: Any) -> bool:
+    if isinstance(one, Mapping):
+        return one.keys() == other.keys() and all(np.array_equal(one[name], other[name]) for name in one)
+    return one == other
+
+
+@dataclass(frozen=True, eq=False)
 class StepReport:
-    """What a solver says of one step; `simulate` completes it to a `Report`.
+    """What a solver reports of one step; `simulate` completes it to a `Report`.
 
     Parameters
     ----------
     status : how the step ended.
     iterations : substeps (XPBD) or Newton iterations (implicit).
-    message : for the person, where the status is not `converged`: what stopped the step, and where.
-    min_distance : smallest distance between surfaces in contact [m], or None where it is not known.
-    details : named numbers of this solver for traces and plots.
+    message : where the status is not `converged`: what stopped the step, and where.
+    min_distance : smallest distance at the end of the step between two surfaces that may touch, edges and faces
+        included [m]; None where the solver does not compute it (`XPBD`), or found nothing in the range of its contact.
+    details : what only this solver reports.
     contacts : makes the list of all contacts, for solvers that know them one by one.
     """
 
@@ -63,5 +93,5 @@ class StepReport:
     iterations: int
     message: str = ""
     min_distance: float | None = None
-    details: dict[str, Any] = field(default_factory=dict)
+    details: SolverDetails = field(default_factory=SolverDetails)
     contacts: Callable[[], ContactPoints] | None = None

@@ -53,6 +53,15 @@ def test_an_input_file_is_not_replaced(place, capsys, arguments):
     assert contents(place) == before
 
 
+def test_a_format_is_not_written_under_the_suffix_of_another(place, capsys):
+    before = contents(place)
+    assert main(["export", "r.vtkhdf", "--to", "glb", "-o", "x.obj"]) == ExitCode.INPUT
+    assert capsys.readouterr().err == (
+        "supple: x.obj: a file in format glb must end in .glb; name it x.glb, or choose another format\n"
+    )
+    assert contents(place) == before
+
+
 @pytest.mark.parametrize(
     ("existing", "message"),
     [

@@ -121,7 +121,7 @@ def test_a_floor_that_rises_lifts_a_cube():
     last = frames[-1]
     assert last.positions["cube"][:, 1].min() == pytest.approx(0.2, abs=1e-3)
     assert last.velocities["cube"][:, 1].mean() == pytest.approx(0.2, rel=2e-2)
-    assert last.report.details["contact_forces"]["cube"][1] == pytest.approx(8 * 9.81, rel=2e-2)
+    assert last.report.details.contact_forces["cube"][1] == pytest.approx(8 * 9.81, rel=2e-2)
 
 
 @pytest.mark.parametrize("kind", ["half-space", "box"])

@@ -153,6 +153,6 @@ def test_newton_iterations_go_to_the_log_at_debug(caplog):
     with caplog.at_level(logging.DEBUG, logger="supple.implicit.newton.minimize"):
         frames, _ = run(DEMOS["twist"], "implicit", steps=1)
     logged = [record.getMessage() for record in caplog.records if record.name == "supple.implicit.newton.minimize"]
-    rows = [row for row in frames[0].report.details["newton"] if row.kind == "newton"]
+    rows = [row for row in frames[0].report.details.newton if row.kind == "newton"]
     assert len(rows) >= 1
     assert sum("iteration=" in line for line in logged) == len(rows)

@@ -63,7 +63,7 @@ def test_a_scene_in_millimetres_takes_the_same_shapes():
     steps = 8
     metres = list(sp.simulate(stack.scene(2), solver, 1 / 50, steps))
     millimetres = list(sp.simulate(stack.scene(2, scale=1e-3), solver, 1 / 50, steps))
-    assert metres[-1].report.details["contact_count"] > 0
+    assert metres[-1].report.details.contacts > 0
     for large, small in zip(metres, millimetres, strict=True):
         assert small.report.status is large.report.status is Status.CONVERGED
         off = np.abs(1e3 * small.state.positions - large.state.positions).max()

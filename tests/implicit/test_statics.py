@@ -120,7 +120,7 @@ def cantilever(along, across):
     frame = equilibrium(scene)
     tip = np.isclose(mesh.vertices[:, 0], high[0])
     moved = (frame.positions["beam"] - mesh.vertices)[tip, 1].mean()
-    return -moved, frame.report.details["reaction_forces"]["pin 'wall' of body 'beam'"]
+    return -moved, frame.report.details.reaction_forces["pin 'wall' of body 'beam'"]
 
 
 def test_cantilever_approaches_timoshenko_from_below():
@@ -162,7 +162,7 @@ def test_uniaxial_stretch_with_free_sides(material, stretch, stress, lateral):
         sp.Pin("cube", right, moved(right, stretch - 1.0), name="right"),
     ]
     frame = equilibrium(sp.Scene([body], pins=pins, gravity=(0, 0, 0)))
-    pull = frame.report.details["reaction_forces"]["pin 'right' of body 'cube'"]
+    pull = frame.report.details.reaction_forces["pin 'right' of body 'cube'"]
     assert pull[0] == pytest.approx(stress, rel=1e-6)
     x = frame.positions["cube"]
     center = np.isclose(X[:, 0], X[:, 0].mean())
@@ -181,7 +181,7 @@ def test_torque_of_a_slightly_twisted_bar():
     twist = sp.Keyframes(times=[0, 1], angles=[0, theta], axis=(1, 0, 0), pivot=center)
     pins = [sp.Pin("bar", left, name="left"), sp.Pin("bar", right, twist, name="right")]
     frame = equilibrium(sp.Scene([body], pins=pins, gravity=(0, 0, 0)))
-    forces = frame.report.details["reaction_forces_by_vertex"]["pin 'right' of body 'bar'"]
+    forces = frame.report.details.reaction_forces_by_vertex["pin 'right' of body 'bar'"]
     torque = np.cross(frame.positions["bar"][right] - center, forces).sum(axis=0)
     shear = youngs / (2 * (1 + nu))
     exact = shear * 0.1406 * side**4 * theta / length
@@ -196,7 +196,7 @@ def test_a_hanging_body_weighs_on_its_pin_and_a_soft_target_stretches():
     top = np.flatnonzero(mesh.vertices[:, 1] == mesh.vertices[:, 1].max())
     weight = 9.81 * 1000 * 1e-3
     pinned = equilibrium(sp.Scene([body], pins=[sp.Pin("weight", top, name="nail")]))
-    reaction = pinned.report.details["reaction_forces"]["pin 'nail' of body 'weight'"]
+    reaction = pinned.report.details.reaction_forces["pin 'nail' of body 'weight'"]
     assert np.allclose(reaction, (0, weight, 0), atol=1e-6 * weight)
     soft = equilibrium(sp.Scene([body], soft_targets=[SoftTarget("weight", top, stiffness=200.0)]))
     sag = (soft.positions["weight"] - mesh.vertices)[top, 1].mean()
@@ -214,8 +214,8 @@ def test_the_direct_solver_and_cg_find_the_same_equilibrium():
     }
     for kind in ("direct", "auto"):
         assert np.abs(by[kind].positions["beam"] - by["pcg"].positions["beam"]).max() < 1e-9
-    assert by["direct"].report.details["direct_solves"] > 0
-    assert by["direct"].report.details["cg_iterations"] == 0
+    assert by["direct"].report.details.direct_solves > 0
+    assert by["direct"].report.details.cg_iterations == 0
 
 
 def test_a_body_on_one_nail_finds_its_hanging_place():

@@ -332,7 +332,7 @@ def test_a_failed_write_leaves_the_old_family(tmp_path: Path, monkeypatch: pytes
 
 def test_a_folder_of_the_same_name_leaves_no_file(tmp_path: Path) -> None:
     (tmp_path / "a.1.ele").mkdir()
-    with pytest.raises(MeshError, match=r"a\.1\.ele: it cannot be written: is a directory"):
+    with pytest.raises(MeshError, match=r"a\.1\.ele: is a folder"):
         write_tetgen(TetMesh(POINTS, TETS), tmp_path / "a.1.node")
     assert [p.name for p in tmp_path.iterdir()] == ["a.1.ele"]
     with pytest.raises(MeshError, match=r"cannot be written"):

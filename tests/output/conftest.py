@@ -1,4 +1,4 @@
-"""A small scene, and a solver that moves it along known paths: what output is tested with, whatever solvers do."""
+"""A small scene, and a solver that moves it along known paths, so that tests of output do not depend on solvers."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.implicit.details import ImplicitDetails
 from supple.output.recording.reader import Recording, read_recording
 from supple.output.recording.recorder import Recorder
 from supple.simulate import simulate
@@ -19,7 +20,7 @@ from supple.state import State, Status, StepReport
 
 @dataclass(frozen=True)
 class Prescribed(Solver):
-    """Every body swings up and down, and breathes: positions are known in closed form."""
+    """Every body is stretched and compressed along y: positions are known in closed form."""
 
     stop_at: int = -1
     message: str = ""
@@ -32,12 +33,22 @@ class Prescribed(Solver):
         x = path_of(state.positions, state.time, time)
         number = round(time / dt)
         status = Status.BLOCKED if number == self.stop_at else Status.CONVERGED
-        said = StepReport(status, number, self.message, 0.25 * number, {"residual": np.float64(0.5), "n": [number]})
-        return State(time, x, (x - state.positions) / dt), said
+        details = ImplicitDetails(
+            contacts=number,
+            dhat=1e-3 if number % 2 else None,
+            contact_forces={name: np.array([number, 0.5, -1.0]) for name in ("cube", "slab")} if number % 3 else {},
+            seconds={"contact": 0.25 * number, "other": 0.1},
+        )
+        report = StepReport(status, number, self.message, 0.25 * number, details)
+        return State(time, x, (x - state.positions) / dt), report
+
+    def initial_details(self, system, workspace):
+        zero = np.zeros(3)
+        return ImplicitDetails(contact_forces={"cube": zero, "slab": zero}, seconds={"contact": 0.0, "other": 0.0})
 
 
 def path_of(x: np.ndarray, before: float, after: float) -> np.ndarray:
-    """Positions at `after` of what is at x at `before`."""
+    """Positions at time `after` of the points that are at x at time `before`."""
     stretch = (1.0 + 0.3 * np.sin(4.0 * after)) / (1.0 + 0.3 * np.sin(4.0 * before))
     return x * [1.0, stretch, 1.0]
 
@@ -89,14 +100,14 @@ def small_scene(divisions: int = 2, material=None) -> sp.Scene:
 
 
 def record(path: Path, steps: int = 8, *, moved_by: Solver | None = None, divisions: int = 2, **options) -> list:
-    """Record the small scene; the frames that were simulated, the start not among them."""
+    """Record the small scene; returns the simulated frames, without the start."""
     sinks = [Recorder(path, **options)]
     return list(simulate(small_scene(divisions), moved_by or Prescribed(), 1 / 30, steps, sinks=sinks))
 
 
 @pytest.fixture(scope="session")
 def tools() -> SimpleNamespace:
-    """The names above, for tests: this file cannot be imported by them."""
+    """The names above: tests cannot import this file."""
     return SimpleNamespace(
         Prescribed=Prescribed, box=box, octahedron=octahedron, small_scene=small_scene, record=record
     )
@@ -104,7 +115,7 @@ def tools() -> SimpleNamespace:
 
 @pytest.fixture(scope="session")
 def recorded(tmp_path_factory) -> tuple[Path, list]:
-    """A recording of 24 steps, never to be changed, and the frames in it."""
+    """A recording of 24 steps, which tests must not change, and the frames in it."""
     path = tmp_path_factory.mktemp("recorded") / "recording.vtkhdf"
     return path, record(path, 24, scene_text="bodies: []\n", solver="Prescribed()")
 

@@ -1,4 +1,4 @@
-"""What is drawn: surfaces that face outward, in view of the camera."""
+"""Drawn surfaces face outward and are in view of the camera."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_frames_are_chosen_evenly(recording):
     assert len(evenly(recording, 100)) == 25
 
 
-def test_what_would_hide_the_bodies_can_be_seen_through(tmp_path, tools):
+def test_obstacles_that_would_hide_the_bodies_are_transparent(tmp_path, tools):
     scene = sp.Scene(
         bodies=[sp.Body("cube", tools.box(), sp.EdgesAndVolume(density=1000.0))],
         obstacles=[

@@ -1,4 +1,4 @@
-"""Exports are read back with other programs' readers, and must show what the recording holds."""
+"""Exports are read with the readers of other programs, and must contain the data of the recording."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _TYPES = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
 
 
 class Glb:
-    """A GLB file taken apart by hand, as the specification says."""
+    """A GLB file, read according to the specification."""
 
     def __init__(self, path):
         data = path.read_bytes()
@@ -167,7 +167,7 @@ def test_usd_has_time_samples(tmp_path, recorded, recording):
     ("to", "module", "extra"),
     [("usd", "supple.output.export.usd", "usd"), ("mp4", "supple.output.export.video", "video")],
 )
-def test_what_is_not_installed_is_named(tmp_path, recorded, monkeypatch, to, module, extra):
+def test_a_missing_package_is_named(tmp_path, recorded, monkeypatch, to, module, extra):
     monkeypatch.setattr(f"{module}.find_spec", lambda name: None)
     with pytest.raises(OutputError, match=rf"not installed; pip install 'supple\[{extra}\]'"):
         export(recorded[0], to, tmp_path / f"x.{to}")
@@ -216,8 +216,8 @@ def test_mp4_plays_every_frame_at_the_speed_of_the_simulation(tmp_path, tools):
     assert (np.abs(shown[0] - shown[4]).max(axis=2) > 30).mean() > 0.01
 
 
-def test_a_drawing_process_that_dies_is_one_clear_line(tmp_path, recorded, monkeypatch):
-    """Where OpenGL is missing, VTK aborts its process; here another one does so in its place."""
+def test_a_crash_of_the_drawing_process_is_an_error_of_one_line(tmp_path, recorded, monkeypatch):
+    """Where OpenGL is missing, VTK aborts its process; here another process does."""
     die = "import os, sys; sys.stderr.write('libEGL warning: no display\\nvtkEGLRenderWindow failed\\n'); os.abort()"
     real = subprocess.run
     monkeypatch.setattr(video.subprocess, "run", lambda _, **options: real([sys.executable, "-c", die], **options))
@@ -227,8 +227,8 @@ def test_a_drawing_process_that_dies_is_one_clear_line(tmp_path, recorded, monke
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_killed_recording_is_mended_by_exporting_it(tmp_path, tools, recorded):
-    """What a killed writer leaves: frames counted for us that VTK's part of the file does not count yet, and room."""
+def test_exporting_repairs_the_recording_of_a_killed_writer(tmp_path, tools, recorded):
+    """A killed writer leaves frames that are in our count but not yet in that of VTK, and unused room."""
     from supple.output.recording.file import RecordingFile
     from supple.output.recording.recorder import Recorder
     from supple.simulate import simulate
@@ -246,20 +246,20 @@ def test_a_killed_recording_is_mended_by_exporting_it(tmp_path, tools, recorded)
         patch.setattr(Recorder, "end", lambda self: None)
         for _ in simulate(tools.small_scene(), tools.Prescribed(), 1 / 30, 4, sinks=[Recorder(path)]):
             pass
-    mended = export(path, "vtkhdf", tmp_path / "mended.vtkhdf")
-    with read_recording(mended) as recording:
+    repaired = export(path, "vtkhdf", tmp_path / "repaired.vtkhdf")
+    with read_recording(repaired) as recording:
         assert len(recording) == 5
         np.testing.assert_array_equal(recording[4].positions["slab"], recorded[1][3].positions["slab"])
     vtk = pytest.importorskip("vtk")
     reader = vtk.vtkHDFReader()
-    reader.SetFileName(str(mended))
+    reader.SetFileName(str(repaired))
     reader.UpdateInformation()
     assert reader.GetNumberOfSteps() == 5
     times = reader.GetOutputInformation(0).Get(vtk.vtkStreamingDemandDrivenPipeline.TIME_STEPS())
     np.testing.assert_allclose(times, np.arange(5) / 30, atol=1e-12)
 
 
-def test_outputs_appear_whole_or_not_at_all(tmp_path, recorded, monkeypatch):
+def test_a_failed_export_leaves_the_old_output(tmp_path, recorded, monkeypatch):
     folder = tmp_path / "frames"
     export(recorded[0], "obj", folder)
     before = {f.name: f.stat().st_mtime_ns for f in folder.iterdir()}
@@ -277,17 +277,18 @@ def test_outputs_appear_whole_or_not_at_all(tmp_path, recorded, monkeypatch):
     assert {f.name: f.stat().st_mtime_ns for f in folder.iterdir()} == before
     assert (tmp_path / "old.glb").read_bytes() == b"old"
     assert sorted(f.name for f in tmp_path.iterdir()) == ["frames", "old.glb"]
-    export(recorded[0], "obj", folder)  # our own folder is replaced
+    export(recorded[0], "obj", folder)  # a folder that Supple wrote is replaced
 
 
-def test_places_that_are_not_ours_are_left_alone(tmp_path, recorded):
+def test_files_of_other_programs_are_not_replaced(tmp_path, recorded):
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.txt").write_text("words")
-    with pytest.raises(OutputError, match=r"thesis\.txt.*not ours to delete"):
+    with pytest.raises(OutputError, match=r"thesis\.txt.*which Supple did not write"):
         export(recorded[0], "obj", tmp_path / "mine")
     assert (tmp_path / "mine" / "thesis.txt").read_text() == "words"
+    (tmp_path / "mine.glb").mkdir()
     with pytest.raises(OutputError, match="is a folder"):
-        export(recorded[0], "glb", tmp_path / "mine")
+        export(recorded[0], "glb", tmp_path / "mine.glb")
     with pytest.raises(OutputError, match="is a file"):
         export(recorded[0], "pvd", tmp_path / "mine" / "thesis.txt")
     with pytest.raises(OutputError, match="itself, which is read"):
@@ -297,6 +298,31 @@ def test_places_that_are_not_ours_are_left_alone(tmp_path, recorded):
 def test_unknown_formats_are_refused(recorded):
     with pytest.raises(OutputError, match="no format 'stl'; take one of glb, obj, pvd"):
         export(recorded[0], "stl")
+
+
+@pytest.mark.parametrize(
+    ("to", "output", "text"),
+    [
+        ("glb", "x.obj", r"x\.obj: a file in format glb must end in \.glb; name it x\.glb"),
+        ("GLB", "x", r"x: a file in format glb must end in \.glb; name it x\.glb"),
+        ("usd", "x.html", r"must end in \.usdc or \.usda or \.usd; name it x\.usdc"),
+        ("vtkhdf", "x.vtu", r"must end in \.vtkhdf or "),
+        ("obj", "x.obj", r"x\.obj: format obj is a folder of files; name it x"),
+        ("pvd", "x.glb", r"x\.glb: format pvd is a folder of files; name it x"),
+    ],
+)
+def test_a_suffix_of_another_format_is_refused(tmp_path, recorded, to, output, text):
+    (tmp_path / "x.obj").write_text("mine")
+    with pytest.raises(OutputError, match=text) as caught:
+        export(recorded[0], to, tmp_path / output)
+    assert "\n" not in str(caught.value)
+    assert [path.name for path in tmp_path.iterdir()] == ["x.obj"]
+    assert (tmp_path / "x.obj").read_text() == "mine"
+
+
+def test_a_suffix_of_the_format_is_accepted_in_any_case(tmp_path, recorded):
+    assert export(recorded[0], "vtu", tmp_path / "last.VTU").is_file()
+    assert export(recorded[0], "obj", tmp_path / "frames.v2").is_dir()
 
 
 def test_every_format_has_its_writer():

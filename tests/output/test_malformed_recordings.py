@@ -1,4 +1,4 @@
-"""Whatever a recording's file holds, the reader answers with frames or with one clear line."""
+"""For any contents of the file, the reader returns frames or raises an error of one line."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ def _set(path, value):
     return change
 
 
-def _promise(file):
+def _claim_many_values(file):
     del file["supple/masses"]
     file.create_dataset("supple/masses", (1 << 40,), "f8", chunks=(1 << 16,))
 
 
-def _promise_rows(file):
+def _claim_many_rows(file):
     del file["supple/rest_positions"]
     file.create_dataset("supple/rest_positions", (1 << 40, 3), "f8", chunks=(1 << 10, 3))
 
@@ -69,15 +69,15 @@ def _swap_bodies(file):
 
 DAMAGES = {
     "more frames than rows": (_set("supple/frames_written", np.int64(26)), "26 frames need"),
-    "no frames": (_set("supple/frames_written", np.int64(0)), "holds 0 frames"),
-    "negative frames": (_set("supple/frames_written", np.int64(-3)), "holds -3 frames"),
+    "no frames": (_set("supple/frames_written", np.int64(0)), "number of frames is 0"),
+    "negative frames": (_set("supple/frames_written", np.int64(-3)), "number of frames is -3"),
     "huge count": (_set("supple/frames_written", np.int64(1 << 62)), "frames need"),
-    "huge array": (_promise, "has shape"),
-    "huge rest shape": (_promise_rows, "promises more than the file can hold"),
+    "huge array": (_claim_many_values, "has shape"),
+    "huge rest shape": (_claim_many_rows, "claims more data than the file can contain"),
     "triangle out of range": (_far_triangle, "points to row 10000"),
     "rows out of range": (_swap_bodies, "outside of 54 vertices"),
     "no header": (_delete("supple/header"), "supple/header is missing"),
-    "header is no JSON": (_set("supple/header", "{"), "header is not the JSON"),
+    "header is no JSON": (_set("supple/header", "{"), "header is not the expected JSON"),
     "header is a number": (_set("supple/header", 3.0), "is no text"),
     "no bodies": (_header(bodies=[]), "no bodies"),
     "no time step": (_header(dt=0.0), "no time step"),
@@ -88,28 +88,28 @@ DAMAGES = {
     "points of integers": (_set("VTKHDF/Points", np.zeros((25 * 54, 3), dtype=int)), "holds int64"),
     "times are not finite": (_set("supple/frames/time", np.full(25, np.nan)), "time is not finite"),
     "unknown status": (_set("supple/frames/status", np.full(25, 9, dtype=np.uint8)), "newer Supple"),
-    "newer format": (_newer, "format 99, this one reads 1"),
+    "newer format": (_newer, "format 99, this one reads 2"),
     "another program's": (_delete("supple"), "a VTKHDF UnstructuredGrid of another program"),
 }
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_damage_is_named(tmp_path, recorded, damage):
+def test_damaged_contents_are_errors_of_one_line(tmp_path, recorded, damage):
     path = tmp_path / "damaged.vtkhdf"
     shutil.copy(recorded[0], path)
-    change, said = DAMAGES[damage]
+    change, reason = DAMAGES[damage]
     with h5py.File(path, "r+") as file:
         change(file)
     with pytest.raises(OutputError) as caught:
         read_recording(path)
     text = str(caught.value)
     assert text.startswith(f"{path}: ")
-    assert said in text
+    assert reason in text
     assert "\n" not in text
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "said"),
+    ("name", "content", "reason"),
     [
         ("missing.vtkhdf", None, "there is no such file"),
         ("empty.vtkhdf", b"", "is empty"),
@@ -118,11 +118,11 @@ def test_damage_is_named(tmp_path, recorded, damage):
         ("head.vtkhdf", b"\x89HDF\r\n\x1a\n" + bytes(500), "is damaged"),
     ],
 )
-def test_files_of_another_kind(tmp_path, name, content, said):
+def test_files_that_are_not_recordings(tmp_path, name, content, reason):
     path = tmp_path / name
     if content is not None:
         path.write_bytes(content)
-    with pytest.raises(OutputError, match=said) as caught:
+    with pytest.raises(OutputError, match=reason) as caught:
         read_recording(path)
     assert "\n" not in str(caught.value)
 
@@ -136,7 +136,7 @@ def test_folders_and_plain_hdf5(tmp_path):
         read_recording(tmp_path / "plain.h5")
 
 
-def test_files_cut_off_anywhere(tmp_path, recorded):
+def test_files_cut_at_any_position(tmp_path, recorded):
     whole = recorded[0].read_bytes()
     chance = random.Random(3)
     path = tmp_path / "cut.vtkhdf"
@@ -147,12 +147,12 @@ def test_files_cut_off_anywhere(tmp_path, recorded):
         assert "\n" not in str(caught.value)
 
 
-def test_changed_bytes_give_frames_or_one_line(tmp_path, recorded):
-    """Random bytes anywhere: the reader may not notice a changed number, but it may not fall over."""
+def test_random_bytes_give_frames_or_an_error(tmp_path, recorded):
+    """Random bytes anywhere: the reader need not notice a changed number, but it must not crash."""
     whole = bytearray(recorded[0].read_bytes())
     chance = random.Random(5)
     path = tmp_path / "noisy.vtkhdf"
-    said = []
+    errors = []
     for _ in range(150):
         noisy = bytearray(whole)
         for _ in range(chance.choice([1, 4, 64])):
@@ -162,9 +162,9 @@ def test_changed_bytes_give_frames_or_one_line(tmp_path, recorded):
             with read_recording(path) as recording:
                 _read_all(recording)
         except OutputError as error:
-            said.append(str(error))
-    assert said
-    assert not any("\n" in text for text in said)
+            errors.append(str(error))
+    assert errors
+    assert not any("\n" in text for text in errors)
 
 
 def _read_all(recording) -> None:
@@ -173,7 +173,7 @@ def _read_all(recording) -> None:
 
 
 @pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="the superuser may read everything")
-def test_files_that_may_not_be_read(tmp_path: Path, recorded):
+def test_files_without_permission_to_read(tmp_path: Path, recorded):
     path = tmp_path / "secret.vtkhdf"
     shutil.copy(recorded[0], path)
     path.chmod(0)
@@ -181,8 +181,8 @@ def test_files_that_may_not_be_read(tmp_path: Path, recorded):
         read_recording(path)
 
 
-def test_a_recording_whose_names_are_damaged_is_not_copied(tmp_path, recorded):
-    """Nothing that is shown needs this name, so the file opens; HDF5 meets it when all of it is copied."""
+def test_a_recording_with_damaged_names_is_not_copied(tmp_path, recorded):
+    """The reader does not need this name, so that the file opens; HDF5 reads it when the whole file is copied."""
     data = recorded[0].read_bytes()
     name = b"NumberOfCells\0"
     assert name in data

@@ -1,4 +1,4 @@
-"""Where a system limits the size of files, as quotas do: one line, nothing half-written. HDF5 alone would crash."""
+"""Where the system limits the size of files, there is an error of one line and no partial file. HDF5 would crash."""
 
 from __future__ import annotations
 
@@ -38,28 +38,28 @@ works = {
     **{f"a.{to}": lambda to=to: export(source, ENDINGS.get(to, to), folder / f"a.{to}") for to in sys.argv[3:]},
     "video": lambda: _write_mp4(iter([np.roll(noise, k) for k in range(60)]), folder / "a.mp4", 30.0, (128, 96)),
 }
-said = {}
+results = {}
 for name, work in works.items():
     try:
         work()
-        said[name] = "done"
+        results[name] = "done"
     except (OSError, sp.SuppleError) as error:
-        said[name] = str(error)
+        results[name] = str(error)
 (folder / "a.mp4").unlink(missing_ok=True)  # its own writer renames it only when it is whole
-print(json.dumps(said))
+print(json.dumps(results))
 """
 
 
-def test_files_that_may_not_be_large_are_refused_and_leave_nothing(tmp_path, recorded):
+def test_a_limit_of_file_sizes_is_an_error_and_leaves_no_file(tmp_path, recorded):
     formats = ["vtkhdf", "glb", *(["usdc"] if find_spec("pxr") else [])]
     command = [sys.executable, "-c", IN_NO_ROOM, str(recorded[0]), str(tmp_path), *formats]
     done = subprocess.run(command, capture_output=True, text=True, timeout=200)
     assert done.returncode == 0, done.stderr[-2000:]
     assert "Traceback" not in done.stderr
-    said = json.loads(done.stdout)
-    assert said.pop("video").endswith("of 60 frames; is there room?")
-    assert set(said) == {"recording.vtkhdf", "plot.png", "mesh.ele", *(f"a.{to}" for to in formats)}
-    for name, text in said.items():
+    results = json.loads(done.stdout)
+    assert results.pop("video").endswith("of 60 frames; is there room?")
+    assert set(results) == {"recording.vtkhdf", "plot.png", "mesh.ele", *(f"a.{to}" for to in formats)}
+    for name, text in results.items():
         assert "cannot be written: File too large" in text, name
         assert "\n" not in text
     assert list(tmp_path.iterdir()) == []

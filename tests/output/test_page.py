@@ -1,4 +1,4 @@
-"""The page is opened in a browser without a network: it must play."""
+"""The page plays in a browser without a network."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def test_the_page_plays_in_a_browser(tmp_path, tools, browser, pixels):
     page.set_default_timeout(90_000)
     errors, asked = [], []
     page.on("pageerror", lambda error: errors.append(str(error)))
-    page.on("console", lambda said: errors.append(said.text) if said.type == "error" else None)
+    page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
     page.on("request", lambda request: asked.append(request.url))
     page.goto(page_file.as_uri())
     page.wait_for_selector("canvas")
@@ -40,7 +40,7 @@ def test_the_page_plays_in_a_browser(tmp_path, tools, browser, pixels):
 
 
 def _red(shot: np.ndarray) -> int:
-    """Pixels of the color of the first body; nothing else on the page has it, but the warning's orange edge."""
+    """Pixels of the color of the first body; only the orange edge of the warning has it too."""
     return int(np.count_nonzero((shot[..., 0] - shot[..., 2] > 60) & (shot[..., 1] < 140)))
 
 
@@ -48,7 +48,7 @@ def _moved(a: np.ndarray, b: np.ndarray) -> int:
     return int(np.count_nonzero(np.abs(a - b).max(axis=2) > 60))
 
 
-def test_pages_need_nothing_and_leave_no_server(tmp_path, recorded, capfd):
+def test_pages_are_self_contained_and_leave_no_server(tmp_path, recorded, capfd):
     import threading
 
     path = write_page(recorded[0], tmp_path / "index.html")

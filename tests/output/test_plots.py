@@ -1,4 +1,4 @@
-"""The plot shows the numbers of the recording, and is a picture."""
+"""The plot is a picture of the numbers in the recording."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_plots_that_cannot_be_written(tmp_path, recorded):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_pyplot_is_left_alone(tmp_path, recorded):
+def test_pyplot_is_not_used(tmp_path, recorded):
     import matplotlib.pyplot as plt
 
     plot_recording(recorded[0], tmp_path / "plot.png")
@@ -47,7 +47,7 @@ def test_pyplot_is_left_alone(tmp_path, recorded):
 
 
 @pytest.mark.parametrize("size", [1.0, 1e-7, 1e9])
-def test_the_legend_leaves_the_power_of_ten_alone(size):
+def test_the_legend_does_not_cover_the_power_of_ten(size):
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -1,4 +1,4 @@
-"""The progress bar: one line where nobody watches, a bar where somebody does."""
+"""The progress bar: a bar in a terminal, otherwise one line."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ def test_without_a_terminal_there_is_one_line(tools):
     assert re.fullmatch(r"5 of 5 frames in [\d.]+ s, [\d.]+ ms each in the solver; converged\n", text.getvalue())
 
 
-def test_an_early_stop_is_said(tools):
+def test_an_early_stop_is_reported(tools):
     text = io.StringIO()
     _run(tools, Console(file=text), stop_at=2)
     assert text.getvalue().startswith("2 of 5 frames")
     assert text.getvalue().endswith("blocked\n")
 
 
-def test_no_steps_are_no_fault(tools):
+def test_a_run_of_no_steps(tools):
     text = io.StringIO()
     _run(tools, Console(file=text), 0)
     assert text.getvalue().startswith("0 of 0 frames")

@@ -16,7 +16,7 @@ SHEET = sp.SurfaceMesh([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], [[0, 2,
 
 
 def scene():
-    """A box on a rising sheet, and a box sewn to it by all kinds of stitches."""
+    """A box on a rising sheet, and a box joined to it by all kinds of stitches."""
     mesh = sp.shapes.box((0.1, 0.1, 0.1), (1, 1, 1))
     bodies = [sp.Body("low", mesh, SOFT, position=(0, 0.06, 0)), sp.Body("high", mesh, SOFT, position=(0, 0.18, 0))]
     up = sp.Keyframes([0.0, 1.0], [[0, 0, 0], [0, 0.5, 0]])
@@ -34,7 +34,7 @@ def recorded(tmp_path_factory):
     return path, frames
 
 
-def test_at_rest_nothing_is_stored_and_stretched_it_is():
+def test_stitch_energy_is_zero_at_rest_and_positive_when_stretched():
     one = scene()
     stitching = one.stitching
     x = initial_state(one).positions
@@ -69,14 +69,14 @@ def test_reports_and_recordings_agree(recorded):
             assert segments.shape == (8, 2, 3)
             nodes = frames[0].system.stitching.tets.vertices[:, 0]
             assert np.array_equal(segments[:4, 0], kept.state.positions[nodes])
-            # The sheet rises by half a metre a second; under each corner of the box is where it was sewn on.
+            # The sheet rises by half a metre a second; under each corner of the box is where it was stitched.
             assert np.allclose(segments[:4, 1, 1], 0.5 * kept.time)
             assert np.allclose(np.abs(segments[:4, 1, [0, 2]]), 0.05)
         first = recording.stitches.segments(recording[0].state.positions, recording[0].poses)
         assert np.allclose(np.linalg.norm(first[:, 0] - first[:, 1], axis=1), [0.01] * 4 + [0.02] * 4)
 
 
-def test_the_page_draws_them_as_segments_that_move(recorded, tmp_path, monkeypatch):
+def test_the_page_draws_stitches_as_moving_segments(recorded, tmp_path, monkeypatch):
     drawn = []
 
     class Handle:
@@ -99,7 +99,7 @@ def test_the_page_draws_them_as_segments_that_move(recorded, tmp_path, monkeypat
     assert drawn[-1][1][0, 1, 1] > drawn[0][1][0, 1, 1] + 0.1
 
 
-def test_the_plot_has_their_energy_and_stretch(recorded, tmp_path, monkeypatch):
+def test_the_plot_has_energy_and_stretch_of_stitches(recorded, tmp_path, monkeypatch):
     from matplotlib.axes import Axes
 
     lines, plot = {}, Axes.plot
@@ -117,7 +117,7 @@ def test_the_plot_has_their_energy_and_stretch(recorded, tmp_path, monkeypatch):
     assert np.array_equal(lines[STITCH_LINE][1:], [report.largest_stitch_stretch for report in reports])
 
 
-def test_a_recording_of_an_earlier_version_has_none(recorded, tmp_path):
+def test_a_recording_of_an_earlier_version_has_no_stitches(recorded, tmp_path):
     path = tmp_path / "old.vtkhdf"
     path.write_bytes(recorded[0].read_bytes())
     with h5py.File(path, "r+") as file:
@@ -130,7 +130,7 @@ def test_a_recording_of_an_earlier_version_has_none(recorded, tmp_path):
     plot_recording(path, tmp_path / "plot.png")
 
 
-def test_a_recording_whose_stitches_are_broken_is_refused(recorded, tmp_path):
+def test_invalid_stitches_in_a_recording_are_an_error(recorded, tmp_path):
     path = tmp_path / "broken.vtkhdf"
     path.write_bytes(recorded[0].read_bytes())
     with h5py.File(path, "r+") as file:

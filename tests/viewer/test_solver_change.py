@@ -30,6 +30,7 @@ class TestHandover:
         assert np.abs(live.body_positions("cube") - before).max() < 1e-3
         run(live, 2)
         assert measures(live).min_distance > 0.0
+        assert measures(live).contacts > 0
         change(SetSolver("xpbd"), live)
         run(live, 2)
 

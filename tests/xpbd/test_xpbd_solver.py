@@ -123,7 +123,7 @@ def test_threads_do_not_change_a_bit(monkeypatch):
     runs = [list(sp.simulate(scene, XPBD(substeps=8, threads=threads), DT, 10))[-1] for threads in (1, 2)]
     np.testing.assert_array_equal(runs[0].state.positions, runs[1].state.positions)
     np.testing.assert_array_equal(runs[0].state.velocities, runs[1].state.velocities)
-    assert runs[0].report.details["contacts"] > 0
+    assert runs[0].report.details.contacts > 0
 
 
 @pytest.mark.parametrize("material", [JELLY, CLASSIC], ids=["neo-hookean", "edges+volume"])

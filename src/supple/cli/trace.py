@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from supple.errors import SolverError
+from supple.implicit.details import ImplicitDetails
 from supple.implicit.newton.trace import NewtonRow, trace_csv
 from supple.implicit.solver import Implicit
-from supple.output.files.atomic import parent_folder, whole_file
+from supple.replacing import parent_folder, whole_file
 from supple.simulate import Frame
 from supple.solver import Solver
 
@@ -27,28 +29,30 @@ class NewtonTrace:
     def __init__(self, path: Path) -> None:
         parent_folder(path)
         self.path = path
-        self.frames: list[tuple[float, list[NewtonRow]]] = []
+        self.frames: list[tuple[float, Sequence[NewtonRow]]] = []
 
     def begin(self, first: Frame, dt: float, steps: int) -> None:
-        """Nothing has been iterated yet."""
+        """Forget the frames of an earlier run."""
         self.frames.clear()
 
     def write(self, frame: Frame) -> None:
         """Keep the rows of a frame."""
-        self.frames.append((frame.time, frame.report.details["newton"]))
+        details = frame.report.details
+        assert isinstance(details, ImplicitDetails)
+        self.frames.append((frame.time, details.newton))
 
     def end(self) -> None:
-        """Write them all."""
+        """Write all rows."""
         with whole_file(self.path) as fresh:
             fresh.write_text(trace_csv(self.frames), encoding="utf-8", newline="\n")
 
 
 def traces(path: Path | None, solver: Solver) -> list[NewtonTrace]:
-    """The sink that `--trace` asks for, if it does.
+    """The sink for `--trace`; none where the option is not given.
 
     Raises
     ------
-    SolverError : where the solver has no iterations of Newton's method to tell of.
+    SolverError : where the solver does not use Newton's method.
     """
     if path is None:
         return []

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
 from supple.errors import SolverError
 from supple.implicit.contact.build import contact_model
+from supple.implicit.contact.points import forces_on_owners
 from supple.implicit.contact.settings import IPCContact
+from supple.implicit.details import ImplicitDetails
 from supple.implicit.energies.damping import viscosity_of
 from supple.implicit.energies.elasticity import elasticity_of
 from supple.implicit.energies.potential import HessianBlocks
@@ -26,6 +27,7 @@ from supple.implicit.stepping.integrators import Integrator, Static, integrator_
 from supple.implicit.stepping.reactions import reaction_forces
 from supple.implicit.stepping.substep import StepSettings, Substep, take_substep
 from supple.implicit.stepping.substepping import Division
+from supple.implicit.timings import PARTS
 from supple.implicit.workspace import Workspace
 from supple.solver import Solver
 from supple.state import State, Status, StepReport
@@ -134,17 +136,42 @@ class Implicit(Solver):
             damped,
         )
 
+    def check(self, system: System, state: State, workspace: Workspace) -> None:
+        """Raise where a step cannot start from `state`; see `Solver.check`.
+
+        Raises
+        ------
+        SceneError : where surfaces intersect, or a body is inside something solid.
+        SolverError : where surfaces touch, or a tet is inverted whose material has no energy there.
+        """
+        refuse_inverted(system, workspace.elasticity.material, state.positions)
+        if workspace.contact is not None:
+            workspace.contact.refuse_intersecting(workspace.with_obstacles(state).positions, state.time)
+        workspace.checked = state.positions
+
+    def initial_details(self, system: System, workspace: Workspace) -> ImplicitDetails:
+        """No iterations, and all forces zero; see `Solver.initial_details`."""
+        zero = np.zeros((len(workspace.system.rest_positions), 3))
+        pushes = {} if workspace.contact is None else forces_on_owners(workspace.contact, zero)
+        return ImplicitDetails(
+            contact_forces=pushes,
+            friction_forces=pushes,
+            reaction_forces=reaction_forces(system, zero)[0],
+            seconds=dict.fromkeys((*PARTS, "other"), 0.0),
+        )
+
     def step(self, system: System, state: State, dt: float, workspace: Workspace) -> tuple[State, StepReport]:
         """Advance by dt, in as many substeps as it takes; see `Solver.step`.
 
         Raises
         ------
-        SolverError : where the state has inverted tets of a material that has no energy there.
+        SceneError, SolverError : see `check`, which is called here for a state that is not known to pass it.
         """
-        refuse_inverted(system, workspace.elasticity.material, state.positions)
-        n = len(state.positions)
-        state = workspace.taken_in(state)
         workspace.tools.clock.restart()
+        if state.positions is not workspace.checked:
+            self.check(system, state, workspace)
+        n = len(state.positions)
+        state = workspace.with_obstacles(state)
         division = Division.of(workspace.system, state.time, dt, workspace.diagonal, self.max_substeps)
         now = state
         settings = StepSettings(integrator_of(self.integrator), self.tolerance, self.max_iterations)
@@ -166,32 +193,19 @@ class Implicit(Solver):
             substeps += 1
             division.advance()
         now = replace(now, positions=now.positions[:n], velocities=now.velocities[:n])
-        workspace.last = now.positions
-        details = _details(rows, substeps)
-        report = StepReport(worst, sum(row.kind == "newton" for row in rows), message, details=details)
+        workspace.checked = now.positions
+        details = ImplicitDetails.of_rows(rows, substeps)
+        nearest, contacts = None, None
         if last is not None:
-            gradient = last.outcome.end.gradient
-            details["reaction_forces"], details["reaction_forces_by_vertex"] = reaction_forces(system, gradient)
-            report = last.contact.completed(report, last.state.positions)
-        report.details["seconds"] = workspace.tools.clock.shares()
-        return now, report
+            totals, by_vertex = reaction_forces(system, last.outcome.end.gradient)
+            details = replace(details, reaction_forces=totals, reaction_forces_by_vertex=by_vertex)
+            details, nearest, contacts = last.contact.measured(details, last.state.positions)
+        details = replace(details, seconds=workspace.tools.clock.shares())
+        return now, StepReport(worst, details.newton_iterations, message, nearest, details, contacts)
 
 
-def _limit_message(said: str, division: Division) -> str:
+def _limit_message(message: str, division: Division) -> str:
     """Why a substep failed that may not be divided any more."""
     if division.halves == 1:
-        return said
-    return f"{said}; in a substep of {division.length:.3g} s, which max_substeps lets be no shorter"
-
-
-def _details(rows: list[NewtonRow], substeps: int) -> dict[str, Any]:
-    return {
-        "newton_iterations": sum(row.kind == "newton" for row in rows),
-        "extension_iterations": sum(row.kind == "extension" for row in rows),
-        "cg_iterations": sum(row.linear_iterations for row in rows),
-        "direct_solves": sum(row.linear_solver == "direct" for row in rows),
-        "line_search_cuts": sum(row.cuts for row in rows),
-        "filter_steps": sum(row.filter < 1.0 for row in rows),
-        "substeps": substeps,
-        "newton": rows,
-    }
+        return message
+    return f"{message}; in a substep of {division.length:.3g} s, which max_substeps lets be no shorter"

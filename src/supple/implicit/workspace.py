@@ -26,7 +26,7 @@ class Workspace:
     ----------
     system : with the obstacles' vertices after the bodies'
     diagonal : of the smallest body's bounding box at rest [m]
-    last : the positions that the latest step ended with
+    checked : the positions that `Implicit.check` has accepted, or that the latest step ended with
     """
 
     system: System
@@ -38,30 +38,20 @@ class Workspace:
     stabilizer: Stabilizer
     stitches: StitchEnergy | None
     stitch_viscosity: StitchViscosity | None
-    last: NDArray[np.float64] | None = None
+    checked: NDArray[np.float64] | None = None
 
     @property
     def bodies_end(self) -> int:
         """The first vertex that is an obstacle's."""
         return max(part.vertices.stop for part in self.system.bodies)
 
-    def taken_in(self, state: State) -> State:
-        """A state with the obstacles' vertices after the bodies'.
-
-        Raises
-        ------
-        SolverError : where a state from outside has surfaces that intersect; what a step ended with has none.
-        """
-        if self.contact is None:
+    def with_obstacles(self, state: State) -> State:
+        """The state with the obstacles' vertices after the bodies'."""
+        if self.contact is None or not self.contact.obstacles:
             return state
-        known = state.positions is self.last
-        if self.contact.obstacles:
-            there = self.contact.obstacle_positions(state.time)
-            state = replace(
-                state,
-                positions=np.concatenate([state.positions, there]),
-                velocities=np.concatenate([state.velocities, np.zeros_like(there)]),
-            )
-        if not known:
-            self.contact.refuse_intersecting(state.positions, state.time)
-        return state
+        there = self.contact.obstacle_positions(state.time)
+        return replace(
+            state,
+            positions=np.concatenate([state.positions, there]),
+            velocities=np.concatenate([state.velocities, np.zeros_like(there)]),
+        )

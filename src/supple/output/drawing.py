@@ -1,6 +1,6 @@
-"""What a recording looks like: surfaces of bodies and obstacles, their colors, and where to look from.
+"""How a recording is drawn: surfaces of bodies and obstacles, their colors, and the viewpoint.
 
-Pages, videos and exports draw from here, so that they all show the same thing.
+Pages, videos and exports use it, so that all show the same.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from supple.output.recording.reader import RecordedFrame, Recording, read_recording
 from supple.output.recording.scene import RecordedBody, RecordedObstacle
 
-# Gummy colors, told apart also by those who see few colors (after Okabe and Ito, brightened).
+# Colors that can also be distinguished with color blindness (after Okabe and Ito, brightened).
 BODY_COLORS = (
     (230, 92, 60),
     (64, 156, 225),
@@ -29,7 +29,7 @@ BODY_COLORS = (
 )
 OBSTACLE_COLOR = (176, 180, 188)
 STITCH_COLOR = (214, 40, 90)
-# A room is one surface between the eye and the bodies; walls stand behind each other, so each must be fainter.
+# A room is one surface between the eye and the bodies; walls can overlap, so that each must be more transparent.
 ROOM_OPACITY, WALL_OPACITY = 0.13, 0.05
 _SPHERE_RINGS, _SPHERE_SEGMENTS = 24, 48
 
@@ -48,13 +48,13 @@ class Picture:
         return self.body.name
 
     def at(self, frame: RecordedFrame) -> NDArray[np.float64]:
-        """Where the vertices of the drawn surface are: the skin's, or the boundary's."""
+        """Positions of the vertices of the drawn surface, the skin or the boundary."""
         x = frame.state.positions[self.body.vertices]
         return x[self.used] if self.body.skin is None else self.body.skin.positions(x)
 
 
 def pictures(recording: Recording) -> list[Picture]:
-    """One for each body: its skin where it has one, its boundary where not."""
+    """One for each body: its skin, or its boundary where it has no skin."""
     made = []
     for i, body in enumerate(recording.bodies):
         color = BODY_COLORS[i % len(BODY_COLORS)]
@@ -68,7 +68,7 @@ def pictures(recording: Recording) -> list[Picture]:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """Where everything is, over the whole recording, and where it is seen from.
+    """The bounds of a whole recording, and its viewpoint.
 
     Attributes
     ----------
@@ -86,11 +86,11 @@ class View:
 
     @property
     def radius(self) -> float:
-        """Of the ball about `center` that holds all bodies at all times [m]."""
+        """Of the ball about `center` that contains all bodies at all times [m]."""
         return max(0.5 * float(np.linalg.norm(self.high - self.low)), 1e-6)
 
     def eye(self, angle: float) -> NDArray[np.float64]:
-        """From where the ball fills a camera that sees `angle` [degrees] upwards, a little from above and aside."""
+        """The viewpoint from which the ball fills a vertical angle of view [degrees], slightly above and aside."""
         side = np.eye(3)[int(np.argmin(np.abs(self.up)))]
         ahead = np.cross(side, self.up)
         side = np.cross(self.up, ahead / np.linalg.norm(ahead))
@@ -100,7 +100,7 @@ class View:
 
 
 def view_of(recording: Recording) -> View:
-    """Bounds over all frames (at most about 200 of them are looked at)."""
+    """Bounds over all frames, of which at most about 200 are read."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for frame in recording[:: max(1, len(recording) // 200)]:
         x = frame.state.positions[np.isfinite(frame.state.positions).all(axis=1)]
@@ -116,7 +116,7 @@ def view_of(recording: Recording) -> View:
 
 @dataclass(frozen=True, eq=False)
 class ObstaclePicture:
-    """An obstacle's triangles where it is at time 0; `RecordedFrame.poses[number]` carries them on."""
+    """An obstacle's triangles in its place at time 0; `RecordedFrame.poses[number]` moves them to a frame."""
 
     number: int
     name: str
@@ -131,18 +131,18 @@ class ObstaclePicture:
 
 
 class HasObstacles(Protocol):
-    """Something with obstacles: a recording, or a scene that is on show."""
+    """Something with obstacles: a recording, or a scene on a live page."""
 
     @property
     def obstacles(self) -> Sequence[RecordedObstacle]:
-        """Where they are at time 0."""
+        """In their places at time 0."""
         ...
 
 
 def obstacle_pictures(source: HasObstacles, view: View) -> list[ObstaclePicture]:
-    """One for each obstacle. A half-space is a square about what happens.
+    """One for each obstacle. A half-space is a square around the bodies.
 
-    What would hide the bodies can be seen through: rooms, and half-spaces that are no floor.
+    Obstacles that would hide the bodies are transparent: rooms, and half-spaces that are not floors.
     """
     made = []
     for number, obstacle in enumerate(source.obstacles):
@@ -187,7 +187,7 @@ def _square(point: NDArray, normal: NDArray, view: View) -> tuple[NDArray[np.flo
 
 
 def _ball() -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """The unit sphere from rings and segments, with its poles on y."""
+    """The unit sphere, made of rings and segments; its poles are on y."""
     rings, segments = _SPHERE_RINGS, _SPHERE_SEGMENTS
     theta = np.linspace(0.0, np.pi, rings + 1)[1:-1, None]
     phi = np.linspace(0.0, 2.0 * np.pi, segments, endpoint=False)[None]
@@ -223,7 +223,7 @@ def vertex_normals(x: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDAr
 
 @contextmanager
 def opened(recording: Recording | str | Path) -> Iterator[Recording]:
-    """A recording that is open already, or one that is opened for this block."""
+    """The recording itself if it is open, otherwise one that is opened for this block."""
     if isinstance(recording, Recording):
         yield recording
     else:
@@ -232,7 +232,7 @@ def opened(recording: Recording | str | Path) -> Iterator[Recording]:
 
 
 def evenly(recording: Recording, most: int) -> list[RecordedFrame]:
-    """At most `most` frames, evenly spaced, the first and the last among them."""
+    """At most `most` frames, evenly spaced, including the first and the last."""
     if len(recording) <= most:
         return list(recording)
     chosen = np.unique(np.linspace(0, len(recording) - 1, most).round().astype(int))

@@ -1,6 +1,6 @@
-"""A page that plays a recording in a browser: one file, nothing to install, nothing from the network.
+"""A page that plays a recording in a browser: one file that needs no installation and no network.
 
-The player is viser's client (three.js), which its wheel carries; the frames travel inside the page, compressed.
+The player is the client of viser (three.js), which is in the wheel of viser; the page contains the frames, compressed.
 """
 
 from __future__ import annotations
@@ -22,19 +22,18 @@ from supple.output.drawing import (
     pictures,
     view_of,
 )
-from supple.output.files.atomic import whole_file
 from supple.output.recording.reader import Recording
-from supple.output.viser_server import server_for_a_moment
+from supple.output.viser_server import temporary_server
+from supple.replacing import whole_file
 
-# Bytes of moving vertices before compression, which halves them or better; longer recordings are shown with fewer
-# frames.
+# Bytes of moving vertices before compression, which at least halves them; pages of longer recordings have fewer frames.
 _MOST_BYTES = 36_000_000
 _ANGLE = 35.0  # of the camera, upwards [degrees]
-_RESOLUTION = 2.0**-13  # vertices are rounded to this, as a part of the size of the scene: less than a pixel
+_RESOLUTION = 2.0**-13  # to which vertices are rounded, as a share of the size of the scene: less than a pixel
 
 
 def write_page(recording: Recording | str | Path, output: str | Path) -> Path:
-    """Write `output` (such as index.html), which plays the recording in a loop wherever it is opened.
+    """Write `output` (such as index.html), which plays the recording in a loop in any browser.
 
     Raises
     ------
@@ -47,13 +46,13 @@ def write_page(recording: Recording | str | Path, output: str | Path) -> Path:
 
 
 def _page(recording: Recording) -> str:
-    with server_for_a_moment() as server:
+    with temporary_server() as server:
         text = _serialize(server, recording)
     return titled(text, ", ".join(body.name for body in recording.bodies))
 
 
 def titled(page: str, title: str) -> str:
-    """A page of viser's with a title of our own."""
+    """A page of viser with our title."""
     return page.replace("<title>Viser</title>", f"<title>{html.escape(title[:80])} · Supple</title>", 1)
 
 
@@ -74,10 +73,10 @@ def _serialize(server: Any, recording: Recording) -> str:
     size = sum(12 * len(picture.at(first)) for picture in drawn) + 24 * len(recording.stitches)
     frames = evenly(recording, max(2, _MOST_BYTES // max(1, size)))
     serializer = server.get_scene_serializer()
-    shown = first.time
+    previous = first.time
     for frame in frames[1:]:
-        serializer.insert_sleep(max(0.0, frame.time - shown))
-        shown = frame.time
+        serializer.insert_sleep(max(0.0, frame.time - previous))
+        previous = frame.time
         for handle, picture in zip(handles, drawn, strict=True):
             handle.vertices = _rounded(picture.at(frame), quantum)
         if stitches is not None:
@@ -105,7 +104,7 @@ def _set_stage(server: Any, view: View) -> None:
 
 
 def _add_obstacles(server: Any, recording: Recording, view: View) -> dict[int, tuple[Any, NDArray[np.float64]]]:
-    """Draw the obstacles; their handles by number, and where they stand."""
+    """Draw the obstacles; returns their handles and poses by number."""
     handles = {}
     for obstacle in obstacle_pictures(recording, view):
         pose = recording[0].poses[obstacle.number]
@@ -126,7 +125,7 @@ def _add_obstacles(server: Any, recording: Recording, view: View) -> dict[int, t
 
 
 def _add_stitches(server: Any, recording: Recording, quantum: float) -> Any:
-    """Draw stitches as segments; their handle, or None where there are none."""
+    """Draw stitches as segments; returns their handle, or None where there are none."""
     if not len(recording.stitches):
         return None
     first = recording[0]
@@ -147,7 +146,7 @@ def _quaternion(R: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def quantum_of(view: View) -> float:
-    """The power of two that vertices are rounded to: numbers with few bits compress well."""
+    """The power of two to which vertices are rounded: numbers with few bits compress well."""
     return float(2.0 ** np.floor(np.log2(_RESOLUTION * 2.0 * view.radius)))
 
 

@@ -1,4 +1,4 @@
-"""One picture of all that a recording measured over time."""
+"""One picture of all measurements of a recording over time."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from supple.errors import OutputError
 from supple.output.drawing import BODY_COLORS, opened
-from supple.output.files.atomic import whole_file
 from supple.output.recording.reader import Recording
+from supple.replacing import whole_file
 
 _KINDS = ("png", "pdf", "svg")
-_LEGEND: dict[str, Any] = {  # above the lines, not on them
-    "loc": "lower right",  # a power of ten may stand on the left
+_LEGEND: dict[str, Any] = {  # above the axes
+    "loc": "lower right",  # the left side may have a power of ten
     "bbox_to_anchor": (1.0, 1.0),
     "borderaxespad": 0.0,
     "ncols": 8,
@@ -40,7 +40,7 @@ def plot_recording(recording: Recording | str | Path, output: str | Path) -> Pat
     output = Path(output)
     kind = output.suffix[1:].lower()
     if kind not in _KINDS and not output.is_dir():
-        raise OutputError(f"{output}: there is no picture format {output.suffix!r} here; take .png, .pdf or .svg")
+        raise OutputError(f"{output}: there is no picture format {output.suffix!r}; take .png, .pdf or .svg")
     with opened(recording) as source:
         figure = Figure(figsize=(12.0, 9.0), layout="constrained", dpi=110)
         FigureCanvasAgg(figure)
@@ -81,13 +81,13 @@ def _draw(recording: Recording, axes) -> None:
     worst.set_ylabel("smallest J = det F")
     stretch = recording.series("largest_stitch_stretch")
     if np.isfinite(stretch).any():
-        beside = worst.twinx()
-        beside.plot(t, stretch, color=STITCH_LINE)
-        beside.set_ylabel("largest stretch of a stitch", color=STITCH_LINE)
-        beside.spines["top"].set_visible(False)
+        right = worst.twinx()
+        right.plot(t, stretch, color=STITCH_LINE)
+        right.set_ylabel("largest stretch of a stitch", color=STITCH_LINE)
+        right.spines["top"].set_visible(False)
     ms = 1e3 * recording.series("wall_seconds")
     wall.plot(t[1:], ms[1:], color="0.3")
-    # The first step often loads or compiles the kernels; let it not flatten all the others.
+    # The first step often compiles or loads the kernels; on a linear axis, the other steps would then not be visible.
     if len(t) > 1 and ms[1:].min() > 0.0 and ms[1:].max() > 20.0 * np.median(ms[1:]):
         wall.set_yscale("log")
     else:

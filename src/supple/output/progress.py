@@ -1,4 +1,4 @@
-"""A sink that tells a person how a simulation gets on."""
+"""A sink that shows the progress of a simulation in a terminal."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress
 
-_SMOOTHING = 0.2  # how much the newest frame counts in the milliseconds that are shown
+_SMOOTHING = 0.2  # weight of the newest frame in the displayed milliseconds
 
 
 class ProgressBar:
     """Frames done, milliseconds of each, time left, and how the last step ended.
 
-    Where the output is no terminal (a file, a pipe, CI), there is no bar but one line at the end.
+    Where the output is not a terminal (a file, a pipe, CI), there is one line at the end instead of a bar.
 
     Parameters
     ----------
-    console : where to write; standard error by default, so that standard output stays free for results.
+    console : where to write; standard error by default, so that standard output contains only results.
     """
 
     def __init__(self, console: Console | None = None) -> None:
         self._console = console
         self._bar: Progress | None = None
-        self._began = 0.0
+        self._start = 0.0
         self._frames = 0
         self._steps = 0
         self._solver_seconds = 0.0
-        self._shown_ms: float | None = None
+        self._displayed_ms: float | None = None
         self._status = ""
 
     def begin(self, first: Frame, dt: float, steps: int) -> None:
@@ -40,8 +40,14 @@ class ProgressBar:
 
         if self._console is None:
             self._console = Console(stderr=True)
-        self._began = time.perf_counter()
-        self._frames, self._steps, self._solver_seconds, self._shown_ms, self._status = 0, steps, 0.0, None, "starting"
+        self._start = time.perf_counter()
+        self._frames, self._steps, self._solver_seconds, self._displayed_ms, self._status = (
+            0,
+            steps,
+            0.0,
+            None,
+            "starting",
+        )
         if self._console.is_terminal:
             columns = (
                 BarColumn(),
@@ -60,10 +66,10 @@ class ProgressBar:
         self._solver_seconds += report.wall_seconds
         self._status = str(report.status)
         ms = 1e3 * report.wall_seconds
-        before = self._shown_ms
-        self._shown_ms = ms if before is None else before + _SMOOTHING * (ms - before)
+        before = self._displayed_ms
+        self._displayed_ms = ms if before is None else before + _SMOOTHING * (ms - before)
         if self._bar is not None:
-            self._bar.update(self._task, completed=self._frames, ms=f"{self._shown_ms:.1f}", status=self._status)
+            self._bar.update(self._task, completed=self._frames, ms=f"{self._displayed_ms:.1f}", status=self._status)
 
     def end(self) -> None:
         if self._bar is not None:
@@ -71,6 +77,6 @@ class ProgressBar:
             self._bar = None
         elif self._console is not None:
             each = f", {1e3 * self._solver_seconds / self._frames:.1f} ms each in the solver" if self._frames else ""
-            seconds = time.perf_counter() - self._began
+            seconds = time.perf_counter() - self._start
             done = f"{self._frames} of {self._steps} frames in {seconds:.1f} s{each}; {self._status}"
             self._console.print(done, soft_wrap=True, highlight=False, markup=False)

@@ -1,4 +1,4 @@
-"""viser's server, without its greetings and without its tunnel to the public."""
+"""The server of viser, without its messages on standard output and without its public tunnel."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from supple.errors import OutputError
 
 
 def start_server(host: str, port: int) -> Any:
-    """A server of pages on `host`, at `port` or, where that is taken, a higher one; 0 takes any that is free.
+    """A server of pages on `host`, at `port` or, where that is in use, a higher one; 0 takes any free port.
 
     Raises
     ------
-    OutputError : where there is no port to be had.
+    OutputError : where there is no free port.
     """
     import viser
     from viser import _messages
 
-    # viser greets on standard output, which belongs to whoever called us.
+    # viser prints to standard output, which is for results of the caller.
     with contextlib.redirect_stdout(io.StringIO()):
         try:
             server = viser.ViserServer(host=host, port=port, verbose=False)
         except OSError as error:
-            raise OutputError(f"page: the server needs a port on {host} and got none: {error}") from None
-    # Any visitor could else ask for an address through which the whole world sees the page.
+            raise OutputError(f"page: the server found no free port on {host}: {error}; give another port") from None
+    # Otherwise any visitor could request a public address for the page.
     for request in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
         with contextlib.suppress(AssertionError):
             server._websock_server.unregister_handler(request)
@@ -34,14 +34,14 @@ def start_server(host: str, port: int) -> Any:
 
 
 def stop_server(server: Any) -> None:
-    """Stop it, quietly."""
+    """Stop it without output."""
     with contextlib.redirect_stdout(io.StringIO()):
         server.stop()
 
 
 @contextlib.contextmanager
-def server_for_a_moment() -> Iterator[Any]:
-    """A server that nobody is meant to visit: to draw on, and to take the drawing from."""
+def temporary_server() -> Iterator[Any]:
+    """A server without visitors, for drawing a scene that is then written to a page."""
     server = start_server("127.0.0.1", 0)
     try:
         yield server

@@ -25,6 +25,7 @@ from supple.xpbd.constraints.stitch_anchors import StitchAnchors
 from supple.xpbd.constraints.stitches import stitch_constraints
 from supple.xpbd.contact.collisions import Collisions
 from supple.xpbd.contact.settings import XPBDContact
+from supple.xpbd.details import XPBDDetails
 from supple.xpbd.external_forces import ExternalForces
 from supple.xpbd.integration import (
     accelerate,
@@ -171,14 +172,14 @@ class XPBD(Solver):
                     break
         lost = first_lost(ws.points, ws.velocities)
         if lost >= 0:
-            return state, StepReport(Status.NOT_FINITE, self.substeps, message=_what_is_lost(ws, lost, state.time + dt))
-        report = StepReport(
-            Status.CONVERGED,
-            self.substeps,
-            min_distance=ws.collisions.min_distance,
-            details={"contacts": ws.collisions.contacts},
-        )
-        return _unload(ws, state.time + dt), report
+            message = _what_is_lost(ws, lost, state.time + dt)
+            return state, StepReport(Status.NOT_FINITE, self.substeps, message, details=XPBDDetails())
+        details = XPBDDetails(ws.collisions.contacts, ws.collisions.smallest_gap)
+        return _unload(ws, state.time + dt), StepReport(Status.CONVERGED, self.substeps, details=details)
+
+    def initial_details(self, system: System, workspace: XPBDWorkspace) -> XPBDDetails:
+        """No contacts; see `Solver.initial_details`."""
+        return XPBDDetails()
 
 
 def _check_count(name: str, value: object) -> None:

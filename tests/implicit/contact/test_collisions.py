@@ -24,8 +24,8 @@ def oblique():
 def collide(scene, dt, steps, **solver):
     frames = list(sp.simulate(scene, sp.Implicit(**solver), dt, steps))
     assert {frame.report.status for frame in frames} == {"converged"}
-    assert any(frame.report.details["contact_count"] for frame in frames)
-    assert frames[-1].report.details["contact_count"] == 0  # they have parted again
+    assert any(frame.report.details.contacts for frame in frames)
+    assert frames[-1].report.details.contacts == 0  # they have parted again
     return [first_frame(scene, initial_state(scene)), *frames]
 
 
@@ -54,7 +54,7 @@ def test_a_collision_keeps_linear_momentum(integrator):
 def test_the_forces_of_a_collision_have_no_moment(integrator):
     """Angular momentum: contact adds none, whatever the time integrator does to it."""
     for frame in collide(oblique(), 0.005, 50, integrator=integrator)[1:]:
-        forces = frame.report.details["contact_forces"]
+        forces = frame.report.details.contact_forces
         total = np.linalg.norm(forces["one"])
         assert np.linalg.norm(forces["one"] + forces["two"]) <= 1e-9 * total
         found = frame.contacts

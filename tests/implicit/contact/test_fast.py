@@ -20,7 +20,7 @@ def test_head_on_cubes_converge_and_keep_their_momentum(dt: float):
     frame = next(iter(sp.simulate(head_on(20.0), sp.Implicit(), dt, 1)))
     assert frame.report.status == "converged", frame.report.message
     assert frame.det_F.min() > 0.0
-    assert frame.report.details["substeps"] <= 4
+    assert frame.report.details.substeps <= 4
     masses = frame.system.masses
     assert np.abs(masses @ frame.state.velocities).max() < 1e-6 * masses.sum() * 20.0
 
@@ -37,6 +37,6 @@ def test_what_rests_is_not_divided_in_long_steps():
     body = sp.Body("cube", CUBE, RUBBER, position=(0, 0.1001, 0))
     for frame in sp.simulate(sp.Scene([body], [sp.HalfSpace()]), sp.Implicit(), 2.0, 3):
         assert frame.report.status == "converged"
-        assert frame.report.details["substeps"] == 1
+        assert frame.report.details.substeps == 1
     weight = frame.system.masses.sum() * 9.81
-    assert frame.report.details["contact_forces"]["cube"][1] == pytest.approx(weight, rel=1e-3)
+    assert frame.report.details.contact_forces["cube"][1] == pytest.approx(weight, rel=1e-3)

@@ -102,7 +102,7 @@ def test_friction_acts_on_both_with_opposite_forces():
     for kind in ("half-space", "box"):
         frames, _ = slide(sp.Scene([block(youngs=1e6)], obstacles=[downhill(0.5)[kind]]), 0.25)
         details = frames[-1].report.details
-        forces = details["friction_forces"]
+        forces = details.friction_forces
         name = next(key for key in forces if key != "block")
         weight = 8.0 * GRAVITY
         assert np.linalg.norm(forces["block"]) == pytest.approx(weight * np.sin(ANGLE), rel=0.05)

@@ -33,21 +33,21 @@ def settled(scene, dt=0.05, steps=30, **solver):
 def test_a_resting_cube_presses_with_its_weight(kind):
     start = 0.13 if kind == "bowl" else 0.1005
     frame = settled(sp.Scene([block(position=(0, start, 0))], obstacles=[SUPPORTS[kind]]))
-    forces = frame.report.details["contact_forces"]
+    forces = frame.report.details.contact_forces
     name = next(key for key in forces if key != "cube")
     assert forces["cube"][1] == pytest.approx(WEIGHT, rel=1e-3)
     assert np.abs(forces["cube"] + forces[name]).max() < 1e-6 * WEIGHT
     assert np.abs(forces["cube"][[0, 2]]).max() < 1e-3 * WEIGHT
     assert frame.report.min_distance is not None
-    assert 0.0 < frame.report.min_distance < frame.report.details["dhat"]
-    assert frame.report.details["contact_count"] == len(frame.contacts)
+    assert 0.0 < frame.report.min_distance < frame.report.details.dhat
+    assert frame.report.details.contacts == len(frame.contacts)
 
 
 def test_a_ball_presses_on_the_ball_below():
     """A cup that hangs over a ball: contact outside a sphere."""
     ball = sp.Sphere(center=(0, -0.5, 0), radius=0.5)
     frame = settled(sp.Scene([block(position=(0, 0.103, 0))], obstacles=[ball]), steps=12)
-    assert frame.report.details["contact_forces"]["cube"][1] == pytest.approx(WEIGHT, rel=0.02)
+    assert frame.report.details.contact_forces["cube"][1] == pytest.approx(WEIGHT, rel=0.02)
 
 
 @pytest.mark.parametrize("integrator", ["bdf2", "newmark"])
@@ -58,7 +58,7 @@ def test_second_order_integrators_carry_the_weight_too(integrator):
     scene = sp.Scene([body], obstacles=[sp.HalfSpace()])
     frames = list(sp.simulate(scene, sp.Implicit(integrator=integrator), 0.01, 120))
     assert {frame.report.status for frame in frames} == {"converged"}
-    mean = np.mean([frame.report.details["contact_forces"]["cube"][1] for frame in frames[40:]])
+    mean = np.mean([frame.report.details.contact_forces["cube"][1] for frame in frames[40:]])
     assert mean == pytest.approx(WEIGHT, rel=0.03)
 
 
@@ -76,8 +76,8 @@ def test_statics_presses_until_the_forces_balance():
     away = body.place(mesh.vertices)[top] + np.array([0, -0.02, 0]) - last.positions["cube"][top]
     pulled = 500.0 * away.sum(axis=0)
     details = last.report.details
-    held = sum(details["reaction_forces"].values())
-    pressed = details["contact_forces"]["cube"]
+    held = sum(details.reaction_forces.values())
+    pressed = details.contact_forces["cube"]
     assert pressed[1] > 1.0
     # The pinned vertex is pulled by its target, too, which the pin has to bear.
     assert np.abs(pulled + held + pressed).max() < 1e-4 * np.abs(pressed).max()

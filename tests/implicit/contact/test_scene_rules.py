@@ -51,7 +51,7 @@ def test_pairs_that_do_not_collide_fall_through():
     last = run(sp.Scene(bodies, obstacles=[floor], contact_pairs=[ghost]), 0.05, 8)[-1]
     assert last.positions["solid"][:, 1].min() > 0.0
     assert last.positions["ghost"][:, 1].max() < -0.2
-    assert np.abs(last.report.details["contact_forces"]["ghost"]).max() == 0.0
+    assert np.abs(last.report.details.contact_forces["ghost"]).max() == 0.0
 
 
 def test_bodies_that_do_not_collide_pass_through_each_other():
@@ -85,16 +85,16 @@ def test_contacts_lie_between_the_surfaces_and_sum_to_the_reported_forces():
     found, details = last.contacts, last.report.details
     assert found is not None
     assert found.names == ("lower", "upper", "table", "wall")
-    assert len(found) == details["contact_count"] > 4
+    assert len(found) == details.contacts > 4
     assert np.allclose(np.linalg.norm(found.normals, axis=1), 1.0)
     assert (found.distances > 0.0).all()
-    assert (found.distances < details["dhat"]).all()
+    assert (found.distances < details.dhat).all()
     assert found.distances.min() == pytest.approx(last.report.min_distance)
     # Forces push the first thing away from the second; smoothed nearly parallel edges may pull, by next to nothing.
     assert (np.einsum("ij,ij->i", found.forces, found.normals) >= -1e-3 * WEIGHT).all()
     for name in ("lower", "upper", "table"):
         total = sum(found.force_between(name, other) for other in found.names if other != name)
-        assert np.abs(total - details["contact_forces"][name]).max() < 1e-6 * WEIGHT
+        assert np.abs(total - details.contact_forces[name]).max() < 1e-6 * WEIGHT
     assert np.array_equal(found.force_between("lower", "upper"), -found.force_between("upper", "lower"))
     assert found.force_between("upper", "lower")[1] == pytest.approx(WEIGHT, rel=2e-2)
     assert found.force_between("lower", "table")[1] == pytest.approx(2 * WEIGHT, rel=2e-2)
@@ -102,7 +102,7 @@ def test_contacts_lie_between_the_surfaces_and_sum_to_the_reported_forces():
     with_table = (found.first == 2) | (found.second == 2)
     lowest = last.positions["lower"][:, 1].min()
     assert (found.points[with_table][:, 1] > 0.0).all()
-    assert (found.points[with_table][:, 1] < lowest + details["dhat"]).all()
+    assert (found.points[with_table][:, 1] < lowest + details.dhat).all()
 
 
 def scaled(size):
@@ -119,7 +119,7 @@ def scaled(size):
 
 def test_a_scene_in_millimetres_has_the_shapes_of_the_scene_in_metres():
     large, small = (run(scaled(size), 0.02, 15, sp.Implicit(tolerance=1e-7)) for size in (1.0, 1e-3))
-    assert large[-1].report.details["contact_count"] > 0
+    assert large[-1].report.details.contacts > 0
     for a, b in zip(large, small, strict=True):
         assert np.abs(1e3 * b.state.positions - a.state.positions).max() < 1e-6
 
@@ -134,7 +134,7 @@ def cube(name, **body):
 bodies = [cube("one", position=(0, .105, 0)), cube("two", position=(.03, .31, .01), velocity=(0, -1, 0))]
 scene = sp.Scene(bodies, obstacles=[sp.Box(center=(0, -.5, 0), size=(2, 1, 2), friction=.3)])
 frames = list(sp.simulate(scene, sp.Implicit(), 0.02, 4))
-assert frames[-1].report.details["contact_count"] > 10
+assert frames[-1].report.details.contacts > 10
 print(hashlib.sha256(frames[-1].state.positions.tobytes()).hexdigest())
 """
 

@@ -213,9 +213,9 @@ def test_the_trace_has_a_row_for_every_iteration():
     pull = sp.Keyframes(times=[0, 1], displacements=[[0, 0, 0], [0.5, 0.2, 0]])
     scene = sp.Scene([body], pins=[sp.Pin("bar", left), sp.Pin("bar", right, pull)])
     frames = list(follow(scene, Implicit(contact=None), 1 / 60, 3))
-    text = trace_csv((frame.time, frame.report.details["newton"]) for frame in frames)
+    text = trace_csv((frame.time, frame.report.details.newton) for frame in frames)
     lines = text.splitlines()
     assert lines[0].startswith("time,iteration,energy")
     details = [frame.report.details for frame in frames]
-    assert len(lines) - 1 == sum(d["newton_iterations"] + d["extension_iterations"] for d in details)
-    assert all(frame.report.iterations == frame.report.details["newton_iterations"] for frame in frames)
+    assert len(lines) - 1 == sum(d.newton_iterations + d.extension_iterations for d in details)
+    assert all(frame.report.iterations == frame.report.details.newton_iterations for frame in frames)

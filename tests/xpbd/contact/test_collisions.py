@@ -62,7 +62,7 @@ def test_nothing_to_collide_with_is_nothing():
     assert Collisions(build_system(scene), XPBDContact())
     assert Collisions(build_system(pile()), None)
     frame = next(iter(sp.simulate(scene, XPBD(substeps=2, contact=None), 1 / 60, 1)))
-    assert frame.report.min_distance is None
+    assert frame.report.details.smallest_gap is None
 
 
 def test_gap_and_thickness_are_what_was_asked_for():
@@ -74,7 +74,7 @@ def test_gap_and_thickness_are_what_was_asked_for():
             gravity=(0, 0, 0),
         )
         solver = XPBD(substeps=10, contact=XPBDContact(thickness=thickness))
-        gaps = [f.report.min_distance for f in sp.simulate(scene, solver, 1 / 60, 20)]
+        gaps = [f.report.details.smallest_gap for f in sp.simulate(scene, solver, 1 / 60, 20)]
         assert min(gaps) == pytest.approx(thickness, rel=0.02)
         assert gaps[0] == pytest.approx(0.02, abs=0.004)
 

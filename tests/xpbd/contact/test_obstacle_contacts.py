@@ -65,7 +65,7 @@ def test_a_dropped_ball_comes_to_rest_on_it(kind):
     assert min(lowest) > level - 0.1 * thickness
     assert lowest[-1] == pytest.approx(level, abs=0.006 if kind == "bowl" else 0.02 * thickness)
     assert frame.report.kinetic_energy < 5e-3  # 5 cm/s
-    assert frame.report.min_distance == pytest.approx(level, abs=1e-4)
+    assert frame.report.details.smallest_gap == pytest.approx(level, abs=1e-4)
 
 
 @pytest.mark.parametrize("kind", ["ball", "closed triangles"])

@@ -56,7 +56,7 @@ def test_two_balls_collide_and_keep_their_momentum(offset):
     last = frames[-1]
     apart = last.velocities["b"].mean(axis=0) - last.velocities["a"].mean(axis=0)
     assert apart @ [1, 0, 0] > 0.3  # they have parted again
-    assert min(f.report.min_distance for f in frames if f.report.min_distance is not None) > 0
+    assert min(f.report.details.smallest_gap for f in frames if f.report.details.smallest_gap is not None) > 0
 
 
 @pytest.mark.parametrize("speed", [1.0, 4.0])
@@ -88,7 +88,7 @@ def test_a_heap_comes_to_rest_without_overlaps():
         assert overlapping(frame) == 0
     heights = sorted(p[:, 1].mean() for p in frames[-1].positions.values())
     assert np.diff(heights).min() > 0.1
-    assert min(f.report.min_distance for f in frames) > -1e-4
+    assert min(f.report.details.smallest_gap for f in frames) > -1e-4
 
 
 def arch(name="arch"):
@@ -136,7 +136,7 @@ def test_a_body_at_rest_has_no_contact_with_itself():
         scene = sp.Scene([sp.Body("b", mesh, SOFT, angular_velocity=(3, 2, 1))], gravity=(0, 0, 0))
         with_contact = list(sp.simulate(scene, XPBD(substeps=5), 1 / 60, 10))[-1]
         without = list(sp.simulate(scene, XPBD(substeps=5, contact=None), 1 / 60, 10))[-1]
-        assert with_contact.report.details["contacts"] == 0
+        assert with_contact.report.details.contacts == 0
         assert (with_contact.state.positions == without.state.positions).all()
 
 

@@ -55,7 +55,7 @@ def check(
     """
     from supple.output.check.checker import check_recording
     from supple.output.check.settings import CheckSettings
-    from supple.output.files.atomic import refuse_to_replace
+    from supple.replacing import refuse_to_replace
 
     given = {
         "every": every,

@@ -25,7 +25,7 @@ def export(
         glb (Blender, three.js), obj (a folder, one file per frame), pvd (a folder for ParaView), vtu (the last frame),
         vtkhdf (compressed, or repaired after a kill), usd (extra: usd), gif or mp4 (extra: video), html (a page).
     output
-        File or folder to write; without it, beside the recording and under its name.
+        File or folder to write, with a suffix of the format; without it, beside the recording and under its name.
     """
     from supple.output.export.exporter import export as write
 

@@ -67,7 +67,7 @@ def mesh(
     from supple.mesh.io.tetgen_files import write_tetgen
     from supple.mesh.meshing.tetrahedralize import tetrahedralize_reported
     from supple.mesh.surface import SurfaceMesh
-    from supple.output.files.atomic import refuse_to_replace
+    from supple.replacing import refuse_to_replace
 
     # Checked before the meshing, which can take minutes.
     if output.suffix.lower() not in TET_EXTENSIONS:

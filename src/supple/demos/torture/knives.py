@@ -8,6 +8,7 @@ import numpy as np
 
 from supple.demos.demo import Claim, Demo
 from supple.demos.torture.watch import ContactMeasurement, Torture, mass, mechanical_energy
+from supple.implicit.details import ImplicitDetails
 from supple.implicit.solver import Implicit
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
@@ -46,7 +47,8 @@ class _Measurement(ContactMeasurement):
             contacts.force_between("mat", f"knife{k}")[1] if contacts is not None else 0.0
             for k in range(1, len(PLACES) + 1)
         ]
-        friction = self.last.report.details.get("friction_forces", {}).get("mat", np.zeros(3))
+        details = self.last.report.details
+        friction = details.friction_forces["mat"] if isinstance(details, ImplicitDetails) else np.zeros(3)
         carried = (sum(forces) + float(friction[1])) / weight
         before, after = mechanical_energy(self.first), mechanical_energy(self.last)
         return [

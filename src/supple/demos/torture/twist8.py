@@ -56,7 +56,7 @@ class _Measurement(ContactMeasurement):
 
     def write(self, frame: Frame) -> None:
         super().write(frame)
-        self.most = max(self.most, frame.report.details.get("contact_count", 0))
+        self.most = max(self.most, frame.report.details.contacts)
         targets = frame.system.pin_targets(frame.time)
         off = np.abs(frame.state.positions[frame.system.pinned_vertices] - targets)
         self.pin_error = max(self.pin_error, float(off.max()))

@@ -1,4 +1,4 @@
-"""What is written down of every Newton iteration."""
+"""One row of numbers for every Newton iteration, and the rows as CSV."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class NewtonRow:
     iteration : from 0; extension iterations, which bring pins to their places, count separately
     energy : of the objective after the step [J]; force : largest component of the gradient before it [N]
     direction : largest component of the Newton direction [m]
-    linear_solver : "pcg", "direct" or "none"; linear_iterations : of CG; linear_tolerance : asked of CG
+    linear_solver : "pcg", "direct" or "none"; linear_iterations : of CG; linear_tolerance : required of CG
     filter : largest step without inversion, at most 1; step : taken, as a share of the direction; cuts : of the line
         search
     projected : whether the Hessian was that of the convex model

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.contact_points import ContactPoints
 from supple.implicit.contact.friction import Friction
 from supple.implicit.contact.half_spaces import PlaneFriction
 from supple.implicit.contact.model import Barriers, ContactModel
 from supple.implicit.contact.points import contact_points, forces_on_owners
+from supple.implicit.details import ImplicitDetails
 from supple.implicit.newton.minimize import Outcome
 from supple.implicit.newton.objective import Objective
-from supple.state import Status, StepReport
+from supple.state import Status
+
+FindContacts = Callable[[], ContactPoints] | None
 
 # Surfaces nearer than this share of dhat: an adaptive barrier becomes stiffer.
 _TOO_NEAR = 1e-2
@@ -102,28 +107,31 @@ class ContactStep:
             return replace(outcome, status=Status.LINE_SEARCH_FAILED, message="two surfaces intersect after the step")
         return outcome
 
-    def completed(self, report: StepReport, x: NDArray[np.float64]) -> StepReport:
-        """The report of a step that ended at x (n, 3), with what contact does there."""
+    def measured(
+        self, details: ImplicitDetails, x: NDArray[np.float64]
+    ) -> tuple[ImplicitDetails, float | None, FindContacts]:
+        """The details of a step that ended at x (n, 3), with what contact does there.
+
+        Returns
+        -------
+        details, nearest, contacts : the latter two are `min_distance` and `contacts` of `StepReport`.
+        """
         model, barriers = self.model, self.barriers
         if model is None or barriers is None:
-            return report
+            return details, None, None
         normal, tangential = np.zeros_like(x), np.zeros_like(x)
         for term in barriers.terms:
             term.add_gradient(x, normal)
         for term in self.frictions or ():
             term.add_gradient(x, tangential)
-        nearest = model.smallest_distance(x)
-        details = {
-            **report.details,
-            "contact_count": model.count(x),
-            "contact_forces": forces_on_owners(model, normal / self.weight),
-            "friction_forces": forces_on_owners(model, tangential / self.weight),
-            "contact_stiffness": self.stiffness / self.weight,
-            "dhat": model.scales.dhat,
-        }
-        return replace(
-            report,
-            min_distance=nearest if np.isfinite(nearest) else None,
-            details=details,
-            contacts=lambda: contact_points(model, barriers, x, self.weight),
+        details = replace(
+            details,
+            contacts=model.count(x),
+            contact_forces=forces_on_owners(model, normal / self.weight),
+            friction_forces=forces_on_owners(model, tangential / self.weight),
+            contact_stiffness=self.stiffness / self.weight,
+            dhat=model.scales.dhat,
         )
+        nearest = model.smallest_distance(x)
+        nearest = nearest if np.isfinite(nearest) else None
+        return details, nearest, lambda: contact_points(model, barriers, x, self.weight)

@@ -18,7 +18,7 @@ from supple.mesh.io.cells import CellSoup, FormatError, tets_of
 from supple.mesh.io.polygons import triangles_of
 from supple.mesh.io.tetgen_family import SUFFIXES, family_paths, is_tetgen_path, read_tetgen_family
 from supple.mesh.merge import merge_map
-from supple.replacing import put_in_place, remove_abandoned, temporary_name
+from supple.replacing import whole_files
 
 logger = logging.getLogger(__name__)
 
@@ -147,16 +147,8 @@ def _contents(path: Path) -> bytes:
 
 
 def _write_whole(path: Path, write: Callable[[Path], object]) -> None:
-    """Write under a temporary name in the same folder, then rename: the file is either complete or absent."""
-    temporary = temporary_name(path)
-    try:
-        write(temporary)
-        put_in_place(temporary, path)
-    except OSError as error:
-        raise MeshError(f"{path}: it cannot be written: {error.strerror or error}") from None
-    finally:
-        temporary.unlink(missing_ok=True)
-    remove_abandoned(path)
+    with whole_files(path, error=MeshError) as fresh:
+        write(fresh[path])
 
 
 def _unknown_extension(path: Path, known: tuple[str, ...], hint: str) -> MeshError:

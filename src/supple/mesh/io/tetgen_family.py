@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshError
-from supple.mesh.io.file_group import write_together
 from supple.mesh.io.tetgen_table import Columns, Table, read_header, read_rows, read_text
 from supple.mesh.topology import TET_EDGES, TET_FACETS, edge_keys, facet_keys
+from supple.replacing import whole_files
 
 SUFFIXES = (".node", ".ele", ".edge", ".face")
 
@@ -81,8 +81,10 @@ def write_tetgen_family(
     if base_index not in (0, 1):
         raise MeshError(f"{path}: base_index must be 0 or 1, not {base_index!r}")
     paths = family_paths(path)
-    texts = _family_text(vertices, tets, edges, triangles, base_index)
-    write_together({paths[suffix]: text for suffix, text in texts.items()})
+    with whole_files(*paths.values(), error=MeshError) as fresh:
+        for suffix, pieces in _family_text(vertices, tets, edges, triangles, base_index).items():
+            with fresh[paths[suffix]].open("w", encoding="ascii", newline="\n") as file:
+                file.writelines(pieces)
     return paths
 
 

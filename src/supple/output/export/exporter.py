@@ -1,4 +1,4 @@
-"""Recordings in other programs' formats: one file per format, and this table of them."""
+"""Recordings in the formats of other programs: one module for each format, and the table of them."""
 
 from __future__ import annotations
 
@@ -9,20 +9,25 @@ from pathlib import Path
 
 from supple.errors import OutputError
 from supple.output.drawing import opened
-from supple.output.files.atomic import refuse_to_replace
 from supple.output.recording.reader import Recording
+from supple.output.recording.recorder import SUFFIXES as RECORDING_SUFFIXES
+from supple.replacing import refuse_to_replace
 
 Writer = Callable[[Recording, Path], None]
 
 
 @dataclass(frozen=True)
 class Format:
-    """One format: what it is, the module and function that write it, and how its files are called."""
+    """One format.
 
-    about: str
+    Attributes
+    ----------
+    home : the module in this package, and its function that writes the format
+    suffixes : that a file of this format may have; none where the format is a folder
+    """
+
     home: str
-    ending: str
-    is_folder: bool = False
+    suffixes: tuple[str, ...] = ()
 
     def writer(self) -> Writer:
         module, _, name = self.home.partition(":")
@@ -30,21 +35,15 @@ class Format:
 
 
 FORMATS = {
-    "glb": Format("glTF 2.0 with morph targets: Blender, three.js, game engines", "export.glb:write_glb", ".glb"),
-    "obj": Format("a folder with one Wavefront OBJ for each frame", "export.obj:write_obj_folder", "_obj", True),
-    "pvd": Format(
-        "a folder with a ParaView collection and one VTU for each frame", "export.pvd:write_pvd", "_pvd", True
-    ),
-    "vtu": Format("the last frame as a VTK unstructured grid", "export.pvd:write_last_vtu", ".vtu"),
-    "vtkhdf": Format(
-        "a recording again, compressed; mends one whose writer was killed",
-        "export.vtkhdf:write_vtkhdf",
-        ".small.vtkhdf",
-    ),
-    "usd": Format("Universal Scene Description, with time samples (extra: usd)", "export.usd:write_usd", ".usdc"),
-    "gif": Format("an animated picture (extra: video)", "export.video:write_gif", ".gif"),
-    "mp4": Format("a video (extra: video)", "export.video:write_mp4", ".mp4"),
-    "html": Format("a page that plays it in a browser", "page:write_page", ".html"),
+    "glb": Format("export.glb:write_glb", (".glb",)),  # glTF 2.0 with morph targets
+    "obj": Format("export.obj:write_obj_folder"),  # one Wavefront OBJ for each frame
+    "pvd": Format("export.pvd:write_pvd"),  # a ParaView collection and one VTU for each frame
+    "vtu": Format("export.pvd:write_last_vtu", (".vtu",)),  # the last frame as a VTK unstructured grid
+    "vtkhdf": Format("export.vtkhdf:write_vtkhdf", RECORDING_SUFFIXES),  # a recording again, compressed and repaired
+    "usd": Format("export.usd:write_usd", (".usdc", ".usda", ".usd")),  # with time samples (extra: usd)
+    "gif": Format("export.video:write_gif", (".gif",)),  # (extra: video)
+    "mp4": Format("export.video:write_mp4", (".mp4",)),  # (extra: video)
+    "html": Format("page:write_page", (".html", ".htm")),  # plays the recording in a browser
 }
 
 
@@ -55,18 +54,43 @@ def export(recording: Recording | str | Path, to: str, output: str | Path | None
     ----------
     recording : an open recording, or its path.
     to : "glb", "obj", "pvd", "vtu", "vtkhdf", "usd", "gif", "mp4" or "html"; see `FORMATS`.
-    output : file or folder; beside the recording, under its name, where it is not given. What is there is replaced.
+    output : file, with a suffix of the format, or folder; beside the recording, under its name, where it is not given.
+        What is there is replaced.
 
     Raises
     ------
-    OutputError : where the recording cannot be read, the format is unknown or needs something that is not installed, or
-        the output cannot be written. Nothing half-written is left.
+    OutputError : where the recording cannot be read, the format is unknown, needs something that is not installed or
+        does not agree with the output's suffix, or the output cannot be written. No incomplete file is left.
     """
-    chosen = FORMATS.get(to.lower().lstrip("."))
-    if chosen is None:
+    name = to.lower().lstrip(".")
+    if name not in FORMATS:
         raise OutputError(f"export: there is no format {to!r}; take one of {', '.join(FORMATS)}")
+    if output is not None:
+        _require_suffix(name, Path(output))
     with opened(recording) as source:
-        path = Path(output) if output is not None else source.path.with_name(source.path.stem + chosen.ending)
+        path = Path(output) if output is not None else source.path.with_name(source.path.stem + _ending(name))
         refuse_to_replace(source.path, path)
-        chosen.writer()(source, path)
+        FORMATS[name].writer()(source, path)
     return path
+
+
+def _ending(name: str) -> str:
+    """What follows the stem of the recording in the name of the output."""
+    if not FORMATS[name].suffixes:
+        return f"_{name}"
+    return (".small" if name == "vtkhdf" else "") + FORMATS[name].suffixes[0]
+
+
+def _require_suffix(name: str, output: Path) -> None:
+    """Raise `OutputError` where the name of the output belongs to another format."""
+    chosen, suffix = FORMATS[name], output.suffix.lower()
+    if chosen.suffixes and suffix not in chosen.suffixes:
+        raise OutputError(
+            f"{output}: a file in format {name} must end in {' or '.join(chosen.suffixes)}; name it "
+            f"{output.stem}{chosen.suffixes[0]}, or choose another format"
+        )
+    known = {f".{name}", *(ending for other in FORMATS.values() for ending in other.suffixes)}
+    if not chosen.suffixes and suffix in known:
+        raise OutputError(
+            f"{output}: format {name} is a folder of files; name it {output.stem}, or choose another format"
+        )

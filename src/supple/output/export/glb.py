@@ -1,7 +1,7 @@
 """Binary glTF 2.0: one mesh for each body, a morph target for each frame, and their weights animated.
 
 Source: Khronos, "glTF 2.0 Specification", sections 3.7.2.2 (morph targets) and 3.11 (animations). glTF is y up, in
-metres, as we are.
+metres, as in Supple.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from supple.output.drawing import (
     vertex_normals,
     view_of,
 )
-from supple.output.files.atomic import whole_file
 from supple.output.recording.reader import RecordedFrame, Recording
+from supple.replacing import whole_file
 
 logger = logging.getLogger(__name__)
 
-# Weights grow with the square of this, and importers with many targets grow slow.
+# The size of the weights grows with the square of this number, and importers are slow with many targets.
 _MOST_FRAMES = 300
 _FLOAT, _UNSIGNED = 5126, 5125
 _VERTICES, _INDICES = 34962, 34963
@@ -49,7 +49,7 @@ def write_glb(recording: Recording, output: Path) -> None:
 
 
 class _Glb:
-    """A glTF document and its one buffer, as they grow."""
+    """A glTF document and its one buffer, to which meshes are added."""
 
     def __init__(self, frames: list[RecordedFrame]) -> None:
         import pygltflib
@@ -70,7 +70,7 @@ class _Glb:
         self.weights: int | None = None
 
     def add_body(self, picture: Picture) -> None:
-        """A mesh whose first shape is frame 0, and whose k-th morph target leads to frame k."""
+        """Add a mesh whose base shape is frame 0, and whose k-th morph target gives frame k."""
         x0 = picture.at(self.frames[0])
         n0 = vertex_normals(x0, picture.triangles)
         targets = []
@@ -83,19 +83,19 @@ class _Glb:
             self._animate(node, "weights", self._weights())
 
     def add_obstacle(self, obstacle: ObstaclePicture) -> None:
-        """A rigid mesh, with its poses animated where it moves."""
-        # Corners are not shared, so that edges stay sharp.
+        """Add a rigid mesh; its poses are animated where it moves."""
+        # Triangles share no corners, so that edges stay sharp.
         x = obstacle.vertices[obstacle.triangles.ravel()]
         triangles = np.arange(len(x), dtype=np.int32).reshape(-1, 3)
         material = self._material(OBSTACLE_COLOR, obstacle.opacity)
         node = self._mesh_node(obstacle.name, x, vertex_normals(x, triangles), triangles, material, [])
         poses = np.stack([frame.poses[obstacle.number] for frame in self.frames])
-        turns = _quaternions(poses[:, :, :3])
+        rotations = _quaternions(poses[:, :, :3])
         made = self.document.nodes[node]
-        made.translation, made.rotation = poses[0, :, 3].tolist(), turns[0].tolist()
+        made.translation, made.rotation = poses[0, :, 3].tolist(), rotations[0].tolist()
         if len(poses) > 1 and np.any(poses != poses[0]):
             self._animate(node, "translation", self._vectors(poses[:, :, 3]))
-            self._animate(node, "rotation", self._accessor(turns, "VEC4"))
+            self._animate(node, "rotation", self._accessor(rotations, "VEC4"))
 
     def to_bytes(self) -> bytes:
         """The whole file."""
@@ -107,7 +107,7 @@ class _Glb:
         return b"".join(self.document.save_to_bytes())
 
     def _weights(self) -> int:
-        """Target k has all the weight in frame k, and none in any other; the first frame is the mesh itself."""
+        """Target k has weight 1 in frame k and 0 in all others; the first frame is the mesh itself."""
         if self.weights is None:
             k = len(self.frames)
             self.weights = self._accessor(np.eye(k, k - 1, -1).reshape(-1, 1), "SCALAR")
@@ -137,13 +137,13 @@ class _Glb:
 
     def _material(self, color: tuple[int, int, int], opacity: float) -> int:
         kinds = self.kinds
-        linear = ((np.array(color) / 255.0 + 0.055) / 1.055) ** 2.4  # sRGB, as all our colors lie above its linear part
+        linear = ((np.array(color) / 255.0 + 0.055) / 1.055) ** 2.4  # sRGB; all our colors are above its linear part
         surface = kinds.PbrMetallicRoughness(
             baseColorFactor=[*linear.tolist(), opacity], metallicFactor=0.0, roughnessFactor=0.45
         )
-        seen_through = opacity < 1.0
-        mode = kinds.BLEND if seen_through else kinds.OPAQUE
-        made = kinds.Material(pbrMetallicRoughness=surface, doubleSided=seen_through, alphaMode=mode, alphaCutoff=None)
+        transparent = opacity < 1.0
+        mode = kinds.BLEND if transparent else kinds.OPAQUE
+        made = kinds.Material(pbrMetallicRoughness=surface, doubleSided=transparent, alphaMode=mode, alphaCutoff=None)
         self.document.materials.append(made)
         return len(self.document.materials) - 1
 
@@ -172,10 +172,10 @@ class _Glb:
 
 
 def _quaternions(R: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(k, 4) as (x, y, z, w) of rotations (k, 3, 3), each on the side of the one before it."""
+    """(k, 4) as (x, y, z, w) of rotations (k, 3, 3), each with the sign that is nearer to the one before it."""
     from scipy.spatial.transform import Rotation
 
     q = Rotation.from_matrix(R).as_quat()
-    turned = np.cumprod(np.where(np.einsum("ij,ij->i", q[1:], q[:-1]) < 0.0, -1.0, 1.0))
-    q[1:] *= turned[:, None]
+    signs = np.cumprod(np.where(np.einsum("ij,ij->i", q[1:], q[:-1]) < 0.0, -1.0, 1.0))
+    q[1:] *= signs[:, None]
     return q

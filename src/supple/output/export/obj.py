@@ -1,4 +1,4 @@
-"""A folder of Wavefront OBJ files, one for each frame, as nearly every program reads them."""
+"""A folder of Wavefront OBJ files, one for each frame; nearly every program reads them."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ from pathlib import Path
 import numpy as np
 
 from supple.output.drawing import obstacle_pictures, pictures, view_of
-from supple.output.files.atomic import whole_folder
 from supple.output.recording.reader import Recording
+from supple.replacing import whole_folder
 
 
 def write_obj_folder(recording: Recording, output: Path) -> None:
-    """Write frame_00000.obj, frame_00001.obj, ...: bodies as objects, and the obstacles where they are then."""
+    """Write frame_00000.obj, frame_00001.obj, ...: bodies as objects, and the obstacles in their places."""
     digits = max(5, len(str(len(recording) - 1)))
     bodies = [(picture.name, picture) for picture in pictures(recording)]
-    shown = bodies + [(obstacle.name, obstacle) for obstacle in obstacle_pictures(recording, view_of(recording))]
+    objects = bodies + [(obstacle.name, obstacle) for obstacle in obstacle_pictures(recording, view_of(recording))]
     faces, start = [], 1
-    for _, picture in shown:
+    for _, picture in objects:
         faces.append("".join(f"f {a} {b} {c}\n" for a, b, c in (picture.triangles + start).tolist()))
         start += len(picture.at(recording[0]))
     with whole_folder(output) as folder:
         for k, frame in enumerate(recording):
             text = io.StringIO()
             text.write(f"# Supple: frame {frame.index}, t = {frame.time:.9g} s, metres, y up\n")
-            for (name, picture), face in zip(shown, faces, strict=True):
+            for (name, picture), face in zip(objects, faces, strict=True):
                 text.write(f"o {'_'.join(name.split())}\n")
                 np.savetxt(text, picture.at(frame), fmt="v %.9g %.9g %.9g")
                 text.write(face)

@@ -1,4 +1,4 @@
-"""ParaView's older series: a .pvd that lists one VTU file for each frame. (A recording itself opens there as well.)"""
+"""ParaView's older format for series: a .pvd that lists one VTU file for each frame. It also opens recordings."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from supple.output.files.atomic import whole_file, whole_folder
 from supple.output.recording.reader import RecordedFrame, Recording
+from supple.replacing import whole_file, whole_folder
 
 
 def write_pvd(recording: Recording, output: Path) -> None:
-    """Write a folder with recording.pvd and frame_00000.vtu, ...: tets, velocities, J and body of each."""
+    """Write a folder with recording.pvd and frame_00000.vtu, ...: with tets, velocities, J and body numbers."""
     digits = max(5, len(str(len(recording) - 1)))
     with whole_folder(output) as folder:
         lines = ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1">', "  <Collection>"]

@@ -14,10 +14,8 @@ import numpy as np
 
 from supple.errors import OutputError
 from supple.output.drawing import OBSTACLE_COLOR, obstacle_pictures, pictures, view_of
-from supple.output.files.atomic import whole_file
 from supple.output.recording.reader import Recording
-
-_SUFFIXES = (".usd", ".usdc", ".usda")
+from supple.replacing import whole_file
 
 
 def write_usd(recording: Recording, output: Path) -> None:
@@ -29,8 +27,6 @@ def write_usd(recording: Recording, output: Path) -> None:
     """
     if find_spec("pxr") is None:
         raise OutputError("export to USD needs OpenUSD, which is not installed; pip install 'supple[usd]'")
-    if output.suffix.lower() not in _SUFFIXES:
-        raise OutputError(f"{output}: USD knows a file by its ending; name it {output.stem}.usdc")
     from pxr import Tf, Usd, UsdGeom
 
     with whole_file(output) as fresh:
@@ -59,9 +55,9 @@ def write_usd(recording: Recording, output: Path) -> None:
         try:
             stage.GetRootLayer().Save()
         except Tf.ErrorException as error:
-            # USD says which of its source lines failed, then why, then what it finds when it reads that back.
-            said = re.search(r"rror occurred writing file: ([^'\n]*)", str(error))
-            raise OSError(errno.EIO, said[1] if said else "USD could not write it") from None
+            # The text contains the line of USD's source, then the reason, then what USD reads back.
+            reason = re.search(r"rror occurred writing file: ([^'\n]*)", str(error))
+            raise OSError(errno.EIO, reason[1] if reason else "USD could not write it") from None
 
 
 def _define(stage, path: str, name: str, picture):
@@ -89,6 +85,6 @@ def _set_points(mesh, x, time: int | None) -> None:
 
 
 def _identifier(name: str, number: int) -> str:
-    """A name that USD allows, and that nothing else has."""
+    """A unique name that USD allows."""
     plain = "".join(c if c.isascii() and c.isalnum() else "_" for c in name)
     return f"_{number}_{plain}" if not plain or plain[0].isdigit() else f"{plain}_{number}"

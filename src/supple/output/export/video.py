@@ -1,4 +1,4 @@
-"""Videos of a recording. They are drawn in a child process: where OpenGL is missing, drawing ends the whole process."""
+"""Videos of a recording. A child process draws them, because drawing without OpenGL ends the whole process."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from supple.errors import OutputError
-from supple.output.files.atomic import whole_file
 from supple.output.recording.reader import Recording
+from supple.replacing import whole_file
 
 _NEEDED = {"gif": ("pyvista", "PIL"), "mp4": ("pyvista", "imageio_ffmpeg")}
 
@@ -29,7 +29,6 @@ def _write(recording: Recording, output: Path, kind: str) -> None:
     if missing:
         raise OutputError(f"export to {kind} needs {missing[0]}, which is not installed; pip install 'supple[video]'")
     with whole_file(output) as fresh:
-        # The new name may have any suffix; the drawer goes by `kind`.
         command = [sys.executable, "-m", "supple.output.export.video_worker", str(recording.path), str(fresh), kind]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode != 0 or not fresh.exists():
@@ -37,8 +36,8 @@ def _write(recording: Recording, output: Path, kind: str) -> None:
 
 
 def _reason(done: subprocess.CompletedProcess[str]) -> str:
-    said = [line for line in done.stderr.splitlines() if line.strip()]
-    last = said[-1] if said else ""
+    lines = [line for line in done.stderr.splitlines() if line.strip()]
+    last = lines[-1] if lines else ""
     if last.startswith("video: "):
         return last.removeprefix("video: ")
     signs = ("EGL", "OpenGL", "GLX", "X server", "OSMesa", "render window")
@@ -47,4 +46,4 @@ def _reason(done: subprocess.CompletedProcess[str]) -> str:
             "drawing needs OpenGL, which does not work here; on Debian and Ubuntu: apt install libegl1 libgl1 "
             f"(the drawing process ended with code {done.returncode})"
         )
-    return f"the drawing process ended with code {done.returncode}: {last or 'it said nothing'}"
+    return f"the drawing process ended with code {done.returncode}: {last or 'without a message'}"

@@ -29,7 +29,7 @@ _MOST_FRAMES = {"gif": 400, "mp4": 10_000}
 
 
 def draw(recording: Recording, frames: list[RecordedFrame], size: tuple[int, int]) -> Iterator[NDArray[np.uint8]]:
-    """Each frame as a picture (height, width, 3), from one place that sees the whole recording."""
+    """Each frame as a picture (height, width, 3), from one viewpoint that shows the whole recording."""
     import pyvista
 
     view = view_of(recording)
@@ -40,7 +40,7 @@ def draw(recording: Recording, frames: list[RecordedFrame], size: tuple[int, int
         mesh = _polydata(pyvista, picture.at(frames[0]), picture.triangles)
         color = [c / 255.0 for c in picture.color]
         actor = plotter.add_mesh(mesh, color=color, specular=0.4, specular_power=25, ambient=0.15)
-        actor.prop.interpolation = "phong"  # with the normals that are set for each frame below
+        actor.prop.interpolation = "phong"  # uses the normals that are set for each frame below
         moving.append((mesh, picture, True))
     for obstacle in obstacle_pictures(recording, view):
         mesh = _polydata(pyvista, obstacle.at(frames[0]), obstacle.triangles)
@@ -72,10 +72,10 @@ def _polydata(pyvista: Any, x: NDArray[np.float64], triangles: NDArray[np.int32]
 def write(source: Path, output: Path, kind: str) -> None:
     """Draw a recording to a file."""
     with read_recording(source) as recording:
-        shown = max(float(recording.times[-1] - recording.times[0]), recording.dt)
-        wanted = min(_MOST_FRAMES[kind], max(2, round(shown * _RATES[kind]) + 1))
-        frames = evenly(recording, wanted)
-        rate = max((len(frames) - 1) / shown, 1.0)
+        duration = max(float(recording.times[-1] - recording.times[0]), recording.dt)
+        count = min(_MOST_FRAMES[kind], max(2, round(duration * _RATES[kind]) + 1))
+        frames = evenly(recording, count)
+        rate = max((len(frames) - 1) / duration, 1.0)
         images = draw(recording, frames, _SIZES[kind])
         if kind == "gif":
             _write_gif(images, output, rate)
@@ -87,7 +87,7 @@ def _write_gif(images: Iterator[NDArray[np.uint8]], output: Path, rate: float) -
     from PIL import Image
 
     pages = [Image.fromarray(image).quantize(128, dither=Image.Dither.NONE) for image in images]
-    # GIF counts in hundredths of a second.
+    # GIF has a time unit of a hundredth of a second.
     duration = max(20, round(100.0 / rate) * 10)
     pages[0].save(output, format="GIF", save_all=True, append_images=pages[1:], duration=duration, loop=0)
 
@@ -108,7 +108,7 @@ def _write_mp4(images: Iterator[NDArray[np.uint8]], output: Path, rate: float, s
     for sent, image in enumerate(images, start=1):  # noqa: B007
         writer.send(image)
     writer.close()
-    # The writer does not tell whether ffmpeg could write all that it was given.
+    # The writer does not report whether ffmpeg could write all frames.
     try:
         written = imageio_ffmpeg.count_frames_and_secs(str(output))[0]
     except RuntimeError:
@@ -117,7 +117,7 @@ def _write_mp4(images: Iterator[NDArray[np.uint8]], output: Path, rate: float, s
         raise OSError(errno.EIO, f"ffmpeg wrote {written} of {sent} frames; is there room?")
 
 
-def _refuse(reason: str) -> int:
+def _fail(reason: str) -> int:
     print(f"video: {' '.join(reason.split())}", file=sys.stderr)
     return 2
 
@@ -127,9 +127,9 @@ def main(arguments: list[str]) -> int:
     try:
         write(Path(source), Path(output), kind)
     except SuppleError as error:
-        return _refuse(str(error))
+        return _fail(str(error))
     except OSError as error:
-        return _refuse(f"cannot be written: {error.strerror or error}; choose another place or make room there")
+        return _fail(f"cannot be written: {error.strerror or error}; choose another place or make room there")
     return 0
 
 

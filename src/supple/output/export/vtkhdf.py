@@ -1,27 +1,29 @@
-"""A recording written again: compressed, without unused room, and whole for VTK where its writer was killed."""
+"""A copy of a recording: compressed, without unused room, and complete for VTK where its writer was killed."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from supple.errors import OutputError
-from supple.output.files.atomic import whole_file
 from supple.output.recording.file import rewrite
 from supple.output.recording.reader import Recording
 from supple.output.recording.recorder import frame_layout
+from supple.replacing import whole_file
 
 
 def write_vtkhdf(recording: Recording, output: Path) -> None:
-    """Copy every whole frame to a compressed VTKHDF file.
+    """Copy every complete frame to a compressed VTKHDF file.
 
     Raises
     ------
     OutputError : where the recording is damaged, or the file cannot be written.
     """
-    layout = frame_layout(len(recording.rest_positions), len(recording.tets), len(recording.obstacles))
+    layout = frame_layout(
+        len(recording.rest_positions), len(recording.tets), len(recording.obstacles), recording.details
+    )
     with whole_file(output) as fresh:
         try:
             rewrite(recording.path, fresh, layout, None, compress=True)
         except (KeyError, RuntimeError, TypeError, ValueError) as error:
-            said = " ".join(str(error).split())
-            raise OutputError(f"{recording.path}: is damaged: {said}; copy or record it again") from None
+            reason = " ".join(str(error).split())
+            raise OutputError(f"{recording.path}: is damaged: {reason}; copy or record it again") from None

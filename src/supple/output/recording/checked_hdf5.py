@@ -1,4 +1,4 @@
-"""An HDF5 file that may be anything: every array is checked before it is read."""
+"""An HDF5 file from an unknown source: every array is checked before it is read."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from supple.errors import OutputError
 
-# An HDF5 file can promise more than it holds. gzip packs at most 1032 to one; nothing we read is larger than that.
+# An HDF5 header can claim more data than the file contains. gzip compresses at most 1032 to one, so that a claim beyond
+# this factor is wrong.
 _MOST_EXPANSION = 1100
 
 
 class CheckedFile:
-    """A file, opened for reading; its errors name it, say what is wrong, and the mend.
+    """A file, opened for reading. Its errors name the file, what is wrong with it, and the remedy.
 
     Raises
     ------
@@ -31,7 +32,7 @@ class CheckedFile:
             raise OutputError(f"{path}: is a folder; give the recording in it, such as {path / 'recording.vtkhdf'}")
         try:
             self._bytes = path.stat().st_size
-            # No lock: the file may be being written, which its layout allows for.
+            # No lock: another process may be writing the file, which its layout allows.
             self._file = h5py.File(path, "r", locking=False)
         except PermissionError:
             raise OutputError(f"{path}: cannot be read: permission denied") from None
@@ -49,17 +50,15 @@ class CheckedFile:
         if start != b"\x89HDF\r\n\x1a\n":
             return OutputError(f"{self.path}: is not a recording: it is no HDF5 file; give a .vtkhdf that Supple wrote")
         if "truncated" in reason:
-            return OutputError(
-                f"{self.path}: is cut off: only {self._bytes} bytes of it are there; copy it again, whole"
-            )
+            return OutputError(f"{self.path}: is cut off: it has only {self._bytes} bytes; copy all of it again")
         return self.broken(" ".join(reason.split()))
 
     def broken(self, what: str) -> OutputError:
-        """The error for contents that contradict themselves."""
+        """The error for contradictory contents."""
         return OutputError(f"{self.path}: is damaged: {what}; copy or record it again")
 
     def newer(self, what: str) -> OutputError:
-        """The error for contents that this version cannot know."""
+        """The error for contents of a version that this one does not know."""
         return OutputError(f"{self.path}: was written by a newer Supple ({what}); update this one")
 
     def other(self, what: str) -> OutputError:
@@ -73,14 +72,14 @@ class CheckedFile:
             return False
 
     def attribute(self, path: str, name: str) -> Any:
-        """An attribute, or None where there is no such thing."""
+        """An attribute, or None where it does not exist."""
         try:
             return self._file[path].attrs.get(name)
         except (KeyError, OSError, RuntimeError, ValueError):
             return None
 
     def dataset(self, path: str) -> h5py.Dataset:
-        """A dataset that is there."""
+        """A dataset, which must exist."""
         try:
             item = self._file[path]
         except (KeyError, OSError, RuntimeError, ValueError):
@@ -127,7 +126,7 @@ class CheckedFile:
             raise self.broken(f"{path} holds {dataset.dtype}")
         one = rows * int(np.prod(row_shape, dtype=np.int64)) * dataset.dtype.itemsize
         if one > _MOST_EXPANSION * self._bytes:
-            raise self.broken(f"{path} promises more than the file can hold")
+            raise self.broken(f"{path} claims more data than the file can contain")
         return dataset
 
     def first_rows(self, path: str, frames: int, row_shape: tuple[int, ...], kind: str) -> NDArray[Any]:
@@ -142,7 +141,7 @@ class CheckedFile:
         if dataset.dtype.kind != kind:
             raise self.broken(f"{path} holds {dataset.dtype}")
         if (dataset.size if size is None else size) * dataset.dtype.itemsize > _MOST_EXPANSION * self._bytes:
-            raise self.broken(f"{path} promises more than the file can hold")
+            raise self.broken(f"{path} claims more data than the file can contain")
         try:
             return np.asarray(dataset[rows])
         except (OSError, RuntimeError, ValueError) as error:

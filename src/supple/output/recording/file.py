@@ -1,12 +1,12 @@
-"""A VTKHDF file that is whole at every moment, even when its writer is killed.
+"""A VTKHDF file that is valid at every moment, also when its writer is killed.
 
-HDF5 alone does not give that: a writer that dies leaves its caches unwritten. So the HDF5 library lays the whole file
-out first, with room for many frames, and closes it. Every series of frames has then a fixed place ("contiguous"
-layout), and a frame is written there as plain bytes. Last come a few eight-byte numbers: how many frames there are,
-for us, and the same number as the `NSteps` attribute and as the lengths of the series in VTKHDF/Steps, for VTK, which
-allows no more entries than steps. Room that is not used yet takes no disk space where the file system knows holes.
+The HDF5 library alone does not guarantee this (docs/decisions.md, 4). Therefore it first lays out the whole file, with
+room for many frames, and closes it. Every series of frames then has a fixed position ("contiguous" layout), and a frame
+is written there as plain bytes. The last writes of a frame are a few numbers of eight bytes: our count of frames, and
+the same number as the `NSteps` attribute and as the lengths of the series in VTKHDF/Steps, for VTK, which allows no
+more entries than steps. Room that is not used takes no disk space where the file system supports holes.
 
-When the room is used up, the file is copied to one with twice the room, which then takes its place.
+When the room is used up, the file is copied to a file with twice the room, which then replaces it.
 
 Sources: VTKHDF file format 2.x (docs.vtk.org); HDF5 file format specification 3.0, sections IV.A.1.a (object header,
 version 1) and IV.A.2.b (dataspace message, version 1).
@@ -34,21 +34,20 @@ from supple.replacing import put_in_place, temporary_name
 
 WRITTEN = "supple/frames_written"
 STEP_TIMES, _TIMES = "VTKHDF/Steps/Values", "supple/frames/time"
-_STEPS_MARK = 0x7375_7070_6C65_2121  # stands for NSteps until its place is known
+_STEPS_MARK = 0x7375_7070_6C65_2121  # the value of NSteps until its position is known
 _COPY_BYTES = 1 << 24
-_STEP_COLUMNS = 5  # different ones in VTKHDF/Steps
-_SPARE_ROOM = 1 << 16  # for what HDF5 writes beside the numbers
+_STEP_COLUMNS = 5  # different columns in VTKHDF/Steps
+_SPARE_ROOM = 1 << 16  # for what HDF5 writes beside the arrays
 
 
 @dataclass(frozen=True)
 class Series:
-    """Something of which every frame has `rows` rows of one shape; or, as a heap, has room for them on average."""
+    """An array of which every frame has `rows` rows of one shape."""
 
     path: str
     rows: int
     row_shape: tuple[int, ...] = ()
     dtype: str = "<f8"
-    heap_end: str | None = None  # the series that says how many values of the heap are used after each frame
 
     @property
     def frame_bytes(self) -> int:
@@ -72,7 +71,7 @@ class Layout:
 
 
 class RecordingFile:
-    """Writes frames to their places in a file that `create` laid out.
+    """Writes frames to their positions in a file that `create` laid out.
 
     Parameters
     ----------
@@ -87,45 +86,36 @@ class RecordingFile:
             header = h5py.h5o.get_info(file["VTKHDF/Steps"].id).addr
             lengths = {h5py.h5o.get_info(item.id).addr for item in _step_datasets(file)}
             self._series = {s.path: s for s in layout.series}
-            self._rooms = {s.path: _dataset(file, s.path).nbytes for s in layout.series}
         self._file: BinaryIO = open(path, "r+b", buffering=0)  # noqa: SIM115
         self._steps = _place_of_mark(self._file, header)
         self._lengths = sorted(_place_of_length(self._file, address, capacity) for address in lengths)
 
     def put(self, path: str, values: ArrayLike) -> None:
-        """Write the next frame's rows of one series; nobody sees them before `commit`."""
+        """Write the next frame's rows of one series; readers see them after `commit`."""
         series = self._series[path]
         data = np.ascontiguousarray(values, dtype=series.dtype)
         if data.nbytes != series.frame_bytes:
             raise ValueError(f"{path}: a frame has {series.frame_bytes} bytes, not {data.nbytes}")
         self._write(self._places[path] + self.written * series.frame_bytes, data.tobytes())
 
-    def put_bytes(self, path: str, offset: int, data: bytes) -> None:
-        """Write bytes somewhere in the room of one series."""
-        self._write(self._places[path] + offset, data)
-
-    def room(self, path: str) -> int:
-        """Bytes of room of one series."""
-        return self._rooms[path]
-
     def commit(self) -> None:
-        """Make the frame that was put count."""
+        """Add the frame that was put to the count of frames."""
         self.written += 1
         self.write_count()
 
     def write_count(self) -> None:
-        """Write how many frames there are to every place that says so."""
+        """Write the number of frames to every position that stores it."""
         number = self.written.to_bytes(8, "little")
-        # NSteps before the lengths: VTK survives a series that is shorter than the number of steps, not a longer one.
+        # NSteps before the lengths: VTK can read series that are shorter than the number of steps, but not longer ones.
         for place in (self._counter, self._steps, *self._lengths):
             self._write(place, number)
 
     def close(self) -> None:
-        """Give the file back to the system."""
+        """Close the file."""
         self._file.close()
 
     def moved(self, path: Path) -> RecordingFile:
-        """The same file, under the name that it has now. It is closed first: some systems rename no open file."""
+        """Rename the file; returns a writer under the new name. Some systems cannot rename an open file."""
         self.close()
         put_in_place(self.path, path)
         there = copy.copy(self)
@@ -140,8 +130,8 @@ class RecordingFile:
 
 
 def create(path: Path, layout: Layout, capacity: int, write_static: Callable[[h5py.File], None]) -> None:
-    """Lay out a file with room for `capacity` frames and none written; `write_static` adds all that does not change."""
-    # Drawn up in memory first, for its size.
+    """Lay out a file with room for `capacity` frames and no frame; `write_static` adds all that does not change."""
+    # A draft in memory gives the size.
     with h5py.File(path, "w", driver="core", backing_store=False) as draft:
         write_static(draft)
         draft.flush()
@@ -158,7 +148,7 @@ def create(path: Path, layout: Layout, capacity: int, write_static: Callable[[h5
 
 
 def rewrite(source: Path, target: Path, layout: Layout, capacity: int | None, *, compress: bool = False) -> None:
-    """Copy a recording's whole frames to a file with another capacity; with None, to one that has no room for more.
+    """Copy the complete frames of a recording to a file with another capacity; None leaves no room for more frames.
 
     With `compress`, the series are stored in gzip chunks, one per frame; nothing can be added to them then.
 
@@ -171,16 +161,14 @@ def rewrite(source: Path, target: Path, layout: Layout, capacity: int | None, *,
     _require_room(target, fixed, length=fixed + layout.frame_bytes * (capacity or 0))
     with h5py.File(source, "r", locking=False) as old, h5py.File(target, "w", libver=("earliest", "v110")) as new:
         written = int(_dataset(old, WRITTEN)[()])
+        present = [series for series in layout.series if series.path in old]  # earlier versions wrote fewer
         _write_step_count(new, _STEPS_MARK if capacity else written)
-        _copy_static(old, new, "", {series.path for series in layout.series})
+        _copy_static(old, new, "", {series.path for series in present})
         new.create_dataset(WRITTEN, data=np.int64(written))
-        for series in layout.series:
-            # VTK's copy of the times may be one frame short, where the writer was stopped between two writes.
+        for series in present:
+            # Where the writer was killed between two writes, VTK's copy of the times can be one frame short.
             source_data = _dataset(old, _TIMES if series.path == STEP_TIMES else series.path)
             rows = written * series.rows
-            if series.heap_end is not None:
-                used = int(_dataset(old, series.heap_end)[written - 1])
-                rows = -(-used // int(np.prod(series.row_shape)))
             shape = (max(rows, (capacity or 0) * series.rows), *series.row_shape)
             if compress and 0 not in shape:
                 chunk = (series.rows if series.rows > 1 else min(rows, 1024), *series.row_shape)
@@ -199,7 +187,7 @@ def rewrite(source: Path, target: Path, layout: Layout, capacity: int | None, *,
 def _require_room(path: Path, size: int, *, length: int = 0) -> None:
     """Raise `OSError` unless `path` may grow by `size` bytes, and be `length` bytes long.
 
-    Where HDF5 itself meets a full disk, a quota or a limit of file sizes, it crashes.
+    HDF5 crashes where it finds the disk full, a quota or a limit of file sizes.
     """
     if shutil.disk_usage(path.parent).free < size + _SPARE_ROOM:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -243,12 +231,12 @@ def _reserve(file: h5py.File, series: Series, shape: tuple[int, ...]) -> h5py.Da
 
 
 def _write_step_count(file: h5py.File, value: int) -> None:
-    """NSteps, before all else: its message goes where the file ends by then, near the group's header."""
+    """Write NSteps, before everything else: HDF5 then stores its value near the header of the group."""
     file.require_group("VTKHDF/Steps").attrs.create("NSteps", value, dtype="<i8")
 
 
 def _write_steps(file: h5py.File, layout: Layout, capacity: int) -> None:
-    """VTKHDF/Steps: where each step's rows begin. Equal columns are one dataset under several names."""
+    """Write VTKHDF/Steps: where each step's rows begin. Equal columns are one dataset under several names."""
     steps = file.require_group("VTKHDF/Steps")
     index = np.arange(capacity, dtype=np.int64)
     steps["PartOffsets"] = np.zeros(capacity, dtype=np.int64)
@@ -266,7 +254,7 @@ def _write_steps(file: h5py.File, layout: Layout, capacity: int) -> None:
 def _step_datasets(file: h5py.File) -> list[h5py.Dataset]:
     found: list[h5py.Dataset] = []
     file["VTKHDF/Steps"].visititems(lambda _, item: found.append(item) if isinstance(item, h5py.Dataset) else None)  # pyright: ignore[reportAttributeAccessIssue]
-    # Hard links are visited once each object, whatever their number.
+    # An object with several hard links is visited once.
     return found
 
 
@@ -282,7 +270,7 @@ def _place(file: h5py.File, series: Series) -> int:
 
 
 def _place_of_mark(file: BinaryIO, header: int) -> int:
-    """Where the value of NSteps is: in or near the object header of the group, or wherever that goes on."""
+    """Where the value of NSteps is: near the object header of the group, or in a continuation of it elsewhere."""
     mark = _STEPS_MARK.to_bytes(8, "little")
     near = max(0, header - (1 << 20))
     file.seek(near)
@@ -292,7 +280,7 @@ def _place_of_mark(file: BinaryIO, header: int) -> int:
     with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as whole:
         place = whole.find(mark)
         if place < 0 or whole.find(mark, place + 1) >= 0:
-            raise OutputError(f"{file.name}: the HDF5 library wrote NSteps in a way that Supple does not know")
+            raise OutputError(f"{file.name}: HDF5 wrote NSteps in an unknown layout; install another version of h5py")
     return place
 
 
@@ -302,5 +290,5 @@ def _place_of_length(file: BinaryIO, header: int, length: int) -> int:
     block = file.read(40)
     known = block[0] == 1 and block[16:18] == b"\x01\x00" and block[24:26] == b"\x01\x01"
     if not known or int.from_bytes(block[32:40], "little") != length:
-        raise OutputError(f"{file.name}: the HDF5 library wrote a dataspace in a way that Supple does not know")
+        raise OutputError(f"{file.name}: HDF5 wrote a length in an unknown layout; install another version of h5py")
     return header + 32

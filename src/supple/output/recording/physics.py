@@ -1,6 +1,6 @@
-"""What a recording keeps of its scene for whoever checks it: the bodies' laws, what acts on them, what may touch.
+"""What a recording keeps of its scene for `supple check`: laws of the bodies, loads, and pairs that may touch.
 
-Written since 0.1; recordings without it stay readable, and some checks say that they cannot be made.
+Recordings from before version 0.1 do not have it; checks that need it are skipped.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class RecordedPhysics:
     ----------
     kind : (m,) row of `registry.ELASTIC_MATERIALS` of each tet, or `NOT_KNOWN`; mu, lam : (m,) [Pa]
     compliances : for each body those of its edges [m/N] and volumes [m^5/N], or None for a body of another law
-    forces, soft_targets, scripted_pins, stitches : how many the scene has
+    forces, soft_targets, scripted_pins, stitches : numbers of them in the scene
     """
 
     kind: NDArray[np.uint8]
@@ -54,7 +54,7 @@ class RecordedPhysics:
 
 
 def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
-    """Write the arrays to the recording's own group; returns what belongs into its header."""
+    """Write the arrays to the group of the recording; returns the part that belongs in its header."""
     m = len(system.tets)
     kind, mu, lam = np.full(m, NOT_KNOWN, dtype=np.uint8), np.zeros(m), np.zeros(m)
     compliances: list[list[float] | None] = []
@@ -89,14 +89,14 @@ def _untouching(system: System) -> list[list[int]]:
 
 
 def _stitched(system: System) -> NDArray[np.int64]:
-    """(k, 4) the vertices of each stitch, some of them twice where it has fewer; anchors count on from the bodies'."""
+    """(k, 4) the vertices of each stitch, the last one twice where it has fewer; anchors come after the bodies'."""
     stitching = system.stitching
     springs = stitching.springs.vertices
     return np.concatenate([stitching.tets.vertices, springs[:, [0, 1, 2, 2]]]).astype(np.int64)
 
 
 def _anchors(system: System) -> NDArray[np.int64]:
-    """(a, 2) obstacle, and row of its recorded vertices, of what is stitched to obstacles."""
+    """(a, 2) obstacle, and row of its recorded vertices, of each anchor."""
     anchors = system.stitching.anchors
     out = np.zeros((len(anchors), 2), dtype=np.int64)
     for k, (owner, point) in enumerate(zip(anchors.owner, anchors.points, strict=True)):
@@ -107,13 +107,13 @@ def _anchors(system: System) -> NDArray[np.int64]:
 
 @dataclass(frozen=True, eq=False)
 class Untouching:
-    """What the scene lets touch, or pass through each other.
+    """Pairs that may touch or pass through each other.
 
     Attributes
     ----------
     pairs : numbers of bodies, then obstacles
     stitched : (k, 4) vertices of stitches: the first may touch the triangles that have all of the others. Numbers from
-        n on, n being that of all bodies' vertices, are anchors
+        n on, where n is the number of all bodies' vertices, are anchors
     anchors : (a, 2) obstacle, and row of its vertices
     """
 
@@ -123,19 +123,21 @@ class Untouching:
 
 
 def read_physics(file: CheckedFile, header: dict[str, Any], m: int) -> RecordedPhysics | None:
-    """The laws of a recording with m tets, or None where it does not tell.
+    """The laws of a recording with m tets, or None where it does not contain them.
 
     Raises
     ------
-    OutputError : where it contradicts itself.
+    OutputError : where the data are contradictory.
     """
-    said = header.get("physics")
-    if said is None:
+    physics = header.get("physics")
+    if physics is None:
         return None
     try:
-        counts = [int(said[key]) for key in ("forces", "soft_targets", "scripted_pins", "stitches")]
-        laws = [str(law) for law in said["laws"]]
-        compliances = tuple(None if pair is None else (float(pair[0]), float(pair[1])) for pair in said["compliances"])
+        counts = [int(physics[key]) for key in ("forces", "soft_targets", "scripted_pins", "stitches")]
+        laws = [str(law) for law in physics["laws"]]
+        compliances = tuple(
+            None if pair is None else (float(pair[0]), float(pair[1])) for pair in physics["compliances"]
+        )
     except (KeyError, TypeError, ValueError, IndexError):
         raise file.broken("the physics in its header is not described as it should be") from None
     if len(compliances) != len(header["bodies"]):
@@ -152,17 +154,17 @@ def read_physics(file: CheckedFile, header: dict[str, Any], m: int) -> RecordedP
 def read_untouching(
     file: CheckedFile, header: dict[str, Any], vertices: int, obstacle_vertices: list[int]
 ) -> Untouching:
-    """What may touch, in a recording with so many vertices of bodies, and of each obstacle.
+    """The pairs that may touch; `vertices` is the number of all bodies', `obstacle_vertices` those of each obstacle.
 
     Raises
     ------
-    OutputError : where it names something that is not there.
+    OutputError : where a body, obstacle or vertex does not exist.
     """
-    said = header.get("physics")
-    if said is None:
+    physics = header.get("physics")
+    if physics is None:
         return Untouching((), np.zeros((0, 4), dtype=np.int64), np.zeros((0, 2), dtype=np.int64))
     try:
-        pairs = tuple((int(i), int(j)) for i, j in said["untouching"])
+        pairs = tuple((int(i), int(j)) for i, j in physics["untouching"])
     except (KeyError, TypeError, ValueError):
         raise file.broken("the pairs that may touch are not described as they should be") from None
     stitched = file.array(f"{_GROUP}/stitched", "i", (None, 4)).astype(np.int64)
@@ -173,5 +175,5 @@ def read_untouching(
     wrong |= ((stitched < 0) | (stitched >= vertices + len(anchors))).any()
     wrong |= any(not (0 <= i < len(obstacle_vertices) and 0 <= k < obstacle_vertices[i]) for i, k in anchors.tolist())
     if wrong:
-        raise file.broken("what may touch names a body, obstacle or vertex that is not there")
+        raise file.broken("what may touch names a body, obstacle or vertex that does not exist")
     return Untouching(pairs, stitched, anchors)

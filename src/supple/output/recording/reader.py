@@ -1,35 +1,38 @@
-"""Reading a recording back, frame by frame, without trusting what the file says of itself."""
+"""Reading a recording frame by frame. The contents of the file are checked before they are used."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, overload
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import OutputError
 from supple.output.recording.checked_hdf5 import CheckedFile
-from supple.output.recording.file import WRITTEN
+from supple.output.recording.details import RecordedDetails
+from supple.output.recording.file import WRITTEN, Series
 from supple.output.recording.physics import RecordedPhysics, read_physics, read_untouching
-from supple.output.recording.recorder import REPORT_NUMBERS, REPORT_VECTORS
+from supple.output.recording.recorder import MESSAGE_BYTES, REPORT_NUMBERS, REPORT_VECTORS
 from supple.output.recording.scene import RecordedBody, RecordedObstacle, read_bodies, read_header, read_obstacles
 from supple.output.recording.stitches import RecordedStitches, read_stitches
 from supple.simulate import Report
 from supple.state import State, Status
 
-# Recordings of earlier versions do not have these; what they were is known all the same.
+# Recordings of earlier versions do not have these, but their values are known.
 _OF_EARLIER = {"stitch_energy": 0.0, "largest_stitch_stretch": np.nan}
+_MESSAGE = "supple/frames/message"
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedFrame:
-    """One frame, read when it is asked for. Names are those of `supple.Frame`."""
+    """One frame, read when it is asked for. Names are those of `supple.Frame`.
+
+    `simulate(..., start=recording[-1])` continues from a frame, with either solver.
+    """
 
     recording: Recording
     number: int
@@ -37,7 +40,7 @@ class RecordedFrame:
     @property
     def index(self) -> int:
         """Number of steps since the start."""
-        return int(self.recording._values("index")[self.number])
+        return int(self.recording._values("supple/frames/index", (), "i")[self.number])
 
     @property
     def time(self) -> float:
@@ -46,7 +49,7 @@ class RecordedFrame:
 
     @cached_property
     def state(self) -> State:
-        """All bodies after each other; `simulate(..., start=frame.state)` goes on from here."""
+        """All vertices, in the order of the bodies."""
         return State(self.time, self._rows("VTKHDF/Points"), self._rows("VTKHDF/PointData/velocities"))
 
     @cached_property
@@ -61,30 +64,33 @@ class RecordedFrame:
 
     @cached_property
     def det_F(self) -> NDArray[np.float64]:
-        """(m,) J of every tet, all bodies after each other."""
+        """(m,) J of every tet, in the order of the bodies."""
         return self._rows("VTKHDF/CellData/det_F")
 
     @cached_property
     def poses(self) -> NDArray[np.float64]:
-        """(obstacles, 3, 4) rotation and translation from where each obstacle is at time 0 to where it is now."""
+        """(obstacles, 3, 4) rotation and translation of each obstacle from its place at time 0 to this frame."""
         return self._rows("supple/frames/poses")
 
     @cached_property
     def report(self) -> Report:
-        """How the step ended, and what was measured on its state."""
+        """How the step ended, and what was measured on its state.
+
+        `details` contains the fields that a recording keeps (see `SolverDetails`); `message` is cut after 512 bytes.
+        Both are empty in recordings of version 0.1.
+        """
         values = {name: float(self.recording.series(name)[self.number]) for name in REPORT_NUMBERS}
         vectors = {name: self.recording.series(name)[self.number] for name in REPORT_VECTORS}
         distance, stretch = values.pop("min_distance"), values.pop("largest_stitch_stretch")
-        said = self.recording._text(self.number)
         return Report(
             **values,
             **vectors,
             status=self.recording.statuses[self.number],
-            iterations=int(self.recording._values("iterations")[self.number]),
+            iterations=int(self.recording._values("supple/frames/iterations", (), "i")[self.number]),
             min_distance=None if np.isnan(distance) else distance,
             largest_stitch_stretch=None if np.isnan(stretch) else stretch,
-            message=str(said.get("message", "")),
-            details=dict(said.get("details", {})),
+            message=self.recording._message(self.number),
+            details=self.recording.details.of_frame(self.number, self.recording._details_series),
         )
 
     def _rows(self, path: str) -> NDArray[Any]:
@@ -97,11 +103,12 @@ class Recording(Sequence[RecordedFrame]):
     Attributes
     ----------
     path : of the file; times : (frames,) [s]
-    bodies, obstacles : what was simulated, and what it met; stitches : what joined them
+    bodies, obstacles, stitches : of the scene
     rest_positions : (n, 3) [m]; masses : (n,) [kg]; tets : (m, 4); triangles : (t, 3); rest_volumes : (m,) [m^3]
     gravity : (3,) [m/s^2]; dt : time from frame to frame [s]
     physics : the bodies' laws and what acts on them, or None where an older version wrote the recording
-    untouching : what the scene lets touch, or pass through each other
+    details : which fields of the solver's details are kept
+    untouching : pairs that may touch or pass through each other
     scene_text : the scene file's text, or None; solver : its description, or None; supple_version : of the writer
     """
 
@@ -119,7 +126,8 @@ class Recording(Sequence[RecordedFrame]):
     def _read(self) -> None:
         file = self._file
         header = read_header(file)
-        self._header = header
+        self._read_series: dict[str, NDArray[Any]] = {}
+        self.details = RecordedDetails.from_header(file, header)
         self.rest_positions = file.array("supple/rest_positions", "f", (None, 3))
         n = len(self.rest_positions)
         self.tets = file.indices("supple/tets", 4, n)
@@ -140,18 +148,20 @@ class Recording(Sequence[RecordedFrame]):
         self.scene_text = file.text("supple/scene") if "supple/scene" in file else None
         self._count = int(file.array(WRITTEN, "i", ()))
         if self._count < 1:
-            raise file.broken(f"it says that it holds {self._count} frames")
+            raise file.broken(f"its number of frames is {self._count}")
         for path, rows, shape, kind in (
             ("VTKHDF/Points", n, (3,), "f"),
             ("VTKHDF/PointData/velocities", n, (3,), "f"),
             ("VTKHDF/CellData/det_F", m, (), "f"),
             ("supple/frames/poses", 1, (len(self.obstacles), 3, 4), "f"),
+            (_MESSAGE, 1, (MESSAGE_BYTES,), "u"),
         ):
-            file.check_series(path, self._count, rows, shape, kind)
+            if path != _MESSAGE or path in file:
+                file.check_series(path, self._count, rows, shape, kind)
         self.times: NDArray[np.float64] = file.first_rows("supple/frames/time", self._count, (), "f")
         if not np.isfinite(self.times).all():
             raise file.broken("a frame's time is not finite")
-        codes = self._values("status")
+        codes = self._values("supple/frames/status", (), "u")
         names = header["statuses"]
         if codes.max() >= len(names) or not set(names) <= {str(status) for status in Status}:
             raise file.newer("a frame has a status that this version does not know")
@@ -183,7 +193,7 @@ class Recording(Sequence[RecordedFrame]):
 
     @property
     def frames(self) -> Recording:
-        """The frames: the recording itself."""
+        """The recording itself, which is the sequence of its frames."""
         return self
 
     def body(self, name: str) -> RecordedBody:
@@ -201,15 +211,18 @@ class Recording(Sequence[RecordedFrame]):
     def series(self, name: str) -> NDArray[np.float64]:
         """A number (frames,) or vector (frames, 3) of the reports over time, such as "kinetic_energy"."""
         if name in REPORT_VECTORS:
-            return self._values(name, (3,))
+            return self._values(f"supple/frames/{name}", (3,))
         if name in REPORT_NUMBERS:
-            return self._values(name)
+            path = f"supple/frames/{name}"
+            if name in _OF_EARLIER and path not in self._file:
+                return np.full(self._count, _OF_EARLIER[name])
+            return self._values(path)
         raise OutputError(
             f"{self.path}: there is no series {name!r}; take one of {', '.join(REPORT_NUMBERS + REPORT_VECTORS)}"
         )
 
     def close(self) -> None:
-        """Close the file; frames that were not read yet cannot be read any more."""
+        """Close the file; frames that were not read before can then not be read."""
         self._file.close()
 
     def __enter__(self) -> Recording:
@@ -218,41 +231,30 @@ class Recording(Sequence[RecordedFrame]):
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _values(self, name: str, shape: tuple[int, ...] = ()) -> NDArray[Any]:
-        kept = self.__dict__.setdefault("_kept", {})
-        if name not in kept:
-            if name in _OF_EARLIER and f"supple/frames/{name}" not in self._file:
-                return np.full(self._count, _OF_EARLIER[name])
-            kind = {"status": "u", "index": "i", "iterations": "i", "text_end": "i"}.get(name, "f")
-            kept[name] = self._file.first_rows(f"supple/frames/{name}", self._count, shape, kind)
-        return kept[name]
+    def _values(self, path: str, shape: tuple[int, ...] = (), kind: str = "f") -> NDArray[Any]:
+        """All frames' rows of a series; read once."""
+        if path not in self._read_series:
+            self._read_series[path] = self._file.first_rows(path, self._count, shape, kind)
+        return self._read_series[path]
 
     def _frame_rows(self, path: str, number: int) -> NDArray[Any]:
         dataset = self._file.dataset(path)
-        rows = {"VTKHDF/CellData/det_F": len(self.tets), "supple/frames/poses": 1}.get(path, len(self.rest_positions))
+        rows = len(self.tets) if path == "VTKHDF/CellData/det_F" else 1
+        if path in ("VTKHDF/Points", "VTKHDF/PointData/velocities"):
+            rows = len(self.rest_positions)
         try:
             block = dataset[number * rows : (number + 1) * rows]
         except (OSError, RuntimeError) as error:
             raise self._file.broken(f"frame {number} cannot be read ({_reason(error)})") from None
         return block[0] if path == "supple/frames/poses" else block
 
-    def _text(self, number: int) -> dict[str, Any]:
-        ends = self._values("text_end")
-        start, stop = int(ends[number - 1]) if number else 0, int(ends[number])
-        heap: h5py.Dataset = self._file.dataset("supple/frames/text")
-        row = heap.shape[1] if heap.ndim == 2 else 0
-        if not 0 <= start <= stop <= len(heap) * row:
-            raise self._file.broken(f"the text of frame {number} lies outside of it")
-        if start == stop:
-            return {}
-        try:
-            block = heap[start // row : -(-stop // row)].tobytes()
-            said = json.loads(block[start % row : start % row + stop - start])
-        except (OSError, RuntimeError, ValueError):
-            raise self._file.broken(f"the text of frame {number} is not JSON") from None
-        if not isinstance(said, dict):
-            raise self._file.broken(f"the text of frame {number} is not a JSON object")
-        return said
+    def _details_series(self, series: Series) -> NDArray[Any]:
+        return self._values(series.path, series.row_shape, np.dtype(series.dtype).kind)
+
+    def _message(self, number: int) -> str:
+        if _MESSAGE not in self._file:
+            return ""
+        return self._frame_rows(_MESSAGE, number).tobytes().rstrip(b"\0").decode(errors="replace")
 
 
 def _reason(error: Exception) -> str:
@@ -260,13 +262,13 @@ def _reason(error: Exception) -> str:
 
 
 def read_recording(path: str | Path) -> Recording:
-    """Open a recording: of a simulation that ended, was killed, or is running still.
+    """Open a recording, of a simulation that has ended, was killed, or is still running.
 
-    Frames are read when they are asked for. What was written after the recording was opened is not seen.
+    A frame is read when it is used. Frames that are written after the recording was opened are not in it.
 
     Raises
     ------
-    OutputError : where the file is missing, a folder, cut off, of another kind, of a newer version, or contradicts
-        itself; the text starts with the path.
+    OutputError : where the file is missing, a folder, cut off, of another kind, of a newer version, or contradictory;
+        the text starts with the path.
     """
     return Recording(path)

@@ -1,24 +1,23 @@
 """A sink that writes every frame to one VTKHDF file, which opens in ParaView and in `read_recording`.
 
-How the file survives a kill is told in `supple.output.recording.file`; what stands in it, in the tables below.
+`supple.output.recording.file` describes how the file survives a kill; the tables below list what is in it.
 """
 
 from __future__ import annotations
 
-import json
 import logging
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from supple.errors import OutputError
-from supple.output.files.atomic import output_error, parent_folder
+from supple.output.recording.details import RecordedDetails
 from supple.output.recording.file import STEP_TIMES, Layout, RecordingFile, Series, create, rewrite
 from supple.output.recording.scene import write_scene
-from supple.replacing import put_in_place, remove_abandoned, temporary_name
-from supple.simulate import Frame, Report
+from supple.replacing import output_error, parent_folder, put_in_place, remove_abandoned, temporary_name
+from supple.simulate import Frame
 from supple.state import Status
 
 logger = logging.getLogger(__name__)
@@ -35,13 +34,13 @@ REPORT_NUMBERS = (
     "largest_stitch_stretch",
 )
 REPORT_VECTORS = ("linear_momentum", "angular_momentum")
-_TEXT_BYTES_PER_FRAME = 512
-# Frames, and bytes of frames, that are given room at first; more when they are needed.
+MESSAGE_BYTES = 512  # longer messages are cut
+# Frames, and bytes of frames, for which there is room at first; the file grows when more are needed.
 _FIRST_FRAMES, _FIRST_ROOM = 1 << 16, 1 << 30
 
 
-def frame_layout(points: int, tets: int, obstacles: int) -> Layout:
-    """The series that every recording has."""
+def frame_layout(points: int, tets: int, obstacles: int, details: RecordedDetails) -> Layout:
+    """The series of a recording."""
     numbers = (Series(f"supple/frames/{name}", 1) for name in REPORT_NUMBERS)
     vectors = (Series(f"supple/frames/{name}", 1, (3,)) for name in REPORT_VECTORS)
     series = (
@@ -56,8 +55,8 @@ def frame_layout(points: int, tets: int, obstacles: int) -> Layout:
         *numbers,
         *vectors,
         Series("supple/frames/poses", 1, (obstacles, 3, 4)),
-        Series("supple/frames/text_end", 1, (), "<i8"),
-        Series("supple/frames/text", 1, (_TEXT_BYTES_PER_FRAME,), "|u1", "supple/frames/text_end"),
+        Series("supple/frames/message", 1, (MESSAGE_BYTES,), "|u1"),
+        *(field.series for field in details.fields),
     )
     return Layout(points, tets, series)
 
@@ -65,20 +64,20 @@ def frame_layout(points: int, tets: int, obstacles: int) -> Layout:
 class Recorder:
     """Records a simulation: `simulate(scene, solver, dt, steps, sinks=[Recorder("out/recording.vtkhdf")])`.
 
-    The file appears, in place of an older one, with the first frame in it, and holds every whole frame from then on,
-    also while it is being written and when the writer is killed.
+    The file replaces an older one when it contains the first frame. From then on it contains every complete frame, also
+    while it is being written and when the writer is killed.
 
     Parameters
     ----------
     path : of the file, ending in .vtkhdf (or .hdf, .hdf5, .h5). Its folder is made where it is missing.
     scene_text : the scene file's text, kept in the recording.
     solver : a description of the solver, kept in the recording.
-    compress : store the frames compressed once the simulation ends. Smaller, and slower to write.
+    compress : compress the frames when the simulation ends. The file is smaller and takes longer to write.
 
     Raises
     ------
-    OutputError : here for an unusable path; from `begin` and `write` where the system refuses (no permission, no
-        room). All whole frames stay readable then.
+    OutputError : from the constructor for an unusable path; from `begin` and `write` where the system reports an error
+        (no permission, no room). All complete frames stay readable.
     """
 
     def __init__(
@@ -86,25 +85,26 @@ class Recorder:
     ) -> None:
         self.path = Path(path)
         if self.path.suffix.lower() not in SUFFIXES:
-            raise OutputError(f"{self.path}: ParaView knows a recording by its ending; name it {self.path.name}.vtkhdf")
+            raise OutputError(f"{self.path}: ParaView needs the suffix of a recording; name it {self.path.name}.vtkhdf")
         if self.path.is_dir():
             raise OutputError(f"{self.path}: is a folder; give the name of a file in it, such as recording.vtkhdf")
         self._scene_text = scene_text
         self._solver = None if solver is None else str(solver)
         self._compress = bool(compress)
         self._file: RecordingFile | None = None
-        self._text_end = 0
+        self._details = RecordedDetails()
         self._wanted = 0
 
     def begin(self, first: Frame, dt: float, steps: int) -> None:
-        """Make the file, with the frame at the start."""
+        """Create the file, with the frame at the start."""
         from supple import __version__
 
         system = first.system
+        self._details = RecordedDetails.like(first.report.details)
         facts = {"supple_version": __version__, "dt": float(dt), "steps": int(steps), "solver": self._solver}
-        layout = frame_layout(len(system.rest_positions), len(system.tets), len(system.obstacles))
+        facts["details"] = self._details.header()
+        layout = frame_layout(len(system.rest_positions), len(system.tets), len(system.obstacles), self._details)
         self._wanted = steps + 1
-        self._text_end = 0
         capacity = min(self._wanted, _FIRST_FRAMES, max(2, _FIRST_ROOM // layout.frame_bytes))
         parent_folder(self.path)
         fresh = temporary_name(self.path)
@@ -132,7 +132,7 @@ class Recorder:
             raise output_error(self.path, error) from None
 
     def end(self) -> None:
-        """Give room that was not used back, and close the file."""
+        """Release room that was not used, and close the file."""
         file, self._file = self._file, None
         if file is None:
             return
@@ -144,13 +144,13 @@ class Recorder:
             rewrite(self.path, fresh, file.layout, None, compress=self._compress)
             put_in_place(fresh, self.path)
         except (OSError, RuntimeError) as error:
-            # The recording is whole as it is; there is only unused room in it.
-            logger.warning("%s: stays larger than it must be: %s", self.path, " ".join(str(error).split()))
+            # The recording is complete; it only contains unused room.
+            logger.warning("%s: is larger than necessary: %s", self.path, " ".join(str(error).split()))
         finally:
             fresh.unlink(missing_ok=True)
 
     def _make_room(self, file: RecordingFile) -> RecordingFile:
-        """The same frames in a file with more room, which takes the place of this one."""
+        """Copy the frames to a file with more room, which replaces this one."""
         capacity = 2 * file.capacity
         if file.capacity < self._wanted:
             capacity = min(capacity, self._wanted)
@@ -168,17 +168,14 @@ class Recorder:
     def _put(self, frame: Frame) -> None:
         assert self._file is not None
         report = frame.report
-        text = _frame_text(report)
-        full = self._file.written == self._file.capacity
-        while full or self._text_end + len(text) > self._file.room("supple/frames/text"):
+        if self._file.written == self._file.capacity:
             self._file = self._make_room(self._file)
-            full = False
         file = self._file
         file.put("VTKHDF/Points", frame.state.positions)
         file.put("VTKHDF/PointData/velocities", frame.state.velocities)
         file.put("VTKHDF/CellData/det_F", frame.det_F)
         file.put(STEP_TIMES, frame.time)
-        # VTK's own copy has its length changed a moment after the frame counts; ours does not.
+        # The length of VTK's copy of the times changes after the count of frames; this one has no length to change.
         file.put("supple/frames/time", frame.time)
         file.put("supple/frames/index", frame.index)
         file.put("supple/frames/status", list(Status).index(report.status))
@@ -192,18 +189,16 @@ class Recorder:
         for pose, obstacle in zip(poses, frame.system.obstacles, strict=True):
             pose[:, :3], pose[:, 3] = obstacle.pose(frame.time)
         file.put("supple/frames/poses", poses)
-        file.put_bytes("supple/frames/text", self._text_end, text)
-        file.put("supple/frames/text_end", self._text_end + len(text))
+        if report.message:  # otherwise the room, which is all zeros, stays a hole in the file
+            file.put("supple/frames/message", _message_bytes(report.message))
+        for field in self._details.fields:
+            file.put(field.series.path, field.stored(getattr(report.details, field.name)))
         file.commit()
-        self._text_end += len(text)
 
 
-def _frame_text(report: Report) -> bytes:
-    """Message and details of a step, as JSON; nothing where there is neither."""
-    said = {key: value for key, value in (("message", report.message), ("details", report.details)) if value}
-    return json.dumps(said, default=_plain).encode() if said else b""
-
-
-def _plain(value: Any) -> Any:
-    """What JSON does not know: NumPy's numbers and arrays as numbers and lists, anything else as its text."""
-    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else str(value)
+def _message_bytes(message: str) -> NDArray[np.uint8]:
+    """The message in UTF-8, with zeros after it."""
+    data, mark = message.encode(), "…".encode()
+    if len(data) > MESSAGE_BYTES:
+        data = data[: MESSAGE_BYTES - len(mark)].decode(errors="ignore").encode() + mark
+    return np.frombuffer(data.ljust(MESSAGE_BYTES, b"\0"), dtype=np.uint8)

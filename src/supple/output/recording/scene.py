@@ -20,7 +20,7 @@ from supple.simulate import Frame
 from supple.state import Status
 from supple.system import BodyRange
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 VTK_TETRA = 10
 
 
@@ -46,13 +46,13 @@ class RecordedBody:
 
 @dataclass(frozen=True, eq=False)
 class RecordedObstacle:
-    """One obstacle of a recording, where it was at time 0.
+    """One obstacle of a recording, in its place at time 0.
 
     Attributes
     ----------
     name : of the obstacle; kind : "HalfSpace", "Box", "Sphere" or "TriangleObstacle"
-    parameters : what it was made with: point, normal; center, size, orientation, inside; radius
-    vertices, triangles : of a TriangleObstacle, else empty
+    parameters : of the obstacle: point, normal; center, size, orientation, inside; radius
+    vertices, triangles : of a TriangleObstacle, otherwise empty
     """
 
     name: str
@@ -63,7 +63,7 @@ class RecordedObstacle:
 
 
 def write_scene(file: h5py.File, first: Frame, facts: dict[str, Any], scene_text: str | None) -> None:
-    """Write everything that no frame changes; `facts` are added to the header."""
+    """Write everything that is the same in all frames; `facts` are added to the header."""
     system = first.system
     n, m = len(system.rest_positions), len(system.tets)
     _write_grid(file.require_group("VTKHDF"), first, n, m)
@@ -156,7 +156,7 @@ def _floats(value: Any) -> list[float]:
 
 
 def read_header(file: CheckedFile) -> dict[str, Any]:
-    """The header of a recording, once it is clear that the file is one, of a version that we know.
+    """The header of a recording; the file is checked to be a recording of a known version.
 
     Raises
     ------
@@ -165,12 +165,12 @@ def read_header(file: CheckedFile) -> dict[str, Any]:
     version = file.attribute("supple", "format_version")
     if version is None:
         kind = file.attribute("VTKHDF", "Type")
-        said = (
+        content = (
             f"a VTKHDF {kind.decode()} of another program"
             if isinstance(kind, bytes)
             else "an HDF5 file of another kind"
         )
-        raise file.other(said)
+        raise file.other(content)
     if not isinstance(version, (int, np.integer)) or version < 1:
         raise file.broken(f"its format version is {version!r}")
     if version > FORMAT_VERSION:
@@ -179,7 +179,7 @@ def read_header(file: CheckedFile) -> dict[str, Any]:
         header = json.loads(file.text("supple/header"))
         dt, lists = float(header["dt"]), [header[key] for key in ("statuses", "bodies", "obstacles")]
     except (ValueError, TypeError, KeyError):
-        raise file.broken("its header is not the JSON that it should be") from None
+        raise file.broken("its header is not the expected JSON") from None
     if not all(isinstance(item, list) for item in lists) or not header["bodies"] or not dt > 0.0:
         raise file.broken("its header has no bodies, or no time step")
     return header
@@ -191,18 +191,18 @@ def read_bodies(
     """The bodies of a recording with n vertices and m tets."""
     bodies = []
     try:
-        for i, said in enumerate(header["bodies"]):
-            ends = [(int(a), int(b)) for a, b in (said["vertices"], said["tets"], said["triangles"])]
+        for i, described in enumerate(header["bodies"]):
+            ends = [(int(a), int(b)) for a, b in (described["vertices"], described["tets"], described["triangles"])]
             (v0, v1), (t0, t1), (f0, f1) = ends
             if not (0 <= v0 < v1 <= n and 0 <= t0 < t1 <= m and 0 <= f0 <= f1 <= len(triangles)):
-                raise file.broken(f"body {said['name']!r} has rows {ends}, outside of {n} vertices and {m} tets")
+                raise file.broken(f"body {described['name']!r} has rows {ends}, outside of {n} vertices and {m} tets")
             own = triangles[f0:f1] - np.int32(v0)
             if own.size and (own.min() < 0 or own.max() >= v1 - v0):
-                raise file.broken(f"body {said['name']!r} has triangles on vertices of another")
-            skin = _read_skin(file, f"supple/skins/{i}", v1 - v0) if said["skin"] else None
+                raise file.broken(f"body {described['name']!r} has triangles on vertices of another")
+            skin = _read_skin(file, f"supple/skins/{i}", v1 - v0) if described["skin"] else None
             rows = slice(v0, v1), slice(t0, t1)
             bodies.append(
-                RecordedBody(str(said["name"]), str(said["material"]), *rows, np.ascontiguousarray(own), skin)
+                RecordedBody(str(described["name"]), str(described["material"]), *rows, np.ascontiguousarray(own), skin)
             )
     except (KeyError, TypeError, ValueError):
         raise file.broken("the bodies in its header are not described as they should be") from None
@@ -219,12 +219,13 @@ def read_obstacles(file: CheckedFile, header: dict[str, Any]) -> tuple[RecordedO
     """The obstacles of a recording."""
     obstacles = []
     try:
-        for i, said in enumerate(header["obstacles"]):
+        for i, described in enumerate(header["obstacles"]):
             vertices, triangles = np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32)
-            if said["kind"] == "TriangleObstacle":
+            if described["kind"] == "TriangleObstacle":
                 vertices = file.array(f"supple/obstacles/{i}/vertices", "f", (None, 3))
                 triangles = file.indices(f"supple/obstacles/{i}/triangles", 3, len(vertices))
-            made = RecordedObstacle(str(said["name"]), str(said["kind"]), dict(said["parameters"]), vertices, triangles)
+            name, kind = str(described["name"]), str(described["kind"])
+            made = RecordedObstacle(name, kind, dict(described["parameters"]), vertices, triangles)
             obstacles.append(made)
     except (KeyError, TypeError, ValueError):
         raise file.broken("the obstacles in its header are not described as they should be") from None

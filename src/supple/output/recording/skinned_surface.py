@@ -1,4 +1,4 @@
-"""A finer surface carried by coarse tets: each of its vertices is a fixed mixture of the four corners of one tet."""
+"""A fine surface on coarse tets: each of its vertices is a fixed affine combination of the corners of one tet."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a recording keeps of stitches: what holds on to what, so that they can be drawn."""
+"""What a recording keeps of stitches, so that they can be drawn."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from supple.system import System, initial_state
 
 @dataclass(frozen=True, eq=False)
 class RecordedStitches:
-    """The stitches of a recording, each from a vertex to the place that was nearest to it at the start.
+    """The stitches of a recording, each from a vertex to the point that was nearest to it at the start.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class RecordedStitches:
 
 
 def write_stitches(own: h5py.Group, system: System) -> None:
-    """Add them to a recording's own group; nothing where there are none."""
+    """Write the stitches to the group of a recording; nothing where there are none."""
     stitching = system.stitching
     if not len(stitching):
         return
@@ -65,7 +65,7 @@ def read_stitches(file: CheckedFile, n: int, obstacles: int) -> RecordedStitches
     anchors = file.array("supple/stitches/anchors", "f", (None, 3))
     owners = file.array("supple/stitches/anchor_owners", "i", (len(anchors),))
     if len(owners) and not 0 <= owners.min() <= owners.max() < obstacles:
-        raise file.broken("a stitch holds on to an obstacle that is not there")
+        raise file.broken("a stitch is attached to an obstacle that does not exist")
     nodes = file.indices("supple/stitches/nodes", 4, n + len(anchors))
     weights = file.array("supple/stitches/weights", "f", (len(nodes), 3))
     return RecordedStitches(nodes, weights, owners, anchors)

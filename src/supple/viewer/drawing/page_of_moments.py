@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from supple.output.page import quantum_of, titled
-from supple.output.viser_server import server_for_a_moment
+from supple.output.viser_server import temporary_server
 from supple.viewer.drawing.layers.skin import drawn_points
 from supple.viewer.drawing.moments.model import Model, Moment
 from supple.viewer.drawing.options import ViewOptions
@@ -38,7 +38,7 @@ def page_of_moments(taken: Sequence[tuple[float, Moment]], options: ViewOptions)
     """
     first = taken[0][1].model
     taken = [taken[i] for i in evenly(len(taken), most_moments(first, options))]
-    with server_for_a_moment() as server:
+    with temporary_server() as server:
         stage = Stage(server, _rounded(taken[0][1]), options)
         serializer = server.get_scene_serializer()
         shown = taken[0][0]

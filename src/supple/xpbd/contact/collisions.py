@@ -36,8 +36,7 @@ class Collisions:
 
     Attributes
     ----------
-    min_distance : smallest gap at the beginnings of the frame's substeps [m], below zero where surfaces overlapped;
-        None when nothing was nearer than about one edge length.
+    smallest_gap : see `XPBDDetails`
     contacts : number of contacts in the last substep.
     """
 
@@ -66,7 +65,7 @@ class Collisions:
         return bool(self.obstacles) or self.surfaces is not None
 
     @property
-    def min_distance(self) -> float | None:
+    def smallest_gap(self) -> float | None:
         return self._smallest if math.isfinite(self._smallest) else None
 
     def begin_step(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float, dt: float) -> None:

@@ -16,6 +16,7 @@ from supple.viewer.engine.scene.live_scene import LiveScene
 from supple.viewer.engine.scene.solvers import kind_of, solver_values
 from supple.viewer.protocol.parameters import PARAMETERS
 from supple.viewer.protocol.snapshots import BodyDescription, Measures, ObstacleDescription, SceneDescription, Value
+from supple.xpbd.details import XPBDDetails
 
 
 def describe(live: LiveScene) -> SceneDescription:
@@ -108,7 +109,7 @@ def obstacle_poses(system: System, time: float) -> tuple[NDArray[np.float64], ND
 
 def measures(live: LiveScene) -> Measures:
     """The numbers of the present state, and of the last step."""
-    report = live.report
+    report, details = live.report, live.report.details
     found = measure(live.system, live.state)
     return Measures(
         status=str(report.status),
@@ -120,8 +121,8 @@ def measures(live: LiveScene) -> Measures:
         linear_momentum=found.linear_momentum,
         angular_momentum=found.angular_momentum,
         spin=np.array([spin(live.system, part, live.state) for part in live.system.bodies]),
-        contacts=int(report.details.get("contacts", 0)),
-        min_distance=report.min_distance,
+        contacts=details.contacts,
+        min_distance=details.smallest_gap if isinstance(details, XPBDDetails) else report.min_distance,
         iterations=int(report.iterations),
     )
 

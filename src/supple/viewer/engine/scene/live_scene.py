@@ -110,6 +110,7 @@ class LiveScene:
             # What a multi-step integrator remembers is its own, and of this state.
             state = replace(state, memory=None)
         workspace = setup.solver.prepare(system)
+        setup.solver.check(system, state, workspace)
         if not begun or not _looks_same(self.system.scene, scene):
             self.generation += 1
         self.revision += 1

@@ -1,1 +1,0 @@
-"""Files appear whole or not at all."""
