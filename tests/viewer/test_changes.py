@@ -8,7 +8,7 @@ import pytest
 import supple as sp
 from supple.errors import CommandError, SolverError, SuppleError
 from supple.viewer.engine.measurement.describe import describe, measures
-from supple.viewer.engine.scene.changes import change
+from supple.viewer.engine.scene.changes import change, without_body
 from supple.viewer.engine.scene.live_scene import LiveScene
 from supple.viewer.protocol import limits
 from supple.viewer.protocol.live_source import LiveSource
@@ -18,11 +18,13 @@ from supple.viewer.protocol.messages import (
     CopyBody,
     MovePusher,
     Pin,
+    ReleaseGrab,
     RemoveBody,
     Reset,
     SetParameter,
     SetSolver,
     Squash,
+    Unpin,
 )
 
 from .conftest import corner_grab, free_source, run, small_source
@@ -100,6 +102,26 @@ class TestSolvers:
         assert live.setup.solver == sp.XPBD(substeps=8)
         run(live, 2)
         assert live.frame == 7
+
+    def test_what_the_solver_remembers_lasts_as_long_as_the_vertices_and_the_state(self):
+        live = LiveScene(free_source())
+        run(live, 2)
+        memory = object()
+        live.state = dataclasses.replace(live.state, memory=memory)
+        for command in (
+            corner_grab((0, 1, 0)),
+            ReleaseGrab(7),
+            SetParameter("youngs", 2e5),
+            SetParameter("substeps", 5),
+            SetParameter("dt", 0.01),
+            MovePusher((3, 3, 3), 0.1),
+            Pin("cube", 1),
+            Unpin(),
+        ):
+            change(command, live)
+            assert live.state.memory is memory, command
+        change(Squash(0.8), live)
+        assert live.state.memory is None
 
     def test_a_switch_that_is_impossible_says_why_and_changes_nothing(self):
         springs = sp.EdgesAndVolume(edge_compliance=1e-4)
@@ -201,6 +223,38 @@ class TestBodies:
         assert len(left.stitches) == 1
         assert [tuple(pair.first) for pair in left.contact_pairs] == [("b",)]
         run(live, 2)
+
+    def test_a_removed_body_takes_along_only_what_refers_to_it(self):
+        """Texts that happen to equal its name (of a pin, a force, a stitch) are no reference."""
+        rubber = sp.StableNeoHookean(youngs=1e5, poisson=0.4)
+        mesh = sp.shapes.box((0.4, 0.4, 0.4), (2, 2, 2))
+        names = ("left", "b", "closest", "b 2")
+        bodies = [sp.Body(name, mesh, rubber, position=(0, 0.41 * k, 0)) for k, name in enumerate(names)]
+        joined = {"max_distance": 0.02, "stiffness": 1e3, "rest_length": 0.01}
+        scene = sp.Scene(
+            bodies,
+            obstacles=[sp.HalfSpace(point=(0, -1, 0), name="floor")],
+            pins=[sp.Pin("b", [0], name="left"), sp.Pin("left", [0], name="b")],
+            forces=[sp.Force("b", [1], (0, 1, 0), name="left"), sp.Force("left", [1], (0, 1, 0))],
+            soft_targets=[sp.SoftTarget("b", [2], 10.0, name="left"), sp.SoftTarget("left", [2], 10.0)],
+            stitches=[
+                sp.VertexVertexStitch("b", "closest", name="left", **joined),
+                sp.VertexVertexStitch("left", "b", **joined),
+            ],
+            contact_pairs=[
+                sp.ContactPair(["left", "b"], "floor", friction=0.2),
+                sp.ContactPair("lef?", "closest", friction=0.3),
+                sp.ContactPair("b*", "closest", friction=0.4),
+            ],
+        )
+        smaller = without_body(scene, "left")
+        assert [pin.label for pin in smaller.pins] == [scene.pins[0].label]
+        assert smaller.forces == scene.forces[:1]
+        assert smaller.soft_targets == scene.soft_targets[:1]
+        assert [tuple(pair.first) for pair in smaller.contact_pairs] == [("b",), ("b*",)]
+        assert smaller.stitches == scene.stitches[:1]
+        # "closest" is also how the stitches find their pairs.
+        assert without_body(scene, "closest").stitches == scene.stitches[1:]
 
     def test_there_is_an_end_to_bodies_and_tets(self, live, monkeypatch):
         monkeypatch.setattr(limits, "MOST_BODIES", 3)

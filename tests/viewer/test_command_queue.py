@@ -54,6 +54,28 @@ def test_more_than_its_capacity_is_dropped_and_moves_still_get_through():
     assert taken[-1] == (6, MovePusher((1, 0, 0), 0.1))
 
 
+def test_the_release_of_a_grab_is_never_dropped():
+    queue = CommandQueue(capacity=3)
+    assert queue.put(1, Grab(7, "cube", (0,), (1.0,), (0, 0, 0)))
+    assert queue.put(2, Play())
+    assert queue.put(3, Play())
+    assert not queue.put(4, Grab(8, "cube", (0,), (1.0,), (0, 0, 0)))
+    # Nothing is held by a grab that was dropped, so that its release may be dropped as well: the queue stays bounded.
+    assert not queue.put(5, ReleaseGrab(8))
+    assert queue.put(6, ReleaseGrab(7))
+    assert not queue.put(7, ReleaseGrab(7))
+    assert [number for number, _ in queue.take(0.0)] == [1, 2, 3, 6]
+
+
+def test_a_full_queue_takes_the_release_of_a_grab_that_has_passed_it():
+    queue = CommandQueue(capacity=1)
+    queue.put(1, Grab(7, "cube", (0,), (1.0,), (0, 0, 0)))
+    queue.take(0.0)
+    queue.put(2, Play())
+    assert queue.put(3, ReleaseGrab(7))
+    assert queue.take(0.0) == [(2, Play()), (3, ReleaseGrab(7))]
+
+
 def test_taking_wakes_up_for_a_command_and_for_the_end():
     queue = CommandQueue()
     threading.Timer(0.05, queue.put, (1, Play())).start()

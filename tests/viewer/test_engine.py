@@ -200,6 +200,16 @@ def test_killed_it_is_said_and_nothing_hangs():
     engine.close()
 
 
+@pytest.mark.skipif(os.name != "posix", reason="sends a signal")
+def test_ctrl_c_in_the_terminal_is_left_to_the_pages_process(fresh):
+    """It reaches both processes."""
+    fresh.send(Play())
+    before = until(fresh, lambda s: s.frame >= 2, "2 frames")
+    os.kill(fresh._process.pid, signal.SIGINT)
+    until(fresh, lambda s: s.frame >= before.frame + 5, "5 frames more")
+    assert fresh.latest().notices == before.notices
+
+
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks at /proc")
 def test_it_ends_when_the_pages_process_is_killed(tmp_path):
     script = tmp_path / "page.py"

@@ -5,7 +5,6 @@ import dataclasses
 import logging
 import math
 import random
-import signal
 import threading
 import time
 from collections import deque
@@ -15,7 +14,9 @@ import pytest
 
 import supple as sp
 from supple.errors import CommandError, SolverError
+from supple.numerics.interruption import interruption_point
 from supple.state import Status, StepReport
+from supple.viewer.engine import simulation_loop
 from supple.viewer.engine.pacing import Pacing
 from supple.viewer.engine.scene.live_scene import LiveScene
 from supple.viewer.engine.simulation_loop import SimulationLoop
@@ -77,6 +78,7 @@ def test_a_step_that_fails_pauses_at_the_last_good_state_and_says_why(loop, fail
 def endless(state):
     while True:
         time.sleep(0.01)
+        interruption_point()
 
 
 def stubborn(state):
@@ -97,6 +99,48 @@ def test_a_step_that_does_not_end_is_given_up(loop, endless):
     assert "given up after" in loop.notices[-1].text
     loop.live.setup = dataclasses.replace(loop.live.setup, solver=solver)
     loop.live.renew()
+    loop.step()
+    assert loop.live.frame == 1
+
+
+def test_a_step_is_given_up_at_no_other_place_than_the_solvers_interruption_points(loop):
+    """A setting of the process, here a number of threads, is not left changed, even where no `try` restores it."""
+    import numba
+
+    before, ended = numba.get_num_threads(), []
+
+    def changes_a_setting(state):
+        numba.set_num_threads(1)
+        end = time.monotonic() + 0.5
+        while time.monotonic() < end:
+            time.sleep(0.01)
+        numba.set_num_threads(before)
+        ended.append(True)
+        interruption_point()
+        return state, StepReport(Status.CONVERGED, 1)
+
+    loop.watch.longest = 0.1
+    with_solver_that(loop, changes_a_setting)
+    loop.step()
+    threads = numba.get_num_threads()
+    numba.set_num_threads(before)
+    assert threads == before
+    assert ended
+    assert "given up after" in loop.notices[-1].text
+
+
+@pytest.mark.parametrize("solver", [sp.XPBD(), sp.Implicit()], ids=["xpbd", "implicit"])
+def test_every_solver_can_be_given_up(loop, solver):
+    import numba
+
+    loop.live.adopt(dataclasses.replace(loop.live.setup, solver=solver))
+    state, threads = loop.live.state, numba.get_num_threads()
+    loop.watch.longest = 0.0
+    loop.step()
+    assert "given up after" in loop.notices[-1].text
+    assert loop.live.state is state
+    assert numba.get_num_threads() == threads
+    loop.watch.longest = 60.0
     loop.step()
     assert loop.live.frame == 1
 
@@ -133,17 +177,6 @@ def test_who_asks_for_a_pause_does_not_wait_for_a_long_step(loop):
     loop.turn(0.0)
     assert loop.applied == 1
     assert not loop.playing
-
-
-def test_ctrl_c_in_the_terminal_does_not_end_a_step(loop):
-    def interrupted(state):
-        signal.raise_signal(signal.SIGINT)
-        return state, StepReport(Status.CONVERGED, 1)
-
-    with_solver_that(loop, interrupted)
-    loop.step()
-    assert loop.notices == deque()
-    assert loop.live.frame == 1
 
 
 def test_what_cannot_be_done_becomes_a_notice_and_play_goes_on(loop):
@@ -205,6 +238,51 @@ def test_a_view_decides_what_a_snapshot_holds(loop):
     assert full.tet_values.shape == (len(loop.live.system.tets),)
     assert full.tet_quantity == "von_mises"
     assert full.contact_points.ndim == 2
+
+
+def fails(*_):
+    raise RuntimeError("a mistake in the library")
+
+
+def test_what_cannot_be_computed_for_the_view_is_told_and_the_simulation_goes_on(loop, monkeypatch):
+    loop.obey(say.Play())
+    loop.obey(say.SetView("J", contacts=True))
+    monkeypatch.setattr(simulation_loop, "contact_points", fails)
+    for _ in range(3):
+        loop.step()
+        loop.publish(0.0)
+    last = loop.outbox.snapshots[-1]
+    assert [notice.text for notice in last.notices] == [
+        "contacts are off: a mistake in the library; choose them again to retry"
+    ]
+    assert (last.frame, last.paused, last.contact_points) == (3, False, None)
+    assert last.tet_values is not None
+    monkeypatch.undo()
+    loop.obey(say.SetView("J", contacts=True))
+    loop.publish(0.0)
+    assert loop.outbox.snapshots[-1].contact_points is not None
+
+
+@pytest.mark.parametrize("function", ["measures", "describe"])
+def test_a_snapshot_that_cannot_be_made_pauses_and_tells_why_once(loop, monkeypatch, function):
+    loop.publish(0.0)
+    monkeypatch.setattr(simulation_loop, function, fails)
+    loop.obey(say.Play())
+    loop.step()
+    loop.live.revision += 1
+    for _ in range(3):
+        loop.publish(0.0)
+    last = loop.outbox.snapshots[-1]
+    assert [notice.text for notice in last.notices] == ["paused; the page cannot be updated: a mistake in the library"]
+    assert last.paused
+    assert not loop.playing
+    monkeypatch.undo()
+    loop.obey(say.Play())
+    loop.step()
+    loop.publish(0.0)
+    last = loop.outbox.snapshots[-1]
+    assert (last.frame, last.paused) == (2, False)
+    assert loop.outbox.descriptions[-1].revision == loop.live.revision
 
 
 def test_what_the_library_warns_of_is_told_once(loop):

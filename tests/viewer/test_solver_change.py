@@ -33,6 +33,20 @@ class TestHandover:
         change(SetSolver("xpbd"), live)
         run(live, 2)
 
+    @pytest.mark.parametrize("kind", ["xpbd", "implicit"])
+    def test_both_solvers_tell_how_many_contacts_there_are(self, kind):
+        live = LiveScene(small_source())
+        change(SetSolver(kind), live)
+        run(live, 2)
+        assert measures(live).contacts == 0
+        for _ in range(60):
+            run(live, 1)
+            if measures(live).contacts:
+                break
+        assert measures(live).contacts >= 4  # the corners of the cube, on the floor
+        if kind == "implicit":
+            assert measures(live).contacts == len(live.report.contacts())
+
     def test_bodies_inside_each_other_do_not_and_the_old_solver_goes_on(self):
         live = LiveScene(small_source(pins=[]))
         cube, block = (part.vertices for part in live.system.bodies)

@@ -16,6 +16,7 @@ from numba.core import config
 from numpy.typing import NDArray
 
 from supple.errors import SolverError
+from supple.numerics.interruption import interruption_point
 from supple.numerics.thread_tuning import Pace
 from supple.solver import Solver
 from supple.state import State, Status, StepReport
@@ -154,6 +155,7 @@ class XPBD(Solver):
             ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt)
         with _threads(self.threads):
             for k in range(self.substeps):
+                interruption_point()
                 started = perf_counter()
                 parallel = ws.pace.choose()
                 end = state.time + (k + 1) * h

@@ -5,8 +5,10 @@ from __future__ import annotations
 import logging
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -52,6 +54,7 @@ class SimulationLoop:
         self.applied = 0
         self.notices: deque[Notice] = deque(maxlen=NOTICES_KEPT)
         self._before: State = live.state
+        self._last: Snapshot | None = None
         self._described = -1
         self._published = 0.0
         self._fresh = True
@@ -150,21 +153,40 @@ class SimulationLoop:
             log.propagate = propagated
 
     def publish(self, now: float) -> None:
-        """Put out a snapshot, after a description where that has changed."""
+        """Send a snapshot, after a new description where the scene has changed.
+
+        Where that fails, the simulation pauses, and the last snapshot is sent again with an error notice.
+        """
         live = self.live
-        if self._described != live.revision:
-            self.outbox.put_description(describe(live))
-            self._described = live.revision
-        self.outbox.put_snapshot(self.snapshot(now))
         self._published, self._fresh = now, False
+        try:
+            description = describe(live) if self._described != live.revision else None
+            self._last = self.snapshot(now)
+        except Exception as error:
+            if self._last is None:
+                raise
+            text = f"paused; the page cannot be updated: {_one_line(error)}"
+            if self.playing or not (self.notices and self.notices[-1].text == text):
+                logger.exception("a snapshot could not be made")
+                self.tell("error", text)
+            self.playing, self.steps_left = False, 0
+            self._last = replace(self._last, paused=True, notices=tuple(self.notices), applied=self.applied)
+            description = None
+        if description is not None:
+            self.outbox.put_description(description)
+            self._described = description.revision
+        self.outbox.put_snapshot(self._last)
 
     def snapshot(self, now: float) -> Snapshot:
         """The present state; in slow motion, one between the last two. Its description stays on the other side."""
-        live, view = self.live, self.view
+        live = self.live
         state = self._shown(now)
         system, setup = live.system, live.setup
         grabs = [spring.state(state.positions[_rows(live, spring.command.body)]) for spring in setup.grabs.values()]
         pusher = setup.pusher
+        contacts = self._requested("contacts", lambda: contact_points(system, state.positions, state.time))
+        quantity = self.view.tet_values or ""
+        values = self._requested("tet_values", lambda: tet_values(system, state.positions, quantity))
         return Snapshot(
             description=None,  # pyright: ignore[reportArgumentType]
             frame=live.frame,
@@ -180,11 +202,23 @@ class SimulationLoop:
             timing=self.pacing.timing(now, self.speed, self.playing),
             notices=tuple(self.notices),
             applied=self.applied,
-            velocities=state.velocities if view.velocities else None,
-            tet_values=None if view.tet_values is None else tet_values(system, state.positions, view.tet_values),
-            tet_quantity=view.tet_values,
-            contact_points=contact_points(system, state.positions, state.time) if view.contacts else None,
+            velocities=state.velocities if self.view.velocities else None,
+            tet_values=values,
+            tet_quantity=self.view.tet_values,
+            contact_points=contacts,
         )
+
+    def _requested(self, name: str, compute: Callable[[], Any]) -> Any | None:
+        """A value that the view asks for, or None. Where it cannot be computed, a notice tells why, and it is off."""
+        if not getattr(self.view, name):
+            return None
+        try:
+            return compute()
+        except Exception as error:
+            logger.exception("%s could not be computed", name)
+            self.view = replace(self.view, **{name: getattr(say.SetView(), name)})
+            self.tell("error", f"{name.replace('_', ' ')} are off: {_one_line(error)}; choose them again to retry")
+            return None
 
     def _shortest(self) -> float:
         # A hair less than the time between two frames: else the clock's jitter would skip every other frame.

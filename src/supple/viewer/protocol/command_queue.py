@@ -6,7 +6,17 @@ import threading
 from collections.abc import Hashable, Iterable
 
 from supple.viewer.protocol import limits
-from supple.viewer.protocol.commands import Command, MoveGrab, MovePusher, SetParameter, SetSpeed, SetView, Unpin
+from supple.viewer.protocol.commands import (
+    Command,
+    Grab,
+    MoveGrab,
+    MovePusher,
+    ReleaseGrab,
+    SetParameter,
+    SetSpeed,
+    SetView,
+    Unpin,
+)
 
 Numbered = tuple[int, Command]
 
@@ -36,18 +46,22 @@ class CommandQueue:
     def __init__(self, capacity: int = limits.MOST_WAITING) -> None:
         self.capacity = capacity
         self.dropped = 0
+        self._grabs: set[int] = set()  # that were accepted and not released yet
         self._waiting: list[Numbered] = []
         self._places: dict[Hashable, int] = {}
         self._changed = threading.Condition()
         self._closed = False
 
     def put(self, number: int, command: Command) -> bool:
-        """Append a command. Returns False, with the command dropped, where the queue is full."""
+        """Append a command. Returns False, with the command dropped, where the queue is full.
+
+        The release of a grab that was accepted is never dropped: its spring would pull for ever.
+        """
         with self._changed:
             about = subject(command)
             if about is not None and about in self._places:
                 self._waiting[self._places[about]] = number, command
-            elif len(self._waiting) >= self.capacity:
+            elif len(self._waiting) >= self.capacity and not self._releases(command):
                 self.dropped += 1
                 return False
             else:
@@ -56,6 +70,10 @@ class CommandQueue:
                 if about is not None:
                     self._places[about] = len(self._waiting)
                 self._waiting.append((number, command))
+                if isinstance(command, Grab):
+                    self._grabs.add(command.grab)
+                elif isinstance(command, ReleaseGrab):
+                    self._grabs.discard(command.grab)
             self._changed.notify()
             return True
 
@@ -88,6 +106,9 @@ class CommandQueue:
     def closed(self) -> bool:
         """Whether nothing will come any more."""
         return self._closed
+
+    def _releases(self, command: Command) -> bool:
+        return isinstance(command, ReleaseGrab) and command.grab in self._grabs
 
     def _speaks_of(self, parameter: str) -> bool:
         """Whether a word on that parameter waits: of one body and of all bodies, the later must stay the later."""

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 Value = float | int | bool
 
+PUSHER = "pusher"  # name of the obstacle that the mouse moves
+
 
 @dataclass(frozen=True, eq=False)
 class BodyDescription:

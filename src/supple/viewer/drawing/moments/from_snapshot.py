@@ -15,8 +15,7 @@ from supple.output.recording.scene import RecordedObstacle
 from supple.output.recording.skinned_surface import SkinnedSurface
 from supple.scene.rotation import rotation_matrix
 from supple.viewer.drawing.moments.model import Model, ModelBody, Moment, colors_of
-from supple.viewer.engine.scene.pusher import NAME as PUSHER
-from supple.viewer.protocol.snapshots import BodyDescription, ObstacleDescription, SceneDescription, Snapshot
+from supple.viewer.protocol.snapshots import PUSHER, BodyDescription, ObstacleDescription, SceneDescription, Snapshot
 
 
 class Translator:

@@ -120,7 +120,7 @@ def measures(live: LiveScene) -> Measures:
         linear_momentum=found.linear_momentum,
         angular_momentum=found.angular_momentum,
         spin=np.array([spin(live.system, part, live.state) for part in live.system.bodies]),
-        contacts=int(report.details.get("contacts", 0)),
+        contacts=int(report.details.get("contacts", report.details.get("contact_count", 0))),
         min_distance=report.min_distance,
         iterations=int(report.iterations),
     )

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import fields, replace
+from fnmatch import fnmatchcase
 from functools import singledispatch
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from supple.errors import CommandError
 from supple.materials.material import Material
 from supple.materials.regions import Regions
 from supple.scene.body import Body
+from supple.scene.contact_pairs import ContactPair
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.state import State
@@ -300,30 +302,28 @@ def _(command: say.RemoveBody, live: LiveScene) -> None:
 
 
 def without_body(scene: Scene, name: str) -> Scene:
-    """The scene without a body, and without everything that names it: pins, forces, springs, stitches."""
-    changes: dict[str, Any] = {"bodies": [body for body in scene.bodies if body.name != name]}
-    for field in fields(scene):
-        items = getattr(scene, field.name)
-        if field.name not in ("bodies", "obstacles", "gravity") and isinstance(items, tuple):
-            left = [_without_name(item, name) for item in items]
-            changes[field.name] = [item for item in left if item is not None]
-    return replace(scene, **changes)
+    """The scene without a body and all that refers to it: pins, forces, soft targets, stitches, contact pairs."""
+    bodies = [body for body in scene.bodies if body.name != name]
+    return replace(
+        scene,
+        bodies=bodies,
+        pins=[pin for pin in scene.pins if pin.body != name],
+        forces=[force for force in scene.forces if force.body != name],
+        soft_targets=[target for target in scene.soft_targets if target.body != name],
+        stitches=[stitch for stitch in scene.stitches if name not in (stitch.first, stitch.second)],
+        contact_pairs=_pairs_among([thing.name for thing in (*bodies, *scene.obstacles)], scene.contact_pairs),
+    )
 
 
-def _without_name(item: Any, body: str) -> Any | None:
-    """A part of a scene without that body: None where it names it, less that name where it names several."""
-    changes: dict[str, Any] = {}
-    for field in fields(item):
-        value = getattr(item, field.name)
-        if field.name == "name" or not field.init:
-            continue
-        if isinstance(value, str) and value == body:
-            return None
-        if isinstance(value, tuple) and body in [each for each in value if isinstance(each, str)]:
-            changes[field.name] = tuple(each for each in value if each != body)
-            if not changes[field.name]:
-                return None
-    return replace(item, **changes) if changes else item
+def _pairs_among(things: Sequence[str | None], pairs: Sequence[ContactPair]) -> list[ContactPair]:
+    """The contact pairs without the names and patterns that mean none of these bodies and obstacles."""
+
+    def known(names: str | Sequence[str]) -> list[str]:
+        patterns = {name: name.replace("[", "[[]") for name in names}  # only `*` and `?` are special
+        return [name for name, pattern in patterns.items() if any(fnmatchcase(str(each), pattern) for each in things)]
+
+    sides = [(pair, known(pair.first), known(pair.second)) for pair in pairs]
+    return [replace(pair, first=first, second=second) for pair, first, second in sides if first and second]
 
 
 def _part(live: LiveScene, name: str) -> BodyRange:

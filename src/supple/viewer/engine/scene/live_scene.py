@@ -88,7 +88,7 @@ class LiveScene:
         self.adopt(Setup(source.scene, source.solver, source.dt), initial_state(source.scene, self.starts), anchors={})
 
     def adopt(self, setup: Setup, state: State | None = None, anchors: Anchors | None = None) -> None:
-        """Go on with another setup.
+        """Go on with another setup. The memory of the present state stays: solvers ignore what is not theirs.
 
         Parameters
         ----------
@@ -104,13 +104,8 @@ class LiveScene:
         scene = setup.whole_scene()
         frame = first_frame(scene, state)
         system = _anchored(frame.system, kept)
-        begun = hasattr(self, "setup")
-        same = begun and (setup.solver, setup.dt) == (self.setup.solver, self.setup.dt) and state is self.state
-        if not same and state.memory is not None:
-            # What a multi-step integrator remembers is its own, and of this state.
-            state = replace(state, memory=None)
         workspace = setup.solver.prepare(system)
-        if not begun or not _looks_same(self.system.scene, scene):
+        if not hasattr(self, "setup") or not _looks_same(self.system.scene, scene):
             self.generation += 1
         self.revision += 1
         self.setup, self.state, self.system, self.workspace = setup, state, system, workspace

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.scene.obstacles import Sphere
+from supple.viewer.protocol.snapshots import PUSHER
 
-NAME = "pusher"
 # Of its radius: how far it moves in one step at most, so that it pushes vertices rather than jumping over them.
 STRIDE = 0.25
 
@@ -27,7 +27,9 @@ class Pusher:
         self._times = (0.0, 0.0)
         self._ends = (self.center, self.center)
         # The obstacle's own place is the origin: its displacement is where it is.
-        self.obstacle = Sphere(center=(0.0, 0.0, 0.0), radius=radius, friction=friction, motion=self._motion, name=NAME)
+        self.obstacle = Sphere(
+            center=(0.0, 0.0, 0.0), radius=radius, friction=friction, motion=self._motion, name=PUSHER
+        )
 
     def _motion(self, time: float) -> NDArray[np.float64]:
         (begin, end), (a, b) = self._times, self._ends
