@@ -108,7 +108,7 @@ def main(rounds: int = 15, frames: int = 90, edge_length: float = 0.1, seconds: 
     live = source(edge_length)
     at_start = load()
     with Engine(live) as engine, opened_page(live, Address(port=0)) as page, listening(page.url):
-        behind_page = page.shown.desk.simulation
+        behind_page = page.content.controller.simulation
         assert isinstance(behind_page, Engine)
         contenders: dict[str, Callable[[], float]] = {
             "headless": lambda: headless(live, frames),

@@ -33,7 +33,7 @@ from supple.viewer.protocol.outbox import DESCRIPTION, SNAPSHOT, Outbox
 
 from .conftest import small_source
 
-PATIENCE = 60.0
+TIMEOUT = 60.0
 
 
 @pytest.fixture(scope="module")
@@ -51,12 +51,12 @@ def fresh(engine):
     for body in engine.description.bodies:
         if body.added:
             engine.send(RemoveBody(body.name))
-    engine.wait_for(engine.send(Reset()), PATIENCE)
+    engine.wait_for(engine.send(Reset()), TIMEOUT)
     return engine
 
 
 def until(engine, condition, what):
-    end = time.monotonic() + PATIENCE
+    end = time.monotonic() + TIMEOUT
     while time.monotonic() < end:
         snapshot = engine.latest()
         if condition(snapshot):
@@ -81,7 +81,7 @@ def test_it_begins_paused_at_the_start_and_says_what_there_is(fresh):
 def test_it_computes_what_the_same_scene_gives_without_a_page(fresh):
     source = small_source()
     *_, last = sp.simulate(source.scene, source.solver, source.dt, 12)
-    fresh.wait_for(fresh.send(Step(12)), PATIENCE)
+    fresh.wait_for(fresh.send(Step(12)), TIMEOUT)
     snapshot = until(fresh, lambda s: s.frame == 12, "12 steps")
     assert np.array_equal(snapshot.positions, last.state.positions)
     assert snapshot.measures.elastic_energy == last.report.elastic_energy
@@ -91,7 +91,7 @@ def test_it_computes_what_the_same_scene_gives_without_a_page(fresh):
 def test_play_runs_and_pause_stops(fresh):
     fresh.send(Play())
     until(fresh, lambda s: s.frame >= 5, "5 frames")
-    paused = fresh.wait_for(fresh.send(Pause()), PATIENCE)
+    paused = fresh.wait_for(fresh.send(Pause()), TIMEOUT)
     assert paused.paused
     time.sleep(0.2)
     assert fresh.latest().frame == paused.frame
@@ -128,7 +128,7 @@ def test_a_page_that_does_not_read_holds_up_nothing(fresh):
     fresh._snapshots = gated = Gated(pipe)
     try:
         fresh.send(Play())
-        assert gated.waiting.wait(PATIENCE)
+        assert gated.waiting.wait(TIMEOUT)
         time.sleep(2.0)
         stale = fresh.latest().frame
         gated.gate.set()
@@ -161,7 +161,7 @@ def test_ten_thousand_moves_at_once_are_one_move(fresh):
         assert fresh.send(MoveGrab(3, (0.0, 0.001 * k, 0.0)))
     number = fresh.send(SetParameter("youngs", 2e5, "cube"))
     assert number == began + 10_001
-    snapshot = fresh.wait_for(number, PATIENCE)
+    snapshot = fresh.wait_for(number, TIMEOUT)
     assert snapshot.description.body("cube").values["youngs"] == 2e5
     fresh.send(SetParameter("youngs", 1e5, "cube"))
 
@@ -187,7 +187,7 @@ def test_a_function_inside_another_cannot_be_sent_and_the_mend_is_told():
 def test_killed_it_is_said_and_nothing_hangs():
     engine = Engine(small_source())
     os.kill(engine._process.pid, signal.SIGKILL)
-    end = time.monotonic() + PATIENCE
+    end = time.monotonic() + TIMEOUT
     while engine.alive and time.monotonic() < end:
         time.sleep(0.01)
     assert engine.send(Play()) == 0
@@ -196,7 +196,7 @@ def test_killed_it_is_said_and_nothing_hangs():
     assert "unexpectedly" in engine.error
     assert engine.latest() is not None
     with pytest.raises(TimeoutError, match="unexpectedly"):
-        engine.wait_for(10**9, PATIENCE)
+        engine.wait_for(10**9, TIMEOUT)
     engine.close()
 
 
@@ -233,7 +233,7 @@ def test_it_ends_when_the_pages_process_is_killed(tmp_path):
     child = int(page.stdout.readline())
     page.kill()
     page.wait()
-    end = time.monotonic() + PATIENCE
+    end = time.monotonic() + TIMEOUT
     while _runs(child) and time.monotonic() < end:
         time.sleep(0.02)
     assert not _runs(child)

@@ -20,8 +20,7 @@ from supple.viewer.engine import simulation_loop
 from supple.viewer.engine.pacing import Pacing
 from supple.viewer.engine.scene.live_scene import LiveScene
 from supple.viewer.engine.simulation_loop import SimulationLoop
-from supple.viewer.protocol import limits
-from supple.viewer.protocol import messages as say
+from supple.viewer.protocol import limits, messages
 from supple.viewer.protocol.command_queue import CommandQueue
 from supple.viewer.protocol.live_source import LiveSource
 
@@ -57,7 +56,7 @@ def crashes(state):
 
 @pytest.mark.parametrize("failure", [not_finite, silently_not_finite, refuses, crashes])
 def test_a_step_that_fails_pauses_at_the_last_good_state_and_says_why(loop, failure):
-    loop.obey(say.Play())
+    loop.execute(messages.Play())
     loop.step()
     good = loop.live.state
     solver = loop.live.setup.solver
@@ -70,7 +69,7 @@ def test_a_step_that_fails_pauses_at_the_last_good_state_and_says_why(loop, fail
     assert notice.level == "error"
     assert notice.text.startswith("paused at t = 0.01667 s; ")
     loop.live.setup = dataclasses.replace(loop.live.setup, solver=solver)
-    loop.obey(say.Play())
+    loop.execute(messages.Play())
     loop.step()
     assert loop.live.frame == 2
 
@@ -90,7 +89,7 @@ def stubborn(state):
 @pytest.mark.parametrize("endless", [endless, stubborn])
 def test_a_step_that_does_not_end_is_given_up(loop, endless):
     loop.watch.longest = 0.2
-    loop.obey(say.Play())
+    loop.execute(messages.Play())
     good, solver = loop.live.state, loop.live.setup.solver
     with_solver_that(loop, endless)
     loop.step()
@@ -98,7 +97,7 @@ def test_a_step_that_does_not_end_is_given_up(loop, endless):
     assert loop.live.state is good
     assert "given up after" in loop.notices[-1].text
     loop.live.setup = dataclasses.replace(loop.live.setup, solver=solver)
-    loop.live.renew()
+    loop.live.prepare_workspace()
     loop.step()
     assert loop.live.frame == 1
 
@@ -159,7 +158,7 @@ def test_compiling_kernels_is_no_part_of_a_step(loop):
         return state, StepReport(Status.CONVERGED, 1)
 
     loop.watch.longest = 0.25
-    loop.obey(say.Play())
+    loop.execute(messages.Play())
     with_solver_that(loop, compiles)
     loop.step()
     assert loop.notices == deque()
@@ -168,51 +167,51 @@ def test_compiling_kernels_is_no_part_of_a_step(loop):
 
 
 def test_who_asks_for_a_pause_does_not_wait_for_a_long_step(loop):
-    loop.watch.patience = 0.1
-    loop.obey(say.Play())
+    loop.watch.longest_awaited = 0.1
+    loop.execute(messages.Play())
     with_solver_that(loop, endless)
-    threading.Timer(0.2, loop.inbox.put, (1, say.Pause())).start()
+    threading.Timer(0.2, loop.inbox.put, (1, messages.Pause())).start()
     loop.step()
     assert "given up after" in loop.notices[-1].text
-    loop.turn(0.0)
+    loop.run_once(0.0)
     assert loop.applied == 1
     assert not loop.playing
 
 
 def test_what_cannot_be_done_becomes_a_notice_and_play_goes_on(loop):
-    loop.obey(say.Play())
-    loop.obey(say.RemoveBody("ghost"))
-    loop.obey(say.SetParameter("edge_compliance", 0.1))
+    loop.execute(messages.Play())
+    loop.execute(messages.RemoveBody("ghost"))
+    loop.execute(messages.SetParameter("edge_compliance", 0.1))
     assert loop.playing
     assert [notice.number for notice in loop.notices] == [1, 2]
     assert "'ghost'" in loop.notices[0].text
     for _ in range(50):
-        loop.obey(say.RemoveBody("ghost"))
+        loop.execute(messages.RemoveBody("ghost"))
     assert [notice.number for notice in loop.notices] == list(range(45, 53))
 
 
 def test_steps_are_simulated_without_waiting_for_the_clock(loop):
-    loop.obey(say.Step(5))
+    loop.execute(messages.Step(5))
     for _ in range(7):
-        loop.turn(0.0)
+        loop.run_once(0.0)
     assert loop.live.frame == 5
     assert loop.steps_left == 0
 
 
 def test_steps_that_come_at_once_all_count_and_none_outlives_a_reset(loop):
-    loop.inbox.put_all(enumerate([say.Step(), say.Step(), say.Step(2)], 1))
+    loop.inbox.put_all(enumerate([messages.Step(), messages.Step(), messages.Step(2)], 1))
     for _ in range(6):
-        loop.turn(0.0)
+        loop.run_once(0.0)
     assert loop.live.frame == 4
-    loop.inbox.put_all(enumerate([say.Step(3), say.Reset()], 4))
+    loop.inbox.put_all(enumerate([messages.Step(3), messages.Reset()], 4))
     for _ in range(6):
-        loop.turn(0.0)
+        loop.run_once(0.0)
     assert loop.live.frame == 0
 
 
 def test_slow_motion_shows_states_between_two_steps(loop):
-    loop.obey(say.SetSpeed(0.1))
-    loop.obey(say.Play())
+    loop.execute(messages.SetSpeed(0.1))
+    loop.execute(messages.Play())
     loop.step()
     loop.step()
     before, after = loop._before, loop.live.state
@@ -221,7 +220,7 @@ def test_slow_motion_shows_states_between_two_steps(loop):
     assert half.time == pytest.approx(0.5 * (before.time + after.time))
     assert half.positions == pytest.approx(0.5 * (before.positions + after.positions))
     assert loop.snapshot(due + 1.0).time == after.time
-    loop.obey(say.Pause())
+    loop.execute(messages.Pause())
     assert loop.snapshot(due - 0.5 * loop._interval()).positions is after.positions
 
 
@@ -232,7 +231,7 @@ def test_a_view_decides_what_a_snapshot_holds(loop):
     assert plain.velocities is None
     assert plain.tet_values is None
     assert plain.contact_points is None
-    loop.obey(say.SetView("von_mises", velocities=True, contacts=True))
+    loop.execute(messages.SetView("von_mises", velocities=True, contacts=True))
     full = loop.snapshot(0.0)
     assert full.velocities.shape == full.positions.shape
     assert full.tet_values.shape == (len(loop.live.system.tets),)
@@ -245,8 +244,8 @@ def fails(*_):
 
 
 def test_what_cannot_be_computed_for_the_view_is_told_and_the_simulation_goes_on(loop, monkeypatch):
-    loop.obey(say.Play())
-    loop.obey(say.SetView("J", contacts=True))
+    loop.execute(messages.Play())
+    loop.execute(messages.SetView("J", contacts=True))
     monkeypatch.setattr(simulation_loop, "contact_points", fails)
     for _ in range(3):
         loop.step()
@@ -258,7 +257,7 @@ def test_what_cannot_be_computed_for_the_view_is_told_and_the_simulation_goes_on
     assert (last.frame, last.paused, last.contact_points) == (3, False, None)
     assert last.tet_values is not None
     monkeypatch.undo()
-    loop.obey(say.SetView("J", contacts=True))
+    loop.execute(messages.SetView("J", contacts=True))
     loop.publish(0.0)
     assert loop.outbox.snapshots[-1].contact_points is not None
 
@@ -267,7 +266,7 @@ def test_what_cannot_be_computed_for_the_view_is_told_and_the_simulation_goes_on
 def test_a_snapshot_that_cannot_be_made_pauses_and_tells_why_once(loop, monkeypatch, function):
     loop.publish(0.0)
     monkeypatch.setattr(simulation_loop, function, fails)
-    loop.obey(say.Play())
+    loop.execute(messages.Play())
     loop.step()
     loop.live.revision += 1
     for _ in range(3):
@@ -277,7 +276,7 @@ def test_a_snapshot_that_cannot_be_made_pauses_and_tells_why_once(loop, monkeypa
     assert last.paused
     assert not loop.playing
     monkeypatch.undo()
-    loop.obey(say.Play())
+    loop.execute(messages.Play())
     loop.step()
     loop.publish(0.0)
     last = loop.outbox.snapshots[-1]
@@ -287,7 +286,7 @@ def test_a_snapshot_that_cannot_be_made_pauses_and_tells_why_once(loop, monkeypa
 
 def test_what_the_library_warns_of_is_told_once(loop):
     log = logging.getLogger("supple.somewhere")
-    with loop.told_of_warnings():
+    with loop.warnings_as_notices():
         for _ in range(3):
             log.warning("tets are too stiff for substeps of %g s", 0.002)
         log.info("not for the page")
@@ -356,33 +355,37 @@ def random_command(rng, bodies, solvers=("xpbd",)):
     """A command of any kind, with sensible or hostile values: None where it could not be made."""
     body = rng.choice([*bodies, "ghost"])
     point = tuple(rng.choice([rng.uniform(-2, 2), rng.uniform(-1e4, 1e4)]) for _ in range(3))
-    parameter = rng.choice(list(say.PARAMETERS.values()))
+    parameter = rng.choice(list(messages.PARAMETERS.values()))
     value = rng.uniform(parameter.low, min(parameter.high, 1e6))
     value = {bool: rng.random() < 0.5, int: min(round(value), 12), float: value}[parameter.kind]
     owner = body if parameter.owner == "body" else None
     size = rng.uniform(0.05, 1.0)
     made = rng.choice(
         [
-            lambda: say.Play(),
-            lambda: say.Pause(),
-            lambda: say.Step(rng.randint(1, 3)),
-            lambda: say.Reset(),
-            lambda: say.SetSpeed(rng.uniform(0.01, 1.0)),
-            lambda: say.SetSolver(rng.choice(solvers)),
-            lambda: say.SetParameter(parameter.name, value, rng.choice([None, owner])),
-            lambda: say.SetView(rng.choice([None, "J", "von_mises", "energy"]), rng.random() < 0.5, rng.random() < 0.5),
-            lambda: say.Grab(rng.randint(0, 20), body, (rng.randint(0, 80),), (1.0,), point, 10 ** rng.uniform(-2, 2)),
-            lambda: say.MoveGrab(rng.randint(0, 20), point),
-            lambda: say.ReleaseGrab(rng.randint(0, 20)),
-            lambda: say.Pin(body, rng.randint(0, 80)),
-            lambda: say.Unpin(body, rng.randint(0, 80)),
-            lambda: say.Unpin(),
-            lambda: say.MovePusher(point, size),
-            lambda: say.RemovePusher(),
-            lambda: say.Squash(rng.uniform(limits.FLATTEST, limits.TALLEST)),
-            lambda: say.AddBody(rng.choice(limits.SHAPES), size, rng.randint(3, 4), rng.choice([None, point])),
-            lambda: say.CopyBody(body),
-            lambda: say.RemoveBody(body),
+            lambda: messages.Play(),
+            lambda: messages.Pause(),
+            lambda: messages.Step(rng.randint(1, 3)),
+            lambda: messages.Reset(),
+            lambda: messages.SetSpeed(rng.uniform(0.01, 1.0)),
+            lambda: messages.SetSolver(rng.choice(solvers)),
+            lambda: messages.SetParameter(parameter.name, value, rng.choice([None, owner])),
+            lambda: messages.SetView(
+                rng.choice([None, "J", "von_mises", "energy"]), rng.random() < 0.5, rng.random() < 0.5
+            ),
+            lambda: messages.Grab(
+                rng.randint(0, 20), body, (rng.randint(0, 80),), (1.0,), point, 10 ** rng.uniform(-2, 2)
+            ),
+            lambda: messages.MoveGrab(rng.randint(0, 20), point),
+            lambda: messages.ReleaseGrab(rng.randint(0, 20)),
+            lambda: messages.Pin(body, rng.randint(0, 80)),
+            lambda: messages.Unpin(body, rng.randint(0, 80)),
+            lambda: messages.Unpin(),
+            lambda: messages.MovePusher(point, size),
+            lambda: messages.RemovePusher(),
+            lambda: messages.Squash(rng.uniform(limits.FLATTEST, limits.TALLEST)),
+            lambda: messages.AddBody(rng.choice(limits.SHAPES), size, rng.randint(3, 4), rng.choice([None, point])),
+            lambda: messages.CopyBody(body),
+            lambda: messages.RemoveBody(body),
         ]
     )
     if rng.random() < 0.2:  # spoil one value
@@ -431,7 +434,7 @@ def play_with(loop, rng, count, solvers):
         else:
             loop.inbox.put(number, command)
         loop.pacing.due = 0.0  # never wait for the clock
-        loop.turn(0.0)
+        loop.run_once(0.0)
         state = loop.live.state
         assert np.isfinite(state.positions).all()
         assert np.isfinite(state.velocities).all()

@@ -49,7 +49,7 @@ class OpenPage:
 
     url: str
     server: Any
-    shown: LivePage | Replay
+    content: LivePage | Replay
 
 
 @contextmanager
@@ -67,12 +67,12 @@ def opened_page(source: LiveSource | str | Path, address: Address | None = None)
         with gate(address.host, address.token):
             server = start_server(address.host, address.port)
         ends.callback(stop_server, server)
-        dress(server)
-        shown = show(server)
-        ends.callback(shown.stop)
+        configure_page(server)
+        content = show(server)
+        ends.callback(content.stop)
         host = socket.gethostname() if address.host in ("", "0.0.0.0", "::") else address.host
         query = f"/?token={address.token}" if address.token else ""
-        yield OpenPage(f"http://{host}:{server.get_port()}{query}", server, shown)
+        yield OpenPage(f"http://{host}:{server.get_port()}{query}", server, content)
 
 
 def _live(source: LiveSource, ends: ExitStack) -> Callable[[Any], LivePage]:
@@ -102,7 +102,7 @@ def serve(source: LiveSource | str | Path, address: Address | None = None, *, op
             threading.Event().wait()
 
 
-def dress(server: Any) -> None:
+def configure_page(server: Any) -> None:
     """Make viser's page ours: the panel stands beside the picture, and nothing is offered that leads elsewhere."""
     server.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(36, 108, 168))
     server.gui.main_panel.dock_right()

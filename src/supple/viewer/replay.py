@@ -14,7 +14,7 @@ import numpy as np
 from supple.output.recording.reader import Recording
 from supple.viewer.controls.record_controls import RecordControls
 from supple.viewer.controls.view_controls import ViewControls
-from supple.viewer.drawing.frame_rate import Pace
+from supple.viewer.drawing.frame_rate import FrameRate
 from supple.viewer.drawing.moments.from_recording import model_of_recording, moment_of_frame
 from supple.viewer.drawing.moments.model import Moment
 from supple.viewer.drawing.options import ViewOptions
@@ -55,7 +55,7 @@ class Replay:
                 "Time [s]", first, last, step if step > 0.0 else 1.0, initial_value=first, disabled=last == first
             )
             self.speed = gui.add_slider("Speed", _SLOWEST, _FASTEST, 0.05, initial_value=1.0)
-            self.said = gui.add_markdown(self._facts(0))
+            self.message = gui.add_markdown(self._facts(0))
             self.export = gui.add_button("Export as page (HTML)")
         self.controls = ViewControls(server, self.stage)
         self.record = RecordControls(server, self.stage)
@@ -70,7 +70,7 @@ class Replay:
         self.slider.on_update(self._seek)
         self.play.on_click(lambda _: self._toggle())
         self.export.on_click(self._send_page)
-        self._pace = Pace(server)
+        self._frame_rate = FrameRate(server)
         self._thread = threading.Thread(target=self._run, name="supple replay", daemon=True)
         self._thread.start()
 
@@ -106,13 +106,13 @@ class Replay:
         """Draw the frame of a time [s]."""
         times = self._recording.times
         self._time = float(np.clip(seconds, times[0], times[-1]))
-        shown = self.frame_at(self._time)
-        moment = self.moment(shown)
+        frame = self.frame_at(self._time)
+        moment = self.moment(frame)
         if moment is not self.stage.moment:
             self.stage.show(moment)
             self.record.note(moment)
             self.controls.refresh()
-            self.said.content = self._facts(shown)
+            self.message.content = self._facts(frame)
 
     def _toggle(self) -> None:
         self.playing = not self.playing
@@ -131,16 +131,16 @@ class Replay:
 
     def _run(self) -> None:
         before = time.monotonic()
-        while not self._end.wait(self._pace.pause()):
+        while not self._end.wait(self._frame_rate.pause()):
             now = time.monotonic()
             passed, before = now - before, now
             times = self._recording.times
             with self._turn:
-                if self.playing and self.slider.value == self._put and self._pace.may_send():
+                if self.playing and self.slider.value == self._put and self._frame_rate.may_send():
                     following = self._time + passed * number(self.speed.value, _SLOWEST, _FASTEST)
                     if following > times[-1]:
                         following = float(times[0])
-                    with self._pace.sending():
+                    with self._frame_rate.sending():
                         self.show(following)
                         self._in_loop(self._advance, float(times[self.frame_at(following)]))
                 elif self._settle_at is not None and now > self._settle_at:
@@ -169,11 +169,11 @@ class Replay:
             self._put = float(np.nextafter(self.slider.value, 0.5 * (times[0] + times[-1])))
             self.slider.value = self._put
 
-    def _facts(self, shown: int) -> str:
+    def _facts(self, frame: int) -> str:
         recording = self._recording
-        report = recording[shown].report
+        report = recording[frame].report
         return (
-            f"Frame {shown} of {len(recording) - 1}, {len(recording.tets)} tets, "
+            f"Frame {frame} of {len(recording) - 1}, {len(recording.tets)} tets, "
             f"{len(recording.rest_positions)} vertices  \n"
             f"smallest J {report.min_det_F:.3g}, {report.status}"
         )

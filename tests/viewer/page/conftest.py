@@ -21,15 +21,15 @@ from supple.viewer.protocol.messages import (
 )
 
 
-class MadeUpSimulation:
+class FakeSimulation:
     """What the page sees of a simulation. `told` are the commands, `snapshot` is the newest one."""
 
     def __init__(self, snapshot: Snapshot) -> None:
-        self.snapshot, self.told, self.error = snapshot, [], None
+        self.snapshot, self.received, self.error = snapshot, [], None
         self.sent = 0  # commands; what `snapshot.applied` says of them is up to the test
 
     def send(self, command):
-        self.told.append(command)
+        self.received.append(command)
         self.sent += 1
         return self.sent
 
@@ -103,11 +103,11 @@ def snapshot_of(description: SceneDescription, **changes) -> Snapshot:
 
 
 @pytest.fixture
-def made_up():
+def fake():
     """Two small boxes over a floor, made up."""
     mesh = sp.shapes.box(size=(1.0, 1.0, 1.0), divisions=(2, 2, 2))
     other = sp.TetMesh(mesh.vertices + np.array([2.0, 0.0, 0.0]), mesh.tets)
-    return MadeUpSimulation(snapshot_of(describe(mesh, other)))
+    return FakeSimulation(snapshot_of(describe(mesh, other)))
 
 
 class Visitor:
@@ -128,7 +128,7 @@ class Visitor:
         if reads:
             threading.Thread(target=self._read, daemon=True).start()
         # A visitor counts as one once its camera is known.
-        self.say(
+        self.send(
             "ViewerCameraMessage",
             wxyz=(1.0, 0.0, 0.0, 0.0),
             position=(0.0, 0.0, -5.0),
@@ -141,19 +141,19 @@ class Visitor:
             up_direction=(0.0, -1.0, 0.0),
         )
 
-    def say(self, kind: str, **fields) -> None:
+    def send(self, kind: str, **fields) -> None:
         import msgspec
 
         self.line.send(msgspec.msgpack.encode({"type": kind, **fields}))
 
     def set(self, handle, value) -> None:
-        self.say("GuiUpdateMessage", uuid=handle._impl.uuid, updates={"value": value})
+        self.send("GuiUpdateMessage", uuid=handle._impl.uuid, updates={"value": value})
 
     def press(self, button) -> None:
-        self.say("GuiUpdateMessage", uuid=button._impl.uuid, updates={"value": True})
+        self.send("GuiUpdateMessage", uuid=button._impl.uuid, updates={"value": True})
 
     def drag(self, handle, phase: str, start, end) -> None:
-        self.say(
+        self.send(
             "SceneNodeDragMessage",
             phase=phase,
             name=handle.name,
@@ -168,7 +168,7 @@ class Visitor:
         )
 
     def click(self, handle, origin, direction) -> None:
-        self.say(
+        self.send(
             "SceneNodeClickMessage",
             name=handle.name,
             instance_index=None,
@@ -219,20 +219,20 @@ def until():
 def server():
     """A server of pages. It has no gate: what a visitor says gets through, whatever it is."""
     from supple.output.viser_server import start_server, stop_server
-    from supple.viewer.app import dress
+    from supple.viewer.app import configure_page
 
     made = start_server("127.0.0.1", 0)
-    dress(made)
+    configure_page(made)
     yield made
     stop_server(made)
 
 
 @pytest.fixture
-def live(server, made_up):
+def live(server, fake):
     """A page of the made-up simulation."""
     from supple.viewer.live_page import LivePage
 
-    page = LivePage(server, made_up, made_up.snapshot)
+    page = LivePage(server, fake, fake.snapshot)
     yield page
     page.stop()
 
@@ -281,10 +281,10 @@ class Screen:
             self.tab.wait_for_timeout(50)
         return found
 
-    def _hear(self, said) -> None:
+    def _hear(self, message) -> None:
         # A slider's own complaint about its keys, in React's event listeners.
-        if said.type == "error" and "passive event listener" not in said.text:
-            self.errors.append(said.text)
+        if message.type == "error" and "passive event listener" not in message.text:
+            self.errors.append(message.text)
 
     @property
     def client(self):
@@ -322,7 +322,7 @@ class Screen:
         for _ in range(times):
             thumb.press(key)
 
-    def insist(self, act, holds, what: str, patience: float = 5.0):
+    def insist(self, act, holds, what: str, interval: float = 5.0):
         """Do something until it has an effect. A busy browser may lose a key, or have drawn too little to be clicked.
 
         For what can be done twice without harm.
@@ -333,7 +333,7 @@ class Screen:
             nonlocal again
             if time.monotonic() > again:
                 act()
-                again = time.monotonic() + patience
+                again = time.monotonic() + interval
             return holds()
 
         return self.wait(done, what)

@@ -24,11 +24,11 @@ def live(look, spot):
     source = LiveSource("ball", scene, sp.XPBD(substeps=8), 1 / 60)
     with opened_page(source, Address(port=0)) as page:
         screen = look(page.url, page.server)
-        desk = page.shown.desk
-        made = SimpleNamespace(screen=screen, page=page.shown, panel=page.shown.panel)
-        made.snapshot = lambda: desk.snapshot
-        made.middle = lambda: desk.snapshot.positions.mean(axis=0)
-        made.height = lambda: float(np.ptp(desk.snapshot.positions[:, 1]))
+        controller = page.content.controller
+        made = SimpleNamespace(screen=screen, page=page.content, panel=page.content.panel)
+        made.snapshot = lambda: controller.snapshot
+        made.middle = lambda: controller.snapshot.positions.mean(axis=0)
+        made.height = lambda: float(np.ptp(controller.snapshot.positions[:, 1]))
         made.red = lambda: spot(screen.shot(), "red")
         made.seen = lambda: made.red()[1]
 
@@ -197,7 +197,7 @@ def test_a_file_becomes_a_body_and_a_bad_one_a_line(resting, spot, tmp_path):
     try:
         upload_two_files(resting, spot, tmp_path)
     finally:
-        resting.page.desk.ask(None, lambda: RemoveBody("my ball 1"))
+        resting.page.controller.send(None, lambda: RemoveBody("my ball 1"))
         resting.screen.wait(lambda: len(resting.snapshot().description.bodies) == 1, "no second body")
 
 
@@ -250,7 +250,7 @@ def test_the_ball_of_the_mouse_pushes(resting):
         mouse.down()
         mouse.move(x + 120, y, steps=2)
 
-    screen.insist(hold, lambda: resting.snapshot().pusher is not None, "the ball of the mouse", patience=15.0)
+    screen.insist(hold, lambda: resting.snapshot().pusher is not None, "the ball of the mouse", interval=15.0)
     for k in range(10):
         mouse.move(x + 120 - 12 * k, y)
         screen.tab.wait_for_timeout(60)

@@ -37,7 +37,7 @@ def test_one_visitor_cannot_end_the_page_for_the_others(server, visit, until):
     heard = []
     count.on_update(lambda event: heard.append(event.target.value))
     visitors[0].set(count, 1e30)  # as an integer it is too large for the line to all others
-    visitors[0].say("GuiUpdateMessage", uuid=count._impl.uuid, updates={"update_cb": None, "value": 3})
+    visitors[0].send("GuiUpdateMessage", uuid=count._impl.uuid, updates={"update_cb": None, "value": 3})
     visitors[0].set(count, 5)
     until(lambda: heard == [5])
     visitors[1].set(count, 6)

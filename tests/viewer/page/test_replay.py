@@ -13,7 +13,7 @@ from supple.viewer.app import Address, opened_page
 from supple.viewer.drawing.moments.from_recording import model_of_recording, moment_of_frame
 from supple.viewer.drawing.options import ViewOptions
 from supple.viewer.drawing.page_of_moments import evenly, page_of_moments
-from supple.viewer.drawing.video_capture import gif_of, kinds_of_films
+from supple.viewer.drawing.video_capture import gif_of, video_formats
 from supple.viewer.replay import Replay
 
 STEPS = 30
@@ -58,7 +58,7 @@ def test_the_slider_shows_the_frame_of_its_time(replay, server, visit, until):
     for number in (7, 0, STEPS):
         visitor.set(replay.slider, float(replay._recording.times[number]))
         until(lambda: not replay.playing and replay.stage.moment is replay.moment(number))  # noqa: B023
-        until(lambda: f"Frame {number} of {STEPS}" in replay.said.content)  # noqa: B023
+        until(lambda: f"Frame {number} of {STEPS}" in replay.message.content)  # noqa: B023
     visitor.press(replay.play)
     until(lambda: replay.playing)
     visitor.leave()
@@ -128,16 +128,14 @@ def test_pages_keep_the_time_and_thin_out(recorded, monkeypatch):
 def test_films_have_all_pictures():
     image = pytest.importorskip("PIL.Image")
     frames = [np.full((20, 30, 3), shade, dtype=np.uint8) for shade in (0, 100, 200)]
-    with image.open(io.BytesIO(gif_of(frames, 10.0))) as film:
-        assert (film.n_frames, film.size, film.info["duration"]) == (3, (30, 20), 100)
-    assert kinds_of_films()["gif"] == ""
+    with image.open(io.BytesIO(gif_of(frames, 10.0))) as capture:
+        assert (capture.n_frames, capture.size, capture.info["duration"]) == (3, (30, 20), 100)
+    assert video_formats()["gif"] == ""
 
 
 def test_what_is_missing_for_a_film_is_said(monkeypatch):
-    from supple.viewer.drawing import video_capture as film
-
-    monkeypatch.setattr(film, "find_spec", lambda name: None)
-    assert "pip install 'supple[video]'" in kinds_of_films()["mp4"]
+    monkeypatch.setattr("supple.viewer.drawing.video_capture.find_spec", lambda name: None)
+    assert "pip install 'supple[video]'" in video_formats()["mp4"]
 
 
 def test_a_person_looks_through_a_recording(recorded, look, spot, tmp_path):
@@ -145,7 +143,7 @@ def test_a_person_looks_through_a_recording(recorded, look, spot, tmp_path):
     from dataclasses import replace
 
     with opened_page(recorded, Address(port=0)) as page:
-        screen, replay = look(page.url, page.server), page.shown
+        screen, replay = look(page.url, page.server), page.content
         where = lambda: spot(screen.shot(), "red")  # noqa: E731
         agree = lambda: screen.reads(replay.slider) == pytest.approx(replay.slider.value, abs=1e-9)  # noqa: E731
         # A key that comes as the last frame is shown moves nothing, hence again.

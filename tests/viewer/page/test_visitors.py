@@ -10,16 +10,16 @@ import supple as sp
 
 
 @pytest.fixture
-def busy(server, made_up):
+def busy(server, fake):
     """A page of a simulation that has something new all the time."""
     from supple.viewer.live_page import LivePage
 
-    page, end = LivePage(server, made_up, made_up.snapshot), threading.Event()
-    rest = made_up.snapshot.positions
+    page, end = LivePage(server, fake, fake.snapshot), threading.Event()
+    rest = fake.snapshot.positions
 
     def run():
         while not end.wait(0.005):
-            made_up.show(positions=rest + 0.1 * np.sin(made_up.snapshot.frame), time=0.01 * made_up.snapshot.frame)
+            fake.show(positions=rest + 0.1 * np.sin(fake.snapshot.frame), time=0.01 * fake.snapshot.frame)
 
     thread = threading.Thread(target=run)
     thread.start()
@@ -34,13 +34,13 @@ def test_a_visitor_that_takes_nothing_holds_up_nobody(busy, server, visit, until
     others = [visit(server.get_port()) for _ in range(9)]
     until(lambda: len(server.get_clients()) == 10)
     buffer = server._websock_server.get_message_buffer()
-    shown = busy.desk.snapshot.frame
+    before = busy.controller.snapshot.frame
     kept, taken = [], [other.taken for other in others]
 
     def well():
         kept.append(len(buffer.message_from_id))
         served = all(other.taken > before + 20 for other, before in zip(others, taken, strict=True))
-        return served and busy.desk.snapshot.frame > shown + 50 and len(kept) > 50
+        return served and busy.controller.snapshot.frame > before + 50 and len(kept) > 50
 
     until(well, 60.0)
     # For the one that takes nothing, the newest of everything is kept, and nothing else.
@@ -50,35 +50,35 @@ def test_a_visitor_that_takes_nothing_holds_up_nobody(busy, server, visit, until
 
 
 def test_the_page_asks_less_of_a_server_that_lags(server, until, monkeypatch):
-    from supple.viewer.drawing import frame_rate as pace_module
-    from supple.viewer.drawing.frame_rate import FASTEST, Pace
+    from supple.viewer.drawing import frame_rate as frame_rate_module
+    from supple.viewer.drawing.frame_rate import FASTEST, FrameRate
 
-    pace = Pace(server)
-    assert pace.interval == FASTEST
-    with pace.sending():
+    frame_rate = FrameRate(server)
+    assert frame_rate.interval == FASTEST
+    with frame_rate.sending():
         pass
-    until(pace.may_send)
+    until(frame_rate.may_send)
     loop, free = server.get_event_loop(), threading.Event()
     loop.call_soon_threadsafe(free.wait, 20.0)
-    with pace.sending():
+    with frame_rate.sending():
         pass
-    assert not pace.may_send()
+    assert not frame_rate.may_send()
     time.sleep(0.1)
     free.set()
-    until(pace.may_send)
-    assert pace.interval >= 0.2  # that it had to wait for the server counts as much as drawing
+    until(frame_rate.may_send)
+    assert frame_rate.interval >= 0.2  # that it had to wait for the server counts as much as drawing
     # Slow to speed up: each picture that the server takes at once counts for 0.3.
     clock = time.monotonic()
-    monkeypatch.setattr(pace_module.time, "monotonic", lambda: clock)
+    monkeypatch.setattr(frame_rate_module.time, "monotonic", lambda: clock)
     intervals = []
     for _ in range(20):
-        pace._came_around(clock, 0.0)
-        intervals.append(pace.interval)
+        frame_rate._came_around(clock, 0.0)
+        intervals.append(frame_rate.interval)
     assert intervals[0] >= 0.7 * 0.2
     assert intervals[-1] == FASTEST
 
 
-def test_fine_skins_are_carried_at_once(made_up):
+def test_fine_skins_are_carried_at_once(fake):
     """What is done for every picture: 100k vertices, in bounded work per vertex and without a Python loop."""
     from supple.mesh.skin import Embedding
     from supple.output.recording.skinned_surface import SkinnedSurface

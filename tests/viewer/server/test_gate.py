@@ -23,7 +23,7 @@ from supple.viewer.server.message_check import Malformed, is_wanted
 from supple.viewer.server.uploads.transfers import refuse_transfers
 
 PROTOCOL = f"viser-v{viser.__version__}"
-PATIENCE = 30.0
+TIMEOUT = 30.0
 
 
 @contextlib.contextmanager
@@ -52,12 +52,12 @@ def secret():
 
 def dial(server, path="", **headers):
     url = f"ws://127.0.0.1:{server.get_port()}{path}"
-    return connect(url, subprotocols=[PROTOCOL], additional_headers=headers, open_timeout=PATIENCE, max_size=None)
+    return connect(url, subprotocols=[PROTOCOL], additional_headers=headers, open_timeout=TIMEOUT, max_size=None)
 
 
 def fetch(server, path="/", **headers):
     request = urllib.request.Request(f"http://127.0.0.1:{server.get_port()}{path}", headers=headers)
-    with urllib.request.urlopen(request, timeout=PATIENCE) as response:
+    with urllib.request.urlopen(request, timeout=TIMEOUT) as response:
         return response.status, response.headers, response.read()
 
 
@@ -81,7 +81,7 @@ def ended(connection):
     """The close code that the server gives; everything that it sends before is read and thrown away."""
     try:
         for _ in range(10_000):
-            connection.recv(timeout=PATIENCE)
+            connection.recv(timeout=TIMEOUT)
     except ConnectionClosed as end:
         return end.rcvd.code
     pytest.fail("the connection stays")
@@ -109,14 +109,14 @@ class TestToken:
         cookie = headers["Set-Cookie"]
         assert {"HttpOnly", "SameSite=Strict"} <= {part.strip() for part in cookie.split(";")}
         with dial(server, Cookie=cookie.split(";")[0]) as connection:
-            assert connection.recv(timeout=PATIENCE)
+            assert connection.recv(timeout=TIMEOUT)
         # and a reload of the page, without the token in its address
         assert fetch(server, "/", Cookie=cookie.split(";")[0])[0] == 200
 
     def test_a_client_that_is_no_browser_may_give_it_in_the_address(self, secret):
         server, token = secret
         with dial(server, f"/?token={token}") as connection:
-            assert connection.recv(timeout=PATIENCE)
+            assert connection.recv(timeout=TIMEOUT)
 
     def test_beyond_this_machine_nothing_is_served_without_one(self):
         with pytest.raises(OutputError, match="needs a token"), served("0.0.0.0"):
@@ -136,7 +136,7 @@ class TestOtherSites:
                 dial(local, Origin=origin)
             assert refused.value.response.status_code == 403
         with dial(local, Origin=f"http://127.0.0.1:{port}") as connection:
-            assert connection.recv(timeout=PATIENCE)
+            assert connection.recv(timeout=TIMEOUT)
 
     def test_a_foreign_name_that_points_here_gets_nothing(self, local):
         with pytest.raises(urllib.error.HTTPError) as caught:
@@ -224,7 +224,7 @@ class TestMalformed:
             bad.send(MALFORMED[name])
             assert ended(bad) == 1008
             good.send(camera())
-            good.ping().wait(PATIENCE)
+            good.ping().wait(TIMEOUT)
 
     def test_what_no_picture_needs_is_not_even_read(self, local):
         with dial(local) as bad:
@@ -243,24 +243,24 @@ class TestMalformed:
 
     def test_no_more_pages_than_allowed(self, local, monkeypatch):
         with dial(local) as first:
-            first.ping().wait(PATIENCE)
+            first.ping().wait(TIMEOUT)
             monkeypatch.setattr(limits, "MOST_CLIENTS", 1)
             with dial(local) as second:
                 assert ended(second) == 1013
-            first.ping().wait(PATIENCE)
+            first.ping().wait(TIMEOUT)
 
     def test_connections_that_say_nothing_are_bounded(self, monkeypatch):
         monkeypatch.setattr(limits, "MOST_CONNECTIONS", 5)
         with served() as server, contextlib.ExitStack() as ends:
             place = ("127.0.0.1", server.get_port())
-            silent = [ends.enter_context(socket.create_connection(place, timeout=PATIENCE)) for _ in range(5)]
+            silent = [ends.enter_context(socket.create_connection(place, timeout=TIMEOUT)) for _ in range(5)]
             for line in silent:
                 line.sendall(b"GET / HTTP/1.1\r\n")
-            one_more = ends.enter_context(socket.create_connection(place, timeout=PATIENCE))
+            one_more = ends.enter_context(socket.create_connection(place, timeout=TIMEOUT))
             with contextlib.suppress(ConnectionResetError):
                 assert one_more.recv(100) == b""  # dropped
             silent[0].close()  # there is room again, once the server has noticed
-            end = time.monotonic() + PATIENCE
+            end = time.monotonic() + TIMEOUT
             while True:
                 try:
                     assert fetch(server)[0] == 200
@@ -286,7 +286,7 @@ class TestMalformed:
             connection.send(camera())
             connection.send(file_start(source_component_uuid=slider._impl.uuid))
             connection.send(part(source_component_uuid=slider._impl.uuid))
-            connection.ping().wait(PATIENCE)
+            connection.ping().wait(TIMEOUT)
         assert slider.value == 1.0
         assert local.gui._current_file_upload_states == {}
 
@@ -306,7 +306,7 @@ class TestMalformed:
         with dial(local) as connection:
             connection.send(camera())
             connection.send(msgspec.msgpack.encode(update))
-            end = time.monotonic() + PATIENCE
+            end = time.monotonic() + TIMEOUT
             while slider.value != 7.0 and time.monotonic() < end:
                 time.sleep(0.01)
         assert slider.value == 7.0
@@ -317,7 +317,7 @@ class TestPort:
         # Not any free port: those that the system hands out may be another's by the time the server comes back.
         port = first_free_port("127.0.0.1", 20_000 + 50 * (os.getpid() % 200) + 25)
         with served(port=port) as server, dial(server) as connection:
-            connection.recv(timeout=PATIENCE)
+            connection.recv(timeout=TIMEOUT)
             server.stop()
             assert ended(connection) in (1001, 1006, 1012)
         for _ in range(2):
@@ -325,7 +325,7 @@ class TestPort:
             with served(port=port) as again:
                 assert again.get_port() == port
                 with dial(again) as connection:
-                    assert connection.recv(timeout=PATIENCE)
+                    assert connection.recv(timeout=TIMEOUT)
 
     def test_a_port_that_is_taken_is_said(self):
         with socket.socket() as other:

@@ -100,8 +100,8 @@ HOSTILE = {
 
 @pytest.mark.parametrize("name", HOSTILE)
 def test_what_is_no_closed_surface_is_refused_in_a_line(read, name):
-    suffix, content, said = HOSTILE[name]
-    with pytest.raises(SuppleError, match=f"mesh{suffix}.*({said})"):
+    suffix, content, message = HOSTILE[name]
+    with pytest.raises(SuppleError, match=f"mesh{suffix}.*({message})"):
         read(suffix, content)
 
 

@@ -28,7 +28,7 @@ class Simulation(Protocol):
         ...
 
 
-class Desk:
+class Controller:
     """Passes commands on, for visitors.
 
     Parameters
@@ -42,7 +42,7 @@ class Desk:
         # Inputs are exchanged for others by the thread that draws, and by those that serve visitors.
         self.lock = threading.RLock()
 
-    def ask(self, client: Any, make: Callable[[], Command]) -> int:
+    def send(self, client: Any, make: Callable[[], Command]) -> int:
         """Make a command and send it, and return its number. Where it is not to be had, the visitor is told why.
 
         Parameters
@@ -52,11 +52,11 @@ class Desk:
         try:
             return self.simulation.send(make())
         except SuppleError as error:
-            tell(client, "Not done", str(error))
+            notify(client, "Not done", str(error))
             return 0
 
 
-def in_order(react: Callable[[Any], object]) -> Callable[[Any], Coroutine[Any, Any, None]]:
+def sequential(react: Callable[[Any], object]) -> Callable[[Any], Coroutine[Any, Any, None]]:
     """What answers to a button, as a coroutine: viser runs these one by one, right after the value has come in.
 
     Functions it runs in threads, in any order: one that looks at the value may see that of a later click.
@@ -68,7 +68,7 @@ def in_order(react: Callable[[Any], object]) -> Callable[[Any], Coroutine[Any, A
     return called
 
 
-def tell(client: Any, title: str, text: str, color: str = "orange") -> None:
+def notify(client: Any, title: str, text: str, color: str = "orange") -> None:
     """Show a visitor a line for a while."""
     if client is not None:
         client.add_notification(title, text, auto_close_seconds=6.0, color=color)

@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from supple.viewer.controls.controller import Desk, in_order
-from supple.viewer.controls.pending import Wish
+from supple.viewer.controls.controller import Controller, sequential
+from supple.viewer.controls.pending import PendingValue
 from supple.viewer.protocol.messages import SetParameter
 from supple.viewer.protocol.parameters import PARAMETERS, Parameter
 from supple.viewer.protocol.snapshots import Value
@@ -18,7 +18,7 @@ _LEAST_POWER = -12.0
 # What stands beside a slider is short.
 _SHORT = {"youngs": "E", "edge_compliance": "Edges", "volume_compliance": "Volume"}
 # Ends of sliders, where the allowed range is wider than a slider can be used for.
-_HANDY = {"gravity": (-20.0, 20.0), "friction": (0.0, 2.0), "poisson": (0.0, 0.499), "youngs": (1e2, 1e9)}
+_SLIDER_ENDS = {"gravity": (-20.0, 20.0), "friction": (0.0, 2.0), "poisson": (0.0, 0.499), "youngs": (1e2, 1e9)}
 
 
 class ParameterInput:
@@ -30,13 +30,13 @@ class ParameterInput:
     """
 
     def __init__(
-        self, gui: Any, desk: Desk, name: str, value: Value, whose: Callable[[], str | None] = lambda: None
+        self, gui: Any, controller: Controller, name: str, value: Value, whose: Callable[[], str | None] = lambda: None
     ) -> None:
         self.parameter: Parameter = PARAMETERS[name]
-        self._desk, self._whose = desk, whose
-        self._wish, self._removed = Wish(), False
+        self._controller, self._whose = controller, whose
+        self._pending, self._removed = PendingValue(), False
         self.value: Value = value
-        low, high = _HANDY.get(name, (self.parameter.low, self.parameter.high))
+        low, high = _SLIDER_ENDS.get(name, (self.parameter.low, self.parameter.high))
         self._low, self._high = min(low, float(value)), max(high, float(value))
         if self.parameter.kind is bool:
             self.handle = gui.add_checkbox(self._label(value), initial_value=bool(value))
@@ -45,7 +45,7 @@ class ParameterInput:
             self.handle = gui.add_slider(
                 self._label(value), *self._ends(), self._step(), initial_value=place, hint=self._hint()
             )
-        self.handle.on_update(in_order(self._moved))
+        self.handle.on_update(sequential(self._moved))
 
     def show(self, value: Value, applied: int) -> None:
         """Bring the input to the simulation's value, unless a visitor is at it.
@@ -54,7 +54,7 @@ class ParameterInput:
         ----------
         applied : number of the newest command that the simulation has acted upon
         """
-        if value != self.value and not self._wish.stands(applied):
+        if value != self.value and not self._pending.stands(applied):
             self.value = value
             self.handle.value = self._place(value)
             self.handle.label = self._label(value)
@@ -67,7 +67,7 @@ class ParameterInput:
     def _moved(self, event: Any) -> None:
         if event.client is None:
             return
-        with self._desk.lock:
+        with self._controller.lock:
             value = self._value_at(self.handle.value)
             if self._removed or value == self.value:
                 return
@@ -75,7 +75,7 @@ class ParameterInput:
             self.handle.label = self._label(value)
             # Within the lock: else a moment's old value could be shown between the two.
             name, whose = self.parameter.name, self._whose()
-            self._wish.made(self._desk.ask(event.client, lambda: SetParameter(name, value, whose)))
+            self._pending.made(self._controller.send(event.client, lambda: SetParameter(name, value, whose)))
 
     def _ends(self) -> tuple[float, float]:
         if self.parameter.kind is int:

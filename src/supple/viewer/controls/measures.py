@@ -24,7 +24,7 @@ class Measures:
         self._rows: deque[tuple[float, ...]] = deque(maxlen=_MOST_POINTS)
         self._text = ""
         with gui.add_folder("Measures"):
-            self._said = gui.add_markdown("")
+            self._message = gui.add_markdown("")
             self.energy = self._plot(gui, "Energy [J]", (("kinetic", "#e65c3c"), ("elastic", "#409ce1")))
             self.spin = self._plot(gui, "Spin [rad/s]", (("fastest body", "#34ac78"),))
         self.note(snapshot)
@@ -42,9 +42,9 @@ class Measures:
 
     def show(self, snapshot: Snapshot) -> None:
         """Bring numbers and plots up to date."""
-        text = said_of(snapshot)
+        text = measures_text(snapshot)
         if text != self._text:
-            self._said.content = self._text = text
+            self._message.content = self._text = text
         with self._lock:
             rows = np.nan_to_num(np.array(self._rows, dtype=np.float64), posinf=0.0, neginf=0.0)
         self._draw(self.energy, rows, (1, 2))
@@ -72,7 +72,7 @@ class Measures:
         handle.data = tuple(np.ascontiguousarray(rows[:, k]) for k in (0, *columns))
 
 
-def said_of(snapshot: Snapshot) -> str:
+def measures_text(snapshot: Snapshot) -> str:
     """Counts, energies, the worst tet, and how the last step ended."""
     scene, measures = snapshot.description, snapshot.measures
     spin = float(np.linalg.norm(measures.spin, axis=1).max()) if len(measures.spin) else 0.0

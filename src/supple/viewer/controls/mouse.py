@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.viewer.controls.controller import Desk
+from supple.viewer.controls.controller import Controller
 from supple.viewer.controls.mouse_controls import MouseControls
 from supple.viewer.drawing.picking import nearest_surface_point, point_on_camera_plane, surface_point_on_ray
 from supple.viewer.drawing.stage import Stage
@@ -34,21 +34,21 @@ class Mouse:
     server : viser's; desk : where commands go; controls : what the mouse is to do
     """
 
-    def __init__(self, server: Any, desk: Desk, controls: MouseControls) -> None:
-        self._server, self._desk, self._controls = server, desk, controls
+    def __init__(self, server: Any, controller: Controller, controls: MouseControls) -> None:
+        self._server, self._controller, self._controls = server, controller, controls
         self._stage: Stage | None = None
         self._numbers = itertools.count(1)
         self._grabs: dict[int, int] = {}  # by visitor
         self._pushes: dict[int, _Push] = {}
         self._backdrop: Any = None
-        server.on_client_disconnect(lambda client: self.let_go(client.client_id))
+        server.on_client_disconnect(lambda client: self.release(client.client_id))
 
     def attach(self, stage: Stage) -> None:
         """What is on this stage is dragged; its bodies come to `listen`."""
         self._stage = stage
         self.switch()
 
-    def listen(self, handles: list[Any]) -> None:
+    def add_handlers(self, handles: list[Any]) -> None:
         """Let meshes of bodies answer to the mouse."""
         for handle in handles:
             # Coroutines: viser runs them one after the other, and functions in any order.
@@ -79,7 +79,7 @@ class Mouse:
     async def drag(self, event: Any) -> None:
         """Called by viser while something is dragged."""
         if event.phase == "end":  # whatever the mouse did when it began
-            self.let_go(event.client_id)
+            self.release(event.client_id)
         elif self._controls.pushes:
             self._push(event)
         else:
@@ -93,25 +93,25 @@ class Mouse:
         if point is None:
             return
         body, vertex = point.body, point.nearest_vertex
-        held = vertex + body.vertices.start in self._desk.snapshot.pinned
-        self._desk.ask(event.client, lambda: (Unpin if held else Pin)(body.name, vertex))
+        held = vertex + body.vertices.start in self._controller.snapshot.pinned
+        self._controller.send(event.client, lambda: (Unpin if held else Pin)(body.name, vertex))
 
-    def let_go(self, visitor: int) -> None:
+    def release(self, visitor: int) -> None:
         """Release what a visitor holds."""
         self._pushes.pop(visitor, None)
         number = self._grabs.pop(visitor, None)
         if number is not None:
-            self._desk.ask(None, lambda: ReleaseGrab(number))
+            self._controller.send(None, lambda: ReleaseGrab(number))
 
     def _pull(self, event: Any) -> None:
         visitor = event.client_id
         if not _finite(event.start_position, event.end_position) or self._stage is None:
             return
         if event.phase == "start":
-            self.let_go(visitor)
+            self.release(visitor)
             point = nearest_surface_point(self._stage.moment, event.start_position)
             number = self._grabs[visitor] = next(self._numbers)
-            self._desk.ask(
+            self._controller.send(
                 event.client,
                 lambda: Grab(
                     number,
@@ -123,7 +123,7 @@ class Mouse:
                 ),
             )
         elif visitor in self._grabs:
-            self._desk.ask(event.client, lambda: MoveGrab(self._grabs[visitor], event.end_position))
+            self._controller.send(event.client, lambda: MoveGrab(self._grabs[visitor], event.end_position))
 
     def _push(self, event: Any) -> None:
         visitor = event.client_id
@@ -139,13 +139,13 @@ class Mouse:
         place = point_on_camera_plane(eye, event.end_position, look, push.through)
         if place is not None:
             x, y, z = (float(coordinate) for coordinate in place + push.offset)
-            self._desk.ask(event.client, lambda: MovePusher((x, y, z), self._controls.radius))
+            self._controller.send(event.client, lambda: MovePusher((x, y, z), self._controls.radius))
 
     def _begin_push(self, event: Any, eye: NDArray[np.float64]) -> _Push:
         """On a body, the ball starts just before it, seen from the camera; elsewhere in the plane of the bodies."""
         assert self._stage is not None
         if event.target.name == _BACKDROP:
-            return _Push(self._stage.moment.shown_positions.mean(axis=0), np.zeros(3))
+            return _Push(self._stage.moment.finite_positions.mean(axis=0), np.zeros(3))
         touched = np.asarray(event.start_position)
         toward = eye - touched
         toward /= max(float(np.linalg.norm(toward)), 1e-12)

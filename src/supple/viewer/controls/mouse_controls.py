@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from supple.viewer.controls.controller import Desk, in_order
+from supple.viewer.controls.controller import Controller, sequential
 from supple.viewer.protocol import limits
 from supple.viewer.protocol.messages import RemovePusher, Unpin
 from supple.viewer.server.browser_values import number, one_of
@@ -22,10 +22,10 @@ class MouseControls:
     changed : called when another mode is chosen
     """
 
-    def __init__(self, gui: Any, desk: Desk, changed: Callable[[], None]) -> None:
+    def __init__(self, gui: Any, controller: Controller, changed: Callable[[], None]) -> None:
         self._changed = changed
-        self._desk = desk
-        scene = desk.snapshot.description
+        self._controller = controller
+        scene = controller.snapshot.description
         size = max(float(max(scene.high - scene.low)), 10.0 * limits.SMALLEST_LENGTH)
         self._radii = 0.02 * size, 0.5 * size
         with gui.add_folder("Mouse"):
@@ -37,8 +37,8 @@ class MouseControls:
             )
             self.unpin = gui.add_button("Unpin all")
         # One after the other, so that the backdrop is there just when the ball can be moved.
-        self.mode.on_update(in_order(self._switch))
-        self.unpin.on_click(in_order(lambda e: desk.ask(e.client, Unpin)))
+        self.mode.on_update(sequential(self._switch))
+        self.unpin.on_click(sequential(lambda e: controller.send(e.client, Unpin)))
 
     @property
     def pushes(self) -> bool:
@@ -60,7 +60,7 @@ class MouseControls:
         self._hint.content = _HINTS[PUSH if pushes else DRAG]
         self.strength.visible, self.radius_input.visible = not pushes, pushes
         if not pushes:
-            self._desk.ask(event.client, RemovePusher)
+            self._controller.send(event.client, RemovePusher)
         self._changed()
 
 

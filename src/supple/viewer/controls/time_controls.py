@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from supple.viewer.controls.controller import Desk, in_order
+from supple.viewer.controls.controller import Controller, sequential
 from supple.viewer.protocol import limits
 from supple.viewer.protocol.messages import Pause, Play, Reset, SetSpeed, Step
 from supple.viewer.protocol.snapshots import Snapshot
@@ -17,54 +17,56 @@ _BACK = ("step", "reset")
 class TimeControls:
     """The folder "Time"."""
 
-    def __init__(self, gui: Any, desk: Desk) -> None:
-        self._desk = desk
+    def __init__(self, gui: Any, controller: Controller) -> None:
+        self._controller = controller
         with gui.add_folder("Time"):
-            self._said = gui.add_markdown("")
-            self._text = self._stands = ""
+            self._message = gui.add_markdown("")
+            self._text = self._time_text = ""
             self.play = gui.add_button("Play")
             self.back = gui.add_button_group("Frames", _BACK)
             self.speed = gui.add_slider(
                 "Slow motion", limits.SLOWEST_MOTION, limits.FASTEST_MOTION, 0.01, initial_value=1.0
             )
-        self.play.on_click(in_order(lambda e: desk.ask(e.client, Play if desk.snapshot.paused else Pause)))
-        self.back.on_click(in_order(self._go_back))
-        self.speed.on_update(in_order(self._set_speed))
+        self.play.on_click(
+            sequential(lambda e: controller.send(e.client, Play if controller.snapshot.paused else Pause))
+        )
+        self.back.on_click(sequential(self._go_back))
+        self.speed.on_update(sequential(self._set_speed))
 
     def show(self, snapshot: Snapshot) -> None:
         """Say how things stand."""
-        wanted = "Play" if snapshot.paused else "Pause"
-        if self.play.label != wanted:
-            self.play.label = wanted
-        self._stands = said_of_time(snapshot)
-        self._say(self._stands)
+        label = "Play" if snapshot.paused else "Pause"
+        if self.play.label != label:
+            self.play.label = label
+        self._time_text = time_text(snapshot)
+        self._show_message(self._time_text)
 
     def wait(self, seconds: float) -> None:
         """Say that nothing has been heard of the simulation for some seconds."""
         why = "a long step, or kernels that are compiled when they are first used"
-        self._say(f"{self._stands}  \n**Busy for {seconds:.0f} s:** {why}")
+        self._show_message(f"{self._time_text}  \n**Busy for {seconds:.0f} s:** {why}")
 
-    def mourn(self, error: str) -> None:
+    def show_error(self, error: str) -> None:
         """Say that the simulation is gone."""
-        self._say(f"**The simulation is gone:** {plain(error)}")
+        self._show_message(f"**The simulation is gone:** {plain(error)}")
         for handle in (self.play, self.speed):
             if not handle.disabled:
                 handle.disabled = True
 
-    def _say(self, text: str) -> None:
+    def _show_message(self, text: str) -> None:
         if text != self._text:
-            self._said.content = self._text = text
+            self._message.content = self._text = text
 
     def _go_back(self, event: Any) -> None:
-        self._desk.ask(event.client, Step if one_of(self.back.value, _BACK) == "step" else Reset)
+        self._controller.send(event.client, Step if one_of(self.back.value, _BACK) == "step" else Reset)
 
     def _set_speed(self, event: Any) -> None:
         if event.client is not None:
             factor = number(self.speed.value, limits.SLOWEST_MOTION, limits.FASTEST_MOTION)
-            self._desk.ask(event.client, lambda: SetSpeed(factor))
+            self._controller.send(event.client, lambda: SetSpeed(factor))
 
 
-def said_of_time(snapshot: Snapshot) -> str:
+def time_text(snapshot: Snapshot) -> str:
     """A line or two: the time, how fast it goes, and whether that is as fast as it should."""
     timing = snapshot.timing
     lines = [f"t = {snapshot.time:.2f} s, frame {snapshot.frame}"]

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from supple.errors import SuppleError
-from supple.viewer.controls.controller import Desk, tell
+from supple.viewer.controls.controller import Controller, notify
 from supple.viewer.protocol import limits
 from supple.viewer.protocol.messages import AddMesh
 from supple.viewer.server.uploads.meshing import Upload, mesh_of_upload
@@ -26,10 +26,12 @@ class UploadControls:
     size, youngs : asked for what the new body is to have [m], [Pa]
     """
 
-    def __init__(self, server: Any, desk: Desk, size: Callable[[], float], youngs: Callable[[], float]) -> None:
-        self._desk, self._size, self._youngs = desk, size, youngs
+    def __init__(
+        self, server: Any, controller: Controller, size: Callable[[], float], youngs: Callable[[], float]
+    ) -> None:
+        self._controller, self._size, self._youngs = controller, size, youngs
         self.button = server.gui.add_upload_button("From a file", mime_type=",".join(limits.UPLOAD_FORMATS), hint=_HINT)
-        self._said = server.gui.add_markdown("", visible=False)
+        self._message = server.gui.add_markdown("", visible=False)
         self._busy, self._stop = threading.Lock(), threading.Event()
         self.transfers = Transfers(server, self.button, self._take, self._refuse)
 
@@ -44,29 +46,29 @@ class UploadControls:
         if self._stop.is_set() or not self._busy.acquire(blocking=False):
             self._refuse(client, f"{name}: another file is being read; try again when it is done")
             return
-        self._say(_progress(0.0))
+        self._show_message(_progress(0.0))
         threading.Thread(target=self._work, args=(client, upload, youngs), name="supple upload", daemon=True).start()
 
     def _work(self, client: Any, upload: Upload, youngs: float) -> None:
         """In a thread of its own: the page and the simulation go on meanwhile."""
         try:
-            made = mesh_of_upload(upload, lambda seconds: self._say(_progress(seconds)), self._stop)
-            self._desk.ask(client, lambda: AddMesh(made.vertices, made.tets, youngs, body_name(upload.name)))
+            made = mesh_of_upload(upload, lambda seconds: self._show_message(_progress(seconds)), self._stop)
+            self._controller.send(client, lambda: AddMesh(made.vertices, made.tets, youngs, body_name(upload.name)))
         except SuppleError as error:
             self._refuse(client, str(error))
         except OSError as error:
             self._refuse(client, f"{upload.name}: it cannot be stored: {error.strerror or error}")
         finally:
-            self._say("")
+            self._show_message("")
             self._busy.release()
 
     def _refuse(self, client: Any, why: str) -> None:
         if not self._stop.is_set():
-            tell(client, "Not added", why[:500], "red")
+            notify(client, "Not added", why[:500], "red")
 
-    def _say(self, text: str) -> None:
-        if text != self._said.content and not self._stop.is_set():
-            self._said.content, self._said.visible = text, bool(text)
+    def _show_message(self, text: str) -> None:
+        if text != self._message.content and not self._stop.is_set():
+            self._message.content, self._message.visible = text, bool(text)
 
 
 def _progress(seconds: float) -> str:

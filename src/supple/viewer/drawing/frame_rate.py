@@ -11,7 +11,7 @@ FASTEST, SLOWEST = 1.0 / 60.0, 0.5  # between two pictures [s]
 _SHARE = 0.5  # of the time that drawing may take
 
 
-class Pace:
+class FrameRate:
     """Nothing queues up: a picture is sent only once the server has dealt with the one before.
 
     viser keeps, for each visitor, the newest value of everything that is drawn, and sends it when that visitor has

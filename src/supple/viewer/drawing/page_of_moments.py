@@ -28,7 +28,7 @@ def evenly(count: int, most: int) -> list[int]:
     return [int(i) for i in np.unique(np.linspace(0, count - 1, min(count, most)).round())]
 
 
-def page_of_moments(taken: Sequence[tuple[float, Moment]], options: ViewOptions) -> str:
+def page_of_moments(moments: Sequence[tuple[float, Moment]], options: ViewOptions) -> str:
     """The HTML of a page that plays what was taken, in a loop.
 
     Parameters
@@ -36,15 +36,15 @@ def page_of_moments(taken: Sequence[tuple[float, Moment]], options: ViewOptions)
     taken : at least one moment, each with when it is shown [s], ascending
     options : how it is drawn
     """
-    first = taken[0][1].model
-    taken = [taken[i] for i in evenly(len(taken), most_moments(first, options))]
+    first = moments[0][1].model
+    moments = [moments[i] for i in evenly(len(moments), most_moments(first, options))]
     with server_for_a_moment() as server:
-        stage = Stage(server, _rounded(taken[0][1]), options)
+        stage = Stage(server, _rounded(moments[0][1]), options)
         serializer = server.get_scene_serializer()
-        shown = taken[0][0]
-        for seconds, moment in taken[1:]:
-            serializer.insert_sleep(max(0.0, seconds - shown))
-            shown = seconds
+        previous = moments[0][0]
+        for seconds, moment in moments[1:]:
+            serializer.insert_sleep(max(0.0, seconds - previous))
+            previous = seconds
             stage.show(_rounded(moment))
         serializer.insert_sleep(0.1)
         text = serializer.as_html()
@@ -54,4 +54,4 @@ def page_of_moments(taken: Sequence[tuple[float, Moment]], options: ViewOptions)
 def _rounded(moment: Moment) -> Moment:
     """With positions of few bits, which compress well."""
     quantum = quantum_of(moment.model.view)
-    return replace(moment, positions=np.round(moment.shown_positions / quantum) * quantum)
+    return replace(moment, positions=np.round(moment.finite_positions / quantum) * quantum)

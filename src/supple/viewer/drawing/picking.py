@@ -43,10 +43,10 @@ def nearest_surface_point(moment: Moment, place: ArrayLike) -> SurfacePoint:
     from trimesh.triangles import closest_point
 
     rows, _ = _triangles(moment.model)
-    corners = moment.shown_positions[rows]
-    wanted = np.asarray(place, dtype=np.float64)
-    points = closest_point(corners, np.broadcast_to(wanted, (len(rows), 3)))
-    nearest = int(np.argmin(np.linalg.norm(points - wanted, axis=1)))
+    corners = moment.finite_positions[rows]
+    query = np.asarray(place, dtype=np.float64)
+    points = closest_point(corners, np.broadcast_to(query, (len(rows), 3)))
+    nearest = int(np.argmin(np.linalg.norm(points - query, axis=1)))
     return _on_triangle(moment, nearest, points[nearest])
 
 
@@ -56,7 +56,7 @@ def surface_point_on_ray(moment: Moment, origin: ArrayLike, direction: ArrayLike
     Source: Möller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection" (1997).
     """
     rows, _ = _triangles(moment.model)
-    a, b, c = (moment.shown_positions[rows[:, k]] for k in range(3))
+    a, b, c = (moment.finite_positions[rows[:, k]] for k in range(3))
     start, along = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
     h = np.cross(along, c - a)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -77,7 +77,7 @@ def _on_triangle(moment: Moment, triangle: int, place: NDArray[np.float64]) -> S
 
     rows, owner = _triangles(moment.model)
     body = moment.model.bodies[owner[triangle]]
-    corners = moment.shown_positions[rows[triangle]]
+    corners = moment.finite_positions[rows[triangle]]
     with np.errstate(all="ignore"):
         weights = points_to_barycentric(corners[None], place[None], method="cross")[0]
     if not np.isfinite(weights).all():  # a triangle without area

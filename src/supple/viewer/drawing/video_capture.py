@@ -20,7 +20,7 @@ from supple.errors import OutputError
 _MOST_SECONDS, _MOST_FRAMES = 60.0, 900
 _SMALLEST_PAUSE = 0.05  # between pictures [s]
 _TALLEST = 720  # [pixels]
-_PATIENCE = 20.0  # for one picture [s]; software OpenGL takes seconds
+_PICTURE_TIMEOUT = 20.0  # for one picture [s]; software OpenGL takes seconds
 
 
 def picture_of(client: Any, tallest: int = 2160, kind: str = "png") -> NDArray[np.uint8]:
@@ -36,7 +36,7 @@ def picture_of(client: Any, tallest: int = 2160, kind: str = "png") -> NDArray[n
     # Even numbers of pixels: what encoders of video ask for.
     size = [max(2, int(n * scale) // 2 * 2) for n in (height, width)]
     try:
-        picture = client.get_render(*size, transport_format=kind, timeout=_PATIENCE)
+        picture = client.get_render(*size, transport_format=kind, timeout=_PICTURE_TIMEOUT)
     except (RuntimeError, TimeoutError, ConnectionError, OSError, ValueError) as error:
         raise OutputError(f"the browser sent no picture: {error}") from None
     if list(picture.shape[:2]) != size:
@@ -58,13 +58,13 @@ def png_of(client: Any) -> bytes:
     return out.getvalue()
 
 
-def kinds_of_films() -> dict[str, str]:
+def video_formats() -> dict[str, str]:
     """Kinds of films that can be made here, and what is missing for those that cannot ("" where nothing is)."""
     missing = "" if find_spec("imageio_ffmpeg") else "needs imageio-ffmpeg: pip install 'supple[video]'"
     return {"gif": "", "mp4": missing}
 
 
-class Film:
+class VideoCapture:
     """Takes pictures from one visitor's browser until it is stopped."""
 
     def __init__(self, client: Any) -> None:
@@ -104,7 +104,7 @@ class Film:
         """
         self._stop.set()
         self._thread.join()
-        missing = kinds_of_films()[kind]
+        missing = video_formats()[kind]
         if missing:
             raise OutputError(f"{kind.upper()} {missing}")
         if not self._frames:

@@ -73,9 +73,9 @@ class Engine:
         with self._arrived:
             self._arrived.wait_for(lambda: self._raw is not None or self._error is not None, start_timeout)
         if self._raw is None:
-            said = self._error or f"the simulation has not begun within {start_timeout:g} s"
+            reason = self._error or f"the simulation has not begun within {start_timeout:g} s"
             self.close()
-            raise SolverError(said)
+            raise SolverError(reason)
 
     def send(self, command: Command) -> int:
         """Give a command to the simulation, without waiting for it.

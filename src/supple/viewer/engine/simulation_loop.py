@@ -21,8 +21,7 @@ from supple.viewer.engine.pacing import Pacing
 from supple.viewer.engine.scene.changes import change
 from supple.viewer.engine.scene.live_scene import LiveScene
 from supple.viewer.engine.step_watch import StepWatch
-from supple.viewer.protocol import commands as say
-from supple.viewer.protocol import limits
+from supple.viewer.protocol import commands, limits
 from supple.viewer.protocol.command_queue import CommandQueue
 from supple.viewer.protocol.outbox import Outbox
 from supple.viewer.protocol.snapshots import Notice, Snapshot
@@ -46,10 +45,10 @@ class SimulationLoop:
         self.playing = False
         self.steps_left = 0
         self.speed = 1.0
-        self.view = say.SetView()
+        self.view = commands.SetView()
         self.pacing = Pacing()
         self.watch = StepWatch(
-            limits.LONGEST_STEP, lambda: inbox.holds(say.Pause, say.Reset), limits.LONGEST_STEP_WHEN_ASKED
+            limits.LONGEST_STEP, lambda: inbox.holds(commands.Pause, commands.Reset), limits.LONGEST_STEP_WHEN_ASKED
         )
         self.applied = 0
         self.notices: deque[Notice] = deque(maxlen=NOTICES_KEPT)
@@ -61,14 +60,14 @@ class SimulationLoop:
 
     def run(self) -> None:
         """Until the page's process is gone."""
-        with self.told_of_warnings():
+        with self.warnings_as_notices():
             while not self.inbox.closed:
-                self.turn(self._time_to_wait())
+                self.run_once(self._time_to_wait())
 
-    def turn(self, wait: float) -> None:
+    def run_once(self, wait: float) -> None:
         """One round: commands, a step if one is due, a snapshot if there is something to show."""
         for number, command in self.inbox.take(wait):
-            self.obey(command)
+            self.execute(command)
             self.applied = max(self.applied, number)
             self._fresh = True
         now = time.perf_counter()
@@ -79,36 +78,38 @@ class SimulationLoop:
         if (self._fresh and since >= self._shortest()) or self._blends(now) or since >= HEARTBEAT:
             self.publish(now)
 
-    def obey(self, command: say.Command) -> None:
+    def execute(self, command: commands.Command) -> None:
         """Do what a command says; what cannot be done becomes a notice."""
         try:
             match command:
-                case say.Play():
+                case commands.Play():
                     if not self.playing:
                         self.playing = True
                         self.pacing.start(time.perf_counter())
-                case say.Pause():
+                case commands.Pause():
                     self.playing, self.steps_left = False, 0
-                case say.Step():
+                case commands.Step():
                     self.playing = False
                     # Each counts, also where the one before has not been simulated yet.
                     self.steps_left = min(self.steps_left + command.count, limits.MOST_STEPS)
-                case say.SetSpeed():
+                case commands.SetSpeed():
                     self.speed = command.factor
                     self.pacing.start(time.perf_counter())
-                case say.SetView():
+                case commands.SetView():
                     self.view = command
                 case _:
                     with self.watch.limited():
                         change(command, self.live)
-                    if isinstance(command, say.Reset):  # frames that were asked for before are not of the new start
+                    if isinstance(
+                        command, commands.Reset
+                    ):  # frames that were asked for before are not of the new start
                         self.steps_left = 0
                     self._before = self.live.state
         except (SuppleError, MemoryError) as error:
-            self.tell("error", _one_line(error))
+            self.notify("error", _one_line(error))
         except Exception as error:
             logger.exception("the command %s failed", command)
-            self.tell("error", f"{type(command).__name__} failed: {_one_line(error)}")
+            self.notify("error", f"{type(command).__name__} failed: {_one_line(error)}")
 
     def step(self) -> None:
         """Simulate one frame; where that fails, time stops at the last good state, and a notice says why."""
@@ -124,24 +125,24 @@ class SimulationLoop:
             logger.exception("a step failed")
             failed = f"{type(error).__name__}: {_one_line(error)}"
         if failed:
-            self.live.renew()
+            self.live.prepare_workspace()
         now = time.perf_counter()
         self.steps_left = max(0, self.steps_left - 1)
         self._fresh = True
         if failed:
             self.playing, self.steps_left = False, 0
-            self.tell("error", f"paused at t = {self.live.state.time:.4g} s; {failed}")
+            self.notify("error", f"paused at t = {self.live.state.time:.4g} s; {failed}")
             return
         self._before = before
         self.pacing.stepped(now, now - began, self.live.setup.dt, self.speed)
 
-    def tell(self, level: str, text: str) -> None:
+    def notify(self, level: str, text: str) -> None:
         """Leave a notice for the person at the page."""
         number = self.notices[-1].number + 1 if self.notices else 1
         self.notices.append(Notice(number, level, text))
 
     @contextmanager
-    def told_of_warnings(self) -> Iterator[None]:
+    def warnings_as_notices(self) -> Iterator[None]:
         """Whatever the library warns of within becomes a notice, once."""
         log, handler = logging.getLogger("supple"), _Notices(self)
         propagated, log.propagate = log.propagate, False
@@ -168,7 +169,7 @@ class SimulationLoop:
             text = f"paused; the page cannot be updated: {_one_line(error)}"
             if self.playing or not (self.notices and self.notices[-1].text == text):
                 logger.exception("a snapshot could not be made")
-                self.tell("error", text)
+                self.notify("error", text)
             self.playing, self.steps_left = False, 0
             self._last = replace(self._last, paused=True, notices=tuple(self.notices), applied=self.applied)
             description = None
@@ -180,7 +181,7 @@ class SimulationLoop:
     def snapshot(self, now: float) -> Snapshot:
         """The present state; in slow motion, one between the last two. Its description stays on the other side."""
         live = self.live
-        state = self._shown(now)
+        state = self._displayed_state(now)
         system, setup = live.system, live.setup
         grabs = [spring.state(state.positions[_rows(live, spring.command.body)]) for spring in setup.grabs.values()]
         pusher = setup.pusher
@@ -216,8 +217,8 @@ class SimulationLoop:
             return compute()
         except Exception as error:
             logger.exception("%s could not be computed", name)
-            self.view = replace(self.view, **{name: getattr(say.SetView(), name)})
-            self.tell("error", f"{name.replace('_', ' ')} are off: {_one_line(error)}; choose them again to retry")
+            self.view = replace(self.view, **{name: getattr(commands.SetView(), name)})
+            self.notify("error", f"{name.replace('_', ' ')} are off: {_one_line(error)}; choose them again to retry")
             return None
 
     def _shortest(self) -> float:
@@ -233,7 +234,7 @@ class SimulationLoop:
     def _blends(self, now: float) -> bool:
         return self._in_slow_motion() and now - self._published >= self._shortest()
 
-    def _shown(self, now: float) -> State:
+    def _displayed_state(self, now: float) -> State:
         after, before = self.live.state, self._before
         if not self._in_slow_motion() or before is after or len(before.positions) != len(after.positions):
             return after
@@ -262,15 +263,15 @@ class _Notices(logging.Handler):
     def __init__(self, loop: SimulationLoop) -> None:
         super().__init__(logging.WARNING)
         self.loop = loop
-        self.told: set[str] = set()
+        self.received: set[str] = set()
 
     def emit(self, record: logging.LogRecord) -> None:
         text = " ".join(record.getMessage().split())[:500]
         if record.levelno >= logging.ERROR:
             logging.getLogger().handle(record)
-        elif text not in self.told and len(self.told) < 1000:
-            self.told.add(text)
-            self.loop.tell("info", text)
+        elif text not in self.received and len(self.received) < 1000:
+            self.received.add(text)
+            self.loop.notify("info", text)
 
 
 def _rows(live: LiveScene, body: str) -> slice:

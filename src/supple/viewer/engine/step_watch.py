@@ -27,9 +27,11 @@ class StepWatch:
     impatient, patience : whether a person waits for the end of the step, and the limit in this case [s].
     """
 
-    def __init__(self, longest: float, impatient: Callable[[], bool] = lambda: False, patience: float = 1.0) -> None:
-        self.longest, self.patience = longest, patience
-        self._impatient = impatient
+    def __init__(
+        self, longest: float, is_awaited: Callable[[], bool] = lambda: False, longest_awaited: float = 1.0
+    ) -> None:
+        self.longest, self.longest_awaited = longest, longest_awaited
+        self._is_awaited = is_awaited
         self._compiled = CompileClock()
 
     @contextmanager
@@ -39,7 +41,7 @@ class StepWatch:
 
         def check() -> None:
             seconds = time.monotonic() - began - (self._compiled.seconds - compiled)
-            if seconds > self.longest or (seconds > self.patience and self._impatient()):
+            if seconds > self.longest or (seconds > self.longest_awaited and self._is_awaited()):
                 raise StepTooLong(f"given up after {seconds:.1f} s")
 
         with interruptible(check):

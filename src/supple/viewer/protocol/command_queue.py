@@ -87,9 +87,9 @@ class CommandQueue:
         with self._changed:
             if not self._waiting and not self._closed:
                 self._changed.wait(timeout)
-            taken, self._waiting = self._waiting, []
+            commands, self._waiting = self._waiting, []
             self._places.clear()
-            return taken
+            return commands
 
     def holds(self, *kinds: type[Command]) -> bool:
         """Whether a command of one of those kinds waits."""

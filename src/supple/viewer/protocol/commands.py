@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from supple.errors import CommandError, SceneError
 from supple.scene.values import check_name
 from supple.viewer.protocol import limits
-from supple.viewer.protocol.displayed import shown
+from supple.viewer.protocol.displayed import displayed
 from supple.viewer.protocol.parameters import find_parameter
 
 Point = tuple[float, float, float]
@@ -77,7 +77,7 @@ class SetSolver(Command):
 
     def __post_init__(self) -> None:
         if self.kind not in ("xpbd", "implicit"):
-            raise CommandError(f"there is no solver {shown(self.kind)}; there are xpbd and implicit")
+            raise CommandError(f"there is no solver {displayed(self.kind)}; there are xpbd and implicit")
 
 
 @dataclass(frozen=True)
@@ -118,10 +118,12 @@ class SetView(Command):
 
     def __post_init__(self) -> None:
         if self.tet_values not in (None, "J", "von_mises", "energy"):
-            raise CommandError(f"there are no values {shown(self.tet_values)} of tets; there are J, von_mises, energy")
+            raise CommandError(
+                f"there are no values {displayed(self.tet_values)} of tets; there are J, von_mises, energy"
+            )
         for name in ("velocities", "contacts"):
             if not isinstance(getattr(self, name), bool):
-                raise CommandError(f"{name} is {shown(getattr(self, name))}; give true or false")
+                raise CommandError(f"{name} is {displayed(getattr(self, name))}; give true or false")
 
 
 @dataclass(frozen=True)
@@ -263,7 +265,7 @@ class AddBody(Command):
 
     def __post_init__(self) -> None:
         if self.shape not in limits.SHAPES:
-            raise CommandError(f"there is no shape {shown(self.shape)}; there are {', '.join(limits.SHAPES)}")
+            raise CommandError(f"there is no shape {displayed(self.shape)}; there are {', '.join(limits.SHAPES)}")
         _set(self, "size", _number(self.size, "size", limits.SMALLEST_LENGTH, limits.LARGEST_LENGTH))
         _set(self, "resolution", _whole(self.resolution, "resolution", limits.COARSEST, limits.FINEST))
         if self.position is not None:
@@ -325,17 +327,17 @@ def _set(command: Command, name: str, value: object) -> None:
 
 def _number(value: object, what: str, low: float, high: float) -> float:
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
-        raise CommandError(f"{what} is {shown(value)}; give a number")
+        raise CommandError(f"{what} is {displayed(value)}; give a number")
     if not low <= value <= high or not math.isfinite(value):
-        raise CommandError(f"{what} is {shown(value)}; it must be from {low:g} to {high:g}")
+        raise CommandError(f"{what} is {displayed(value)}; it must be from {low:g} to {high:g}")
     return float(value)
 
 
 def _whole(value: object, what: str, low: int, high: int) -> int:
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
-        raise CommandError(f"{what} is {shown(value)}; give a whole number")
+        raise CommandError(f"{what} is {displayed(value)}; give a whole number")
     if not low <= value <= high:
-        raise CommandError(f"{what} is {shown(value)}; it must be from {low} to {high}")
+        raise CommandError(f"{what} is {displayed(value)}; it must be from {low} to {high}")
     return int(value)
 
 
@@ -347,7 +349,7 @@ def _point(value: object, what: str) -> Point:
 
 def _items(value: object, what: str, least: int, most: int) -> list[object]:
     if not isinstance(value, (tuple, list, np.ndarray)) or (isinstance(value, np.ndarray) and value.ndim != 1):
-        raise CommandError(f"{what} is {shown(value)}; give a list")
+        raise CommandError(f"{what} is {displayed(value)}; give a list")
     if not least <= len(value) <= most:
         raise CommandError(f"{what} has {len(value)} values; give {least if least == most else f'{least} to {most}'}")
     return list(value)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 
-def shown(value: object) -> str:
+def displayed(value: object) -> str:
     """A value on one short line, whatever it is."""
     try:
         text = " ".join(repr(value).split())

@@ -48,7 +48,7 @@ UPLOAD_FORMATS = (".stl", ".obj", ".ply", ".off", ".vtp", ".vtk")
 LARGEST_UPLOAD, UPLOAD_PART = 16 * 1024 * 1024, 512 * 1024
 MOST_UPLOADED_TRIANGLES = 20_000
 LONGEST_UPLOAD, UPLOAD_MEMORY = 60.0, 3 * 2**30
-MOST_UPLOADS, UPLOAD_PATIENCE = 4, 60.0
+MOST_UPLOADS, UPLOAD_TIMEOUT = 4, 60.0
 
 # Connections of any kind, also of those that have not shown a token; and browsers with an open page.
 MOST_CONNECTIONS = 256

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from supple.errors import CommandError
-from supple.viewer.protocol.displayed import shown
+from supple.viewer.protocol.displayed import displayed
 
 Owner = Literal["solver", "scene", "body"]
 
@@ -44,15 +44,15 @@ class Parameter:
         """
         if self.kind is bool:
             if not isinstance(value, (bool, np.bool_)):
-                raise CommandError(f"{self.name} is {shown(value)}; give true or false")
+                raise CommandError(f"{self.name} is {displayed(value)}; give true or false")
             return bool(value)
         if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
-            raise CommandError(f"{self.name} is {shown(value)}; give a number")
+            raise CommandError(f"{self.name} is {displayed(value)}; give a number")
         if not self.low <= value <= self.high or not math.isfinite(value):
-            raise CommandError(f"{self.name} is {shown(value)}; it must be from {self.low:g} to {self.high:g}")
+            raise CommandError(f"{self.name} is {displayed(value)}; it must be from {self.low:g} to {self.high:g}")
         if self.kind is int:
             if value != int(value):
-                raise CommandError(f"{self.name} is {shown(value)}; give a whole number")
+                raise CommandError(f"{self.name} is {displayed(value)}; give a whole number")
             return int(value)
         return float(value)
 
@@ -84,5 +84,5 @@ def find_parameter(name: object) -> Parameter:
     CommandError : where there is none.
     """
     if not isinstance(name, str) or name not in PARAMETERS:
-        raise CommandError(f"there is no parameter {shown(name)}; there are {', '.join(PARAMETERS)}")
+        raise CommandError(f"there is no parameter {displayed(name)}; there are {', '.join(PARAMETERS)}")
     return PARAMETERS[name]

@@ -59,9 +59,9 @@ def require_free_port(host: str, port: int) -> None:
                 probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # a port that was just given up is free
             probe.bind(place)
     except (OSError, UnicodeError) as error:
-        mend = "choose another --port" if port else "choose another --host"
+        remedy = "choose another --port" if port else "choose another --host"
         raise OutputError(
-            f"cannot serve at {host}, port {port} ({getattr(error, 'strerror', None) or error}); {mend}"
+            f"cannot serve at {host}, port {port} ({getattr(error, 'strerror', None) or error}); {remedy}"
         ) from None
 
 
@@ -81,7 +81,7 @@ def first_free_port(host: str, start: int, tries: int = 20) -> int:
 
 
 @dataclass(frozen=True)
-class Doorkeeper:
+class AccessCheck:
     """Answers a request for a connection.
 
     Attributes
@@ -91,7 +91,7 @@ class Doorkeeper:
 
     token: str | None = None
 
-    def refusal(self, path: str, headers: Any) -> str | None:
+    def denial(self, path: str, headers: Any) -> str | None:
         """Why a request is turned away, or None."""
         host = headers.get("Host", "")
         if self.token is None and not is_loopback(_hostname(host)):
@@ -158,7 +158,7 @@ def gate(host: str, token: str | None = None) -> Iterator[None]:
         raise OutputError(f"a page at {host} can be reached from other machines; it needs a token")
     import websockets.asyncio.server as websockets_server
 
-    keeper, taken_over = Doorkeeper(token), False
+    access, taken_over = AccessCheck(token), False
     clients: set[Any] = set()
 
     def serve(handler: Any, *arguments: Any, process_request: Any = None, **options: Any) -> Any:
@@ -168,7 +168,7 @@ def gate(host: str, token: str | None = None) -> Iterator[None]:
         options |= {"max_size": limits.LARGEST_PICTURE, "max_queue": 16, "close_timeout": 1.0}
         options["create_connection"] = bounded_connections(limits.MOST_CONNECTIONS)
         asyncio.get_running_loop().set_exception_handler(_log_quietly)
-        answer = _guarded(process_request, keeper)
+        answer = _guarded(process_request, access)
         return original(_watched(handler, clients), *arguments, process_request=answer, **options)
 
     with _one_at_a_time:
@@ -182,17 +182,17 @@ def gate(host: str, token: str | None = None) -> Iterator[None]:
         raise OutputError("this version of viser cannot be guarded; install viser 1.1")
 
 
-def _guarded(process_request: Any, keeper: Doorkeeper) -> Callable[[Any, Any], Any]:
+def _guarded(process_request: Any, access: AccessCheck) -> Callable[[Any, Any], Any]:
     """The server's answer to HTTP requests, after the doorkeeper's."""
 
     def answer(connection: Any, request: Any) -> Any:
-        why = keeper.refusal(request.path, request.headers)
+        why = access.denial(request.path, request.headers)
         if why is not None:
             logger.info("turned away: %s", why)
             return connection.respond(http.HTTPStatus.FORBIDDEN, f"Supple: {why}\n")
         response = None if process_request is None else process_request(connection, request)
-        cookie = keeper.cookie(request.headers)
-        if response is not None and cookie is not None and keeper.holds_token(request.path):
+        cookie = access.cookie(request.headers)
+        if response is not None and cookie is not None and access.holds_token(request.path):
             response.headers["Set-Cookie"] = cookie
         if response is not None:
             response.headers["Referrer-Policy"] = "no-referrer"  # the address holds a secret

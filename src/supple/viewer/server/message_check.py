@@ -106,24 +106,24 @@ def _check_fields(kind: str, message: dict[Any, Any]) -> None:
             raise Malformed(f"{name} of {kind} is of another type")
 
 
-def _fits(value: object, wanted: Any, depth: int) -> bool:
+def _fits(value: object, kind_of_value: Any, depth: int) -> bool:
     """Whether a value is of an annotated type. JavaScript knows one kind of number: 1.0 arrives as an integer."""
     if depth > DEEPEST:
         return False
-    origin, arguments = typing.get_origin(wanted), typing.get_args(wanted)
-    if wanted in (float, int):
+    origin, arguments = typing.get_origin(kind_of_value), typing.get_args(kind_of_value)
+    if kind_of_value in (float, int):
         return _is_number(value)
-    if wanted is bool:
+    if kind_of_value is bool:
         return isinstance(value, bool)
-    if wanted is str:
+    if kind_of_value is str:
         return isinstance(value, str)
-    if wanted is bytes:
+    if kind_of_value is bytes:
         return isinstance(value, bytes)
     if origin is typing.Literal:
         return isinstance(value, str | int | None) and value in arguments
     if origin in (typing.Union, UnionType):
         return any(_fits(value, each, depth + 1) for each in arguments)
-    if wanted is type(None):
+    if kind_of_value is type(None):
         return value is None
     if origin is tuple:
         if not isinstance(value, list):

@@ -6,8 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from supple.viewer.drawing import video_capture
-
 
 class Guest:
     """A visitor who keeps the files that are sent, and whose browser shows one shade after the other."""
@@ -29,15 +27,15 @@ def guest():
     return Guest()
 
 
-def test_a_page_of_what_was_seen(live, made_up, guest, until):
+def test_a_page_of_what_was_seen(live, fake, guest, until):
     record, event = live.panel.record, SimpleNamespace(client=guest)
     record._toggle(event)
     assert record.recording
     assert record.record.label == "Stop"
     for k in range(3):
-        wanted = made_up.show(positions=made_up.snapshot.positions + 0.1, time=0.1 * (k + 1))
+        wanted = fake.show(positions=fake.snapshot.positions + 0.1, time=0.1 * (k + 1))
         until(lambda: live.stage.moment.time == wanted.time)  # noqa: B023
-    until(lambda: len(record._taken) >= 4)
+    until(lambda: len(record._moments) >= 4)
     record._toggle(event)
     assert not record.recording
     assert record.record.label == "Record"
@@ -67,7 +65,7 @@ def test_a_video_of_what_the_browser_shows(live, guest, until, tmp_path):
     assert record.recording
     until(lambda: guest.shade >= 100)
     record._toggle(event)
-    assert record._said.content == ""
+    assert record._message.content == ""
     (tmp_path / "film.mp4").write_bytes(guest.files["supple.mp4"])
     reader = ffmpeg.read_frames(str(tmp_path / "film.mp4"))
     facts = next(reader)
@@ -92,7 +90,7 @@ def test_a_picture_of_another_size_than_asked_for_is_not_taken(live, guest):
     record._take_picture(SimpleNamespace(client=guest))
     assert asked == [(2160, 2160)]
     assert guest.files == {}
-    assert "another size" in record._said.content
+    assert "another size" in record._message.content
 
 
 def test_a_browser_that_sends_no_picture_is_told(live, guest):
@@ -104,16 +102,16 @@ def test_a_browser_that_sends_no_picture_is_told(live, guest):
     guest.get_render = nothing
     record._take_picture(SimpleNamespace(client=guest))
     assert guest.files == {}
-    assert "no frame" in record._said.content
+    assert "no frame" in record._message.content
     guest.get_render = Guest.get_render.__get__(guest)
     record._take_picture(SimpleNamespace(client=guest))
     assert guest.files["supple.png"].startswith(b"\x89PNG")
 
 
 def test_what_is_not_installed_is_said(live, guest, monkeypatch):
-    monkeypatch.setattr(video_capture, "find_spec", lambda name: None)
+    monkeypatch.setattr("supple.viewer.drawing.video_capture.find_spec", lambda name: None)
     record = live.panel.record
     record.kind.value = "MP4"
     record._toggle(SimpleNamespace(client=guest))
     assert not record.recording
-    assert "pip install 'supple[video]'" in html.unescape(record._said.content)
+    assert "pip install 'supple[video]'" in html.unescape(record._message.content)

@@ -8,20 +8,20 @@ import pytest
 import supple as sp
 from supple.viewer.drawing.coloring.color_scale import BINS, Limits, bar_html, bin_of
 from supple.viewer.drawing.coloring.fields import FIELDS
-from supple.viewer.drawing.moments.from_snapshot import Translator
+from supple.viewer.drawing.moments.from_snapshot import MomentBuilder
 
 J, MISES, ENERGY = FIELDS.values()
 
 
 @pytest.fixture
-def stretched(made_up):
+def stretched(fake):
     """Body 0 stretched to twice its length in x, body 1 at rest; body 0 made of StVK, body 1 of something unknown."""
-    x = made_up.snapshot.positions.copy()
-    model = Translator().moment(made_up.snapshot).model
+    x = fake.snapshot.positions.copy()
+    model = MomentBuilder().moment(fake.snapshot).model
     first = replace(model.bodies[0], material=sp.StVenantKirchhoff(youngs=1000.0, poisson=0.0))
     model = replace(model, bodies=(first, model.bodies[1]))
     x[first.vertices] *= [2.0, 1.0, 1.0]
-    moment = Translator().moment(made_up.show(positions=x))
+    moment = MomentBuilder().moment(fake.show(positions=x))
     return replace(moment, model=model)
 
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from supple.viewer.drawing.moments.from_snapshot import Translator
+from supple.viewer.drawing.moments.from_snapshot import MomentBuilder
 from supple.viewer.drawing.picking import nearest_surface_point, point_on_camera_plane, surface_point_on_ray
 
 
 @pytest.fixture
-def moment(made_up):
-    return Translator().moment(made_up.snapshot)
+def moment(fake):
+    return MomentBuilder().moment(fake.snapshot)
 
 
 def place_of(moment, point):

@@ -46,7 +46,7 @@ class ContactView(Layer):
         self._arrows.remove()
 
 
-def said_of_contacts(moment: Moment) -> str:
+def contacts_text(moment: Moment) -> str:
     """What the panel says of them."""
     if moment.contact_points is None:
         return "Contacts: none are told by this solver."

@@ -45,7 +45,7 @@ class SkinView(Layer):
 
 
 def _points(moment: Moment, body: Any, used: Any) -> Any:
-    x = moment.shown_positions[body.vertices]
+    x = moment.finite_positions[body.vertices]
     return body.skin.positions(x) if used is None else x[used]
 
 

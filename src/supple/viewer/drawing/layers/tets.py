@@ -54,7 +54,7 @@ class TetView(Layer):
         self.update(moment)
 
     def update(self, moment: Moment) -> None:
-        x = moment.shown_positions[self._corners]
+        x = moment.finite_positions[self._corners]
         if self._explode > 0.0:
             x = x + self._offsets(moment)[self._owner][:, None]
         if self._field is None or self._limits is None:
@@ -75,7 +75,7 @@ class TetView(Layer):
     def _offsets(self, moment: Moment) -> NDArray[np.float64]:
         """(m, 3) how far each tet is moved away from its body's centre [m]."""
         model = moment.model
-        centers = moment.shown_positions[model.tets].mean(axis=1)
+        centers = moment.finite_positions[model.tets].mean(axis=1)
         offsets = np.empty_like(centers)
         for body in model.bodies:
             offsets[body.tets] = centers[body.tets] - centers[body.tets].mean(axis=0)

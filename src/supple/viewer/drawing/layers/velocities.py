@@ -29,7 +29,7 @@ class VelocityView(Layer):
     def update(self, moment: Moment) -> None:
         if moment.velocities is None:
             return
-        start = moment.shown_positions[self._rows]
+        start = moment.finite_positions[self._rows]
         way = np.nan_to_num(_SECONDS * moment.velocities[self._rows], posinf=0.0, neginf=0.0)
         length = np.linalg.norm(way, axis=1, keepdims=True)
         way *= np.minimum(1.0, self._longest / np.maximum(length, 1e-300))

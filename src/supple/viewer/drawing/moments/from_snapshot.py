@@ -18,7 +18,7 @@ from supple.viewer.drawing.moments.model import Model, ModelBody, Moment, colors
 from supple.viewer.protocol.snapshots import PUSHER, BodyDescription, ObstacleDescription, SceneDescription, Snapshot
 
 
-class Translator:
+class MomentBuilder:
     """Makes moments of snapshots. What does not change between them is made once."""
 
     def __init__(self) -> None:

@@ -159,14 +159,14 @@ class Moment:
     @cached_property
     def stitch_segments(self) -> NDArray[np.float64]:
         """(k, 2, 3) the two ends of every stitch [m]."""
-        x, recorded = self.shown_positions, self.model.recorded_stitches
+        x, recorded = self.finite_positions, self.model.recorded_stitches
         if recorded is not None:
             return np.asarray(recorded.segments(x, self.poses))
         rows = self.model.stitches
         return np.stack([x[rows[:, 0]], x[rows[:, 1:]].mean(axis=1)], axis=1)
 
     @cached_property
-    def shown_positions(self) -> NDArray[np.float64]:
+    def finite_positions(self) -> NDArray[np.float64]:
         """(n, 3) [m], with zeros in place of what is not finite: a browser is given numbers only."""
         return np.nan_to_num(self.positions, posinf=0.0, neginf=0.0)
 

@@ -22,12 +22,11 @@ from supple.state import State
 from supple.system import BodyRange, initial_state
 from supple.viewer.engine.scene.grab_spring import make_spring
 from supple.viewer.engine.scene.live_scene import LiveScene
-from supple.viewer.engine.scene.new_bodies import body_of_mesh, check_room, free_name, new_body, place_for
+from supple.viewer.engine.scene.new_bodies import body_of_mesh, check_size, new_body, place_for, unused_name
 from supple.viewer.engine.scene.obstacle_distance import moved_out
 from supple.viewer.engine.scene.pusher import Pusher
 from supple.viewer.engine.scene.solvers import SOLVERS, kind_of, with_value
-from supple.viewer.protocol import commands as say
-from supple.viewer.protocol import limits
+from supple.viewer.protocol import commands, limits
 from supple.viewer.protocol.parameters import find_parameter
 from supple.viewer.protocol.snapshots import Value
 
@@ -36,7 +35,7 @@ CLEARANCE = 1e-3
 
 
 @singledispatch
-def change(command: say.Command, live: LiveScene) -> None:
+def change(command: commands.Command, live: LiveScene) -> None:
     """Do to the scene what a command says.
 
     Raises
@@ -47,19 +46,19 @@ def change(command: say.Command, live: LiveScene) -> None:
 
 
 @change.register
-def _(command: say.Reset, live: LiveScene) -> None:
+def _(command: commands.Reset, live: LiveScene) -> None:
     live.reset()
 
 
 @change.register
-def _(command: say.SetSolver, live: LiveScene) -> None:
+def _(command: commands.SetSolver, live: LiveScene) -> None:
     if kind_of(live.setup.solver) == command.kind:
         return
     setup = replace(live.setup, solver=live.solvers.get(command.kind) or SOLVERS[command.kind]())
     if command.kind == "xpbd":
         live.adopt(setup)
     else:
-        live.adopt_tried(setup, clear_of_obstacles(live))
+        live.adopt_checked(setup, clear_of_obstacles(live))
 
 
 def clear_of_obstacles(live: LiveScene) -> State | None:
@@ -78,11 +77,11 @@ def clear_of_obstacles(live: LiveScene) -> State | None:
 
 
 @change.register
-def _(command: say.SetParameter, live: LiveScene) -> None:
+def _(command: commands.SetParameter, live: LiveScene) -> None:
     setup, scene = live.setup, live.setup.scene
     match find_parameter(command.name).owner:
         case "solver":
-            live.adopt_tried(replace(setup, solver=with_value(setup.solver, command.name, command.value)))
+            live.adopt_checked(replace(setup, solver=with_value(setup.solver, command.name, command.value)))
         case "scene" if command.name == "dt":
             live.adopt(replace(setup, dt=float(command.value)))
         case "scene":
@@ -91,7 +90,7 @@ def _(command: say.SetParameter, live: LiveScene) -> None:
             live.adopt(replace(setup, scene=_with_body_value(live, command)))
 
 
-def _with_body_value(live: LiveScene, command: say.SetParameter) -> Scene:
+def _with_body_value(live: LiveScene, command: commands.SetParameter) -> Scene:
     scene = live.setup.scene
     if command.body is not None:
         _part(live, command.body)
@@ -130,7 +129,7 @@ def _tuned_material(material: Material, name: str, value: float) -> Material | N
 
 
 @change.register
-def _(command: say.Grab, live: LiveScene) -> None:
+def _(command: commands.Grab, live: LiveScene) -> None:
     part = _part(live, command.body)
     others = {number: spring for number, spring in live.setup.grabs.items() if number != command.grab}
     if len(others) >= limits.MOST_GRABS:
@@ -140,44 +139,44 @@ def _(command: say.Grab, live: LiveScene) -> None:
 
 
 @change.register
-def _(command: say.MoveGrab, live: LiveScene) -> None:
+def _(command: commands.MoveGrab, live: LiveScene) -> None:
     spring = live.setup.grabs.get(command.grab)
     if spring is not None:  # else let go meanwhile, by a reset for instance
         spring.target[:] = command.target
 
 
 @change.register
-def _(command: say.ReleaseGrab, live: LiveScene) -> None:
+def _(command: commands.ReleaseGrab, live: LiveScene) -> None:
     grabs = dict(live.setup.grabs)
     if grabs.pop(command.grab, None) is not None:
         live.adopt(replace(live.setup, grabs=grabs))
 
 
 @change.register
-def _(command: say.Pin, live: LiveScene) -> None:
+def _(command: commands.Pin, live: LiveScene) -> None:
     part = _part(live, command.body)
     if command.vertex >= len(part.body.mesh.vertices):
         raise CommandError(f"body {part.name!r} has no vertex {command.vertex}")
     if part.vertices.start + command.vertex in live.system.pinned_vertices:
         return
-    pins = dict(live.setup.hand_pins)
+    pins = dict(live.setup.page_pins)
     if len(pins) >= limits.MOST_PINS:
         raise CommandError(f"{len(pins)} vertices are pinned by hand already; unpin some first")
     pins[command.body, command.vertex] = Pin(command.body, [command.vertex], name="by hand")
-    live.adopt(replace(live.setup, hand_pins=pins))
+    live.adopt(replace(live.setup, page_pins=pins))
 
 
 @change.register
-def _(command: say.Unpin, live: LiveScene) -> None:
+def _(command: commands.Unpin, live: LiveScene) -> None:
     setup = live.setup
     if command.body is None or command.vertex is None:
-        if setup.hand_pins:
-            live.adopt(replace(setup, hand_pins={}))
+        if setup.page_pins:
+            live.adopt(replace(setup, page_pins={}))
         return
     part = _part(live, command.body)
-    if (command.body, command.vertex) in setup.hand_pins:
-        left = {key: pin for key, pin in setup.hand_pins.items() if key != (command.body, command.vertex)}
-        live.adopt(replace(setup, hand_pins=left))
+    if (command.body, command.vertex) in setup.page_pins:
+        left = {key: pin for key, pin in setup.page_pins.items() if key != (command.body, command.vertex)}
+        live.adopt(replace(setup, page_pins=left))
         return
     _take_from_pin(live, part, command.vertex)
 
@@ -200,22 +199,22 @@ def _take_from_pin(live: LiveScene, part: BodyRange, vertex: int) -> None:
 
 
 @change.register
-def _(command: say.MovePusher, live: LiveScene) -> None:
+def _(command: commands.MovePusher, live: LiveScene) -> None:
     pusher = live.setup.pusher
     if pusher is not None and pusher.radius == command.radius:
-        pusher.wanted[:] = command.center
+        pusher.target[:] = command.center
         return
-    live.adopt_tried(replace(live.setup, pusher=Pusher(np.array(command.center), command.radius)))
+    live.adopt_checked(replace(live.setup, pusher=Pusher(np.array(command.center), command.radius)))
 
 
 @change.register
-def _(command: say.RemovePusher, live: LiveScene) -> None:
+def _(command: commands.RemovePusher, live: LiveScene) -> None:
     if live.setup.pusher is not None:
         live.adopt(replace(live.setup, pusher=None))
 
 
 @change.register
-def _(command: say.Squash, live: LiveScene) -> None:
+def _(command: commands.Squash, live: LiveScene) -> None:
     pinned = set(live.system.pinned_vertices.tolist())
     free = [
         part.vertices
@@ -228,7 +227,7 @@ def _(command: say.Squash, live: LiveScene) -> None:
     x, v = live.state.positions.copy(), live.state.velocities.copy()
     x[rows] = flattened(x[rows], live.up, command.factor)
     v[rows] = 0.0
-    live.adopt_tried(live.setup, State(live.state.time, x, v))
+    live.adopt_checked(live.setup, State(live.state.time, x, v))
 
 
 def flattened(points: NDArray[np.float64], up: NDArray[np.float64], factor: float) -> NDArray[np.float64]:
@@ -244,24 +243,24 @@ def flattened(points: NDArray[np.float64], up: NDArray[np.float64], factor: floa
 
 
 @change.register
-def _(command: say.AddBody, live: LiveScene) -> None:
+def _(command: commands.AddBody, live: LiveScene) -> None:
     _add(live, new_body(command, live.setup.scene, live.state.positions, live.up))
 
 
 @change.register
-def _(command: say.AddMesh, live: LiveScene) -> None:
+def _(command: commands.AddMesh, live: LiveScene) -> None:
     _add(live, body_of_mesh(command, live.setup.scene, live.state.positions, live.up))
 
 
 @change.register
-def _(command: say.CopyBody, live: LiveScene) -> None:
+def _(command: commands.CopyBody, live: LiveScene) -> None:
     body = _part(live, command.body).body
     place = place_for(body.mesh, command.position, live.state.positions, live.up)
     _add(
         live,
         replace(
             body,
-            name=free_name(live.setup.scene, re.sub(r" \d+$", "", body.name)),  # a copy of "ball 1" is "ball 2"
+            name=unused_name(live.setup.scene, re.sub(r" \d+$", "", body.name)),  # a copy of "ball 1" is "ball 2"
             position=place,
             rotation=np.zeros(3),
             velocity=np.zeros(3),
@@ -272,7 +271,7 @@ def _(command: say.CopyBody, live: LiveScene) -> None:
 
 def _add(live: LiveScene, body: Body) -> None:
     scene = live.setup.scene
-    check_room(scene, body.mesh)
+    check_size(scene, body.mesh)
     grown = replace(scene, bodies=(*scene.bodies, body))
     alone = initial_state(Scene([body]))
     state = State(
@@ -280,11 +279,11 @@ def _add(live: LiveScene, body: Body) -> None:
         np.concatenate([live.state.positions, alone.positions]),
         np.concatenate([live.state.velocities, alone.velocities]),
     )
-    live.adopt_tried(replace(live.setup, scene=grown, added=live.setup.added | {body.name}), state)
+    live.adopt_checked(replace(live.setup, scene=grown, added=live.setup.added | {body.name}), state)
 
 
 @change.register
-def _(command: say.RemoveBody, live: LiveScene) -> None:
+def _(command: commands.RemoveBody, live: LiveScene) -> None:
     part, setup = _part(live, command.body), live.setup
     if len(setup.scene.bodies) == 1:
         raise CommandError(f"body {part.name!r} is the only one; a scene needs one")
@@ -294,7 +293,7 @@ def _(command: say.RemoveBody, live: LiveScene) -> None:
     smaller = replace(
         setup,
         scene=without_body(setup.scene, part.name),
-        hand_pins={key: pin for key, pin in setup.hand_pins.items() if key[0] != part.name},
+        page_pins={key: pin for key, pin in setup.page_pins.items() if key[0] != part.name},
         grabs={number: spring for number, spring in setup.grabs.items() if spring.command.body != part.name},
         added=setup.added - {part.name},
     )

@@ -19,7 +19,7 @@ from supple.solver import Solver
 from supple.state import State, Status, StepReport
 from supple.system import System, initial_state
 from supple.viewer.engine.scene.grab_spring import GrabSpring
-from supple.viewer.engine.scene.new_bodies import with_room
+from supple.viewer.engine.scene.new_bodies import moved_apart
 from supple.viewer.engine.scene.pusher import Pusher
 from supple.viewer.engine.scene.solvers import kind_of
 from supple.viewer.protocol.live_source import LiveSource
@@ -41,18 +41,18 @@ class Setup:
     scene: Scene
     solver: Solver
     dt: float
-    hand_pins: Mapping[tuple[str, int], Pin] = field(default_factory=lambda: MappingProxyType({}))
+    page_pins: Mapping[tuple[str, int], Pin] = field(default_factory=lambda: MappingProxyType({}))
     grabs: Mapping[int, GrabSpring] = field(default_factory=lambda: MappingProxyType({}))
     pusher: Pusher | None = None
     added: frozenset[str] = frozenset()
 
     def whole_scene(self) -> Scene:
         """The scene with everything that the page has put into it."""
-        if not self.hand_pins and not self.grabs and self.pusher is None:
+        if not self.page_pins and not self.grabs and self.pusher is None:
             return self.scene
         return replace(
             self.scene,
-            pins=(*self.scene.pins, *self.hand_pins.values()),
+            pins=(*self.scene.pins, *self.page_pins.values()),
             soft_targets=(*self.scene.soft_targets, *(spring.soft_target for spring in self.grabs.values())),
             obstacles=(*self.scene.obstacles, *([self.pusher.obstacle] if self.pusher else [])),
         )
@@ -114,7 +114,7 @@ class LiveScene:
         }
         self.solvers[kind_of(setup.solver)] = setup.solver
 
-    def adopt_tried(self, setup: Setup, state: State | None = None, anchors: Anchors | None = None) -> None:
+    def adopt_checked(self, setup: Setup, state: State | None = None, anchors: Anchors | None = None) -> None:
         """The same, for changes after which a solver that never lets surfaces meet might not be able to take a step.
 
         Raises
@@ -134,9 +134,9 @@ class LiveScene:
         except BaseException:
             vars(self).update(before)
             raise
-        self.renew()  # the step that was tried has left its traces
+        self.prepare_workspace()  # the step that was tried has left its traces
 
-    def renew(self) -> None:
+    def prepare_workspace(self) -> None:
         """Prepare the workspace anew, after a step that was tried, or given up."""
         self.workspace = self.setup.solver.prepare(self.system)
 
@@ -173,8 +173,8 @@ class LiveScene:
         names = {body.name for body in self.setup.scene.bodies}
         scene = replace(self.setup.scene, pins=tuple(pin for pin in self.pins if pin.body in names))
         starts = {name: start for name, start in self.starts.items() if name in names}
-        scene = with_room(scene, self.setup.added, starts, self.up)
-        self.adopt_tried(
+        scene = moved_apart(scene, self.setup.added, starts, self.up)
+        self.adopt_checked(
             Setup(scene, self.setup.solver, self.setup.dt, added=self.setup.added),
             initial_state(scene, starts),
             anchors={},

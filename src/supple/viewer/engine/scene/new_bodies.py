@@ -47,7 +47,7 @@ def new_body(command: AddBody, scene: Scene, positions: NDArray[np.float64], up:
     material = StableNeoHookean(
         youngs=command.youngs, poisson=command.poisson, density=command.density, damping=_DAMPING
     )
-    name = command.name if command.name is not None else free_name(scene, command.shape.replace("_", " "))
+    name = command.name if command.name is not None else unused_name(scene, command.shape.replace("_", " "))
     return Body(name, mesh, material, position=place_for(mesh, command.position, positions, up), friction=_FRICTION)
 
 
@@ -61,17 +61,17 @@ def body_of_mesh(command: AddMesh, scene: Scene, positions: NDArray[np.float64],
     mesh = TetMesh(command.vertices, command.tets)
     material = StableNeoHookean(youngs=command.youngs, poisson=0.45, density=1000.0, damping=_DAMPING)
     place = place_for(mesh, None, positions, up)
-    return Body(free_name(scene, command.name), mesh, material, position=place, friction=_FRICTION)
+    return Body(unused_name(scene, command.name), mesh, material, position=place, friction=_FRICTION)
 
 
 def place_for(
-    mesh: TetMesh, wanted: Point | None, positions: NDArray[np.float64], up: NDArray[np.float64]
+    mesh: TetMesh, position: Point | None, positions: NDArray[np.float64], up: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Where to place a mesh's origin: its box's center at `wanted`, or the whole of it above all `positions` (n, 3)."""
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     center = 0.5 * (low + high)
-    if wanted is not None:
-        return np.asarray(wanted) - center
+    if position is not None:
+        return np.asarray(position) - center
     middle = 0.5 * (positions.min(axis=0) + positions.max(axis=0))
     heights = mesh.vertices @ up
     reach = float(heights.max() - heights.min())
@@ -79,13 +79,13 @@ def place_for(
     return middle - center + (top - heights.min() - (middle - center) @ up) * up
 
 
-def free_name(scene: Scene, stem: str) -> str:
+def unused_name(scene: Scene, stem: str) -> str:
     """`stem` with the first number that no body's name has."""
-    taken = {body.name for body in scene.bodies}
-    return next(f"{stem} {k}" for k in itertools.count(1) if f"{stem} {k}" not in taken)
+    used = {body.name for body in scene.bodies}
+    return next(f"{stem} {k}" for k in itertools.count(1) if f"{stem} {k}" not in used)
 
 
-def check_room(scene: Scene, mesh: TetMesh) -> None:
+def check_size(scene: Scene, mesh: TetMesh) -> None:
     """Raise `CommandError` where another body with that mesh would be too much for a live page."""
     if len(scene.bodies) >= limits.MOST_BODIES:
         raise CommandError(f"there are {len(scene.bodies)} bodies already; remove one first")
@@ -96,7 +96,7 @@ def check_room(scene: Scene, mesh: TetMesh) -> None:
         )
 
 
-def with_room(
+def moved_apart(
     scene: Scene, added: frozenset[str], starts: Mapping[str, NDArray[np.float64]], up: NDArray[np.float64]
 ) -> Scene:
     """The scene with those of its `added` bodies that would start inside another one's box placed above everything.

@@ -22,7 +22,7 @@ class Pusher:
 
     def __init__(self, center: NDArray[np.float64], radius: float, friction: float = 0.5) -> None:
         self.center = np.array(center, dtype=np.float64)
-        self.wanted = self.center.copy()
+        self.target = self.center.copy()
         self.radius = radius
         self._times = (0.0, 0.0)
         self._ends = (self.center, self.center)
@@ -40,7 +40,7 @@ class Pusher:
 
     def begin_step(self, time: float, dt: float) -> None:
         """Plan the way from `time` to `time + dt` [s]: straight, and at most a stride."""
-        way = self.wanted - self.center
+        way = self.target - self.center
         length, longest = float(np.linalg.norm(way)), STRIDE * self.radius
         if length > longest:
             way *= longest / length

@@ -23,7 +23,7 @@ from supple.viewer.protocol import limits
 from supple.viewer.server.uploads.worker import ANSWER, JOB, MESH
 
 # How often the child is looked at [s].
-_LOOK = 0.1
+_POLL = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class TetArrays:
 
 
 def mesh_of_upload(
-    upload: Upload, tell: Callable[[float], None] = lambda seconds: None, stop: threading.Event | None = None
+    upload: Upload, progress: Callable[[float], None] = lambda seconds: None, stop: threading.Event | None = None
 ) -> TetArrays:
     """Read a surface and fill it with tets.
 
@@ -77,18 +77,18 @@ def mesh_of_upload(
             "memory": limits.UPLOAD_MEMORY,
         }
         (folder / JOB).write_text(json.dumps(job), "utf-8")
-        code = _run(folder, tell, stop or threading.Event())
+        code = _run(folder, progress, stop or threading.Event())
         answer = folder / ANSWER
         if answer.exists():
-            said = str(json.loads(answer.read_text("utf-8"))["error"])
-            raise MeshError(said.replace(stored, upload.name))
+            message = str(json.loads(answer.read_text("utf-8"))["error"])
+            raise MeshError(message.replace(stored, upload.name))
         if code != 0 or not (folder / MESH).exists():
             raise MeshingError(f"{upload.name}: reading it failed (exit code {code}); make it smaller or save it anew")
         with np.load(folder / MESH, allow_pickle=False) as mesh:
             return TetArrays(mesh["vertices"], mesh["tets"])
 
 
-def _run(folder: Path, tell: Callable[[float], None], stop: threading.Event) -> int:
+def _run(folder: Path, progress: Callable[[float], None], stop: threading.Event) -> int:
     """Exit code of the child."""
     environment = os.environ | {
         # The child finds the same packages as this process, however this one found them.
@@ -113,12 +113,12 @@ def _run(folder: Path, tell: Callable[[float], None], stop: threading.Event) -> 
     try:
         while True:
             with contextlib.suppress(subprocess.TimeoutExpired):
-                return child.wait(timeout=_LOOK)
-            taken = time.monotonic() - began
-            tell(taken)
+                return child.wait(timeout=_POLL)
+            seconds = time.monotonic() - began
+            progress(seconds)
             if stop.is_set():
                 raise MeshingError("the page was closed")
-            if taken > limits.LONGEST_UPLOAD:
+            if seconds > limits.LONGEST_UPLOAD:
                 raise MeshingError(f"it takes longer than {limits.LONGEST_UPLOAD:g} s; make the surface coarser")
     finally:
         if child.poll() is None:

@@ -79,10 +79,10 @@ class Transfers:
         """
         now = time.monotonic()
         for other, transfer in list(self._running.items()):
-            if other == visitor or now - transfer.last > limits.UPLOAD_PATIENCE:
+            if other == visitor or now - transfer.last > limits.UPLOAD_TIMEOUT:
                 del self._running[other]
         # A browser gives the name alone; whoever gives a path means its last part.
-        name = shown_name(message.filename)
+        name = printable_name(message.filename)
         suffix = "." + name.rpartition(".")[2].lower()
         if suffix not in limits.UPLOAD_FORMATS:
             raise CommandError(f"{name}: give a surface as {', '.join(limits.UPLOAD_FORMATS)}")
@@ -123,7 +123,7 @@ class Transfers:
         client._websock_connection.queue_message(answer)
 
 
-def shown_name(name: str) -> str:
+def printable_name(name: str) -> str:
     """The last part of a path, in characters that any place can show."""
     last = name.replace("\\", "/").rpartition("/")[2]
     return "".join(c if c.isprintable() else "?" for c in last)[-60:] or "file"

@@ -28,12 +28,12 @@ def main() -> int:
     try:
         _mesh(job)
     except SuppleError as error:
-        said = str(error)
+        message = str(error)
     except MemoryError:
-        said = f"{job['file']}: it needs more memory than an upload may have"
+        message = f"{job['file']}: it needs more memory than an upload may have"
     else:
         return 0
-    Path(ANSWER).write_text(json.dumps({"error": " ".join(said.split())}), "utf-8")
+    Path(ANSWER).write_text(json.dumps({"error": " ".join(message.split())}), "utf-8")
     return 1
 
 
