@@ -119,7 +119,7 @@ def test_what_cannot_be_shown_or_served_is_one_line(tmp_path, scene, served, cap
     outside.write_text(SCENE.replace("shape: {kind: box, divisions: [1, 1, 1]}", "mesh: {file: ../mesh.stl}"))
     with socket.socket() as other:
         other.bind(("127.0.0.1", 0))
-        other.add_handlers()
+        other.listen()
         taken = str(other.getsockname()[1])
         for arguments in (
             ["view", str(tmp_path / "missing.yaml")],

@@ -167,7 +167,7 @@ def test_ten_thousand_moves_at_once_are_one_move(fresh):
 
 
 def test_only_commands_can_be_sent(fresh):
-    with pytest.raises(CommandError, match="str is no command"):
+    with pytest.raises(CommandError, match="str is not a command"):
         fresh.send("__import__('os').system('true')")
 
 

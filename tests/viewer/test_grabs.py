@@ -91,7 +91,7 @@ class TestGrabs:
             change(Grab(1, "ghost", (0,), (1.0,), (0, 0, 0)), live)
         for number in range(limits.MOST_GRABS):
             change(Grab(number, "cube", (number,), (1.0,), (0, 1, 0)), live)
-        with pytest.raises(CommandError, match="let one go"):
+        with pytest.raises(CommandError, match="release one"):
             change(Grab(99, "cube", (0,), (1.0,), (0, 1, 0)), live)
         change(Grab(3, "cube", (0,), (1.0,), (0, 1, 0)), live)
         assert len(live.setup.grabs) == limits.MOST_GRABS

@@ -1,4 +1,4 @@
-"""A running simulation on a page of viser's."""
+"""The page of a live simulation."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from supple.viewer.protocol.snapshots import Snapshot
 
 logger = logging.getLogger(__name__)
 
-# The simulation says something every half a second, unless it is amid something long. Then the page says so [s].
+# A snapshot arrives every half a second, except during a long step. After this time the page displays "Busy" [s].
 _SILENT_AFTER = 2.0
 
 
 class LivePage:
-    """Shows the newest snapshot, as often as browsers can take it, and passes commands on.
+    """Draws the newest snapshot, at a rate that the browsers can follow, and sends commands to the simulation.
 
-    The simulation is never waited for, and never waits for the page.
+    Page and simulation never wait for each other.
 
     Parameters
     ----------
@@ -58,14 +58,14 @@ class LivePage:
             if not self._frame_rate.may_send():
                 continue
             try:
-                self._look()
+                self._draw_newest()
                 self.panel.refresh()
             except Exception:
-                # Whatever one snapshot does to the page, the next one is drawn.
+                # An error in one snapshot must not stop the page.
                 logger.exception("page: a snapshot could not be drawn")
 
-    def _look(self) -> None:
-        """Draw the newest snapshot, if it is not on show yet."""
+    def _draw_newest(self) -> None:
+        """Draw the newest snapshot, if it has not been drawn yet."""
         error = self._simulation.error
         if error is not None:
             self.panel.time.show_error(error)

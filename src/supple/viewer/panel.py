@@ -1,4 +1,4 @@
-"""The panel beside a running simulation: everything a visitor can see in numbers, and change."""
+"""The panel of a live simulation: its measures, and all that a visitor can change."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from supple.viewer.drawing.stage import Stage
 from supple.viewer.protocol.messages import SetView
 from supple.viewer.protocol.snapshots import Snapshot
 
-_NUMBERS_EVERY = 0.15  # [s]: numbers that change faster cannot be read
+_NUMBERS_EVERY = 0.15  # [s]; numbers that change faster cannot be read
 _PLOTS_EVERY = 0.5  # [s]
 TABS = ("Bodies", "View", "Solver")
 
 
 class Panel:
-    """All folders: time at the top, the others in tabs below.
+    """All folders: time at the top, the others in tabs below it.
 
     Parameters
     ----------
-    server : viser's; desk : where commands go
+    server : of viser; controller : sends the commands
     """
 
     def __init__(self, server: Any, controller: Controller) -> None:
@@ -50,7 +50,7 @@ class Panel:
         self._last_notice = max((notice.number for notice in snapshot.notices), default=0)
 
     def attach(self, stage: Stage) -> None:
-        """Add the folders that need something to be on show."""
+        """Add the folders that need a stage."""
         self.stage = stage
         gui = self._server.gui
         with self._bodies_tab:
@@ -68,17 +68,17 @@ class Panel:
         self.refresh()
 
     def stop(self) -> None:
-        """End what it does by itself."""
+        """End its threads."""
         self.upload.stop()
 
     def show(self, snapshot: Snapshot) -> None:
-        """Take notice of a snapshot; `refresh` shows it."""
+        """Store a snapshot; `refresh` displays it."""
         self._controller.snapshot = snapshot
         self.measures.note(snapshot)
         self._notify(snapshot)
 
     def refresh(self) -> None:
-        """Bring everything up to date that is not: numbers and plots less often than the picture."""
+        """Update what has changed; numbers and plots less often than the picture."""
         snapshot, now = self._controller.snapshot, time.monotonic()
         if snapshot is not self._numbers_of and now - self._numbers_at >= _NUMBERS_EVERY:
             self._numbers_at, self._numbers_of = now, snapshot
@@ -91,7 +91,7 @@ class Panel:
             self.measures.show(snapshot)
 
     def _notify(self, snapshot: Snapshot) -> None:
-        """Show the notices that were not shown yet."""
+        """Display new notices."""
         for notice in snapshot.notices:
             if notice.number > self._last_notice:
                 self._last_notice = notice.number
@@ -103,7 +103,7 @@ class Panel:
         self.mouse.switch()
 
     def _view_changed(self, options: ViewOptions) -> None:
-        """Ask the simulation for what is to be drawn: it measures nothing that nobody looks at."""
+        """Request the values to draw from the simulation, which computes no others."""
         field = FIELDS.get(options.color_by)
         key = field.key if field is not None and options.surface != "wireframe" else None
         self._controller.send(None, lambda: SetView(key, options.velocities, options.contacts))

@@ -72,7 +72,7 @@ def test_the_page_asks_less_of_a_server_that_lags(server, until, monkeypatch):
     monkeypatch.setattr(frame_rate_module.time, "monotonic", lambda: clock)
     intervals = []
     for _ in range(20):
-        frame_rate._came_around(clock, 0.0)
+        frame_rate._processed(clock, 0.0)
         intervals.append(frame_rate.interval)
     assert intervals[0] >= 0.7 * 0.2
     assert intervals[-1] == FASTEST

@@ -347,7 +347,7 @@ class TestPort:
 
 
 def test_a_server_that_was_not_started_through_the_gate_is_refused():
-    with pytest.raises(OutputError, match="cannot be guarded"), gate("127.0.0.1"):
+    with pytest.raises(OutputError, match="cannot be protected"), gate("127.0.0.1"):
         pass
 
 

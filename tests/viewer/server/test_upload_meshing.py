@@ -106,7 +106,7 @@ def test_what_is_no_closed_surface_is_refused_in_a_line(read, name):
 
 
 def test_too_many_triangles_are_refused(read, ball):
-    with pytest.raises(MeshError, match="an upload may have 10: make it coarser"):
+    with pytest.raises(MeshError, match="an upload may have 10; make it coarser"):
         read(".off", ball[".off"], triangles=10)
 
 

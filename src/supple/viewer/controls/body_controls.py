@@ -1,4 +1,4 @@
-"""Bodies: what they are made of, squashing and stretching them, and adding and removing them."""
+"""The folders for bodies: parameters, squash and stretch, copy, remove and add."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class BodyControls:
     def __init__(self, gui: Any, controller: Controller) -> None:
         self._gui, self._controller = gui, controller
         self.inputs: dict[str, ParameterInput] = {}
-        self._made_for: tuple[Any, ...] = ()
+        self._inputs_for: tuple[Any, ...] = ()
         scene = controller.snapshot.description
         size = float(max(scene.high - scene.low))
         with gui.add_folder("Bodies") as self._folder:
@@ -44,7 +44,7 @@ class BodyControls:
         self.show(controller.snapshot)
 
     def show(self, snapshot: Snapshot) -> None:
-        """Bring the inputs to the simulation's values."""
+        """Set the inputs to the values of the simulation."""
         with self._controller.lock:
             self._show(snapshot)
 
@@ -52,12 +52,12 @@ class BodyControls:
         scene = snapshot.description
         names = (ALL, *(body.name for body in scene.bodies))
         if self.which.options != names:
-            if self.which.value not in names:  # first: else a body that is gone would be chosen for a moment
+            if self.which.value not in names:  # first: otherwise a removed body would be selected for a moment
                 self.which.value = ALL
             self.which.options = names
         values = self._values(scene)
-        made_for = (self.which.value, *values)
-        if made_for != self._made_for:
+        inputs_for = (self.which.value, *values)
+        if inputs_for != self._inputs_for:
             for made in self.inputs.values():
                 made.remove()
             with self._folder:
@@ -65,7 +65,7 @@ class BodyControls:
                     name: ParameterInput(self._gui, self._controller, name, value, self._whose)
                     for name, value in values.items()
                 }
-            self._made_for = made_for
+            self._inputs_for = inputs_for
             self.change.visible = self.which.value != ALL
         for name, made in self.inputs.items():
             made.show(values[name], snapshot.applied)
@@ -74,7 +74,7 @@ class BodyControls:
         return None if self.which.value == ALL else str(self.which.value)
 
     def _values(self, scene: SceneDescription) -> dict[str, Value]:
-        """Of the chosen body; or of the first that has it, where all are chosen."""
+        """Values of the selected body; for "all bodies", of the first body that has the parameter."""
         whose = self._whose()
         found: dict[str, Value] = {}
         for body in scene.bodies:
@@ -104,9 +104,9 @@ class BodyControls:
         )
 
     def new_size(self) -> float:
-        """Of a body that is added [m]."""
+        """Size of a new body [m]."""
         return number(self.size.value, 1e-3, 100.0)
 
     def new_youngs(self) -> float:
-        """Young's modulus of a body that is added [Pa]."""
+        """Young's modulus of a new body [Pa]."""
         return 10.0 ** number(self.youngs.value, 3.0, 8.0)

@@ -1,4 +1,4 @@
-"""Numbers of the running simulation, and two small plots over the last seconds."""
+"""The folder "Measures" of the panel: numbers of the simulation, and two plots over the last seconds."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Measures:
         self.note(snapshot)
 
     def note(self, snapshot: Snapshot) -> None:
-        """Remember what the plots show."""
+        """Store the values for the plots."""
         measures = snapshot.measures
         fastest = float(np.linalg.norm(measures.spin, axis=1).max()) if len(measures.spin) else 0.0
         row = (snapshot.time, measures.kinetic_energy, measures.elastic_energy, fastest)
@@ -41,7 +41,7 @@ class Measures:
                 self._rows.append(row)
 
     def show(self, snapshot: Snapshot) -> None:
-        """Bring numbers and plots up to date."""
+        """Update numbers and plots."""
         text = measures_text(snapshot)
         if text != self._text:
             self._message.content = self._text = text
@@ -73,7 +73,7 @@ class Measures:
 
 
 def measures_text(snapshot: Snapshot) -> str:
-    """Counts, energies, the worst tet, and how the last step ended."""
+    """Counts, energies, the smallest J, and the status of the last step."""
     scene, measures = snapshot.description, snapshot.measures
     spin = float(np.linalg.norm(measures.spin, axis=1).max()) if len(measures.spin) else 0.0
     total = measures.kinetic_energy + measures.elastic_energy + measures.potential_energy

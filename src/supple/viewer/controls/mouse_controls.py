@@ -1,4 +1,4 @@
-"""What the mouse does."""
+"""The folder "Mouse" of the panel: mode, stiffness and radius."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class MouseControls:
 
     Parameters
     ----------
-    changed : called when another mode is chosen
+    changed : called when another mode is selected
     """
 
     def __init__(self, gui: Any, controller: Controller, changed: Callable[[], None]) -> None:
@@ -36,7 +36,7 @@ class MouseControls:
                 "Ball [m]", *self._radii, 0.01 * size, initial_value=0.15 * size, visible=False
             )
             self.unpin = gui.add_button("Unpin all")
-        # One after the other, so that the backdrop is there just when the ball can be moved.
+        # In order, so that the backdrop exists exactly in the mode "push".
         self.mode.on_update(sequential(self._switch))
         self.unpin.on_click(sequential(lambda e: controller.send(e.client, Unpin)))
 
@@ -47,12 +47,12 @@ class MouseControls:
 
     @property
     def stiffness(self) -> float:
-        """Of springs, as a factor."""
+        """Stiffness factor of grabs."""
         return 10.0 ** number(self.strength.value, -1.5, 1.5)
 
     @property
     def radius(self) -> float:
-        """Of the ball [m]."""
+        """Radius of the ball [m]."""
         return number(self.radius_input.value, *self._radii)
 
     def _switch(self, event: Any) -> None:
@@ -65,6 +65,6 @@ class MouseControls:
 
 
 _HINTS = {
-    DRAG: "Drag a body to pull it, let go to throw it; click to pin or unpin. Drag beside it to look around.",
-    PUSH: "Hold the button anywhere: a ball follows the pointer. Right button and wheel move the camera.",
+    DRAG: "Drag a body to pull it; release it to throw it. Click to pin or unpin. Drag beside it to turn the camera.",
+    PUSH: "Hold the button anywhere: a ball follows the pointer. The right button and the wheel move the camera.",
 }

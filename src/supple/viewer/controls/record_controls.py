@@ -1,4 +1,4 @@
-"""The part of the panel that keeps what is seen: pictures, films, and pages that play."""
+"""The folder "Record" of the panel: screenshots, videos, and HTML pages that play."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from supple.viewer.server.plain_markdown import plain
 
 _PAGE = "page (HTML)"
 _MOST_SECONDS = 120.0  # of a page
-_MOST_BYTES = 300_000_000  # of moments that are kept
+_MOST_BYTES = 300_000_000  # of recorded moments
 
 
 class RecordControls:
-    """Buttons for a screenshot and for recording; who presses them is sent the file."""
+    """Buttons for a screenshot and for recording; the visitor who presses one receives the file."""
 
     def __init__(self, server: Any, stage: Stage) -> None:
         self._stage = stage
         self._lock = threading.Lock()
-        # Pictures and files are made one at a time: they take long, and the threads that serve visitors are few.
+        # Only one picture or file at a time: each takes long, and few threads serve the visitors.
         self._busy = threading.Lock()
         self._moments: list[tuple[float, Moment]] | None = None
         self._capture: VideoCapture | None = None
@@ -35,13 +35,13 @@ class RecordControls:
             self.screenshot = gui.add_button("Screenshot")
             self.kind = gui.add_dropdown("Record as", (_PAGE, *(kind.upper() for kind in kinds)), initial_value=_PAGE)
             self.record = gui.add_button("Record")
-            lacking = [f"{kind.upper()} {missing}" for kind, missing in kinds.items() if missing]
-            self._message = gui.add_markdown("; ".join(lacking), visible=bool(lacking))
-        self.screenshot.on_click(self._take_picture)
+            missing_formats = [f"{kind.upper()} {missing}" for kind, missing in kinds.items() if missing]
+            self._message = gui.add_markdown("; ".join(missing_formats), visible=bool(missing_formats))
+        self.screenshot.on_click(self._send_screenshot)
         self.record.on_click(self._toggle)
 
     def note(self, moment: Moment) -> None:
-        """Called with every moment that is shown."""
+        """Called with every drawn moment."""
         with self._lock:
             if self._moments is None:
                 return
@@ -53,14 +53,14 @@ class RecordControls:
 
     @property
     def recording(self) -> bool:
-        """Whether something is being recorded."""
+        """Whether a recording is active."""
         return self._moments is not None or self._capture is not None
 
     def show_message(self, text: str) -> None:
-        """Show a line below the buttons."""
+        """Display a line below the buttons."""
         self._message.content, self._message.visible = plain(text), bool(text)
 
-    def _take_picture(self, event: Any) -> None:
+    def _send_screenshot(self, event: Any) -> None:
         if event.client is None or not self._busy.acquire(blocking=False):
             return
         try:

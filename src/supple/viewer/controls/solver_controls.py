@@ -1,4 +1,4 @@
-"""Which solver, and its numbers."""
+"""The folder "Solver" of the panel: the solver and its parameters."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _KINDS = ("xpbd", "implicit")
 
 
 class SolverControls:
-    """The folder "Solver". Its inputs are those that the solver has; another solver may have others."""
+    """The folder "Solver". Its inputs are the parameters of the present solver."""
 
     def __init__(self, gui: Any, controller: Controller) -> None:
         self._gui, self._controller = gui, controller
@@ -31,7 +31,7 @@ class SolverControls:
         self.show(controller.snapshot)
 
     def show(self, snapshot: Snapshot) -> None:
-        """Bring the inputs to the simulation's values."""
+        """Set the inputs to the values of the simulation."""
         with self._controller.lock:
             self._show(snapshot)
 
@@ -46,12 +46,12 @@ class SolverControls:
             self._input_names = names
         for name, made in self.inputs.items():
             made.show(scene.values[name], snapshot.applied)
-        # What was shown last, not what the input says by now: a choice that has just come in is not to be lost.
-        if self._kind != scene.solver and not self._pending.stands(snapshot.applied):
+        # Compared with the last displayed kind, not with the input: a new choice of a visitor must not be lost.
+        if self._kind != scene.solver and not self._pending.is_pending(snapshot.applied):
             self.kind.value = self._kind = scene.solver
 
     def _switch(self, event: Any) -> None:
         if event.client is not None:
             with self._controller.lock:
                 self._kind = one_of(self.kind.value, _KINDS)
-                self._pending.made(self._controller.send(event.client, lambda: SetSolver(self._kind)))
+                self._pending.requested(self._controller.send(event.client, lambda: SetSolver(self._kind)))

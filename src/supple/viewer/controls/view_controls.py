@@ -1,4 +1,4 @@
-"""The part of the panel that chooses how things are drawn; the same for simulations and recordings."""
+"""The folder "View" of the panel: view options, for simulations and recordings."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ _AXES = ("x", "y", "z")
 
 
 class ViewControls:
-    """Dropdowns, sliders and check boxes for a stage, and the color bar.
+    """Inputs for the view options of a stage, and the color bar.
 
     Parameters
     ----------
-    server : viser's; stage : what they choose for; changed : is told of every choice, before it is drawn
+    server : of viser; stage : draws with the options; changed : called with every change, before it is drawn
     """
 
     def __init__(
@@ -61,8 +61,8 @@ class ViewControls:
         self.camera.on_click(self._look)
 
     def apply(self) -> None:
-        """Draw as the panel says."""
-        # Inputs that change together are dealt with in any order; the last one must see what all of them say.
+        """Draw with the options of the panel."""
+        # Inputs that change together arrive in any order; the last one must see the values of all.
         with self._lock:
             self._apply()
 
@@ -85,7 +85,7 @@ class ViewControls:
         self.refresh()
 
     def refresh(self) -> None:
-        """Bring the color bar, and what is said of contacts and stitches, up to date."""
+        """Update the color bar and the text about contacts."""
         stage = self._stage
         field, limits = stage.field, stage.color_range
         bar = "" if field is None or limits is None else bar_html(field, *limits)

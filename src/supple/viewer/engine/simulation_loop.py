@@ -1,4 +1,4 @@
-"""The simulation's own process: steps in real time, does what commands say, and waits for nobody."""
+"""The loop of the simulation process: takes steps in real time, executes commands, sends snapshots."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ from supple.viewer.protocol.snapshots import Notice, Snapshot
 
 logger = logging.getLogger(__name__)
 
-HEARTBEAT = 0.5  # without anything new, a snapshot after this time all the same [s]
+HEARTBEAT = 0.5  # longest time between two snapshots [s]
 NOTICES_KEPT = 8
 
 
 class SimulationLoop:
-    """Runs a live scene until its queue of commands is closed.
+    """Runs a live scene until its command queue is closed.
 
     Attributes
     ----------
-    playing : whether time runs; steps_left : how many frames to simulate although it does not
+    playing : whether the time runs; steps_left : number of frames to simulate while it does not
     """
 
     def __init__(self, live: LiveScene, inbox: CommandQueue, outbox: Outbox) -> None:
@@ -59,13 +59,13 @@ class SimulationLoop:
         self._fresh = True
 
     def run(self) -> None:
-        """Until the page's process is gone."""
+        """Run until the process of the page ends."""
         with self.warnings_as_notices():
             while not self.inbox.closed:
                 self.run_once(self._time_to_wait())
 
     def run_once(self, wait: float) -> None:
-        """One round: commands, a step if one is due, a snapshot if there is something to show."""
+        """Execute commands, take a step if one is due, send a snapshot if there is something new."""
         for number, command in self.inbox.take(wait):
             self.execute(command)
             self.applied = max(self.applied, number)
@@ -75,11 +75,11 @@ class SimulationLoop:
             self.step()
         now = time.perf_counter()
         since = now - self._published
-        if (self._fresh and since >= self._shortest()) or self._blends(now) or since >= HEARTBEAT:
+        if (self._fresh and since >= self._shortest()) or self._interpolates(now) or since >= HEARTBEAT:
             self.publish(now)
 
     def execute(self, command: commands.Command) -> None:
-        """Do what a command says; what cannot be done becomes a notice."""
+        """Execute a command; where it fails, send a notice."""
         try:
             match command:
                 case commands.Play():
@@ -90,7 +90,7 @@ class SimulationLoop:
                     self.playing, self.steps_left = False, 0
                 case commands.Step():
                     self.playing = False
-                    # Each counts, also where the one before has not been simulated yet.
+                    # Each Step counts, also where the previous one has not been simulated yet.
                     self.steps_left = min(self.steps_left + command.count, limits.MOST_STEPS)
                 case commands.SetSpeed():
                     self.speed = command.factor
@@ -100,9 +100,7 @@ class SimulationLoop:
                 case _:
                     with self.watch.limited():
                         change(command, self.live)
-                    if isinstance(
-                        command, commands.Reset
-                    ):  # frames that were asked for before are not of the new start
+                    if isinstance(command, commands.Reset):  # frames that were requested before belong to the old start
                         self.steps_left = 0
                     self._before = self.live.state
         except (SuppleError, MemoryError) as error:
@@ -112,7 +110,7 @@ class SimulationLoop:
             self.notify("error", f"{type(command).__name__} failed: {_one_line(error)}")
 
     def step(self) -> None:
-        """Simulate one frame; where that fails, time stops at the last good state, and a notice says why."""
+        """Simulate one frame; where this fails, pause at the last good state, and send a notice with the reason."""
         began = time.perf_counter()
         before = self.live.state
         try:
@@ -137,13 +135,13 @@ class SimulationLoop:
         self.pacing.stepped(now, now - began, self.live.setup.dt, self.speed)
 
     def notify(self, level: str, text: str) -> None:
-        """Leave a notice for the person at the page."""
+        """Send a notice to the page."""
         number = self.notices[-1].number + 1 if self.notices else 1
         self.notices.append(Notice(number, level, text))
 
     @contextmanager
     def warnings_as_notices(self) -> Iterator[None]:
-        """Whatever the library warns of within becomes a notice, once."""
+        """A block in which each warning of the library becomes a notice, once."""
         log, handler = logging.getLogger("supple"), _Notices(self)
         propagated, log.propagate = log.propagate, False
         log.addHandler(handler)
@@ -179,7 +177,7 @@ class SimulationLoop:
         self.outbox.put_snapshot(self._last)
 
     def snapshot(self, now: float) -> Snapshot:
-        """The present state; in slow motion, one between the last two. Its description stays on the other side."""
+        """The present state; in slow motion, a state between the last two. `Engine` adds the description."""
         live = self.live
         state = self._displayed_state(now)
         system, setup = live.system, live.setup
@@ -210,7 +208,7 @@ class SimulationLoop:
         )
 
     def _requested(self, name: str, compute: Callable[[], Any]) -> Any | None:
-        """A value that the view asks for, or None. Where it cannot be computed, a notice tells why, and it is off."""
+        """A value that the view requests, or None. Where it cannot be computed, it is turned off, with a notice."""
         if not getattr(self.view, name):
             return None
         try:
@@ -222,7 +220,7 @@ class SimulationLoop:
             return None
 
     def _shortest(self) -> float:
-        # A hair less than the time between two frames: else the clock's jitter would skip every other frame.
+        # Slightly less than the time between two frames: otherwise jitter of the clock would skip every second frame.
         return 0.9 / limits.FRAMES_PER_SECOND
 
     def _interval(self) -> float:
@@ -231,7 +229,7 @@ class SimulationLoop:
     def _in_slow_motion(self) -> bool:
         return self.playing and self.steps_left == 0 and self._interval() > 1.5 / limits.FRAMES_PER_SECOND
 
-    def _blends(self, now: float) -> bool:
+    def _interpolates(self, now: float) -> bool:
         return self._in_slow_motion() and now - self._published >= self._shortest()
 
     def _displayed_state(self, now: float) -> State:
@@ -258,7 +256,7 @@ class SimulationLoop:
 
 
 class _Notices(logging.Handler):
-    """Tells a loop of warnings. Errors are for the terminal as well: they are mistakes in the code."""
+    """Turns warnings into notices of a loop. Errors go to the terminal: they are faults of the code."""
 
     def __init__(self, loop: SimulationLoop) -> None:
         super().__init__(logging.WARNING)

@@ -24,7 +24,7 @@ class StepWatch:
     Parameters
     ----------
     longest : limit for one step [s].
-    impatient, patience : whether a person waits for the end of the step, and the limit in this case [s].
+    is_awaited, longest_awaited : whether a person waits for the end of the step, and the limit in this case [s].
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Commands on their way: in order, never more than a fixed number, and of a moving hand only the newest place."""
+"""A bounded queue of commands, in order. Of the moves of one grab it keeps only the newest."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Numbered = tuple[int, Command]
 
 
 def subject(command: Command) -> Hashable | None:
-    """What a command is the last word on; None for commands of which each counts."""
+    """The key of what a command sets; None for commands of which each one counts."""
     match command:
         case MoveGrab(grab=grab):
             return "grab", grab
@@ -37,10 +37,10 @@ def subject(command: Command) -> Hashable | None:
 
 
 class CommandQueue:
-    """A bounded queue between two threads. A newer word on the same subject takes the older one's place.
+    """A bounded queue between two threads. A newer command replaces an older one with the same `subject`.
 
-    It does so only where no other kind of command came between the two, so that the outcome stays the same: moving a
-    grab after letting it go is not moving it before.
+    It does so only where no other kind of command came between the two, so that the result is the same: a move after
+    the release of a grab differs from a move before it.
     """
 
     def __init__(self, capacity: int = limits.MOST_WAITING) -> None:
@@ -53,9 +53,9 @@ class CommandQueue:
         self._closed = False
 
     def put(self, number: int, command: Command) -> bool:
-        """Append a command. Returns False, with the command dropped, where the queue is full.
+        """Append a command. Returns False where the queue is full: the command is dropped.
 
-        The release of a grab that was accepted is never dropped: its spring would pull for ever.
+        The release of an accepted grab is never dropped, because its spring would pull for ever.
         """
         with self._changed:
             about = subject(command)
@@ -65,7 +65,7 @@ class CommandQueue:
                 self.dropped += 1
                 return False
             else:
-                if about is None or (isinstance(command, SetParameter) and self._speaks_of(command.name)):
+                if about is None or (isinstance(command, SetParameter) and self._sets(command.name)):
                     self._places.clear()
                 if about is not None:
                     self._places[about] = len(self._waiting)
@@ -83,7 +83,7 @@ class CommandQueue:
             self.put(number, command)
 
     def take(self, timeout: float | None) -> list[Numbered]:
-        """Everything that waits, oldest first; waits for something until `timeout` [s] (None: for ever)."""
+        """All waiting commands, oldest first. Waits for the first one up to `timeout` [s] (None: without limit)."""
         with self._changed:
             if not self._waiting and not self._closed:
                 self._changed.wait(timeout)
@@ -92,24 +92,24 @@ class CommandQueue:
             return commands
 
     def holds(self, *kinds: type[Command]) -> bool:
-        """Whether a command of one of those kinds waits."""
+        """Whether a command of one of these kinds waits."""
         with self._changed:
             return any(isinstance(command, kinds) for _, command in self._waiting)
 
     def close(self) -> None:
-        """Wake whoever waits; nothing will come any more."""
+        """Wake the reader; no more commands will come."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
 
     @property
     def closed(self) -> bool:
-        """Whether nothing will come any more."""
+        """Whether no more commands will come."""
         return self._closed
 
     def _releases(self, command: Command) -> bool:
         return isinstance(command, ReleaseGrab) and command.grab in self._grabs
 
-    def _speaks_of(self, parameter: str) -> bool:
-        """Whether a word on that parameter waits: of one body and of all bodies, the later must stay the later."""
+    def _sets(self, parameter: str) -> bool:
+        """Whether a waiting command sets this parameter. The order of "one body" and "all bodies" must be kept."""
         return any(isinstance(key, tuple) and key[:2] == ("parameter", parameter) for key in self._places)

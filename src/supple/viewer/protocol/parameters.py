@@ -1,4 +1,4 @@
-"""The numbers that a page may change while a simulation runs, and the range of each: for sliders and for checks."""
+"""The parameters that a page may change while a simulation runs, with their ranges, for sliders and checks."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ Owner = Literal["solver", "scene", "body"]
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of a running simulation.
+    """One parameter of a running simulation.
 
     Attributes
     ----------
-    name : as commands and descriptions call it; label : as a panel calls it; unit : "" where it has none
-    owner : "body" where each body has a value of its own
+    name : in commands and descriptions; label : on the panel; unit : "" where it has none
+    owner : "body" where each body has its own value
     kind : float, int or bool; low, high : both are allowed
-    logarithmic : whether a slider should run in powers of ten (zero, where allowed, is its left end)
+    logarithmic : whether a slider uses powers of ten (zero, where allowed, is its left end)
     """
 
     name: str
@@ -36,7 +36,7 @@ class Parameter:
     logarithmic: bool = False
 
     def checked(self, value: object) -> float | int | bool:
-        """`value`, as this parameter's kind.
+        """`value`, converted to `kind`.
 
         Raises
         ------

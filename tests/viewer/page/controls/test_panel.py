@@ -67,7 +67,7 @@ def test_the_page_says_when_the_simulation_is_slow_or_gone(live, fake, until):
     fake.show(paused=False, timing=Timing(40.0, 25.0, 0.42, keeps_up=False))
     until(lambda: "Too slow for real time" in message() and "0.42 of real time" in message() and "40.0 ms" in message())
     fake.error = "it ran out of memory"
-    until(lambda: "gone" in message() and "out of memory" in message())
+    until(lambda: "has ended" in message() and "out of memory" in message())
 
 
 def test_the_page_says_when_nothing_is_heard_of_the_simulation(live, fake, until, monkeypatch):
@@ -278,7 +278,7 @@ def test_what_is_looked_at_is_asked_for(live, visitor, received, until):
     assert received() == SetView("von_mises", velocities=True)
     visitor.set(views.contacts, True)
     assert received() == SetView("von_mises", velocities=True, contacts=True)
-    until(lambda: "none are told" in views._message.content)
+    until(lambda: "not known" in views._message.content)
     visitor.set(views.surface, "wireframe")
     assert received() == SetView(None, velocities=True, contacts=True)
     until(lambda: live.stage.options.surface == "wireframe")

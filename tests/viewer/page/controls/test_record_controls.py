@@ -87,7 +87,7 @@ def test_a_picture_of_another_size_than_asked_for_is_not_taken(live, guest):
         return np.zeros((height + 2, width, 3), dtype=np.uint8)
 
     guest.get_render = another
-    record._take_picture(SimpleNamespace(client=guest))
+    record._send_screenshot(SimpleNamespace(client=guest))
     assert asked == [(2160, 2160)]
     assert guest.files == {}
     assert "another size" in record._message.content
@@ -100,11 +100,11 @@ def test_a_browser_that_sends_no_picture_is_told(live, guest):
         raise TimeoutError("no frame")
 
     guest.get_render = nothing
-    record._take_picture(SimpleNamespace(client=guest))
+    record._send_screenshot(SimpleNamespace(client=guest))
     assert guest.files == {}
     assert "no frame" in record._message.content
     guest.get_render = Guest.get_render.__get__(guest)
-    record._take_picture(SimpleNamespace(client=guest))
+    record._send_screenshot(SimpleNamespace(client=guest))
     assert guest.files["supple.png"].startswith(b"\x89PNG")
 
 

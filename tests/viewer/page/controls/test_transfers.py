@@ -95,7 +95,7 @@ def test_what_is_wrong_with_it_is_said_and_the_page_goes_on(live, fake, visitor,
     announce(visitor, live, b"abc")
     give(visitor, live, b"abc")
     assert working.wait(20.0)
-    assert "filled with tets, 3 s" in live.panel.upload._message.content
+    assert "being meshed, 3 s" in live.panel.upload._message.content
     # Meanwhile everything else works, but for a second file.
     announce(visitor, live, b"abc", transfer_uuid="two")
     give(visitor, live, b"abc", transfer_uuid="two")
@@ -115,7 +115,7 @@ REFUSED = {
     "no format": ({"filename": "ball"}, "give a surface as"),
     "nothing": ({"size_bytes": 0, "part_count": 0}, "empty"),
     "less than nothing": ({"size_bytes": -5, "part_count": 0}, "empty"),
-    "too large": ({"size_bytes": limits.LARGEST_UPLOAD + 1, "part_count": 33}, "may have 16 MiB"),
+    "too large": ({"size_bytes": limits.LARGEST_UPLOAD + 1, "part_count": 33}, "the limit is 16 MiB"),
     "other parts": ({"part_count": 2}, "parts"),
     "parts without end": ({"part_count": 2**40}, "parts"),
 }
@@ -170,7 +170,7 @@ def test_only_so_many_come_in_at_once(live, server, visit, meshed, until, monkey
     for visitor in visitors:
         announce(visitor, live, b"abc")
     until(lambda: texts)
-    assert "2 files are coming in already" in texts[0]
+    assert "2 files are being uploaded already" in texts[0]
     # One that gets no further makes room.
     monkeypatch.setattr(limits, "UPLOAD_TIMEOUT", -1.0)
     announce(visitors[2], live, b"abc")

@@ -1,4 +1,4 @@
-"""Dots where vertices are pinned."""
+"""Pinned vertices."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A running scene in the words of a page: its description, and the numbers of a snapshot."""
+"""Describes a live scene for the page: its description, and the measures of a snapshot."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from supple.viewer.protocol.snapshots import BodyDescription, Measures, Obstacle
 
 
 def describe(live: LiveScene) -> SceneDescription:
-    """Everything about the scene that does not change from frame to frame."""
+    """All properties of the scene that do not change from frame to frame."""
     system, setup = live.system, live.setup
     gravity = -float(np.asarray(setup.scene.gravity) @ live.up)
     positions = live.state.positions
@@ -59,7 +59,7 @@ def _body(part: BodyRange, masses: NDArray[np.float64], added: frozenset[str]) -
 
 
 def _material_values(material: Any) -> dict[str, Value]:
-    """Of the material's parameters, those that a page can change: one number each."""
+    """The parameters of the material that a page can change: those that are one number."""
     values: dict[str, Value] = {}
     for field in fields(material):
         value = getattr(material, field.name)
@@ -89,7 +89,7 @@ def _obstacle(obstacle: Obstacle) -> ObstacleDescription:
 
 
 def _stitches(system: System) -> NDArray[np.int32]:
-    """(k, 4) global vertices of everything that is stitched together; -1 where there is none."""
+    """(k, 4) global vertices of the stitches; -1 for a node that is not a vertex."""
     stitching = getattr(system, "stitching", None)
     if stitching is None or not len(stitching):
         return np.zeros((0, 4), dtype=np.int32)
@@ -107,7 +107,7 @@ def obstacle_poses(system: System, time: float) -> tuple[NDArray[np.float64], ND
 
 
 def measures(live: LiveScene) -> Measures:
-    """The numbers of the present state, and of the last step."""
+    """The measures of the present state and of the last step."""
     report = live.report
     found = measure(live.system, live.state)
     return Measures(

@@ -1,4 +1,4 @@
-"""What each command does to a running scene."""
+"""The effect of each command on a live scene."""
 
 from __future__ import annotations
 
@@ -30,19 +30,19 @@ from supple.viewer.protocol import commands, limits
 from supple.viewer.protocol.parameters import find_parameter
 from supple.viewer.protocol.snapshots import Value
 
-# Of the mean edge: how far from obstacles vertices are when the implicit solver takes over.
+# Distance between vertices and obstacles at a change to the implicit solver, as a share of the mean edge length.
 CLEARANCE = 1e-3
 
 
 @singledispatch
 def change(command: commands.Command, live: LiveScene) -> None:
-    """Do to the scene what a command says.
+    """Execute a command on the scene.
 
     Raises
     ------
-    SuppleError : where that is impossible; nothing is changed then.
+    SuppleError : where this is impossible; then nothing is changed.
     """
-    raise CommandError(f"a scene does not know the command {type(command).__name__}")
+    raise CommandError(f"a scene cannot execute the command {type(command).__name__}")
 
 
 @change.register
@@ -62,9 +62,9 @@ def _(command: commands.SetSolver, live: LiveScene) -> None:
 
 
 def clear_of_obstacles(live: LiveScene) -> State | None:
-    """The state with all vertices a little off the obstacles, for a solver that knows no touching; None: as it is.
+    """The state with a small gap between vertices and obstacles, for a solver that needs a distance above zero.
 
-    XPBD leaves vertices right on an obstacle, or a little inside. A thousandth of an edge is enough to begin with.
+    XPBD leaves vertices exactly on an obstacle, or slightly inside. Returns None where nothing has to be moved.
     """
     system, state = live.system, live.state
     gap = CLEARANCE * float(system.rest_lengths.mean())
@@ -95,7 +95,7 @@ def _with_body_value(live: LiveScene, command: commands.SetParameter) -> Scene:
     if command.body is not None:
         _part(live, command.body)
     bodies = [
-        _tuned(body, command.name, command.value) if command.body in (None, body.name) else None
+        _with_value(body, command.name, command.value) if command.body in (None, body.name) else None
         for body in scene.bodies
     ]
     if not any(bodies):
@@ -112,17 +112,18 @@ def _with_body_value(live: LiveScene, command: commands.SetParameter) -> Scene:
     )
 
 
-def _tuned(body: Body, name: str, value: Value) -> Body | None:
-    """The body with that value, or None where it has no such parameter."""
+def _with_value(body: Body, name: str, value: Value) -> Body | None:
+    """The body with this value, or None where it has no such parameter."""
     if name == "friction":
         return replace(body, friction=float(value))
-    material = _tuned_material(body.material, name, float(value))
+    material = _material_with_value(body.material, name, float(value))
     return None if material is None else replace(body, material=material)
 
 
-def _tuned_material(material: Material, name: str, value: float) -> Material | None:
+def _material_with_value(material: Material, name: str, value: float) -> Material | None:
     if isinstance(material, Regions):
-        return replace(material, materials=[_tuned_material(each, name, value) or each for each in material.materials])
+        materials = [_material_with_value(each, name, value) or each for each in material.materials]
+        return replace(material, materials=materials)
     if name not in {field.name for field in fields(material)}:
         return None
     return replace(material, **{name: value})
@@ -133,7 +134,7 @@ def _(command: commands.Grab, live: LiveScene) -> None:
     part = _part(live, command.body)
     others = {number: spring for number, spring in live.setup.grabs.items() if number != command.grab}
     if len(others) >= limits.MOST_GRABS:
-        raise CommandError(f"there are {len(others)} hands on the scene already; let one go first")
+        raise CommandError(f"there are {len(others)} grabs already; release one first")
     spring = make_spring(command, live.setup.scene, part, live.system.masses, live.state.positions)
     live.adopt(replace(live.setup, grabs={**others, command.grab: spring}))
 
@@ -141,7 +142,7 @@ def _(command: commands.Grab, live: LiveScene) -> None:
 @change.register
 def _(command: commands.MoveGrab, live: LiveScene) -> None:
     spring = live.setup.grabs.get(command.grab)
-    if spring is not None:  # else let go meanwhile, by a reset for instance
+    if spring is not None:  # otherwise it was removed meanwhile, for example by a reset
         spring.target[:] = command.target
 
 
@@ -161,8 +162,8 @@ def _(command: commands.Pin, live: LiveScene) -> None:
         return
     pins = dict(live.setup.page_pins)
     if len(pins) >= limits.MOST_PINS:
-        raise CommandError(f"{len(pins)} vertices are pinned by hand already; unpin some first")
-    pins[command.body, command.vertex] = Pin(command.body, [command.vertex], name="by hand")
+        raise CommandError(f"{len(pins)} vertices are pinned on the page already; unpin some first")
+    pins[command.body, command.vertex] = Pin(command.body, [command.vertex], name="page")
     live.adopt(replace(live.setup, page_pins=pins))
 
 
@@ -178,11 +179,11 @@ def _(command: commands.Unpin, live: LiveScene) -> None:
         left = {key: pin for key, pin in setup.page_pins.items() if key != (command.body, command.vertex)}
         live.adopt(replace(setup, page_pins=left))
         return
-    _take_from_pin(live, part, command.vertex)
+    _remove_from_pin(live, part, command.vertex)
 
 
-def _take_from_pin(live: LiveScene, part: BodyRange, vertex: int) -> None:
-    """Take a vertex out of one of the scene's own pins."""
+def _remove_from_pin(live: LiveScene, part: BodyRange, vertex: int) -> None:
+    """Remove a vertex from one of the pins of the scene."""
     row = part.vertices.start + vertex
     held = next((held for held in live.system.pins if row in held.vertices), None)
     if held is None:
@@ -231,9 +232,9 @@ def _(command: commands.Squash, live: LiveScene) -> None:
 
 
 def flattened(points: NDArray[np.float64], up: NDArray[np.float64], factor: float) -> NDArray[np.float64]:
-    """Points (k, 3) pressed to `factor` of their height along `up`, about the lowest, and widened by 1 / sqrt(factor).
+    """Points (k, 3) with their height along `up`, above the lowest one, times `factor`, and their width / sqrt(factor).
 
-    One linear map for all, of determinant 1: no tet changes its volume, and bodies that did not touch do not.
+    One linear map of determinant 1 for all points: no tet changes its volume, and separate bodies stay separate.
     """
     heights = points @ up
     low = heights.min()
@@ -260,7 +261,7 @@ def _(command: commands.CopyBody, live: LiveScene) -> None:
         live,
         replace(
             body,
-            name=unused_name(live.setup.scene, re.sub(r" \d+$", "", body.name)),  # a copy of "ball 1" is "ball 2"
+            name=unused_name(live.setup.scene, re.sub(r" \d+$", "", body.name)),  # a copy of "ball 1" is named "ball 2"
             position=place,
             rotation=np.zeros(3),
             velocity=np.zeros(3),
@@ -286,7 +287,7 @@ def _add(live: LiveScene, body: Body) -> None:
 def _(command: commands.RemoveBody, live: LiveScene) -> None:
     part, setup = _part(live, command.body), live.setup
     if len(setup.scene.bodies) == 1:
-        raise CommandError(f"body {part.name!r} is the only one; a scene needs one")
+        raise CommandError(f"body {part.name!r} is the only one; add another body first")
     keep = np.ones(len(live.state.positions), dtype=bool)
     keep[part.vertices] = False
     state = State(live.state.time, live.state.positions[keep], live.state.velocities[keep])
@@ -301,7 +302,7 @@ def _(command: commands.RemoveBody, live: LiveScene) -> None:
 
 
 def without_body(scene: Scene, name: str) -> Scene:
-    """The scene without a body and all that refers to it: pins, forces, soft targets, stitches, contact pairs."""
+    """The scene without a body and what refers to it: pins, forces, soft targets, stitches, contact pairs."""
     bodies = [body for body in scene.bodies if body.name != name]
     return replace(
         scene,
@@ -315,7 +316,7 @@ def without_body(scene: Scene, name: str) -> Scene:
 
 
 def _pairs_among(things: Sequence[str | None], pairs: Sequence[ContactPair]) -> list[ContactPair]:
-    """The contact pairs without the names and patterns that mean none of these bodies and obstacles."""
+    """The contact pairs without the names and patterns that match none of these bodies and obstacles."""
 
     def known(names: str | Sequence[str]) -> list[str]:
         patterns = {name: name.replace("[", "[[]") for name in names}  # only `*` and `?` are special

@@ -1,4 +1,4 @@
-"""The scene behind a page while it runs: what a person may change, the state, and what solvers made of both."""
+"""The scene of a live page: its setup, which commands change, its state, and the data of the solver."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ class Setup:
 
     Attributes
     ----------
-    scene : without hands, pusher and pins by hand; those are
-    hand_pins : by body and vertex; grabs : by number; pusher : or None
-    added : names of bodies that a page added
+    scene : without what the page adds to it:
+    page_pins : pins made on the page, by body and vertex; grabs : by number; pusher : or None
+    added : names of bodies that were added on the page
     """
 
     scene: Scene
@@ -47,7 +47,7 @@ class Setup:
     added: frozenset[str] = frozenset()
 
     def whole_scene(self) -> Scene:
-        """The scene with everything that the page has put into it."""
+        """The scene with pins, grabs and pusher of the page."""
         if not self.page_pins and not self.grabs and self.pusher is None:
             return self.scene
         return replace(
@@ -59,14 +59,14 @@ class Setup:
 
 
 class LiveScene:
-    """A running simulation that can be changed between two steps. A change that cannot be made changes nothing.
+    """A running simulation that can be changed between two steps. A change that fails has no effect.
 
     Attributes
     ----------
-    setup, state : see `Setup` and `State`; frame : steps since the start
+    setup, state : see `Setup` and `State`; frame : number of steps since the start
     system, workspace : of the present setup
-    solvers : by kind, as they were last used
-    starts : by body name, (n, 3) of bodies that start deformed; pins : those of the scene itself
+    solvers : by kind, with the settings used last
+    starts : by body name, (n, 3) of bodies with deformed initial positions; pins : those of the source
     report : of the last step
     generation, revision : see `SceneDescription`
 
@@ -88,16 +88,16 @@ class LiveScene:
         self.adopt(Setup(source.scene, source.solver, source.dt), initial_state(source.scene, self.starts), anchors={})
 
     def adopt(self, setup: Setup, state: State | None = None, anchors: Anchors | None = None) -> None:
-        """Go on with another setup. The memory of the present state stays: solvers ignore what is not theirs.
+        """Continue with another setup. The memory of the present state is kept: a solver ignores that of another one.
 
         Parameters
         ----------
-        state : to go on from, where it is not the present one.
-        anchors : where pins and soft targets hold, of those that are kept; None keeps all.
+        state : to continue from, where it is not the present one.
+        anchors : positions at which pins and soft targets hold, for those that are kept; None keeps all.
 
         Raises
         ------
-        SuppleError : where the setup cannot be simulated from that state; nothing is changed then.
+        SuppleError : where the setup cannot be simulated from this state; then nothing is changed.
         """
         state = self.state if state is None else state
         kept = self._anchors if anchors is None else anchors
@@ -105,7 +105,7 @@ class LiveScene:
         frame = first_frame(scene, state)
         system = _anchored(frame.system, kept)
         workspace = setup.solver.prepare(system)
-        if not hasattr(self, "setup") or not _looks_same(self.system.scene, scene):
+        if not hasattr(self, "setup") or not _same_shapes(self.system.scene, scene):
             self.generation += 1
         self.revision += 1
         self.setup, self.state, self.system, self.workspace = setup, state, system, workspace
@@ -115,33 +115,33 @@ class LiveScene:
         self.solvers[kind_of(setup.solver)] = setup.solver
 
     def adopt_checked(self, setup: Setup, state: State | None = None, anchors: Anchors | None = None) -> None:
-        """The same, for changes after which a solver that never lets surfaces meet might not be able to take a step.
+        """The same as `adopt`, after a trial step: a solver that allows no intersection may be unable to take a step.
 
         Raises
         ------
-        SuppleError : where the first step would fail; nothing is changed then.
+        SuppleError : where the first step would fail; then nothing is changed.
         """
         before = dict(vars(self))
         self.adopt(setup, state, anchors)
-        if kind_of(setup.solver) == "xpbd":  # goes on from anywhere
+        if kind_of(setup.solver) == "xpbd":  # takes steps from any state
             return
         try:
             _, report = setup.solver.step(self.system, self.state, setup.dt, self.workspace)
             if not report.status.can_go_on:
                 raise SolverError(
-                    f"the solver {kind_of(setup.solver)} cannot go on from there: {report.message or report.status}"
+                    f"the solver {kind_of(setup.solver)} cannot start from there: {report.message or report.status}"
                 )
         except BaseException:
             vars(self).update(before)
             raise
-        self.prepare_workspace()  # the step that was tried has left its traces
+        self.prepare_workspace()  # the trial step has changed the workspace
 
     def prepare_workspace(self) -> None:
-        """Prepare the workspace anew, after a step that was tried, or given up."""
+        """Prepare a new workspace, after a step that was not completed."""
         self.workspace = self.setup.solver.prepare(self.system)
 
     def step(self) -> StepReport:
-        """Simulate one frame. Where that fails, the state stays as it was, and the report says why."""
+        """Simulate one frame. Where this fails, the state does not change, and the report contains the reason."""
         setup = self.setup
         if setup.pusher is not None:
             setup.pusher.begin_step(self.state.time, setup.dt)
@@ -149,7 +149,7 @@ class LiveScene:
             spring.pull(self.body_positions(spring.command.body), self._anchors[spring.soft_target])
         state, report = self._stepped()
         if not report.status.can_go_on and setup.pusher is not None and setup.pusher.moves:
-            setup.pusher.stay()  # where it cannot press any further
+            setup.pusher.stay()  # it is blocked
             state, report = self._stepped()
         self.report = report
         if report.status.can_go_on:
@@ -166,9 +166,9 @@ class LiveScene:
         return state, report
 
     def reset(self) -> None:
-        """Back to the start, with the bodies that are there now, and the parameters and solver as they are.
+        """Return to the start, with the present bodies, parameters and solver.
 
-        Bodies that were added stay where they were added; where another one has its start there, they move above all.
+        Added bodies return to where they were added. Where another body starts there, they are placed above all bodies.
         """
         names = {body.name for body in self.setup.scene.bodies}
         scene = replace(self.setup.scene, pins=tuple(pin for pin in self.pins if pin.body in names))
@@ -189,21 +189,21 @@ class LiveScene:
 
     @property
     def up(self) -> NDArray[np.float64]:
-        """(3,) unit vector against gravity; where there was never any, along y."""
+        """(3,) unit vector against the gravity of the source; along y where that is zero."""
         gravity = np.asarray(self.source.scene.gravity)
         size = np.linalg.norm(gravity)
         return -gravity / size if size > 0.0 else np.array([0.0, 1.0, 0.0])
 
 
 def _anchored(system: System, kept: Anchors) -> System:
-    """The system, with pins and soft targets that were there before holding exactly where they held then."""
+    """The system, in which pins and soft targets that existed before keep their exact anchors."""
     pins = tuple(replace(held, anchors=kept.get(held.pin, held.anchors)) for held in system.pins)
     softs = tuple(replace(soft, anchors=kept.get(soft.target, soft.anchors)) for soft in system.soft_targets)
     return replace(system, pins=pins, soft_targets=softs)
 
 
-def _looks_same(old: Scene, new: Scene) -> bool:
-    """Whether what is drawn of two scenes has the same shapes."""
+def _same_shapes(old: Scene, new: Scene) -> bool:
+    """Whether the shapes to draw are the same in two scenes."""
     bodies = [(body.name, body.mesh, body.skin) for body in old.bodies]
     obstacles = [(type(obstacle), obstacle.name, obstacle.motion) for obstacle in old.obstacles]
     return bodies == [(body.name, body.mesh, body.skin) for body in new.bodies] and obstacles == [

@@ -1,4 +1,4 @@
-"""The pusher: a solid ball that follows the pointer, and reaches it as fast as contact can bear."""
+"""The pusher: a solid ball that follows the pointer, with a limited speed."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from numpy.typing import NDArray
 from supple.scene.obstacles import Sphere
 from supple.viewer.protocol.snapshots import PUSHER
 
-# Of its radius: how far it moves in one step at most, so that it pushes vertices rather than jumping over them.
+# Longest motion in one step, as a share of the radius: otherwise the ball could jump over vertices.
 STRIDE = 0.25
 
 
 class Pusher:
-    """A ball on its way to `wanted` (3,) [m].
+    """A ball that moves to `target` (3,) [m].
 
     Attributes
     ----------
-    center : (3,) where it is at the beginning of the coming step [m]; radius : [m]
+    center : (3,) at the start of the next step [m]; radius : [m]
     """
 
     def __init__(self, center: NDArray[np.float64], radius: float, friction: float = 0.5) -> None:
@@ -26,7 +26,7 @@ class Pusher:
         self.radius = radius
         self._times = (0.0, 0.0)
         self._ends = (self.center, self.center)
-        # The obstacle's own place is the origin: its displacement is where it is.
+        # The obstacle is placed at the origin, so that its displacement is its position.
         self.obstacle = Sphere(
             center=(0.0, 0.0, 0.0), radius=radius, friction=friction, motion=self._motion, name=PUSHER
         )
@@ -39,7 +39,7 @@ class Pusher:
         return a + share * (b - a)
 
     def begin_step(self, time: float, dt: float) -> None:
-        """Plan the way from `time` to `time + dt` [s]: straight, and at most a stride."""
+        """Set the motion from `time` to `time + dt` [s]: straight, and at most STRIDE of the radius."""
         way = self.target - self.center
         length, longest = float(np.linalg.norm(way)), STRIDE * self.radius
         if length > longest:
@@ -49,13 +49,13 @@ class Pusher:
 
     @property
     def moves(self) -> bool:
-        """Whether it moves in the step that was begun."""
+        """Whether it moves in the present step."""
         return not np.array_equal(*self._ends)
 
     def stay(self) -> None:
-        """Not to move in the step that was begun."""
+        """Do not move in the present step."""
         self._ends = self.center, self.center
 
     def end_step(self) -> None:
-        """Stand where the step has led to."""
+        """Take the position at the end of the step."""
         self.center = self._ends[1]
