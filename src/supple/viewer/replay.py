@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import threading
 import time
-from collections import OrderedDict
 from collections.abc import Callable
 from contextlib import suppress
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -38,7 +38,7 @@ class Replay:
     def __init__(self, server: Any, recording: Recording, options: ViewOptions | None = None) -> None:
         self._recording = recording
         self._model = model_of_recording(recording)
-        self._moments: OrderedDict[int, Moment] = OrderedDict()
+        self._cached = lru_cache(_KEPT)(lambda index: moment_of_frame(self._model, recording[index]))
         # Only one thread at a time may read HDF5.
         self._reading = threading.Lock()
         # Both the playing thread and visitors change the time.
@@ -79,16 +79,10 @@ class Replay:
         self._end.set()
         self._thread.join()
 
-    def moment(self, number_of_frame: int) -> Moment:
+    def moment(self, index: int) -> Moment:
         """One frame; the frames requested last are cached."""
         with self._reading:
-            known = self._moments.get(number_of_frame)
-            if known is None:
-                known = moment_of_frame(self._model, self._recording[number_of_frame])
-                self._moments[number_of_frame] = known
-                if len(self._moments) > _KEPT:
-                    self._moments.popitem(last=False)
-            return known
+            return self._cached(index)
 
     def page(self) -> str:
         """The whole recording as HTML page, with the present view options."""

@@ -46,29 +46,26 @@ class BodyControls:
     def show(self, snapshot: Snapshot) -> None:
         """Set the inputs to the values of the simulation."""
         with self._controller.lock:
-            self._show(snapshot)
-
-    def _show(self, snapshot: Snapshot) -> None:
-        scene = snapshot.description
-        names = (ALL, *(body.name for body in scene.bodies))
-        if self.which.options != names:
-            if self.which.value not in names:  # first: otherwise a removed body would be selected for a moment
-                self.which.value = ALL
-            self.which.options = names
-        values = self._values(scene)
-        inputs_for = (self.which.value, *values)
-        if inputs_for != self._inputs_for:
-            for made in self.inputs.values():
-                made.remove()
-            with self._folder:
-                self.inputs = {
-                    name: ParameterInput(self._gui, self._controller, name, value, self._whose)
-                    for name, value in values.items()
-                }
-            self._inputs_for = inputs_for
-            self.change.visible = self.which.value != ALL
-        for name, made in self.inputs.items():
-            made.show(values[name], snapshot.applied)
+            scene = snapshot.description
+            names = (ALL, *(body.name for body in scene.bodies))
+            if self.which.options != names:
+                if self.which.value not in names:  # first: otherwise a removed body would be selected for a moment
+                    self.which.value = ALL
+                self.which.options = names
+            values = self._values(scene)
+            inputs_for = (self.which.value, *values)
+            if inputs_for != self._inputs_for:
+                for made in self.inputs.values():
+                    made.remove()
+                with self._folder:
+                    self.inputs = {
+                        name: ParameterInput(self._gui, self._controller, name, value, self._whose)
+                        for name, value in values.items()
+                    }
+                self._inputs_for = inputs_for
+                self.change.visible = self.which.value != ALL
+            for name, made in self.inputs.items():
+                made.show(values[name], snapshot.applied)
 
     def _whose(self) -> str | None:
         return None if self.which.value == ALL else str(self.which.value)

@@ -33,22 +33,19 @@ class SolverControls:
     def show(self, snapshot: Snapshot) -> None:
         """Set the inputs to the values of the simulation."""
         with self._controller.lock:
-            self._show(snapshot)
-
-    def _show(self, snapshot: Snapshot) -> None:
-        scene = snapshot.description
-        names = tuple(name for name in PARAMETERS if name in scene.values)
-        if names != self._input_names:
-            for made in self.inputs.values():
-                made.remove()
-            with self._folder:
-                self.inputs = {n: ParameterInput(self._gui, self._controller, n, scene.values[n]) for n in names}
-            self._input_names = names
-        for name, made in self.inputs.items():
-            made.show(scene.values[name], snapshot.applied)
-        # Compared with the last displayed kind, not with the input: a new choice of a visitor must not be lost.
-        if self._kind != scene.solver and not self._pending.is_pending(snapshot.applied):
-            self.kind.value = self._kind = scene.solver
+            scene = snapshot.description
+            names = tuple(name for name in PARAMETERS if name in scene.values)
+            if names != self._input_names:
+                for made in self.inputs.values():
+                    made.remove()
+                with self._folder:
+                    self.inputs = {n: ParameterInput(self._gui, self._controller, n, scene.values[n]) for n in names}
+                self._input_names = names
+            for name, made in self.inputs.items():
+                made.show(scene.values[name], snapshot.applied)
+            # Compared with the last displayed kind, not with the input: a new choice of a visitor must not be lost.
+            if self._kind != scene.solver and not self._pending.is_pending(snapshot.applied):
+                self.kind.value = self._kind = scene.solver
 
     def _switch(self, event: Any) -> None:
         if event.client is not None:

@@ -46,17 +46,9 @@ class ViewControls:
             self._message = gui.add_markdown("", visible=False)
             self._last_message = ""
             self.camera = gui.add_button_group("Camera", PRESETS)
-        inputs = (
-            self.surface,
-            self.color_by,
-            self.explode,
-            self.cut_axis,
-            self.cut_place,
-            self.velocities,
-            self.contacts,
-            self.stitches,
-        )
-        for handle in inputs:
+        for handle in (self.surface, self.color_by, self.explode, self.cut_axis, self.cut_place):
+            handle.on_update(lambda _: self.apply())
+        for handle in (self.velocities, self.contacts, self.stitches):
             handle.on_update(lambda _: self.apply())
         self.camera.on_click(self._look)
 
@@ -64,25 +56,22 @@ class ViewControls:
         """Draw with the options of the panel."""
         # Inputs that change together arrive in any order; the last one must see the values of all.
         with self._lock:
-            self._apply()
-
-    def _apply(self) -> None:
-        options = replace(
-            self._stage.options,
-            surface=one_of(self.surface.value, SURFACES),
-            color_by=one_of(self.color_by.value, (COLOR_BY_BODY, *FIELDS)),
-            explode=number(self.explode.value, 0.05, 1.5),
-            cut_axis=one_of(self.cut_axis.value, _AXES),
-            cut_place=number(self.cut_place.value, 0.0, 1.0),
-            velocities=bool(self.velocities.value),
-            contacts=bool(self.contacts.value),
-            stitches=bool(self.stitches.value),
-        )
-        self.explode.visible = options.surface == "exploded tets"
-        self.cut_axis.visible = self.cut_place.visible = options.surface == "cut"
-        self._changed(options)
-        self._stage.apply(options)
-        self.refresh()
+            options = replace(
+                self._stage.options,
+                surface=one_of(self.surface.value, SURFACES),
+                color_by=one_of(self.color_by.value, (COLOR_BY_BODY, *FIELDS)),
+                explode=number(self.explode.value, 0.05, 1.5),
+                cut_axis=one_of(self.cut_axis.value, _AXES),
+                cut_place=number(self.cut_place.value, 0.0, 1.0),
+                velocities=bool(self.velocities.value),
+                contacts=bool(self.contacts.value),
+                stitches=bool(self.stitches.value),
+            )
+            self.explode.visible = options.surface == "exploded tets"
+            self.cut_axis.visible = self.cut_place.visible = options.surface == "cut"
+            self._changed(options)
+            self._stage.apply(options)
+            self.refresh()
 
     def refresh(self) -> None:
         """Update the color bar and the text about contacts."""

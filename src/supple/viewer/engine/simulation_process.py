@@ -27,22 +27,11 @@ def run_simulation(source: LiveSource, commands: Connection, snapshots: Connecti
 
     try:
         live = LiveScene(source)
-        warm_up(live)
+        live.warm_up()
     except (SuppleError, MemoryError) as error:
         snapshots.send_bytes(packed(ERROR, " ".join(str(error).split()) or type(error).__name__))
         return
     SimulationLoop(live, inbox, Outbox(snapshots)).run()
-
-
-def warm_up(live: object) -> None:
-    """Take one step and discard it, so that compiled kernels are loaded before a person waits for them."""
-    from supple.viewer.engine.scene.live_scene import LiveScene
-
-    assert isinstance(live, LiveScene)
-    state = live.state
-    live.step()
-    live.frame = 0
-    live.adopt(live.setup, state)
 
 
 def _read(commands: Connection, inbox: CommandQueue) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 # Lengths and coordinates in a command [m].
 SMALLEST_LENGTH, LARGEST_LENGTH = 1e-4, 1e3
 FARTHEST = 1e4
-FASTEST = 1e3  # velocities [m/s]
 
 # Of one live scene.
 MOST_BODIES = 64

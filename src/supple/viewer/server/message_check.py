@@ -113,18 +113,12 @@ def _fits(value: object, kind_of_value: Any, depth: int) -> bool:
     origin, arguments = typing.get_origin(kind_of_value), typing.get_args(kind_of_value)
     if kind_of_value in (float, int):
         return _is_number(value)
-    if kind_of_value is bool:
-        return isinstance(value, bool)
-    if kind_of_value is str:
-        return isinstance(value, str)
-    if kind_of_value is bytes:
-        return isinstance(value, bytes)
+    if kind_of_value in (bool, str, bytes, type(None)):
+        return isinstance(value, kind_of_value)
     if origin is typing.Literal:
         return isinstance(value, str | int | None) and value in arguments
     if origin in (typing.Union, UnionType):
         return any(_fits(value, each, depth + 1) for each in arguments)
-    if kind_of_value is type(None):
-        return value is None
     if origin is tuple:
         if not isinstance(value, list):
             return False

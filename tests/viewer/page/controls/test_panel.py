@@ -54,9 +54,9 @@ def test_time(live, fake, visitor, received, until):
     until(lambda: time_controls.play.label == "Pause")
     visitor.press(time_controls.play)
     assert received() == Pause()
-    visitor.set(time_controls.back, "step")
+    visitor.set(time_controls.frames, "step")
     assert received() == Step()
-    visitor.set(time_controls.back, "reset")
+    visitor.set(time_controls.frames, "reset")
     assert received() == Reset()
     visitor.set(time_controls.speed, 0.25)
     assert received() == SetSpeed(0.25)
@@ -179,7 +179,7 @@ def test_clicks_that_come_at_once_are_taken_one_by_one(live, visitor, fake, unti
     time_controls, bodies = live.panel.time, live.panel.bodies
     youngs = bodies.inputs["youngs"].handle
     for k in range(20):
-        visitor.set(time_controls.back, "step" if k % 2 else "reset")
+        visitor.set(time_controls.frames, "step" if k % 2 else "reset")
         visitor.set(bodies.squash, "stretch" if k % 2 else "squash")
         visitor.set(youngs, 5.0 + 0.1 * k)
     until(lambda: len(fake.received) >= 59)  # the first modulus is there already

@@ -99,7 +99,7 @@ def test_what_is_wrong_with_it_is_said_and_the_page_goes_on(live, fake, visitor,
     # Meanwhile everything else works, but for a second file.
     announce(visitor, live, b"abc", transfer_uuid="two")
     give(visitor, live, b"abc", transfer_uuid="two")
-    until(lambda: heard and "another file is being read" in heard[0])
+    until(lambda: heard and "another file is being meshed" in heard[0])
     visitor.press(live.panel.time.play)
     fake.show(paused=False)
     until(lambda: fake.received)

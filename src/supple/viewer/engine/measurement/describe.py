@@ -33,7 +33,7 @@ def describe(live: LiveScene) -> SceneDescription:
         up=live.up,
         low=positions.min(axis=0),
         high=positions.max(axis=0),
-        stitches=_stitches(system),
+        stitches=np.asarray(system.stitching.elements(), dtype=np.int32).reshape(-1, 4),
         n_vertices=len(positions),
         n_tets=len(system.tets),
         n_constraints=sum(int(made.count) for made in getattr(live.workspace, "sets", ())),
@@ -86,14 +86,6 @@ def _obstacle(obstacle: Obstacle) -> ObstacleDescription:
             shape = {"vertices": surface.vertices, "triangles": surface.triangles.astype(np.int32)}
     name = obstacle.name or obstacle.label
     return ObstacleDescription(name, type(obstacle).__name__, shape, obstacle.motion is not None, obstacle.friction)
-
-
-def _stitches(system: System) -> NDArray[np.int32]:
-    """(k, 4) global vertices of the stitches; -1 for a node that is not a vertex."""
-    stitching = getattr(system, "stitching", None)
-    if stitching is None or not len(stitching):
-        return np.zeros((0, 4), dtype=np.int32)
-    return np.asarray(stitching.elements(), dtype=np.int32)
 
 
 def obstacle_poses(system: System, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

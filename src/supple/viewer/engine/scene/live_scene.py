@@ -105,7 +105,7 @@ class LiveScene:
         frame = first_frame(scene, state)
         system = _anchored(frame.system, kept)
         workspace = setup.solver.prepare(system)
-        if not hasattr(self, "setup") or not _same_shapes(self.system.scene, scene):
+        if not hasattr(self, "setup") or _shapes(self.system.scene) != _shapes(scene):
             self.generation += 1
         self.revision += 1
         self.setup, self.state, self.system, self.workspace = setup, state, system, workspace
@@ -139,6 +139,13 @@ class LiveScene:
     def prepare_workspace(self) -> None:
         """Prepare a new workspace, after a step that was not completed."""
         self.workspace = self.setup.solver.prepare(self.system)
+
+    def warm_up(self) -> None:
+        """Take one step and discard it, so that compiled kernels are loaded before a person waits for them."""
+        state = self.state
+        self.step()
+        self.frame = 0
+        self.adopt(self.setup, state)
 
     def step(self) -> StepReport:
         """Simulate one frame. Where this fails, the state does not change, and the report contains the reason."""
@@ -202,13 +209,10 @@ def _anchored(system: System, kept: Anchors) -> System:
     return replace(system, pins=pins, soft_targets=softs)
 
 
-def _same_shapes(old: Scene, new: Scene) -> bool:
-    """Whether the shapes to draw are the same in two scenes."""
-    bodies = [(body.name, body.mesh, body.skin) for body in old.bodies]
-    obstacles = [(type(obstacle), obstacle.name, obstacle.motion) for obstacle in old.obstacles]
-    return bodies == [(body.name, body.mesh, body.skin) for body in new.bodies] and obstacles == [
-        (type(obstacle), obstacle.name, obstacle.motion) for obstacle in new.obstacles
-    ]
+def _shapes(scene: Scene) -> list[tuple[Any, ...]]:
+    """The shapes to draw, as a key for comparison."""
+    bodies = [(body.name, body.mesh, body.skin) for body in scene.bodies]
+    return [*bodies, *((type(obstacle), obstacle.name, obstacle.motion) for obstacle in scene.obstacles)]
 
 
 def _is_finite(state: State) -> bool:
