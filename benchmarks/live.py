@@ -1,8 +1,8 @@
-"""The live page's cost: the same frames without it, in its own process, and with the page served, in turns.
+"""The cost of the live page: the same frames with `simulate`, in the simulation process, and with a served page.
 
-A ball of 5k tets falls on a floor. Each round simulates the same frames in all three ways, as fast as they can; ratios
-are taken within a round, and their median over the rounds, so that a machine that is busy now and then does not matter
-much. Then the last two play against the clock.
+A ball of 5k tets falls on a floor. Each round simulates the same frames in all three ways, as fast as possible. Ratios
+are computed within a round, and their median over the rounds, which reduces the effect of other load on the machine.
+Then the last two ways run in real time.
 
 usage: python -m benchmarks.live
 """
@@ -25,8 +25,8 @@ from supple.viewer.protocol.messages import Play, Reset, Step
 
 WAYS = {
     "headless": "simulate(), no page",
-    "engine": "in the page's process for simulation, snapshots read at 60 Hz",
-    "page": "the same with the page served, and a websocket that takes it all",
+    "engine": "in the simulation process, snapshots read at 60 Hz",
+    "page": "the same with a served page, and a websocket that reads all messages",
 }
 LISTEN = """
 import sys, viser
@@ -39,7 +39,7 @@ with connect(sys.argv[1], subprotocols=["viser-v" + viser.__version__], max_size
 
 
 def source(edge_length: float) -> LiveSource:
-    """A ball half a metre above the floor."""
+    """A ball half a meter above the floor."""
     ball = sp.Body(
         "ball",
         sp.shapes.sphere(radius=0.5, edge_length=edge_length),
@@ -58,7 +58,7 @@ def headless(live: LiveSource, frames: int) -> float:
 
 
 def behind(engine: Engine, frames: int, look: float) -> float:
-    """The same in the engine's process, from the command to the last frame as this process sees it [ms]."""
+    """The same in the process of the engine, from the command to the last frame in this process [ms]."""
     began = time.perf_counter()
     engine.send(Reset())
     number = engine.send(Step(frames))
@@ -70,7 +70,7 @@ def behind(engine: Engine, frames: int, look: float) -> float:
 
 
 def played(engine: Engine, seconds: float) -> str:
-    """How a simulation does against the clock."""
+    """Ratio to real time and step time of a playing simulation."""
     engine.send(Reset())
     engine.send(Play())
     end = time.perf_counter() + seconds
@@ -85,7 +85,7 @@ def played(engine: Engine, seconds: float) -> str:
 
 @contextlib.contextmanager
 def listening(url: str) -> Iterator[None]:
-    """A process with a websocket that takes what a browser would get."""
+    """A process with a websocket that reads all messages for a browser."""
     listener = subprocess.Popen(
         [sys.executable, "-c", LISTEN, url.replace("http", "ws", 1)], stdout=subprocess.PIPE, text=True
     )
@@ -99,12 +99,12 @@ def listening(url: str) -> Iterator[None]:
 
 
 def load() -> str:
-    """How busy the machine was in the last minute."""
+    """Load of the machine in the last minute."""
     return f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
 
 
 def main(rounds: int = 15, frames: int = 90, edge_length: float = 0.1, seconds: float = 10.0) -> dict[str, list[float]]:
-    """Run all ways in turns and print them side by side. Returns the times of each, by round [ms/frame]."""
+    """Run all ways alternately and print their times. Returns the times of each, by round [ms/frame]."""
     live = source(edge_length)
     at_start = load()
     with Engine(live) as engine, opened_page(live, Address(port=0)) as page, listening(page.url):

@@ -1,4 +1,4 @@
-"""Draw the pictures of docs/live.md anew: `python docs/draw_live_page.py`, with Chromium and the tools of tests."""
+"""Draw the pictures of docs/live.md: `python docs/draw_live_page.py`; needs Chromium and the packages of the tests."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def scene() -> LiveSource:
 
 
 def save(tab, name: str) -> None:
-    """A picture of the page, in few colors: they are small so."""
+    """Save a picture of the page with few colors, so that the file is small."""
     shot = Image.open(io.BytesIO(tab.screenshot())).convert("RGB")
     shot.quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.FLOYDSTEINBERG).save(
         FOLDER / name, optimize=True
@@ -48,7 +48,7 @@ def save(tab, name: str) -> None:
 
 
 def draw_live(tab, page) -> None:
-    """Every view of a running simulation."""
+    """All views of a live simulation."""
     panel, controller = page.content.panel, page.content.controller
     client = next(iter(page.server.get_clients().values()))
     eye, center = np.asarray(client.camera.position), np.asarray(page.content.stage.model.view.center)

@@ -1,4 +1,4 @@
-"""The simulation in a process of its own: nothing that happens to the page stalls it or outlives it."""
+"""The simulation process: the page cannot block it, and it ends with the page."""
 
 import multiprocessing
 import os
@@ -62,10 +62,10 @@ def until(engine, condition, what):
         if condition(snapshot):
             return snapshot
         time.sleep(0.01)
-    pytest.fail(f"never came to pass: {what}; {engine.error}")
+    pytest.fail(f"did not happen: {what}; {engine.error}")
 
 
-def test_it_begins_paused_at_the_start_and_says_what_there_is(fresh):
+def test_it_starts_paused_with_a_description(fresh):
     snapshot = fresh.latest()
     assert snapshot.paused
     assert snapshot.frame == 0
@@ -78,7 +78,7 @@ def test_it_begins_paused_at_the_start_and_says_what_there_is(fresh):
     assert len(snapshot.pinned) == 9
 
 
-def test_it_computes_what_the_same_scene_gives_without_a_page(fresh):
+def test_it_computes_the_same_as_simulate(fresh):
     source = small_source()
     *_, last = sp.simulate(source.scene, source.solver, source.dt, 12)
     fresh.wait_for(fresh.send(Step(12)), TIMEOUT)
@@ -97,7 +97,7 @@ def test_play_runs_and_pause_stops(fresh):
     assert fresh.latest().frame == paused.frame
 
 
-def test_descriptions_and_snapshots_always_belong_together(fresh):
+def test_snapshots_always_match_their_description(fresh):
     fresh.send(Play())
     for k in range(10):
         fresh.send(AddBody("box", resolution=3, size=0.2, name=f"new {k}"))
@@ -110,7 +110,7 @@ def test_descriptions_and_snapshots_always_belong_together(fresh):
 
 
 class Gated:
-    """The reading end of a pipe that nobody reads until the gate is open."""
+    """The reading end of a pipe that is not read until the gate is open."""
 
     def __init__(self, pipe):
         self.pipe, self.gate, self.waiting = pipe, threading.Event(), threading.Event()
@@ -121,9 +121,9 @@ class Gated:
         return self.pipe.recv_bytes()
 
 
-def test_a_page_that_does_not_read_holds_up_nothing(fresh):
-    # Snapshots are of about 3 KiB and a pipe holds 64 KiB: a simulation that waited for its reader would stop after
-    # some twenty frames, and never skip one.
+def test_a_page_that_does_not_read_does_not_block_the_simulation(fresh):
+    # A snapshot has about 3 KiB, a pipe holds 64 KiB: a simulation that waits for its reader would stop after about
+    # twenty frames, and never skip one.
     pipe = fresh._snapshots
     fresh._snapshots = gated = Gated(pipe)
     try:
@@ -132,13 +132,13 @@ def test_a_page_that_does_not_read_holds_up_nothing(fresh):
         time.sleep(2.0)
         stale = fresh.latest().frame
         gated.gate.set()
-        until(fresh, lambda s: s.frame > stale + 40, "frames that were simulated while nobody looked")
+        until(fresh, lambda s: s.frame > stale + 40, "frames that were simulated without a reader")
     finally:
         gated.gate.set()
         fresh._snapshots = pipe
 
 
-def test_an_outbox_keeps_only_the_newest_and_never_blocks():
+def test_an_outbox_keeps_only_the_newest_snapshot_and_never_blocks():
     reader, writer = multiprocessing.Pipe(duplex=False)
     outbox = Outbox(writer)
     outbox.put_description("old")
@@ -155,7 +155,7 @@ def test_an_outbox_keeps_only_the_newest_and_never_blocks():
     assert received[-2:] == [(DESCRIPTION, "new"), (SNAPSHOT, (100, b""))]
 
 
-def test_ten_thousand_moves_at_once_are_one_move(fresh):
+def test_ten_thousand_moves_at_once_are_merged(fresh):
     began = fresh.latest().applied
     for k in range(10_000):
         assert fresh.send(MoveGrab(3, (0.0, 0.001 * k, 0.0)))
@@ -171,20 +171,20 @@ def test_only_commands_can_be_sent(fresh):
         fresh.send("__import__('os').system('true')")
 
 
-def test_a_scene_that_cannot_be_simulated_is_said_by_the_constructor():
+def test_the_constructor_refuses_a_scene_that_cannot_be_simulated():
     source = small_source()
     springs = sp.Body("springs", sp.shapes.box(), sp.EdgesAndVolume())
     with pytest.raises(SolverError, match="'springs'"):
         Engine(LiveSource("springs", sp.Scene([springs]), sp.Implicit(), source.dt))
 
 
-def test_a_function_inside_another_cannot_be_sent_and_the_mend_is_told():
+def test_a_local_function_cannot_be_sent_and_the_message_names_the_remedy():
     floor = sp.HalfSpace(motion=lambda t: (0.0, 0.1 * t, 0.0))
     with pytest.raises(SceneError, match="use Keyframes"):
         Engine(small_source(obstacles=[floor]))
 
 
-def test_killed_it_is_said_and_nothing_hangs():
+def test_a_killed_process_is_reported_and_nothing_blocks():
     engine = Engine(small_source())
     os.kill(engine._process.pid, signal.SIGKILL)
     end = time.monotonic() + TIMEOUT
@@ -201,8 +201,8 @@ def test_killed_it_is_said_and_nothing_hangs():
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends a signal")
-def test_ctrl_c_in_the_terminal_is_left_to_the_pages_process(fresh):
-    """It reaches both processes."""
+def test_the_simulation_process_ignores_ctrl_c(fresh):
+    """The signal reaches both processes."""
     fresh.send(Play())
     before = until(fresh, lambda s: s.frame >= 2, "2 frames")
     os.kill(fresh._process.pid, signal.SIGINT)
@@ -211,7 +211,7 @@ def test_ctrl_c_in_the_terminal_is_left_to_the_pages_process(fresh):
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks at /proc")
-def test_it_ends_when_the_pages_process_is_killed(tmp_path):
+def test_it_ends_when_the_process_of_the_page_is_killed(tmp_path):
     script = tmp_path / "page.py"
     script.write_text(
         textwrap.dedent("""

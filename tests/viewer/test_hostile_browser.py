@@ -1,4 +1,4 @@
-"""A served page with a live simulation behind it, and browsers that send anything: the simulation does not notice."""
+"""A live page and browsers that send arbitrary messages, without effect on the simulation."""
 
 import contextlib
 import random
@@ -49,7 +49,7 @@ def until_frame(engine, frame):
     return snapshot
 
 
-def test_malformed_messages_change_nothing_of_the_simulation(page, engine):
+def test_malformed_messages_do_not_change_the_simulation(page, engine):
     engine.send(Play())
     until_frame(engine, 2)
     for raw in MALFORMED.values():
@@ -58,7 +58,7 @@ def test_malformed_messages_change_nothing_of_the_simulation(page, engine):
     played = until_frame(engine, engine.latest().frame + 5)
     engine.wait_for(engine.send(Pause()), TIMEOUT)
     assert played.notices == ()
-    # It is the same simulation as without any browser: bit for bit.
+    # The simulation is bit for bit the same as without a browser.
     import supple as sp
 
     source = small_source()
@@ -66,18 +66,18 @@ def test_malformed_messages_change_nothing_of_the_simulation(page, engine):
     assert np.array_equal(engine.latest().positions, last.state.positions)
 
 
-def test_ten_tabs_that_never_read_and_vanish_hold_up_nothing(page, engine):
+def test_ten_tabs_that_never_read_do_not_block_the_server(page, engine):
     engine.send(Play())
     tabs = [dial(page) for _ in range(10)]
     for tab in tabs:
         tab.send(camera())
     until_frame(engine, 30)
     for tab in tabs:
-        tab.socket.close()  # without a farewell
+        tab.socket.close()  # without a closing handshake
     until_frame(engine, engine.latest().frame + 10)
 
 
-def test_well_formed_nonsense_for_every_input_of_the_panel_leaves_a_finite_state(page, engine):
+def test_random_valid_messages_to_every_input_leave_a_finite_state(page, engine):
     engine.send(Play())
     rng = random.Random(3)
     nonsense = [-1, 0, 1, 7, 1e300, -1e300, 2**60, True, False, None, "", "x" * 2000, [], [1, 2], {}, {"a": [1]}, "1e5"]

@@ -1,4 +1,4 @@
-"""The loop in the simulation's process, without the process: failures, slow motion, views, and a thousand commands."""
+"""The simulation loop without its process: failures, slow motion, views, and random commands."""
 
 import contextlib
 import dataclasses
@@ -28,7 +28,7 @@ from .conftest import Collected
 
 
 def with_solver_that(loop, step):
-    """The loop's scene with a solver that does `step` instead of simulating."""
+    """Replace the solver of the loop by one that calls `step`."""
 
     class Broken(type(loop.live.setup.solver)):
         def step(self, system, state, dt, workspace):
@@ -55,7 +55,7 @@ def crashes(state):
 
 
 @pytest.mark.parametrize("failure", [not_finite, silently_not_finite, refuses, crashes])
-def test_a_step_that_fails_pauses_at_the_last_good_state_and_says_why(loop, failure):
+def test_a_failed_step_pauses_at_the_last_good_state_with_a_notice(loop, failure):
     loop.execute(messages.Play())
     loop.step()
     good = loop.live.state
@@ -87,7 +87,7 @@ def stubborn(state):
 
 
 @pytest.mark.parametrize("endless", [endless, stubborn])
-def test_a_step_that_does_not_end_is_given_up(loop, endless):
+def test_an_endless_step_is_given_up(loop, endless):
     loop.watch.longest = 0.2
     loop.execute(messages.Play())
     good, solver = loop.live.state, loop.live.setup.solver
@@ -102,8 +102,8 @@ def test_a_step_that_does_not_end_is_given_up(loop, endless):
     assert loop.live.frame == 1
 
 
-def test_a_step_is_given_up_at_no_other_place_than_the_solvers_interruption_points(loop):
-    """A setting of the process, here a number of threads, is not left changed, even where no `try` restores it."""
+def test_a_step_is_interrupted_only_at_interruption_points(loop):
+    """A setting of the process, here the number of threads, is restored also where a solver has no `try` block."""
     import numba
 
     before, ended = numba.get_num_threads(), []
@@ -129,7 +129,7 @@ def test_a_step_is_given_up_at_no_other_place_than_the_solvers_interruption_poin
 
 
 @pytest.mark.parametrize("solver", [sp.XPBD(), sp.Implicit()], ids=["xpbd", "implicit"])
-def test_every_solver_can_be_given_up(loop, solver):
+def test_every_solver_can_be_interrupted(loop, solver):
     import numba
 
     loop.live.adopt(dataclasses.replace(loop.live.setup, solver=solver))
@@ -144,12 +144,12 @@ def test_every_solver_can_be_given_up(loop, solver):
     assert loop.live.frame == 1
 
 
-def test_compiling_kernels_is_no_part_of_a_step(loop):
-    """On a machine where a solver was never used, its first step takes long, and is not given up for that."""
+def test_compilation_of_kernels_is_not_part_of_a_step(loop):
+    """The first step of a solver on a new machine takes long, and must not be given up."""
     import numba
 
     def compiles(state):
-        # Each is compiled anew, for half a second or more in all.
+        # A new kernel each time, for half a second or more in total.
         began, compiled = time.monotonic(), 0
         while time.monotonic() - began < 0.5:
             kernel = numba.njit(lambda x, y=compiled: np.sort(x)[::-1].sum() + y)
@@ -166,7 +166,7 @@ def test_compiling_kernels_is_no_part_of_a_step(loop):
     assert loop.playing
 
 
-def test_who_asks_for_a_pause_does_not_wait_for_a_long_step(loop):
+def test_a_request_to_pause_interrupts_a_long_step(loop):
     loop.watch.longest_awaited = 0.1
     loop.execute(messages.Play())
     with_solver_that(loop, endless)
@@ -178,7 +178,7 @@ def test_who_asks_for_a_pause_does_not_wait_for_a_long_step(loop):
     assert not loop.playing
 
 
-def test_what_cannot_be_done_becomes_a_notice_and_play_goes_on(loop):
+def test_impossible_commands_become_notices_and_play_continues(loop):
     loop.execute(messages.Play())
     loop.execute(messages.RemoveBody("ghost"))
     loop.execute(messages.SetParameter("edge_compliance", 0.1))
@@ -198,7 +198,7 @@ def test_steps_are_simulated_without_waiting_for_the_clock(loop):
     assert loop.steps_left == 0
 
 
-def test_steps_that_come_at_once_all_count_and_none_outlives_a_reset(loop):
+def test_all_steps_count_until_a_reset(loop):
     loop.inbox.put_all(enumerate([messages.Step(), messages.Step(), messages.Step(2)], 1))
     for _ in range(6):
         loop.run_once(0.0)
@@ -209,7 +209,7 @@ def test_steps_that_come_at_once_all_count_and_none_outlives_a_reset(loop):
     assert loop.live.frame == 0
 
 
-def test_slow_motion_shows_states_between_two_steps(loop):
+def test_slow_motion_interpolates_states(loop):
     loop.execute(messages.SetSpeed(0.1))
     loop.execute(messages.Play())
     loop.step()
@@ -224,7 +224,7 @@ def test_slow_motion_shows_states_between_two_steps(loop):
     assert loop.snapshot(due - 0.5 * loop._interval()).positions is after.positions
 
 
-def test_a_view_decides_what_a_snapshot_holds(loop):
+def test_a_snapshot_contains_what_the_view_requests(loop):
     for _ in range(20):
         loop.live.step()
     plain = loop.snapshot(0.0)
@@ -243,7 +243,7 @@ def fails(*_):
     raise RuntimeError("a mistake in the library")
 
 
-def test_what_cannot_be_computed_for_the_view_is_told_and_the_simulation_goes_on(loop, monkeypatch):
+def test_a_failed_view_value_becomes_a_notice_and_the_simulation_continues(loop, monkeypatch):
     loop.execute(messages.Play())
     loop.execute(messages.SetView("J", contacts=True))
     monkeypatch.setattr(simulation_loop, "contact_points", fails)
@@ -263,7 +263,7 @@ def test_what_cannot_be_computed_for_the_view_is_told_and_the_simulation_goes_on
 
 
 @pytest.mark.parametrize("function", ["measures", "describe"])
-def test_a_snapshot_that_cannot_be_made_pauses_and_tells_why_once(loop, monkeypatch, function):
+def test_a_failed_snapshot_pauses_with_one_notice(loop, monkeypatch, function):
     loop.publish(0.0)
     monkeypatch.setattr(simulation_loop, function, fails)
     loop.execute(messages.Play())
@@ -284,7 +284,7 @@ def test_a_snapshot_that_cannot_be_made_pauses_and_tells_why_once(loop, monkeypa
     assert loop.outbox.descriptions[-1].revision == loop.live.revision
 
 
-def test_what_the_library_warns_of_is_told_once(loop):
+def test_each_warning_becomes_one_notice(loop):
     log = logging.getLogger("supple.somewhere")
     with loop.warnings_as_notices():
         for _ in range(3):
@@ -307,14 +307,14 @@ class TestPacing:
             pacing.stepped(now, seconds_per_step, dt, speed)
         return pacing.timing(now, speed, True)
 
-    def test_a_quick_simulation_runs_in_real_time(self):
+    def test_a_fast_simulation_runs_in_real_time(self):
         timing = self.paced(0.002)
         assert timing.real_time_ratio == pytest.approx(1.0, abs=0.03)
         assert timing.frames_per_second == pytest.approx(60.0, abs=2.0)
         assert timing.step_ms == pytest.approx(2.0)
         assert timing.keeps_up
 
-    def test_a_slow_one_says_so(self):
+    def test_a_slow_simulation_is_reported(self):
         timing = self.paced(0.05)
         assert timing.real_time_ratio == pytest.approx(1 / 3, abs=0.02)
         assert timing.frames_per_second == pytest.approx(20.0, abs=1.0)
@@ -325,7 +325,7 @@ class TestPacing:
         assert timing.real_time_ratio == pytest.approx(0.1, abs=0.02)
         assert timing.keeps_up
 
-    def test_after_a_stall_time_does_not_race(self):
+    def test_after_a_delay_only_one_step_is_compensated(self):
         pacing = Pacing()
         pacing.start(0.0)
         pacing.stepped(0.01, 0.01, 1 / 60, 1.0)
@@ -352,7 +352,7 @@ HOSTILE = [
 
 
 def random_command(rng, bodies, solvers=("xpbd",)):
-    """A command of any kind, with sensible or hostile values: None where it could not be made."""
+    """A command of any kind, with valid or hostile values; None where it is refused."""
     body = rng.choice([*bodies, "ghost"])
     point = tuple(rng.choice([rng.uniform(-2, 2), rng.uniform(-1e4, 1e4)]) for _ in range(3))
     parameter = rng.choice(list(messages.PARAMETERS.values()))
@@ -388,14 +388,14 @@ def random_command(rng, bodies, solvers=("xpbd",)):
             lambda: messages.RemoveBody(body),
         ]
     )
-    if rng.random() < 0.2:  # spoil one value
+    if rng.random() < 0.2:  # make one value invalid
         good = made()
         names = [field.name for field in dataclasses.fields(good)]
         if not names:
             return good
-        spoilt = {name: getattr(good, name) for name in names} | {rng.choice(names): rng.choice(HOSTILE)}
+        changed = {name: getattr(good, name) for name in names} | {rng.choice(names): rng.choice(HOSTILE)}
         try:
-            return type(good)(**spoilt)
+            return type(good)(**changed)
         except CommandError:
             return None
     return made()
@@ -405,10 +405,10 @@ def test_a_thousand_random_commands_leave_a_finite_state(loop, monkeypatch, capl
     monkeypatch.setattr(limits, "MOST_BODIES", 4)
     monkeypatch.setattr(limits, "MOST_TETS", 900)
     rng = random.Random(20240229)
-    refused = play_with(loop, rng, 1000, ["xpbd"])
+    refused = run_random_commands(loop, rng, 1000, ["xpbd"])
     assert refused > 50
     assert loop.live.generation > 20
-    # Nothing went wrong that was not foreseen: unforeseen exceptions are logged.
+    # Only unexpected exceptions are logged.
     assert [record.message for record in caplog.records if record.levelname == "ERROR"] == []
     assert loop.snapshot(0.0).measures.status in set(Status)
 
@@ -419,12 +419,12 @@ def test_random_commands_to_the_implicit_solver_leave_a_finite_state(caplog):
     source = LiveSource("cube", sp.Scene([cube], [sp.HalfSpace()]), sp.Implicit(max_substeps=4), 1 / 60)
     loop = SimulationLoop(LiveScene(source), CommandQueue(), Collected())
     loop.watch.longest = 0.2
-    play_with(loop, random.Random(5), 80, ["xpbd", "implicit"])
+    run_random_commands(loop, random.Random(5), 80, ["xpbd", "implicit"])
     assert [record.message for record in caplog.records if record.levelname == "ERROR"] == []
 
 
-def play_with(loop, rng, count, solvers):
-    """Give random commands to a loop, one a turn. Returns how many could not even be made."""
+def run_random_commands(loop, rng, count, solvers):
+    """Send random commands to a loop, one in each run. Returns how many were refused."""
     refused = 0
     for number in range(count):
         bodies = [part.name for part in loop.live.system.bodies]
@@ -433,7 +433,7 @@ def play_with(loop, rng, count, solvers):
             refused += 1
         else:
             loop.inbox.put(number, command)
-        loop.pacing.due = 0.0  # never wait for the clock
+        loop.pacing.due = 0.0  # do not wait for the clock
         loop.run_once(0.0)
         state = loop.live.state
         assert np.isfinite(state.positions).all()

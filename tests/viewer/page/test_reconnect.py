@@ -1,4 +1,4 @@
-"""A page whose server goes away says so, and goes on when it is back."""
+"""A page displays that its server has ended, and reconnects to a new one."""
 
 import os
 
@@ -14,8 +14,8 @@ def serve(port, simulation):
     return server, LivePage(server, simulation, simulation.snapshot)
 
 
-def test_the_server_goes_and_comes_back(fake, look, spot):
-    # Not any free port: those that the system hands out may be another's by the time the server comes back.
+def test_the_page_reconnects_to_a_restarted_server(fake, look, spot):
+    # Not a port that the system selects: another process may use it before the server restarts.
     server, page = serve(first_free_port("127.0.0.1", 20_000 + 50 * (os.getpid() % 200)), fake)
     screen = look(f"http://127.0.0.1:{server.get_port()}", server)
     connected = screen.tab.get_by_text("Connected", exact=True)
@@ -25,10 +25,10 @@ def test_the_server_goes_and_comes_back(fake, look, spot):
     stop_server(server)
     screen.wait(lambda: screen.tab.get_by_text("Connecting...").count() == 1, "word that the server is gone")
     assert connected.count() == 0
-    # What was seen last stays.
+    # The last picture stays.
     assert spot(screen.shot(), "red")[0] > 100
     before = spot(screen.shot(), "red")[1]
-    fake.show(positions=fake.snapshot.positions[::-1].copy())  # the bodies change places
+    fake.show(positions=fake.snapshot.positions[::-1].copy())  # the bodies exchange their positions
     server, page = serve(port, fake)
     try:
         assert server.get_port() == port

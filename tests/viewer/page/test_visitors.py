@@ -1,4 +1,4 @@
-"""Many visitors, slow visitors: nobody holds up the page, nothing piles up."""
+"""Many and slow visitors: they do not block the page, and no queue grows."""
 
 import threading
 import time
@@ -11,7 +11,7 @@ import supple as sp
 
 @pytest.fixture
 def busy(server, fake):
-    """A page of a simulation that has something new all the time."""
+    """A page of a simulation that sends new snapshots all the time."""
     from supple.viewer.live_page import LivePage
 
     page, end = LivePage(server, fake, fake.snapshot), threading.Event()
@@ -29,7 +29,7 @@ def busy(server, fake):
     page.stop()
 
 
-def test_a_visitor_that_takes_nothing_holds_up_nobody(busy, server, visit, until):
+def test_a_visitor_who_never_reads_does_not_block_others(busy, server, visit, until):
     stuck = visit(server.get_port(), reads=False)
     others = [visit(server.get_port()) for _ in range(9)]
     until(lambda: len(server.get_clients()) == 10)
@@ -43,13 +43,13 @@ def test_a_visitor_that_takes_nothing_holds_up_nobody(busy, server, visit, until
         return served and busy.controller.snapshot.frame > before + 50 and len(kept) > 50
 
     until(well, 60.0)
-    # For the one that takes nothing, the newest of everything is kept, and nothing else.
+    # For the visitor who never reads, only the newest values are kept.
     assert max(kept) <= min(kept) + 20
     for visitor in (stuck, *others):
         visitor.leave()
 
 
-def test_the_page_asks_less_of_a_server_that_lags(server, until, monkeypatch):
+def test_the_frame_rate_decreases_where_the_server_falls_behind(server, until, monkeypatch):
     from supple.viewer.drawing import frame_rate as frame_rate_module
     from supple.viewer.drawing.frame_rate import FASTEST, FrameRate
 
@@ -66,8 +66,8 @@ def test_the_page_asks_less_of_a_server_that_lags(server, until, monkeypatch):
     time.sleep(0.1)
     free.set()
     until(frame_rate.may_send)
-    assert frame_rate.interval >= 0.2  # that it had to wait for the server counts as much as drawing
-    # Slow to speed up: each picture that the server takes at once counts for 0.3.
+    assert frame_rate.interval >= 0.2  # the delay of the server counts like drawing
+    # The rate increases slowly: each picture without delay has the weight 0.3.
     clock = time.monotonic()
     monkeypatch.setattr(frame_rate_module.time, "monotonic", lambda: clock)
     intervals = []
@@ -78,8 +78,8 @@ def test_the_page_asks_less_of_a_server_that_lags(server, until, monkeypatch):
     assert intervals[-1] == FASTEST
 
 
-def test_fine_skins_are_carried_at_once(fake):
-    """What is done for every picture: 100k vertices, in bounded work per vertex and without a Python loop."""
+def test_fine_skins_follow_their_tets_without_a_python_loop(fake):
+    """The work for every picture: 100k vertices, with bounded work for each and without a Python loop."""
     from supple.mesh.skin import Embedding
     from supple.output.recording.skinned_surface import SkinnedSurface
 

@@ -1,4 +1,4 @@
-"""The panel and the mouse, over a real line to the server: what visitors do becomes commands."""
+"""The panel and the mouse, with a real websocket: input of visitors becomes commands."""
 
 import random
 import time
@@ -37,7 +37,7 @@ from supple.viewer.protocol.messages import (
 
 @pytest.fixture
 def received(fake, until):
-    """The command that comes next."""
+    """Returns the next command."""
 
     def next_command():
         until(lambda: fake.received, what="a command")
@@ -62,7 +62,7 @@ def test_time(live, fake, visitor, received, until):
     assert received() == SetSpeed(0.25)
 
 
-def test_the_page_says_when_the_simulation_is_slow_or_gone(live, fake, until):
+def test_the_page_displays_that_the_simulation_is_slow_or_has_ended(live, fake, until):
     message = lambda: live.panel.time._message.content  # noqa: E731
     fake.show(paused=False, timing=Timing(40.0, 25.0, 0.42, keeps_up=False))
     until(lambda: "Too slow for real time" in message() and "0.42 of real time" in message() and "40.0 ms" in message())
@@ -70,7 +70,7 @@ def test_the_page_says_when_the_simulation_is_slow_or_gone(live, fake, until):
     until(lambda: "has ended" in message() and "out of memory" in message())
 
 
-def test_the_page_says_when_nothing_is_heard_of_the_simulation(live, fake, until, monkeypatch):
+def test_the_page_displays_that_the_simulation_is_busy(live, fake, until, monkeypatch):
     message = lambda: live.panel.time._message.content  # noqa: E731
     monkeypatch.setattr(live_page, "_SILENT_AFTER", 0.05)
     fake.show(time=1.25)
@@ -80,7 +80,7 @@ def test_the_page_says_when_nothing_is_heard_of_the_simulation(live, fake, until
     until(lambda: "t = 2.50 s" in message() and "Busy" not in message())
 
 
-def test_solver_and_its_numbers(live, fake, visitor, received, until):
+def test_solver_and_its_parameters(live, fake, visitor, received, until):
     solver = live.panel.solver
     assert list(solver.inputs) == ["substeps", "momentum_restore", "gravity"]
     visitor.set(solver.kind, "implicit")
@@ -91,7 +91,7 @@ def test_solver_and_its_numbers(live, fake, visitor, received, until):
     assert received() == SetParameter("momentum_restore", False)
     visitor.set(solver.inputs["gravity"].handle, -1.5)
     assert received() == SetParameter("gravity", -1.5)
-    # Another solver has other numbers.
+    # Another solver has other parameters.
     description = replace(fake.snapshot.description, revision=2, solver="implicit", values={"gravity": -3.0})
     fake.show(description=description)
     until(lambda: list(solver.inputs) == ["gravity"])
@@ -99,12 +99,12 @@ def test_solver_and_its_numbers(live, fake, visitor, received, until):
     assert solver.inputs["gravity"].handle.value == -3.0
 
 
-def test_numbers_of_bodies(live, fake, visitor, received, until):
+def test_parameters_of_bodies(live, fake, visitor, received, until):
     bodies = live.panel.bodies
     visitor.set(bodies.inputs["youngs"].handle, 6.0)
     assert received() == SetParameter("youngs", 1e6)
     until(lambda: "1 MPa" in bodies.inputs["youngs"].handle.label)
-    visitor.set(bodies.inputs["damping"].handle, -12.0)  # the left end: it is there already
+    visitor.set(bodies.inputs["damping"].handle, -12.0)  # the left end: the value does not change
     visitor.set(bodies.which, "body 1")
     until(lambda: bodies.change.visible)
     assert fake.received == []
@@ -116,7 +116,7 @@ def test_numbers_of_bodies(live, fake, visitor, received, until):
     assert received() == SetParameter("poisson", 0.25, "body 1")
 
 
-def test_bodies_come_and_go(live, fake, visitor, received, until):
+def test_bodies_are_added_copied_and_removed(live, fake, visitor, received, until):
     bodies = live.panel.bodies
     visitor.set(bodies.squash, "squash")
     assert received() == Squash(0.5)
@@ -142,7 +142,7 @@ def test_bodies_come_and_go(live, fake, visitor, received, until):
     assert bodies.which.value == "all bodies"
 
 
-def test_values_follow_the_simulation_but_not_under_the_hand(live, fake, visitor, received, until, monkeypatch):
+def test_inputs_follow_the_simulation_unless_a_value_is_pending(live, fake, visitor, received, until, monkeypatch):
     old = fake.snapshot.description
     changed = replace(old, revision=2, values=old.values | {"substeps": 33})
     fake.show(description=changed)
@@ -151,16 +151,16 @@ def test_values_follow_the_simulation_but_not_under_the_hand(live, fake, visitor
     visitor.set(substeps.handle, 50)
     received()
     displayed = lambda snapshot: until(lambda: live.panel._numbers_of is snapshot)  # noqa: E731
-    # The command has not been acted upon yet, however long that takes: a step may be long.
+    # The command has not been executed yet: a step may be long.
     monkeypatch.setattr("supple.viewer.controls.pending._KEEP_SECONDS", 0.0)
     displayed(fake.show())
     assert substeps.handle.value == 50
-    # Now it has been, and came to nothing.
+    # Now it has been executed, without effect.
     fake.show(applied=fake.sent)
     until(lambda: substeps.handle.value == 33)
 
 
-def test_a_choice_of_solver_stands_until_it_is_answered(live, fake, visitor, received, until, monkeypatch):
+def test_a_selected_solver_is_pending_until_its_command_is_executed(live, fake, visitor, received, until, monkeypatch):
     monkeypatch.setattr("supple.viewer.controls.pending._KEEP_SECONDS", 0.0)
     solver = live.panel.solver
     visitor.set(solver.kind, "implicit")
@@ -168,37 +168,37 @@ def test_a_choice_of_solver_stands_until_it_is_answered(live, fake, visitor, rec
     snapshot = fake.show()
     until(lambda: live.panel._numbers_of is snapshot)
     assert solver.kind.value == "implicit"
-    fake.show(applied=fake.sent)  # it was refused
+    fake.show(applied=fake.sent)  # the command failed
     until(lambda: solver.kind.value == "xpbd")
     visitor.set(solver.kind, "implicit")
     assert received() == SetSolver("implicit")
 
 
-def test_clicks_that_come_at_once_are_taken_one_by_one(live, visitor, fake, until):
-    """Each is what it was, whatever was clicked right after it."""
+def test_simultaneous_clicks_are_handled_in_order(live, visitor, fake, until):
+    """A later click does not change an earlier one."""
     time_controls, bodies = live.panel.time, live.panel.bodies
     youngs = bodies.inputs["youngs"].handle
     for k in range(20):
         visitor.set(time_controls.frames, "step" if k % 2 else "reset")
         visitor.set(bodies.squash, "stretch" if k % 2 else "squash")
         visitor.set(youngs, 5.0 + 0.1 * k)
-    until(lambda: len(fake.received) >= 59)  # the first modulus is there already
+    until(lambda: len(fake.received) >= 59)  # the first modulus does not change
     assert [command for command in fake.received if isinstance(command, (Step, Reset))] == [Reset(), Step()] * 10
     assert [command for command in fake.received if isinstance(command, Squash)] == [Squash(0.5), Squash(1.5)] * 10
     moduli = [command.value for command in fake.received if isinstance(command, SetParameter)]
     np.testing.assert_allclose(moduli, 10.0 ** (5.0 + 0.1 * np.arange(1, 20)))
 
 
-def test_a_drag_ends_whatever_the_mouse_does_by_then(live, visitor, received, until):
+def test_a_drag_ends_in_any_mode_of_the_mouse(live, visitor, received, until):
     handle, x = live.stage.body_handles[0], live.stage.moment.positions[0]
     visitor.drag(handle, "start", x, x)
     grab = received()
-    visitor.set(live.panel.mouse_controls.mode, "push")  # by anyone
+    visitor.set(live.panel.mouse_controls.mode, "push")  # by any visitor
     visitor.drag(handle, "end", x, x)
     assert received() == ReleaseGrab(grab.grab)
 
 
-def test_a_drag_is_a_spring_that_is_let_go(live, visitor, received):
+def test_a_drag_is_a_grab_with_release(live, visitor, received):
     handle = live.stage.body_handles[0]
     x = live.stage.moment.positions[live.stage.model.bodies[0].vertices]
     corner = int(np.argmax(x.sum(axis=1)))
@@ -215,7 +215,7 @@ def test_a_drag_is_a_spring_that_is_let_go(live, visitor, received):
     assert received() == ReleaseGrab(grab.grab)
 
 
-def test_who_leaves_lets_go(live, server, visit, received, until):
+def test_a_visitor_who_leaves_releases_the_grab(live, server, visit, received, until):
     visitor = visit(server.get_port())
     until(server.get_clients)
     handle, x = live.stage.body_handles[0], live.stage.moment.positions[0]
@@ -242,7 +242,7 @@ def test_a_click_pins_and_unpins(live, fake, visitor, received, until):
     assert received() == Unpin()
 
 
-def test_the_ball_follows_the_pointer(live, server, visitor, received, until):
+def test_the_pusher_follows_the_pointer(live, server, visitor, received, until):
     controls = live.panel.mouse_controls
     visitor.set(controls.mode, "push")
     until(lambda: live.panel.mouse._backdrop is not None)
@@ -258,7 +258,7 @@ def test_the_ball_follows_the_pointer(live, server, visitor, received, until):
     assert first.radius == pytest.approx(0.2)
     np.testing.assert_allclose(first.center, (0.0, 0.0, middle[2]), atol=1e-9)
     np.testing.assert_allclose(second.center, (11.0 * (5.0 + middle[2]) / 55.0, 0.0, middle[2]), atol=1e-9)
-    # On a body it starts before it, as seen from the camera.
+    # On a body it starts in front of it.
     handle, touched = live.stage.body_handles[0], live.stage.moment.positions[0]
     visitor.drag(backdrop, "end", (0.0, 0.0, 50.0), (11.0, 0.0, 50.0))
     visitor.drag(handle, "start", touched, touched)
@@ -270,7 +270,7 @@ def test_the_ball_follows_the_pointer(live, server, visitor, received, until):
     until(lambda: "/backdrop" not in server.scene._handle_from_node_name)
 
 
-def test_what_is_looked_at_is_asked_for(live, visitor, received, until):
+def test_the_view_options_request_values(live, visitor, received, until):
     views = live.panel.views
     visitor.set(views.color_by, "von Mises stress")
     assert received() == SetView("von_mises")
@@ -284,7 +284,7 @@ def test_what_is_looked_at_is_asked_for(live, visitor, received, until):
     until(lambda: live.stage.options.surface == "wireframe")
 
 
-def test_choices_made_at_once_are_all_taken(live, visitor, until):
+def test_simultaneous_view_options_all_take_effect(live, visitor, until):
     views = live.panel.views
     for k in range(20):
         surface, color = ("tets", "energy density") if k % 2 else ("skin", "body")
@@ -301,12 +301,12 @@ def test_choices_made_at_once_are_all_taken(live, visitor, until):
 @pytest.mark.parametrize(
     ("preset", "ahead"), [("top", (0.0, -1.0, 0.0)), ("corner", None), ("front", None), ("side", None)]
 )
-def test_camera_presets_look_at_everything(live, server, visitor, until, preset, ahead):
+def test_the_whole_scene_is_visible_from_camera_presets(live, server, visitor, until, preset, ahead):
     view, camera = live.stage.model.view, next(iter(server.get_clients().values())).camera
     visitor.set(live.panel.views.camera, preset)
 
     def axis():
-        """The camera's third axis, which it looks along."""
+        """The viewing direction of the camera."""
         w, x, y, z = camera.wxyz
         return np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
 
@@ -319,12 +319,12 @@ def test_camera_presets_look_at_everything(live, server, visitor, until, preset,
     until(lambda: np.linalg.norm(camera.position) > 3.0 and looks_there())
     looks = np.asarray(camera.look_at) - np.asarray(camera.position)
     angle = np.arcsin(view.radius / np.linalg.norm(looks))
-    assert angle < 0.5 * np.radians(35.0)  # all of it is in the picture
+    assert angle < 0.5 * np.radians(35.0)  # the whole scene is in the picture
     if ahead is not None:
         np.testing.assert_allclose(looks / np.linalg.norm(looks), ahead, atol=2e-3)
 
 
-def test_notices_are_shown_once(live, server, fake, visitor, until, monkeypatch):
+def test_notices_are_displayed_once(live, server, fake, visitor, until, monkeypatch):
     displayed = []
     client = next(iter(server.get_clients().values()))
     monkeypatch.setattr(client, "add_notification", lambda title, text, **_: displayed.append(text))
@@ -339,7 +339,7 @@ def test_notices_are_shown_once(live, server, fake, visitor, until, monkeypatch)
 
 
 def test_a_thousand_random_events(live, server, fake, visit, until, caplog, capfd):
-    """Three visitors do anything at all, also what no page would let them; the page stays well."""
+    """Three visitors send random events, also events that no page would send; the page continues."""
     visitors = [visit(server.get_port()) for _ in range(3)]
     until(lambda: len(server.get_clients()) == 3)
     rng = random.Random(3)
@@ -383,7 +383,7 @@ def test_a_thousand_random_events(live, server, fake, visit, until, caplog, capf
         if k % 100 == 0:
             grabs = (GrabState(1, "body 0", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),) if rng.random() < 0.5 else ()
             fake.show(grabs=grabs, time=0.01 * k)
-    # All of it has been dealt with once what was said last has come through; another visitor may have been faster.
+    # All events have been handled once the last value has arrived; another visitor may have been faster.
     factors = iter(np.linspace(0.2, 0.9, 1000))
 
     def heard(visitor, message):

@@ -1,4 +1,4 @@
-"""Files over the line to the server: what the button asks for gets through, and nothing else."""
+"""Uploads to the server: only files for the button are accepted."""
 
 import html
 import threading
@@ -21,7 +21,7 @@ PART = limits.UPLOAD_PART
 
 @pytest.fixture
 def heard(live, server, visitor, monkeypatch):
-    """The lines that the visitor is shown."""
+    """The notifications of the visitor."""
     lines = []
     client = next(iter(server.get_clients().values()))
     monkeypatch.setattr(client, "add_notification", lambda title, text, **_: lines.append(text))
@@ -30,7 +30,7 @@ def heard(live, server, visitor, monkeypatch):
 
 @pytest.fixture
 def meshed(monkeypatch):
-    """The files that get as far as the mesher, of which there is none here."""
+    """The files that reach the mesher, which is replaced."""
     files = []
     box = sp.shapes.box(divisions=(1, 1, 1))
 
@@ -64,7 +64,7 @@ def give(visitor, live, content, index=0, **changes):
     visitor.send("FileTransferPart", **fields | changes)
 
 
-def test_a_file_becomes_a_command(live, fake, visitor, meshed, heard, until):
+def test_an_upload_becomes_a_command(live, fake, visitor, meshed, heard, until):
     visitor.set(live.panel.bodies.size, 0.75)
     visitor.set(live.panel.bodies.youngs, 6.0)
     content = bytes(range(256)) * 5000  # three parts
@@ -82,7 +82,7 @@ def test_a_file_becomes_a_command(live, fake, visitor, meshed, heard, until):
     until(lambda: not live.panel.upload._busy.locked())
 
 
-def test_what_is_wrong_with_it_is_said_and_the_page_goes_on(live, fake, visitor, meshed, heard, until, monkeypatch):
+def test_an_error_in_a_file_is_displayed_and_the_page_continues(live, fake, visitor, meshed, heard, until, monkeypatch):
     working, go_on = threading.Event(), threading.Event()
 
     def mesh(upload, notify, stop):
@@ -96,7 +96,7 @@ def test_what_is_wrong_with_it_is_said_and_the_page_goes_on(live, fake, visitor,
     give(visitor, live, b"abc")
     assert working.wait(20.0)
     assert "being meshed, 3 s" in live.panel.upload._message.content
-    # Meanwhile everything else works, but for a second file.
+    # Meanwhile all other functions work, except a second upload.
     announce(visitor, live, b"abc", transfer_uuid="two")
     give(visitor, live, b"abc", transfer_uuid="two")
     until(lambda: heard and "another file is being meshed" in heard[0])
@@ -122,18 +122,18 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_is_announced_is_checked(live, fake, visitor, meshed, heard, until, name):
+def test_announcements_are_checked(live, fake, visitor, meshed, heard, until, name):
     changes, text = REFUSED[name]
     announce(visitor, live, b"abc", **changes)
     until(lambda: heard and text in heard[0])
-    give(visitor, live, b"abc")  # what comes all the same is passed over
+    give(visitor, live, b"abc")  # further parts are ignored
     visitor.press(live.panel.time.play)
     until(lambda: fake.received)
     assert meshed == []
 
 
 @pytest.mark.parametrize("changes", [{"part_index": 1}, {"content": b"abcd"}, {"content": b""}, {"part_index": -1}])
-def test_parts_that_do_not_fit_end_the_transfer(live, fake, visitor, meshed, heard, until, changes):
+def test_invalid_parts_end_the_transfer(live, fake, visitor, meshed, heard, until, changes):
     announce(visitor, live, b"abc")
     give(visitor, live, **{"content": b"abc"} | changes)
     until(lambda: heard and "damaged" in heard[0])
@@ -143,7 +143,7 @@ def test_parts_that_do_not_fit_end_the_transfer(live, fake, visitor, meshed, hea
     assert meshed == []
 
 
-def test_other_inputs_take_no_files_and_nothing_is_kept(live, server, fake, visitor, meshed, until):
+def test_other_inputs_accept_no_files_and_nothing_is_kept(live, server, fake, visitor, meshed, until):
     speed = live.panel.time.speed
     announce(visitor, live, b"abc", source_component_uuid=speed._impl.uuid)
     give(visitor, live, b"abc", source_component_uuid=speed._impl.uuid)
@@ -154,13 +154,13 @@ def test_other_inputs_take_no_files_and_nothing_is_kept(live, server, fake, visi
     assert speed.value == 1.0
     assert server.gui._current_file_upload_states == {}
     assert len(live.panel.upload.transfers._running) == 1
-    # Who leaves takes it along.
+    # It ends with its visitor.
     visitor.leave()
     until(lambda: not live.panel.upload.transfers._running)
     assert meshed == []
 
 
-def test_only_so_many_come_in_at_once(live, server, visit, meshed, until, monkeypatch):
+def test_the_number_of_simultaneous_uploads_is_limited(live, server, visit, meshed, until, monkeypatch):
     monkeypatch.setattr(limits, "MOST_UPLOADS", 2)
     visitors = [visit(server.get_port()) for _ in range(3)]
     until(lambda: len(server.get_clients()) == 3)
@@ -171,7 +171,7 @@ def test_only_so_many_come_in_at_once(live, server, visit, meshed, until, monkey
         announce(visitor, live, b"abc")
     until(lambda: texts)
     assert "2 files are being uploaded already" in texts[0]
-    # One that gets no further makes room.
+    # A transfer without progress is given up.
     monkeypatch.setattr(limits, "UPLOAD_TIMEOUT", -1.0)
     announce(visitors[2], live, b"abc")
     give(visitors[2], live, b"abc")
@@ -180,7 +180,7 @@ def test_only_so_many_come_in_at_once(live, server, visit, meshed, until, monkey
         visitor.leave()
 
 
-def test_a_page_that_is_closed_ends_what_it_reads(live, visitor, until, monkeypatch):
+def test_closing_the_page_stops_an_upload(live, visitor, until, monkeypatch):
     ended = threading.Event()
 
     def mesh(upload, notify, stop):
@@ -217,7 +217,7 @@ def test_names_of_files_and_bodies(file, displayed, body):
 @pytest.mark.parametrize(
     "text", ["<script>alert(1)</script>", "{1 + 1}", "![x](http://a.example/x.png)", "**a** `b` | # c"]
 )
-def test_text_from_elsewhere_is_text(text):
+def test_text_is_escaped_for_markdown(text):
     marked = plain(text)
     assert html.unescape(marked) == text
     assert not set(marked) & set('<>{}[]!*`|"\\_~')

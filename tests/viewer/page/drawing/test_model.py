@@ -1,4 +1,4 @@
-"""What the page draws: from snapshots and from recordings."""
+"""The data that the page draws, from snapshots and from recordings."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from supple.viewer.drawing.moments.from_snapshot import MomentBuilder
 from supple.viewer.drawing.moments.model import facets_of
 
 
-def test_every_facet_is_found_once_and_the_outer_ones_are_the_surface():
+def test_every_facet_is_found_once_and_outer_facets_are_the_surface():
     mesh = sp.shapes.box(size=(1.0, 1.0, 1.0), divisions=(3, 2, 2))
     facets = facets_of(mesh.tets)
     outer = facets.triangles[facets.outer < 0]
@@ -34,11 +34,11 @@ def test_a_snapshot_becomes_a_moment(fake):
     np.testing.assert_array_equal(moment.tet_values["J"], values)
     np.testing.assert_allclose(np.linalg.det(moment.deformation_gradients), 1.0)
     np.testing.assert_array_equal(moment.poses[0], np.eye(4)[:3])
-    # Of the same generation: the same model, so that nothing is built anew.
+    # The same generation has the same model, so that no layer is created again.
     assert translator.moment(fake.show()).model is moment.model
 
 
-def test_the_ball_of_the_mouse_does_not_make_the_picture_anew(fake):
+def test_the_pusher_does_not_create_a_new_model(fake):
     from dataclasses import replace
 
     from supple.viewer.protocol.messages import ObstacleDescription
@@ -81,7 +81,7 @@ def test_a_skin_follows_the_tets_of_its_body(fake):
     np.testing.assert_allclose(drawn, fine * [1.0, 2.0, 1.0] + [0.0, 1.0, 0.0], atol=1e-12)
 
 
-def test_materials_are_read_from_the_text_of_recordings_and_nothing_is_run():
+def test_materials_are_read_from_text_and_nothing_is_executed():
     made = material_from_text(repr(sp.StableNeoHookean(youngs=1e4, poisson=0.4, density=900.0)))
     assert (made.youngs, made.poisson, made.density) == (1e4, 0.4, 900.0)
     assert material_from_text("NeoHookean(youngs=np.float64(2.0), poisson=0.25)").youngs == 2.0
