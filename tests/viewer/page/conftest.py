@@ -323,9 +323,9 @@ class Screen:
             thumb.press(key)
 
     def insist(self, act, holds, what: str, interval: float = 5.0):
-        """Repeat an action until it has an effect. A busy browser may lose a key, or has not drawn the target of a click.
+        """Repeat an action until it has an effect: a busy browser may lose a key or a click.
 
-        For what can be done twice without harm.
+        The action must be harmless where it is repeated.
         """
         again = 0.0
 

@@ -56,10 +56,7 @@ class Measures:
 
         return gui.add_uplot(
             tuple(np.zeros(1) for _ in range(len(series) + 1)),
-            (
-                uplot.Series(label="t [s]"),
-                *(uplot.Series(label=name, stroke=color, width=2) for name, color in series),
-            ),
+            (uplot.Series(label="t [s]"), *(uplot.Series(label=name, stroke=color, width=2) for name, color in series)),
             title=title,
             scales={"x": uplot.Scale(time=False, auto=True), "y": uplot.Scale(auto=True)},
             height=130,

@@ -11,10 +11,6 @@ from supple.numerics.interruption import interruptible
 from supple.viewer.engine.compile_clock import CompileClock
 
 
-class StepTooLong(SolverError):
-    """A step was given up."""
-
-
 class StepWatch:
     """Ends a computation by an exception once it takes too long, at the next interruption point of the solver.
 
@@ -36,13 +32,13 @@ class StepWatch:
 
     @contextmanager
     def limited(self) -> Iterator[None]:
-        """A block that ends with `StepTooLong` where it takes too long."""
+        """A block that ends with a `SolverError` where it takes too long."""
         began, compiled = time.monotonic(), self._compiled.seconds
 
         def check() -> None:
             seconds = time.monotonic() - began - (self._compiled.seconds - compiled)
             if seconds > self.longest or (seconds > self.longest_awaited and self._is_awaited()):
-                raise StepTooLong(f"given up after {seconds:.1f} s")
+                raise SolverError(f"given up after {seconds:.1f} s")
 
         with interruptible(check):
             yield

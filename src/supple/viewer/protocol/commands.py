@@ -153,11 +153,7 @@ class Grab(Command):
         _set(self, "vertices", _vertices(self.vertices))
         _set(self, "weights", _weights(self.weights, len(self.vertices)))
         _set(self, "target", _point(self.target, "target"))
-        _set(
-            self,
-            "stiffness",
-            _number(self.stiffness, "stiffness", limits.WEAKEST_GRAB, limits.STRONGEST_GRAB),
-        )
+        _set(self, "stiffness", _number(self.stiffness, "stiffness", limits.WEAKEST_GRAB, limits.STRONGEST_GRAB))
 
 
 @dataclass(frozen=True)

@@ -106,9 +106,7 @@ def _with_body_value(live: LiveScene, command: commands.SetParameter) -> Scene:
     if command.name == "friction" and command.body is None:
         obstacles = [replace(obstacle, friction=float(command.value)) for obstacle in obstacles]
     return replace(
-        scene,
-        bodies=[new or old for new, old in zip(bodies, scene.bodies, strict=True)],
-        obstacles=obstacles,
+        scene, bodies=[new or old for new, old in zip(bodies, scene.bodies, strict=True)], obstacles=obstacles
     )
 
 
