@@ -1,8 +1,8 @@
 """The cost of the live page: the same frames without it, in its process, and with the page served, alternately.
 
-A ball of 5k tets falls on a floor. Each round simulates the same frames in all three ways, as fast as they can; ratios
-are taken within a round, and their median over the rounds, so that a machine that is busy now and then does not matter
-much. Then the last two play against the clock.
+A ball of 5k tets falls on a floor. Each round simulates the same frames in all three ways, as fast as possible. Ratios
+are computed within a round, and their median over the rounds, which reduces the effect of other load on the machine.
+Then the last two ways run in real time.
 
 usage: python -m benchmarks.live
 """
@@ -25,8 +25,8 @@ from supple.viewer.protocol.messages import Play, Reset, Step
 
 WAYS = {
     "headless": "simulate(), no page",
-    "engine": "in the page's process for simulation, snapshots read at 60 Hz",
-    "page": "the same with the page served, and a websocket that takes it all",
+    "engine": "in the simulation process, snapshots read at 60 Hz",
+    "page": "the same with a served page, and a websocket that reads all messages",
 }
 LISTEN = """
 import sys, viser
@@ -39,7 +39,7 @@ with connect(sys.argv[1], subprotocols=["viser-v" + viser.__version__], max_size
 
 
 def source(edge_length: float) -> LiveSource:
-    """A ball half a metre above the floor."""
+    """A ball half a meter above the floor."""
     ball = sp.Body(
         "ball",
         sp.shapes.sphere(radius=0.5, edge_length=edge_length),
@@ -108,7 +108,7 @@ def main(rounds: int = 15, frames: int = 90, edge_length: float = 0.1, seconds: 
     live = source(edge_length)
     at_start = load()
     with Engine(live) as engine, opened_page(live, Address(port=0)) as page, listening(page.url):
-        behind_page = page.shown.desk.simulation
+        behind_page = page.content.controller.simulation
         assert isinstance(behind_page, Engine)
         programs: dict[str, Callable[[], float]] = {
             "headless": lambda: headless(live, frames),

@@ -1,4 +1,4 @@
-"""Draw the pictures of docs/live.md anew: `python docs/draw_live_page.py`, with Chromium and the tools of tests."""
+"""Draw the pictures of docs/live.md: `python docs/draw_live_page.py`; needs Chromium and the packages of the tests."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def scene() -> LiveSource:
 
 
 def save(tab, name: str) -> None:
-    """A picture of the page, in few colors: they are small so."""
+    """Save a picture of the page with few colors, so that the file is small."""
     shot = Image.open(io.BytesIO(tab.screenshot())).convert("RGB")
     shot.quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.FLOYDSTEINBERG).save(
         FOLDER / name, optimize=True
@@ -48,10 +48,10 @@ def save(tab, name: str) -> None:
 
 
 def draw_live(tab, page) -> None:
-    """Every view of a running simulation."""
-    panel, desk = page.shown.panel, page.shown.desk
+    """All views of a live simulation."""
+    panel, controller = page.content.panel, page.content.controller
     client = next(iter(page.server.get_clients().values()))
-    eye, center = np.asarray(client.camera.position), np.asarray(page.shown.stage.model.view.center)
+    eye, center = np.asarray(client.camera.position), np.asarray(page.content.stage.model.view.center)
     with client.atomic():
         client.camera.position = tuple(center + 0.82 * (eye - center))
         client.camera.look_at = tuple(center - [0.0, 0.12, 0.0])
@@ -66,26 +66,26 @@ def draw_live(tab, page) -> None:
         save(tab, name)
 
     tab.get_by_role("button", name="Play").click()
-    while desk.snapshot.time < 0.5:
+    while controller.snapshot.time < 0.5:
         settle(0.1)
-    bear = desk.snapshot.body_positions("bear")
+    bear = controller.snapshot.body_positions("bear")
     ear = int(np.argmax(bear[:, 1]))
     target = tuple(float(x) for x in bear[ear] + np.array([-0.1, 0.5, 0.0]))
-    desk.simulation.send(Grab(1, "bear", (ear,), (1.0,), target, stiffness=0.05))
+    controller.simulation.send(Grab(1, "bear", (ear,), (1.0,), target, stiffness=0.05))
     settle(3.0)
     save(tab, "live.png")
-    desk.simulation.send(ReleaseGrab(1))
+    controller.simulation.send(ReleaseGrab(1))
     tab.get_by_role("button", name="Pause").click()
     settle(1.0)
     for command in (Reset(), SetParameter("youngs", 1.5e4), Step(15)):
-        desk.simulation.send(command)
+        controller.simulation.send(command)
     settle(2.0)
     tab.get_by_role("tab", name="View").click()
     show("live_stress.png", surface="tets", color_by="von Mises stress")
     show("live_exploded.png", surface="exploded tets", color_by="volume ratio J")
     show("live_cut.png", surface="cut", color_by="energy density", cut_axis="z", cut_place=0.5)
     for command in (Reset(), SetParameter("youngs", 6e4), Step(9)):
-        desk.simulation.send(command)
+        controller.simulation.send(command)
     show("live_velocities.png", surface="skin", color_by="body", velocities=True)
     tab.get_by_role("button", name="Play").click()
     settle(2.0)
@@ -101,16 +101,16 @@ def draw_live(tab, page) -> None:
 
 def draw_file(tab, page) -> None:
     """A body from a file, above the others."""
-    desk = page.shown.desk
+    controller = page.content.controller
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "ring.stl"
         torus_surface(radius=0.3, tube_radius=0.11, edge_length=0.08).save(file)
         tab.get_by_role("tab", name="Bodies").click()
         tab.get_by_text("Add a body").click()
         tab.locator("input[type=file]").set_input_files(file)
-        while len(desk.snapshot.description.bodies) < 5:
+        while len(controller.snapshot.description.bodies) < 5:
             tab.wait_for_timeout(100)
-    desk.simulation.send(Step(18))
+    controller.simulation.send(Step(18))
     tab.get_by_role("button", name="From a file").scroll_into_view_if_needed()
     tab.wait_for_timeout(6000)
     save(tab, "live_file.png")

@@ -1,4 +1,4 @@
-"""`supple view` and `supple demo --live`: sources, address and access."""
+"""`supple view` and `supple demo --live`: what is served, at which address."""
 
 import os
 import signal
@@ -28,7 +28,7 @@ dt: 0.01
 
 @pytest.fixture
 def served(monkeypatch):
-    """What the page would have been asked to serve."""
+    """The arguments of `serve`."""
     calls = []
 
     def serve(source, address, *, open_browser):
@@ -45,7 +45,7 @@ def scene(tmp_path):
     return path
 
 
-def test_a_scene_file_is_shown_with_its_solver_time_step_and_deformed_start(scene, served):
+def test_a_scene_file_is_served_with_solver_time_step_and_initial_positions(scene, served):
     assert main(["view", str(scene), "--no-open"]) == ExitCode.OK
     [(source, address, open_browser)] = served
     assert isinstance(source, LiveSource)
@@ -56,14 +56,14 @@ def test_a_scene_file_is_shown_with_its_solver_time_step_and_deformed_start(scen
     assert not open_browser
 
 
-def test_another_solver_can_be_chosen(scene, served):
+def test_another_solver_can_be_selected(scene, served):
     assert main(["view", str(scene), "--solver", "implicit"]) == ExitCode.OK
     assert isinstance(served[0][0].solver, sp.Implicit)
     assert served[0][2]
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::"])
-def test_the_address_for_other_machines_has_a_new_secret_each_time(scene, served, host):
+def test_for_other_machines_the_address_contains_a_new_token(scene, served, host):
     if host == "::" and not socket.has_ipv6:
         pytest.skip("no IPv6")
     for _ in range(2):
@@ -81,7 +81,7 @@ def test_a_recording_is_found_by_its_file_or_folder(tmp_path, served):
     assert main(["view", str(tmp_path), "--solver", "xpbd"]) == ExitCode.INPUT
 
 
-def test_a_demo_is_shown_live_and_nothing_is_recorded(tmp_path, monkeypatch, served):
+def test_a_live_demo_is_served_and_not_recorded(tmp_path, monkeypatch, served):
     monkeypatch.chdir(tmp_path)
     assert main(["demo", "squash", "--live", "--port", "0"]) == ExitCode.OK
     assert main(["demo", "squash", "--live", "--solver", "implicit", "--no-open"]) == ExitCode.OK
@@ -94,7 +94,7 @@ def test_a_demo_is_shown_live_and_nothing_is_recorded(tmp_path, monkeypatch, ser
 
 @pytest.mark.skipif(os.name != "posix", reason="sends an interrupt as a terminal does")
 def test_the_shell_serves_a_page_until_ctrl_c(scene):
-    # Whoever runs the tests in the background may have had SIGINT ignored; a person at a terminal has not.
+    # SIGINT may be ignored where the tests run in the background; at a terminal it is not.
     heard = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731
     shell = subprocess.Popen(
         [sys.executable, "-m", "supple", "view", str(scene), "--port", "0", "--no-open"],
@@ -107,12 +107,12 @@ def test_the_shell_serves_a_page_until_ctrl_c(scene):
     address = shell.stdout.readline().split()[0]
     with urllib.request.urlopen(address, timeout=60) as response:
         assert response.status == 200
-    os.killpg(shell.pid, signal.SIGINT)  # both processes hear it, as from a terminal
+    os.killpg(shell.pid, signal.SIGINT)  # both processes receive it, as from a terminal
     out, err = shell.communicate(timeout=60)
     assert (shell.returncode, out, err) == (ExitCode.OK, "", "")
 
 
-def test_a_source_or_address_that_cannot_be_used_is_one_line(tmp_path, scene, served, capfd):
+def test_errors_are_one_line(tmp_path, scene, served, capfd):
     (tmp_path / "mesh.stl").write_text("solid")
     outside = tmp_path / "inner" / "outside.yaml"
     outside.parent.mkdir()

@@ -46,7 +46,7 @@ def live():
 
 
 class Collected:
-    """An outbox that keeps what it is given."""
+    """An outbox that stores what it gets."""
 
     def __init__(self):
         self.descriptions, self.snapshots = [], []
@@ -60,7 +60,7 @@ class Collected:
 
 @pytest.fixture
 def loop(live):
-    """A loop without processes: commands go in with `obey`, snapshots come out of `snapshot`."""
+    """A loop without processes: `execute` runs commands, `snapshot` returns snapshots."""
     from supple.viewer.protocol.command_queue import CommandQueue
 
     return SimulationLoop(live, CommandQueue(), Collected())

@@ -1,4 +1,4 @@
-"""What commands change in a running scene (values, solver, bodies, its start): judged by the simulation's state."""
+"""Effects of commands on a live scene (parameters, solver, bodies, reset), checked on the state of the simulation."""
 
 import dataclasses
 
@@ -8,7 +8,7 @@ import pytest
 import supple as sp
 from supple.errors import CommandError, SolverError, SuppleError
 from supple.viewer.engine.measurement.describe import describe, measures
-from supple.viewer.engine.scene.changes import change
+from supple.viewer.engine.scene.changes import change, without_body
 from supple.viewer.engine.scene.live_scene import LiveScene
 from supple.viewer.protocol import limits
 from supple.viewer.protocol.live_source import LiveSource
@@ -18,18 +18,20 @@ from supple.viewer.protocol.messages import (
     CopyBody,
     MovePusher,
     Pin,
+    ReleaseGrab,
     RemoveBody,
     Reset,
     SetParameter,
     SetSolver,
     Squash,
+    Unpin,
 )
 
 from .conftest import corner_grab, free_source, run, small_source
 
 
 class TestParameters:
-    def test_values_take_effect_in_the_system_and_stand_in_the_description(self, live):
+    def test_values_change_the_system_and_the_description(self, live):
         for name, value in {"youngs": 3e5, "poisson": 0.3, "damping": 0.02, "density": 500.0, "friction": 0.7}.items():
             change(SetParameter(name, value, "cube"), live)
             assert describe(live).body("cube").values[name] == value
@@ -42,7 +44,7 @@ class TestParameters:
         run(live, 1)
         assert live.state.time == pytest.approx(0.01)
 
-    def test_gravity_keeps_its_direction_and_turns_round_below_zero(self, live):
+    def test_gravity_keeps_its_axis_and_may_be_negative(self, live):
         change(SetParameter("gravity", -2.0), live)
         assert live.system.gravity == pytest.approx([0, 2.0, 0])
         assert describe(live).values["gravity"] == pytest.approx(-2.0)
@@ -51,12 +53,12 @@ class TestParameters:
         change(SetParameter("gravity", 9.81), live)
         assert live.system.gravity == pytest.approx([0, -9.81, 0])
 
-    def test_friction_of_all_goes_to_obstacles_too(self, live):
+    def test_friction_of_all_bodies_also_sets_obstacles(self, live):
         change(SetParameter("friction", 0.4), live)
         assert [obstacle.friction for obstacle in live.system.obstacles] == [0.4]
         assert [part.body.friction for part in live.system.bodies] == [0.4, 0.4]
 
-    def test_a_parameter_that_nothing_has_is_refused_and_changes_nothing(self, live):
+    def test_an_unknown_parameter_is_refused_and_changes_nothing(self, live):
         revision = live.revision
         with pytest.raises(CommandError, match="no body here has edge_compliance"):
             change(SetParameter("edge_compliance", 1e-3), live)
@@ -64,7 +66,7 @@ class TestParameters:
             change(SetParameter("youngs", 1e5, "ghost"), live)
         assert live.revision == revision
 
-    def test_regions_are_tuned_together(self):
+    def test_a_parameter_sets_all_regions(self):
         mesh = sp.shapes.box((1, 1, 1), (1, 1, 2))
         soft, hard = (sp.StableNeoHookean(youngs=y, poisson=0.3) for y in (1e4, 1e6))
         body = sp.Body("bar", mesh, sp.Regions(materials=[soft, hard], index=[0] * 6 + [1] * 6))
@@ -73,7 +75,7 @@ class TestParameters:
         change(SetParameter("damping", 0.03), live)
         assert set(np.asarray(live.system.bodies[0].body.material.damping)) == {0.03}
 
-    def test_momentum_restore_can_be_seen_to_matter(self):
+    def test_without_momentum_restore_a_body_starts_to_spin(self):
         spins = {}
         for restore in (True, False):
             live = LiveScene(free_source())
@@ -86,7 +88,7 @@ class TestParameters:
 
 
 class TestSolvers:
-    def test_positions_and_velocities_go_over(self):
+    def test_a_change_of_solver_keeps_positions_and_velocities(self):
         live = LiveScene(free_source())
         change(Squash(0.8), live)
         run(live, 3)
@@ -101,7 +103,27 @@ class TestSolvers:
         run(live, 2)
         assert live.frame == 7
 
-    def test_a_switch_that_is_impossible_says_why_and_changes_nothing(self):
+    def test_memory_of_the_solver_is_kept_while_the_state_does_not_change(self):
+        live = LiveScene(free_source())
+        run(live, 2)
+        memory = object()
+        live.state = dataclasses.replace(live.state, memory=memory)
+        for command in (
+            corner_grab((0, 1, 0)),
+            ReleaseGrab(7),
+            SetParameter("youngs", 2e5),
+            SetParameter("substeps", 5),
+            SetParameter("dt", 0.01),
+            MovePusher((3, 3, 3), 0.1),
+            Pin("cube", 1),
+            Unpin(),
+        ):
+            change(command, live)
+            assert live.state.memory is memory, command
+        change(Squash(0.8), live)
+        assert live.state.memory is None
+
+    def test_an_impossible_change_of_solver_is_refused_and_changes_nothing(self):
         springs = sp.EdgesAndVolume(edge_compliance=1e-4)
         body = sp.Body("ball", sp.shapes.box((0.4, 0.4, 0.4), (2, 2, 2)), springs)
         live = LiveScene(LiveSource("springs", sp.Scene([body]), sp.XPBD(substeps=4), 0.01))
@@ -113,7 +135,7 @@ class TestSolvers:
         assert live.revision == revision
         run(live, 2)
 
-    def test_inverted_tets_of_a_material_without_energy_there_are_found_before_the_switch(self):
+    def test_inverted_tets_without_energy_prevent_a_change_of_solver(self):
         mesh = sp.shapes.box((0.4, 0.4, 0.4), (1, 1, 1))
         body = sp.Body("cube", mesh, sp.NeoHookean(youngs=1e5, poisson=0.3))
         source = LiveSource("inverted", sp.Scene([body]), sp.Implicit(), 0.01)
@@ -127,7 +149,7 @@ class TestSolvers:
 
 class TestBodies:
     @pytest.mark.parametrize("shape", limits.SHAPES)
-    def test_each_shape_lands_above_the_others_in_its_size(self, live, shape):
+    def test_a_new_shape_is_placed_above_the_others_with_its_size(self, live, shape):
         top = live.state.positions[:, 1].max()
         others = {part.name: live.body_positions(part.name).copy() for part in live.system.bodies}
         change(AddBody(shape, size=0.3, resolution=4), live)
@@ -141,7 +163,7 @@ class TestBodies:
         assert describe(live).bodies[-1].added
         run(live, 2)
 
-    def test_a_mesh_that_is_given_lands_above_the_others(self, live):
+    def test_a_given_mesh_is_placed_above_the_others(self, live):
         mesh = sp.shapes.box((0.3, 0.2, 0.1), (2, 2, 2))
         top = live.state.positions[:, 1].max()
         for k in (1, 2):
@@ -161,7 +183,7 @@ class TestBodies:
         change(Reset(), live)
         assert [body.name for body in live.setup.scene.bodies] == ["cube", "block", "mine 2"]
 
-    def test_copies_and_removal_leave_everything_else_as_it_was(self, live):
+    def test_copy_and_removal_do_not_change_other_bodies(self, live):
         run(live, 5)
         change(Pin("block", 40), live)
         change(corner_grab((0, 2, 0)), live)
@@ -181,7 +203,7 @@ class TestBodies:
         with pytest.raises(CommandError, match="only one"):
             change(RemoveBody("cube 1"), live)
 
-    def test_what_names_a_body_goes_with_it(self):
+    def test_what_refers_to_a_body_is_removed_with_it(self):
         rubber = sp.StableNeoHookean(youngs=1e5, poisson=0.4)
         mesh = sp.shapes.box((0.4, 0.4, 0.4), (2, 2, 2))
         bodies = [sp.Body(name, mesh, rubber, position=(0, 0.41 * k, 0)) for k, name in enumerate("abc")]
@@ -202,7 +224,39 @@ class TestBodies:
         assert [tuple(pair.first) for pair in left.contact_pairs] == [("b",)]
         run(live, 2)
 
-    def test_there_is_an_end_to_bodies_and_tets(self, live, monkeypatch):
+    def test_only_what_refers_to_a_body_is_removed_with_it(self):
+        """The name of a pin, force or stitch that equals the name of the body is not a reference to it."""
+        rubber = sp.StableNeoHookean(youngs=1e5, poisson=0.4)
+        mesh = sp.shapes.box((0.4, 0.4, 0.4), (2, 2, 2))
+        names = ("left", "b", "closest", "b 2")
+        bodies = [sp.Body(name, mesh, rubber, position=(0, 0.41 * k, 0)) for k, name in enumerate(names)]
+        joined = {"max_distance": 0.02, "stiffness": 1e3, "rest_length": 0.01}
+        scene = sp.Scene(
+            bodies,
+            obstacles=[sp.HalfSpace(point=(0, -1, 0), name="floor")],
+            pins=[sp.Pin("b", [0], name="left"), sp.Pin("left", [0], name="b")],
+            forces=[sp.Force("b", [1], (0, 1, 0), name="left"), sp.Force("left", [1], (0, 1, 0))],
+            soft_targets=[sp.SoftTarget("b", [2], 10.0, name="left"), sp.SoftTarget("left", [2], 10.0)],
+            stitches=[
+                sp.VertexVertexStitch("b", "closest", name="left", **joined),
+                sp.VertexVertexStitch("left", "b", **joined),
+            ],
+            contact_pairs=[
+                sp.ContactPair(["left", "b"], "floor", friction=0.2),
+                sp.ContactPair("lef?", "closest", friction=0.3),
+                sp.ContactPair("b*", "closest", friction=0.4),
+            ],
+        )
+        smaller = without_body(scene, "left")
+        assert [pin.label for pin in smaller.pins] == [scene.pins[0].label]
+        assert smaller.forces == scene.forces[:1]
+        assert smaller.soft_targets == scene.soft_targets[:1]
+        assert [tuple(pair.first) for pair in smaller.contact_pairs] == [("b",), ("b*",)]
+        assert smaller.stitches == scene.stitches[:1]
+        # "closest" is also the pairing of the stitches.
+        assert without_body(scene, "closest").stitches == scene.stitches[1:]
+
+    def test_numbers_of_bodies_and_tets_are_limited(self, live, monkeypatch):
         monkeypatch.setattr(limits, "MOST_BODIES", 3)
         change(CopyBody("cube"), live)
         with pytest.raises(CommandError, match="remove one"):
@@ -212,13 +266,13 @@ class TestBodies:
         with pytest.raises(CommandError, match="resolution"):
             change(AddBody("box", resolution=8), live)
 
-    def test_a_name_that_is_taken_is_refused(self, live):
+    def test_a_used_name_is_refused(self, live):
         with pytest.raises(SuppleError, match="cube"):
             change(AddBody("box", resolution=3, name="cube"), live)
         assert len(live.system.bodies) == 2
 
 
-def test_reset_goes_back_to_the_start_with_what_was_added_and_tuned(live):
+def test_reset_keeps_added_bodies_and_parameters(live):
     start = live.state.positions.copy()
     change(SetParameter("youngs", 5e4, "cube"), live)
     change(corner_grab((0, 2, 0)), live)
@@ -238,7 +292,7 @@ def test_reset_goes_back_to_the_start_with_what_was_added_and_tuned(live):
     run(live, 2)
 
 
-def test_a_deformed_start_is_what_reset_goes_back_to():
+def test_reset_restores_deformed_initial_positions():
     source = small_source()
     flat = source.scene.body("cube").place(source.scene.body("cube").mesh.vertices) * [1.2, 0.7, 1.2]
     live = LiveScene(dataclasses.replace(source, initial_positions={"cube": flat}))
@@ -249,7 +303,7 @@ def test_a_deformed_start_is_what_reset_goes_back_to():
     assert np.array_equal(live.body_positions("cube"), flat)
 
 
-def test_nothing_is_drawn_anew_for_a_slider(live):
+def test_a_parameter_does_not_change_the_generation(live):
     generation = live.generation
     change(SetParameter("youngs", 5e4, "cube"), live)
     change(SetParameter("friction", 0.5), live)
@@ -260,7 +314,7 @@ def test_nothing_is_drawn_anew_for_a_slider(live):
     assert live.generation == generation + 1
 
 
-def test_after_a_reset_no_added_body_is_inside_another(live):
+def test_after_a_reset_added_bodies_do_not_overlap_others(live):
     run(live, 30)  # the cube has left its place at the start
     change(AddBody("box", resolution=3, size=0.3, position=(0.0, 0.6, 0.0)), live)
     change(Reset(), live)

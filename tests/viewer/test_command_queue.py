@@ -1,4 +1,4 @@
-"""The queue of commands: bounded, in order, and of a moving hand only the newest place."""
+"""The command queue: bounded, in order, with only the newest move of a grab."""
 
 import threading
 import time
@@ -14,18 +14,18 @@ def drained(*commands, capacity=100):
     return queue.take(0.0)
 
 
-def test_only_the_newest_place_of_a_hand_is_kept_and_hands_do_not_mix():
+def test_only_the_newest_move_of_each_grab_is_kept():
     first, second = [MoveGrab(1, (x, 0, 0)) for x in range(50)], [MoveGrab(2, (0, x, 0)) for x in range(50)]
     mixed = [command for pair in zip(first, second, strict=True) for command in pair]
     assert drained(*mixed) == [(99, first[-1]), (100, second[-1])]
 
 
-def test_a_move_after_letting_go_is_not_taken_before_it():
+def test_moves_keep_their_order_with_release_and_grab():
     commands = [MoveGrab(1, (1, 0, 0)), ReleaseGrab(1), Grab(1, "cube", (0,), (1,), (0, 0, 0)), MoveGrab(1, (2, 0, 0))]
     assert [command for _, command in drained(*commands)] == commands
 
 
-def test_the_last_word_on_a_parameter_of_one_body_and_of_all_stays_the_last():
+def test_parameters_of_one_body_and_of_all_bodies_keep_their_order():
     commands = [
         SetParameter("youngs", 1e4),
         SetParameter("youngs", 2e4, "cube"),
@@ -37,12 +37,12 @@ def test_the_last_word_on_a_parameter_of_one_body_and_of_all_stays_the_last():
     assert [command for _, command in drained(*again)] == again[-1:]
 
 
-def test_each_play_pause_and_step_counts():
+def test_no_play_pause_or_step_is_merged():
     commands = [Play(), Pause(), Play(), Step(2), Step(2)]
     assert [command for _, command in drained(*commands)] == commands
 
 
-def test_more_than_its_capacity_is_dropped_and_moves_still_get_through():
+def test_commands_beyond_the_capacity_are_dropped_and_moves_are_merged():
     queue = CommandQueue(capacity=5)
     assert all(queue.put(k, Step()) for k in range(4))
     assert queue.put(4, MovePusher((0, 0, 0), 0.1))
@@ -54,7 +54,29 @@ def test_more_than_its_capacity_is_dropped_and_moves_still_get_through():
     assert taken[-1] == (6, MovePusher((1, 0, 0), 0.1))
 
 
-def test_taking_wakes_up_for_a_command_and_for_the_end():
+def test_the_release_of_a_grab_is_never_dropped():
+    queue = CommandQueue(capacity=3)
+    assert queue.put(1, Grab(7, "cube", (0,), (1.0,), (0, 0, 0)))
+    assert queue.put(2, Play())
+    assert queue.put(3, Play())
+    assert not queue.put(4, Grab(8, "cube", (0,), (1.0,), (0, 0, 0)))
+    # A dropped grab has no spring, so that its release may be dropped as well: the queue stays bounded.
+    assert not queue.put(5, ReleaseGrab(8))
+    assert queue.put(6, ReleaseGrab(7))
+    assert not queue.put(7, ReleaseGrab(7))
+    assert [number for number, _ in queue.take(0.0)] == [1, 2, 3, 6]
+
+
+def test_a_full_queue_accepts_the_release_of_an_earlier_grab():
+    queue = CommandQueue(capacity=1)
+    queue.put(1, Grab(7, "cube", (0,), (1.0,), (0, 0, 0)))
+    queue.take(0.0)
+    queue.put(2, Play())
+    assert queue.put(3, ReleaseGrab(7))
+    assert queue.take(0.0) == [(2, Play()), (3, ReleaseGrab(7))]
+
+
+def test_take_returns_at_a_command_and_at_close():
     queue = CommandQueue()
     threading.Timer(0.05, queue.put, (1, Play())).start()
     assert queue.take(30.0) == [(1, Play())]

@@ -1,4 +1,4 @@
-"""Commands check themselves: whatever a page sends, one that exists is well-formed."""
+"""Commands check their values when they are created."""
 
 import math
 
@@ -91,14 +91,14 @@ HOSTILE = [
 
 
 @pytest.mark.parametrize(("kind", "values"), HOSTILE, ids=lambda value: getattr(value, "__name__", None))
-def test_malformed_commands_cannot_be_made(kind, values):
+def test_malformed_commands_are_refused(kind, values):
     with pytest.raises(CommandError) as caught:
         kind(*values)
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 400
 
 
-def test_weights_are_made_to_sum_to_one_and_numbers_become_plain_python():
+def test_weights_are_normalized_and_numbers_become_python_types():
     grab = Grab(np.int64(3), "ball", np.array([4, 5]), np.array([1.0, 3.0]), np.array([1, 2, 3]))
     assert grab.weights == (0.25, 0.75)
     assert grab.vertices == (4, 5)

@@ -1,4 +1,4 @@
-"""The simulation in a process of its own: nothing that happens to the page stalls it or outlives it."""
+"""The simulation process: the page cannot block it, and it ends with the page."""
 
 import multiprocessing
 import os
@@ -33,7 +33,7 @@ from supple.viewer.protocol.outbox import DESCRIPTION, SNAPSHOT, Outbox
 
 from .conftest import small_source
 
-PATIENCE = 60.0
+TIMEOUT = 60.0
 
 
 @pytest.fixture(scope="module")
@@ -51,21 +51,21 @@ def fresh(engine):
     for body in engine.description.bodies:
         if body.added:
             engine.send(RemoveBody(body.name))
-    engine.wait_for(engine.send(Reset()), PATIENCE)
+    engine.wait_for(engine.send(Reset()), TIMEOUT)
     return engine
 
 
 def until(engine, condition, what):
-    end = time.monotonic() + PATIENCE
+    end = time.monotonic() + TIMEOUT
     while time.monotonic() < end:
         snapshot = engine.latest()
         if condition(snapshot):
             return snapshot
         time.sleep(0.01)
-    pytest.fail(f"never came to pass: {what}; {engine.error}")
+    pytest.fail(f"did not happen: {what}; {engine.error}")
 
 
-def test_it_begins_paused_at_the_start_and_says_what_there_is(fresh):
+def test_it_starts_paused_with_a_description(fresh):
     snapshot = fresh.latest()
     assert snapshot.paused
     assert snapshot.frame == 0
@@ -78,10 +78,10 @@ def test_it_begins_paused_at_the_start_and_says_what_there_is(fresh):
     assert len(snapshot.pinned) == 9
 
 
-def test_it_computes_what_the_same_scene_gives_without_a_page(fresh):
+def test_it_computes_the_same_as_simulate(fresh):
     source = small_source()
     *_, last = sp.simulate(source.scene, source.solver, source.dt, 12)
-    fresh.wait_for(fresh.send(Step(12)), PATIENCE)
+    fresh.wait_for(fresh.send(Step(12)), TIMEOUT)
     snapshot = until(fresh, lambda s: s.frame == 12, "12 steps")
     assert np.array_equal(snapshot.positions, last.state.positions)
     assert snapshot.measures.elastic_energy == last.report.elastic_energy
@@ -91,13 +91,13 @@ def test_it_computes_what_the_same_scene_gives_without_a_page(fresh):
 def test_play_runs_and_pause_stops(fresh):
     fresh.send(Play())
     until(fresh, lambda s: s.frame >= 5, "5 frames")
-    paused = fresh.wait_for(fresh.send(Pause()), PATIENCE)
+    paused = fresh.wait_for(fresh.send(Pause()), TIMEOUT)
     assert paused.paused
     time.sleep(0.2)
     assert fresh.latest().frame == paused.frame
 
 
-def test_descriptions_and_snapshots_always_belong_together(fresh):
+def test_snapshots_always_match_their_description(fresh):
     fresh.send(Play())
     for k in range(10):
         fresh.send(AddBody("box", resolution=3, size=0.2, name=f"new {k}"))
@@ -110,7 +110,7 @@ def test_descriptions_and_snapshots_always_belong_together(fresh):
 
 
 class Gated:
-    """The reading end of a pipe that nobody reads until the gate is open."""
+    """The reading end of a pipe that is not read until the gate is open."""
 
     def __init__(self, pipe):
         self.pipe, self.gate, self.waiting = pipe, threading.Event(), threading.Event()
@@ -121,24 +121,24 @@ class Gated:
         return self.pipe.recv_bytes()
 
 
-def test_a_page_that_does_not_read_holds_up_nothing(fresh):
-    # Snapshots are of about 3 KiB and a pipe holds 64 KiB: a simulation that waited for its reader would stop after
-    # some twenty frames, and never skip one.
+def test_a_page_that_does_not_read_does_not_block_the_simulation(fresh):
+    # A snapshot has about 3 KiB, a pipe holds 64 KiB: a simulation that waits for its reader would stop after about
+    # twenty frames, and never skip one.
     pipe = fresh._snapshots
     fresh._snapshots = gated = Gated(pipe)
     try:
         fresh.send(Play())
-        assert gated.waiting.wait(PATIENCE)
+        assert gated.waiting.wait(TIMEOUT)
         time.sleep(2.0)
         stale = fresh.latest().frame
         gated.gate.set()
-        until(fresh, lambda s: s.frame > stale + 40, "frames that were simulated while nobody looked")
+        until(fresh, lambda s: s.frame > stale + 40, "frames that were simulated without a reader")
     finally:
         gated.gate.set()
         fresh._snapshots = pipe
 
 
-def test_an_outbox_keeps_only_the_newest_and_never_blocks():
+def test_an_outbox_keeps_only_the_newest_snapshot_and_never_blocks():
     reader, writer = multiprocessing.Pipe(duplex=False)
     outbox = Outbox(writer)
     outbox.put_description("old")
@@ -155,39 +155,39 @@ def test_an_outbox_keeps_only_the_newest_and_never_blocks():
     assert received[-2:] == [(DESCRIPTION, "new"), (SNAPSHOT, (100, b""))]
 
 
-def test_ten_thousand_moves_at_once_are_one_move(fresh):
+def test_ten_thousand_moves_at_once_are_merged(fresh):
     began = fresh.latest().applied
     for k in range(10_000):
         assert fresh.send(MoveGrab(3, (0.0, 0.001 * k, 0.0)))
     number = fresh.send(SetParameter("youngs", 2e5, "cube"))
     assert number == began + 10_001
-    snapshot = fresh.wait_for(number, PATIENCE)
+    snapshot = fresh.wait_for(number, TIMEOUT)
     assert snapshot.description.body("cube").values["youngs"] == 2e5
     fresh.send(SetParameter("youngs", 1e5, "cube"))
 
 
 def test_only_commands_can_be_sent(fresh):
-    with pytest.raises(CommandError, match="str is no command"):
+    with pytest.raises(CommandError, match="str is not a command"):
         fresh.send("__import__('os').system('true')")
 
 
-def test_a_scene_that_cannot_be_simulated_is_said_by_the_constructor():
+def test_the_constructor_refuses_a_scene_that_cannot_be_simulated():
     source = small_source()
     springs = sp.Body("springs", sp.shapes.box(), sp.EdgesAndVolume())
     with pytest.raises(SolverError, match="'springs'"):
         Engine(LiveSource("springs", sp.Scene([springs]), sp.Implicit(), source.dt))
 
 
-def test_a_function_inside_another_cannot_be_sent_and_the_mend_is_told():
+def test_a_local_function_cannot_be_sent_and_the_message_names_the_remedy():
     floor = sp.HalfSpace(motion=lambda t: (0.0, 0.1 * t, 0.0))
     with pytest.raises(SceneError, match="use Keyframes"):
         Engine(small_source(obstacles=[floor]))
 
 
-def test_killed_it_is_said_and_nothing_hangs():
+def test_a_killed_process_is_reported_and_nothing_blocks():
     engine = Engine(small_source())
     os.kill(engine._process.pid, signal.SIGKILL)
-    end = time.monotonic() + PATIENCE
+    end = time.monotonic() + TIMEOUT
     while engine.alive and time.monotonic() < end:
         time.sleep(0.01)
     assert engine.send(Play()) == 0
@@ -196,12 +196,22 @@ def test_killed_it_is_said_and_nothing_hangs():
     assert "unexpectedly" in engine.error
     assert engine.latest() is not None
     with pytest.raises(TimeoutError, match="unexpectedly"):
-        engine.wait_for(10**9, PATIENCE)
+        engine.wait_for(10**9, TIMEOUT)
     engine.close()
 
 
+@pytest.mark.skipif(os.name != "posix", reason="sends a signal")
+def test_the_simulation_process_ignores_ctrl_c(fresh):
+    """The signal reaches both processes."""
+    fresh.send(Play())
+    before = until(fresh, lambda s: s.frame >= 2, "2 frames")
+    os.kill(fresh._process.pid, signal.SIGINT)
+    until(fresh, lambda s: s.frame >= before.frame + 5, "5 frames more")
+    assert fresh.latest().notices == before.notices
+
+
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks at /proc")
-def test_it_ends_when_the_pages_process_is_killed(tmp_path):
+def test_it_ends_when_the_process_of_the_page_is_killed(tmp_path):
     script = tmp_path / "page.py"
     script.write_text(
         textwrap.dedent("""
@@ -223,7 +233,7 @@ def test_it_ends_when_the_pages_process_is_killed(tmp_path):
     child = int(page.stdout.readline())
     page.kill()
     page.wait()
-    end = time.monotonic() + PATIENCE
+    end = time.monotonic() + TIMEOUT
     while _runs(child) and time.monotonic() < end:
         time.sleep(0.02)
     assert not _runs(child)

@@ -1,4 +1,4 @@
-"""What hands do to a running scene (grab, pin, push, squash), judged by the simulation's state."""
+"""Effects of grab, pin, pusher and squash on a live scene, checked on the state of the simulation."""
 
 import dataclasses
 
@@ -28,7 +28,7 @@ from .conftest import corner_grab, free_source, run, small_source
 
 
 class TestGrabs:
-    def test_a_body_hangs_on_its_spring_as_hookes_law_says(self):
+    def test_the_stretch_of_a_hanging_body_follows_hookes_law(self):
         live = LiveScene(small_source(obstacles=[]))
         change(corner_grab((-0.2, 1.5, -0.2)), live)
         spring = live.setup.grabs[7]
@@ -39,7 +39,7 @@ class TestGrabs:
         stretch = spring.target - spring.point(live.body_positions("cube"))
         assert spring.stiffness * stretch == pytest.approx([0.0, weight, 0.0], abs=0.02 * weight)
 
-    def test_let_go_a_body_keeps_its_velocity(self):
+    def test_a_released_body_keeps_its_momentum(self):
         live = LiveScene(free_source())
         change(corner_grab((-0.2, -0.2, -0.2)), live)
         for k in range(40):
@@ -47,13 +47,13 @@ class TestGrabs:
             live.step()
         momentum = live.system.masses @ live.state.velocities
         speed = momentum[0] / live.system.masses.sum()
-        assert speed > 1.0  # the hand moves at 3 m/s
+        assert speed > 1.0  # the target moves at 3 m/s
         change(ReleaseGrab(7), live)
         assert live.system.masses @ live.state.velocities == pytest.approx(momentum, rel=1e-12)
         run(live, 30)
         assert live.system.masses @ live.state.velocities == pytest.approx(momentum, rel=1e-9)
 
-    def test_a_spring_brings_no_torque_about_its_own_point(self):
+    def test_a_grab_causes_no_torque_about_its_point(self):
         live = LiveScene(free_source())
         change(Grab(1, "cube", tuple(live.system.tets[0].tolist()), (0.25,) * 4, (0.0, 0.0, 0.0)), live)
         spring = live.setup.grabs[1]
@@ -66,7 +66,7 @@ class TestGrabs:
         assert forces[0] == pytest.approx([0, 0.3, 0])
 
     @pytest.mark.parametrize("stiffness", [limits.WEAKEST_GRAB, limits.STRONGEST_GRAB])
-    def test_no_hand_is_strong_or_far_enough_to_break_the_simulation(self, live, stiffness):
+    def test_the_stiffest_and_farthest_grab_leaves_a_finite_state(self, live, stiffness):
         change(corner_grab((9e3, 9e3, 9e3), stiffness=stiffness), live)
         for k in range(60):
             change(MoveGrab(7, (9e3 * (-1) ** k, 9e3, 0.0)), live)
@@ -74,7 +74,7 @@ class TestGrabs:
         assert live.report.status == "converged"
         assert np.isfinite(live.state.positions).all()
 
-    def test_the_barycentric_point_is_what_moves(self):
+    def test_the_barycentric_point_reaches_the_target(self):
         live = LiveScene(free_source())
         a, b, c = describe(live).body("cube").triangles[5].tolist()
         change(Grab(1, "cube", (a, b, c), (0.2, 0.3, 0.5), (1.0, 0.0, 0.0)), live)
@@ -84,21 +84,21 @@ class TestGrabs:
         point = np.array([0.2, 0.3, 0.5]) @ live.body_positions("cube")[[a, b, c]]
         assert point == pytest.approx([1.0, 0.0, 0.0], abs=1e-3)
 
-    def test_vertices_that_are_not_there_and_too_many_hands_are_refused(self, live):
+    def test_unknown_vertices_and_too_many_grabs_are_refused(self, live):
         with pytest.raises(CommandError, match="has no vertex 1000"):
             change(Grab(1, "cube", (1000,), (1.0,), (0, 0, 0)), live)
         with pytest.raises(CommandError, match="no body 'ghost'"):
             change(Grab(1, "ghost", (0,), (1.0,), (0, 0, 0)), live)
         for number in range(limits.MOST_GRABS):
             change(Grab(number, "cube", (number,), (1.0,), (0, 1, 0)), live)
-        with pytest.raises(CommandError, match="let one go"):
+        with pytest.raises(CommandError, match="release one"):
             change(Grab(99, "cube", (0,), (1.0,), (0, 1, 0)), live)
         change(Grab(3, "cube", (0,), (1.0,), (0, 1, 0)), live)
         assert len(live.setup.grabs) == limits.MOST_GRABS
 
 
 class TestPins:
-    def test_a_pinned_vertex_stays_where_it_is_through_every_other_change(self, live):
+    def test_a_pinned_vertex_does_not_move_at_other_changes(self, live):
         run(live, 10)
         place = live.body_positions("cube")[5].copy()
         change(Pin("cube", 5), live)
@@ -111,7 +111,7 @@ class TestPins:
         run(live, 10)
         assert live.body_positions("cube")[5, 1] < place[1] - 0.01
 
-    def test_a_vertex_of_the_scenes_own_pin_can_be_let_go_and_comes_back_with_a_reset(self, live):
+    def test_a_vertex_of_a_pin_of_the_scene_can_be_unpinned_until_a_reset(self, live):
         before = live.system.pinned_vertices.tolist()
         start = live.system.bodies[1].vertices.start
         vertex = before[0] - start
@@ -123,7 +123,7 @@ class TestPins:
         change(Reset(), live)
         assert live.system.pinned_vertices.tolist() == before
 
-    def test_unpin_alone_lets_go_of_what_was_pinned_by_hand_only(self, live):
+    def test_unpin_without_vertex_removes_only_pins_of_the_page(self, live):
         before = live.system.pinned_vertices.tolist()
         change(Pin("cube", 1), live)
         change(Pin("cube", 2), live)
@@ -146,14 +146,14 @@ class TestPusher:
         distance = np.linalg.norm(live.state.positions - center, axis=1)
         assert distance.min() > 0.2 - 0.02
 
-    def test_it_never_moves_farther_than_a_stride_in_one_step(self):
+    def test_its_motion_in_one_step_is_limited(self):
         live = LiveScene(free_source())
         change(MovePusher((-5.0, 0.0, 0.0), 0.2), live)
         change(MovePusher((5.0, 0.0, 0.0), 0.2), live)
         run(live, 1)
         assert live.setup.pusher.center == pytest.approx([-4.95, 0.0, 0.0])
 
-    def test_it_can_be_taken_away(self, live):
+    def test_it_can_be_removed(self, live):
         change(MovePusher((0.0, 2.0, 0.0), 0.2), live)
         assert [obstacle.name for obstacle in live.system.obstacles] == ["floor", "pusher"]
         generation = live.generation
@@ -163,7 +163,7 @@ class TestPusher:
 
 
 class TestSquash:
-    def test_no_tet_changes_its_volume_and_the_lowest_point_stays(self, live):
+    def test_volumes_and_the_lowest_point_do_not_change(self, live):
         low = live.body_positions("cube")[:, 1].min()
         pinned = live.body_positions("block").copy()
         change(Squash(0.5), live)

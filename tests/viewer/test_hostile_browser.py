@@ -1,4 +1,4 @@
-"""A served page with a live simulation behind it, and browsers that send anything: the simulation does not notice."""
+"""A live page and browsers that send arbitrary messages, without effect on the simulation."""
 
 import contextlib
 import random
@@ -18,7 +18,7 @@ from supple.viewer.protocol.messages import Pause, Play, Reset
 from .conftest import small_source
 from .server.test_gate import MALFORMED, camera
 
-PATIENCE = 60.0
+TIMEOUT = 60.0
 
 
 @pytest.fixture(scope="module")
@@ -29,19 +29,19 @@ def page():
 
 @pytest.fixture
 def engine(page):
-    engine = page.shown.desk.simulation
+    engine = page.content.controller.simulation
     assert isinstance(engine, Engine)
-    engine.wait_for(engine.send(Reset()), PATIENCE)
+    engine.wait_for(engine.send(Reset()), TIMEOUT)
     return engine
 
 
 def dial(page):
     url = f"ws://127.0.0.1:{page.server.get_port()}"
-    return connect(url, subprotocols=[f"viser-v{viser.__version__}"], max_size=None, open_timeout=PATIENCE)
+    return connect(url, subprotocols=[f"viser-v{viser.__version__}"], max_size=None, open_timeout=TIMEOUT)
 
 
 def until_frame(engine, frame):
-    end = time.monotonic() + PATIENCE
+    end = time.monotonic() + TIMEOUT
     while (snapshot := engine.latest()).frame < frame:
         assert engine.alive
         assert time.monotonic() < end, "time stands still"
@@ -49,16 +49,16 @@ def until_frame(engine, frame):
     return snapshot
 
 
-def test_malformed_messages_change_nothing_of_the_simulation(page, engine):
+def test_malformed_messages_do_not_change_the_simulation(page, engine):
     engine.send(Play())
     until_frame(engine, 2)
     for raw in MALFORMED.values():
         with contextlib.suppress(ConnectionClosed), dial(page) as bad:
             bad.send(raw)
     played = until_frame(engine, engine.latest().frame + 5)
-    engine.wait_for(engine.send(Pause()), PATIENCE)
+    engine.wait_for(engine.send(Pause()), TIMEOUT)
     assert played.notices == ()
-    # It is the same simulation as without any browser: bit for bit.
+    # The simulation is bit for bit the same as without a browser.
     import supple as sp
 
     source = small_source()
@@ -66,18 +66,18 @@ def test_malformed_messages_change_nothing_of_the_simulation(page, engine):
     assert np.array_equal(engine.latest().positions, last.state.positions)
 
 
-def test_ten_tabs_that_never_read_and_vanish_hold_up_nothing(page, engine):
+def test_ten_tabs_that_never_read_do_not_block_the_server(page, engine):
     engine.send(Play())
     tabs = [dial(page) for _ in range(10)]
     for tab in tabs:
         tab.send(camera())
     until_frame(engine, 30)
     for tab in tabs:
-        tab.socket.close()  # without a farewell
+        tab.socket.close()  # without a closing handshake
     until_frame(engine, engine.latest().frame + 10)
 
 
-def test_well_formed_nonsense_for_every_input_of_the_panel_leaves_a_finite_state(page, engine):
+def test_random_valid_messages_to_every_input_leave_a_finite_state(page, engine):
     engine.send(Play())
     rng = random.Random(3)
     nonsense = [-1, 0, 1, 7, 1e300, -1e300, 2**60, True, False, None, "", "x" * 2000, [], [1, 2], {}, {"a": [1]}, "1e5"]
@@ -92,12 +92,12 @@ def test_well_formed_nonsense_for_every_input_of_the_panel_leaves_a_finite_state
                 tab.send(msgspec.msgpack.encode(update))
             if k % 100 == 0:
                 assert np.isfinite(engine.latest().positions).all()
-        tab.ping().wait(PATIENCE)
-    snapshot = engine.wait_for(engine.send(Pause()), PATIENCE)
+        tab.ping().wait(TIMEOUT)
+    snapshot = engine.wait_for(engine.send(Pause()), TIMEOUT)
     assert engine.alive
     assert np.isfinite(snapshot.positions).all()
     frame = snapshot.frame
     with dial(page) as tab:  # and the next visitor gets the page
-        assert tab.recv(timeout=PATIENCE)
+        assert tab.recv(timeout=TIMEOUT)
     engine.send(Play())
     until_frame(engine, frame + 3)

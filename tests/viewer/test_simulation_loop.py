@@ -1,11 +1,10 @@
-"""The loop in the simulation's process, without the process: failures, slow motion, views, and a thousand commands."""
+"""The simulation loop without its process: failures, slow motion, views, and random commands."""
 
 import contextlib
 import dataclasses
 import logging
 import math
 import random
-import signal
 import threading
 import time
 from collections import deque
@@ -15,12 +14,13 @@ import pytest
 
 import supple as sp
 from supple.errors import CommandError, SolverError
+from supple.numerics.interruption import interruption_point
 from supple.state import Status, StepReport
+from supple.viewer.engine import simulation_loop
 from supple.viewer.engine.pacing import Pacing
 from supple.viewer.engine.scene.live_scene import LiveScene
 from supple.viewer.engine.simulation_loop import SimulationLoop
-from supple.viewer.protocol import limits
-from supple.viewer.protocol import messages as say
+from supple.viewer.protocol import limits, messages
 from supple.viewer.protocol.command_queue import CommandQueue
 from supple.viewer.protocol.live_source import LiveSource
 
@@ -28,7 +28,7 @@ from .conftest import Collected
 
 
 def with_solver_that(loop, step):
-    """The loop's scene with a solver that does `step` instead of simulating."""
+    """Replace the solver of the loop by one that calls `step`."""
 
     class Broken(type(loop.live.setup.solver)):
         def step(self, system, state, dt, workspace):
@@ -55,8 +55,8 @@ def crashes(state):
 
 
 @pytest.mark.parametrize("failure", [not_finite, silently_not_finite, refuses, crashes])
-def test_a_step_that_fails_pauses_at_the_last_good_state_and_says_why(loop, failure):
-    loop.obey(say.Play())
+def test_a_failed_step_pauses_at_the_last_good_state_with_a_notice(loop, failure):
+    loop.execute(messages.Play())
     loop.step()
     good = loop.live.state
     solver = loop.live.setup.solver
@@ -69,7 +69,7 @@ def test_a_step_that_fails_pauses_at_the_last_good_state_and_says_why(loop, fail
     assert notice.level == "error"
     assert notice.text.startswith("paused at t = 0.01667 s; ")
     loop.live.setup = dataclasses.replace(loop.live.setup, solver=solver)
-    loop.obey(say.Play())
+    loop.execute(messages.Play())
     loop.step()
     assert loop.live.frame == 2
 
@@ -77,6 +77,7 @@ def test_a_step_that_fails_pauses_at_the_last_good_state_and_says_why(loop, fail
 def endless(state):
     while True:
         time.sleep(0.01)
+        interruption_point()
 
 
 def stubborn(state):
@@ -86,9 +87,9 @@ def stubborn(state):
 
 
 @pytest.mark.parametrize("endless", [endless, stubborn])
-def test_a_step_that_does_not_end_is_given_up(loop, endless):
+def test_an_endless_step_is_given_up(loop, endless):
     loop.watch.longest = 0.2
-    loop.obey(say.Play())
+    loop.execute(messages.Play())
     good, solver = loop.live.state, loop.live.setup.solver
     with_solver_that(loop, endless)
     loop.step()
@@ -96,17 +97,59 @@ def test_a_step_that_does_not_end_is_given_up(loop, endless):
     assert loop.live.state is good
     assert "given up after" in loop.notices[-1].text
     loop.live.setup = dataclasses.replace(loop.live.setup, solver=solver)
-    loop.live.renew()
+    loop.live.prepare_workspace()
     loop.step()
     assert loop.live.frame == 1
 
 
-def test_compiling_kernels_is_no_part_of_a_step(loop):
-    """On a machine where a solver was never used, its first step takes long, and is not given up for that."""
+def test_a_step_is_interrupted_only_at_interruption_points(loop):
+    """A setting of the process, here the number of threads, is restored also where a solver has no `try` block."""
+    import numba
+
+    before, ended = numba.get_num_threads(), []
+
+    def changes_a_setting(state):
+        numba.set_num_threads(1)
+        end = time.monotonic() + 0.5
+        while time.monotonic() < end:
+            time.sleep(0.01)
+        numba.set_num_threads(before)
+        ended.append(True)
+        interruption_point()
+        return state, StepReport(Status.CONVERGED, 1)
+
+    loop.watch.longest = 0.1
+    with_solver_that(loop, changes_a_setting)
+    loop.step()
+    threads = numba.get_num_threads()
+    numba.set_num_threads(before)
+    assert threads == before
+    assert ended
+    assert "given up after" in loop.notices[-1].text
+
+
+@pytest.mark.parametrize("solver", [sp.XPBD(), sp.Implicit()], ids=["xpbd", "implicit"])
+def test_every_solver_can_be_interrupted(loop, solver):
+    import numba
+
+    loop.live.adopt(dataclasses.replace(loop.live.setup, solver=solver))
+    state, threads = loop.live.state, numba.get_num_threads()
+    loop.watch.longest = 0.0
+    loop.step()
+    assert "given up after" in loop.notices[-1].text
+    assert loop.live.state is state
+    assert numba.get_num_threads() == threads
+    loop.watch.longest = 60.0
+    loop.step()
+    assert loop.live.frame == 1
+
+
+def test_compilation_of_kernels_is_not_part_of_a_step(loop):
+    """The first step of a solver on a new machine takes long, and must not be given up."""
     import numba
 
     def compiles(state):
-        # Each is compiled anew, for half a second or more in all.
+        # A new kernel each time, for half a second or more in total.
         began, compiled = time.monotonic(), 0
         while time.monotonic() - began < 0.5:
             kernel = numba.njit(lambda x, y=compiled: np.sort(x)[::-1].sum() + y)
@@ -115,7 +158,7 @@ def test_compiling_kernels_is_no_part_of_a_step(loop):
         return state, StepReport(Status.CONVERGED, 1)
 
     loop.watch.longest = 0.25
-    loop.obey(say.Play())
+    loop.execute(messages.Play())
     with_solver_that(loop, compiles)
     loop.step()
     assert loop.notices == deque()
@@ -123,63 +166,52 @@ def test_compiling_kernels_is_no_part_of_a_step(loop):
     assert loop.playing
 
 
-def test_who_asks_for_a_pause_does_not_wait_for_a_long_step(loop):
-    loop.watch.patience = 0.1
-    loop.obey(say.Play())
+def test_a_request_to_pause_interrupts_a_long_step(loop):
+    loop.watch.longest_awaited = 0.1
+    loop.execute(messages.Play())
     with_solver_that(loop, endless)
-    threading.Timer(0.2, loop.inbox.put, (1, say.Pause())).start()
+    threading.Timer(0.2, loop.inbox.put, (1, messages.Pause())).start()
     loop.step()
     assert "given up after" in loop.notices[-1].text
-    loop.turn(0.0)
+    loop.run_once(0.0)
     assert loop.applied == 1
     assert not loop.playing
 
 
-def test_ctrl_c_in_the_terminal_does_not_end_a_step(loop):
-    def interrupted(state):
-        signal.raise_signal(signal.SIGINT)
-        return state, StepReport(Status.CONVERGED, 1)
-
-    with_solver_that(loop, interrupted)
-    loop.step()
-    assert loop.notices == deque()
-    assert loop.live.frame == 1
-
-
-def test_what_cannot_be_done_becomes_a_notice_and_play_goes_on(loop):
-    loop.obey(say.Play())
-    loop.obey(say.RemoveBody("ghost"))
-    loop.obey(say.SetParameter("edge_compliance", 0.1))
+def test_impossible_commands_become_notices_and_play_continues(loop):
+    loop.execute(messages.Play())
+    loop.execute(messages.RemoveBody("ghost"))
+    loop.execute(messages.SetParameter("edge_compliance", 0.1))
     assert loop.playing
     assert [notice.number for notice in loop.notices] == [1, 2]
     assert "'ghost'" in loop.notices[0].text
     for _ in range(50):
-        loop.obey(say.RemoveBody("ghost"))
+        loop.execute(messages.RemoveBody("ghost"))
     assert [notice.number for notice in loop.notices] == list(range(45, 53))
 
 
 def test_steps_are_simulated_without_waiting_for_the_clock(loop):
-    loop.obey(say.Step(5))
+    loop.execute(messages.Step(5))
     for _ in range(7):
-        loop.turn(0.0)
+        loop.run_once(0.0)
     assert loop.live.frame == 5
     assert loop.steps_left == 0
 
 
-def test_steps_that_come_at_once_all_count_and_none_outlives_a_reset(loop):
-    loop.inbox.put_all(enumerate([say.Step(), say.Step(), say.Step(2)], 1))
+def test_all_steps_count_until_a_reset(loop):
+    loop.inbox.put_all(enumerate([messages.Step(), messages.Step(), messages.Step(2)], 1))
     for _ in range(6):
-        loop.turn(0.0)
+        loop.run_once(0.0)
     assert loop.live.frame == 4
-    loop.inbox.put_all(enumerate([say.Step(3), say.Reset()], 4))
+    loop.inbox.put_all(enumerate([messages.Step(3), messages.Reset()], 4))
     for _ in range(6):
-        loop.turn(0.0)
+        loop.run_once(0.0)
     assert loop.live.frame == 0
 
 
-def test_slow_motion_shows_states_between_two_steps(loop):
-    loop.obey(say.SetSpeed(0.1))
-    loop.obey(say.Play())
+def test_slow_motion_interpolates_states(loop):
+    loop.execute(messages.SetSpeed(0.1))
+    loop.execute(messages.Play())
     loop.step()
     loop.step()
     before, after = loop._before, loop.live.state
@@ -188,18 +220,18 @@ def test_slow_motion_shows_states_between_two_steps(loop):
     assert half.time == pytest.approx(0.5 * (before.time + after.time))
     assert half.positions == pytest.approx(0.5 * (before.positions + after.positions))
     assert loop.snapshot(due + 1.0).time == after.time
-    loop.obey(say.Pause())
+    loop.execute(messages.Pause())
     assert loop.snapshot(due - 0.5 * loop._interval()).positions is after.positions
 
 
-def test_a_view_decides_what_a_snapshot_holds(loop):
+def test_a_snapshot_contains_what_the_view_requests(loop):
     for _ in range(20):
         loop.live.step()
     plain = loop.snapshot(0.0)
     assert plain.velocities is None
     assert plain.tet_values is None
     assert plain.contact_points is None
-    loop.obey(say.SetView("von_mises", velocities=True, contacts=True))
+    loop.execute(messages.SetView("von_mises", velocities=True, contacts=True))
     full = loop.snapshot(0.0)
     assert full.velocities.shape == full.positions.shape
     assert full.tet_values.shape == (len(loop.live.system.tets),)
@@ -207,9 +239,54 @@ def test_a_view_decides_what_a_snapshot_holds(loop):
     assert full.contact_points.ndim == 2
 
 
-def test_what_the_library_warns_of_is_told_once(loop):
+def fails(*_):
+    raise RuntimeError("a mistake in the library")
+
+
+def test_a_failed_view_value_becomes_a_notice_and_the_simulation_continues(loop, monkeypatch):
+    loop.execute(messages.Play())
+    loop.execute(messages.SetView("J", contacts=True))
+    monkeypatch.setattr(simulation_loop, "contact_points", fails)
+    for _ in range(3):
+        loop.step()
+        loop.publish(0.0)
+    last = loop.outbox.snapshots[-1]
+    assert [notice.text for notice in last.notices] == [
+        "contacts are off: a mistake in the library; choose them again to retry"
+    ]
+    assert (last.frame, last.paused, last.contact_points) == (3, False, None)
+    assert last.tet_values is not None
+    monkeypatch.undo()
+    loop.execute(messages.SetView("J", contacts=True))
+    loop.publish(0.0)
+    assert loop.outbox.snapshots[-1].contact_points is not None
+
+
+@pytest.mark.parametrize("function", ["measures", "describe"])
+def test_a_failed_snapshot_pauses_with_one_notice(loop, monkeypatch, function):
+    loop.publish(0.0)
+    monkeypatch.setattr(simulation_loop, function, fails)
+    loop.execute(messages.Play())
+    loop.step()
+    loop.live.revision += 1
+    for _ in range(3):
+        loop.publish(0.0)
+    last = loop.outbox.snapshots[-1]
+    assert [notice.text for notice in last.notices] == ["paused; the page cannot be updated: a mistake in the library"]
+    assert last.paused
+    assert not loop.playing
+    monkeypatch.undo()
+    loop.execute(messages.Play())
+    loop.step()
+    loop.publish(0.0)
+    last = loop.outbox.snapshots[-1]
+    assert (last.frame, last.paused) == (2, False)
+    assert loop.outbox.descriptions[-1].revision == loop.live.revision
+
+
+def test_each_warning_becomes_one_notice(loop):
     log = logging.getLogger("supple.somewhere")
-    with loop.told_of_warnings():
+    with loop.warnings_as_notices():
         for _ in range(3):
             log.warning("tets are too stiff for substeps of %g s", 0.002)
         log.info("not for the page")
@@ -230,14 +307,14 @@ class TestPacing:
             pacing.stepped(now, seconds_per_step, dt, speed)
         return pacing.timing(now, speed, True)
 
-    def test_a_quick_simulation_runs_in_real_time(self):
+    def test_a_fast_simulation_runs_in_real_time(self):
         timing = self.paced(0.002)
         assert timing.real_time_ratio == pytest.approx(1.0, abs=0.03)
         assert timing.frames_per_second == pytest.approx(60.0, abs=2.0)
         assert timing.step_ms == pytest.approx(2.0)
         assert timing.keeps_up
 
-    def test_a_slow_one_says_so(self):
+    def test_a_slow_simulation_is_reported(self):
         timing = self.paced(0.05)
         assert timing.real_time_ratio == pytest.approx(1 / 3, abs=0.02)
         assert timing.frames_per_second == pytest.approx(20.0, abs=1.0)
@@ -248,7 +325,7 @@ class TestPacing:
         assert timing.real_time_ratio == pytest.approx(0.1, abs=0.02)
         assert timing.keeps_up
 
-    def test_after_a_stall_time_does_not_race(self):
+    def test_after_a_delay_only_one_step_is_compensated(self):
         pacing = Pacing()
         pacing.start(0.0)
         pacing.stepped(0.01, 0.01, 1 / 60, 1.0)
@@ -275,46 +352,50 @@ HOSTILE = [
 
 
 def random_command(rng, bodies, solvers=("xpbd",)):
-    """A command of any kind, with sensible or hostile values: None where it could not be made."""
+    """A command of any kind, with valid or hostile values; None where it is refused."""
     body = rng.choice([*bodies, "ghost"])
     point = tuple(rng.choice([rng.uniform(-2, 2), rng.uniform(-1e4, 1e4)]) for _ in range(3))
-    parameter = rng.choice(list(say.PARAMETERS.values()))
+    parameter = rng.choice(list(messages.PARAMETERS.values()))
     value = rng.uniform(parameter.low, min(parameter.high, 1e6))
     value = {bool: rng.random() < 0.5, int: min(round(value), 12), float: value}[parameter.kind]
     owner = body if parameter.owner == "body" else None
     size = rng.uniform(0.05, 1.0)
     made = rng.choice(
         [
-            lambda: say.Play(),
-            lambda: say.Pause(),
-            lambda: say.Step(rng.randint(1, 3)),
-            lambda: say.Reset(),
-            lambda: say.SetSpeed(rng.uniform(0.01, 1.0)),
-            lambda: say.SetSolver(rng.choice(solvers)),
-            lambda: say.SetParameter(parameter.name, value, rng.choice([None, owner])),
-            lambda: say.SetView(rng.choice([None, "J", "von_mises", "energy"]), rng.random() < 0.5, rng.random() < 0.5),
-            lambda: say.Grab(rng.randint(0, 20), body, (rng.randint(0, 80),), (1.0,), point, 10 ** rng.uniform(-2, 2)),
-            lambda: say.MoveGrab(rng.randint(0, 20), point),
-            lambda: say.ReleaseGrab(rng.randint(0, 20)),
-            lambda: say.Pin(body, rng.randint(0, 80)),
-            lambda: say.Unpin(body, rng.randint(0, 80)),
-            lambda: say.Unpin(),
-            lambda: say.MovePusher(point, size),
-            lambda: say.RemovePusher(),
-            lambda: say.Squash(rng.uniform(limits.FLATTEST, limits.TALLEST)),
-            lambda: say.AddBody(rng.choice(limits.SHAPES), size, rng.randint(3, 4), rng.choice([None, point])),
-            lambda: say.CopyBody(body),
-            lambda: say.RemoveBody(body),
+            lambda: messages.Play(),
+            lambda: messages.Pause(),
+            lambda: messages.Step(rng.randint(1, 3)),
+            lambda: messages.Reset(),
+            lambda: messages.SetSpeed(rng.uniform(0.01, 1.0)),
+            lambda: messages.SetSolver(rng.choice(solvers)),
+            lambda: messages.SetParameter(parameter.name, value, rng.choice([None, owner])),
+            lambda: messages.SetView(
+                rng.choice([None, "J", "von_mises", "energy"]), rng.random() < 0.5, rng.random() < 0.5
+            ),
+            lambda: messages.Grab(
+                rng.randint(0, 20), body, (rng.randint(0, 80),), (1.0,), point, 10 ** rng.uniform(-2, 2)
+            ),
+            lambda: messages.MoveGrab(rng.randint(0, 20), point),
+            lambda: messages.ReleaseGrab(rng.randint(0, 20)),
+            lambda: messages.Pin(body, rng.randint(0, 80)),
+            lambda: messages.Unpin(body, rng.randint(0, 80)),
+            lambda: messages.Unpin(),
+            lambda: messages.MovePusher(point, size),
+            lambda: messages.RemovePusher(),
+            lambda: messages.Squash(rng.uniform(limits.FLATTEST, limits.TALLEST)),
+            lambda: messages.AddBody(rng.choice(limits.SHAPES), size, rng.randint(3, 4), rng.choice([None, point])),
+            lambda: messages.CopyBody(body),
+            lambda: messages.RemoveBody(body),
         ]
     )
-    if rng.random() < 0.2:  # spoil one value
+    if rng.random() < 0.2:  # make one value invalid
         good = made()
         names = [field.name for field in dataclasses.fields(good)]
         if not names:
             return good
-        spoilt = {name: getattr(good, name) for name in names} | {rng.choice(names): rng.choice(HOSTILE)}
+        changed = {name: getattr(good, name) for name in names} | {rng.choice(names): rng.choice(HOSTILE)}
         try:
-            return type(good)(**spoilt)
+            return type(good)(**changed)
         except CommandError:
             return None
     return made()
@@ -324,10 +405,10 @@ def test_a_thousand_random_commands_leave_a_finite_state(loop, monkeypatch, capl
     monkeypatch.setattr(limits, "MOST_BODIES", 4)
     monkeypatch.setattr(limits, "MOST_TETS", 900)
     rng = random.Random(20240229)
-    refused = play_with(loop, rng, 1000, ["xpbd"])
+    refused = run_random_commands(loop, rng, 1000, ["xpbd"])
     assert refused > 50
     assert loop.live.generation > 20
-    # Nothing went wrong that was not foreseen: unforeseen exceptions are logged.
+    # Only unexpected exceptions are logged.
     assert [record.message for record in caplog.records if record.levelname == "ERROR"] == []
     assert loop.snapshot(0.0).measures.status in set(Status)
 
@@ -338,12 +419,12 @@ def test_random_commands_to_the_implicit_solver_leave_a_finite_state(caplog):
     source = LiveSource("cube", sp.Scene([cube], [sp.HalfSpace()]), sp.Implicit(max_substeps=4), 1 / 60)
     loop = SimulationLoop(LiveScene(source), CommandQueue(), Collected())
     loop.watch.longest = 0.2
-    play_with(loop, random.Random(5), 80, ["xpbd", "implicit"])
+    run_random_commands(loop, random.Random(5), 80, ["xpbd", "implicit"])
     assert [record.message for record in caplog.records if record.levelname == "ERROR"] == []
 
 
-def play_with(loop, rng, count, solvers):
-    """Give random commands to a loop, one a turn. Returns how many could not even be made."""
+def run_random_commands(loop, rng, count, solvers):
+    """Send random commands to a loop, one in each run. Returns how many were refused."""
     refused = 0
     for number in range(count):
         bodies = [part.name for part in loop.live.system.bodies]
@@ -352,8 +433,8 @@ def play_with(loop, rng, count, solvers):
             refused += 1
         else:
             loop.inbox.put(number, command)
-        loop.pacing.due = 0.0  # never wait for the clock
-        loop.turn(0.0)
+        loop.pacing.due = 0.0  # do not wait for the clock
+        loop.run_once(0.0)
         state = loop.live.state
         assert np.isfinite(state.positions).all()
         assert np.isfinite(state.velocities).all()

@@ -1,4 +1,4 @@
-"""From XPBD to the implicit solver in the middle of a run, and the way out of obstacles that this takes."""
+"""A change from XPBD to the implicit solver during a run, with vertices moved out of obstacles."""
 
 import dataclasses
 
@@ -16,10 +16,10 @@ from supple.viewer.protocol.messages import MovePusher, SetSolver
 from .conftest import free_source, run, small_source
 
 
-class TestHandover:
-    """From XPBD, which lets surfaces touch and overlap a little, to a solver that knows no touching."""
+class TestSolverChange:
+    """XPBD allows contact at distance zero and small overlaps, the implicit solver does not."""
 
-    def test_a_body_at_rest_on_the_floor_goes_over(self):
+    def test_a_body_at_rest_on_the_floor_continues(self):
         live = LiveScene(small_source())
         for _ in range(90):
             run(live, 1)
@@ -34,7 +34,21 @@ class TestHandover:
         change(SetSolver("xpbd"), live)
         run(live, 2)
 
-    def test_bodies_inside_each_other_do_not_and_the_old_solver_goes_on(self):
+    @pytest.mark.parametrize("kind", ["xpbd", "implicit"])
+    def test_both_solvers_report_the_number_of_contacts(self, kind):
+        live = LiveScene(small_source())
+        change(SetSolver(kind), live)
+        run(live, 2)
+        assert measures(live).contacts == 0
+        for _ in range(60):
+            run(live, 1)
+            if measures(live).contacts:
+                break
+        assert measures(live).contacts >= 4  # the corners of the cube, on the floor
+        if kind == "implicit":
+            assert measures(live).contacts == len(live.report.contacts())
+
+    def test_intersecting_bodies_are_refused_and_the_old_solver_continues(self):
         live = LiveScene(small_source(pins=[]))
         cube, block = (part.vertices for part in live.system.bodies)
         x = live.state.positions.copy()
@@ -47,7 +61,7 @@ class TestHandover:
         live.step()
         assert live.frame == 1
 
-    def test_a_pusher_through_a_body_is_refused_by_it(self):
+    def test_a_pusher_inside_a_body_is_refused(self):
         live = LiveScene(free_source())
         change(SetSolver("implicit"), live)
         with pytest.raises(SuppleError):
@@ -67,12 +81,12 @@ class TestHandover:
         (sp.Box(size=(1, 1, 1), inside=True), (0.6, 0.7, 0.0)),
     ],
 )
-def test_points_in_an_obstacle_are_moved_straight_out_of_it(obstacle, point):
+def test_points_in_an_obstacle_are_moved_out_along_the_normal(obstacle, point):
     before = np.array([point, (0.0, 9.0, 0.0) if not getattr(obstacle, "inside", False) else (0.0, 0.0, 0.0)])
     depth = -signed_distance(obstacle, before, 0.0)[0]
     assert depth > 0.0
     after = moved_out(obstacle, before, 0.0, 0.01)
     assert signed_distance(obstacle, after, 0.0)[0] == pytest.approx(0.01, rel=0.02)
-    if not (isinstance(obstacle, sp.Box) and obstacle.inside):  # from a corner, the way leads along two faces
+    if not (isinstance(obstacle, sp.Box) and obstacle.inside):  # from a corner, points move along two faces
         assert np.linalg.norm(after[0] - before[0]) == pytest.approx(depth + 0.01, rel=0.02)
     assert np.array_equal(after[1], before[1])

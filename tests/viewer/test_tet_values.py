@@ -1,4 +1,4 @@
-"""Numbers that bodies are colored by, against what can be worked out by hand; and where things touch."""
+"""Values for coloring, compared with closed forms, and contact points."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ def test_J_is_the_ratio_of_volumes():
     assert ratios == pytest.approx(np.full(48, 1.5))
 
 
-def test_a_small_uniaxial_stretch_has_the_von_mises_stress_of_hookes_law():
+def test_von_mises_stress_of_a_small_uniaxial_stretch():
     system = cube_system(RUBBER)
     e, nu = 1e-5, 0.3
     x = system.rest_positions * [1.0 + e, 1.0 - nu * e, 1.0 - nu * e]
@@ -31,7 +31,7 @@ def test_a_small_uniaxial_stretch_has_the_von_mises_stress_of_hookes_law():
     assert tet_values(system, x, "energy") == pytest.approx(np.full(48, 0.5 * 1e5 * e**2), rel=1e-3)
 
 
-def test_pressure_alone_is_no_von_mises_stress():
+def test_pressure_has_no_von_mises_stress():
     system = cube_system(RUBBER)
     assert tet_values(system, 0.9 * system.rest_positions, "von_mises") == pytest.approx(np.zeros(48), abs=1e-6)
 
@@ -71,7 +71,7 @@ OBSTACLES = {
 
 
 @pytest.mark.parametrize("name", OBSTACLES)
-def test_vertices_on_obstacles_are_points_of_contact(name):
+def test_vertices_on_obstacles_are_contact_points(name):
     system = cube_system(RUBBER, obstacles=[OBSTACLES[name]])
     x = system.rest_positions
     found = contact_points(system, x, 1.0)
@@ -82,7 +82,7 @@ def test_vertices_on_obstacles_are_points_of_contact(name):
     assert len(contact_points(system, away, 1.0)) == 0
 
 
-def test_bodies_touch_where_they_are_near_each_other():
+def test_contact_points_between_bodies():
     mesh = sp.shapes.box((1, 1, 1), (2, 2, 2))
     bodies = [sp.Body(name, mesh, RUBBER, position=(0, y, 0)) for name, y in (("low", 0.0), ("high", 1.01))]
     sheet = sp.TriangleObstacle(

@@ -1,4 +1,4 @@
-"""The page: a server that shows a running simulation, or a recording, in browsers."""
+"""The page: a server that displays a live simulation, or a recording, in browsers."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class Address:
 
     Attributes
     ----------
-    host, port : of the server; port 0 takes any free one
-    token : what the page's address must hold (`?token=...`); None where everyone who reaches it may see it
+    host, port : of the server; port 0 selects any free port
+    token : the address must contain it (`?token=...`); None where everyone who reaches the page may use it
     """
 
     host: str = "127.0.0.1"
@@ -39,46 +39,46 @@ class Address:
 
 @dataclass(frozen=True, eq=False)
 class OpenPage:
-    """A page that is being served.
+    """A page while it is served.
 
     Attributes
     ----------
-    url : for a browser; server : viser's
-    shown : what draws on it
+    url : for a browser; server : of viser
+    content : draws the page
     """
 
     url: str
     server: Any
-    shown: LivePage | Replay
+    content: LivePage | Replay
 
 
 @contextmanager
 def opened_page(source: LiveSource | str | Path, address: Address | None = None) -> Iterator[OpenPage]:
-    """Serve a live scene, or the recording at a path, for a block.
+    """Serve a live scene, or the recording at a path, within a block.
 
     Raises
     ------
-    SceneError, SolverError, OutputError : where the source cannot be simulated or read, or the port cannot be had.
+    SceneError, SolverError, OutputError : where the source cannot be simulated or read, or the port is not free.
     """
     address = Address() if address is None else address
     with ExitStack() as ends:
-        show = _live(source, ends) if isinstance(source, LiveSource) else _replay(source, ends)
-        require_free_port(address.host, address.port)  # viser would take the next one, and say nothing
+        draw = _live(source, ends) if isinstance(source, LiveSource) else _replay(source, ends)
+        require_free_port(address.host, address.port)  # viser would silently use the next port
         with gate(address.host, address.token):
             server = start_server(address.host, address.port)
         ends.callback(stop_server, server)
-        dress(server)
-        shown = show(server)
-        ends.callback(shown.stop)
+        configure_page(server)
+        content = draw(server)
+        ends.callback(content.stop)
         host = socket.gethostname() if address.host in ("", "0.0.0.0", "::") else address.host
         query = f"/?token={address.token}" if address.token else ""
-        yield OpenPage(f"http://{host}:{server.get_port()}{query}", server, shown)
+        yield OpenPage(f"http://{host}:{server.get_port()}{query}", server, content)
 
 
 def _live(source: LiveSource, ends: ExitStack) -> Callable[[Any], LivePage]:
     engine = ends.enter_context(Engine(source))
     first = engine.latest()
-    assert first is not None  # the engine waits for it
+    assert first is not None  # the constructor of the engine waits for it
     return lambda server: LivePage(server, engine, first)
 
 
@@ -95,15 +95,15 @@ def serve(source: LiveSource | str | Path, address: Address | None = None, *, op
     SceneError, SolverError, OutputError : see `opened_page`.
     """
     with opened_page(source, address) as page:
-        print(f"{page.url}  (Ctrl+C ends it)", flush=True)
+        print(f"{page.url}  (press Ctrl+C to end)", flush=True)
         if open_browser:
             webbrowser.open(page.url)
         with suppress(KeyboardInterrupt):
             threading.Event().wait()
 
 
-def dress(server: Any) -> None:
-    """Make viser's page ours: the panel stands beside the picture, and nothing is offered that leads elsewhere."""
+def configure_page(server: Any) -> None:
+    """Configure the page of viser: the panel is beside the picture; links and the share button are removed."""
     server.gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(36, 108, 168))
     server.gui.main_panel.dock_right()
     guard_inputs(server)

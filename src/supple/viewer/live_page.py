@@ -1,4 +1,4 @@
-"""A running simulation on a page of viser's."""
+"""The page of a live simulation."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import threading
 import time
 from typing import Any
 
-from supple.viewer.controls.controller import Desk, Simulation
-from supple.viewer.drawing.frame_rate import Pace
-from supple.viewer.drawing.moments.from_snapshot import Translator
+from supple.viewer.controls.controller import Controller, Simulation
+from supple.viewer.drawing.frame_rate import FrameRate
+from supple.viewer.drawing.moments.from_snapshot import MomentBuilder
 from supple.viewer.drawing.options import ViewOptions
 from supple.viewer.drawing.stage import Stage
 from supple.viewer.panel import Panel
@@ -17,14 +17,14 @@ from supple.viewer.protocol.snapshots import Snapshot
 
 logger = logging.getLogger(__name__)
 
-# The simulation says something every half a second, unless it is amid something long. Then the page says so [s].
-_SILENCE = 2.0
+# A snapshot arrives every half a second, except during a long step. After this time the page displays "Busy" [s].
+_SILENT_AFTER = 2.0
 
 
 class LivePage:
-    """Shows the newest snapshot, as often as browsers can take it, and passes commands on.
+    """Draws the newest snapshot, at a rate that the browsers can follow, and sends commands to the simulation.
 
-    The simulation is never waited for, and never waits for the page.
+    Page and simulation never wait for each other.
 
     Parameters
     ----------
@@ -35,14 +35,14 @@ class LivePage:
         self, server: Any, simulation: Simulation, first: Snapshot, options: ViewOptions | None = None
     ) -> None:
         self._simulation = simulation
-        self._translator = Translator()
-        self._shown, self._heard = first, time.monotonic()
-        self.desk = Desk(simulation, first)
-        self.panel = Panel(server, self.desk)
-        moment = self._translator.moment(first)
-        self.stage = Stage(server, moment, options or ViewOptions(), self.panel.mouse.listen)
+        self._moment_builder = MomentBuilder()
+        self._displayed, self._received_at = first, time.monotonic()
+        self.controller = Controller(simulation, first)
+        self.panel = Panel(server, self.controller)
+        moment = self._moment_builder.moment(first)
+        self.stage = Stage(server, moment, options or ViewOptions(), self.panel.mouse.add_handlers)
         self.panel.attach(self.stage)
-        self._pace = Pace(server)
+        self._frame_rate = FrameRate(server)
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._run, name="supple page", daemon=True)
         self._thread.start()
@@ -54,30 +54,30 @@ class LivePage:
         self._thread.join()
 
     def _run(self) -> None:
-        while not self._end.wait(self._pace.pause()):
-            if not self._pace.may_send():
+        while not self._end.wait(self._frame_rate.pause()):
+            if not self._frame_rate.may_send():
                 continue
             try:
-                self._look()
+                self._draw_newest()
                 self.panel.refresh()
             except Exception:
-                # Whatever one snapshot does to the page, the next one is drawn.
+                # An error in one snapshot must not stop the page.
                 logger.exception("page: a snapshot could not be drawn")
 
-    def _look(self) -> None:
-        """Draw the newest snapshot, if it is not on show yet."""
+    def _draw_newest(self) -> None:
+        """Draw the newest snapshot, if it has not been drawn yet."""
         error = self._simulation.error
         if error is not None:
-            self.panel.time.mourn(error)
+            self.panel.time.show_error(error)
         snapshot = self._simulation.latest()
-        if snapshot is None or snapshot is self._shown:
-            silent = time.monotonic() - self._heard
-            if error is None and silent > _SILENCE:
+        if snapshot is None or snapshot is self._displayed:
+            silent = time.monotonic() - self._received_at
+            if error is None and silent > _SILENT_AFTER:
                 self.panel.time.wait(silent)
             return
-        self._heard = time.monotonic()
-        with self._pace.sending():
-            self._shown = snapshot
-            self.stage.show(self._translator.moment(snapshot))
+        self._received_at = time.monotonic()
+        with self._frame_rate.sending():
+            self._displayed = snapshot
+            self.stage.show(self._moment_builder.moment(snapshot))
             self.panel.record.note(self.stage.moment)
             self.panel.show(snapshot)

@@ -1,4 +1,4 @@
-"""The panel beside a running simulation: everything a visitor can see in numbers, and change."""
+"""The panel of a live simulation: its measures, and all that a visitor can change."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import time
 from typing import Any
 
 from supple.viewer.controls.body_controls import BodyControls
-from supple.viewer.controls.controller import Desk, tell
+from supple.viewer.controls.controller import Controller, notify
 from supple.viewer.controls.measures import Measures
 from supple.viewer.controls.mouse import Mouse
 from supple.viewer.controls.mouse_controls import MouseControls
@@ -21,65 +21,65 @@ from supple.viewer.drawing.stage import Stage
 from supple.viewer.protocol.messages import SetView
 from supple.viewer.protocol.snapshots import Snapshot
 
-_NUMBERS_EVERY = 0.15  # [s]: numbers that change faster cannot be read
+_NUMBERS_EVERY = 0.15  # [s]; numbers that change faster cannot be read
 _PLOTS_EVERY = 0.5  # [s]
 TABS = ("Bodies", "View", "Solver")
 
 
 class Panel:
-    """All folders: time at the top, the others in tabs below.
+    """All folders: time at the top, the others in tabs below it.
 
     Parameters
     ----------
-    server : viser's; desk : where commands go
+    server : of viser; controller : sends the commands
     """
 
-    def __init__(self, server: Any, desk: Desk) -> None:
-        self._server, self._desk = server, desk
-        gui, snapshot = server.gui, desk.snapshot
-        self.time = TimeControls(gui, desk)
+    def __init__(self, server: Any, controller: Controller) -> None:
+        self._server, self._controller = server, controller
+        gui, snapshot = server.gui, controller.snapshot
+        self.time = TimeControls(gui, controller)
         tabs = gui.add_tab_group()
         self._bodies_tab, self._view_tab, self._solver_tab = (tabs.add_tab(name) for name in TABS)
         with self._bodies_tab:
-            self.mouse_controls = MouseControls(gui, desk, self._mouse_changed)
-        self.mouse = Mouse(server, desk, self.mouse_controls)
+            self.mouse_controls = MouseControls(gui, controller, self._mouse_changed)
+        self.mouse = Mouse(server, controller, self.mouse_controls)
         self.stage: Stage | None = None
         self._numbers_at = self._plots_at = 0.0
         self._numbers_of: Snapshot | None = None
         self._plots_of: Snapshot | None = None
-        self._told = max((notice.number for notice in snapshot.notices), default=0)
+        self._last_notice = max((notice.number for notice in snapshot.notices), default=0)
 
     def attach(self, stage: Stage) -> None:
-        """Add the folders that need something to be on show."""
+        """Add the folders that need a stage."""
         self.stage = stage
         gui = self._server.gui
         with self._bodies_tab:
-            self.bodies = bodies = BodyControls(gui, self._desk)
+            self.bodies = bodies = BodyControls(gui, self._controller)
             with bodies.new:
-                self.upload = UploadControls(self._server, self._desk, bodies.new_size, bodies.new_youngs)
+                self.upload = UploadControls(self._server, self._controller, bodies.new_size, bodies.new_youngs)
         with self._view_tab:
             self.views = ViewControls(self._server, stage, self._view_changed)
             self.record = RecordControls(self._server, stage)
         with self._solver_tab:
-            self.solver = SolverControls(gui, self._desk)
-            self.measures = Measures(gui, self._desk.snapshot)
+            self.solver = SolverControls(gui, self._controller)
+            self.measures = Measures(gui, self._controller.snapshot)
         self.mouse.attach(stage)
-        self.show(self._desk.snapshot)
+        self.show(self._controller.snapshot)
         self.refresh()
 
     def stop(self) -> None:
-        """End what it does by itself."""
+        """End its threads."""
         self.upload.stop()
 
     def show(self, snapshot: Snapshot) -> None:
-        """Take notice of a snapshot; `refresh` shows it."""
-        self._desk.snapshot = snapshot
+        """Store a snapshot; `refresh` displays it."""
+        self._controller.snapshot = snapshot
         self.measures.note(snapshot)
-        self._tell(snapshot)
+        self._notify(snapshot)
 
     def refresh(self) -> None:
-        """Bring everything up to date that is not: numbers and plots less often than the picture."""
-        snapshot, now = self._desk.snapshot, time.monotonic()
+        """Update what has changed; numbers and plots less often than the picture."""
+        snapshot, now = self._controller.snapshot, time.monotonic()
         if snapshot is not self._numbers_of and now - self._numbers_at >= _NUMBERS_EVERY:
             self._numbers_at, self._numbers_of = now, snapshot
             self.time.show(snapshot)
@@ -90,20 +90,20 @@ class Panel:
             self._plots_at, self._plots_of = now, snapshot
             self.measures.show(snapshot)
 
-    def _tell(self, snapshot: Snapshot) -> None:
-        """Show the notices that were not shown yet."""
+    def _notify(self, snapshot: Snapshot) -> None:
+        """Display new notices."""
         for notice in snapshot.notices:
-            if notice.number > self._told:
-                self._told = notice.number
+            if notice.number > self._last_notice:
+                self._last_notice = notice.number
                 for client in self._server.get_clients().values():
                     error = notice.level == "error"
-                    tell(client, "Simulation", notice.text, "red" if error else "blue")
+                    notify(client, "Simulation", notice.text, "red" if error else "blue")
 
     def _mouse_changed(self) -> None:
         self.mouse.switch()
 
     def _view_changed(self, options: ViewOptions) -> None:
-        """Ask the simulation for what is to be drawn: it measures nothing that nobody looks at."""
+        """Request the values to draw from the simulation, which computes no others."""
         field = FIELDS.get(options.color_by)
         key = field.key if field is not None and options.surface != "wireframe" else None
-        self._desk.ask(None, lambda: SetView(key, options.velocities, options.contacts))
+        self._controller.send(None, lambda: SetView(key, options.velocities, options.contacts))

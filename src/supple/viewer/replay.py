@@ -1,12 +1,12 @@
-"""A recording on the page: a slider over time, and the views of a running simulation."""
+"""The page of a recording: a time slider, and the same views as for a live simulation."""
 
 from __future__ import annotations
 
 import threading
 import time
-from collections import OrderedDict
 from collections.abc import Callable
 from contextlib import suppress
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from supple.output.recording.reader import Recording
 from supple.viewer.controls.record_controls import RecordControls
 from supple.viewer.controls.view_controls import ViewControls
-from supple.viewer.drawing.frame_rate import Pace
+from supple.viewer.drawing.frame_rate import FrameRate
 from supple.viewer.drawing.moments.from_recording import model_of_recording, moment_of_frame
 from supple.viewer.drawing.moments.model import Moment
 from supple.viewer.drawing.options import ViewOptions
@@ -24,24 +24,24 @@ from supple.viewer.server.browser_values import number
 
 _SLOWEST, _FASTEST = 0.05, 4.0
 _KEPT = 64  # frames
-_SETTLES = 0.3  # after a visitor's last move of the slider [s]
+_SETTLES = 0.3  # time after the last slider input of a visitor [s]
 
 
 class Replay:
-    """Plays a recording on a server of viser's.
+    """Plays a recording on a server of viser.
 
     Parameters
     ----------
-    server : see `supple.output.viser_server`; recording : open as long as this is
+    server : see `supple.output.viser_server`; recording : must stay open while this object is used
     """
 
     def __init__(self, server: Any, recording: Recording, options: ViewOptions | None = None) -> None:
         self._recording = recording
         self._model = model_of_recording(recording)
-        self._moments: OrderedDict[int, Moment] = OrderedDict()
-        # HDF5 is read by one thread at a time.
+        self._cached = lru_cache(_KEPT)(lambda index: moment_of_frame(self._model, recording[index]))
+        # Only one thread at a time may read HDF5.
         self._reading = threading.Lock()
-        # Time runs by itself, or a visitor moves it.
+        # Both the playing thread and visitors change the time.
         self._turn = threading.RLock()
         self._end = threading.Event()
         self.stage = Stage(server, self.moment(0), options or ViewOptions())
@@ -55,7 +55,7 @@ class Replay:
                 "Time [s]", first, last, step if step > 0.0 else 1.0, initial_value=first, disabled=last == first
             )
             self.speed = gui.add_slider("Speed", _SLOWEST, _FASTEST, 0.05, initial_value=1.0)
-            self.said = gui.add_markdown(self._facts(0))
+            self.message = gui.add_markdown(self._facts(0))
             self.export = gui.add_button("Export as page (HTML)")
         self.controls = ViewControls(server, self.stage)
         self.record = RecordControls(server, self.stage)
@@ -63,41 +63,35 @@ class Replay:
         if not self.playing:
             self.play.label = "Play"
         self._time = first
-        # Where playing has put the slider last; elsewhere, a visitor has moved it, who will be heard soon.
+        # The slider value that playing has set last. Another value comes from a visitor, whose event arrives soon.
         self._put = self.slider.value
         self._settle_at: float | None = None
         self._loop = server.get_event_loop()
         self.slider.on_update(self._seek)
         self.play.on_click(lambda _: self._toggle())
         self.export.on_click(self._send_page)
-        self._pace = Pace(server)
+        self._frame_rate = FrameRate(server)
         self._thread = threading.Thread(target=self._run, name="supple replay", daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
-        """End the thread that plays."""
+        """End the playing thread."""
         self._end.set()
         self._thread.join()
 
-    def moment(self, number_of_frame: int) -> Moment:
-        """One frame; the latest ones that were asked for are kept."""
+    def moment(self, index: int) -> Moment:
+        """One frame; the frames requested last are cached."""
         with self._reading:
-            known = self._moments.get(number_of_frame)
-            if known is None:
-                known = moment_of_frame(self._model, self._recording[number_of_frame])
-                self._moments[number_of_frame] = known
-                if len(self._moments) > _KEPT:
-                    self._moments.popitem(last=False)
-            return known
+            return self._cached(index)
 
     def page(self) -> str:
-        """The whole recording as a page, drawn as it is shown now."""
+        """The whole recording as HTML page, with the present view options."""
         options = self.stage.options
         chosen = evenly(len(self._recording), most_moments(self._model, options))
         return page_of_moments([(float(self._recording.times[i]), self.moment(i)) for i in chosen], options)
 
     def frame_at(self, seconds: float) -> int:
-        """The frame that is shown at a time [s]: the last one that is not later."""
+        """The frame to draw at a time [s]: the last one that is not later."""
         times = self._recording.times
         step = 0.5 * float(np.diff(times).min()) if len(times) > 1 else 0.0
         return int(np.clip(np.searchsorted(times, seconds + step, side="right") - 1, 0, len(times) - 1))
@@ -106,20 +100,20 @@ class Replay:
         """Draw the frame of a time [s]."""
         times = self._recording.times
         self._time = float(np.clip(seconds, times[0], times[-1]))
-        shown = self.frame_at(self._time)
-        moment = self.moment(shown)
+        frame = self.frame_at(self._time)
+        moment = self.moment(frame)
         if moment is not self.stage.moment:
             self.stage.show(moment)
             self.record.note(moment)
             self.controls.refresh()
-            self.said.content = self._facts(shown)
+            self.message.content = self._facts(frame)
 
     def _toggle(self) -> None:
         self.playing = not self.playing
         self.play.label = "Pause" if self.playing else "Play"
 
     def _seek(self, event: Any) -> None:
-        """A visitor has moved the slider; what moves by itself while playing comes without one."""
+        """Handle slider input of a visitor; updates by playing have no client."""
         if event.client is not None:
             with self._turn:
                 if self.playing:
@@ -131,16 +125,16 @@ class Replay:
 
     def _run(self) -> None:
         before = time.monotonic()
-        while not self._end.wait(self._pace.pause()):
+        while not self._end.wait(self._frame_rate.pause()):
             now = time.monotonic()
             passed, before = now - before, now
             times = self._recording.times
             with self._turn:
-                if self.playing and self.slider.value == self._put and self._pace.may_send():
+                if self.playing and self.slider.value == self._put and self._frame_rate.may_send():
                     following = self._time + passed * number(self.speed.value, _SLOWEST, _FASTEST)
                     if following > times[-1]:
                         following = float(times[0])
-                    with self._pace.sending():
+                    with self._frame_rate.sending():
                         self.show(following)
                         self._in_loop(self._advance, float(times[self.frame_at(following)]))
                 elif self._settle_at is not None and now > self._settle_at:
@@ -148,32 +142,32 @@ class Replay:
                     self._in_loop(self._send_again)
 
     def _in_loop(self, call: Callable[..., None], *arguments: float) -> None:
-        """Let the server's loop do it, which also reads what visitors say: nothing comes in between."""
+        """Run a function in the loop of the server, which also reads messages: no message comes in between."""
         with suppress(RuntimeError):  # the server has stopped
             self._loop.call_soon_threadsafe(call, *arguments)
 
     def _advance(self, seconds: float) -> None:
-        """Put the slider where playing is, unless a visitor has moved it."""
+        """Move the slider to the playing time, unless a visitor has moved it."""
         if self.playing and self.slider.value == self._put:
             self._put = seconds
             self.slider.value = seconds
 
     def _send_again(self) -> None:
-        """Put the sliders of all visitors where this one is.
+        """Send the slider value to all visitors again.
 
-        What playing sent last may have crossed a visitor's move on the line, and that browser then shows a time
-        which is not the one shown. viser sends no value twice, so it becomes another by its last bit.
+        The last value of playing and the input of a visitor may have been sent at the same time; then that browser
+        displays an old time. viser does not send the same value twice, so that its last bit is changed.
         """
         if not self.playing:
             times = self._recording.times
             self._put = float(np.nextafter(self.slider.value, 0.5 * (times[0] + times[-1])))
             self.slider.value = self._put
 
-    def _facts(self, shown: int) -> str:
+    def _facts(self, frame: int) -> str:
         recording = self._recording
-        report = recording[shown].report
+        report = recording[frame].report
         return (
-            f"Frame {shown} of {len(recording) - 1}, {len(recording.tets)} tets, "
+            f"Frame {frame} of {len(recording) - 1}, {len(recording.tets)} tets, "
             f"{len(recording.rest_positions)} vertices  \n"
             f"smallest J {report.min_det_F:.3g}, {report.status}"
         )

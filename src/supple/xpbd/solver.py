@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from supple.errors import SolverError
 from supple.numerics.thread_tuning import ThreadTuner
+from supple.numerics.interruption import interruption_point
 from supple.solver import Solver
 from supple.state import State, Status, StepReport
 from supple.system import System
@@ -155,6 +156,7 @@ class XPBD(Solver):
             ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt)
         with _threads(self.threads):
             for k in range(self.substeps):
+                interruption_point()
                 started = perf_counter()
                 parallel = ws.pace.choose()
                 end = state.time + (k + 1) * h

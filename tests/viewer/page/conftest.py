@@ -1,4 +1,4 @@
-"""A simulation that is made up, for tests of the page alone: it notes what it is told, and shows what it is given."""
+"""A fake simulation for tests of the page: it stores received commands, and sends given snapshots."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from supple.viewer.protocol.messages import (
 )
 
 
-class MadeUpSimulation:
-    """What the page sees of a simulation. `told` are the commands, `snapshot` is the newest one."""
+class FakeSimulation:
+    """The interface of a simulation. `received` are the commands, `snapshot` is the newest one."""
 
     def __init__(self, snapshot: Snapshot) -> None:
-        self.snapshot, self.told, self.error = snapshot, [], None
-        self.sent = 0  # commands; what `snapshot.applied` says of them is up to the test
+        self.snapshot, self.received, self.error = snapshot, [], None
+        self.sent = 0  # number of commands; the test sets `snapshot.applied`
 
     def send(self, command):
-        self.told.append(command)
+        self.received.append(command)
         self.sent += 1
         return self.sent
 
@@ -103,15 +103,15 @@ def snapshot_of(description: SceneDescription, **changes) -> Snapshot:
 
 
 @pytest.fixture
-def made_up():
-    """Two small boxes over a floor, made up."""
+def fake():
+    """A fake simulation of two small boxes above a floor."""
     mesh = sp.shapes.box(size=(1.0, 1.0, 1.0), divisions=(2, 2, 2))
     other = sp.TetMesh(mesh.vertices + np.array([2.0, 0.0, 0.0]), mesh.tets)
-    return MadeUpSimulation(snapshot_of(describe(mesh, other)))
+    return FakeSimulation(snapshot_of(describe(mesh, other)))
 
 
 class Visitor:
-    """A browser's side of the line, without a browser: says what a page would say, and reads, or does not."""
+    """A websocket client that sends the messages of a page, and may read or not."""
 
     def __init__(self, port: int, query: str = "", reads: bool = True) -> None:
         import viser
@@ -127,8 +127,8 @@ class Visitor:
         )
         if reads:
             threading.Thread(target=self._read, daemon=True).start()
-        # A visitor counts as one once its camera is known.
-        self.say(
+        # The server counts a visitor after it has sent its camera.
+        self.send(
             "ViewerCameraMessage",
             wxyz=(1.0, 0.0, 0.0, 0.0),
             position=(0.0, 0.0, -5.0),
@@ -141,19 +141,19 @@ class Visitor:
             up_direction=(0.0, -1.0, 0.0),
         )
 
-    def say(self, kind: str, **fields) -> None:
+    def send(self, kind: str, **fields) -> None:
         import msgspec
 
         self.line.send(msgspec.msgpack.encode({"type": kind, **fields}))
 
     def set(self, handle, value) -> None:
-        self.say("GuiUpdateMessage", uuid=handle._impl.uuid, updates={"value": value})
+        self.send("GuiUpdateMessage", uuid=handle._impl.uuid, updates={"value": value})
 
     def press(self, button) -> None:
-        self.say("GuiUpdateMessage", uuid=button._impl.uuid, updates={"value": True})
+        self.send("GuiUpdateMessage", uuid=button._impl.uuid, updates={"value": True})
 
     def drag(self, handle, phase: str, start, end) -> None:
-        self.say(
+        self.send(
             "SceneNodeDragMessage",
             phase=phase,
             name=handle.name,
@@ -168,7 +168,7 @@ class Visitor:
         )
 
     def click(self, handle, origin, direction) -> None:
-        self.say(
+        self.send(
             "SceneNodeClickMessage",
             name=handle.name,
             instance_index=None,
@@ -196,13 +196,13 @@ def _plain(point) -> list[float]:
 
 @pytest.fixture(scope="session")
 def visit():
-    """Makes visitors: `visit(port)`."""
+    """Creates visitors: `visit(port)`."""
     return Visitor
 
 
 @pytest.fixture(scope="session")
 def until():
-    """Waits until something holds, and fails where it never does."""
+    """Waits until a condition holds; fails after a time limit."""
 
     def wait(holds, seconds: float = 20.0, what: str = "what was waited for"):
         end = time.monotonic() + seconds
@@ -217,29 +217,29 @@ def until():
 
 @pytest.fixture
 def server():
-    """A server of pages. It has no gate: what a visitor says gets through, whatever it is."""
+    """A server without access control: all messages of visitors are handled."""
     from supple.output.viser_server import start_server, stop_server
-    from supple.viewer.app import dress
+    from supple.viewer.app import configure_page
 
     made = start_server("127.0.0.1", 0)
-    dress(made)
+    configure_page(made)
     yield made
     stop_server(made)
 
 
 @pytest.fixture
-def live(server, made_up):
-    """A page of the made-up simulation."""
+def live(server, fake):
+    """A page of the fake simulation."""
     from supple.viewer.live_page import LivePage
 
-    page = LivePage(server, made_up, made_up.snapshot)
+    page = LivePage(server, fake, fake.snapshot)
     yield page
     page.stop()
 
 
 @pytest.fixture
 def visitor(live, server, visit, until):
-    """One who looks at the page of the made-up simulation."""
+    """A visitor of the page of the fake simulation."""
     made = visit(server.get_port())
     until(server.get_clients)
     yield made
@@ -247,7 +247,7 @@ def visitor(live, server, visit, until):
 
 
 class Screen:
-    """A browser that looks at a page, and what a person does there.
+    """A browser with a page, and the actions of a person there.
 
     Attributes
     ----------
@@ -258,21 +258,21 @@ class Screen:
         self._pixels, self.server = pixels, server
         self.errors: list[str] = []
         self.tab = browser.new_page(viewport={"width": 720, "height": 420})
-        self.tab.set_default_timeout(90_000)  # drawing in software, on a machine that does much else
+        self.tab.set_default_timeout(90_000)  # software rendering on a busy machine
         self.tab.on("pageerror", lambda error: self.errors.append(str(error)))
         self.tab.on("console", self._hear)
         self.tab.goto(url)
         self.tab.wait_for_selector("canvas")
-        # Software OpenGL is told of in a corner, in the color of a body.
+        # A notification about software OpenGL has the color of a body.
         self.tab.locator(".mantine-Notification-closeButton").first.dispatch_event("click")
         self.wait(lambda: server.get_clients(), "the browser as a visitor")
 
     def close(self) -> None:
-        """To be called when its test is over: drawing on, in software, it would slow down all others."""
+        """Must be called at the end of the test: software rendering would slow down the others."""
         self.tab.close()
 
     def wait(self, holds, what: str, seconds: float = 90.0):
-        """Wait until something holds, while the browser goes on."""
+        """Wait until a condition holds, while the browser runs."""
         end = time.monotonic() + seconds
         while not (found := holds()):
             if time.monotonic() > end:
@@ -281,10 +281,10 @@ class Screen:
             self.tab.wait_for_timeout(50)
         return found
 
-    def _hear(self, said) -> None:
-        # A slider's own complaint about its keys, in React's event listeners.
-        if said.type == "error" and "passive event listener" not in said.text:
-            self.errors.append(said.text)
+    def _hear(self, message) -> None:
+        # A known warning of sliders about their event listeners.
+        if message.type == "error" and "passive event listener" not in message.text:
+            self.errors.append(message.text)
 
     @property
     def client(self):
@@ -296,7 +296,7 @@ class Screen:
         return self._pixels(self.tab, clip=box)
 
     def place(self, point) -> tuple[float, float]:
-        """Where a point in space is on the screen [pixels]."""
+        """Position of a point on the screen [pixels]."""
         camera = self.client.camera
         eye, ahead = np.asarray(camera.position), np.asarray(camera.look_at) - np.asarray(camera.position)
         ahead /= np.linalg.norm(ahead)
@@ -322,10 +322,10 @@ class Screen:
         for _ in range(times):
             thumb.press(key)
 
-    def insist(self, act, holds, what: str, patience: float = 5.0):
-        """Do something until it has an effect. A busy browser may lose a key, or have drawn too little to be clicked.
+    def insist(self, act, holds, what: str, interval: float = 5.0):
+        """Repeat an action until it has an effect: a busy browser may lose a key or a click.
 
-        For what can be done twice without harm.
+        The action must be harmless where it is repeated.
         """
         again = 0.0
 
@@ -333,13 +333,13 @@ class Screen:
             nonlocal again
             if time.monotonic() > again:
                 act()
-                again = time.monotonic() + patience
+                again = time.monotonic() + interval
             return holds()
 
         return self.wait(done, what)
 
     def reads(self, handle) -> float:
-        """What a slider says in the browser."""
+        """The value of a slider in the browser."""
         return float(self._thumb(handle).get_attribute("aria-valuenow"))
 
     def _thumb(self, handle):
@@ -362,7 +362,7 @@ def look(browser, pixels):
 
 @pytest.fixture(scope="session")
 def spot():
-    """Where a body of some color is in a picture: how many pixels, their middle (x, y), and their height."""
+    """Finds a body by its color in a picture: number of pixels, their center (x, y), and their height."""
 
     def find(shot: np.ndarray, color: str) -> tuple[int, np.ndarray, int]:
         r, g, b = (shot[..., k] for k in range(3))

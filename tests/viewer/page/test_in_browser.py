@@ -1,4 +1,4 @@
-"""The live page in a real browser, with a real simulation behind it: state and picture tell the same story."""
+"""The live page in a browser with a real simulation: both state and picture are checked."""
 
 from types import SimpleNamespace
 
@@ -24,16 +24,16 @@ def live(look, spot):
     source = LiveSource("ball", scene, sp.XPBD(substeps=8), 1 / 60)
     with opened_page(source, Address(port=0)) as page:
         screen = look(page.url, page.server)
-        desk = page.shown.desk
-        made = SimpleNamespace(screen=screen, page=page.shown, panel=page.shown.panel)
-        made.snapshot = lambda: desk.snapshot
-        made.middle = lambda: desk.snapshot.positions.mean(axis=0)
-        made.height = lambda: float(np.ptp(desk.snapshot.positions[:, 1]))
+        controller = page.content.controller
+        made = SimpleNamespace(screen=screen, page=page.content, panel=page.content.panel)
+        made.snapshot = lambda: controller.snapshot
+        made.middle = lambda: controller.snapshot.positions.mean(axis=0)
+        made.height = lambda: float(np.ptp(controller.snapshot.positions[:, 1]))
         made.red = lambda: spot(screen.shot(), "red")
         made.seen = lambda: made.red()[1]
 
         def drawn(holds, what):
-            """Wait until the picture shows something: it comes later than the state."""
+            """Wait for the picture, which is later than the state."""
             return screen.wait(lambda: holds(made.red()), what)
 
         made.drawn = drawn
@@ -66,7 +66,7 @@ def resting(still):
     return still
 
 
-def test_time_runs_pauses_steps_and_begins_anew(still):
+def test_play_pause_step_and_reset(still):
     screen, before = still.screen, still.seen()
     screen.press("Play")
     screen.wait(lambda: still.middle()[1] < 0.35, "the fall")
@@ -87,7 +87,7 @@ def test_time_runs_pauses_steps_and_begins_anew(still):
     assert screen.errors == []
 
 
-def test_a_body_follows_the_mouse_and_is_let_go(resting):
+def test_a_body_follows_the_mouse_until_it_is_released(resting):
     screen, mouse = resting.screen, resting.screen.tab.mouse
     low = resting.seen()
     grip, up = resting.middle() + np.array([0.0, 0.1, 0.0]), np.array([0.0, 0.2, 0.0])
@@ -107,7 +107,7 @@ def test_a_body_follows_the_mouse_and_is_let_go(resting):
     resting.drawn(lambda red: np.abs(red[1] - where()).max() < 25, "the fall in the picture")
 
 
-def test_a_click_pins_a_vertex_and_another_one_lets_it_go(resting):
+def test_a_click_pins_a_vertex_and_another_one_unpins_it(resting):
     screen, tab = resting.screen, resting.screen.tab
     top = resting.snapshot().positions[np.argmax(resting.snapshot().positions[:, 1])]
     x, y = screen.place(top - [0.0, 0.05, 0.0])
@@ -157,7 +157,7 @@ def test_a_squashed_ball_recovers(resting):
     resting.drawn(lambda red: abs(red[2] - seen) < 0.1 * seen, "the ball's own shape in the picture")
 
 
-def test_another_solver_goes_on(still):
+def test_another_solver_continues(still):
     screen, solver = still.screen, still.panel.solver
     screen.show_tab("Solver")
     try:
@@ -175,7 +175,7 @@ def test_another_solver_goes_on(still):
         screen.show_tab("Bodies")
 
 
-def test_a_body_comes_and_goes(still, spot):
+def test_a_body_is_added_and_removed(still, spot):
     screen, bodies = still.screen, still.panel.bodies
     blue = lambda: spot(screen.shot(), "blue")[0]  # noqa: E731
     assert blue() < 20
@@ -192,12 +192,12 @@ def test_a_body_comes_and_goes(still, spot):
     screen.tab.get_by_text("Add a body").click()
 
 
-def test_a_file_becomes_a_body_and_a_bad_one_a_line(resting, spot, tmp_path):
-    """Uploaded in the browser, filled with tets in a process of its own, while the simulation goes on."""
+def test_a_file_becomes_a_body_and_a_bad_file_a_message(resting, spot, tmp_path):
+    """The file is uploaded in the browser and meshed in another process, while the simulation continues."""
     try:
         upload_two_files(resting, spot, tmp_path)
     finally:
-        resting.page.desk.ask(None, lambda: RemoveBody("my ball 1"))
+        resting.page.controller.send(None, lambda: RemoveBody("my ball 1"))
         resting.screen.wait(lambda: len(resting.snapshot().description.bodies) == 1, "no second body")
 
 
@@ -216,11 +216,11 @@ def upload_two_files(resting, spot, tmp_path):
 
     files.set_input_files(tmp_path / "my ball.stl")
     screen.wait(added, "the body")
-    assert frames[-1] > frames[0] + 5  # time did not stand still
+    assert frames[-1] > frames[0] + 5  # the time has run
     body = resting.snapshot().description.bodies[1]
     assert body.name == "my ball 1"
-    assert np.ptp(body.rest_positions, axis=0).max() == pytest.approx(0.18, abs=0.01)  # the size that the panel says
-    screen.press("Pause")  # it rolls away else
+    assert np.ptp(body.rest_positions, axis=0).max() == pytest.approx(0.18, abs=0.01)  # the size on the panel
+    screen.press("Pause")  # otherwise the body rolls away
     screen.press("reset")
     screen.wait(lambda: blue() > 60, "the body in the picture")
     screen.press("Play")
@@ -235,7 +235,7 @@ def upload_two_files(resting, spot, tmp_path):
     screen.tab.get_by_text("Add a body").click()
 
 
-def test_the_ball_of_the_mouse_pushes(resting):
+def test_the_pusher_pushes_a_body(resting):
     screen, controls = resting.screen, resting.panel.mouse_controls
     screen.choose(controls.mode, "push")
     screen.wait(lambda: controls.radius_input.visible, "the ball's size")
@@ -244,13 +244,13 @@ def test_the_ball_of_the_mouse_pushes(resting):
     mouse = screen.tab.mouse
 
     def hold():
-        """Until the browser has what hears the mouse beside the body, this turns the camera a little."""
+        """Before the browser has drawn the backdrop, this turns the camera slightly."""
         mouse.up()
         mouse.move(x + 130, y)
         mouse.down()
         mouse.move(x + 120, y, steps=2)
 
-    screen.insist(hold, lambda: resting.snapshot().pusher is not None, "the ball of the mouse", patience=15.0)
+    screen.insist(hold, lambda: resting.snapshot().pusher is not None, "the ball of the mouse", interval=15.0)
     for k in range(10):
         mouse.move(x + 120 - 12 * k, y)
         screen.tab.wait_for_timeout(60)
@@ -264,6 +264,6 @@ def test_the_ball_of_the_mouse_pushes(resting):
     screen.wait(lambda: resting.snapshot().pusher is None, "no ball of the mouse")
 
 
-def test_nothing_went_wrong_meanwhile(live):
+def test_the_browser_reported_no_errors(live):
     assert live.screen.errors == []
     assert np.isfinite(live.snapshot().positions).all()

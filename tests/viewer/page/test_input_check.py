@@ -1,4 +1,4 @@
-"""Inputs take what they offer, and nothing else."""
+"""Inputs accept only allowed values."""
 
 import math
 
@@ -30,14 +30,14 @@ def test_buttons_and_check_boxes(server, value, offered):
     assert is_offered(server.gui.add_button("b"), value) is offered
 
 
-def test_one_visitor_cannot_end_the_page_for_the_others(server, visit, until):
+def test_invalid_values_do_not_affect_other_visitors(server, visit, until):
     count = server.gui.add_slider("count", 1, 9, 1, initial_value=2)
     visitors = [visit(server.get_port()) for _ in range(2)]
     until(lambda: len(server.get_clients()) == 2)
     heard = []
     count.on_update(lambda event: heard.append(event.target.value))
-    visitors[0].set(count, 1e30)  # as an integer it is too large for the line to all others
-    visitors[0].say("GuiUpdateMessage", uuid=count._impl.uuid, updates={"update_cb": None, "value": 3})
+    visitors[0].set(count, 1e30)  # as an integer it is too large to be sent to the others
+    visitors[0].send("GuiUpdateMessage", uuid=count._impl.uuid, updates={"update_cb": None, "value": 3})
     visitors[0].set(count, 5)
     until(lambda: heard == [5])
     visitors[1].set(count, 6)

@@ -1,38 +1,38 @@
-"""A page whose server goes away says so, and goes on when it is back."""
+"""A page displays that its server has ended, and reconnects to a new one."""
 
 import os
 
 from supple.output.viser_server import start_server, stop_server
-from supple.viewer.app import dress
+from supple.viewer.app import configure_page
 from supple.viewer.live_page import LivePage
 from supple.viewer.server.gate import first_free_port
 
 
 def serve(port, simulation):
     server = start_server("127.0.0.1", port)
-    dress(server)
+    configure_page(server)
     return server, LivePage(server, simulation, simulation.snapshot)
 
 
-def test_the_server_goes_and_comes_back(made_up, look, spot):
-    # Not any free port: those that the system hands out may be another's by the time the server comes back.
-    server, page = serve(first_free_port("127.0.0.1", 20_000 + 50 * (os.getpid() % 200)), made_up)
+def test_the_page_reconnects_to_a_restarted_server(fake, look, spot):
+    # Not a port that the system selects: another process may use it before the server restarts.
+    server, page = serve(first_free_port("127.0.0.1", 20_000 + 50 * (os.getpid() % 200)), fake)
     screen = look(f"http://127.0.0.1:{server.get_port()}", server)
-    said = screen.tab.get_by_text("Connected", exact=True)
-    screen.wait(lambda: said.count() == 1 and spot(screen.shot(), "red")[0] > 100, "the page")
+    connected = screen.tab.get_by_text("Connected", exact=True)
+    screen.wait(lambda: connected.count() == 1 and spot(screen.shot(), "red")[0] > 100, "the page")
     port = server.get_port()
     page.stop()
     stop_server(server)
     screen.wait(lambda: screen.tab.get_by_text("Connecting...").count() == 1, "word that the server is gone")
-    assert said.count() == 0
-    # What was seen last stays.
+    assert connected.count() == 0
+    # The last picture stays.
     assert spot(screen.shot(), "red")[0] > 100
     before = spot(screen.shot(), "red")[1]
-    made_up.show(positions=made_up.snapshot.positions[::-1].copy())  # the bodies change places
-    server, page = serve(port, made_up)
+    fake.show(positions=fake.snapshot.positions[::-1].copy())  # the bodies exchange their positions
+    server, page = serve(port, fake)
     try:
         assert server.get_port() == port
-        screen.wait(lambda: said.count() == 1, "the connection")
+        screen.wait(lambda: connected.count() == 1, "the connection")
         screen.wait(lambda: spot(screen.shot(), "red")[1][0] > before[0] + 50, "the new state in the picture")
     finally:
         screen.close()

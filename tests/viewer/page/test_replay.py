@@ -1,4 +1,4 @@
-"""Recordings on the page, and what visitors take home from it."""
+"""Recordings on the page, and their exports."""
 
 import io
 import time
@@ -13,7 +13,7 @@ from supple.viewer.app import Address, opened_page
 from supple.viewer.drawing.moments.from_recording import model_of_recording, moment_of_frame
 from supple.viewer.drawing.options import ViewOptions
 from supple.viewer.drawing.page_of_moments import evenly, page_of_moments
-from supple.viewer.drawing.video_capture import gif_of, kinds_of_films
+from supple.viewer.drawing.video_capture import gif_of, video_formats
 from supple.viewer.replay import Replay
 
 STEPS = 30
@@ -39,7 +39,7 @@ def replay(server, recorded):
         made.stop()
 
 
-def test_it_plays_and_begins_anew(replay, until):
+def test_it_plays_in_a_loop(replay, until):
     seen = set()
 
     def all_of_it():
@@ -49,34 +49,34 @@ def test_it_plays_and_begins_anew(replay, until):
     until(all_of_it, what="the second round")
 
 
-def test_the_slider_shows_the_frame_of_its_time(replay, server, visit, until):
+def test_the_slider_selects_a_frame(replay, server, visit, until):
     visitor = visit(server.get_port())
     until(server.get_clients)
-    # Paused first: a slider that plays may be where the visitor puts it, and then nothing has changed.
+    # Paused first: a playing slider may already have the value that the visitor sets.
     visitor.press(replay.play)
     until(lambda: not replay.playing)
     for number in (7, 0, STEPS):
         visitor.set(replay.slider, float(replay._recording.times[number]))
         until(lambda: not replay.playing and replay.stage.moment is replay.moment(number))  # noqa: B023
-        until(lambda: f"Frame {number} of {STEPS}" in replay.said.content)  # noqa: B023
+        until(lambda: f"Frame {number} of {STEPS}" in replay.message.content)  # noqa: B023
     visitor.press(replay.play)
     until(lambda: replay.playing)
     visitor.leave()
 
 
-def test_a_visitor_who_moves_the_playing_slider_is_told_where_it_came_to_rest(replay, server, visit, until):
+def test_the_final_slider_value_is_sent_to_a_visitor_who_moves_it(replay, server, visit, until):
     visitor = visit(server.get_port())
     until(server.get_clients)
-    aim = float(replay._recording.times[7]) + 1e-3  # where playing never is
+    aim = float(replay._recording.times[7]) + 1e-3  # a value that playing never sets
     visitor.set(replay.slider, aim)
     until(lambda: not replay.playing and replay.stage.moment is replay.moment(7))
-    # What playing sent may come after the visitor's own move; viser sends only what differs from the value before.
+    # A value of playing may arrive after that of the visitor; viser sends only values that differ from the last one.
     until(lambda: replay.slider.value not in (aim, replay._recording.times[7]))
     assert replay.slider.value == pytest.approx(aim, abs=1e-12)
     visitor.leave()
 
 
-def test_times_between_frames_and_beyond_them(replay):
+def test_frames_at_times_between_and_beyond_frames(replay):
     times = replay._recording.times
     assert replay.frame_at(-1.0) == 0
     assert replay.frame_at(99.0) == STEPS
@@ -84,7 +84,7 @@ def test_times_between_frames_and_beyond_them(replay):
         assert replay.frame_at(float(times[number])) == number
 
 
-def test_a_page_of_the_recording_stands_alone(replay, browser, pixels, spot, tmp_path):
+def test_an_exported_page_is_self_contained(replay, browser, pixels, spot, tmp_path):
     from dataclasses import replace
 
     replay.playing = False
@@ -110,7 +110,7 @@ def test_a_page_of_the_recording_stands_alone(replay, browser, pixels, spot, tmp
     assert asked == [file.as_uri()]
 
 
-def test_pages_keep_the_time_and_thin_out(recorded, monkeypatch):
+def test_exported_pages_keep_times_and_drop_frames_above_the_limit(recorded, monkeypatch):
     from supple.viewer.drawing import page_of_moments as module
 
     with read_recording(recorded) as recording:
@@ -125,30 +125,28 @@ def test_pages_keep_the_time_and_thin_out(recorded, monkeypatch):
     assert evenly(3, 9) == [0, 1, 2]
 
 
-def test_films_have_all_pictures():
+def test_a_gif_contains_all_pictures():
     image = pytest.importorskip("PIL.Image")
     frames = [np.full((20, 30, 3), shade, dtype=np.uint8) for shade in (0, 100, 200)]
-    with image.open(io.BytesIO(gif_of(frames, 10.0))) as film:
-        assert (film.n_frames, film.size, film.info["duration"]) == (3, (30, 20), 100)
-    assert kinds_of_films()["gif"] == ""
+    with image.open(io.BytesIO(gif_of(frames, 10.0))) as capture:
+        assert (capture.n_frames, capture.size, capture.info["duration"]) == (3, (30, 20), 100)
+    assert video_formats()["gif"] == ""
 
 
-def test_what_is_missing_for_a_film_is_said(monkeypatch):
-    from supple.viewer.drawing import video_capture as film
-
-    monkeypatch.setattr(film, "find_spec", lambda name: None)
-    assert "pip install 'supple[video]'" in kinds_of_films()["mp4"]
+def test_the_missing_encoder_is_named(monkeypatch):
+    monkeypatch.setattr("supple.viewer.drawing.video_capture.find_spec", lambda name: None)
+    assert "pip install 'supple[video]'" in video_formats()["mp4"]
 
 
-def test_a_person_looks_through_a_recording(recorded, look, spot, tmp_path):
-    """In the browser: the slider, another view, a screenshot, and a page to take home."""
+def test_a_recording_in_the_browser(recorded, look, spot, tmp_path):
+    """The slider, another view, a screenshot, and an exported page."""
     from dataclasses import replace
 
     with opened_page(recorded, Address(port=0)) as page:
-        screen, replay = look(page.url, page.server), page.shown
+        screen, replay = look(page.url, page.server), page.content
         where = lambda: spot(screen.shot(), "red")  # noqa: E731
         agree = lambda: screen.reads(replay.slider) == pytest.approx(replay.slider.value, abs=1e-9)  # noqa: E731
-        # A key that comes as the last frame is shown moves nothing, hence again.
+        # A key at the last frame has no effect, so that it is repeated.
         for _ in range(20):
             if not replay.playing:
                 break

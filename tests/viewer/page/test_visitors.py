@@ -1,4 +1,4 @@
-"""Many visitors, slow visitors: nobody holds up the page, nothing piles up."""
+"""Many and slow visitors: they do not block the page, and no queue grows."""
 
 import threading
 import time
@@ -10,16 +10,16 @@ import supple as sp
 
 
 @pytest.fixture
-def busy(server, made_up):
-    """A page of a simulation that has something new all the time."""
+def busy(server, fake):
+    """A page of a simulation that sends new snapshots all the time."""
     from supple.viewer.live_page import LivePage
 
-    page, end = LivePage(server, made_up, made_up.snapshot), threading.Event()
-    rest = made_up.snapshot.positions
+    page, end = LivePage(server, fake, fake.snapshot), threading.Event()
+    rest = fake.snapshot.positions
 
     def run():
         while not end.wait(0.005):
-            made_up.show(positions=rest + 0.1 * np.sin(made_up.snapshot.frame), time=0.01 * made_up.snapshot.frame)
+            fake.show(positions=rest + 0.1 * np.sin(fake.snapshot.frame), time=0.01 * fake.snapshot.frame)
 
     thread = threading.Thread(target=run)
     thread.start()
@@ -29,57 +29,57 @@ def busy(server, made_up):
     page.stop()
 
 
-def test_a_visitor_that_takes_nothing_holds_up_nobody(busy, server, visit, until):
+def test_a_visitor_who_never_reads_does_not_block_others(busy, server, visit, until):
     stuck = visit(server.get_port(), reads=False)
     others = [visit(server.get_port()) for _ in range(9)]
     until(lambda: len(server.get_clients()) == 10)
     buffer = server._websock_server.get_message_buffer()
-    shown = busy.desk.snapshot.frame
+    before = busy.controller.snapshot.frame
     kept, taken = [], [other.taken for other in others]
 
     def well():
         kept.append(len(buffer.message_from_id))
         served = all(other.taken > before + 20 for other, before in zip(others, taken, strict=True))
-        return served and busy.desk.snapshot.frame > shown + 50 and len(kept) > 50
+        return served and busy.controller.snapshot.frame > before + 50 and len(kept) > 50
 
     until(well, 60.0)
-    # For the one that takes nothing, the newest of everything is kept, and nothing else.
+    # For the visitor who never reads, only the newest values are kept.
     assert max(kept) <= min(kept) + 20
     for visitor in (stuck, *others):
         visitor.leave()
 
 
-def test_the_page_asks_less_of_a_server_that_lags(server, until, monkeypatch):
-    from supple.viewer.drawing import frame_rate as pace_module
-    from supple.viewer.drawing.frame_rate import FASTEST, Pace
+def test_the_frame_rate_decreases_where_the_server_falls_behind(server, until, monkeypatch):
+    from supple.viewer.drawing import frame_rate as frame_rate_module
+    from supple.viewer.drawing.frame_rate import FASTEST, FrameRate
 
-    pace = Pace(server)
-    assert pace.interval == FASTEST
-    with pace.sending():
+    frame_rate = FrameRate(server)
+    assert frame_rate.interval == FASTEST
+    with frame_rate.sending():
         pass
-    until(pace.may_send)
+    until(frame_rate.may_send)
     loop, free = server.get_event_loop(), threading.Event()
     loop.call_soon_threadsafe(free.wait, 20.0)
-    with pace.sending():
+    with frame_rate.sending():
         pass
-    assert not pace.may_send()
+    assert not frame_rate.may_send()
     time.sleep(0.1)
     free.set()
-    until(pace.may_send)
-    assert pace.interval >= 0.2  # that it had to wait for the server counts as much as drawing
-    # Slow to speed up: each picture that the server takes at once counts for 0.3.
+    until(frame_rate.may_send)
+    assert frame_rate.interval >= 0.2  # the delay of the server counts like drawing
+    # The rate increases slowly: each picture without delay has the weight 0.3.
     clock = time.monotonic()
-    monkeypatch.setattr(pace_module.time, "monotonic", lambda: clock)
+    monkeypatch.setattr(frame_rate_module.time, "monotonic", lambda: clock)
     intervals = []
     for _ in range(20):
-        pace._came_around(clock, 0.0)
-        intervals.append(pace.interval)
+        frame_rate._processed(clock, 0.0)
+        intervals.append(frame_rate.interval)
     assert intervals[0] >= 0.7 * 0.2
     assert intervals[-1] == FASTEST
 
 
-def test_fine_skins_are_carried_at_once(made_up):
-    """What is done for every picture: 100k vertices, in bounded work per vertex and without a Python loop."""
+def test_fine_skins_follow_their_tets_without_a_python_loop(fake):
+    """The work for every picture: 100k vertices, with bounded work for each and without a Python loop."""
     from supple.mesh.skin import Embedding
     from supple.output.recording.skinned_surface import SkinnedSurface
 

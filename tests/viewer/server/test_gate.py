@@ -1,4 +1,4 @@
-"""The gate in front of viser's server: tokens, other sites, malformed messages. Real server, real websocket client."""
+"""Access control in front of the server of viser: tokens, other sites, malformed messages."""
 
 import contextlib
 import http.client
@@ -23,7 +23,7 @@ from supple.viewer.server.message_check import Malformed, is_wanted
 from supple.viewer.server.uploads.transfers import refuse_transfers
 
 PROTOCOL = f"viser-v{viser.__version__}"
-PATIENCE = 30.0
+TIMEOUT = 30.0
 
 
 @contextlib.contextmanager
@@ -52,12 +52,12 @@ def secret():
 
 def dial(server, path="", **headers):
     url = f"ws://127.0.0.1:{server.get_port()}{path}"
-    return connect(url, subprotocols=[PROTOCOL], additional_headers=headers, open_timeout=PATIENCE, max_size=None)
+    return connect(url, subprotocols=[PROTOCOL], additional_headers=headers, open_timeout=TIMEOUT, max_size=None)
 
 
 def fetch(server, path="/", **headers):
     request = urllib.request.Request(f"http://127.0.0.1:{server.get_port()}{path}", headers=headers)
-    with urllib.request.urlopen(request, timeout=PATIENCE) as response:
+    with urllib.request.urlopen(request, timeout=TIMEOUT) as response:
         return response.status, response.headers, response.read()
 
 
@@ -78,17 +78,17 @@ def camera(**changes):
 
 
 def ended(connection):
-    """The close code that the server gives; everything that it sends before is read and thrown away."""
+    """The close code that the server gives; all messages before it are read and discarded."""
     try:
         for _ in range(10_000):
-            connection.recv(timeout=PATIENCE)
+            connection.recv(timeout=TIMEOUT)
     except ConnectionClosed as end:
         return end.rcvd.code
     pytest.fail("the connection stays")
 
 
 class TestToken:
-    def test_without_it_neither_page_nor_websocket_is_had(self, secret):
+    def test_without_token_neither_page_nor_websocket_is_served(self, secret):
         server, token = secret
         for path in ("/", "/?token=", "/?token=wrong", f"/?token={token[:-1]}", f"/?other={token}", "/index.html"):
             with pytest.raises(urllib.error.HTTPError) as caught:
@@ -100,7 +100,7 @@ class TestToken:
                 dial(server, path, Cookie=cookie)
             assert refused.value.response.status_code == 403
 
-    def test_the_page_sets_the_cookie_with_which_its_websocket_gets_in(self, secret):
+    def test_the_page_sets_a_cookie_that_its_websocket_uses(self, secret):
         server, token = secret
         status, headers, body = fetch(server, f"/?token={token}")
         assert status == 200
@@ -109,20 +109,20 @@ class TestToken:
         cookie = headers["Set-Cookie"]
         assert {"HttpOnly", "SameSite=Strict"} <= {part.strip() for part in cookie.split(";")}
         with dial(server, Cookie=cookie.split(";")[0]) as connection:
-            assert connection.recv(timeout=PATIENCE)
+            assert connection.recv(timeout=TIMEOUT)
         # and a reload of the page, without the token in its address
         assert fetch(server, "/", Cookie=cookie.split(";")[0])[0] == 200
 
-    def test_a_client_that_is_no_browser_may_give_it_in_the_address(self, secret):
+    def test_other_clients_may_send_the_token_in_the_address(self, secret):
         server, token = secret
         with dial(server, f"/?token={token}") as connection:
-            assert connection.recv(timeout=PATIENCE)
+            assert connection.recv(timeout=TIMEOUT)
 
-    def test_beyond_this_machine_nothing_is_served_without_one(self):
+    def test_other_machines_need_a_token(self):
         with pytest.raises(OutputError, match="needs a token"), served("0.0.0.0"):
             pass
 
-    def test_each_is_another_one_and_long(self):
+    def test_tokens_differ_and_are_long(self):
         tokens = {new_token() for _ in range(100)}
         assert len(tokens) == 100
         assert min(map(len, tokens)) >= 24
@@ -136,20 +136,20 @@ class TestOtherSites:
                 dial(local, Origin=origin)
             assert refused.value.response.status_code == 403
         with dial(local, Origin=f"http://127.0.0.1:{port}") as connection:
-            assert connection.recv(timeout=PATIENCE)
+            assert connection.recv(timeout=TIMEOUT)
 
-    def test_a_foreign_name_that_points_here_gets_nothing(self, local):
+    def test_a_foreign_host_name_is_refused(self, local):
         with pytest.raises(urllib.error.HTTPError) as caught:
             fetch(local, "/", Host="rebound.example:8080")
         assert caught.value.code == 403
         assert fetch(local, "/", Host="localhost:8080")[0] == 200
 
     @pytest.mark.parametrize("host", ["127.0.0.1", "127.8.8.8", "localhost", "::1", "[::1]"])
-    def test_what_is_this_machine(self, host):
+    def test_loopback_hosts(self, host):
         assert is_loopback(host)
 
     @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.5", "example.org", "", "127.0.0.1.example.org"])
-    def test_what_is_not(self, host):
+    def test_other_hosts(self, host):
         assert not is_loopback(host)
 
 
@@ -218,21 +218,21 @@ MALFORMED |= {
 
 class TestMalformed:
     @pytest.mark.parametrize("name", MALFORMED)
-    def test_the_connection_is_dropped_and_others_stay(self, local, name):
+    def test_a_malformed_message_closes_only_its_connection(self, local, name):
         with dial(local) as good, dial(local) as bad:
             good.send(camera())
             bad.send(MALFORMED[name])
             assert ended(bad) == 1008
             good.send(camera())
-            good.ping().wait(PATIENCE)
+            good.ping().wait(TIMEOUT)
 
-    def test_what_no_picture_needs_is_not_even_read(self, local):
+    def test_a_message_beyond_the_size_limit_is_not_read(self, local):
         with dial(local) as bad:
             with contextlib.suppress(ConnectionClosed):
                 bad.send(b"\0" * (limits.LARGEST_PICTURE + 1))
             assert ended(bad) == 1009
 
-    def test_a_flood_ends_the_connection(self, local, monkeypatch):
+    def test_too_many_messages_close_the_connection(self, local, monkeypatch):
         monkeypatch.setattr(limits, "MESSAGES_AT_ONCE", 50)
         monkeypatch.setattr(limits, "MESSAGES_PER_SECOND", 1)
         with dial(local) as bad:
@@ -241,56 +241,56 @@ class TestMalformed:
                     bad.send(camera())
             assert ended(bad) == 1008
 
-    def test_no_more_pages_than_allowed(self, local, monkeypatch):
+    def test_the_number_of_pages_is_limited(self, local, monkeypatch):
         with dial(local) as first:
-            first.ping().wait(PATIENCE)
+            first.ping().wait(TIMEOUT)
             monkeypatch.setattr(limits, "MOST_CLIENTS", 1)
             with dial(local) as second:
                 assert ended(second) == 1013
-            first.ping().wait(PATIENCE)
+            first.ping().wait(TIMEOUT)
 
-    def test_connections_that_say_nothing_are_bounded(self, monkeypatch):
+    def test_the_number_of_silent_connections_is_limited(self, monkeypatch):
         monkeypatch.setattr(limits, "MOST_CONNECTIONS", 5)
         with served() as server, contextlib.ExitStack() as ends:
             place = ("127.0.0.1", server.get_port())
-            silent = [ends.enter_context(socket.create_connection(place, timeout=PATIENCE)) for _ in range(5)]
+            silent = [ends.enter_context(socket.create_connection(place, timeout=TIMEOUT)) for _ in range(5)]
             for line in silent:
                 line.sendall(b"GET / HTTP/1.1\r\n")
-            one_more = ends.enter_context(socket.create_connection(place, timeout=PATIENCE))
+            one_more = ends.enter_context(socket.create_connection(place, timeout=TIMEOUT))
             with contextlib.suppress(ConnectionResetError):
                 assert one_more.recv(100) == b""  # dropped
             silent[0].close()  # there is room again, once the server has noticed
-            end = time.monotonic() + PATIENCE
+            end = time.monotonic() + TIMEOUT
             while True:
                 try:
                     assert fetch(server)[0] == 200
                     break
                 except (OSError, http.client.HTTPException):
-                    assert time.monotonic() < end, "nobody gets in any more"
+                    assert time.monotonic() < end, "no connection is accepted any more"
                     time.sleep(0.05)
 
-    def test_requests_to_share_the_page_with_the_world_are_passed_over(self):
+    def test_requests_to_share_the_page_are_ignored(self):
         assert not is_wanted(msgspec.msgpack.encode({"type": "ShareUrlRequest"}))
         assert is_wanted(camera())
 
-    def test_files_and_their_parts_pass(self):
-        # Whether anybody asked for them is decided later.
+    def test_messages_of_uploads_are_passed_on(self):
+        # `Transfers` decides later whether they are accepted.
         assert is_wanted(file_start())
         assert is_wanted(part(limits.UPLOAD_PART))
 
-    def test_a_file_is_for_nobody_where_there_is_no_button(self, local):
-        """As on the page of a recording."""
+    def test_a_file_is_ignored_where_there_is_no_upload_button(self, local):
+        """The page of a recording has none."""
         refuse_transfers(local)
         slider = local.gui.add_slider("youngs", min=0.0, max=10.0, step=0.5, initial_value=1.0)
         with dial(local) as connection:
             connection.send(camera())
             connection.send(file_start(source_component_uuid=slider._impl.uuid))
             connection.send(part(source_component_uuid=slider._impl.uuid))
-            connection.ping().wait(PATIENCE)
+            connection.ping().wait(TIMEOUT)
         assert slider.value == 1.0
         assert local.gui._current_file_upload_states == {}
 
-    def test_random_changes_of_a_good_message_are_judged_without_an_exception(self):
+    def test_random_changes_of_a_message_raise_nothing_but_malformed(self):
         rng, good, wanted = random.Random(1), camera(), 0
         for _ in range(3000):
             raw = bytearray(good)
@@ -300,24 +300,24 @@ class TestMalformed:
                 wanted += is_wanted(bytes(raw))
         assert 0 < wanted < 3000
 
-    def test_a_slider_still_works(self, local):
+    def test_a_valid_slider_message_is_handled(self, local):
         slider = local.gui.add_slider("youngs", min=0.0, max=10.0, step=0.5, initial_value=1.0)
         update = {"type": "GuiUpdateMessage", "uuid": slider._impl.uuid, "updates": {"value": 7}}
         with dial(local) as connection:
             connection.send(camera())
             connection.send(msgspec.msgpack.encode(update))
-            end = time.monotonic() + PATIENCE
+            end = time.monotonic() + TIMEOUT
             while slider.value != 7.0 and time.monotonic() < end:
                 time.sleep(0.01)
         assert slider.value == 7.0
 
 
 class TestPort:
-    def test_the_server_gone_it_can_come_back_at_the_same_port(self):
-        # Not any free port: those that the system hands out may be another's by the time the server comes back.
+    def test_a_server_can_restart_at_the_same_port(self):
+        # Not a port that the system selects: another process may use it before the server restarts.
         port = first_free_port("127.0.0.1", 20_000 + 50 * (os.getpid() % 200) + 25)
         with served(port=port) as server, dial(server) as connection:
-            connection.recv(timeout=PATIENCE)
+            connection.recv(timeout=TIMEOUT)
             server.stop()
             assert ended(connection) in (1001, 1006, 1012)
         for _ in range(2):
@@ -325,33 +325,33 @@ class TestPort:
             with served(port=port) as again:
                 assert again.get_port() == port
                 with dial(again) as connection:
-                    assert connection.recv(timeout=PATIENCE)
+                    assert connection.recv(timeout=TIMEOUT)
 
-    def test_a_port_that_is_taken_is_said(self):
+    def test_a_used_port_is_refused(self):
         with socket.socket() as other:
             other.bind(("127.0.0.1", 0))
             other.listen()
             with pytest.raises(OutputError, match="--port"):
                 require_free_port("127.0.0.1", other.getsockname()[1])
 
-    def test_without_one_asked_for_the_next_free_one_is_taken(self):
+    def test_the_first_free_port_is_found(self):
         with socket.socket() as other:
             other.bind(("127.0.0.1", 0))
             other.listen()
             taken = other.getsockname()[1]
             assert taken < first_free_port("127.0.0.1", taken) <= taken + 19
 
-    def test_a_host_that_is_not_this_machines_is_said(self):
+    def test_a_host_of_another_machine_is_refused(self):
         with pytest.raises(OutputError, match=r"192\.0\.2\.1"):
             require_free_port("192.0.2.1", 8080)
 
 
-def test_a_server_that_was_not_started_through_the_gate_is_refused():
-    with pytest.raises(OutputError, match="cannot be guarded"), gate("127.0.0.1"):
+def test_a_server_without_access_check_is_refused():
+    with pytest.raises(OutputError, match="cannot be protected"), gate("127.0.0.1"):
         pass
 
 
-def test_an_allowance_refills_with_time():
+def test_a_token_bucket_refills_with_time():
     allowance = Allowance(rate=10.0, most=3.0)
     assert [allowance.take(5.0) for _ in range(4)] == [True, True, True, False]
     assert not allowance.take(5.05)

@@ -1,4 +1,4 @@
-"""Uploaded files become tet meshes, or a line that says why not; nothing they do reaches this process."""
+"""Uploaded files become tet meshes or one-line errors, without effect on this process."""
 
 import os
 import struct
@@ -29,7 +29,7 @@ def ball(tmp_path_factory):
     return {suffix: (folder / f"ball{suffix}").read_bytes() for suffix in limits.UPLOAD_FORMATS}
 
 
-def test_a_surface_is_filled_scaled_and_leaves_nothing_behind(ball, tmp_path, monkeypatch):
+def test_a_surface_is_meshed_and_scaled_and_no_file_is_left(ball, tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     seconds = []
     made = mesh_of_upload(Upload("../../etc/ball.stl", ".stl", ball[".stl"], 0.25), seconds.append)
@@ -42,7 +42,7 @@ def test_a_surface_is_filled_scaled_and_leaves_nothing_behind(ball, tmp_path, mo
 
 @pytest.fixture
 def read(tmp_path, monkeypatch):
-    """What the child does, without a child: the tets of a file's bytes."""
+    """The work of the child in this process: the tets of the bytes of a file."""
     monkeypatch.chdir(tmp_path)
 
     def mesh(suffix, content, triangles=20_000):
@@ -99,14 +99,14 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("name", HOSTILE)
-def test_what_is_no_closed_surface_is_refused_in_a_line(read, name):
-    suffix, content, said = HOSTILE[name]
-    with pytest.raises(SuppleError, match=f"mesh{suffix}.*({said})"):
+def test_files_without_a_closed_surface_are_refused_in_one_line(read, name):
+    suffix, content, message = HOSTILE[name]
+    with pytest.raises(SuppleError, match=f"mesh{suffix}.*({message})"):
         read(suffix, content)
 
 
 def test_too_many_triangles_are_refused(read, ball):
-    with pytest.raises(MeshError, match="an upload may have 10: make it coarser"):
+    with pytest.raises(MeshError, match="an upload may have 10; make it coarser"):
         read(".off", ball[".off"], triangles=10)
 
 
@@ -124,7 +124,7 @@ def swelling_file(size):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="this platform has no memory limit for processes")
-def test_a_file_that_swells_ends_its_child_and_nothing_else(monkeypatch):
+def test_a_decompression_bomb_ends_only_its_child(monkeypatch):
     monkeypatch.setattr(limits, "UPLOAD_MEMORY", 600 * 2**20)
     with pytest.raises(SuppleError, match=r"^bomb\.vtp: it needs more memory"):
         mesh_of_upload(Upload("bomb.vtp", ".vtp", swelling_file(2**30), 1.0))
@@ -132,11 +132,11 @@ def test_a_file_that_swells_ends_its_child_and_nothing_else(monkeypatch):
 
 @pytest.mark.skipif(os.name != "posix", reason="looks at groups of processes")
 @pytest.mark.parametrize("how", ["time", "stop"])
-def test_what_takes_too_long_or_is_not_wanted_any_more_is_ended_with_its_mesher(ball, monkeypatch, how):
+def test_a_slow_or_cancelled_upload_is_ended_with_its_mesher(ball, monkeypatch, how):
     children = []
 
     def started(*arguments, **options):
-        # Instead of the mesher: a child that has a child, and both wait.
+        # Instead of the mesher: a child with a child, which both wait.
         code = "import subprocess, sys, time; subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(99)'])"
         children.append(real([arguments[0][0], "-c", code + "; time.sleep(99)"], **options))
         return children[-1]

@@ -24,6 +24,7 @@ from supple.implicit.newton.linear_solver import LinearSolver
 from supple.implicit.newton.objective import Model, Objective
 from supple.implicit.newton.trace import NewtonRow
 from supple.implicit.timings import Clock
+from supple.numerics.interruption import interruption_point
 from supple.state import Status
 
 logger = logging.getLogger(__name__)
@@ -99,6 +100,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
     choice = ConvexityChoice()
     reach = 1.0
     for iteration in range(problem.max_iterations):
+        interruption_point()
         gradient = here.gradient.copy()
         gradient[tools.pinned] = 0.0
         with tools.clock.of("linear_solve"):

@@ -1,4 +1,4 @@
-"""What all parts of the panel share: the way to the simulation, and what is known of it."""
+"""Shared by all parts of the panel: sends commands to the simulation, and keeps its newest snapshot."""
 
 from __future__ import annotations
 
@@ -12,54 +12,54 @@ from supple.viewer.protocol.snapshots import Snapshot
 
 
 class Simulation(Protocol):
-    """What the page needs of the simulation behind it; `supple.viewer.engine.engine.Engine` is one."""
+    """The interface that the page needs of a simulation; `supple.viewer.engine.engine.Engine` implements it."""
 
     def send(self, command: Command) -> int:
-        """Pass a command on; never waits for it to be acted upon. Returns its number, 0 where it was dropped."""
+        """Send a command, without waiting for its execution. Returns its number, or 0 where it was dropped."""
         ...
 
     def latest(self) -> Snapshot | None:
-        """The newest snapshot there is; never waits."""
+        """The newest snapshot; never waits."""
         ...
 
     @property
     def error(self) -> str | None:
-        """Why it is gone, if it is."""
+        """Why the simulation ended, or None."""
         ...
 
 
-class Desk:
-    """Passes commands on, for visitors.
+class Controller:
+    """Sends the commands of visitors.
 
     Parameters
     ----------
     simulation : see `Simulation`
-    snapshot : the newest one that is on show
+    snapshot : the newest one that was drawn
     """
 
     def __init__(self, simulation: Simulation, snapshot: Snapshot) -> None:
         self.simulation, self.snapshot = simulation, snapshot
-        # Inputs are exchanged for others by the thread that draws, and by those that serve visitors.
+        # The drawing thread and the threads that serve visitors replace inputs.
         self.lock = threading.RLock()
 
-    def ask(self, client: Any, make: Callable[[], Command]) -> int:
-        """Make a command and send it, and return its number. Where it is not to be had, the visitor is told why.
+    def send(self, client: Any, make: Callable[[], Command]) -> int:
+        """Create and send a command; returns its number. Where it is invalid, tells the visitor, and returns 0.
 
         Parameters
         ----------
-        client : viser's handle of the visitor, or None where nobody in particular asks
+        client : handle of viser for the visitor, or None where no visitor sent it
         """
         try:
             return self.simulation.send(make())
         except SuppleError as error:
-            tell(client, "Not done", str(error))
+            notify(client, "Not done", str(error))
             return 0
 
 
-def in_order(react: Callable[[Any], object]) -> Callable[[Any], Coroutine[Any, Any, None]]:
-    """What answers to a button, as a coroutine: viser runs these one by one, right after the value has come in.
+def sequential(react: Callable[[Any], object]) -> Callable[[Any], Coroutine[Any, Any, None]]:
+    """An event handler as coroutine: viser runs coroutines in order, directly after it has set the value.
 
-    Functions it runs in threads, in any order: one that looks at the value may see that of a later click.
+    It runs plain functions in threads, in any order: one that reads the value may read that of a later click.
     """
 
     async def called(event: Any) -> None:
@@ -68,7 +68,7 @@ def in_order(react: Callable[[Any], object]) -> Callable[[Any], Coroutine[Any, A
     return called
 
 
-def tell(client: Any, title: str, text: str, color: str = "orange") -> None:
-    """Show a visitor a line for a while."""
+def notify(client: Any, title: str, text: str, color: str = "orange") -> None:
+    """Display a line to a visitor for some seconds."""
     if client is not None:
         client.add_notification(title, text, auto_close_seconds=6.0, color=color)

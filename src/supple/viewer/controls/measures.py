@@ -1,4 +1,4 @@
-"""Numbers of the running simulation, and two small plots over the last seconds."""
+"""The folder "Measures" of the panel: numbers of the simulation, and two plots over the last seconds."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ class Measures:
         self._rows: deque[tuple[float, ...]] = deque(maxlen=_MOST_POINTS)
         self._text = ""
         with gui.add_folder("Measures"):
-            self._said = gui.add_markdown("")
+            self._message = gui.add_markdown("")
             self.energy = self._plot(gui, "Energy [J]", (("kinetic", "#e65c3c"), ("elastic", "#409ce1")))
             self.spin = self._plot(gui, "Spin [rad/s]", (("fastest body", "#34ac78"),))
         self.note(snapshot)
 
     def note(self, snapshot: Snapshot) -> None:
-        """Remember what the plots show."""
+        """Store the values for the plots."""
         measures = snapshot.measures
         fastest = float(np.linalg.norm(measures.spin, axis=1).max()) if len(measures.spin) else 0.0
         row = (snapshot.time, measures.kinetic_energy, measures.elastic_energy, fastest)
@@ -41,10 +41,10 @@ class Measures:
                 self._rows.append(row)
 
     def show(self, snapshot: Snapshot) -> None:
-        """Bring numbers and plots up to date."""
-        text = said_of(snapshot)
+        """Update numbers and plots."""
+        text = measures_text(snapshot)
         if text != self._text:
-            self._said.content = self._text = text
+            self._message.content = self._text = text
         with self._lock:
             rows = np.nan_to_num(np.array(self._rows, dtype=np.float64), posinf=0.0, neginf=0.0)
         self._draw(self.energy, rows, (1, 2))
@@ -56,10 +56,7 @@ class Measures:
 
         return gui.add_uplot(
             tuple(np.zeros(1) for _ in range(len(series) + 1)),
-            (
-                uplot.Series(label="t [s]"),
-                *(uplot.Series(label=name, stroke=color, width=2) for name, color in series),
-            ),
+            (uplot.Series(label="t [s]"), *(uplot.Series(label=name, stroke=color, width=2) for name, color in series)),
             title=title,
             scales={"x": uplot.Scale(time=False, auto=True), "y": uplot.Scale(auto=True)},
             height=130,
@@ -72,8 +69,8 @@ class Measures:
         handle.data = tuple(np.ascontiguousarray(rows[:, k]) for k in (0, *columns))
 
 
-def said_of(snapshot: Snapshot) -> str:
-    """Counts, energies, the worst tet, and how the last step ended."""
+def measures_text(snapshot: Snapshot) -> str:
+    """Counts, energies, the smallest J, and the status of the last step."""
     scene, measures = snapshot.description, snapshot.measures
     spin = float(np.linalg.norm(measures.spin, axis=1).max()) if len(measures.spin) else 0.0
     total = measures.kinetic_energy + measures.elastic_energy + measures.potential_energy

@@ -1,4 +1,4 @@
-"""The mouse: springs that pull at bodies, pins, and the ball that pushes."""
+"""Mouse input: grabs, pins, and the pusher."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.viewer.controls.controller import Desk
+from supple.viewer.controls.controller import Controller
 from supple.viewer.controls.mouse_controls import MouseControls
 from supple.viewer.drawing.picking import nearest_surface_point, point_on_camera_plane, surface_point_on_ray
 from supple.viewer.drawing.stage import Stage
@@ -20,43 +20,43 @@ _BACKDROP = "/backdrop"
 
 @dataclass(frozen=True, eq=False)
 class _Push:
-    """A push that is under way: the plane that the ball stays in, and how far it is from the pointer there."""
+    """An active push: a point of the plane in which the ball moves, and the offset of the ball from the pointer."""
 
     through: NDArray[np.float64]
     offset: NDArray[np.float64]
 
 
 class Mouse:
-    """Turns what visitors do with the mouse into commands. Events of one visitor come in order, in the server's loop.
+    """Converts mouse events of visitors into commands. The events of one visitor arrive in order, in the server loop.
 
     Parameters
     ----------
-    server : viser's; desk : where commands go; controls : what the mouse is to do
+    server : of viser; controller : sends the commands; controls : mode of the mouse
     """
 
-    def __init__(self, server: Any, desk: Desk, controls: MouseControls) -> None:
-        self._server, self._desk, self._controls = server, desk, controls
+    def __init__(self, server: Any, controller: Controller, controls: MouseControls) -> None:
+        self._server, self._controller, self._controls = server, controller, controls
         self._stage: Stage | None = None
         self._numbers = itertools.count(1)
         self._grabs: dict[int, int] = {}  # by visitor
         self._pushes: dict[int, _Push] = {}
         self._backdrop: Any = None
-        server.on_client_disconnect(lambda client: self.let_go(client.client_id))
+        server.on_client_disconnect(lambda client: self.release(client.client_id))
 
     def attach(self, stage: Stage) -> None:
-        """What is on this stage is dragged; its bodies come to `listen`."""
+        """Use the bodies of this stage; the stage passes their meshes to `add_handlers`."""
         self._stage = stage
         self.switch()
 
-    def listen(self, handles: list[Any]) -> None:
-        """Let meshes of bodies answer to the mouse."""
+    def add_handlers(self, handles: list[Any]) -> None:
+        """Add drag and click handlers to the meshes of bodies."""
         for handle in handles:
-            # Coroutines: viser runs them one after the other, and functions in any order.
+            # Coroutines, because viser runs them in order, and functions in any order.
             handle.on_drag("left")(self.drag)
             handle.on_click(self.click)
 
     def switch(self) -> None:
-        """Put a backdrop up while the ball can be moved: the mouse is then heard everywhere."""
+        """Add a backdrop in the mode "push", so that mouse events arrive from the whole picture."""
         if self._stage is None:
             return
         if self._controls.pushes and self._backdrop is None:
@@ -65,7 +65,7 @@ class Mouse:
                 _BACKDROP,
                 radius=60.0 * view.radius,
                 opacity=0.0,
-                wireframe=True,  # lines that nobody sees cost less than faces that nobody sees
+                wireframe=True,  # invisible lines are cheaper than invisible faces
                 side="double",
                 position=tuple(view.center),
                 cast_shadow=False,
@@ -77,41 +77,41 @@ class Mouse:
             self._backdrop = None
 
     async def drag(self, event: Any) -> None:
-        """Called by viser while something is dragged."""
-        if event.phase == "end":  # whatever the mouse did when it began
-            self.let_go(event.client_id)
+        """Called by viser during a drag."""
+        if event.phase == "end":  # in every mode: it may have changed since the start
+            self.release(event.client_id)
         elif self._controls.pushes:
             self._push(event)
         else:
             self._pull(event)
 
     async def click(self, event: Any) -> None:
-        """Called by viser when a body is clicked: pin the vertex there, or let go of it."""
+        """Called by viser when a body is clicked: pin the vertex there, or unpin it."""
         if self._stage is None or self._controls.pushes or not _finite(event.ray_origin, event.ray_direction):
             return
         point = surface_point_on_ray(self._stage.moment, event.ray_origin, event.ray_direction)
         if point is None:
             return
         body, vertex = point.body, point.nearest_vertex
-        held = vertex + body.vertices.start in self._desk.snapshot.pinned
-        self._desk.ask(event.client, lambda: (Unpin if held else Pin)(body.name, vertex))
+        held = vertex + body.vertices.start in self._controller.snapshot.pinned
+        self._controller.send(event.client, lambda: (Unpin if held else Pin)(body.name, vertex))
 
-    def let_go(self, visitor: int) -> None:
-        """Release what a visitor holds."""
+    def release(self, visitor: int) -> None:
+        """End the grab or push of a visitor."""
         self._pushes.pop(visitor, None)
         number = self._grabs.pop(visitor, None)
         if number is not None:
-            self._desk.ask(None, lambda: ReleaseGrab(number))
+            self._controller.send(None, lambda: ReleaseGrab(number))
 
     def _pull(self, event: Any) -> None:
         visitor = event.client_id
         if not _finite(event.start_position, event.end_position) or self._stage is None:
             return
         if event.phase == "start":
-            self.let_go(visitor)
+            self.release(visitor)
             point = nearest_surface_point(self._stage.moment, event.start_position)
             number = self._grabs[visitor] = next(self._numbers)
-            self._desk.ask(
+            self._controller.send(
                 event.client,
                 lambda: Grab(
                     number,
@@ -123,7 +123,7 @@ class Mouse:
                 ),
             )
         elif visitor in self._grabs:
-            self._desk.ask(event.client, lambda: MoveGrab(self._grabs[visitor], event.end_position))
+            self._controller.send(event.client, lambda: MoveGrab(self._grabs[visitor], event.end_position))
 
     def _push(self, event: Any) -> None:
         visitor = event.client_id
@@ -139,13 +139,13 @@ class Mouse:
         place = point_on_camera_plane(eye, event.end_position, look, push.through)
         if place is not None:
             x, y, z = (float(coordinate) for coordinate in place + push.offset)
-            self._desk.ask(event.client, lambda: MovePusher((x, y, z), self._controls.radius))
+            self._controller.send(event.client, lambda: MovePusher((x, y, z), self._controls.radius))
 
     def _begin_push(self, event: Any, eye: NDArray[np.float64]) -> _Push:
-        """On a body, the ball starts just before it, seen from the camera; elsewhere in the plane of the bodies."""
+        """On a body, the ball starts in front of the clicked point; otherwise in the plane of the bodies."""
         assert self._stage is not None
         if event.target.name == _BACKDROP:
-            return _Push(self._stage.moment.shown_positions.mean(axis=0), np.zeros(3))
+            return _Push(self._stage.moment.finite_positions.mean(axis=0), np.zeros(3))
         touched = np.asarray(event.start_position)
         toward = eye - touched
         toward /= max(float(np.linalg.norm(toward)), 1e-12)

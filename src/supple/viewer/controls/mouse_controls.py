@@ -1,11 +1,11 @@
-"""What the mouse does."""
+"""The folder "Mouse" of the panel: mode, stiffness and radius."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
-from supple.viewer.controls.controller import Desk, in_order
+from supple.viewer.controls.controller import Controller, sequential
 from supple.viewer.protocol import limits
 from supple.viewer.protocol.messages import RemovePusher, Unpin
 from supple.viewer.server.browser_values import number, one_of
@@ -19,13 +19,13 @@ class MouseControls:
 
     Parameters
     ----------
-    changed : called when another mode is chosen
+    changed : called when another mode is selected
     """
 
-    def __init__(self, gui: Any, desk: Desk, changed: Callable[[], None]) -> None:
+    def __init__(self, gui: Any, controller: Controller, changed: Callable[[], None]) -> None:
         self._changed = changed
-        self._desk = desk
-        scene = desk.snapshot.description
+        self._controller = controller
+        scene = controller.snapshot.description
         size = max(float(max(scene.high - scene.low)), 10.0 * limits.SMALLEST_LENGTH)
         self._radii = 0.02 * size, 0.5 * size
         with gui.add_folder("Mouse"):
@@ -36,9 +36,9 @@ class MouseControls:
                 "Ball [m]", *self._radii, 0.01 * size, initial_value=0.15 * size, visible=False
             )
             self.unpin = gui.add_button("Unpin all")
-        # One after the other, so that the backdrop is there just when the ball can be moved.
-        self.mode.on_update(in_order(self._switch))
-        self.unpin.on_click(in_order(lambda e: desk.ask(e.client, Unpin)))
+        # In order, so that the backdrop exists exactly in the mode "push".
+        self.mode.on_update(sequential(self._switch))
+        self.unpin.on_click(sequential(lambda e: controller.send(e.client, Unpin)))
 
     @property
     def pushes(self) -> bool:
@@ -47,12 +47,12 @@ class MouseControls:
 
     @property
     def stiffness(self) -> float:
-        """Of springs, as a factor."""
+        """Stiffness factor of grabs."""
         return 10.0 ** number(self.strength.value, -1.5, 1.5)
 
     @property
     def radius(self) -> float:
-        """Of the ball [m]."""
+        """Radius of the ball [m]."""
         return number(self.radius_input.value, *self._radii)
 
     def _switch(self, event: Any) -> None:
@@ -60,11 +60,11 @@ class MouseControls:
         self._hint.content = _HINTS[PUSH if pushes else DRAG]
         self.strength.visible, self.radius_input.visible = not pushes, pushes
         if not pushes:
-            self._desk.ask(event.client, RemovePusher)
+            self._controller.send(event.client, RemovePusher)
         self._changed()
 
 
 _HINTS = {
-    DRAG: "Drag a body to pull it, let go to throw it; click to pin or unpin. Drag beside it to look around.",
-    PUSH: "Hold the button anywhere: a ball follows the pointer. Right button and wheel move the camera.",
+    DRAG: "Drag a body to pull it; release it to throw it. Click to pin or unpin. Drag beside it to turn the camera.",
+    PUSH: "Hold the button anywhere: a ball follows the pointer. The right button and the wheel move the camera.",
 }

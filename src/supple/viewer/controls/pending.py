@@ -1,32 +1,32 @@
-"""What a visitor has asked for, until the simulation has dealt with it."""
+"""The input value of a visitor, while the simulation has not executed its command."""
 
 from __future__ import annotations
 
 import math
 import time
 
-# How long after a visitor's touch an input is left alone, even where the simulation has dealt with it [s]: who moves a
-# slider goes on moving it.
-_HANDS_OFF = 1.0
-# A command that was dropped on the way is never dealt with [s].
+# An input of a visitor is kept for this time, even after the simulation has executed its command [s], because a visitor
+# who moves a slider continues to move it.
+_KEEP_SECONDS = 1.0
+# A dropped command is never executed: its value is kept for this time [s].
 _LONGEST = 60.0
 
 
-class Wish:
-    """Whether an input still shows what its visitor wants, and not yet what the simulation has.
+class PendingValue:
+    """Tells whether an input keeps the value of a visitor instead of the value of the simulation.
 
-    A simulation that is amid a long step still tells of the value from before.
+    During a long step the snapshots still contain the old value.
     """
 
     def __init__(self) -> None:
-        self._touched = -math.inf
+        self._changed = -math.inf
         self._number = 0
 
-    def made(self, number: int) -> None:
-        """A visitor has asked for something, by the command of that number."""
-        self._touched, self._number = time.monotonic(), number
+    def requested(self, number: int) -> None:
+        """Store the number of the command that a visitor has sent."""
+        self._changed, self._number = time.monotonic(), number
 
-    def stands(self, applied: int) -> bool:
-        """Whether it is to be left on show, where the simulation has acted upon the commands up to `applied`."""
-        since = time.monotonic() - self._touched
-        return since < _HANDS_OFF or (applied < self._number and since < _LONGEST)
+    def is_pending(self, applied: int) -> bool:
+        """Whether the value is kept, where the simulation has executed the commands up to `applied`."""
+        since = time.monotonic() - self._changed
+        return since < _KEEP_SECONDS or (applied < self._number and since < _LONGEST)

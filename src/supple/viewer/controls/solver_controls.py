@@ -1,12 +1,12 @@
-"""Which solver, and its numbers."""
+"""The folder "Solver" of the panel: the solver and its parameters."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from supple.viewer.controls.controller import Desk, in_order
+from supple.viewer.controls.controller import Controller, sequential
 from supple.viewer.controls.inputs import ParameterInput
-from supple.viewer.controls.pending import Wish
+from supple.viewer.controls.pending import PendingValue
 from supple.viewer.protocol.messages import SetSolver
 from supple.viewer.protocol.parameters import PARAMETERS
 from supple.viewer.protocol.snapshots import Snapshot
@@ -16,42 +16,39 @@ _KINDS = ("xpbd", "implicit")
 
 
 class SolverControls:
-    """The folder "Solver". Its inputs are those that the solver has; another solver may have others."""
+    """The folder "Solver". Its inputs are the parameters of the present solver."""
 
-    def __init__(self, gui: Any, desk: Desk) -> None:
-        self._gui, self._desk = gui, desk
+    def __init__(self, gui: Any, controller: Controller) -> None:
+        self._gui, self._controller = gui, controller
         self.inputs: dict[str, ParameterInput] = {}
-        self._shown: tuple[str, ...] = ()
-        self._wish = Wish()
-        self._kind = desk.snapshot.description.solver
+        self._input_names: tuple[str, ...] = ()
+        self._pending = PendingValue()
+        self._kind = controller.snapshot.description.solver
         self._folder = gui.add_folder("Solver")
         with self._folder:
-            self.kind = gui.add_dropdown("Solver", _KINDS, initial_value=desk.snapshot.description.solver)
-        self.kind.on_update(in_order(self._switch))
-        self.show(desk.snapshot)
+            self.kind = gui.add_dropdown("Solver", _KINDS, initial_value=controller.snapshot.description.solver)
+        self.kind.on_update(sequential(self._switch))
+        self.show(controller.snapshot)
 
     def show(self, snapshot: Snapshot) -> None:
-        """Bring the inputs to the simulation's values."""
-        with self._desk.lock:
-            self._show(snapshot)
-
-    def _show(self, snapshot: Snapshot) -> None:
-        scene = snapshot.description
-        names = tuple(name for name in PARAMETERS if name in scene.values)
-        if names != self._shown:
-            for made in self.inputs.values():
-                made.remove()
-            with self._folder:
-                self.inputs = {n: ParameterInput(self._gui, self._desk, n, scene.values[n]) for n in names}
-            self._shown = names
-        for name, made in self.inputs.items():
-            made.show(scene.values[name], snapshot.applied)
-        # What was shown last, not what the input says by now: a choice that has just come in is not to be lost.
-        if self._kind != scene.solver and not self._wish.stands(snapshot.applied):
-            self.kind.value = self._kind = scene.solver
+        """Set the inputs to the values of the simulation."""
+        with self._controller.lock:
+            scene = snapshot.description
+            names = tuple(name for name in PARAMETERS if name in scene.values)
+            if names != self._input_names:
+                for made in self.inputs.values():
+                    made.remove()
+                with self._folder:
+                    self.inputs = {n: ParameterInput(self._gui, self._controller, n, scene.values[n]) for n in names}
+                self._input_names = names
+            for name, made in self.inputs.items():
+                made.show(scene.values[name], snapshot.applied)
+            # Compared with the last displayed kind, not with the input: a new choice of a visitor must not be lost.
+            if self._kind != scene.solver and not self._pending.is_pending(snapshot.applied):
+                self.kind.value = self._kind = scene.solver
 
     def _switch(self, event: Any) -> None:
         if event.client is not None:
-            with self._desk.lock:
+            with self._controller.lock:
                 self._kind = one_of(self.kind.value, _KINDS)
-                self._wish.made(self._desk.ask(event.client, lambda: SetSolver(self._kind)))
+                self._pending.requested(self._controller.send(event.client, lambda: SetSolver(self._kind)))

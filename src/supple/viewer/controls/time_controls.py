@@ -1,71 +1,73 @@
-"""Play, pause, step, reset and slow motion."""
+"""The folder "Time" of the panel: play, pause, step, reset and slow motion."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from supple.viewer.controls.controller import Desk, in_order
+from supple.viewer.controls.controller import Controller, sequential
 from supple.viewer.protocol import limits
 from supple.viewer.protocol.messages import Pause, Play, Reset, SetSpeed, Step
 from supple.viewer.protocol.snapshots import Snapshot
 from supple.viewer.server.browser_values import number, one_of
 from supple.viewer.server.plain_markdown import plain
 
-_BACK = ("step", "reset")
+_FRAME_ACTIONS = ("step", "reset")
 
 
 class TimeControls:
     """The folder "Time"."""
 
-    def __init__(self, gui: Any, desk: Desk) -> None:
-        self._desk = desk
+    def __init__(self, gui: Any, controller: Controller) -> None:
+        self._controller = controller
         with gui.add_folder("Time"):
-            self._said = gui.add_markdown("")
-            self._text = self._stands = ""
+            self._message = gui.add_markdown("")
+            self._text = self._time_text = ""
             self.play = gui.add_button("Play")
-            self.back = gui.add_button_group("Frames", _BACK)
+            self.frames = gui.add_button_group("Frames", _FRAME_ACTIONS)
             self.speed = gui.add_slider(
                 "Slow motion", limits.SLOWEST_MOTION, limits.FASTEST_MOTION, 0.01, initial_value=1.0
             )
-        self.play.on_click(in_order(lambda e: desk.ask(e.client, Play if desk.snapshot.paused else Pause)))
-        self.back.on_click(in_order(self._go_back))
-        self.speed.on_update(in_order(self._set_speed))
+        self.play.on_click(
+            sequential(lambda e: controller.send(e.client, Play if controller.snapshot.paused else Pause))
+        )
+        self.frames.on_click(sequential(self._change_frame))
+        self.speed.on_update(sequential(self._set_speed))
 
     def show(self, snapshot: Snapshot) -> None:
-        """Say how things stand."""
-        wanted = "Play" if snapshot.paused else "Pause"
-        if self.play.label != wanted:
-            self.play.label = wanted
-        self._stands = said_of_time(snapshot)
-        self._say(self._stands)
+        """Display time, speed and state."""
+        label = "Play" if snapshot.paused else "Pause"
+        if self.play.label != label:
+            self.play.label = label
+        self._time_text = time_text(snapshot)
+        self._show_message(self._time_text)
 
     def wait(self, seconds: float) -> None:
-        """Say that nothing has been heard of the simulation for some seconds."""
-        why = "a long step, or kernels that are compiled when they are first used"
-        self._say(f"{self._stands}  \n**Busy for {seconds:.0f} s:** {why}")
+        """Display that the simulation has not sent anything for some seconds."""
+        why = "a long step, or the compilation of kernels at their first use"
+        self._show_message(f"{self._time_text}  \n**Busy for {seconds:.0f} s:** {why}")
 
-    def mourn(self, error: str) -> None:
-        """Say that the simulation is gone."""
-        self._say(f"**The simulation is gone:** {plain(error)}")
+    def show_error(self, error: str) -> None:
+        """Display that the simulation has ended."""
+        self._show_message(f"**The simulation has ended:** {plain(error)}")
         for handle in (self.play, self.speed):
             if not handle.disabled:
                 handle.disabled = True
 
-    def _say(self, text: str) -> None:
+    def _show_message(self, text: str) -> None:
         if text != self._text:
-            self._said.content = self._text = text
+            self._message.content = self._text = text
 
-    def _go_back(self, event: Any) -> None:
-        self._desk.ask(event.client, Step if one_of(self.back.value, _BACK) == "step" else Reset)
+    def _change_frame(self, event: Any) -> None:
+        self._controller.send(event.client, Step if one_of(self.frames.value, _FRAME_ACTIONS) == "step" else Reset)
 
     def _set_speed(self, event: Any) -> None:
         if event.client is not None:
             factor = number(self.speed.value, limits.SLOWEST_MOTION, limits.FASTEST_MOTION)
-            self._desk.ask(event.client, lambda: SetSpeed(factor))
+            self._controller.send(event.client, lambda: SetSpeed(factor))
 
 
-def said_of_time(snapshot: Snapshot) -> str:
-    """A line or two: the time, how fast it goes, and whether that is as fast as it should."""
+def time_text(snapshot: Snapshot) -> str:
+    """Time, speed, and a warning where the simulation is too slow."""
     timing = snapshot.timing
     lines = [f"t = {snapshot.time:.2f} s, frame {snapshot.frame}"]
     if snapshot.paused:
@@ -78,6 +80,6 @@ def said_of_time(snapshot: Snapshot) -> str:
         if not timing.keeps_up:
             lines.append(
                 f"**Too slow for {'real time' if snapshot.speed == 1.0 else f'{snapshot.speed:g} of real time'}:** "
-                "fewer substeps or tets would help"
+                "use fewer substeps or tets"
             )
     return "  \n".join(lines)

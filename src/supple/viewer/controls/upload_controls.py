@@ -1,4 +1,4 @@
-"""A body from a file that the visitor has: it is uploaded, filled with tets elsewhere, and added above everything."""
+"""Adds a body from a file of a visitor: it is uploaded, meshed in a child process, and placed above all bodies."""
 
 from __future__ import annotations
 
@@ -7,34 +7,36 @@ from collections.abc import Callable
 from typing import Any
 
 from supple.errors import SuppleError
-from supple.viewer.controls.controller import Desk, tell
+from supple.viewer.controls.controller import Controller, notify
 from supple.viewer.protocol import limits
 from supple.viewer.protocol.messages import AddMesh
 from supple.viewer.server.uploads.meshing import Upload, mesh_of_upload
 from supple.viewer.server.uploads.transfers import Transfers
 
 _HINT = f"A closed surface, at most {limits.LARGEST_UPLOAD // 2**20} MiB and {limits.MOST_UPLOADED_TRIANGLES} triangles"
-# Characters that no body's name may have, see `supple.scene.values.check_name`.
+# Characters that are not allowed in names of bodies, see `supple.scene.values.check_name`.
 _FORBIDDEN = '/\\:*?"<>|'
 
 
 class UploadControls:
-    """The button, and a line that says how far it is. One file at a time is filled with tets.
+    """The upload button, and a line with the progress. One file at a time is meshed.
 
     Parameters
     ----------
-    size, youngs : asked for what the new body is to have [m], [Pa]
+    size, youngs : return the values for the new body [m], [Pa]
     """
 
-    def __init__(self, server: Any, desk: Desk, size: Callable[[], float], youngs: Callable[[], float]) -> None:
-        self._desk, self._size, self._youngs = desk, size, youngs
+    def __init__(
+        self, server: Any, controller: Controller, size: Callable[[], float], youngs: Callable[[], float]
+    ) -> None:
+        self._controller, self._size, self._youngs = controller, size, youngs
         self.button = server.gui.add_upload_button("From a file", mime_type=",".join(limits.UPLOAD_FORMATS), hint=_HINT)
-        self._said = server.gui.add_markdown("", visible=False)
+        self._message = server.gui.add_markdown("", visible=False)
         self._busy, self._stop = threading.Lock(), threading.Event()
         self.transfers = Transfers(server, self.button, self._take, self._refuse)
 
     def stop(self) -> None:
-        """End what is under way, and wait for its end."""
+        """Stop the present file, and wait for its end."""
         self._stop.set()
         with self._busy:
             pass
@@ -42,39 +44,39 @@ class UploadControls:
     def _take(self, client: Any, name: str, suffix: str, content: bytes) -> None:
         upload, youngs = Upload(name, suffix, content, self._size()), self._youngs()
         if self._stop.is_set() or not self._busy.acquire(blocking=False):
-            self._refuse(client, f"{name}: another file is being read; try again when it is done")
+            self._refuse(client, f"{name}: another file is being meshed; try again when it is done")
             return
-        self._say(_progress(0.0))
+        self._show_message(_progress(0.0))
         threading.Thread(target=self._work, args=(client, upload, youngs), name="supple upload", daemon=True).start()
 
     def _work(self, client: Any, upload: Upload, youngs: float) -> None:
-        """In a thread of its own: the page and the simulation go on meanwhile."""
+        """Runs in its own thread, while page and simulation go on."""
         try:
-            made = mesh_of_upload(upload, lambda seconds: self._say(_progress(seconds)), self._stop)
-            self._desk.ask(client, lambda: AddMesh(made.vertices, made.tets, youngs, body_name(upload.name)))
+            made = mesh_of_upload(upload, lambda seconds: self._show_message(_progress(seconds)), self._stop)
+            self._controller.send(client, lambda: AddMesh(made.vertices, made.tets, youngs, body_name(upload.name)))
         except SuppleError as error:
             self._refuse(client, str(error))
         except OSError as error:
-            self._refuse(client, f"{upload.name}: it cannot be stored: {error.strerror or error}")
+            self._refuse(client, f"{upload.name}: it cannot be saved: {error.strerror or error}")
         finally:
-            self._say("")
+            self._show_message("")
             self._busy.release()
 
     def _refuse(self, client: Any, why: str) -> None:
         if not self._stop.is_set():
-            tell(client, "Not added", why[:500], "red")
+            notify(client, "Not added", why[:500], "red")
 
-    def _say(self, text: str) -> None:
-        if text != self._said.content and not self._stop.is_set():
-            self._said.content, self._said.visible = text, bool(text)
+    def _show_message(self, text: str) -> None:
+        if text != self._message.content and not self._stop.is_set():
+            self._message.content, self._message.visible = text, bool(text)
 
 
 def _progress(seconds: float) -> str:
-    # Without the file's name: this is Markdown.
-    return f"The file is being filled with tets, {seconds:.0f} s."
+    # Without the name of the file, because this is Markdown.
+    return f"The file is being meshed, {seconds:.0f} s."
 
 
 def body_name(file: str) -> str:
-    """A body's name after a file's."""
+    """The name of a body from the name of a file."""
     stem = file.rpartition(".")[0]
     return "".join("_" if c in _FORBIDDEN else c for c in stem).strip(" .")[:40] or "mesh"

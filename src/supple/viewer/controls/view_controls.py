@@ -1,4 +1,4 @@
-"""The part of the panel that chooses how things are drawn; the same for simulations and recordings."""
+"""The folder "View" of the panel: view options, for simulations and recordings."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 from supple.viewer.drawing.camera import PRESETS, look_from
 from supple.viewer.drawing.coloring.color_scale import bar_html
 from supple.viewer.drawing.coloring.fields import FIELDS
-from supple.viewer.drawing.layers.contacts import said_of_contacts
+from supple.viewer.drawing.layers.contacts import contacts_text
 from supple.viewer.drawing.options import COLOR_BY_BODY, SURFACES, ViewOptions
 from supple.viewer.drawing.stage import Stage
 from supple.viewer.server.browser_values import number, one_of
@@ -19,11 +19,11 @@ _AXES = ("x", "y", "z")
 
 
 class ViewControls:
-    """Dropdowns, sliders and check boxes for a stage, and the color bar.
+    """Inputs for the view options of a stage, and the color bar.
 
     Parameters
     ----------
-    server : viser's; stage : what they choose for; changed : is told of every choice, before it is drawn
+    server : of viser; stage : draws with the options; changed : called with every change, before it is drawn
     """
 
     def __init__(
@@ -39,63 +39,52 @@ class ViewControls:
             self.cut_axis = gui.add_dropdown("Cut across", _AXES, initial_value=options.cut_axis, visible=False)
             self.cut_place = gui.add_slider("Cut at", 0.0, 1.0, 0.01, initial_value=options.cut_place, visible=False)
             self._bar = gui.add_html("", visible=False)
-            self._shown_bar = ""
+            self._last_bar = ""
             self.velocities = gui.add_checkbox("Velocities", initial_value=options.velocities)
             self.contacts = gui.add_checkbox("Contacts", initial_value=options.contacts)
             self.stitches = gui.add_checkbox("Stitches", initial_value=options.stitches)
-            self._said = gui.add_markdown("", visible=False)
-            self._shown_said = ""
+            self._message = gui.add_markdown("", visible=False)
+            self._last_message = ""
             self.camera = gui.add_button_group("Camera", PRESETS)
-        inputs = (
-            self.surface,
-            self.color_by,
-            self.explode,
-            self.cut_axis,
-            self.cut_place,
-            self.velocities,
-            self.contacts,
-            self.stitches,
-        )
-        for handle in inputs:
+        for handle in (self.surface, self.color_by, self.explode, self.cut_axis, self.cut_place):
+            handle.on_update(lambda _: self.apply())
+        for handle in (self.velocities, self.contacts, self.stitches):
             handle.on_update(lambda _: self.apply())
         self.camera.on_click(self._look)
 
     def apply(self) -> None:
-        """Draw as the panel says."""
-        # Inputs that change together are dealt with in any order; the last one must see what all of them say.
+        """Draw with the options of the panel."""
+        # Inputs that change together arrive in any order; the last one must see the values of all.
         with self._lock:
-            self._apply()
-
-    def _apply(self) -> None:
-        options = replace(
-            self._stage.options,
-            surface=one_of(self.surface.value, SURFACES),
-            color_by=one_of(self.color_by.value, (COLOR_BY_BODY, *FIELDS)),
-            explode=number(self.explode.value, 0.05, 1.5),
-            cut_axis=one_of(self.cut_axis.value, _AXES),
-            cut_place=number(self.cut_place.value, 0.0, 1.0),
-            velocities=bool(self.velocities.value),
-            contacts=bool(self.contacts.value),
-            stitches=bool(self.stitches.value),
-        )
-        self.explode.visible = options.surface == "exploded tets"
-        self.cut_axis.visible = self.cut_place.visible = options.surface == "cut"
-        self._changed(options)
-        self._stage.apply(options)
-        self.refresh()
+            options = replace(
+                self._stage.options,
+                surface=one_of(self.surface.value, SURFACES),
+                color_by=one_of(self.color_by.value, (COLOR_BY_BODY, *FIELDS)),
+                explode=number(self.explode.value, 0.05, 1.5),
+                cut_axis=one_of(self.cut_axis.value, _AXES),
+                cut_place=number(self.cut_place.value, 0.0, 1.0),
+                velocities=bool(self.velocities.value),
+                contacts=bool(self.contacts.value),
+                stitches=bool(self.stitches.value),
+            )
+            self.explode.visible = options.surface == "exploded tets"
+            self.cut_axis.visible = self.cut_place.visible = options.surface == "cut"
+            self._changed(options)
+            self._stage.apply(options)
+            self.refresh()
 
     def refresh(self) -> None:
-        """Bring the color bar, and what is said of contacts and stitches, up to date."""
+        """Update the color bar and the text about contacts."""
         stage = self._stage
         field, limits = stage.field, stage.color_range
         bar = "" if field is None or limits is None else bar_html(field, *limits)
-        if bar != self._shown_bar:
+        if bar != self._last_bar:
             self._bar.content, self._bar.visible = bar, bool(bar)
-            self._shown_bar = bar
-        said = said_of_contacts(stage.moment) if stage.options.contacts else ""
-        if said != self._shown_said:
-            self._said.content, self._said.visible = said, bool(said)
-            self._shown_said = said
+            self._last_bar = bar
+        message = contacts_text(stage.moment) if stage.options.contacts else ""
+        if message != self._last_message:
+            self._message.content, self._message.visible = message, bool(message)
+            self._last_message = message
 
     def _look(self, event: Any) -> None:
         if event.client is not None:

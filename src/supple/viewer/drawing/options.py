@@ -1,4 +1,4 @@
-"""How the page shows what it shows."""
+"""View options of the page."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ COLOR_BY_BODY = "body"
 
 @dataclass(frozen=True)
 class ViewOptions:
-    """What is drawn.
+    """What is drawn, and how.
 
     Attributes
     ----------
     surface : one of SURFACES
     color_by : COLOR_BY_BODY, or the name of one of the fields
-    explode : how far tets are pulled apart; cut_axis : "x", "y" or "z"; cut_place : from 0 to 1
+    explode : distance by which tets are pulled apart; cut_axis : "x", "y" or "z"; cut_place : from 0 to 1
     velocities, contacts, stitches : whether they are drawn
     """
 

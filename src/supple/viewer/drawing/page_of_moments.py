@@ -1,4 +1,4 @@
-"""Moments as a page that plays them: one file, self-contained, drawn as the options say."""
+"""Exports moments as an HTML page that plays them: one self-contained file."""
 
 from __future__ import annotations
 
@@ -14,37 +14,37 @@ from supple.viewer.drawing.moments.model import Model, Moment
 from supple.viewer.drawing.options import ViewOptions
 from supple.viewer.drawing.stage import Stage
 
-MOST_BYTES = 36_000_000  # of moving points before compression; longer takes are shown with fewer moments
+MOST_BYTES = 36_000_000  # of moving points before compression; longer sequences keep fewer moments
 
 
 def most_moments(model: Model, options: ViewOptions) -> int:
-    """How many moments a page of reasonable size can hold."""
+    """Number of moments for a page of at most MOST_BYTES."""
     size = 12 * (drawn_points(model) if options.surface in ("skin", "wireframe") else 24 * len(model.tets))
     return max(2, MOST_BYTES // max(1, size))
 
 
 def evenly(count: int, most: int) -> list[int]:
-    """At most `most` of the numbers below `count`, evenly spaced, the first and the last among them."""
+    """At most `most` numbers below `count`, evenly spaced, with the first and the last one."""
     return [int(i) for i in np.unique(np.linspace(0, count - 1, min(count, most)).round())]
 
 
-def page_of_moments(taken: Sequence[tuple[float, Moment]], options: ViewOptions) -> str:
-    """The HTML of a page that plays what was taken, in a loop.
+def page_of_moments(moments: Sequence[tuple[float, Moment]], options: ViewOptions) -> str:
+    """The HTML of a page that plays moments in a loop.
 
     Parameters
     ----------
-    taken : at least one moment, each with when it is shown [s], ascending
-    options : how it is drawn
+    moments : at least one, each with its time on the page [s], ascending
+    options : how they are drawn
     """
-    first = taken[0][1].model
-    taken = [taken[i] for i in evenly(len(taken), most_moments(first, options))]
+    first = moments[0][1].model
+    moments = [moments[i] for i in evenly(len(moments), most_moments(first, options))]
     with temporary_server() as server:
-        stage = Stage(server, _rounded(taken[0][1]), options)
+        stage = Stage(server, _rounded(moments[0][1]), options)
         serializer = server.get_scene_serializer()
-        shown = taken[0][0]
-        for seconds, moment in taken[1:]:
-            serializer.insert_sleep(max(0.0, seconds - shown))
-            shown = seconds
+        previous = moments[0][0]
+        for seconds, moment in moments[1:]:
+            serializer.insert_sleep(max(0.0, seconds - previous))
+            previous = seconds
             stage.show(_rounded(moment))
         serializer.insert_sleep(0.1)
         text = serializer.as_html()
@@ -52,6 +52,6 @@ def page_of_moments(taken: Sequence[tuple[float, Moment]], options: ViewOptions)
 
 
 def _rounded(moment: Moment) -> Moment:
-    """With positions of few bits, which compress well."""
+    """The moment with rounded positions, which compress well."""
     quantum = quantum_of(moment.model.view)
-    return replace(moment, positions=np.round(moment.shown_positions / quantum) * quantum)
+    return replace(moment, positions=np.round(moment.finite_positions / quantum) * quantum)

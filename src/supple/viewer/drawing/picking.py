@@ -1,4 +1,4 @@
-"""What is under the mouse: points of bodies, from places and rays in space."""
+"""Points on the surfaces of bodies, found from points and rays in space."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from supple.viewer.drawing.moments.model import Model, ModelBody, Moment
 
 @dataclass(frozen=True, eq=False)
 class SurfacePoint:
-    """A point of a body's boundary.
+    """A point on the boundary of a body.
 
     Attributes
     ----------
     body : the body
-    vertices : (3,) of the triangle that it lies on, rows of the body's own; weights : (3,) barycentric coordinates
-    place : (3,) where it is [m]
+    vertices : (3,) of the triangle that contains it, numbered in the body; weights : (3,) barycentric coordinates
+    place : (3,) its position [m]
     """
 
     body: ModelBody
@@ -28,35 +28,35 @@ class SurfacePoint:
 
     @property
     def nearest_vertex(self) -> int:
-        """The vertex of the triangle that is nearest to it, a row of the body's own."""
+        """The vertex of the triangle with the largest weight, numbered in the body."""
         return int(self.vertices[np.argmax(self.weights)])
 
 
 def _triangles(model: Model) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Triangles (t, 3) of all bodies, rows of the model's vertices, and the body of each (t,)."""
+    """Triangles (t, 3) of all bodies, numbered in the model, and the body of each (t,)."""
     rows = [body.triangles.astype(np.int64) + body.vertices.start for body in model.bodies]
     return np.concatenate(rows), np.repeat(np.arange(len(rows)), [len(row) for row in rows])
 
 
 def nearest_surface_point(moment: Moment, place: ArrayLike) -> SurfacePoint:
-    """The point of any boundary that is nearest to a place (3,) [m]."""
+    """The point on any boundary that is nearest to a point (3,) [m]."""
     from trimesh.triangles import closest_point
 
     rows, _ = _triangles(moment.model)
-    corners = moment.shown_positions[rows]
-    wanted = np.asarray(place, dtype=np.float64)
-    points = closest_point(corners, np.broadcast_to(wanted, (len(rows), 3)))
-    nearest = int(np.argmin(np.linalg.norm(points - wanted, axis=1)))
+    corners = moment.finite_positions[rows]
+    query = np.asarray(place, dtype=np.float64)
+    points = closest_point(corners, np.broadcast_to(query, (len(rows), 3)))
+    nearest = int(np.argmin(np.linalg.norm(points - query, axis=1)))
     return _on_triangle(moment, nearest, points[nearest])
 
 
 def surface_point_on_ray(moment: Moment, origin: ArrayLike, direction: ArrayLike) -> SurfacePoint | None:
-    """The first point of any boundary that a ray from `origin` (3,) in `direction` (3,) meets; None where it misses.
+    """The first intersection of a ray from `origin` (3,) in `direction` (3,) with any boundary, or None.
 
     Source: Möller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection" (1997).
     """
     rows, _ = _triangles(moment.model)
-    a, b, c = (moment.shown_positions[rows[:, k]] for k in range(3))
+    a, b, c = (moment.finite_positions[rows[:, k]] for k in range(3))
     start, along = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
     h = np.cross(along, c - a)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -77,7 +77,7 @@ def _on_triangle(moment: Moment, triangle: int, place: NDArray[np.float64]) -> S
 
     rows, owner = _triangles(moment.model)
     body = moment.model.bodies[owner[triangle]]
-    corners = moment.shown_positions[rows[triangle]]
+    corners = moment.finite_positions[rows[triangle]]
     with np.errstate(all="ignore"):
         weights = points_to_barycentric(corners[None], place[None], method="cross")[0]
     if not np.isfinite(weights).all():  # a triangle without area
@@ -89,15 +89,15 @@ def _on_triangle(moment: Moment, triangle: int, place: NDArray[np.float64]) -> S
 def point_on_camera_plane(
     eye: ArrayLike, toward: ArrayLike, look: ArrayLike, through: ArrayLike
 ) -> NDArray[np.float64] | None:
-    """Where the line from the eye (3,) to a place (3,) meets the plane through a point that faces the camera.
+    """Intersection of the line from the eye (3,) to a point (3,) with the plane through a point that faces the camera.
 
     Parameters
     ----------
-    look : (3,) the direction that the camera looks in; through : (3,) a point of the plane
+    look : (3,) viewing direction of the camera; through : (3,) a point of the plane
 
     Returns
     -------
-    (3,) [m], or None where the line does not meet it before the eye.
+    (3,) [m], or None where there is no intersection in front of the eye.
     """
     start, along, normal = (np.asarray(v, dtype=np.float64) for v in (eye, toward, look))
     along = along - start

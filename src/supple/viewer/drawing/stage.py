@@ -1,4 +1,4 @@
-"""The picture on the page: layers that are put up as the options say, and drawn anew for every moment."""
+"""The 3D picture of the page: layers, selected by the options and updated for every moment."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ from supple.viewer.drawing.layers.velocities import VelocityView
 from supple.viewer.drawing.moments.model import Model, Moment
 from supple.viewer.drawing.options import COLOR_BY_BODY, ViewOptions
 
-# What is done to the meshes of bodies whenever there are new ones: make them answer to the mouse.
+# Called with new meshes of bodies, for example to add mouse handlers.
 Prepare = Callable[[list[Any]], None]
 
 
 class Stage:
-    """Everything that is drawn in 3D.
+    """All layers of the 3D picture.
 
     Parameters
     ----------
-    server : viser's; moment : the first one; options : see `ViewOptions`
-    prepare : is given the meshes of bodies whenever there are new ones
+    server : of viser; moment : the first one; options : see `ViewOptions`
+    prepare : called with the meshes of bodies whenever they are created
     """
 
     def __init__(self, server: Any, moment: Moment, options: ViewOptions, prepare: Prepare | None = None) -> None:
         self._server, self._scene = server, server.scene
         self._prepare = prepare
-        # Options change in threads of the server; moments come from the pump.
+        # Options change in threads of the server; moments come from the drawing thread.
         self._lock = threading.RLock()
         self.options, self.moment = options, moment
         self._layers: list[Layer] = []
@@ -47,26 +47,26 @@ class Stage:
 
     @property
     def model(self) -> Model:
-        """What the moments are moments of."""
+        """The model of the present moment."""
         return self.moment.model
 
     @property
     def field(self) -> Field | None:
-        """What is colored by, if anything."""
+        """The field for coloring, or None."""
         return None if self.options.color_by == COLOR_BY_BODY else FIELDS[self.options.color_by]
 
     @property
     def color_range(self) -> tuple[float, float] | None:
-        """(low, high) of the color bar, where there is one."""
+        """(low, high) of the color bar, or None."""
         return self._bodies.range if isinstance(self._bodies, TetView) else None
 
     @property
     def body_handles(self) -> list[Any]:
-        """The meshes of bodies that are on show."""
+        """The meshes of the drawn bodies."""
         return self._bodies.handles if self._bodies is not None else []
 
     def show(self, moment: Moment) -> None:
-        """Draw a moment. One of another model, with other bodies, is built anew."""
+        """Draw a moment; one of another model creates all layers again."""
         with self._lock, self._server.atomic():
             changed = moment.model is not self.moment.model
             self.moment = moment
@@ -77,7 +77,7 @@ class Stage:
                 layer.update(moment)
 
     def apply(self, options: ViewOptions) -> None:
-        """Draw the same moment in another way."""
+        """Draw the same moment with other options."""
         with self._lock, self._server.atomic():
             if options != self.options:
                 self.options = options

@@ -1,4 +1,4 @@
-"""Pictures as one visitor sees them, and films of them."""
+"""Screenshots and videos, rendered by the browser of one visitor."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from supple.errors import OutputError
 _MOST_SECONDS, _MOST_FRAMES = 60.0, 900
 _SMALLEST_PAUSE = 0.05  # between pictures [s]
 _TALLEST = 720  # [pixels]
-_PATIENCE = 20.0  # for one picture [s]; software OpenGL takes seconds
+_PICTURE_TIMEOUT = 20.0  # software OpenGL takes seconds [s]
 
 
 def picture_of(client: Any, tallest: int = 2160, kind: str = "png") -> NDArray[np.uint8]:
-    """What a visitor sees in 3D (height, width, 3 or 4).
+    """The 3D view of a visitor as picture (height, width, 3 or 4).
 
     Raises
     ------
-    OutputError : where the browser sends none.
+    OutputError : where the browser sends no picture.
     """
-    # What a browser says of its window may be anything.
+    # The size that a browser sends can be any number.
     height, width = (max(1.0, float(n)) for n in (client.camera.image_height, client.camera.image_width))
     scale = min(1.0, tallest / height, 4.0 * tallest / width)
-    # Even numbers of pixels: what encoders of video ask for.
+    # Video encoders need even numbers of pixels.
     size = [max(2, int(n * scale) // 2 * 2) for n in (height, width)]
     try:
-        picture = client.get_render(*size, transport_format=kind, timeout=_PATIENCE)
+        picture = client.get_render(*size, transport_format=kind, timeout=_PICTURE_TIMEOUT)
     except (RuntimeError, TimeoutError, ConnectionError, OSError, ValueError) as error:
         raise OutputError(f"the browser sent no picture: {error}") from None
     if list(picture.shape[:2]) != size:
@@ -45,7 +45,7 @@ def picture_of(client: Any, tallest: int = 2160, kind: str = "png") -> NDArray[n
 
 
 def png_of(client: Any) -> bytes:
-    """What a visitor sees in 3D, on white, as a PNG file."""
+    """The 3D view of a visitor, on white, as PNG file."""
     from PIL import Image
 
     shot = Image.fromarray(picture_of(client))
@@ -58,14 +58,14 @@ def png_of(client: Any) -> bytes:
     return out.getvalue()
 
 
-def kinds_of_films() -> dict[str, str]:
-    """Kinds of films that can be made here, and what is missing for those that cannot ("" where nothing is)."""
+def video_formats() -> dict[str, str]:
+    """The video formats, and for each what has to be installed ("" where nothing is missing)."""
     missing = "" if find_spec("imageio_ffmpeg") else "needs imageio-ffmpeg: pip install 'supple[video]'"
     return {"gif": "", "mp4": missing}
 
 
-class Film:
-    """Takes pictures from one visitor's browser until it is stopped."""
+class VideoCapture:
+    """Captures pictures from the browser of one visitor until `end`."""
 
     def __init__(self, client: Any) -> None:
         self._client = client
@@ -74,7 +74,7 @@ class Film:
         self._times: list[float] = []
         self._error: OutputError | None = None
         self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="supple film", daemon=True)
+        self._thread = threading.Thread(target=self._run, name="supple video capture", daemon=True)
         self._thread.start()
 
     def _run(self) -> None:
@@ -89,22 +89,22 @@ class Film:
                 self._error = error
                 break
             self._size = self._size or picture.shape
-            if picture.shape != self._size:  # a window that is resized ends the film
+            if picture.shape != self._size:  # a resized window ends the video
                 break
             self._frames.append(_packed(picture))
             self._times.append(now)
             self._stop.wait(_SMALLEST_PAUSE)
 
     def end(self, kind: str) -> bytes:
-        """Stop, and give the film as a file.
+        """Stop, and return the video as a file.
 
         Raises
         ------
-        OutputError : where there is no picture, or what makes films of that kind is not installed.
+        OutputError : where there is no picture, or the encoder of this format is not installed.
         """
         self._stop.set()
         self._thread.join()
-        missing = kinds_of_films()[kind]
+        missing = video_formats()[kind]
         if missing:
             raise OutputError(f"{kind.upper()} {missing}")
         if not self._frames:
@@ -146,7 +146,7 @@ def mp4_of(frames: Iterable[NDArray[np.uint8]], rate: float) -> bytes:
     import imageio_ffmpeg
 
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "film.mp4"
+        path = Path(folder) / "video.mp4"
         pictures = iter(frames)
         first = next(pictures)
         height, width = first.shape[:2]

@@ -1,4 +1,4 @@
-"""How long kernels have been compiled for: once on every machine, and no part of a step."""
+"""The time that Numba spends compiling kernels: once on every machine; it is not part of a step."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from numba.core import event
 
 
 class CompileClock(event.Listener):
-    """Adds up the time [s] that Numba compiles, in any thread, since this was made."""
+    """The total time [s] that Numba compiles, in any thread, since this object was created."""
 
     def __init__(self) -> None:
-        self._depth = 0  # kernels that call others compile them, too
+        self._depth = 0  # compilations are nested
         self._began = self._before = 0.0
         event.register("numba:compile", self)
 
@@ -30,10 +30,10 @@ class CompileClock(event.Listener):
 
     @property
     def running(self) -> bool:
-        """Whether something is being compiled now."""
+        """Whether Numba compiles now."""
         return self._depth > 0
 
     @property
     def seconds(self) -> float:
-        """Until now."""
+        """The total until now."""
         return self._before + (time.monotonic() - self._began if self.running else 0.0)

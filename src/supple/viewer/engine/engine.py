@@ -1,4 +1,4 @@
-"""The page's end of the simulation: starts its process, tells it what to do, and knows its newest state."""
+"""The simulation as the page sees it: starts its process, sends commands, and receives snapshots."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from supple.viewer.protocol.live_source import LiveSource
 from supple.viewer.protocol.outbox import DESCRIPTION, ERROR
 from supple.viewer.protocol.snapshots import SceneDescription, Snapshot
 
-# A process that does not end by itself within this time [s] is ended.
+# A process that does not end by itself within this time [s] is terminated.
 GRACE = 2.0
 
 
 class Engine:
-    """A simulation in a process of its own. No method waits for the simulation, apart from the constructor.
+    """A simulation in its own process. Only the constructor and `wait_for` wait for the simulation.
 
-    Safe to use from several threads. Ends with `close`, as a context manager, or with this process.
+    Thread-safe. The process ends with `close`, at the end of the context, or with this process.
 
     Parameters
     ----------
     source : what to simulate.
-    start_timeout : how long to wait for the first snapshot [s]; on a new machine, kernels are compiled before it.
+    start_timeout : longest time to wait for the first snapshot [s]; on a new machine, kernels are compiled before it.
 
     Raises
     ------
@@ -62,10 +62,10 @@ class Engine:
             self._process.start()
         except (pickle.PicklingError, AttributeError, TypeError) as error:
             raise SceneError(
-                f"the scene cannot be sent to a process of its own ({error}); use Keyframes in place of functions of "
-                "time that are defined inside others"
+                f"the scene cannot be sent to another process ({error}); use Keyframes in place of functions of time "
+                "that are defined inside other functions"
             ) from None
-        # Only the child holds these ends now: when it dies, this process hears of it, and the other way round.
+        # Only the child keeps these ends open: so each process detects the end of the other one.
         command_reader.close()
         snapshot_writer.close()
         threading.Thread(target=self._read, name="snapshots", daemon=True).start()
@@ -73,20 +73,22 @@ class Engine:
         with self._arrived:
             self._arrived.wait_for(lambda: self._raw is not None or self._error is not None, start_timeout)
         if self._raw is None:
-            said = self._error or f"the simulation has not begun within {start_timeout:g} s"
+            reason = self._error or f"the simulation did not start within {start_timeout:g} s"
             self.close()
-            raise SolverError(said)
+            raise SolverError(reason)
 
     def send(self, command: Command) -> int:
-        """Give a command to the simulation, without waiting for it.
+        """Send a command to the simulation, without waiting for it.
 
         Returns
         -------
-        its number: once a snapshot's `applied` is that or more, it has been acted upon. 0 where the command was
-        dropped, because too many are waiting or the simulation is gone.
+        its number: the command has been executed once `applied` of a snapshot is at least this number. 0 where the
+        command was dropped, because too many wait or the simulation has ended.
         """
         if not isinstance(command, Command):
-            raise CommandError(f"a {type(command).__name__} is no command")
+            raise CommandError(
+                f"a {type(command).__name__} is not a command; give one of supple.viewer.protocol.messages"
+            )
         if not self.alive:
             return 0
         with self._number_lock:
@@ -97,7 +99,7 @@ class Engine:
             return number
 
     def latest(self) -> Snapshot | None:
-        """The newest snapshot; None before there is one. The same object until there is a newer one."""
+        """The newest snapshot, or None; the same object until a newer one arrives."""
         with self._arrived:
             if self._raw is not None:
                 (description, data), self._raw = self._raw, None
@@ -105,11 +107,11 @@ class Engine:
             return self._latest
 
     def wait_for(self, number: int, timeout: float = 10.0) -> Snapshot:
-        """The first snapshot that is seen after a command of that number has been acted upon.
+        """The first received snapshot after the command of this number has been executed.
 
         Raises
         ------
-        TimeoutError : where that takes longer than `timeout` [s], or the simulation is gone.
+        TimeoutError : where this takes longer than `timeout` [s], or the simulation has ended.
         """
         end = time.monotonic() + timeout
         while True:
@@ -118,29 +120,29 @@ class Engine:
                 return snapshot
             left = end - time.monotonic()
             if left <= 0.0 or not self.alive:
-                raise TimeoutError(self.error or f"the simulation has not answered within {timeout:g} s")
+                raise TimeoutError(self.error or f"the simulation did not answer within {timeout:g} s")
             with self._arrived:
                 self._arrived.wait_for(lambda: self._raw is not None, min(left, 0.5))
 
     @property
     def description(self) -> SceneDescription:
-        """Of the newest snapshot's scene."""
+        """The description of the newest snapshot."""
         snapshot = self.latest()
-        assert snapshot is not None  # there was one when the constructor returned
+        assert snapshot is not None  # the constructor waits for the first one
         return snapshot.description
 
     @property
     def alive(self) -> bool:
-        """Whether the simulation's process runs."""
+        """Whether the process of the simulation runs."""
         return not self._closing and self._error is None and self._process.is_alive()
 
     @property
     def error(self) -> str | None:
-        """Why the simulation is gone, if it has not been closed."""
+        """Why the simulation ended, where it was not closed."""
         return self._error
 
     def close(self) -> None:
-        """End the simulation's process."""
+        """End the process of the simulation."""
         self._closing = True
         self._outgoing.close()
         with contextlib.suppress(OSError):
@@ -160,7 +162,7 @@ class Engine:
         self.close()
 
     def _read(self) -> None:
-        """Drain the pipe, so that only the newest snapshot is ever kept."""
+        """Read all messages, and keep only the newest snapshot."""
         while True:
             try:
                 data = self._snapshots.recv_bytes()
@@ -173,7 +175,7 @@ class Engine:
                 elif kind == DESCRIPTION:
                     self._description = pickle.loads(content)
                 elif self._description is not None:
-                    # Unpacked only when it is asked for.
+                    # Unpickled only when `latest` is called.
                     self._raw = self._description, content
                 self._arrived.notify_all()
         self._process.join(GRACE)
@@ -188,5 +190,5 @@ class Engine:
             try:
                 if batch:
                     self._commands.send(batch)
-            except OSError:  # the simulation is gone; its other pipe says so
+            except OSError:  # the simulation has ended; `_read` detects it
                 return

@@ -1,4 +1,4 @@
-"""Simulated time against the clock: when the next frame is due, and whether frames come in time."""
+"""Simulated time and wall-clock time: when the next frame is due, and whether frames are on time."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from collections import deque
 
 from supple.viewer.protocol.snapshots import Timing
 
-# What is measured looks back this far [s].
+# Length of the time window of measurements [s].
 WINDOW = 1.0
-# Slower than the speed that was asked for by more than this share is said to be late.
+# Share by which the simulation may be slower than the requested speed.
 TOLERANCE = 0.1
 
 
 class Pacing:
-    """The clock of a running simulation. All times are those of `time.perf_counter` [s]."""
+    """The clock of a running simulation. All times are values of `time.perf_counter` [s]."""
 
     def __init__(self) -> None:
         self.due = 0.0
@@ -21,7 +21,7 @@ class Pacing:
         self._steps: deque[tuple[float, float, float]] = deque()
 
     def start(self, now: float) -> None:
-        """Time begins to run, or runs at another speed from now on."""
+        """Start the time, or change its speed."""
         self.due = self._begun = now
         self._steps.clear()
 
@@ -30,11 +30,11 @@ class Pacing:
         self._steps.append((now, seconds, dt))
         while self._steps[0][0] < now - WINDOW and len(self._steps) > 2:
             self._steps.popleft()
-        # A step that came late is made up for only by one: nobody wants to see a film run faster after a pause.
+        # A late step is compensated by at most one step, so that the motion does not run faster after a delay.
         self.due = max(self.due + dt / speed, now - dt / speed)
 
     def timing(self, now: float, speed: float, playing: bool) -> Timing:
-        """How fast it has been lately."""
+        """The speed within the last window."""
         if not self._steps:
             return Timing()
         step_ms = 1e3 * sum(seconds for _, seconds, _ in self._steps) / len(self._steps)
@@ -44,7 +44,7 @@ class Pacing:
         if span <= 0.0:
             return Timing(step_ms=step_ms)
         ratio = sum(dt for _, _, dt in self._steps) / span
-        # The frame that waits for its time belongs to the span, but is not counted yet.
+        # The frame that is not due yet belongs to the span, but is not counted yet.
         dt = self._steps[-1][2]
         late = span > 0.5 and ratio + dt / span < (1.0 - TOLERANCE) * speed
         return Timing(step_ms, len(self._steps) / span, ratio, not late)

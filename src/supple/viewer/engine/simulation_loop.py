@@ -1,12 +1,14 @@
-"""The simulation's own process: steps in real time, does what commands say, and waits for nobody."""
+"""The loop of the simulation process: takes steps in real time, executes commands, sends snapshots."""
 
 from __future__ import annotations
 
 import logging
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -19,24 +21,23 @@ from supple.viewer.engine.pacing import Pacing
 from supple.viewer.engine.scene.changes import change
 from supple.viewer.engine.scene.live_scene import LiveScene
 from supple.viewer.engine.step_watch import StepWatch
-from supple.viewer.protocol import commands as say
-from supple.viewer.protocol import limits
+from supple.viewer.protocol import commands, limits
 from supple.viewer.protocol.command_queue import CommandQueue
 from supple.viewer.protocol.outbox import Outbox
 from supple.viewer.protocol.snapshots import Notice, Snapshot
 
 logger = logging.getLogger(__name__)
 
-HEARTBEAT = 0.5  # without anything new, a snapshot after this time all the same [s]
+HEARTBEAT = 0.5  # longest time between two snapshots [s]
 NOTICES_KEPT = 8
 
 
 class SimulationLoop:
-    """Runs a live scene until its queue of commands is closed.
+    """Runs a live scene until its command queue is closed.
 
     Attributes
     ----------
-    playing : whether time runs; steps_left : how many frames to simulate although it does not
+    playing : whether the time runs; steps_left : number of frames to simulate while it does not
     """
 
     def __init__(self, live: LiveScene, inbox: CommandQueue, outbox: Outbox) -> None:
@@ -44,28 +45,29 @@ class SimulationLoop:
         self.playing = False
         self.steps_left = 0
         self.speed = 1.0
-        self.view = say.SetView()
+        self.view = commands.SetView()
         self.pacing = Pacing()
         self.watch = StepWatch(
-            limits.LONGEST_STEP, lambda: inbox.holds(say.Pause, say.Reset), limits.LONGEST_STEP_WHEN_ASKED
+            limits.LONGEST_STEP, lambda: inbox.holds(commands.Pause, commands.Reset), limits.LONGEST_STEP_WHEN_ASKED
         )
         self.applied = 0
         self.notices: deque[Notice] = deque(maxlen=NOTICES_KEPT)
         self._before: State = live.state
+        self._last: Snapshot | None = None
         self._described = -1
         self._published = 0.0
         self._fresh = True
 
     def run(self) -> None:
-        """Until the page's process is gone."""
-        with self.told_of_warnings():
+        """Run until the process of the page ends."""
+        with self.warnings_as_notices():
             while not self.inbox.closed:
-                self.turn(self._time_to_wait())
+                self.run_once(self._time_to_wait())
 
-    def turn(self, wait: float) -> None:
-        """One round: commands, a step if one is due, a snapshot if there is something to show."""
+    def run_once(self, wait: float) -> None:
+        """Execute commands, take a step if one is due, send a snapshot if there is something new."""
         for number, command in self.inbox.take(wait):
-            self.obey(command)
+            self.execute(command)
             self.applied = max(self.applied, number)
             self._fresh = True
         now = time.perf_counter()
@@ -73,42 +75,42 @@ class SimulationLoop:
             self.step()
         now = time.perf_counter()
         since = now - self._published
-        if (self._fresh and since >= self._shortest()) or self._blends(now) or since >= HEARTBEAT:
+        if (self._fresh and since >= self._shortest()) or self._interpolates(now) or since >= HEARTBEAT:
             self.publish(now)
 
-    def obey(self, command: say.Command) -> None:
-        """Do what a command says; what cannot be done becomes a notice."""
+    def execute(self, command: commands.Command) -> None:
+        """Execute a command; where it fails, send a notice."""
         try:
             match command:
-                case say.Play():
+                case commands.Play():
                     if not self.playing:
                         self.playing = True
                         self.pacing.start(time.perf_counter())
-                case say.Pause():
+                case commands.Pause():
                     self.playing, self.steps_left = False, 0
-                case say.Step():
+                case commands.Step():
                     self.playing = False
-                    # Each counts, also where the one before has not been simulated yet.
+                    # Each Step counts, also where the previous one has not been simulated yet.
                     self.steps_left = min(self.steps_left + command.count, limits.MOST_STEPS)
-                case say.SetSpeed():
+                case commands.SetSpeed():
                     self.speed = command.factor
                     self.pacing.start(time.perf_counter())
-                case say.SetView():
+                case commands.SetView():
                     self.view = command
                 case _:
                     with self.watch.limited():
                         change(command, self.live)
-                    if isinstance(command, say.Reset):  # frames that were asked for before are not of the new start
+                    if isinstance(command, commands.Reset):  # frames that were requested before belong to the old start
                         self.steps_left = 0
                     self._before = self.live.state
         except (SuppleError, MemoryError) as error:
-            self.tell("error", _one_line(error))
+            self.notify("error", _one_line(error))
         except Exception as error:
             logger.exception("the command %s failed", command)
-            self.tell("error", f"{type(command).__name__} failed: {_one_line(error)}")
+            self.notify("error", f"{type(command).__name__} failed: {_one_line(error)}")
 
     def step(self) -> None:
-        """Simulate one frame; where that fails, time stops at the last good state, and a notice says why."""
+        """Simulate one frame; where this fails, pause at the last good state, and send a notice with the reason."""
         began = time.perf_counter()
         before = self.live.state
         try:
@@ -121,25 +123,25 @@ class SimulationLoop:
             logger.exception("a step failed")
             failed = f"{type(error).__name__}: {_one_line(error)}"
         if failed:
-            self.live.renew()
+            self.live.prepare_workspace()
         now = time.perf_counter()
         self.steps_left = max(0, self.steps_left - 1)
         self._fresh = True
         if failed:
             self.playing, self.steps_left = False, 0
-            self.tell("error", f"paused at t = {self.live.state.time:.4g} s; {failed}")
+            self.notify("error", f"paused at t = {self.live.state.time:.4g} s; {failed}")
             return
         self._before = before
         self.pacing.stepped(now, now - began, self.live.setup.dt, self.speed)
 
-    def tell(self, level: str, text: str) -> None:
-        """Leave a notice for the person at the page."""
+    def notify(self, level: str, text: str) -> None:
+        """Send a notice to the page."""
         number = self.notices[-1].number + 1 if self.notices else 1
         self.notices.append(Notice(number, level, text))
 
     @contextmanager
-    def told_of_warnings(self) -> Iterator[None]:
-        """Whatever the library warns of within becomes a notice, once."""
+    def warnings_as_notices(self) -> Iterator[None]:
+        """A block in which each warning of the library becomes a notice, once."""
         log, handler = logging.getLogger("supple"), _Notices(self)
         propagated, log.propagate = log.propagate, False
         log.addHandler(handler)
@@ -150,21 +152,40 @@ class SimulationLoop:
             log.propagate = propagated
 
     def publish(self, now: float) -> None:
-        """Put out a snapshot, after a description where that has changed."""
+        """Send a snapshot, after a new description where the scene has changed.
+
+        Where that fails, the simulation pauses, and the last snapshot is sent again with an error notice.
+        """
         live = self.live
-        if self._described != live.revision:
-            self.outbox.put_description(describe(live))
-            self._described = live.revision
-        self.outbox.put_snapshot(self.snapshot(now))
         self._published, self._fresh = now, False
+        try:
+            description = describe(live) if self._described != live.revision else None
+            self._last = self.snapshot(now)
+        except Exception as error:
+            if self._last is None:
+                raise
+            text = f"paused; the page cannot be updated: {_one_line(error)}"
+            if self.playing or not (self.notices and self.notices[-1].text == text):
+                logger.exception("a snapshot could not be made")
+                self.notify("error", text)
+            self.playing, self.steps_left = False, 0
+            self._last = replace(self._last, paused=True, notices=tuple(self.notices), applied=self.applied)
+            description = None
+        if description is not None:
+            self.outbox.put_description(description)
+            self._described = description.revision
+        self.outbox.put_snapshot(self._last)
 
     def snapshot(self, now: float) -> Snapshot:
-        """The present state; in slow motion, one between the last two. Its description stays on the other side."""
-        live, view = self.live, self.view
-        state = self._shown(now)
+        """The present state; in slow motion, a state between the last two. `Engine` adds the description."""
+        live = self.live
+        state = self._displayed_state(now)
         system, setup = live.system, live.setup
         grabs = [spring.state(state.positions[_rows(live, spring.command.body)]) for spring in setup.grabs.values()]
         pusher = setup.pusher
+        contacts = self._requested("contacts", lambda: contact_points(system, state.positions, state.time))
+        quantity = self.view.tet_values or ""
+        values = self._requested("tet_values", lambda: tet_values(system, state.positions, quantity))
         return Snapshot(
             description=None,  # pyright: ignore[reportArgumentType]
             frame=live.frame,
@@ -180,14 +201,26 @@ class SimulationLoop:
             timing=self.pacing.timing(now, self.speed, self.playing),
             notices=tuple(self.notices),
             applied=self.applied,
-            velocities=state.velocities if view.velocities else None,
-            tet_values=None if view.tet_values is None else tet_values(system, state.positions, view.tet_values),
-            tet_quantity=view.tet_values,
-            contact_points=contact_points(system, state.positions, state.time) if view.contacts else None,
+            velocities=state.velocities if self.view.velocities else None,
+            tet_values=values,
+            tet_quantity=self.view.tet_values,
+            contact_points=contacts,
         )
 
+    def _requested(self, name: str, compute: Callable[[], Any]) -> Any | None:
+        """A value that the view requests, or None. Where it cannot be computed, it is turned off, with a notice."""
+        if not getattr(self.view, name):
+            return None
+        try:
+            return compute()
+        except Exception as error:
+            logger.exception("%s could not be computed", name)
+            self.view = replace(self.view, **{name: getattr(commands.SetView(), name)})
+            self.notify("error", f"{name.replace('_', ' ')} are off: {_one_line(error)}; choose them again to retry")
+            return None
+
     def _shortest(self) -> float:
-        # A hair less than the time between two frames: else the clock's jitter would skip every other frame.
+        # Slightly less than the time between two frames: otherwise jitter of the clock would skip every second frame.
         return 0.9 / limits.FRAMES_PER_SECOND
 
     def _interval(self) -> float:
@@ -196,10 +229,10 @@ class SimulationLoop:
     def _in_slow_motion(self) -> bool:
         return self.playing and self.steps_left == 0 and self._interval() > 1.5 / limits.FRAMES_PER_SECOND
 
-    def _blends(self, now: float) -> bool:
+    def _interpolates(self, now: float) -> bool:
         return self._in_slow_motion() and now - self._published >= self._shortest()
 
-    def _shown(self, now: float) -> State:
+    def _displayed_state(self, now: float) -> State:
         after, before = self.live.state, self._before
         if not self._in_slow_motion() or before is after or len(before.positions) != len(after.positions):
             return after
@@ -223,20 +256,20 @@ class SimulationLoop:
 
 
 class _Notices(logging.Handler):
-    """Tells a loop of warnings. Errors are for the terminal as well: they are mistakes in the code."""
+    """Turns warnings into notices of a loop. Errors go to the terminal: they are faults of the code."""
 
     def __init__(self, loop: SimulationLoop) -> None:
         super().__init__(logging.WARNING)
         self.loop = loop
-        self.told: set[str] = set()
+        self.received: set[str] = set()
 
     def emit(self, record: logging.LogRecord) -> None:
         text = " ".join(record.getMessage().split())[:500]
         if record.levelno >= logging.ERROR:
             logging.getLogger().handle(record)
-        elif text not in self.told and len(self.told) < 1000:
-            self.told.add(text)
-            self.loop.tell("info", text)
+        elif text not in self.received and len(self.received) < 1000:
+            self.received.add(text)
+            self.loop.notify("info", text)
 
 
 def _rows(live: LiveScene, body: str) -> slice:

@@ -1,4 +1,4 @@
-"""What runs in the simulation's process: from the pipes to the loop."""
+"""The main function of the simulation process: connects the pipes with the loop."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from supple.viewer.protocol.live_source import LiveSource
 
 
 def run_simulation(source: LiveSource, commands: Connection, snapshots: Connection, log_level: int) -> None:
-    """Simulate until the other end of `commands` is closed, by will or because the page's process has died."""
-    # Ctrl-C in a terminal reaches both processes; the page's ends this one.
+    """Simulate until the other end of `commands` is closed, by `Engine.close` or by the end of the page's process."""
+    # Ctrl-C in a terminal reaches both processes; the process of the page ends this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     logging.basicConfig(level=log_level, format="%(levelname)s: %(message)s")
     inbox = CommandQueue()
@@ -27,22 +27,11 @@ def run_simulation(source: LiveSource, commands: Connection, snapshots: Connecti
 
     try:
         live = LiveScene(source)
-        warm_up(live)
+        live.warm_up()
     except (SuppleError, MemoryError) as error:
         snapshots.send_bytes(packed(ERROR, " ".join(str(error).split()) or type(error).__name__))
         return
     SimulationLoop(live, inbox, Outbox(snapshots)).run()
-
-
-def warm_up(live: object) -> None:
-    """Try one step and forget it: compiled kernels are loaded before a person waits for them."""
-    from supple.viewer.engine.scene.live_scene import LiveScene
-
-    assert isinstance(live, LiveScene)
-    state = live.state
-    live.step()
-    live.frame = 0
-    live.adopt(live.setup, state)
 
 
 def _read(commands: Connection, inbox: CommandQueue) -> None:
@@ -54,5 +43,5 @@ def _read(commands: Connection, inbox: CommandQueue) -> None:
         except Exception:
             logging.getLogger(__name__).exception("commands could not be read")
     inbox.close()
-    # The loop may be amid a long step, and nobody waits for it any more.
+    # The loop may be within a long step, and its result is not needed.
     os._exit(0)

@@ -1,4 +1,4 @@
-"""Commands on their way: in order, never more than a fixed number, and of a moving hand only the newest place."""
+"""A bounded queue of commands, in order. Of the moves of one grab it keeps only the newest."""
 
 from __future__ import annotations
 
@@ -6,13 +6,23 @@ import threading
 from collections.abc import Hashable, Iterable
 
 from supple.viewer.protocol import limits
-from supple.viewer.protocol.commands import Command, MoveGrab, MovePusher, SetParameter, SetSpeed, SetView, Unpin
+from supple.viewer.protocol.commands import (
+    Command,
+    Grab,
+    MoveGrab,
+    MovePusher,
+    ReleaseGrab,
+    SetParameter,
+    SetSpeed,
+    SetView,
+    Unpin,
+)
 
 Numbered = tuple[int, Command]
 
 
 def subject(command: Command) -> Hashable | None:
-    """What a command is the last word on; None for commands of which each counts."""
+    """The key of what a command sets; None for commands of which each one counts."""
     match command:
         case MoveGrab(grab=grab):
             return "grab", grab
@@ -27,35 +37,43 @@ def subject(command: Command) -> Hashable | None:
 
 
 class CommandQueue:
-    """A bounded queue between two threads. A newer word on the same subject takes the older one's place.
+    """A bounded queue between two threads. A newer command replaces an older one with the same `subject`.
 
-    It does so only where no other kind of command came between the two, so that the outcome stays the same: moving a
-    grab after letting it go is not moving it before.
+    It does so only where no other kind of command came between the two, so that the result is the same: a move after
+    the release of a grab differs from a move before it.
     """
 
     def __init__(self, capacity: int = limits.MOST_WAITING) -> None:
         self.capacity = capacity
         self.dropped = 0
+        self._grabs: set[int] = set()  # that were accepted and not released yet
         self._waiting: list[Numbered] = []
         self._places: dict[Hashable, int] = {}
         self._changed = threading.Condition()
         self._closed = False
 
     def put(self, number: int, command: Command) -> bool:
-        """Append a command. Returns False, with the command dropped, where the queue is full."""
+        """Append a command. Returns False where the queue is full: the command is dropped.
+
+        The release of an accepted grab is never dropped, because its spring would pull for ever.
+        """
         with self._changed:
             about = subject(command)
             if about is not None and about in self._places:
                 self._waiting[self._places[about]] = number, command
-            elif len(self._waiting) >= self.capacity:
+            elif len(self._waiting) >= self.capacity and not self._releases(command):
                 self.dropped += 1
                 return False
             else:
-                if about is None or (isinstance(command, SetParameter) and self._speaks_of(command.name)):
+                if about is None or (isinstance(command, SetParameter) and self._sets(command.name)):
                     self._places.clear()
                 if about is not None:
                     self._places[about] = len(self._waiting)
                 self._waiting.append((number, command))
+                if isinstance(command, Grab):
+                    self._grabs.add(command.grab)
+                elif isinstance(command, ReleaseGrab):
+                    self._grabs.discard(command.grab)
             self._changed.notify()
             return True
 
@@ -65,30 +83,33 @@ class CommandQueue:
             self.put(number, command)
 
     def take(self, timeout: float | None) -> list[Numbered]:
-        """Everything that waits, oldest first; waits for something until `timeout` [s] (None: for ever)."""
+        """All waiting commands, oldest first. Waits for the first one up to `timeout` [s] (None: without limit)."""
         with self._changed:
             if not self._waiting and not self._closed:
                 self._changed.wait(timeout)
-            taken, self._waiting = self._waiting, []
+            commands, self._waiting = self._waiting, []
             self._places.clear()
-            return taken
+            return commands
 
     def holds(self, *kinds: type[Command]) -> bool:
-        """Whether a command of one of those kinds waits."""
+        """Whether a command of one of these kinds waits."""
         with self._changed:
             return any(isinstance(command, kinds) for _, command in self._waiting)
 
     def close(self) -> None:
-        """Wake whoever waits; nothing will come any more."""
+        """Wake the reader; no more commands will come."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
 
     @property
     def closed(self) -> bool:
-        """Whether nothing will come any more."""
+        """Whether no more commands will come."""
         return self._closed
 
-    def _speaks_of(self, parameter: str) -> bool:
-        """Whether a word on that parameter waits: of one body and of all bodies, the later must stay the later."""
+    def _releases(self, command: Command) -> bool:
+        return isinstance(command, ReleaseGrab) and command.grab in self._grabs
+
+    def _sets(self, parameter: str) -> bool:
+        """Whether a waiting command sets this parameter. The order of "one body" and "all bodies" must be kept."""
         return any(isinstance(key, tuple) and key[:2] == ("parameter", parameter) for key in self._places)

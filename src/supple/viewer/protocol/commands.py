@@ -1,7 +1,7 @@
-"""What a page may tell the simulation. Each command checks itself when it is made: none that exists is malformed.
+"""The commands that a page sends to the simulation. Each one checks its values when it is created.
 
-A command can still ask for the impossible, such as a body that is not there; the simulation then says so in a notice,
-and goes on.
+A valid command can still be impossible, for example where it names a body that does not exist. The simulation then
+sends a notice and continues.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from supple.errors import CommandError, SceneError
 from supple.scene.values import check_name
 from supple.viewer.protocol import limits
-from supple.viewer.protocol.displayed import shown
+from supple.viewer.protocol.displayed import displayed
 from supple.viewer.protocol.parameters import find_parameter
 
 Point = tuple[float, float, float]
@@ -33,17 +33,17 @@ class Command:
 
 @dataclass(frozen=True)
 class Play(Command):
-    """Let time run."""
+    """Start the time."""
 
 
 @dataclass(frozen=True)
 class Pause(Command):
-    """Stop time."""
+    """Stop the time."""
 
 
 @dataclass(frozen=True)
 class Step(Command):
-    """Pause, and simulate `count` frames."""
+    """Pause, then simulate `count` frames."""
 
     count: int = 1
 
@@ -53,15 +53,15 @@ class Step(Command):
 
 @dataclass(frozen=True)
 class Reset(Command):
-    """Back to the start: bodies that were added stay, where they were added; hands let go; pins by hand are gone.
+    """Return to the start. Added bodies stay where they were added. Grabs, and pins made on the page, are removed.
 
-    Parameters and solver stay as they are.
+    Parameters and solver do not change.
     """
 
 
 @dataclass(frozen=True)
 class SetSpeed(Command):
-    """Slow motion: 1 is real time, 0.1 a tenth of it. The length of the simulation's steps stays the same."""
+    """Slow motion: 1 is real time, 0.1 is a tenth of it. The time step of the simulation does not change."""
 
     factor: float
 
@@ -71,13 +71,13 @@ class SetSpeed(Command):
 
 @dataclass(frozen=True)
 class SetSolver(Command):
-    """Go on from the present state with another solver: "xpbd" or "implicit"."""
+    """Continue from the present state with another solver: "xpbd" or "implicit"."""
 
     kind: str
 
     def __post_init__(self) -> None:
         if self.kind not in ("xpbd", "implicit"):
-            raise CommandError(f"there is no solver {shown(self.kind)}; there are xpbd and implicit")
+            raise CommandError(f"there is no solver {displayed(self.kind)}; there are xpbd and implicit")
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,8 @@ class SetParameter(Command):
 
     Parameters
     ----------
-    body : whose, for parameters of bodies; None for all bodies that have it (and for friction: obstacles, too).
+    body : name of the body, for parameters of bodies; None for all bodies that have the parameter (for `friction`, the
+        obstacles as well).
     """
 
     name: str
@@ -104,12 +105,12 @@ class SetParameter(Command):
 
 @dataclass(frozen=True)
 class SetView(Command):
-    """Which numbers the page wants beside positions; none of them by default, since each costs time.
+    """The values that the page needs in addition to positions. The default is none, because each takes time.
 
     Parameters
     ----------
     tet_values : None, "J", "von_mises" [Pa] or "energy" [J/m^3]
-    velocities, contacts : whether snapshots should hold them
+    velocities, contacts : whether snapshots contain them
     """
 
     tet_values: str | None = None
@@ -118,25 +119,25 @@ class SetView(Command):
 
     def __post_init__(self) -> None:
         if self.tet_values not in (None, "J", "von_mises", "energy"):
-            raise CommandError(f"there are no values {shown(self.tet_values)} of tets; there are J, von_mises, energy")
+            raise CommandError(f"tet_values is {displayed(self.tet_values)}; give J, von_mises, energy or None")
         for name in ("velocities", "contacts"):
             if not isinstance(getattr(self, name), bool):
-                raise CommandError(f"{name} is {shown(getattr(self, name))}; give true or false")
+                raise CommandError(f"{name} is {displayed(getattr(self, name))}; give true or false")
 
 
 @dataclass(frozen=True)
 class Grab(Command):
-    """Take hold of a point of a body with a spring, until `ReleaseGrab`. The body keeps its velocity then: a throw.
+    """Attach a spring to a point of a body, until `ReleaseGrab`. The released body keeps its velocity.
 
     Parameters
     ----------
-    grab : a number of the page's choice; with the number of a grab that is there already, this one takes its place.
+    grab : a number that the page chooses. A grab that has this number already is replaced.
     body : its name.
     vertices : one to four vertices of the body's mesh, numbered from 0 in the body.
-    weights : one per vertex; they are made to sum to 1. The point is there: (1,) for a vertex, the barycentric
-        coordinates of a point on a triangle or in a tet.
-    target : (3,) where the spring pulls the point to [m].
-    stiffness : factor of the strength that suits the body's mass and size.
+    weights : one for each vertex, scaled so that their sum is 1: (1,) for a vertex, or the barycentric coordinates of a
+        point on a triangle or in a tet.
+    target : (3,) the point to which the spring pulls [m].
+    stiffness : factor of the default stiffness, which follows from the mass and size of the body.
     """
 
     grab: int
@@ -152,16 +153,12 @@ class Grab(Command):
         _set(self, "vertices", _vertices(self.vertices))
         _set(self, "weights", _weights(self.weights, len(self.vertices)))
         _set(self, "target", _point(self.target, "target"))
-        _set(
-            self,
-            "stiffness",
-            _number(self.stiffness, "stiffness", limits.WEAKEST_GRAB, limits.STRONGEST_GRAB),
-        )
+        _set(self, "stiffness", _number(self.stiffness, "stiffness", limits.WEAKEST_GRAB, limits.STRONGEST_GRAB))
 
 
 @dataclass(frozen=True)
 class MoveGrab(Command):
-    """Move the place (3,) [m] that a grab pulls to."""
+    """Move the target (3,) [m] of a grab."""
 
     grab: int
     target: Point
@@ -173,7 +170,7 @@ class MoveGrab(Command):
 
 @dataclass(frozen=True)
 class ReleaseGrab(Command):
-    """Let go."""
+    """Remove a grab."""
 
     grab: int
 
@@ -183,7 +180,7 @@ class ReleaseGrab(Command):
 
 @dataclass(frozen=True)
 class Pin(Command):
-    """Hold a vertex where it is."""
+    """Hold a vertex at its present position."""
 
     body: str
     vertex: int
@@ -195,7 +192,7 @@ class Pin(Command):
 
 @dataclass(frozen=True)
 class Unpin(Command):
-    """Let go of a pinned vertex, whoever pinned it; without a vertex, of all that were pinned by hand."""
+    """Release a pinned vertex, or, without a vertex, all vertices that were pinned on the page."""
 
     body: str | None = None
     vertex: int | None = None
@@ -210,7 +207,7 @@ class Unpin(Command):
 
 @dataclass(frozen=True)
 class MovePusher(Command):
-    """Put the pusher, a solid ball, at `center` (3,) [m], or move it there if it exists; `radius` [m]."""
+    """Move the pusher, a solid ball, to `center` (3,) [m]; create it if it does not exist; `radius` [m]."""
 
     center: Point
     radius: float
@@ -222,14 +219,14 @@ class MovePusher(Command):
 
 @dataclass(frozen=True)
 class RemovePusher(Command):
-    """Take the pusher away."""
+    """Remove the pusher."""
 
 
 @dataclass(frozen=True)
 class Squash(Command):
-    """Press all free bodies at once to `factor` of their height, along gravity; they get wider and keep their volume.
+    """Scale the height of all free bodies, along gravity, by `factor`. They get wider and keep their volume.
 
-    Above 1 this stretches them. They are at rest in that shape, and then let go. The lowest point stays where it is.
+    A factor above 1 stretches them. The bodies start from this shape at rest. The lowest point does not move.
     """
 
     factor: float = 0.5
@@ -245,11 +242,11 @@ class AddBody(Command):
     Parameters
     ----------
     shape : one of `limits.SHAPES`.
-    size : of the whole shape: edge, diameter or height [m].
-    resolution : edges across it.
-    position : (3,) of its center [m], or None: above everything else.
+    size : edge, diameter or height of the shape [m].
+    resolution : number of edges across the shape.
+    position : (3,) of its center [m], or None: above all other bodies.
     youngs [Pa], poisson, density [kg/m^3]
-    name : None for the shape's own, with a number.
+    name : None for the name of the shape with a number.
     """
 
     shape: str
@@ -263,7 +260,7 @@ class AddBody(Command):
 
     def __post_init__(self) -> None:
         if self.shape not in limits.SHAPES:
-            raise CommandError(f"there is no shape {shown(self.shape)}; there are {', '.join(limits.SHAPES)}")
+            raise CommandError(f"there is no shape {displayed(self.shape)}; there are {', '.join(limits.SHAPES)}")
         _set(self, "size", _number(self.size, "size", limits.SMALLEST_LENGTH, limits.LARGEST_LENGTH))
         _set(self, "resolution", _whole(self.resolution, "resolution", limits.COARSEST, limits.FINEST))
         if self.position is not None:
@@ -276,13 +273,13 @@ class AddBody(Command):
 
 @dataclass(frozen=True, eq=False)
 class AddMesh(Command):
-    """Add a body of stable Neo-Hookean rubber above everything else, with a mesh that is given.
+    """Add a body of stable Neo-Hookean rubber with a given mesh, above all other bodies.
 
     Parameters
     ----------
     vertices : (n, 3) [m]; tets : (m, 4) rows of them
     youngs [Pa]
-    name : free ones are made of it, with a number.
+    name : the body gets this name with a number.
     """
 
     vertices: NDArray[np.float64]
@@ -298,7 +295,7 @@ class AddMesh(Command):
 
 @dataclass(frozen=True)
 class CopyBody(Command):
-    """Add a body like one that is there, at rest and undeformed; `position` as for `AddBody`."""
+    """Add an undeformed copy of a body, at rest; `position` as for `AddBody`."""
 
     body: str
     position: Point | None = None
@@ -311,7 +308,7 @@ class CopyBody(Command):
 
 @dataclass(frozen=True)
 class RemoveBody(Command):
-    """Remove a body, and the pins, forces, springs and stitches on it. The last one stays."""
+    """Remove a body, and the pins, forces, springs and stitches on it. The last body cannot be removed."""
 
     body: str
 
@@ -325,17 +322,17 @@ def _set(command: Command, name: str, value: object) -> None:
 
 def _number(value: object, what: str, low: float, high: float) -> float:
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
-        raise CommandError(f"{what} is {shown(value)}; give a number")
+        raise CommandError(f"{what} is {displayed(value)}; give a number")
     if not low <= value <= high or not math.isfinite(value):
-        raise CommandError(f"{what} is {shown(value)}; it must be from {low:g} to {high:g}")
+        raise CommandError(f"{what} is {displayed(value)}; it must be from {low:g} to {high:g}")
     return float(value)
 
 
 def _whole(value: object, what: str, low: int, high: int) -> int:
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
-        raise CommandError(f"{what} is {shown(value)}; give a whole number")
+        raise CommandError(f"{what} is {displayed(value)}; give a whole number")
     if not low <= value <= high:
-        raise CommandError(f"{what} is {shown(value)}; it must be from {low} to {high}")
+        raise CommandError(f"{what} is {displayed(value)}; it must be from {low} to {high}")
     return int(value)
 
 
@@ -347,7 +344,7 @@ def _point(value: object, what: str) -> Point:
 
 def _items(value: object, what: str, least: int, most: int) -> list[object]:
     if not isinstance(value, (tuple, list, np.ndarray)) or (isinstance(value, np.ndarray) and value.ndim != 1):
-        raise CommandError(f"{what} is {shown(value)}; give a list")
+        raise CommandError(f"{what} is {displayed(value)}; give a list")
     if not least <= len(value) <= most:
         raise CommandError(f"{what} has {len(value)} values; give {least if least == most else f'{least} to {most}'}")
     return list(value)
@@ -361,16 +358,16 @@ def _mesh_arrays(vertices: object, tets: object) -> None:
     assert isinstance(tets, np.ndarray)
     if not 1 <= len(tets) <= limits.MOST_TETS or not 4 <= len(vertices) <= 4 * len(tets):
         raise CommandError(
-            f"{len(tets)} tets, {len(vertices)} vertices; a live page has at most {limits.MOST_TETS} tets"
+            f"{len(tets)} tets, {len(vertices)} vertices; a live page allows at most {limits.MOST_TETS} tets"
         )
     if not np.all(np.abs(vertices) <= limits.LARGEST_LENGTH) or tets.min() < 0 or tets.max() >= len(vertices):
-        raise CommandError("a vertex is too far away, or a tet has one that is not there")
+        raise CommandError("a vertex is too far away, or a tet refers to a vertex that does not exist")
 
 
 def _vertices(value: object) -> tuple[int, ...]:
     vertices = tuple(_whole(each, "vertices", 0, 2**31 - 1) for each in _items(value, "vertices", 1, 4))
     if len(set(vertices)) != len(vertices):
-        raise CommandError(f"vertices {list(vertices)} names a vertex twice")
+        raise CommandError(f"vertices {list(vertices)} contains a vertex twice; give each once")
     return vertices
 
 

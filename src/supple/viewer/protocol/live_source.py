@@ -1,4 +1,4 @@
-"""What a live page starts from."""
+"""The input of a live page."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from supple.solver import Solver
 
 @dataclass(frozen=True, eq=False)
 class LiveSource:
-    """A scene with the solver, the time step and the deformed starts that it comes with.
+    """A scene with its solver, time step and deformed initial positions.
 
     Attributes
     ----------
-    title : for the page
+    title : of the page
     dt : [s]
     initial_positions : by body name, (n, 3) [m], of bodies that start deformed
     """

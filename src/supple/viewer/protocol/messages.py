@@ -1,4 +1,4 @@
-"""All that goes between a page and the simulation behind it: commands one way, descriptions and snapshots the other."""
+"""All messages between page and simulation: commands to the simulation, descriptions and snapshots to the page."""
 
 from __future__ import annotations
 

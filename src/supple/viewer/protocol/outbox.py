@@ -1,4 +1,4 @@
-"""Snapshots on their way out of the simulation: the newest only, and never waited for."""
+"""Sends snapshots from the simulation to the page: only the newest one, and without waiting for the reader."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.reduction import ForkingPickler
 from typing import Any
 
-# The first byte of a message says what it holds; the rest is pickled.
+# The first byte of a message is its kind; the rest is pickled.
 DESCRIPTION, SNAPSHOT, ERROR = b"d", b"s", b"e"
 
 
@@ -17,9 +17,9 @@ def packed(kind: bytes, content: Any) -> bytes:
 
 
 class Outbox:
-    """Sends through a pipe from a thread of its own: a reader that is slow, or stands still, holds up only that thread.
+    """Sends through a pipe from its own thread, so that a slow reader blocks only this thread.
 
-    What has not been sent when something newer comes is forgotten.
+    A newer snapshot replaces one that has not been sent yet.
     """
 
     def __init__(self, pipe: Connection) -> None:
@@ -37,7 +37,7 @@ class Outbox:
             self._changed.notify()
 
     def put_snapshot(self, snapshot: Any) -> None:
-        """Send a snapshot, or drop it for the next one."""
+        """Send a snapshot, unless a newer one replaces it."""
         data = packed(SNAPSHOT, snapshot)
         with self._changed:
             self._snapshot = data
@@ -54,5 +54,5 @@ class Outbox:
                     data, self._snapshot = self._snapshot, None
             try:
                 self._pipe.send_bytes(data or b"")
-            except OSError:  # nobody is there any more; the inbox ends the process
+            except OSError:  # the page is gone; the reader of commands ends this process
                 return

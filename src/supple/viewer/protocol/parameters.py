@@ -1,4 +1,4 @@
-"""The numbers that a page may change while a simulation runs, and the range of each: for sliders and for checks."""
+"""The parameters that a page may change while a simulation runs, with their ranges, for sliders and checks."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from typing import Literal
 import numpy as np
 
 from supple.errors import CommandError
-from supple.viewer.protocol.displayed import shown
+from supple.viewer.protocol.displayed import displayed
 
 Owner = Literal["solver", "scene", "body"]
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of a running simulation.
+    """One parameter of a running simulation.
 
     Attributes
     ----------
-    name : as commands and descriptions call it; label : as a panel calls it; unit : "" where it has none
-    owner : "body" where each body has a value of its own
+    name : in commands and descriptions; label : on the panel; unit : "" where it has none
+    owner : "body" where each body has its own value
     kind : float, int or bool; low, high : both are allowed
-    logarithmic : whether a slider should run in powers of ten (zero, where allowed, is its left end)
+    logarithmic : whether a slider uses powers of ten (zero, where allowed, is its left end)
     """
 
     name: str
@@ -36,7 +36,7 @@ class Parameter:
     logarithmic: bool = False
 
     def checked(self, value: object) -> float | int | bool:
-        """`value`, as this parameter's kind.
+        """`value`, converted to `kind`.
 
         Raises
         ------
@@ -44,15 +44,15 @@ class Parameter:
         """
         if self.kind is bool:
             if not isinstance(value, (bool, np.bool_)):
-                raise CommandError(f"{self.name} is {shown(value)}; give true or false")
+                raise CommandError(f"{self.name} is {displayed(value)}; give true or false")
             return bool(value)
         if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
-            raise CommandError(f"{self.name} is {shown(value)}; give a number")
+            raise CommandError(f"{self.name} is {displayed(value)}; give a number")
         if not self.low <= value <= self.high or not math.isfinite(value):
-            raise CommandError(f"{self.name} is {shown(value)}; it must be from {self.low:g} to {self.high:g}")
+            raise CommandError(f"{self.name} is {displayed(value)}; it must be from {self.low:g} to {self.high:g}")
         if self.kind is int:
             if value != int(value):
-                raise CommandError(f"{self.name} is {shown(value)}; give a whole number")
+                raise CommandError(f"{self.name} is {displayed(value)}; give a whole number")
             return int(value)
         return float(value)
 
@@ -84,5 +84,5 @@ def find_parameter(name: object) -> Parameter:
     CommandError : where there is none.
     """
     if not isinstance(name, str) or name not in PARAMETERS:
-        raise CommandError(f"there is no parameter {shown(name)}; there are {', '.join(PARAMETERS)}")
+        raise CommandError(f"there is no parameter {displayed(name)}; there are {', '.join(PARAMETERS)}")
     return PARAMETERS[name]

@@ -1,4 +1,4 @@
-"""What a page gets from the simulation: a description of the scene, and the newest snapshot at any time."""
+"""What the simulation sends to the page: a description of the scene, and snapshots."""
 
 from __future__ import annotations
 
@@ -10,20 +10,22 @@ from numpy.typing import NDArray
 
 Value = float | int | bool
 
+PUSHER = "pusher"  # name of the obstacle that the mouse moves
+
 
 @dataclass(frozen=True, eq=False)
 class BodyDescription:
-    """One body. Its rows in a snapshot's arrays are `vertices` and `tet_rows`.
+    """One body. `vertices` and `tet_rows` are its rows in the arrays of a snapshot.
 
     Attributes
     ----------
     vertices, tet_rows : slices of a snapshot's `positions` and `tet_values`
-    rest_positions : (n, 3) in the mesh's own coordinates [m]
+    rest_positions : (n, 3) in the coordinates of the mesh [m]
     triangles : (t, 3) surface, counter-clockwise from outside; tets : (m, 4); both numbered from 0 in the body
-    skin : vertices (s, 3) in the mesh's coordinates [m] and triangles (u, 3) of the finer surface, or None
-    material : its class's name; values : of the parameters that a page can change, by name
+    skin : vertices (s, 3) in the coordinates of the mesh [m] and triangles (u, 3) of the finer surface, or None
+    material : name of its class; values : of the parameters that a page can change, by name
     mass : [kg]
-    added : whether a page added it
+    added : whether it was added on the page
     """
 
     name: str
@@ -41,12 +43,12 @@ class BodyDescription:
 
 @dataclass(frozen=True, eq=False)
 class ObstacleDescription:
-    """One obstacle, where it is at time 0; `Snapshot.obstacle_poses` carries it from there.
+    """One obstacle at time 0; `Snapshot.obstacle_poses` transforms it to other times.
 
     Attributes
     ----------
     kind : "HalfSpace", "Box", "Sphere" or "TriangleObstacle"
-    shape : the obstacle's own parameters: point and normal; center, size, rotation; center, radius; inside;
+    shape : the parameters of the obstacle: point and normal; center, size, rotation; center, radius; inside;
         vertices and triangles
     """
 
@@ -63,11 +65,11 @@ class SceneDescription:
 
     Attributes
     ----------
-    generation : another number where bodies or obstacles came or went: what is drawn has to be made anew
-    revision : another number with every change, also of parameters or of the solver
-    solver : "xpbd" or "implicit"; values : of the parameters that belong to solver and scene, by name
+    generation : changes where bodies or obstacles are added or removed; the page then has to draw all of them again
+    revision : changes with every change, also of a parameter or of the solver
+    solver : "xpbd" or "implicit"; values : of the parameters of solver and scene, by name
     up : (3,) unit vector against gravity
-    low, high : (3,) corners of a box about the bodies at the start [m]
+    low, high : (3,) corners of the bounding box of the bodies at the start [m]
     stitches : (k, 4) global vertices: a vertex and the three of the triangle that it is stitched to
     n_vertices, n_tets, n_constraints : of the whole scene; constraints are the solver's, 0 where it has none
     """
@@ -106,7 +108,7 @@ class GrabState:
 
 @dataclass(frozen=True)
 class Notice:
-    """A line for the person at the page; numbers rise, so that each is shown once. `level` is "info" or "error"."""
+    """A line of text for the page. Numbers increase, so that each notice appears once. `level` is "info" or "error"."""
 
     number: int
     level: str
@@ -123,7 +125,7 @@ class Measures:
     kinetic_energy, elastic_energy, potential_energy : [J]; min_det_F : smallest J
     linear_momentum, angular_momentum : (3,) of the scene, the latter about its center of mass
     spin : (bodies, 3) angular velocity of each body about its own center of mass [rad/s]
-    contacts : how many; min_distance : smallest gap [m] or None
+    contacts : number of active contacts; min_distance : smallest gap [m] or None
     iterations : of the last step
     """
 
@@ -143,14 +145,14 @@ class Measures:
 
 @dataclass(frozen=True)
 class Timing:
-    """How fast the simulation is, over the last second or so.
+    """The speed of the simulation, measured over the last second.
 
     Attributes
     ----------
     step_ms : wall-clock time of one step [ms]
     frames_per_second : steps simulated in a second of wall-clock time
     real_time_ratio : simulated time over wall-clock time; 1 is real time
-    keeps_up : whether that is what the speed asked for (within a tenth)
+    keeps_up : whether this ratio reaches the requested speed (within a tenth)
     """
 
     step_ms: float = 0.0
@@ -169,14 +171,14 @@ class Snapshot:
     frame : steps since the start or the last reset; time : simulated [s]
     positions : (n, 3) of all bodies [m]
     obstacle_poses : rotations (k, 3, 3) and translations (k, 3) [m] of the obstacles
-    pinned : (p,) global vertices that are held
+    pinned : (p,) global vertices that are pinned
     grabs : springs that pull; pusher : center (3,) and radius of the ball [m], or None
-    paused : whether time stands still; speed : see `SetSpeed`
+    paused : whether the time is stopped; speed : see `SetSpeed`
     measures, timing : numbers for the panel
-    notices : the newest few; see `Notice`
-    applied : number of the newest command that has been acted upon, see `Engine.send`
-    velocities : (n, 3) [m/s], tet_values : (m,), contact_points : (c, 3) [m], where `SetView` asked for them
-    tet_quantity : what `tet_values` are: "J", "von_mises", "energy" or None
+    notices : the newest ones; see `Notice`
+    applied : number of the newest command that was executed, see `Engine.send`
+    velocities : (n, 3) [m/s], tet_values : (m,), contact_points : (c, 3) [m], where `SetView` requests them
+    tet_quantity : the quantity of `tet_values`: "J", "von_mises", "energy" or None
     """
 
     description: SceneDescription

@@ -1,4 +1,4 @@
-"""A bound on connections that are open at the same time, before anybody has said who he is."""
+"""A limit for the number of open connections, also of those that have not been checked yet."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import Any
 
 
 def bounded_connections(most: int) -> type[Any]:
-    """A kind of connection for `websockets`' server: those beyond `most` are dropped as soon as they are made.
+    """A connection class for the server of `websockets`: connections beyond `most` are closed immediately.
 
-    Whoever opens connections and says nothing would else use up all files that a process may have open; nobody could
-    get in any more, and asyncio would fill the log with it.
+    Otherwise silent connections could use all files that a process may open. Then nobody could connect, and asyncio
+    would fill the log.
     """
     from websockets.asyncio.connection import Connection
     from websockets.asyncio.server import ServerConnection

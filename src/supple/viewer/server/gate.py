@@ -1,7 +1,7 @@
-"""Who may see a page, and what may come in from a browser: in front of viser's server, on the same port.
+"""Access control and message limits in front of the server of viser, on the same port.
 
-viser serves its page and its websocket with one call of `websockets`' `serve`. While the server is started, that call
-is taken over here, and gets limits and a doorkeeper. A viser that starts its server in another way is not let run.
+viser serves its page and its websocket with one call of `serve` of `websockets`. While the server starts, this module
+replaces that function, and adds limits and an access check. A viser that starts its server differently is refused.
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ from supple.viewer.server.message_check import Malformed, is_wanted
 logger = logging.getLogger(__name__)
 
 _one_at_a_time = threading.Lock()
-# Ends of a connection, RFC 6455 section 7.4.1.
+# Status codes for closing a connection, RFC 6455 section 7.4.1.
 _POLICY, _TRY_LATER, _ERROR = 1008, 1013, 1011
 
 
 def new_token() -> str:
-    """A secret for a page's address."""
+    """A secret for the address of a page."""
     return secrets.token_urlsafe(18)
 
 
 def is_loopback(host: str) -> bool:
-    """Whether only this machine can reach a server that listens at `host`."""
+    """Whether a server that listens at `host` can be reached from this machine only."""
     if host.lower() == "localhost":
         return True
     try:
@@ -51,26 +51,26 @@ def is_loopback(host: str) -> bool:
 
 
 def require_free_port(host: str, port: int) -> None:
-    """Raise `OutputError` where nothing can listen at that host and port; port 0 is any that is free."""
+    """Raise `OutputError` where no server can listen at this host and port; port 0 is any free port."""
     try:
         family, kind, protocol, _, place = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         with socket.socket(family, kind, protocol) as probe:
             if os.name == "posix":
-                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # a port that was just given up is free
+                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # a recently closed port counts as free
             probe.bind(place)
     except (OSError, UnicodeError) as error:
-        mend = "choose another --port" if port else "choose another --host"
+        remedy = "choose another --port" if port else "choose another --host"
         raise OutputError(
-            f"cannot serve at {host}, port {port} ({getattr(error, 'strerror', None) or error}); {mend}"
+            f"cannot serve at {host}, port {port} ({getattr(error, 'strerror', None) or error}); {remedy}"
         ) from None
 
 
 def first_free_port(host: str, start: int, tries: int = 20) -> int:
-    """The first port from `start` on that can be listened at.
+    """The first port from `start` on at which a server can listen.
 
     Raises
     ------
-    OutputError : where none of `tries` can.
+    OutputError : where none of `tries` ports is free.
     """
     for port in range(start, start + tries - 1):
         with contextlib.suppress(OutputError):
@@ -81,35 +81,35 @@ def first_free_port(host: str, start: int, tries: int = 20) -> int:
 
 
 @dataclass(frozen=True)
-class Doorkeeper:
-    """Answers a request for a connection.
+class AccessCheck:
+    """Decides on requests for a connection.
 
     Attributes
     ----------
-    token : what the address, or the cookie that the first page sets, must hold; None: no token is needed
+    token : the address, or the cookie that the first page sets, must contain it; None: no token is needed
     """
 
     token: str | None = None
 
-    def refusal(self, path: str, headers: Any) -> str | None:
-        """Why a request is turned away, or None."""
+    def denial(self, path: str, headers: Any) -> str | None:
+        """Why a request is refused, or None."""
         host = headers.get("Host", "")
         if self.token is None and not is_loopback(_hostname(host)):
-            # A page of another site whose name was made to point here.
+            # A page of another site whose host name resolves to this machine (DNS rebinding).
             return "this page is served on this machine only: use http://localhost"
         origin = headers.get("Origin")
         if _is_websocket(headers) and origin is not None and urlsplit(origin).netloc.lower() != host.lower():
             return "a page of another site may not control this simulation"
         if self.token is not None and not (self.holds_token(path) or self._has_cookie(headers)):
-            return "the address needs its token (?token=...), as the terminal shows it"
+            return "the address needs its token (?token=...); use the address in the terminal"
         return None
 
     def holds_token(self, path: str) -> bool:
-        """Whether the address holds the token."""
+        """Whether the address contains the token."""
         return any(self._is_token(each) for each in parse_qs(urlsplit(path).query).get("token", []))
 
     def cookie(self, headers: Any) -> str | None:
-        """The cookie by which the browser shows the token from now on, also when it opens the websocket."""
+        """The cookie with the token, which the browser also sends when it opens the websocket."""
         if self.token is None:
             return None
         return f"{_cookie_name(headers)}={self.token}; HttpOnly; SameSite=Strict; Path=/"
@@ -127,7 +127,7 @@ class Doorkeeper:
 
 
 def _cookie_name(headers: Any) -> str:
-    # Browsers send cookies to every port of a host: each server knows its own by the port.
+    # Browsers send cookies to every port of a host: each server has its own cookie.
     return f"supple-{urlsplit('//' + headers.get('Host', '')).port or 80}"
 
 
@@ -144,31 +144,31 @@ def _is_websocket(headers: Any) -> bool:
 
 @contextmanager
 def gate(host: str, token: str | None = None) -> Iterator[None]:
-    """Start viser's server within this block: it gets a doorkeeper, and limits for what comes in.
+    """Start the server of viser within this block: it gets an access check and limits for incoming messages.
 
     Parameters
     ----------
-    host : where it will listen; beyond this machine, a token is needed.
+    host : where it will listen; where other machines can reach it, a token is needed.
 
     Raises
     ------
-    OutputError : where a token is missing, or the server that was started cannot be guarded.
+    OutputError : where a token is missing, or the server that was started cannot be protected.
     """
     if token is None and not is_loopback(host):
         raise OutputError(f"a page at {host} can be reached from other machines; it needs a token")
     import websockets.asyncio.server as websockets_server
 
-    keeper, taken_over = Doorkeeper(token), False
+    access, replaced = AccessCheck(token), False
     clients: set[Any] = set()
 
     def serve(handler: Any, *arguments: Any, process_request: Any = None, **options: Any) -> Any:
-        nonlocal taken_over
-        taken_over = True
-        # Who floods the server does not answer a farewell: it is not waited for.
+        nonlocal replaced
+        replaced = True
+        # A browser that floods the server does not answer a closing handshake: the server does not wait for it.
         options |= {"max_size": limits.LARGEST_PICTURE, "max_queue": 16, "close_timeout": 1.0}
         options["create_connection"] = bounded_connections(limits.MOST_CONNECTIONS)
         asyncio.get_running_loop().set_exception_handler(_log_quietly)
-        answer = _guarded(process_request, keeper)
+        answer = _guarded(process_request, access)
         return original(_watched(handler, clients), *arguments, process_request=answer, **options)
 
     with _one_at_a_time:
@@ -178,24 +178,24 @@ def gate(host: str, token: str | None = None) -> Iterator[None]:
             yield
         finally:
             websockets_server.serve = original
-    if not taken_over:
-        raise OutputError("this version of viser cannot be guarded; install viser 1.1")
+    if not replaced:
+        raise OutputError("this version of viser cannot be protected; install viser 1.1")
 
 
-def _guarded(process_request: Any, keeper: Doorkeeper) -> Callable[[Any, Any], Any]:
-    """The server's answer to HTTP requests, after the doorkeeper's."""
+def _guarded(process_request: Any, access: AccessCheck) -> Callable[[Any, Any], Any]:
+    """The answer of the server to HTTP requests, after the access check."""
 
     def answer(connection: Any, request: Any) -> Any:
-        why = keeper.refusal(request.path, request.headers)
+        why = access.denial(request.path, request.headers)
         if why is not None:
-            logger.info("turned away: %s", why)
+            logger.info("request refused: %s", why)
             return connection.respond(http.HTTPStatus.FORBIDDEN, f"Supple: {why}\n")
         response = None if process_request is None else process_request(connection, request)
-        cookie = keeper.cookie(request.headers)
-        if response is not None and cookie is not None and keeper.holds_token(request.path):
+        cookie = access.cookie(request.headers)
+        if response is not None and cookie is not None and access.holds_token(request.path):
             response.headers["Set-Cookie"] = cookie
         if response is not None:
-            response.headers["Referrer-Policy"] = "no-referrer"  # the address holds a secret
+            response.headers["Referrer-Policy"] = "no-referrer"  # the address contains a secret
             response.headers["X-Content-Type-Options"] = "nosniff"
         return response
 
@@ -203,7 +203,7 @@ def _guarded(process_request: Any, keeper: Doorkeeper) -> Callable[[Any, Any], A
 
 
 def _watched(handler: Callable[[Any], Awaitable[None]], clients: set[Any]) -> Callable[[Any], Awaitable[None]]:
-    """viser's handler of one connection, which gets well-formed messages only, and no more than a person can send."""
+    """The connection handler of viser, which gets only well-formed messages, and no more than a person can send."""
 
     async def watch(connection: Any) -> None:
         if len(clients) >= limits.MOST_CLIENTS:
@@ -214,11 +214,11 @@ def _watched(handler: Callable[[Any], Awaitable[None]], clients: set[Any]) -> Ca
         try:
             await handler(connection)
         except Malformed as error:
-            logger.info("a browser was disconnected, its message was malformed: %s", error)
+            logger.info("a browser was disconnected because of a malformed message: %s", error)
             await connection.close(_POLICY, "malformed message")
         except Exception as error:
             logger.warning("a browser was disconnected: %s: %s", type(error).__name__, error)
-            await connection.close(_ERROR, "a mistake of the server")
+            await connection.close(_ERROR, "an error of the server")
         finally:
             clients.discard(connection)
 
@@ -226,11 +226,11 @@ def _watched(handler: Callable[[Any], Awaitable[None]], clients: set[Any]) -> Ca
 
 
 def _checked(receive: Callable[[], Awaitable[Any]]) -> Callable[[], Awaitable[bytes]]:
-    """The next message that is well-formed and wanted.
+    """The next message that is well-formed and of a kind that the page uses.
 
     Raises
     ------
-    Malformed : at a message that is not, or where messages come faster than any page sends them.
+    Malformed : where a message is malformed, or messages come faster than any page sends them.
     """
     allowance = Allowance(limits.MESSAGES_PER_SECOND, limits.MESSAGES_AT_ONCE)
 
@@ -240,7 +240,7 @@ def _checked(receive: Callable[[], Awaitable[Any]]) -> Callable[[], Awaitable[by
             if not allowance.take(time.monotonic()):
                 raise Malformed("more messages than a page sends")
             if len(raw) > limits.LARGEST_MESSAGE:
-                # Who sends much is read slowly; the others do not notice.
+                # Large messages are read slowly, without effect on other browsers.
                 await asyncio.sleep(len(raw) / limits.LARGE_MESSAGES_PER_SECOND)
             if is_wanted(raw):
                 return raw
@@ -249,7 +249,7 @@ def _checked(receive: Callable[[], Awaitable[Any]]) -> Callable[[], Awaitable[by
 
 
 class Allowance:
-    """So many at once, refilled at a rate per second: a token bucket."""
+    """A token bucket: `most` at once, refilled at a rate per second."""
 
     def __init__(self, rate: float, most: float) -> None:
         self.rate, self.most = rate, most
@@ -257,7 +257,7 @@ class Allowance:
         self._when: float | None = None
 
     def take(self, now: float) -> bool:
-        """Use one up; False where none is left at the time `now` [s]."""
+        """Take one; False where none is left at the time `now` [s]."""
         if self._when is not None:
             self._left = min(self.most, self._left + (now - self._when) * self.rate)
         self._when = now
@@ -268,6 +268,6 @@ class Allowance:
 
 
 def _log_quietly(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-    """What goes wrong in the handling of one message is a line in the log, not a stack trace in the terminal."""
+    """Log an error in the handling of one message as one line, without a stack trace."""
     error = context.get("exception")
     logger.warning("the page: %s", f"{type(error).__name__}: {error}" if error else context.get("message"))

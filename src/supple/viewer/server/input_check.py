@@ -1,7 +1,7 @@
-"""Whether what a browser sets an input of the panel to is something that the input offers.
+"""Checks the values that browsers set for the inputs of the panel.
 
-viser passes every value on to all other visitors, and to those who come later: one that cannot be sent would end the
-page for all of them.
+viser sends every value to all other visitors, also to later ones. A value that cannot be sent would end the page for
+all of them.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ LONGEST_TEXT = 1000
 
 
 def is_offered(handle: Any, value: object) -> bool:
-    """Whether an input of viser's panel offers a value.
+    """Whether a value is allowed for an input of the panel.
 
     Parameters
     ----------
@@ -28,13 +28,13 @@ def is_offered(handle: Any, value: object) -> bool:
         if isinstance(handle.value, bool) or not isinstance(handle.value, (int, float)) or not math.isfinite(value):
             return False
         low, high = getattr(handle, "min", None), getattr(handle, "max", None)
-        slack = 1e-6 * max(1.0, abs(value))  # a browser rounds to steps
+        slack = 1e-6 * max(1.0, abs(value))  # a browser rounds values to steps
         return (low is None or value >= low - slack) and (high is None or value <= high + slack) and abs(value) < 1e15
     return False
 
 
 def guard_inputs(server: Any) -> None:
-    """Let nothing pass to the panel's inputs but what they offer."""
+    """Ignore all updates of inputs with values that are not allowed."""
     from viser import _messages
 
     handlers = server._websock_server._incoming_handlers

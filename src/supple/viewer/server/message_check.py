@@ -1,4 +1,4 @@
-"""Whether a message of a browser is one that viser's client sends: its kind, its fields, their types, its numbers."""
+"""Checks that a message of a browser is one that the client of viser sends: kind, fields, types, numbers."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from typing import Any
 
 from supple.viewer.protocol import limits
 
-# What a page needs. What viser knows beside these is passed over: a request to share the page through a public server,
-# for one.
+# The kinds that a page uses. Other kinds of viser are ignored, for example a request to share the page on a public
+# server.
 KINDS = frozenset(
     {
         "CommandTriggerMessage",
@@ -33,8 +33,8 @@ KINDS = frozenset(
         "ViewerCameraMessage",
     }
 )
-# What may be larger than `limits.LARGEST_MESSAGE` [bytes]: pictures that the page was asked for, and parts of files.
-# Whether a file is taken, `supple.viewer.server.uploads.transfers` decides.
+# Kinds that may be larger than `limits.LARGEST_MESSAGE` [bytes]: pictures that the server requested, parts of files.
+# `supple.viewer.server.uploads.transfers` decides whether a file is accepted.
 LARGE_KINDS = {
     "GetRenderResponseMessage": limits.LARGEST_PICTURE,
     "FileTransferPart": limits.UPLOAD_PART + limits.LARGEST_MESSAGE,
@@ -47,11 +47,11 @@ class Malformed(Exception):
 
 
 def is_wanted(raw: object) -> bool:
-    """Whether to pass a message on; False for what viser knows and a page of ours does not need.
+    """Whether to handle a message; False for kinds of viser that a page does not use.
 
     Raises
     ------
-    Malformed : where it is no message at all.
+    Malformed : where it is not a message of viser.
     """
     if not isinstance(raw, bytes):
         raise Malformed("text instead of binary data")
@@ -71,8 +71,8 @@ def is_wanted(raw: object) -> bool:
         raise Malformed(f"{len(raw)} bytes")
     _check_fields(kind, message)
     if kind == "GuiUpdateMessage" and set(message["updates"]) != {"value"}:
-        # viser would set any attribute of its own that a message names.
-        raise Malformed("an update of something else than a value")
+        # viser would set any attribute that a message names.
+        raise Malformed("an update of an attribute other than the value")
     return True
 
 
@@ -85,7 +85,7 @@ def _known() -> dict[str, type]:
 
 @cache
 def _fields(kind: str) -> tuple[dict[str, Any], frozenset[str]]:
-    """Types of the fields of a kind of message by name, and the names of those that must be there."""
+    """The types of the fields of a kind of message by name, and the names of the required fields."""
     described = _known()[kind]
     hints = typing.get_type_hints(described)
     fields = dataclasses.fields(described)
@@ -100,31 +100,25 @@ def _fields(kind: str) -> tuple[dict[str, Any], frozenset[str]]:
 def _check_fields(kind: str, message: dict[Any, Any]) -> None:
     types, needed = _fields(kind)
     if not needed <= message.keys() <= types.keys():
-        raise Malformed(f"other fields than those of {kind}")
+        raise Malformed(f"the fields are not those of {kind}")
     for name, value in message.items():
         if not _fits(value, types[name], 0):
-            raise Malformed(f"{name} of {kind} is of another type")
+            raise Malformed(f"{name} of {kind} has another type")
 
 
-def _fits(value: object, wanted: Any, depth: int) -> bool:
-    """Whether a value is of an annotated type. JavaScript knows one kind of number: 1.0 arrives as an integer."""
+def _fits(value: object, kind_of_value: Any, depth: int) -> bool:
+    """Whether a value has an annotated type. JavaScript has one type of number: 1.0 arrives as an integer."""
     if depth > DEEPEST:
         return False
-    origin, arguments = typing.get_origin(wanted), typing.get_args(wanted)
-    if wanted in (float, int):
+    origin, arguments = typing.get_origin(kind_of_value), typing.get_args(kind_of_value)
+    if kind_of_value in (float, int):
         return _is_number(value)
-    if wanted is bool:
-        return isinstance(value, bool)
-    if wanted is str:
-        return isinstance(value, str)
-    if wanted is bytes:
-        return isinstance(value, bytes)
+    if kind_of_value in (bool, str, bytes, type(None)):
+        return isinstance(value, kind_of_value)
     if origin is typing.Literal:
         return isinstance(value, str | int | None) and value in arguments
     if origin in (typing.Union, UnionType):
         return any(_fits(value, each, depth + 1) for each in arguments)
-    if wanted is type(None):
-        return value is None
     if origin is tuple:
         if not isinstance(value, list):
             return False
@@ -141,7 +135,7 @@ def _is_number(value: object) -> bool:
 
 
 def _is_plain(value: object, depth: int) -> bool:
-    """Whether a value is made of texts, finite numbers, lists and dictionaries by text."""
+    """Whether a value consists of strings, finite numbers, lists, and dictionaries with string keys."""
     if depth > DEEPEST:
         return False
     match value:

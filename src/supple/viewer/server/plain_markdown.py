@@ -1,8 +1,8 @@
-"""Text from elsewhere, in places of the page that take Markdown."""
+"""Escapes text for the Markdown elements of the page."""
 
 from __future__ import annotations
 
 
 def plain(text: str) -> str:
-    """Markdown that shows just this text: browsers run what HTML in Markdown says, and names are anyone's."""
+    """Markdown that displays exactly this text. Browsers interpret HTML in Markdown, and names can contain anything."""
     return "".join(c if c.isalnum() or c in " .,:;'()/-+=%" else f"&#{ord(c)};" for c in text)

@@ -1,4 +1,4 @@
-"""What is recorded from a running simulation, and who gets it."""
+"""Screenshots and recordings of a live simulation."""
 
 import html
 from types import SimpleNamespace
@@ -6,11 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from supple.viewer.drawing import video_capture
-
 
 class Guest:
-    """A visitor who keeps the files that are sent, and whose browser shows one shade after the other."""
+    """A visitor who stores received files, and whose browser renders one shade after the other."""
 
     def __init__(self):
         self.files, self.shade = {}, 0
@@ -29,22 +27,22 @@ def guest():
     return Guest()
 
 
-def test_a_page_of_what_was_seen(live, made_up, guest, until):
+def test_recording_as_html_page(live, fake, guest, until):
     record, event = live.panel.record, SimpleNamespace(client=guest)
     record._toggle(event)
     assert record.recording
     assert record.record.label == "Stop"
     for k in range(3):
-        wanted = made_up.show(positions=made_up.snapshot.positions + 0.1, time=0.1 * (k + 1))
+        wanted = fake.show(positions=fake.snapshot.positions + 0.1, time=0.1 * (k + 1))
         until(lambda: live.stage.moment.time == wanted.time)  # noqa: B023
-    until(lambda: len(record._taken) >= 4)
+    until(lambda: len(record._moments) >= 4)
     record._toggle(event)
     assert not record.recording
     assert record.record.label == "Record"
     assert b"__VISER_EMBED_DATA__" in guest.files["supple.html"]
 
 
-def test_a_film_of_what_the_browser_shows(live, guest, until):
+def test_recording_as_gif(live, guest, until):
     image = pytest.importorskip("PIL.Image")
     import io
 
@@ -58,8 +56,8 @@ def test_a_film_of_what_the_browser_shows(live, guest, until):
         assert made.size == (60, 40)
 
 
-def test_a_video_of_what_the_browser_shows(live, guest, until, tmp_path):
-    """Every picture of it is in the MP4, in order and in its shade."""
+def test_recording_as_mp4_contains_every_picture(live, guest, until, tmp_path):
+    """The MP4 contains every picture in order, with its shade."""
     ffmpeg = pytest.importorskip("imageio_ffmpeg")
     record, event = live.panel.record, SimpleNamespace(client=guest)
     record.kind.value = "MP4"
@@ -67,9 +65,9 @@ def test_a_video_of_what_the_browser_shows(live, guest, until, tmp_path):
     assert record.recording
     until(lambda: guest.shade >= 100)
     record._toggle(event)
-    assert record._said.content == ""
-    (tmp_path / "film.mp4").write_bytes(guest.files["supple.mp4"])
-    reader = ffmpeg.read_frames(str(tmp_path / "film.mp4"))
+    assert record._message.content == ""
+    (tmp_path / "video.mp4").write_bytes(guest.files["supple.mp4"])
+    reader = ffmpeg.read_frames(str(tmp_path / "video.mp4"))
     facts = next(reader)
     assert (facts["size"], facts["codec"]) == ((60, 40), "h264")
     shades = [np.frombuffer(frame, np.uint8).mean() for frame in reader]
@@ -78,8 +76,8 @@ def test_a_video_of_what_the_browser_shows(live, guest, until, tmp_path):
     np.testing.assert_allclose(shades, wanted, atol=6.0)
 
 
-def test_a_picture_of_another_size_than_asked_for_is_not_taken(live, guest):
-    """A browser may say and send anything."""
+def test_a_picture_of_another_size_is_refused(live, guest):
+    """A browser can send anything."""
     record = live.panel.record
     guest.camera = SimpleNamespace(image_height=1e300, image_width=1e300)
     asked = []
@@ -89,31 +87,31 @@ def test_a_picture_of_another_size_than_asked_for_is_not_taken(live, guest):
         return np.zeros((height + 2, width, 3), dtype=np.uint8)
 
     guest.get_render = another
-    record._take_picture(SimpleNamespace(client=guest))
+    record._send_screenshot(SimpleNamespace(client=guest))
     assert asked == [(2160, 2160)]
     assert guest.files == {}
-    assert "another size" in record._said.content
+    assert "another size" in record._message.content
 
 
-def test_a_browser_that_sends_no_picture_is_told(live, guest):
+def test_a_missing_picture_is_reported(live, guest):
     record = live.panel.record
 
     def nothing(*_, **__):
         raise TimeoutError("no frame")
 
     guest.get_render = nothing
-    record._take_picture(SimpleNamespace(client=guest))
+    record._send_screenshot(SimpleNamespace(client=guest))
     assert guest.files == {}
-    assert "no frame" in record._said.content
+    assert "no frame" in record._message.content
     guest.get_render = Guest.get_render.__get__(guest)
-    record._take_picture(SimpleNamespace(client=guest))
+    record._send_screenshot(SimpleNamespace(client=guest))
     assert guest.files["supple.png"].startswith(b"\x89PNG")
 
 
-def test_what_is_not_installed_is_said(live, guest, monkeypatch):
-    monkeypatch.setattr(video_capture, "find_spec", lambda name: None)
+def test_a_missing_encoder_is_reported(live, guest, monkeypatch):
+    monkeypatch.setattr("supple.viewer.drawing.video_capture.find_spec", lambda name: None)
     record = live.panel.record
     record.kind.value = "MP4"
     record._toggle(SimpleNamespace(client=guest))
     assert not record.recording
-    assert "pip install 'supple[video]'" in html.unescape(record._said.content)
+    assert "pip install 'supple[video]'" in html.unescape(record._message.content)

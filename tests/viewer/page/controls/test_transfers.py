@@ -1,4 +1,4 @@
-"""Files over the line to the server: what the button asks for gets through, and nothing else."""
+"""Uploads to the server: only files for the button are accepted."""
 
 import html
 import threading
@@ -14,14 +14,14 @@ from supple.viewer.protocol import limits
 from supple.viewer.protocol.messages import AddMesh
 from supple.viewer.server.plain_markdown import plain
 from supple.viewer.server.uploads.meshing import TetArrays
-from supple.viewer.server.uploads.transfers import shown_name
+from supple.viewer.server.uploads.transfers import printable_name
 
 PART = limits.UPLOAD_PART
 
 
 @pytest.fixture
 def heard(live, server, visitor, monkeypatch):
-    """The lines that the visitor is shown."""
+    """The notifications of the visitor."""
     lines = []
     client = next(iter(server.get_clients().values()))
     monkeypatch.setattr(client, "add_notification", lambda title, text, **_: lines.append(text))
@@ -30,11 +30,11 @@ def heard(live, server, visitor, monkeypatch):
 
 @pytest.fixture
 def meshed(monkeypatch):
-    """The files that get as far as the mesher, of which there is none here."""
+    """The files that reach the mesher, which is replaced."""
     files = []
     box = sp.shapes.box(divisions=(1, 1, 1))
 
-    def mesh(upload, tell, stop):
+    def mesh(upload, notify, stop):
         files.append(upload)
         return TetArrays(box.vertices, box.tets)
 
@@ -51,7 +51,7 @@ def announce(visitor, live, content, name="ball.stl", **changes):
         "part_count": -(-len(content) // PART),
         "size_bytes": len(content),
     }
-    visitor.say("FileTransferStartUpload", **fields | changes)
+    visitor.send("FileTransferStartUpload", **fields | changes)
 
 
 def give(visitor, live, content, index=0, **changes):
@@ -61,18 +61,18 @@ def give(visitor, live, content, index=0, **changes):
         "part_index": index,
         "content": content[index * PART : (index + 1) * PART],
     }
-    visitor.say("FileTransferPart", **fields | changes)
+    visitor.send("FileTransferPart", **fields | changes)
 
 
-def test_a_file_becomes_a_command(live, made_up, visitor, meshed, heard, until):
+def test_an_upload_becomes_a_command(live, fake, visitor, meshed, heard, until):
     visitor.set(live.panel.bodies.size, 0.75)
     visitor.set(live.panel.bodies.youngs, 6.0)
     content = bytes(range(256)) * 5000  # three parts
     announce(visitor, live, content, "C:\\things\\my ball.STL")
     for k in range(3):
         give(visitor, live, content, k)
-    until(lambda: made_up.told)
-    [upload], [command] = meshed, made_up.told
+    until(lambda: fake.received)
+    [upload], [command] = meshed, fake.received
     assert (upload.name, upload.suffix, upload.size) == ("my ball.STL", ".stl", 0.75)
     assert upload.content == content
     assert isinstance(command, AddMesh)
@@ -82,11 +82,11 @@ def test_a_file_becomes_a_command(live, made_up, visitor, meshed, heard, until):
     until(lambda: not live.panel.upload._busy.locked())
 
 
-def test_what_is_wrong_with_it_is_said_and_the_page_goes_on(live, made_up, visitor, meshed, heard, until, monkeypatch):
+def test_an_error_in_a_file_is_displayed_and_the_page_continues(live, fake, visitor, meshed, heard, until, monkeypatch):
     working, go_on = threading.Event(), threading.Event()
 
-    def mesh(upload, tell, stop):
-        tell(3.0)
+    def mesh(upload, notify, stop):
+        notify(3.0)
         working.set()
         go_on.wait(20.0)
         raise MeshError("ball.stl: <script>it has a hole</script>")
@@ -95,19 +95,19 @@ def test_what_is_wrong_with_it_is_said_and_the_page_goes_on(live, made_up, visit
     announce(visitor, live, b"abc")
     give(visitor, live, b"abc")
     assert working.wait(20.0)
-    assert "filled with tets, 3 s" in live.panel.upload._said.content
-    # Meanwhile everything else works, but for a second file.
+    assert "being meshed, 3 s" in live.panel.upload._message.content
+    # Meanwhile all other functions work, except a second upload.
     announce(visitor, live, b"abc", transfer_uuid="two")
     give(visitor, live, b"abc", transfer_uuid="two")
-    until(lambda: heard and "another file is being read" in heard[0])
+    until(lambda: heard and "another file is being meshed" in heard[0])
     visitor.press(live.panel.time.play)
-    made_up.show(paused=False)
-    until(lambda: made_up.told)
+    fake.show(paused=False)
+    until(lambda: fake.received)
     go_on.set()
     until(lambda: len(heard) == 2)
     assert heard[1] == "ball.stl: <script>it has a hole</script>"  # a notification is text, and Markdown is not
-    until(lambda: not live.panel.upload._said.visible)
-    assert all(not isinstance(command, AddMesh) for command in made_up.told)
+    until(lambda: not live.panel.upload._message.visible)
+    assert all(not isinstance(command, AddMesh) for command in fake.received)
 
 
 REFUSED = {
@@ -115,64 +115,64 @@ REFUSED = {
     "no format": ({"filename": "ball"}, "give a surface as"),
     "nothing": ({"size_bytes": 0, "part_count": 0}, "empty"),
     "less than nothing": ({"size_bytes": -5, "part_count": 0}, "empty"),
-    "too large": ({"size_bytes": limits.LARGEST_UPLOAD + 1, "part_count": 33}, "may have 16 MiB"),
+    "too large": ({"size_bytes": limits.LARGEST_UPLOAD + 1, "part_count": 33}, "the limit is 16 MiB"),
     "other parts": ({"part_count": 2}, "parts"),
     "parts without end": ({"part_count": 2**40}, "parts"),
 }
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_is_announced_is_checked(live, made_up, visitor, meshed, heard, until, name):
-    changes, said = REFUSED[name]
+def test_announcements_are_checked(live, fake, visitor, meshed, heard, until, name):
+    changes, text = REFUSED[name]
     announce(visitor, live, b"abc", **changes)
-    until(lambda: heard and said in heard[0])
-    give(visitor, live, b"abc")  # what comes all the same is passed over
+    until(lambda: heard and text in heard[0])
+    give(visitor, live, b"abc")  # further parts are ignored
     visitor.press(live.panel.time.play)
-    until(lambda: made_up.told)
+    until(lambda: fake.received)
     assert meshed == []
 
 
 @pytest.mark.parametrize("changes", [{"part_index": 1}, {"content": b"abcd"}, {"content": b""}, {"part_index": -1}])
-def test_parts_that_do_not_fit_end_the_transfer(live, made_up, visitor, meshed, heard, until, changes):
+def test_invalid_parts_end_the_transfer(live, fake, visitor, meshed, heard, until, changes):
     announce(visitor, live, b"abc")
     give(visitor, live, **{"content": b"abc"} | changes)
     until(lambda: heard and "damaged" in heard[0])
     give(visitor, live, b"abc")
     visitor.press(live.panel.time.play)
-    until(lambda: made_up.told)
+    until(lambda: fake.received)
     assert meshed == []
 
 
-def test_other_inputs_take_no_files_and_nothing_is_kept(live, server, made_up, visitor, meshed, until):
+def test_other_inputs_accept_no_files_and_nothing_is_kept(live, server, fake, visitor, meshed, until):
     speed = live.panel.time.speed
     announce(visitor, live, b"abc", source_component_uuid=speed._impl.uuid)
     give(visitor, live, b"abc", source_component_uuid=speed._impl.uuid)
     for k in range(100):
         announce(visitor, live, b"abc", transfer_uuid=f"{k}")
     visitor.press(live.panel.time.play)
-    until(lambda: made_up.told)
+    until(lambda: fake.received)
     assert speed.value == 1.0
     assert server.gui._current_file_upload_states == {}
     assert len(live.panel.upload.transfers._running) == 1
-    # Who leaves takes it along.
+    # It ends with its visitor.
     visitor.leave()
     until(lambda: not live.panel.upload.transfers._running)
     assert meshed == []
 
 
-def test_only_so_many_come_in_at_once(live, server, visit, meshed, until, monkeypatch):
+def test_the_number_of_simultaneous_uploads_is_limited(live, server, visit, meshed, until, monkeypatch):
     monkeypatch.setattr(limits, "MOST_UPLOADS", 2)
     visitors = [visit(server.get_port()) for _ in range(3)]
     until(lambda: len(server.get_clients()) == 3)
-    said = []
+    texts = []
     for client in server.get_clients().values():
-        monkeypatch.setattr(client, "add_notification", lambda title, text, **_: said.append(text))
+        monkeypatch.setattr(client, "add_notification", lambda title, text, **_: texts.append(text))
     for visitor in visitors:
         announce(visitor, live, b"abc")
-    until(lambda: said)
-    assert "2 files are coming in already" in said[0]
-    # One that gets no further makes room.
-    monkeypatch.setattr(limits, "UPLOAD_PATIENCE", -1.0)
+    until(lambda: texts)
+    assert "2 files are being uploaded already" in texts[0]
+    # A transfer without progress is given up.
+    monkeypatch.setattr(limits, "UPLOAD_TIMEOUT", -1.0)
     announce(visitors[2], live, b"abc")
     give(visitors[2], live, b"abc")
     until(lambda: meshed)
@@ -180,10 +180,10 @@ def test_only_so_many_come_in_at_once(live, server, visit, meshed, until, monkey
         visitor.leave()
 
 
-def test_a_page_that_is_closed_ends_what_it_reads(live, visitor, until, monkeypatch):
+def test_closing_the_page_stops_an_upload(live, visitor, until, monkeypatch):
     ended = threading.Event()
 
-    def mesh(upload, tell, stop):
+    def mesh(upload, notify, stop):
         stop.wait(20.0)
         ended.set()
         raise MeshError("closed")
@@ -197,7 +197,7 @@ def test_a_page_that_is_closed_ends_what_it_reads(live, visitor, until, monkeypa
 
 
 @pytest.mark.parametrize(
-    ("file", "shown", "body"),
+    ("file", "displayed", "body"),
     [
         ("bunny.stl", "bunny.stl", "bunny"),
         ("../../etc/passwd.stl", "passwd.stl", "passwd"),
@@ -208,16 +208,16 @@ def test_a_page_that_is_closed_ends_what_it_reads(live, visitor, until, monkeypa
         ("x" * 300 + ".stl", "x" * 56 + ".stl", "x" * 40),
     ],
 )
-def test_names_of_files_and_bodies(file, shown, body):
-    assert shown_name(file) == shown
-    assert body_name(shown) == body
-    AddMesh(np.zeros((4, 3)), np.array([[0, 1, 2, 3]], dtype=np.int32), name=body_name(shown))
+def test_names_of_files_and_bodies(file, displayed, body):
+    assert printable_name(file) == displayed
+    assert body_name(displayed) == body
+    AddMesh(np.zeros((4, 3)), np.array([[0, 1, 2, 3]], dtype=np.int32), name=body_name(displayed))
 
 
 @pytest.mark.parametrize(
     "text", ["<script>alert(1)</script>", "{1 + 1}", "![x](http://a.example/x.png)", "**a** `b` | # c"]
 )
-def test_text_from_elsewhere_is_text(text):
+def test_text_is_escaped_for_markdown(text):
     marked = plain(text)
     assert html.unescape(marked) == text
     assert not set(marked) & set('<>{}[]!*`|"\\_~')

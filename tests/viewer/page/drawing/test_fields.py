@@ -1,4 +1,4 @@
-"""Colors mean numbers: fields against closed forms, and colors against fields."""
+"""Fields compared with closed forms, and colors compared with fields."""
 
 from dataclasses import replace
 
@@ -8,24 +8,24 @@ import pytest
 import supple as sp
 from supple.viewer.drawing.coloring.color_scale import BINS, Limits, bar_html, bin_of
 from supple.viewer.drawing.coloring.fields import FIELDS
-from supple.viewer.drawing.moments.from_snapshot import Translator
+from supple.viewer.drawing.moments.from_snapshot import MomentBuilder
 
 J, MISES, ENERGY = FIELDS.values()
 
 
 @pytest.fixture
-def stretched(made_up):
+def stretched(fake):
     """Body 0 stretched to twice its length in x, body 1 at rest; body 0 made of StVK, body 1 of something unknown."""
-    x = made_up.snapshot.positions.copy()
-    model = Translator().moment(made_up.snapshot).model
+    x = fake.snapshot.positions.copy()
+    model = MomentBuilder().moment(fake.snapshot).model
     first = replace(model.bodies[0], material=sp.StVenantKirchhoff(youngs=1000.0, poisson=0.0))
     model = replace(model, bodies=(first, model.bodies[1]))
     x[first.vertices] *= [2.0, 1.0, 1.0]
-    moment = Translator().moment(made_up.show(positions=x))
+    moment = MomentBuilder().moment(fake.show(positions=x))
     return replace(moment, model=model)
 
 
-def test_fields_of_a_body_that_is_stretched(stretched):
+def test_fields_of_a_stretched_body(stretched):
     first, other = (body.tets for body in stretched.model.bodies)
     np.testing.assert_allclose(J.values(stretched)[first], 2.0)
     np.testing.assert_allclose(J.values(stretched)[other], 1.0)
@@ -37,17 +37,17 @@ def test_fields_of_a_body_that_is_stretched(stretched):
         assert np.isnan(unknown.values(stretched)[other]).all()
 
 
-def test_what_the_simulation_says_is_taken_as_it_is(stretched):
+def test_values_of_the_simulation_are_used(stretched):
     values = np.arange(float(len(stretched.model.tets)))
     np.testing.assert_array_equal(MISES.values(replace(stretched, tet_values={"von_mises": values})), values)
 
 
-def test_bins_cover_the_scale_and_what_is_beyond_it():
+def test_bins_of_values_within_and_beyond_the_scale():
     values = np.array([-5.0, 0.0, 0.499, 0.5, 1.0, 9.0, np.nan, np.inf])
     assert list(bin_of(values, 0.0, 1.0)) == [0, 0, BINS // 2 - 1, BINS // 2, BINS - 1, BINS - 1, BINS, BINS]
 
 
-def test_scales_have_round_ends_and_do_not_flicker():
+def test_ends_of_scales_are_round_and_stable():
     limits = Limits(MISES)
     assert limits.follow(np.full(10, 37.0)) == (0.0, 50.0)
     assert limits.follow(np.full(10, 20.0)) == (0.0, 50.0)
@@ -57,7 +57,7 @@ def test_scales_have_round_ends_and_do_not_flicker():
     assert Limits(J).follow(np.array([0.9, 1.0, 1.07])) == (0.9, 1.1)
 
 
-def test_the_bar_names_what_it_shows():
+def test_the_color_bar_contains_name_unit_and_numbers():
     bar = bar_html(replace(MISES, name="<b>"), 0.0, 2e4)
     assert "&lt;b&gt;" in bar
     assert "[Pa]" in bar

@@ -1,14 +1,14 @@
-"""What the page draws: from snapshots and from recordings."""
+"""The data that the page draws, from snapshots and from recordings."""
 
 import numpy as np
 
 import supple as sp
 from supple.viewer.drawing.moments.from_recording import material_from_text
-from supple.viewer.drawing.moments.from_snapshot import Translator
+from supple.viewer.drawing.moments.from_snapshot import MomentBuilder
 from supple.viewer.drawing.moments.model import facets_of
 
 
-def test_every_facet_is_found_once_and_the_outer_ones_are_the_surface():
+def test_every_facet_is_found_once_and_outer_facets_are_the_surface():
     mesh = sp.shapes.box(size=(1.0, 1.0, 1.0), divisions=(3, 2, 2))
     facets = facets_of(mesh.tets)
     outer = facets.triangles[facets.outer < 0]
@@ -23,10 +23,10 @@ def test_every_facet_is_found_once_and_the_outer_ones_are_the_surface():
         assert outer < 0 or len(set(mesh.tets[inner]) & set(mesh.tets[outer])) == 3
 
 
-def test_a_snapshot_becomes_a_moment(made_up):
-    values = np.linspace(0.0, 1.0, made_up.snapshot.description.n_tets)
-    snapshot = made_up.show(pinned=np.array([3, 30]), tet_values=values, tet_quantity="J", time=0.5)
-    translator = Translator()
+def test_a_snapshot_becomes_a_moment(fake):
+    values = np.linspace(0.0, 1.0, fake.snapshot.description.n_tets)
+    snapshot = fake.show(pinned=np.array([3, 30]), tet_values=values, tet_quantity="J", time=0.5)
+    translator = MomentBuilder()
     moment = translator.moment(snapshot)
     assert [body.name for body in moment.model.bodies] == ["body 0", "body 1"]
     assert moment.time == 0.5
@@ -34,21 +34,21 @@ def test_a_snapshot_becomes_a_moment(made_up):
     np.testing.assert_array_equal(moment.tet_values["J"], values)
     np.testing.assert_allclose(np.linalg.det(moment.deformation_gradients), 1.0)
     np.testing.assert_array_equal(moment.poses[0], np.eye(4)[:3])
-    # Of the same generation: the same model, so that nothing is built anew.
-    assert translator.moment(made_up.show()).model is moment.model
+    # The same generation has the same model, so that no layer is created again.
+    assert translator.moment(fake.show()).model is moment.model
 
 
-def test_the_ball_of_the_mouse_does_not_make_the_picture_anew(made_up):
+def test_the_pusher_does_not_create_a_new_model(fake):
     from dataclasses import replace
 
     from supple.viewer.protocol.messages import ObstacleDescription
 
-    translator = Translator()
-    before = translator.moment(made_up.snapshot)
-    old = made_up.snapshot.description
+    translator = MomentBuilder()
+    before = translator.moment(fake.snapshot)
+    old = fake.snapshot.description
     ball = ObstacleDescription("pusher", "Sphere", {"center": np.zeros(3), "radius": 0.1, "inside": False}, True, 0.5)
     pushed = translator.moment(
-        made_up.show(
+        fake.show(
             description=replace(old, generation=2, obstacles=(*old.obstacles, ball)),
             obstacle_poses=(np.stack([np.eye(3)] * 2), np.zeros((2, 3))),
             pusher=((1.0, 0.0, 0.0), 0.1),
@@ -60,28 +60,28 @@ def test_the_ball_of_the_mouse_does_not_make_the_picture_anew(made_up):
     # Another body does.
     assert (
         translator.moment(
-            made_up.show(
-                description=replace(old, generation=3, bodies=old.bodies[:1]), positions=made_up.snapshot.positions[:27]
+            fake.show(
+                description=replace(old, generation=3, bodies=old.bodies[:1]), positions=fake.snapshot.positions[:27]
             )
         ).model
         is not before.model
     )
 
 
-def test_a_skin_follows_the_tets_of_its_body(made_up):
+def test_a_skin_follows_the_tets_of_its_body(fake):
     from dataclasses import replace
 
-    body = made_up.snapshot.description.bodies[0]
+    body = fake.snapshot.description.bodies[0]
     fine = np.random.default_rng(1).uniform(0.1, 0.9, (50, 3))
     skinned = replace(body, skin=(fine, np.array([[0, 1, 2]])))
-    description = replace(made_up.snapshot.description, bodies=(skinned, *made_up.snapshot.description.bodies[1:]))
-    x = made_up.snapshot.positions * [1.0, 2.0, 1.0] + [0.0, 1.0, 0.0]
-    moment = Translator().moment(made_up.show(description=description, positions=x))
+    description = replace(fake.snapshot.description, bodies=(skinned, *fake.snapshot.description.bodies[1:]))
+    x = fake.snapshot.positions * [1.0, 2.0, 1.0] + [0.0, 1.0, 0.0]
+    moment = MomentBuilder().moment(fake.show(description=description, positions=x))
     drawn = moment.model.bodies[0].skin.positions(moment.positions[moment.model.bodies[0].vertices])
     np.testing.assert_allclose(drawn, fine * [1.0, 2.0, 1.0] + [0.0, 1.0, 0.0], atol=1e-12)
 
 
-def test_materials_are_read_from_the_text_of_recordings_and_nothing_is_run():
+def test_materials_are_read_from_text_and_nothing_is_executed():
     made = material_from_text(repr(sp.StableNeoHookean(youngs=1e4, poisson=0.4, density=900.0)))
     assert (made.youngs, made.poisson, made.density) == (1e4, 0.4, 900.0)
     assert material_from_text("NeoHookean(youngs=np.float64(2.0), poisson=0.25)").youngs == 2.0

@@ -1,15 +1,15 @@
-"""What is under the mouse."""
+"""Points of surfaces under the mouse."""
 
 import numpy as np
 import pytest
 
-from supple.viewer.drawing.moments.from_snapshot import Translator
+from supple.viewer.drawing.moments.from_snapshot import MomentBuilder
 from supple.viewer.drawing.picking import nearest_surface_point, point_on_camera_plane, surface_point_on_ray
 
 
 @pytest.fixture
-def moment(made_up):
-    return Translator().moment(made_up.snapshot)
+def moment(fake):
+    return MomentBuilder().moment(fake.snapshot)
 
 
 def place_of(moment, point):
@@ -17,7 +17,7 @@ def place_of(moment, point):
     return point.weights @ moment.positions[rows]
 
 
-def test_the_nearest_point_of_any_surface(moment):
+def test_nearest_point_of_any_surface(moment):
     low, high = moment.positions[moment.model.bodies[1].vertices].min(axis=0), moment.positions.max(axis=0)
     point = nearest_surface_point(moment, high - np.array([-0.5, 0.3, 0.4]))
     assert point.body.name == "body 1"
@@ -33,7 +33,7 @@ def point_of(moment, low):
     return moment.positions[np.argmin(offsets)]
 
 
-def test_a_ray_meets_the_first_surface_on_its_way(moment):
+def test_first_intersection_of_a_ray(moment):
     low, high = moment.positions.min(axis=0), moment.positions.max(axis=0)
     across = 0.5 * (low + high) + [0.0, 0.07, 0.03]
     point = surface_point_on_ray(moment, [low[0] - 3.0, *across[1:]], [1.0, 0.0, 0.0])
@@ -45,7 +45,7 @@ def test_a_ray_meets_the_first_surface_on_its_way(moment):
     assert surface_point_on_ray(moment, [low[0] - 3.0, *across[1:]], [0.0, 0.0, 0.0]) is None
 
 
-def test_points_on_planes_that_face_the_camera():
+def test_points_on_planes_parallel_to_the_screen():
     eye, look = np.array([0.0, 0.0, -4.0]), np.array([0.0, 0.0, 1.0])
     place = point_on_camera_plane(eye, [3.0, 3.0, 8.0], look, [9.0, -9.0, 0.0])
     np.testing.assert_allclose(place, [1.0, 1.0, 0.0])

@@ -1,4 +1,4 @@
-"""Every way to show a moment: what is sent to browsers, and that nothing piles up."""
+"""All ways to draw a moment: the sent messages, and that their number does not grow."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ import pytest
 from supple.viewer.drawing.coloring.fields import FIELDS
 from supple.viewer.drawing.layers.springs import length_text
 from supple.viewer.drawing.layers.tets import Cut, exploded_facets, kept_tets, outer_facets
-from supple.viewer.drawing.moments.from_snapshot import Translator
+from supple.viewer.drawing.moments.from_snapshot import MomentBuilder
 from supple.viewer.drawing.options import COLOR_BY_BODY, SURFACES, ViewOptions
 from supple.viewer.drawing.stage import Stage
 
@@ -19,11 +19,11 @@ def kept_messages(server):
 
 @pytest.mark.parametrize("surface", SURFACES)
 @pytest.mark.parametrize("color_by", [COLOR_BY_BODY, *FIELDS])
-def test_bodies_are_where_they_are(server, made_up, surface, color_by):
-    translator = Translator()
-    stage = Stage(server, translator.moment(made_up.snapshot), ViewOptions(surface, color_by, explode=0.1))
+def test_bodies_are_drawn_at_their_positions(server, fake, surface, color_by):
+    translator = MomentBuilder()
+    stage = Stage(server, translator.moment(fake.snapshot), ViewOptions(surface, color_by, explode=0.1))
     shift = np.array([0.0, 5.0, 0.0])
-    snapshot = made_up.show(positions=made_up.snapshot.positions + shift)
+    snapshot = fake.show(positions=fake.snapshot.positions + shift)
     stage.show(translator.moment(snapshot))
     drawn = np.concatenate([handle.vertices for handle in stage.body_handles if handle.visible])
     low, high = snapshot.positions.min(axis=0), snapshot.positions.max(axis=0)
@@ -35,92 +35,92 @@ def test_bodies_are_where_they_are(server, made_up, surface, color_by):
         assert drawn[:, 0].max() < high[0]
 
 
-def test_any_number_of_moments_leaves_as_many_messages_as_one(server, made_up):
-    translator = Translator()
+def test_the_number_of_buffered_messages_does_not_grow_with_moments(server, fake):
+    translator = MomentBuilder()
     options = ViewOptions("tets", "volume ratio J", velocities=True, contacts=True)
-    stage = Stage(server, translator.moment(made_up.snapshot), options)
+    stage = Stage(server, translator.moment(fake.snapshot), options)
     rng = np.random.default_rng(5)
     counts = []
     for _ in range(30):
-        x = made_up.snapshot.positions + rng.normal(scale=0.05, size=made_up.snapshot.positions.shape)
-        stage.show(translator.moment(made_up.show(positions=x, velocities=rng.normal(size=x.shape))))
+        x = fake.snapshot.positions + rng.normal(scale=0.05, size=fake.snapshot.positions.shape)
+        stage.show(translator.moment(fake.show(positions=x, velocities=rng.normal(size=x.shape))))
         counts.append(kept_messages(server))
-    assert counts[-1] <= counts[9] + 40  # visibility of colors that were not needed before, at most
+    assert counts[-1] <= counts[9] + 40  # only the visibility of colors that were not used before
 
 
-def test_options_that_change_leave_nothing_behind(server, made_up):
-    stage = Stage(server, Translator().moment(made_up.snapshot), ViewOptions())
+def test_changed_options_remove_all_old_layers(server, fake):
+    stage = Stage(server, MomentBuilder().moment(fake.snapshot), ViewOptions())
     for surface in (*SURFACES, "skin"):
         stage.apply(ViewOptions(surface, velocities=True, contacts=True))
     stage.apply(ViewOptions())
     names = set(server.scene._handle_from_node_name)
     drawn = {name for name in names if name.startswith(("/bodies/", "/velocities", "/contacts"))}
-    # Groups stay, empty: viser makes them itself.
+    # Empty groups stay: viser creates them.
     assert drawn - {"/bodies/tets", "/contacts"} == {"/bodies/0 body 0", "/bodies/1 body 1"}
 
 
-def test_numbers_that_are_lost_are_not_sent(server, made_up):
-    x = made_up.snapshot.positions.copy()
+def test_values_that_are_not_finite_are_not_sent(server, fake):
+    x = fake.snapshot.positions.copy()
     x[3], x[4] = np.nan, np.inf
-    translator = Translator()
+    translator = MomentBuilder()
     for options in (ViewOptions(), ViewOptions("exploded tets", "volume ratio J", velocities=True)):
-        stage = Stage(server, translator.moment(made_up.show(positions=x, velocities=x)), options)
+        stage = Stage(server, translator.moment(fake.show(positions=x, velocities=x)), options)
         for handle in stage.body_handles:
             assert np.isfinite(handle.vertices).all()
 
 
-def test_a_new_generation_is_built_anew(server, made_up):
-    translator = Translator()
-    stage = Stage(server, translator.moment(made_up.snapshot), ViewOptions())
-    old = made_up.snapshot.description
+def test_a_new_generation_creates_new_layers(server, fake):
+    translator = MomentBuilder()
+    stage = Stage(server, translator.moment(fake.snapshot), ViewOptions())
+    old = fake.snapshot.description
     new = replace(old, generation=2, bodies=old.bodies[:1], n_vertices=27, n_tets=48)
     heard = []
     stage._prepare = heard.append
-    stage.show(translator.moment(made_up.show(description=new, positions=made_up.snapshot.positions[:27])))
+    stage.show(translator.moment(fake.show(description=new, positions=fake.snapshot.positions[:27])))
     assert [handle.name for handle in stage.body_handles] == ["/bodies/0 body 0"]
     assert heard == [stage.body_handles]
 
 
-def test_springs_show_their_length_and_pins_their_places(server, made_up):
+def test_springs_with_length_and_pins(server, fake):
     from supple.viewer.protocol.messages import GrabState
 
-    translator = Translator()
-    stage = Stage(server, translator.moment(made_up.snapshot), ViewOptions())
+    translator = MomentBuilder()
+    stage = Stage(server, translator.moment(fake.snapshot), ViewOptions())
     held = GrabState(7, "body 0", (0.0, 0.0, 0.0), (0.0, 0.3, 0.4))
-    stage.show(translator.moment(made_up.show(grabs=(held,), pinned=np.array([2]), pusher=((1.0, 2.0, 3.0), 0.2))))
+    stage.show(translator.moment(fake.show(grabs=(held,), pinned=np.array([2]), pusher=((1.0, 2.0, 3.0), 0.2))))
     nodes = server.scene._handle_from_node_name
     assert nodes["/springs/7"].text == "50.0 cm"
     np.testing.assert_allclose(nodes["/springs/lines"].points, [[[0.0, 0.0, 0.0], [0.0, 0.3, 0.4]]], atol=1e-7)
     assert nodes["/springs/lines"].visible
-    np.testing.assert_allclose(nodes["/pins"].points, made_up.snapshot.positions[[2]])
+    np.testing.assert_allclose(nodes["/pins"].points, fake.snapshot.positions[[2]])
     np.testing.assert_allclose(nodes["/pusher"].position, [1.0, 2.0, 3.0])
     assert nodes["/pusher"].visible
-    stage.show(translator.moment(made_up.show(grabs=(), pusher=None, pinned=np.zeros(0, int))))
+    stage.show(translator.moment(fake.show(grabs=(), pusher=None, pinned=np.zeros(0, int))))
     assert "/springs/7" not in nodes
     assert [nodes[name].visible for name in ("/springs/lines", "/pusher", "/pins")] == [False] * 3
 
 
-def test_stitches_are_lines_from_vertices_to_triangles(server, made_up):
-    description = replace(made_up.snapshot.description, stitches=np.array([[0, 30, 31, 33]], dtype=np.int32))
-    stage = Stage(server, Translator().moment(made_up.show(description=description)), ViewOptions())
+def test_stitches_are_lines_between_vertices_and_triangles(server, fake):
+    description = replace(fake.snapshot.description, stitches=np.array([[0, 30, 31, 33]], dtype=np.int32))
+    stage = Stage(server, MomentBuilder().moment(fake.show(description=description)), ViewOptions())
     assert stage.options.stitches
-    x = made_up.snapshot.positions
+    x = fake.snapshot.positions
     points = server.scene._handle_from_node_name["/stitches"].points
     np.testing.assert_allclose(points, [[x[0], x[[30, 31, 33]].mean(axis=0)]], atol=1e-6)
 
 
 @pytest.mark.parametrize(("meters", "text"), [(1.234, "1.23 m"), (0.123, "12.3 cm"), (0.00123, "1.2 mm")])
-def test_lengths_have_units_that_suit_them(meters, text):
+def test_units_of_lengths(meters, text):
     assert length_text(meters) == text
 
 
-def test_a_cut_shows_the_tets_before_it_closed(made_up):
-    model = Translator().moment(made_up.snapshot).model
+def test_a_cut_draws_a_closed_surface_of_the_kept_tets(fake):
+    model = MomentBuilder().moment(fake.snapshot).model
     kept = kept_tets(model, Cut(1, 0.5))
     assert 0 < kept.sum() < len(kept)
     triangles, owner = outer_facets(model, kept)
     assert kept[owner].all()
-    # Closed: every edge is passed once in each direction; and of the volume of the tets inside.
+    # Closed: every edge occurs once in each direction; the volume is that of the tets inside.
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     forward, backward = ({tuple(edge) for edge in way} for way in (edges, edges[:, ::-1]))
     assert forward == backward

@@ -1,4 +1,4 @@
-"""From numbers to colors, and the bar that says which is which."""
+"""Color scales for values, and the color bar."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 
 from supple.viewer.drawing.coloring.fields import Field
 
-BINS = 16  # colors of a scale; each is one mesh on the page, which knows no colors of triangles
+BINS = 16  # colors of a scale; each is one mesh on the page, because a mesh has one color
 _NOT_KNOWN = (150, 152, 158)
-# A scale grows at once and shrinks only once less than this part of it is used: a bar that flickers cannot be read.
+# A scale grows immediately, and shrinks only where less than this share of it is used: otherwise its ends flicker.
 _SHRINK_BELOW = 0.3
-_QUANTILE = 0.98  # of the values, that the scale must reach: one crushed tet does not make all others look alike
+_QUANTILE = 0.98  # share of the values within the scale: otherwise one extreme tet would give all others the same color
 
 
 def palette(field: Field) -> NDArray[np.uint8]:
-    """(BINS, 3) colors: from blue over white to red where there is a middle, else from dark to bright."""
+    """(BINS, 3) colors: from blue over white to red where the field has a center, otherwise from dark to bright."""
     from matplotlib import colormaps
 
     colors = colormaps["RdBu" if field.center is not None else "viridis"](np.linspace(0.0, 1.0, BINS))
@@ -26,12 +26,12 @@ def palette(field: Field) -> NDArray[np.uint8]:
 
 
 def not_known_color() -> tuple[int, int, int]:
-    """Of tets whose number is not known."""
+    """Color of tets with an unknown value."""
     return _NOT_KNOWN
 
 
 def bin_of(values: NDArray[np.float64], low: float, high: float) -> NDArray[np.int64]:
-    """Which of the colors (0 to BINS - 1) each value has; BINS where it is not finite."""
+    """The color (0 to BINS - 1) of each value; BINS where it is not finite."""
     with np.errstate(invalid="ignore", over="ignore"):
         place = np.floor((values - low) / (high - low) * BINS)
     known = np.isfinite(values)
@@ -39,7 +39,7 @@ def bin_of(values: NDArray[np.float64], low: float, high: float) -> NDArray[np.i
 
 
 class Limits:
-    """The ends of a scale: round numbers that follow what is shown, in steps."""
+    """The ends of a scale: round numbers that follow the displayed values in steps."""
 
     def __init__(self, field: Field) -> None:
         self.field = field
@@ -64,7 +64,7 @@ def _round_up(value: float) -> float:
 
 
 def bar_html(field: Field, low: float, high: float) -> str:
-    """The color bar: its colors, the numbers at its ends and in the middle, and what they are."""
+    """The color bar: its colors, the numbers at its ends and in the middle, and their name and unit."""
     colors = ["rgb({},{},{})".format(*color) for color in palette(field)]
     stops = ",".join(f"{color} {100 * i / BINS:.2f}% {100 * (i + 1) / BINS:.2f}%" for i, color in enumerate(colors))
     title = html.escape(f"{field.name} [{field.unit}]" if field.unit else field.name)

@@ -1,4 +1,4 @@
-"""Numbers of every tet that the page can color by."""
+"""Fields on tets for coloring."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from supple.viewer.drawing.moments.model import Moment
 
 @dataclass(frozen=True)
 class Field:
-    """Something to color by.
+    """A field with one value for each tet.
 
     Attributes
     ----------
-    key : what simulations call it; name, unit : as they stand at the color bar
-    center : what the middle color means, or None where 0 is the lowest
-    measure : of every tet (m,), NaN where it is not known
+    key : its name in messages of the simulation; name, unit : for the color bar
+    center : the value of the middle color, or None where 0 is the lowest value
+    measure : computes the values (m,), NaN where they are not known
     """
 
     key: str
@@ -31,7 +31,7 @@ class Field:
     measure: Callable[[Moment], NDArray[np.float64]]
 
     def values(self, moment: Moment) -> NDArray[np.float64]:
-        """Of every tet (m,), NaN where it is not known: as the simulation says, or else measured here."""
+        """Values (m,), NaN where they are not known: from the simulation, otherwise computed here."""
         known = moment.tet_values.get(self.key)
         return self.measure(moment) if known is None else known
 
@@ -43,7 +43,7 @@ def volume_ratio(moment: Moment) -> NDArray[np.float64]:
 
 @np.errstate(all="ignore")
 def von_mises_stress(moment: Moment) -> NDArray[np.float64]:
-    """Of the Cauchy stress sigma = P F^T / J of every tet (m,) [Pa]: sqrt(3/2 s : s) with s its deviator."""
+    """Von Mises stress of every tet (m,) [Pa], with sigma = P F^T / J: sqrt(3/2 s : s) with s its deviator."""
     out = np.full(len(moment.model.tets), np.nan)
     J = volume_ratio(moment)
     for body in moment.model.bodies:
@@ -57,7 +57,7 @@ def von_mises_stress(moment: Moment) -> NDArray[np.float64]:
 
 @np.errstate(all="ignore")
 def energy_density(moment: Moment) -> NDArray[np.float64]:
-    """Elastic energy per volume at rest of every tet (m,) [J/m^3]."""
+    """Elastic energy per rest volume of every tet (m,) [J/m^3]."""
     out = np.full(len(moment.model.tets), np.nan)
     for body in moment.model.bodies:
         if isinstance(body.material, Elastic):

@@ -1,4 +1,4 @@
-"""Where bodies touch: a point and the direction of the push, for solvers that tell."""
+"""Contacts: a point, and the normal where it is known."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _COLOR = (220, 40, 110)
 
 
 class ContactView(Layer):
-    """A dot for each contact, and an arrow where its normal is known."""
+    """A dot for each contact, and an arrow where the normal is known."""
 
     def __init__(self, scene: Any, moment: Moment) -> None:
         radius = moment.model.view.radius
@@ -46,8 +46,8 @@ class ContactView(Layer):
         self._arrows.remove()
 
 
-def said_of_contacts(moment: Moment) -> str:
-    """What the panel says of them."""
+def contacts_text(moment: Moment) -> str:
+    """Text for the panel."""
     if moment.contact_points is None:
-        return "Contacts: none are told by this solver."
+        return "Contacts: not known."
     return f"Contacts: {len(moment.contact_points)}."

@@ -1,4 +1,4 @@
-"""A grid below everything: it says where the floor is, and how large things are."""
+"""A grid on the ground, which shows the position of the floor and the scale."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from supple.viewer.drawing.moments.model import Moment
 
 
 class Ground(Layer):
-    """Lines on the floor, or below the bodies where there is none."""
+    """Lines on the floor, or below the bodies where there is no floor."""
 
     def __init__(self, scene: Any, moment: Moment) -> None:
         model = moment.model
@@ -25,7 +25,7 @@ class Ground(Layer):
         ]
         lowest = float(np.min([corner @ up for corner in _corners(view.low, view.high)]))
         height = max((float(point @ up) for point in floors), default=lowest)
-        # A hair above the floor: two surfaces in one plane flicker.
+        # Slightly above the floor, because two surfaces in the same plane flicker.
         place = view.center + (height + 2e-3 * view.radius - float(view.center @ up)) * up
         cell = 10.0 ** math.floor(math.log10(view.radius))
         self._grid = scene.add_grid(
@@ -43,7 +43,7 @@ class Ground(Layer):
         )
 
     def update(self, moment: Moment) -> None:
-        """It stays."""
+        """The grid does not change."""
 
     def remove(self) -> None:
         self._grid.remove()

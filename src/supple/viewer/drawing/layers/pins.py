@@ -1,4 +1,4 @@
-"""Dots where vertices are pinned."""
+"""Pinned vertices."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class PinView(Layer):
     def update(self, moment: Moment) -> None:
         some = bool(len(moment.pinned))
         if some:
-            self._dots.points = single(moment.shown_positions[moment.pinned])
+            self._dots.points = single(moment.finite_positions[moment.pinned])
         if self._dots.visible != some:
             self._dots.visible = some
 

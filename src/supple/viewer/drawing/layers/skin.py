@@ -1,4 +1,4 @@
-"""Bodies as smooth shaded surfaces: the fine skin where there is one, else the boundary of the mesh."""
+"""Bodies as smooth shaded surfaces: the fine skin where there is one, otherwise the boundary of the mesh."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from supple.viewer.drawing.moments.model import Model, Moment
 
 
 class SkinView(Layer):
-    """One mesh for each body, or its lines only."""
+    """One mesh for each body, or only its lines."""
 
     def __init__(self, scene: Any, moment: Moment, *, lines: bool = False) -> None:
         self._parts = []
@@ -45,10 +45,10 @@ class SkinView(Layer):
 
 
 def _points(moment: Moment, body: Any, used: Any) -> Any:
-    x = moment.shown_positions[body.vertices]
+    x = moment.finite_positions[body.vertices]
     return body.skin.positions(x) if used is None else x[used]
 
 
 def drawn_points(model: Model) -> int:
-    """How many points the smooth surfaces have."""
+    """Number of points of the smooth surfaces."""
     return sum(len(np.unique(b.triangles)) if b.skin is None else len(b.skin.corners) for b in model.bodies)

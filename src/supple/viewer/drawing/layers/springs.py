@@ -1,4 +1,4 @@
-"""The hands of visitors: springs that pull at bodies, with their length, and the ball that pushes."""
+"""Grabs of visitors, as springs with their length, and the pusher."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _SPRING_COLOR, _PUSHER_COLOR = (20, 150, 70), (120, 90, 200)
 
 
 class SpringView(Layer):
-    """A line for each spring, and a label that says how long it is."""
+    """A line for each spring, and a label with its length."""
 
     def __init__(self, scene: Any, moment: Moment) -> None:
         self._scene = scene
@@ -56,7 +56,7 @@ class SpringView(Layer):
 
 
 class PusherView(Layer):
-    """The ball."""
+    """The ball of the pusher."""
 
     def __init__(self, scene: Any, moment: Moment) -> None:
         self._ball = scene.add_icosphere(
@@ -78,7 +78,7 @@ class PusherView(Layer):
 
 
 def length_text(meters: float) -> str:
-    """A length with a unit that suits it."""
+    """A length in m, cm or mm."""
     if meters >= 1.0:
         return f"{meters:.2f} m"
     return f"{100.0 * meters:.1f} cm" if meters >= 0.01 else f"{1000.0 * meters:.1f} mm"

@@ -9,7 +9,7 @@ from supple.viewer.drawing.moments.model import Moment
 
 
 class StitchView(Layer):
-    """A line for each stitch; nothing where there are none."""
+    """A line for each stitch."""
 
     def __init__(self, scene: Any, moment: Moment) -> None:
         self._handle = None

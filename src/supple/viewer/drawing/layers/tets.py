@@ -1,4 +1,4 @@
-"""Bodies as tets: colored by a number of each, pulled apart, or cut open."""
+"""Bodies as tets: colored by a field, pulled apart, or cut."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from supple.viewer.drawing.moments.model import TET_FACETS, Model, Moment
 
 @dataclass(frozen=True)
 class Cut:
-    """A plane that hides what lies beyond it at rest.
+    """A plane that hides the tets behind it at rest.
 
     Attributes
     ----------
-    axis : 0, 1 or 2; place : from 0 (everything is hidden) to 1 (nothing is), as a part of each body's extent
+    axis : 0, 1 or 2; place : from 0 (all tets are hidden) to 1 (none is hidden), as a share of the extent of each body
     """
 
     axis: int
@@ -33,8 +33,8 @@ class TetView(Layer):
 
     Parameters
     ----------
-    field : what to color by, or None for the bodies' own colors
-    explode : how far the tets are pulled apart, as a part of their distance from the body's centre; 0 shows only the
+    field : for coloring, or None for the colors of the bodies
+    explode : displacement of the tets, as a share of their distance from the center of the body; 0 draws only the
         surface
     cut : a plane that hides tets, or None
     """
@@ -54,7 +54,7 @@ class TetView(Layer):
         self.update(moment)
 
     def update(self, moment: Moment) -> None:
-        x = moment.shown_positions[self._corners]
+        x = moment.finite_positions[self._corners]
         if self._explode > 0.0:
             x = x + self._offsets(moment)[self._owner][:, None]
         if self._field is None or self._limits is None:
@@ -73,9 +73,9 @@ class TetView(Layer):
         return list(self._triangles.handles)
 
     def _offsets(self, moment: Moment) -> NDArray[np.float64]:
-        """(m, 3) how far each tet is moved away from its body's centre [m]."""
+        """(m, 3) displacement of each tet from the center of its body [m]."""
         model = moment.model
-        centers = moment.shown_positions[model.tets].mean(axis=1)
+        centers = moment.finite_positions[model.tets].mean(axis=1)
         offsets = np.empty_like(centers)
         for body in model.bodies:
             offsets[body.tets] = centers[body.tets] - centers[body.tets].mean(axis=0)
@@ -83,7 +83,7 @@ class TetView(Layer):
 
 
 def kept_tets(model: Model, cut: Cut | None) -> NDArray[np.bool_]:
-    """(m,) which tets a cut leaves; at least one of each body."""
+    """(m,) the tets that a cut does not hide; at least one of each body."""
     kept = np.ones(len(model.tets), dtype=bool)
     if cut is not None:
         for body in model.bodies:
@@ -94,7 +94,7 @@ def kept_tets(model: Model, cut: Cut | None) -> NDArray[np.bool_]:
 
 
 def outer_facets(model: Model, kept: NDArray[np.bool_]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """Facets (f, 3) between a tet that is kept and none, counter-clockwise from outside, and that tet (f,)."""
+    """Facets (f, 3) with a kept tet on one side only, counter-clockwise from outside, and this tet (f,)."""
     facets = model.facets
     inner = kept[facets.inner]
     outer = np.where(facets.outer >= 0, kept[facets.outer], False)
@@ -104,6 +104,6 @@ def outer_facets(model: Model, kept: NDArray[np.bool_]) -> tuple[NDArray[np.int3
 
 
 def exploded_facets(model: Model, kept: NDArray[np.bool_]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """All facets (f, 3) of the tets that are kept, and their tets (f,)."""
+    """All facets (f, 3) of the kept tets, and their tets (f,)."""
     rows = np.flatnonzero(kept)
     return model.tets[rows][:, TET_FACETS].reshape(-1, 3), np.repeat(rows, 4)

@@ -1,4 +1,4 @@
-"""How fast the surface moves, as arrows."""
+"""Velocities of the surface, as arrows."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from supple.viewer.drawing.layers.primitives.arrows import Arrows
 from supple.viewer.drawing.layers.primitives.layer import Layer
 from supple.viewer.drawing.moments.model import Moment
 
-_MOST = 400  # arrows; more cannot be told apart
-_HEAD = 0.04  # of an arrow, as a part of the size of the scene
-_SECONDS = 0.15  # an arrow's length is the way in this time
+_MOST = 400  # arrows; more cannot be distinguished
+_HEAD = 0.04  # length of the head of an arrow, as a share of the size of the scene
+_SECONDS = 0.15  # the length of an arrow is the distance in this time
 
 
 class VelocityView(Layer):
-    """An arrow at some vertices of the surface."""
+    """Arrows at some vertices of the surface."""
 
     def __init__(self, scene: Any, moment: Moment) -> None:
         model = moment.model
@@ -29,11 +29,11 @@ class VelocityView(Layer):
     def update(self, moment: Moment) -> None:
         if moment.velocities is None:
             return
-        start = moment.shown_positions[self._rows]
+        start = moment.finite_positions[self._rows]
         way = np.nan_to_num(_SECONDS * moment.velocities[self._rows], posinf=0.0, neginf=0.0)
         length = np.linalg.norm(way, axis=1, keepdims=True)
         way *= np.minimum(1.0, self._longest / np.maximum(length, 1e-300))
-        # Shorter than its own head, an arrow says nothing.
+        # Arrows shorter than their head are not drawn.
         way[np.linalg.norm(way, axis=1) < _HEAD * moment.model.view.radius] = 0.0
         self._arrows.update(start, start + way)
 

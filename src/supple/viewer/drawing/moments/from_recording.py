@@ -1,4 +1,4 @@
-"""Recordings as what the page draws."""
+"""Converts recordings to the data that the page draws."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MATERIALS = {kind.__name__: kind for kind in (*ELASTIC_MATERIALS, EdgesAndVolum
 
 
 def model_of_recording(recording: Recording) -> Model:
-    """What no frame of a recording changes."""
+    """The constant data of a recording."""
     colors = colors_of([body.name for body in recording.bodies])
     bodies = tuple(
         ModelBody(
@@ -50,9 +50,9 @@ def moment_of_frame(model: Model, frame: RecordedFrame) -> Moment:
 
 
 def material_from_text(text: str) -> Material | None:
-    """The material that a recording describes, such as "StableNeoHookean(youngs=1e4, ...)"; None where it is no such.
+    """The material of a text such as "StableNeoHookean(youngs=1e4, ...)"; None where the text has another form.
 
-    Only names of materials and plain numbers are understood: nothing in the text is run.
+    Only names of materials and plain numbers are accepted: nothing in the text is executed.
     """
     try:
         call = ast.parse(text, mode="eval").body
@@ -67,10 +67,10 @@ def material_from_text(text: str) -> Material | None:
 
 
 def _number(node: ast.expr) -> float:
-    """A number, plain or as NumPy writes its own: `np.float64(1.0)`."""
+    """A number, plain or as NumPy writes it: `np.float64(1.0)`."""
     if isinstance(node, ast.Call) and len(node.args) == 1 and not node.keywords:
         node = node.args[0]
     value = ast.literal_eval(node)
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise ValueError("no number")
+        raise ValueError("not a number")
     return float(value)

@@ -1,4 +1,4 @@
-"""Snapshots of a running simulation as what the page draws."""
+"""Converts snapshots of a live simulation to the data that the page draws."""
 
 from __future__ import annotations
 
@@ -15,27 +15,26 @@ from supple.output.recording.scene import RecordedObstacle
 from supple.output.recording.skinned_surface import SkinnedSurface
 from supple.scene.rotation import rotation_matrix
 from supple.viewer.drawing.moments.model import Model, ModelBody, Moment, colors_of
-from supple.viewer.engine.scene.pusher import NAME as PUSHER
-from supple.viewer.protocol.snapshots import BodyDescription, ObstacleDescription, SceneDescription, Snapshot
+from supple.viewer.protocol.snapshots import PUSHER, BodyDescription, ObstacleDescription, SceneDescription, Snapshot
 
 
-class Translator:
-    """Makes moments of snapshots. What does not change between them is made once."""
+class MomentBuilder:
+    """Converts snapshots to moments. Data that do not change are converted once."""
 
     def __init__(self) -> None:
         self._generation: int | None = None
         self._model: Model | None = None
-        self._made_of: tuple[Any, ...] = ()
+        self._key: tuple[Any, ...] = ()
         self._skins: dict[tuple[int, int], SkinnedSurface] = {}
 
     def moment(self, snapshot: Snapshot) -> Moment:
-        """What a snapshot shows."""
+        """The moment of a snapshot."""
         if self._model is None or snapshot.generation != self._generation:
             self._generation = snapshot.generation
-            # The ball of the mouse comes and goes as well, and must not interrupt a drag.
-            made_of = _made_of(snapshot.description)
-            if self._model is None or made_of != self._made_of:
-                self._model, self._made_of = self._model_of(snapshot.description), made_of
+            # The pusher also changes the generation, but a new model would interrupt a drag.
+            key = _model_key(snapshot.description)
+            if self._model is None or key != self._key:
+                self._model, self._key = self._model_of(snapshot.description), key
         rotations, translations = snapshot.obstacle_poses
         poses = np.concatenate([rotations.reshape(-1, 3, 3), translations.reshape(-1, 3, 1)], axis=2)
         poses = poses[: len(self._model.obstacles)]
@@ -65,7 +64,7 @@ class Translator:
         tets = np.concatenate([body.tets + body.vertices.start for body in scene.bodies])
         return Model(
             bodies,
-            tuple(_obstacle(obstacle) for obstacle in _lasting(scene)),
+            tuple(_obstacle(obstacle) for obstacle in _scene_obstacles(scene)),
             np.concatenate([body.rest_positions for body in scene.bodies]),
             np.ascontiguousarray(tets, dtype=np.int32),
             _view_of(scene),
@@ -73,7 +72,7 @@ class Translator:
         )
 
     def _skin_of(self, body: BodyDescription) -> SkinnedSurface | None:
-        """Which tet carries each vertex of a fine surface. A body that comes again is not searched again."""
+        """The fine surface with the tet of each of its vertices; cached, so that a body is searched once."""
         if body.skin is None:
             return None
         vertices, triangles = body.skin
@@ -84,20 +83,20 @@ class Translator:
         return self._skins[key]
 
 
-def _lasting(scene: SceneDescription) -> tuple[ObstacleDescription, ...]:
-    """The obstacles without the ball of the mouse, which comes last and is drawn on its own."""
+def _scene_obstacles(scene: SceneDescription) -> tuple[ObstacleDescription, ...]:
+    """The obstacles without the pusher, which is the last one and has its own layer."""
     some = scene.obstacles
     return some[:-1] if some and some[-1].name == PUSHER else some
 
 
-def _made_of(scene: SceneDescription) -> tuple[Any, ...]:
-    """Something that is equal for scenes that look the same, apart from where everything is."""
+def _model_key(scene: SceneDescription) -> tuple[Any, ...]:
+    """A key that is equal for scenes with the same things to draw, apart from their positions."""
     bodies = ((b.name, _fingerprint(b.rest_positions), _fingerprint(b.tets), b.skin is None) for b in scene.bodies)
-    return (*bodies, *((o.name, o.kind) for o in _lasting(scene)), _fingerprint(scene.stitches))
+    return (*bodies, *((o.name, o.kind) for o in _scene_obstacles(scene)), _fingerprint(scene.stitches))
 
 
 def _view_of(scene: SceneDescription) -> View:
-    """About the bodies as they start, and down to the floor if it is not far below them."""
+    """The view of the bodies at the start, and of the floor where it is not far below them."""
     low, high, up = np.asarray(scene.low), np.asarray(scene.high), np.asarray(scene.up)
     bodies = View(low, high, up)
     for obstacle in scene.obstacles:

@@ -1,6 +1,6 @@
-"""What the page draws, wherever it comes from: a running simulation or a recording.
+"""The data that the page draws, of a live simulation or of a recording.
 
-A `Model` is what no frame changes; a `Moment` is one frame of it. Views know these two, and neither engine nor file.
+A `Model` contains what no frame changes; a `Moment` is one frame. Layers use only these two, neither engine nor file.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from supple.output.recording.scene import RecordedObstacle
 from supple.output.recording.skinned_surface import SkinnedSurface
 from supple.output.recording.stitches import RecordedStitches
 
-# A tet's four facets, each counter-clockwise from outside.
+# The four facets of a tet, each counter-clockwise from outside.
 TET_FACETS = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 
 
@@ -30,10 +30,10 @@ class ModelBody:
     Attributes
     ----------
     name : of the body
-    vertices, tets : its rows in the model's arrays
-    triangles : (t, 3) its boundary, rows of its own vertices, counter-clockwise from outside
-    skin : a finer surface that it carries, or None
-    material : what it is made of, or None where that is not known
+    vertices, tets : its rows in the arrays of the model
+    triangles : (t, 3) its boundary, numbered in the body, counter-clockwise from outside
+    skin : a finer surface that follows its tets, or None
+    material : or None where it is not known
     color : (r, g, b) from 0 to 255
     """
 
@@ -48,16 +48,16 @@ class ModelBody:
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """Everything that stays the same from frame to frame.
+    """All data that do not change from frame to frame.
 
     Attributes
     ----------
     bodies : see `ModelBody`
-    obstacles : what bodies collide with, where it is at time 0
+    obstacles : at time 0
     rest_positions : (n, 3) [m]; tets : (m, 4) rows of them
-    view : bounds of what happens, and which way is up
-    stitches : (k, 4) a vertex, and the three of the triangle that it is stitched to
-    recorded_stitches : those of a recording, which are of more kinds
+    view : bounds of the motion, and the up direction
+    stitches : (k, 4) a vertex, and the three vertices of the triangle that it is stitched to
+    recorded_stitches : stitches of a recording, of any kind
     """
 
     bodies: tuple[ModelBody, ...]
@@ -87,7 +87,7 @@ class Model:
 
     @cached_property
     def rest_centers(self) -> NDArray[np.float64]:
-        """(m, 3) centres of the tets at rest [m]."""
+        """(m, 3) centers of the tets at rest [m]."""
         return self.rest_positions[self.tets].sum(axis=1) / 4.0
 
 
@@ -107,7 +107,7 @@ class Facets:
 
 
 def facets_of(tets: NDArray[np.int32]) -> Facets:
-    """Every facet once."""
+    """All facets, each one once."""
     triangles = tets[:, TET_FACETS].reshape(-1, 3)
     owner = np.repeat(np.arange(len(tets)), 4)
     key = np.sort(triangles, axis=1)
@@ -127,14 +127,14 @@ class Moment:
 
     Attributes
     ----------
-    model : what it is a frame of; time : [s]
+    model : its constant data; time : [s]
     positions : (n, 3) [m]; velocities : (n, 3) [m/s], or None where they are not known
-    poses : (obstacles, 3, 4) rotation and translation from where each obstacle is at time 0
-    contact_points, contact_normals : (c, 3) [m], or None where the solver does not tell
-    pinned : (p,) vertices that are held
-    springs : from a point of a body to where it is pulled, by number
+    poses : (obstacles, 3, 4) rotation and translation of each obstacle since time 0
+    contact_points, contact_normals : (c, 3) [m], or None where they are not known
+    pinned : (p,) vertices that are pinned
+    springs : point of a body and target (3,) [m], by number of the grab
     pusher : center (3,) and radius of a ball [m], or None
-    tet_values : numbers of tets (m,) that are known already, by the key of their field
+    tet_values : values of tets (m,) that the simulation sent, by the key of their field
     """
 
     model: Model
@@ -159,15 +159,15 @@ class Moment:
     @cached_property
     def stitch_segments(self) -> NDArray[np.float64]:
         """(k, 2, 3) the two ends of every stitch [m]."""
-        x, recorded = self.shown_positions, self.model.recorded_stitches
+        x, recorded = self.finite_positions, self.model.recorded_stitches
         if recorded is not None:
             return np.asarray(recorded.segments(x, self.poses))
         rows = self.model.stitches
         return np.stack([x[rows[:, 0]], x[rows[:, 1:]].mean(axis=1)], axis=1)
 
     @cached_property
-    def shown_positions(self) -> NDArray[np.float64]:
-        """(n, 3) [m], with zeros in place of what is not finite: a browser is given numbers only."""
+    def finite_positions(self) -> NDArray[np.float64]:
+        """(n, 3) [m], with zeros instead of values that are not finite, which a browser cannot read."""
         return np.nan_to_num(self.positions, posinf=0.0, neginf=0.0)
 
 

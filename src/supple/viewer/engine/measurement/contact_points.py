@@ -1,4 +1,4 @@
-"""Where bodies touch: measured on the state itself, whatever the solver."""
+"""Points at which surfaces are close to each other, computed from the state, for any solver."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from supple.system import System
 from supple.viewer.engine.scene.obstacle_distance import signed_distance
 from supple.viewer.protocol import limits
 
-# Of the mean edge of the surfaces: what counts as touching.
+# Largest distance of a contact point, as a share of the mean edge length of the surfaces.
 NEAR = 0.1
 
 
 def contact_points(system: System, positions: NDArray[np.float64], time: float) -> NDArray[np.float64]:
-    """(c, 3) points [m] where surfaces are nearer than a tenth of their mean edge; at most `MOST_CONTACT_POINTS`.
+    """(c, 3) points [m] where surfaces are closer than NEAR mean edges; at most `MOST_CONTACT_POINTS`.
 
-    Vertices of bodies on half-spaces, boxes and balls; between bodies, and on triangle obstacles, the pairs of
-    vertices, edges and triangles that IPC would see.
+    On half-spaces, boxes and spheres these are vertices of bodies. Between bodies, and on triangle obstacles, they are
+    the middles of the pairs of vertices, edges and triangles that IPC finds.
     """
     near = NEAR * _mean_edge(system)
     skin = np.unique(system.triangles)

@@ -1,4 +1,4 @@
-"""A running scene in the words of a page: its description, and the numbers of a snapshot."""
+"""Describes a live scene for the page: its description, and the measures of a snapshot."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from supple.xpbd.details import XPBDDetails
 
 
 def describe(live: LiveScene) -> SceneDescription:
-    """Everything about the scene that does not change from frame to frame."""
+    """All properties of the scene that do not change from frame to frame."""
     system, setup = live.system, live.setup
     gravity = -float(np.asarray(setup.scene.gravity) @ live.up)
     positions = live.state.positions
@@ -34,7 +34,7 @@ def describe(live: LiveScene) -> SceneDescription:
         up=live.up,
         low=positions.min(axis=0),
         high=positions.max(axis=0),
-        stitches=_stitches(system),
+        stitches=np.asarray(system.stitching.elements(), dtype=np.int32).reshape(-1, 4),
         n_vertices=len(positions),
         n_tets=len(system.tets),
         n_constraints=sum(int(made.count) for made in getattr(live.workspace, "sets", ())),
@@ -60,7 +60,7 @@ def _body(part: BodyRange, masses: NDArray[np.float64], added: frozenset[str]) -
 
 
 def _material_values(material: Any) -> dict[str, Value]:
-    """Of the material's parameters, those that a page can change: one number each."""
+    """The parameters of the material that a page can change: those that are one number."""
     values: dict[str, Value] = {}
     for field in fields(material):
         value = getattr(material, field.name)
@@ -87,14 +87,6 @@ def _obstacle(obstacle: Obstacle) -> ObstacleDescription:
             shape = {"vertices": surface.vertices, "triangles": surface.triangles.astype(np.int32)}
     name = obstacle.name or obstacle.label
     return ObstacleDescription(name, type(obstacle).__name__, shape, obstacle.motion is not None, obstacle.friction)
-
-
-def _stitches(system: System) -> NDArray[np.int32]:
-    """(k, 4) global vertices of everything that is stitched together; -1 where there is none."""
-    stitching = getattr(system, "stitching", None)
-    if stitching is None or not len(stitching):
-        return np.zeros((0, 4), dtype=np.int32)
-    return np.asarray(stitching.elements(), dtype=np.int32)
 
 
 def obstacle_poses(system: System, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

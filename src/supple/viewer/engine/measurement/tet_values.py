@@ -1,4 +1,4 @@
-"""One number per tet, to color bodies by."""
+"""One value for each tet, for coloring."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ QUANTITIES = ("J", "von_mises", "energy")
 def tet_values(system: System, positions: NDArray[np.float64], quantity: str) -> NDArray[np.float64]:
     """(m,) of every tet: "J" [-], "von_mises" stress [Pa], or "energy" density per rest volume [J/m^3].
 
-    Stress and energy are those of the body's material; 0 where it has none, as edges and volumes have no stress.
+    Stress and energy are those of the material of the body; 0 where it has none (`EdgesAndVolume` has no stress).
     """
     F = deformation_gradients(positions, system.tets, system.rest_shape_inverse)
     J = determinants(F)

@@ -1,11 +1,12 @@
-"""What each command does to a running scene."""
+"""The effect of each command on a live scene."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import fields, replace
+from fnmatch import fnmatchcase
 from functools import singledispatch
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,56 +15,56 @@ from supple.errors import CommandError
 from supple.materials.material import Material
 from supple.materials.regions import Regions
 from supple.scene.body import Body
+from supple.scene.contact_pairs import ContactPair
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.state import State
 from supple.system import BodyRange, initial_state
 from supple.viewer.engine.scene.grab_spring import make_spring
 from supple.viewer.engine.scene.live_scene import LiveScene
-from supple.viewer.engine.scene.new_bodies import body_of_mesh, check_room, free_name, new_body, place_for
+from supple.viewer.engine.scene.new_bodies import body_of_mesh, check_size, new_body, place_for, unused_name
 from supple.viewer.engine.scene.obstacle_distance import moved_out
 from supple.viewer.engine.scene.pusher import Pusher
 from supple.viewer.engine.scene.solvers import SOLVERS, kind_of, with_value
-from supple.viewer.protocol import commands as say
-from supple.viewer.protocol import limits
+from supple.viewer.protocol import commands, limits
 from supple.viewer.protocol.parameters import find_parameter
 from supple.viewer.protocol.snapshots import Value
 
-# Of the mean edge: how far from obstacles vertices are when the implicit solver takes over.
+# Distance between vertices and obstacles at a change to the implicit solver, as a share of the mean edge length.
 CLEARANCE = 1e-3
 
 
 @singledispatch
-def change(command: say.Command, live: LiveScene) -> None:
-    """Do to the scene what a command says.
+def change(command: commands.Command, live: LiveScene) -> None:
+    """Execute a command on the scene.
 
     Raises
     ------
-    SuppleError : where that is impossible; nothing is changed then.
+    SuppleError : where this is impossible; then nothing is changed.
     """
-    raise CommandError(f"a scene does not know the command {type(command).__name__}")
+    raise CommandError(f"a scene cannot execute the command {type(command).__name__}")
 
 
 @change.register
-def _(command: say.Reset, live: LiveScene) -> None:
+def _(command: commands.Reset, live: LiveScene) -> None:
     live.reset()
 
 
 @change.register
-def _(command: say.SetSolver, live: LiveScene) -> None:
+def _(command: commands.SetSolver, live: LiveScene) -> None:
     if kind_of(live.setup.solver) == command.kind:
         return
     setup = replace(live.setup, solver=live.solvers.get(command.kind) or SOLVERS[command.kind]())
     if command.kind == "xpbd":
         live.adopt(setup)
     else:
-        live.adopt_tried(setup, clear_of_obstacles(live))
+        live.adopt_checked(setup, clear_of_obstacles(live))
 
 
 def clear_of_obstacles(live: LiveScene) -> State | None:
-    """The state with all vertices a little off the obstacles, for a solver that knows no touching; None: as it is.
+    """The state with a small gap between vertices and obstacles, for a solver that needs a distance above zero.
 
-    XPBD leaves vertices right on an obstacle, or a little inside. A thousandth of an edge is enough to begin with.
+    XPBD leaves vertices exactly on an obstacle, or slightly inside. Returns None where nothing has to be moved.
     """
     system, state = live.system, live.state
     gap = CLEARANCE * float(system.rest_lengths.mean())
@@ -76,11 +77,11 @@ def clear_of_obstacles(live: LiveScene) -> State | None:
 
 
 @change.register
-def _(command: say.SetParameter, live: LiveScene) -> None:
+def _(command: commands.SetParameter, live: LiveScene) -> None:
     setup, scene = live.setup, live.setup.scene
     match find_parameter(command.name).owner:
         case "solver":
-            live.adopt_tried(replace(setup, solver=with_value(setup.solver, command.name, command.value)))
+            live.adopt_checked(replace(setup, solver=with_value(setup.solver, command.name, command.value)))
         case "scene" if command.name == "dt":
             live.adopt(replace(setup, dt=float(command.value)))
         case "scene":
@@ -89,12 +90,12 @@ def _(command: say.SetParameter, live: LiveScene) -> None:
             live.adopt(replace(setup, scene=_with_body_value(live, command)))
 
 
-def _with_body_value(live: LiveScene, command: say.SetParameter) -> Scene:
+def _with_body_value(live: LiveScene, command: commands.SetParameter) -> Scene:
     scene = live.setup.scene
     if command.body is not None:
         _part(live, command.body)
     bodies = [
-        _tuned(body, command.name, command.value) if command.body in (None, body.name) else None
+        _with_value(body, command.name, command.value) if command.body in (None, body.name) else None
         for body in scene.bodies
     ]
     if not any(bodies):
@@ -105,83 +106,82 @@ def _with_body_value(live: LiveScene, command: say.SetParameter) -> Scene:
     if command.name == "friction" and command.body is None:
         obstacles = [replace(obstacle, friction=float(command.value)) for obstacle in obstacles]
     return replace(
-        scene,
-        bodies=[new or old for new, old in zip(bodies, scene.bodies, strict=True)],
-        obstacles=obstacles,
+        scene, bodies=[new or old for new, old in zip(bodies, scene.bodies, strict=True)], obstacles=obstacles
     )
 
 
-def _tuned(body: Body, name: str, value: Value) -> Body | None:
-    """The body with that value, or None where it has no such parameter."""
+def _with_value(body: Body, name: str, value: Value) -> Body | None:
+    """The body with this value, or None where it has no such parameter."""
     if name == "friction":
         return replace(body, friction=float(value))
-    material = _tuned_material(body.material, name, float(value))
+    material = _material_with_value(body.material, name, float(value))
     return None if material is None else replace(body, material=material)
 
 
-def _tuned_material(material: Material, name: str, value: float) -> Material | None:
+def _material_with_value(material: Material, name: str, value: float) -> Material | None:
     if isinstance(material, Regions):
-        return replace(material, materials=[_tuned_material(each, name, value) or each for each in material.materials])
+        materials = [_material_with_value(each, name, value) or each for each in material.materials]
+        return replace(material, materials=materials)
     if name not in {field.name for field in fields(material)}:
         return None
     return replace(material, **{name: value})
 
 
 @change.register
-def _(command: say.Grab, live: LiveScene) -> None:
+def _(command: commands.Grab, live: LiveScene) -> None:
     part = _part(live, command.body)
     others = {number: spring for number, spring in live.setup.grabs.items() if number != command.grab}
     if len(others) >= limits.MOST_GRABS:
-        raise CommandError(f"there are {len(others)} hands on the scene already; let one go first")
+        raise CommandError(f"there are {len(others)} grabs already; release one first")
     spring = make_spring(command, live.setup.scene, part, live.system.masses, live.state.positions)
     live.adopt(replace(live.setup, grabs={**others, command.grab: spring}))
 
 
 @change.register
-def _(command: say.MoveGrab, live: LiveScene) -> None:
+def _(command: commands.MoveGrab, live: LiveScene) -> None:
     spring = live.setup.grabs.get(command.grab)
-    if spring is not None:  # else let go meanwhile, by a reset for instance
+    if spring is not None:  # otherwise it was removed meanwhile, for example by a reset
         spring.target[:] = command.target
 
 
 @change.register
-def _(command: say.ReleaseGrab, live: LiveScene) -> None:
+def _(command: commands.ReleaseGrab, live: LiveScene) -> None:
     grabs = dict(live.setup.grabs)
     if grabs.pop(command.grab, None) is not None:
         live.adopt(replace(live.setup, grabs=grabs))
 
 
 @change.register
-def _(command: say.Pin, live: LiveScene) -> None:
+def _(command: commands.Pin, live: LiveScene) -> None:
     part = _part(live, command.body)
     if command.vertex >= len(part.body.mesh.vertices):
         raise CommandError(f"body {part.name!r} has no vertex {command.vertex}")
     if part.vertices.start + command.vertex in live.system.pinned_vertices:
         return
-    pins = dict(live.setup.hand_pins)
+    pins = dict(live.setup.page_pins)
     if len(pins) >= limits.MOST_PINS:
-        raise CommandError(f"{len(pins)} vertices are pinned by hand already; unpin some first")
-    pins[command.body, command.vertex] = Pin(command.body, [command.vertex], name="by hand")
-    live.adopt(replace(live.setup, hand_pins=pins))
+        raise CommandError(f"{len(pins)} vertices are pinned on the page already; unpin some first")
+    pins[command.body, command.vertex] = Pin(command.body, [command.vertex], name="page")
+    live.adopt(replace(live.setup, page_pins=pins))
 
 
 @change.register
-def _(command: say.Unpin, live: LiveScene) -> None:
+def _(command: commands.Unpin, live: LiveScene) -> None:
     setup = live.setup
     if command.body is None or command.vertex is None:
-        if setup.hand_pins:
-            live.adopt(replace(setup, hand_pins={}))
+        if setup.page_pins:
+            live.adopt(replace(setup, page_pins={}))
         return
     part = _part(live, command.body)
-    if (command.body, command.vertex) in setup.hand_pins:
-        left = {key: pin for key, pin in setup.hand_pins.items() if key != (command.body, command.vertex)}
-        live.adopt(replace(setup, hand_pins=left))
+    if (command.body, command.vertex) in setup.page_pins:
+        left = {key: pin for key, pin in setup.page_pins.items() if key != (command.body, command.vertex)}
+        live.adopt(replace(setup, page_pins=left))
         return
-    _take_from_pin(live, part, command.vertex)
+    _remove_from_pin(live, part, command.vertex)
 
 
-def _take_from_pin(live: LiveScene, part: BodyRange, vertex: int) -> None:
-    """Take a vertex out of one of the scene's own pins."""
+def _remove_from_pin(live: LiveScene, part: BodyRange, vertex: int) -> None:
+    """Remove a vertex from one of the pins of the scene."""
     row = part.vertices.start + vertex
     held = next((held for held in live.system.pins if row in held.vertices), None)
     if held is None:
@@ -198,22 +198,22 @@ def _take_from_pin(live: LiveScene, part: BodyRange, vertex: int) -> None:
 
 
 @change.register
-def _(command: say.MovePusher, live: LiveScene) -> None:
+def _(command: commands.MovePusher, live: LiveScene) -> None:
     pusher = live.setup.pusher
     if pusher is not None and pusher.radius == command.radius:
-        pusher.wanted[:] = command.center
+        pusher.target[:] = command.center
         return
-    live.adopt_tried(replace(live.setup, pusher=Pusher(np.array(command.center), command.radius)))
+    live.adopt_checked(replace(live.setup, pusher=Pusher(np.array(command.center), command.radius)))
 
 
 @change.register
-def _(command: say.RemovePusher, live: LiveScene) -> None:
+def _(command: commands.RemovePusher, live: LiveScene) -> None:
     if live.setup.pusher is not None:
         live.adopt(replace(live.setup, pusher=None))
 
 
 @change.register
-def _(command: say.Squash, live: LiveScene) -> None:
+def _(command: commands.Squash, live: LiveScene) -> None:
     pinned = set(live.system.pinned_vertices.tolist())
     free = [
         part.vertices
@@ -226,13 +226,13 @@ def _(command: say.Squash, live: LiveScene) -> None:
     x, v = live.state.positions.copy(), live.state.velocities.copy()
     x[rows] = flattened(x[rows], live.up, command.factor)
     v[rows] = 0.0
-    live.adopt_tried(live.setup, State(live.state.time, x, v))
+    live.adopt_checked(live.setup, State(live.state.time, x, v))
 
 
 def flattened(points: NDArray[np.float64], up: NDArray[np.float64], factor: float) -> NDArray[np.float64]:
-    """Points (k, 3) pressed to `factor` of their height along `up`, about the lowest, and widened by 1 / sqrt(factor).
+    """Points (k, 3) with their height along `up`, above the lowest one, times `factor`, and their width / sqrt(factor).
 
-    One linear map for all, of determinant 1: no tet changes its volume, and bodies that did not touch do not.
+    One linear map of determinant 1 for all points: no tet changes its volume, and separate bodies stay separate.
     """
     heights = points @ up
     low = heights.min()
@@ -242,24 +242,24 @@ def flattened(points: NDArray[np.float64], up: NDArray[np.float64], factor: floa
 
 
 @change.register
-def _(command: say.AddBody, live: LiveScene) -> None:
+def _(command: commands.AddBody, live: LiveScene) -> None:
     _add(live, new_body(command, live.setup.scene, live.state.positions, live.up))
 
 
 @change.register
-def _(command: say.AddMesh, live: LiveScene) -> None:
+def _(command: commands.AddMesh, live: LiveScene) -> None:
     _add(live, body_of_mesh(command, live.setup.scene, live.state.positions, live.up))
 
 
 @change.register
-def _(command: say.CopyBody, live: LiveScene) -> None:
+def _(command: commands.CopyBody, live: LiveScene) -> None:
     body = _part(live, command.body).body
     place = place_for(body.mesh, command.position, live.state.positions, live.up)
     _add(
         live,
         replace(
             body,
-            name=free_name(live.setup.scene, re.sub(r" \d+$", "", body.name)),  # a copy of "ball 1" is "ball 2"
+            name=unused_name(live.setup.scene, re.sub(r" \d+$", "", body.name)),  # a copy of "ball 1" is named "ball 2"
             position=place,
             rotation=np.zeros(3),
             velocity=np.zeros(3),
@@ -270,7 +270,7 @@ def _(command: say.CopyBody, live: LiveScene) -> None:
 
 def _add(live: LiveScene, body: Body) -> None:
     scene = live.setup.scene
-    check_room(scene, body.mesh)
+    check_size(scene, body.mesh)
     grown = replace(scene, bodies=(*scene.bodies, body))
     alone = initial_state(Scene([body]))
     state = State(
@@ -278,21 +278,21 @@ def _add(live: LiveScene, body: Body) -> None:
         np.concatenate([live.state.positions, alone.positions]),
         np.concatenate([live.state.velocities, alone.velocities]),
     )
-    live.adopt_tried(replace(live.setup, scene=grown, added=live.setup.added | {body.name}), state)
+    live.adopt_checked(replace(live.setup, scene=grown, added=live.setup.added | {body.name}), state)
 
 
 @change.register
-def _(command: say.RemoveBody, live: LiveScene) -> None:
+def _(command: commands.RemoveBody, live: LiveScene) -> None:
     part, setup = _part(live, command.body), live.setup
     if len(setup.scene.bodies) == 1:
-        raise CommandError(f"body {part.name!r} is the only one; a scene needs one")
+        raise CommandError(f"body {part.name!r} is the only one; add another body first")
     keep = np.ones(len(live.state.positions), dtype=bool)
     keep[part.vertices] = False
     state = State(live.state.time, live.state.positions[keep], live.state.velocities[keep])
     smaller = replace(
         setup,
         scene=without_body(setup.scene, part.name),
-        hand_pins={key: pin for key, pin in setup.hand_pins.items() if key[0] != part.name},
+        page_pins={key: pin for key, pin in setup.page_pins.items() if key[0] != part.name},
         grabs={number: spring for number, spring in setup.grabs.items() if spring.command.body != part.name},
         added=setup.added - {part.name},
     )
@@ -300,30 +300,28 @@ def _(command: say.RemoveBody, live: LiveScene) -> None:
 
 
 def without_body(scene: Scene, name: str) -> Scene:
-    """The scene without a body, and without everything that names it: pins, forces, springs, stitches."""
-    changes: dict[str, Any] = {"bodies": [body for body in scene.bodies if body.name != name]}
-    for field in fields(scene):
-        items = getattr(scene, field.name)
-        if field.name not in ("bodies", "obstacles", "gravity") and isinstance(items, tuple):
-            left = [_without_name(item, name) for item in items]
-            changes[field.name] = [item for item in left if item is not None]
-    return replace(scene, **changes)
+    """The scene without a body and what refers to it: pins, forces, soft targets, stitches, contact pairs."""
+    bodies = [body for body in scene.bodies if body.name != name]
+    return replace(
+        scene,
+        bodies=bodies,
+        pins=[pin for pin in scene.pins if pin.body != name],
+        forces=[force for force in scene.forces if force.body != name],
+        soft_targets=[target for target in scene.soft_targets if target.body != name],
+        stitches=[stitch for stitch in scene.stitches if name not in (stitch.first, stitch.second)],
+        contact_pairs=_pairs_among([thing.name for thing in (*bodies, *scene.obstacles)], scene.contact_pairs),
+    )
 
 
-def _without_name(item: Any, body: str) -> Any | None:
-    """A part of a scene without that body: None where it names it, less that name where it names several."""
-    changes: dict[str, Any] = {}
-    for field in fields(item):
-        value = getattr(item, field.name)
-        if field.name == "name" or not field.init:
-            continue
-        if isinstance(value, str) and value == body:
-            return None
-        if isinstance(value, tuple) and body in [each for each in value if isinstance(each, str)]:
-            changes[field.name] = tuple(each for each in value if each != body)
-            if not changes[field.name]:
-                return None
-    return replace(item, **changes) if changes else item
+def _pairs_among(things: Sequence[str | None], pairs: Sequence[ContactPair]) -> list[ContactPair]:
+    """The contact pairs without the names and patterns that match none of these bodies and obstacles."""
+
+    def known(names: str | Sequence[str]) -> list[str]:
+        patterns = {name: name.replace("[", "[[]") for name in names}  # only `*` and `?` are special
+        return [name for name, pattern in patterns.items() if any(fnmatchcase(str(each), pattern) for each in things)]
+
+    sides = [(pair, known(pair.first), known(pair.second)) for pair in pairs]
+    return [replace(pair, first=first, second=second) for pair, first, second in sides if first and second]
 
 
 def _part(live: LiveScene, name: str) -> BodyRange:

@@ -1,4 +1,4 @@
-"""Hands of the person at the page: springs that pull on a patch of a body's surface."""
+"""Grabs: springs that pull at a patch of the surface of a body."""
 
 from __future__ import annotations
 
@@ -16,26 +16,25 @@ from supple.viewer.protocol import limits
 from supple.viewer.protocol.commands import Grab
 from supple.viewer.protocol.snapshots import GrabState
 
-# A body that hangs on one spring swings at this frequency [Hz], or faster where it would sag by more than SAG of its
-# diagonal.
+# A body that hangs on one spring oscillates at this frequency [Hz], or faster where it would sag by more than SAG of
+# its diagonal.
 FREQUENCY, SAG = 4.0, 0.05
-# Radius of the patch that is held, of the body's diagonal. One vertex alone would be pulled out as a spike.
+# Radius of the patch, as a share of the diagonal of the body. A single vertex would be pulled out as a spike.
 PATCH = 0.06
 
 
 @dataclass(eq=False)
 class GrabSpring:
-    """One grab. The spring pulls at the point p = sum w_i x_i with k |target - p|, shared equally by the patch.
+    """One grab. The spring pulls at the point p = sum w_i x_i with k |target - p|, distributed equally to the patch.
 
-    In every step each vertex of the patch is drawn towards x_i + (target - p), with x_i and p as the step begins. So
-    the force turns with the body, no torque comes of it, and the motion of the patch is damped a little: like a spring
-    with a dashpot of k dt.
+    In every step each vertex of the patch is pulled towards x_i + (target - p), with x_i and p at the start of the
+    step. So the force causes no torque about p, and the motion of the patch is slightly damped, as by a dashpot k dt.
 
     Attributes
     ----------
-    command : what was asked for; target : where it pulls to now [m]
-    patch : (k,) vertices of the body that are held; stiffness : of all of it [N/m]
-    longest : how far the target may draw [m]
+    command : the command that created it; target : (3,) its present target [m]
+    patch : (k,) vertices of the body that it pulls at; stiffness : total [N/m]
+    longest : largest distance over which it pulls [m]
     """
 
     command: Grab
@@ -60,11 +59,11 @@ class GrabSpring:
         return self._displacements
 
     def point(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(3,) where the spring is fastened, from the body's vertices (n, 3) [m]."""
+        """(3,) the point to which the spring is attached, from the vertices (n, 3) of the body [m]."""
         return np.asarray(self.command.weights) @ positions[list(self.command.vertices)]
 
     def pull(self, positions: NDArray[np.float64], anchors: NDArray[np.float64]) -> None:
-        """Set the springs for the coming step.
+        """Set the displacements of the soft target for the next step.
 
         Parameters
         ----------
@@ -77,7 +76,7 @@ class GrabSpring:
         self._displacements = positions[self.patch] + way - anchors
 
     def state(self, positions: NDArray[np.float64]) -> GrabState:
-        """The spring to draw, with the body's vertices (n, 3) [m]."""
+        """The spring to draw, with the vertices (n, 3) of the body [m]."""
         point, target = self.point(positions).tolist(), self.target.tolist()
         return GrabState(self.command.grab, self.command.body, tuple(point), tuple(target))
 
@@ -89,7 +88,7 @@ def make_spring(
 
     Parameters
     ----------
-    part : the body's rows; masses : (n,) [kg] and positions : (n, 3) [m] of the whole system
+    part : rows of the body; masses : (n,) [kg] and positions : (n, 3) [m] of the whole system
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The scene behind a page while it runs: what a person may change, the state, and what solvers made of both."""
+"""The scene of a live page: its setup, which commands change, its state, and the data of the solver."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from supple.solver import Solver
 from supple.state import State, Status, StepReport
 from supple.system import System, initial_state
 from supple.viewer.engine.scene.grab_spring import GrabSpring
-from supple.viewer.engine.scene.new_bodies import with_room
+from supple.viewer.engine.scene.new_bodies import moved_apart
 from supple.viewer.engine.scene.pusher import Pusher
 from supple.viewer.engine.scene.solvers import kind_of
 from supple.viewer.protocol.live_source import LiveSource
@@ -33,40 +33,40 @@ class Setup:
 
     Attributes
     ----------
-    scene : without hands, pusher and pins by hand; those are
-    hand_pins : by body and vertex; grabs : by number; pusher : or None
-    added : names of bodies that a page added
+    scene : without what the page adds to it:
+    page_pins : pins made on the page, by body and vertex; grabs : by number; pusher : or None
+    added : names of bodies that were added on the page
     """
 
     scene: Scene
     solver: Solver
     dt: float
-    hand_pins: Mapping[tuple[str, int], Pin] = field(default_factory=lambda: MappingProxyType({}))
+    page_pins: Mapping[tuple[str, int], Pin] = field(default_factory=lambda: MappingProxyType({}))
     grabs: Mapping[int, GrabSpring] = field(default_factory=lambda: MappingProxyType({}))
     pusher: Pusher | None = None
     added: frozenset[str] = frozenset()
 
     def whole_scene(self) -> Scene:
-        """The scene with everything that the page has put into it."""
-        if not self.hand_pins and not self.grabs and self.pusher is None:
+        """The scene with pins, grabs and pusher of the page."""
+        if not self.page_pins and not self.grabs and self.pusher is None:
             return self.scene
         return replace(
             self.scene,
-            pins=(*self.scene.pins, *self.hand_pins.values()),
+            pins=(*self.scene.pins, *self.page_pins.values()),
             soft_targets=(*self.scene.soft_targets, *(spring.soft_target for spring in self.grabs.values())),
             obstacles=(*self.scene.obstacles, *([self.pusher.obstacle] if self.pusher else [])),
         )
 
 
 class LiveScene:
-    """A running simulation that can be changed between two steps. A change that cannot be made changes nothing.
+    """A running simulation that can be changed between two steps. A change that fails has no effect.
 
     Attributes
     ----------
-    setup, state : see `Setup` and `State`; frame : steps since the start
+    setup, state : see `Setup` and `State`; frame : number of steps since the start
     system, workspace : of the present setup
-    solvers : by kind, as they were last used
-    starts : by body name, (n, 3) of bodies that start deformed; pins : those of the scene itself
+    solvers : by kind, with the settings used last
+    starts : by body name, (n, 3) of bodies with deformed initial positions; pins : those of the source
     report : of the last step
     generation, revision : see `SceneDescription`
 
@@ -88,30 +88,25 @@ class LiveScene:
         self.adopt(Setup(source.scene, source.solver, source.dt), initial_state(source.scene, self.starts), anchors={})
 
     def adopt(self, setup: Setup, state: State | None = None, anchors: Anchors | None = None) -> None:
-        """Go on with another setup.
+        """Continue with another setup. The memory of the present state is kept: a solver ignores that of another one.
 
         Parameters
         ----------
-        state : to go on from, where it is not the present one.
-        anchors : where pins and soft targets hold, of those that are kept; None keeps all.
+        state : to continue from, where it is not the present one.
+        anchors : positions at which pins and soft targets hold, for those that are kept; None keeps all.
 
         Raises
         ------
-        SuppleError : where the setup cannot be simulated from that state; nothing is changed then.
+        SuppleError : where the setup cannot be simulated from this state; then nothing is changed.
         """
         state = self.state if state is None else state
         kept = self._anchors if anchors is None else anchors
         scene = setup.whole_scene()
         frame = first_frame(scene, state)
         system = _anchored(frame.system, kept)
-        begun = hasattr(self, "setup")
-        same = begun and (setup.solver, setup.dt) == (self.setup.solver, self.setup.dt) and state is self.state
-        if not same and state.memory is not None:
-            # What a multi-step integrator remembers is its own, and of this state.
-            state = replace(state, memory=None)
         workspace = setup.solver.prepare(system)
         setup.solver.check(system, state, workspace)
-        if not begun or not _looks_same(self.system.scene, scene):
+        if not hasattr(self, "setup") or _shapes(self.system.scene) != _shapes(scene):
             self.generation += 1
         self.revision += 1
         self.setup, self.state, self.system, self.workspace = setup, state, system, workspace
@@ -120,34 +115,41 @@ class LiveScene:
         }
         self.solvers[kind_of(setup.solver)] = setup.solver
 
-    def adopt_tried(self, setup: Setup, state: State | None = None, anchors: Anchors | None = None) -> None:
-        """The same, for changes after which a solver that never lets surfaces meet might not be able to take a step.
+    def adopt_checked(self, setup: Setup, state: State | None = None, anchors: Anchors | None = None) -> None:
+        """The same as `adopt`, after a trial step: a solver that allows no intersection may be unable to take a step.
 
         Raises
         ------
-        SuppleError : where the first step would fail; nothing is changed then.
+        SuppleError : where the first step would fail; then nothing is changed.
         """
         before = dict(vars(self))
         self.adopt(setup, state, anchors)
-        if kind_of(setup.solver) == "xpbd":  # goes on from anywhere
+        if kind_of(setup.solver) == "xpbd":  # takes steps from any state
             return
         try:
             _, report = setup.solver.step(self.system, self.state, setup.dt, self.workspace)
             if not report.status.can_go_on:
                 raise SolverError(
-                    f"the solver {kind_of(setup.solver)} cannot go on from there: {report.message or report.status}"
+                    f"the solver {kind_of(setup.solver)} cannot start from there: {report.message or report.status}"
                 )
         except BaseException:
             vars(self).update(before)
             raise
-        self.renew()  # the step that was tried has left its traces
+        self.prepare_workspace()  # the trial step has changed the workspace
 
-    def renew(self) -> None:
-        """Prepare the workspace anew, after a step that was tried, or given up."""
+    def prepare_workspace(self) -> None:
+        """Prepare a new workspace, after a step that was not completed."""
         self.workspace = self.setup.solver.prepare(self.system)
 
+    def warm_up(self) -> None:
+        """Take one step and discard it, so that compiled kernels are loaded before a person waits for them."""
+        state = self.state
+        self.step()
+        self.frame = 0
+        self.adopt(self.setup, state)
+
     def step(self) -> StepReport:
-        """Simulate one frame. Where that fails, the state stays as it was, and the report says why."""
+        """Simulate one frame. Where this fails, the state does not change, and the report contains the reason."""
         setup = self.setup
         if setup.pusher is not None:
             setup.pusher.begin_step(self.state.time, setup.dt)
@@ -155,7 +157,7 @@ class LiveScene:
             spring.pull(self.body_positions(spring.command.body), self._anchors[spring.soft_target])
         state, report = self._stepped()
         if not report.status.can_go_on and setup.pusher is not None and setup.pusher.moves:
-            setup.pusher.stay()  # where it cannot press any further
+            setup.pusher.stay()  # it is blocked
             state, report = self._stepped()
         self.report = report
         if report.status.can_go_on:
@@ -172,15 +174,15 @@ class LiveScene:
         return state, report
 
     def reset(self) -> None:
-        """Back to the start, with the bodies that are there now, and the parameters and solver as they are.
+        """Return to the start, with the present bodies, parameters and solver.
 
-        Bodies that were added stay where they were added; where another one has its start there, they move above all.
+        Added bodies return to where they were added. Where another body starts there, they are placed above all bodies.
         """
         names = {body.name for body in self.setup.scene.bodies}
         scene = replace(self.setup.scene, pins=tuple(pin for pin in self.pins if pin.body in names))
         starts = {name: start for name, start in self.starts.items() if name in names}
-        scene = with_room(scene, self.setup.added, starts, self.up)
-        self.adopt_tried(
+        scene = moved_apart(scene, self.setup.added, starts, self.up)
+        self.adopt_checked(
             Setup(scene, self.setup.solver, self.setup.dt, added=self.setup.added),
             initial_state(scene, starts),
             anchors={},
@@ -195,26 +197,23 @@ class LiveScene:
 
     @property
     def up(self) -> NDArray[np.float64]:
-        """(3,) unit vector against gravity; where there was never any, along y."""
+        """(3,) unit vector against the gravity of the source; along y where that is zero."""
         gravity = np.asarray(self.source.scene.gravity)
         size = np.linalg.norm(gravity)
         return -gravity / size if size > 0.0 else np.array([0.0, 1.0, 0.0])
 
 
 def _anchored(system: System, kept: Anchors) -> System:
-    """The system, with pins and soft targets that were there before holding exactly where they held then."""
+    """The system, in which pins and soft targets that existed before keep their exact anchors."""
     pins = tuple(replace(held, anchors=kept.get(held.pin, held.anchors)) for held in system.pins)
     softs = tuple(replace(soft, anchors=kept.get(soft.target, soft.anchors)) for soft in system.soft_targets)
     return replace(system, pins=pins, soft_targets=softs)
 
 
-def _looks_same(old: Scene, new: Scene) -> bool:
-    """Whether what is drawn of two scenes has the same shapes."""
-    bodies = [(body.name, body.mesh, body.skin) for body in old.bodies]
-    obstacles = [(type(obstacle), obstacle.name, obstacle.motion) for obstacle in old.obstacles]
-    return bodies == [(body.name, body.mesh, body.skin) for body in new.bodies] and obstacles == [
-        (type(obstacle), obstacle.name, obstacle.motion) for obstacle in new.obstacles
-    ]
+def _shapes(scene: Scene) -> list[tuple[Any, ...]]:
+    """The shapes to draw, as a key for comparison."""
+    bodies = [(body.name, body.mesh, body.skin) for body in scene.bodies]
+    return [*bodies, *((type(obstacle), obstacle.name, obstacle.motion) for obstacle in scene.obstacles)]
 
 
 def _is_finite(state: State) -> bool:

@@ -1,4 +1,4 @@
-"""Bodies that a page adds: made from a few numbers, and placed where there is room."""
+"""Creates the bodies that are added on the page, and places them in free space."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from supple.scene.scene import Scene
 from supple.viewer.protocol import limits
 from supple.viewer.protocol.commands import AddBody, AddMesh, Point
 
-# Of the new body's height: the gap to what is below.
+# Gap below a new body, as a share of its height.
 GAP = 0.1
-# Of new bodies.
+# Material values of new bodies.
 _DAMPING, _FRICTION = 0.005, 0.3
 
 
 def make_mesh(shape: str, size: float, resolution: int) -> TetMesh:
-    """The mesh of a whitelisted shape, `size` [m] across, with `resolution` edges across it."""
+    """The mesh of one of `limits.SHAPES`, of `size` [m], with `resolution` edges across it."""
     edge = size / resolution
     match shape:
         case "box":
@@ -42,17 +42,17 @@ def make_mesh(shape: str, size: float, resolution: int) -> TetMesh:
 
 
 def new_body(command: AddBody, scene: Scene, positions: NDArray[np.float64], up: NDArray[np.float64]) -> Body:
-    """The body that a command describes, above `positions` (n, 3) [m] unless it names a place."""
+    """The body that a command describes, above `positions` (n, 3) [m] where the command gives no position."""
     mesh = make_mesh(command.shape, command.size, command.resolution)
     material = StableNeoHookean(
         youngs=command.youngs, poisson=command.poisson, density=command.density, damping=_DAMPING
     )
-    name = command.name if command.name is not None else free_name(scene, command.shape.replace("_", " "))
+    name = command.name if command.name is not None else unused_name(scene, command.shape.replace("_", " "))
     return Body(name, mesh, material, position=place_for(mesh, command.position, positions, up), friction=_FRICTION)
 
 
 def body_of_mesh(command: AddMesh, scene: Scene, positions: NDArray[np.float64], up: NDArray[np.float64]) -> Body:
-    """The body that a command brings the mesh of, above `positions` (n, 3) [m].
+    """A body with the mesh of a command, above `positions` (n, 3) [m].
 
     Raises
     ------
@@ -61,17 +61,17 @@ def body_of_mesh(command: AddMesh, scene: Scene, positions: NDArray[np.float64],
     mesh = TetMesh(command.vertices, command.tets)
     material = StableNeoHookean(youngs=command.youngs, poisson=0.45, density=1000.0, damping=_DAMPING)
     place = place_for(mesh, None, positions, up)
-    return Body(free_name(scene, command.name), mesh, material, position=place, friction=_FRICTION)
+    return Body(unused_name(scene, command.name), mesh, material, position=place, friction=_FRICTION)
 
 
 def place_for(
-    mesh: TetMesh, wanted: Point | None, positions: NDArray[np.float64], up: NDArray[np.float64]
+    mesh: TetMesh, position: Point | None, positions: NDArray[np.float64], up: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Where to place a mesh's origin: its box's center at `wanted`, or the whole of it above all `positions` (n, 3)."""
+    """Position of the origin of a mesh: its box is centered at `position`, or is above all `positions` (n, 3) [m]."""
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     center = 0.5 * (low + high)
-    if wanted is not None:
-        return np.asarray(wanted) - center
+    if position is not None:
+        return np.asarray(position) - center
     middle = 0.5 * (positions.min(axis=0) + positions.max(axis=0))
     heights = mesh.vertices @ up
     reach = float(heights.max() - heights.min())
@@ -79,31 +79,31 @@ def place_for(
     return middle - center + (top - heights.min() - (middle - center) @ up) * up
 
 
-def free_name(scene: Scene, stem: str) -> str:
-    """`stem` with the first number that no body's name has."""
-    taken = {body.name for body in scene.bodies}
-    return next(f"{stem} {k}" for k in itertools.count(1) if f"{stem} {k}" not in taken)
+def unused_name(scene: Scene, stem: str) -> str:
+    """`stem` with the first number that gives an unused name."""
+    used = {body.name for body in scene.bodies}
+    return next(f"{stem} {k}" for k in itertools.count(1) if f"{stem} {k}" not in used)
 
 
-def check_room(scene: Scene, mesh: TetMesh) -> None:
-    """Raise `CommandError` where another body with that mesh would be too much for a live page."""
+def check_size(scene: Scene, mesh: TetMesh) -> None:
+    """Raise `CommandError` where another body with this mesh exceeds the limits of a live page."""
     if len(scene.bodies) >= limits.MOST_BODIES:
         raise CommandError(f"there are {len(scene.bodies)} bodies already; remove one first")
     total = len(mesh.tets) + sum(len(body.mesh.tets) for body in scene.bodies)
     if total > limits.MOST_TETS:
         raise CommandError(
-            f"that would make {total} tets; a live page has at most {limits.MOST_TETS}: lower the resolution"
+            f"the scene would have {total} tets; a live page allows at most {limits.MOST_TETS}: lower the resolution"
         )
 
 
-def with_room(
+def moved_apart(
     scene: Scene, added: frozenset[str], starts: Mapping[str, NDArray[np.float64]], up: NDArray[np.float64]
 ) -> Scene:
-    """The scene with those of its `added` bodies that would start inside another one's box placed above everything.
+    """The scene in which `added` bodies that would start inside the box of another body are placed above all bodies.
 
     Parameters
     ----------
-    starts : by body name, (n, 3) of bodies that do not start as they are placed [m]
+    starts : by body name, (n, 3) deformed initial positions [m]
     """
     places = [starts.get(body.name, body.place(body.mesh.vertices)) for body in scene.bodies if body.name not in added]
     bodies = []

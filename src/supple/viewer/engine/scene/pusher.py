@@ -1,4 +1,4 @@
-"""The pusher: a solid ball that follows the pointer, and reaches it as fast as contact can bear."""
+"""The pusher: a solid ball that follows the pointer, with a limited speed."""
 
 from __future__ import annotations
 
@@ -6,28 +6,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.scene.obstacles import Sphere
+from supple.viewer.protocol.snapshots import PUSHER
 
-NAME = "pusher"
-# Of its radius: how far it moves in one step at most, so that it pushes vertices rather than jumping over them.
+# Longest motion in one step, as a share of the radius: otherwise the ball could jump over vertices.
 STRIDE = 0.25
 
 
 class Pusher:
-    """A ball on its way to `wanted` (3,) [m].
+    """A ball that moves to `target` (3,) [m].
 
     Attributes
     ----------
-    center : (3,) where it is at the beginning of the coming step [m]; radius : [m]
+    center : (3,) at the start of the next step [m]; radius : [m]
     """
 
     def __init__(self, center: NDArray[np.float64], radius: float, friction: float = 0.5) -> None:
         self.center = np.array(center, dtype=np.float64)
-        self.wanted = self.center.copy()
+        self.target = self.center.copy()
         self.radius = radius
         self._times = (0.0, 0.0)
         self._ends = (self.center, self.center)
-        # The obstacle's own place is the origin: its displacement is where it is.
-        self.obstacle = Sphere(center=(0.0, 0.0, 0.0), radius=radius, friction=friction, motion=self._motion, name=NAME)
+        # The obstacle is placed at the origin, so that its displacement is its position.
+        self.obstacle = Sphere(
+            center=(0.0, 0.0, 0.0), radius=radius, friction=friction, motion=self._motion, name=PUSHER
+        )
 
     def _motion(self, time: float) -> NDArray[np.float64]:
         (begin, end), (a, b) = self._times, self._ends
@@ -37,8 +39,8 @@ class Pusher:
         return a + share * (b - a)
 
     def begin_step(self, time: float, dt: float) -> None:
-        """Plan the way from `time` to `time + dt` [s]: straight, and at most a stride."""
-        way = self.wanted - self.center
+        """Set the motion from `time` to `time + dt` [s]: straight, and at most STRIDE of the radius."""
+        way = self.target - self.center
         length, longest = float(np.linalg.norm(way)), STRIDE * self.radius
         if length > longest:
             way *= longest / length
@@ -47,13 +49,13 @@ class Pusher:
 
     @property
     def moves(self) -> bool:
-        """Whether it moves in the step that was begun."""
+        """Whether it moves in the present step."""
         return not np.array_equal(*self._ends)
 
     def stay(self) -> None:
-        """Not to move in the step that was begun."""
+        """Do not move in the present step."""
         self._ends = self.center, self.center
 
     def end_step(self) -> None:
-        """Stand where the step has led to."""
+        """Take the position at the end of the step."""
         self.center = self._ends[1]

@@ -1,4 +1,4 @@
-"""The solvers that a page can choose from, and which of their parameters it can change."""
+"""The solvers that a page can select, and the parameters of these solvers that it can change."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def _xpbd() -> Solver:
 def _implicit() -> Solver:
     from supple.implicit.solver import Implicit
 
-    # A step that would take hundreds of iterations is one that nobody at a page waits for.
+    # A step with hundreds of iterations is too slow for an interactive page.
     return Implicit(max_substeps=8)
 
 
@@ -28,12 +28,12 @@ SOLVERS: dict[str, Callable[[], Solver]] = {"xpbd": _xpbd, "implicit": _implicit
 
 
 def kind_of(solver: Solver) -> str:
-    """By which name a page knows a solver: that of its class, in lower case."""
+    """The name of a solver on the page: that of its class, in lower case."""
     return type(solver).__name__.lower()
 
 
 def solver_values(solver: Solver) -> dict[str, Value]:
-    """Of the solver's parameters, those that a page can change."""
+    """The parameters of the solver that a page can change."""
     values: dict[str, Value] = {}
     for name in _fields(solver):
         if name in PARAMETERS and PARAMETERS[name].owner == "solver":

@@ -1,4 +1,4 @@
-"""From the bytes of an uploaded file to a tet mesh, in a child process with bounds on time and memory."""
+"""Meshes an uploaded file in a child process with limits for time and memory."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ from supple.errors import MeshError, MeshingError
 from supple.viewer.protocol import limits
 from supple.viewer.server.uploads.worker import ANSWER, JOB, MESH
 
-# How often the child is looked at [s].
-_LOOK = 0.1
+# Time between two checks of the child [s].
+_POLL = 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class Upload:
-    """A file as it came from a browser.
+    """A file from a browser.
 
     Attributes
     ----------
-    name : what the visitor calls it, to be shown only; suffix : one of `limits.UPLOAD_FORMATS`
-    content : its bytes; size : what its largest extent becomes [m]
+    name : given by the visitor, only for display; suffix : one of `limits.UPLOAD_FORMATS`
+    content : its bytes; size : largest extent of the new body [m]
     """
 
     name: str
@@ -51,22 +51,22 @@ class TetArrays:
 
 
 def mesh_of_upload(
-    upload: Upload, tell: Callable[[float], None] = lambda seconds: None, stop: threading.Event | None = None
+    upload: Upload, progress: Callable[[float], None] = lambda seconds: None, stop: threading.Event | None = None
 ) -> TetArrays:
-    """Read a surface and fill it with tets.
+    """Read a surface and mesh it with tets.
 
     Parameters
     ----------
     tell : called now and then with the seconds that have gone by
-    stop : ends it early
+    stop : ends it early where it is set
 
     Raises
     ------
-    MeshError, MeshingError : what is wrong with the file, or which bound it met, and the mend.
+    MeshError, MeshingError : what is wrong with the file, or which limit it exceeds, and the remedy.
     """
     with tempfile.TemporaryDirectory(prefix="supple-upload-", ignore_cleanup_errors=True) as made:
         folder = Path(made)
-        # The visitor's name for it is nowhere part of a path.
+        # The name that the visitor gives is not part of any path.
         stored = f"mesh{upload.suffix}"
         (folder / stored).write_bytes(upload.content)
         job = {
@@ -77,26 +77,26 @@ def mesh_of_upload(
             "memory": limits.UPLOAD_MEMORY,
         }
         (folder / JOB).write_text(json.dumps(job), "utf-8")
-        code = _run(folder, tell, stop or threading.Event())
+        code = _run(folder, progress, stop or threading.Event())
         answer = folder / ANSWER
         if answer.exists():
-            said = str(json.loads(answer.read_text("utf-8"))["error"])
-            raise MeshError(said.replace(stored, upload.name))
+            message = str(json.loads(answer.read_text("utf-8"))["error"])
+            raise MeshError(message.replace(stored, upload.name))
         if code != 0 or not (folder / MESH).exists():
-            raise MeshingError(f"{upload.name}: reading it failed (exit code {code}); make it smaller or save it anew")
+            raise MeshingError(f"{upload.name}: reading it failed (exit code {code}); make it smaller or save it again")
         with np.load(folder / MESH, allow_pickle=False) as mesh:
             return TetArrays(mesh["vertices"], mesh["tets"])
 
 
-def _run(folder: Path, tell: Callable[[float], None], stop: threading.Event) -> int:
-    """Exit code of the child."""
+def _run(folder: Path, progress: Callable[[float], None], stop: threading.Event) -> int:
+    """Run the child; returns its exit code."""
     environment = os.environ | {
-        # The child finds the same packages as this process, however this one found them.
+        # The child uses the same packages as this process.
         "PYTHONPATH": os.pathsep.join(os.path.abspath(entry) for entry in sys.path if entry),
-        "OPENBLAS_NUM_THREADS": "1",  # idle threads would use up the address space
+        "OPENBLAS_NUM_THREADS": "1",  # idle threads would use the address space
         "MALLOC_ARENA_MAX": "2",
         "PYTHONIOENCODING": "utf-8",
-        "TMPDIR": str(folder),  # whatever it leaves there goes with the folder
+        "TMPDIR": str(folder),  # is deleted with the folder
     }
     with (folder / "output.txt").open("wb") as output:
         child = subprocess.Popen(
@@ -106,19 +106,19 @@ def _run(folder: Path, tell: Callable[[float], None], stop: threading.Event) -> 
             stdin=subprocess.PIPE,
             stdout=output,
             stderr=subprocess.STDOUT,
-            # A group of its own, to be ended together with the mesher that it starts.
+            # Its own process group, which also contains the mesher that it starts.
             start_new_session=True,
         )
     began = time.monotonic()
     try:
         while True:
             with contextlib.suppress(subprocess.TimeoutExpired):
-                return child.wait(timeout=_LOOK)
-            taken = time.monotonic() - began
-            tell(taken)
+                return child.wait(timeout=_POLL)
+            seconds = time.monotonic() - began
+            progress(seconds)
             if stop.is_set():
                 raise MeshingError("the page was closed")
-            if taken > limits.LONGEST_UPLOAD:
+            if seconds > limits.LONGEST_UPLOAD:
                 raise MeshingError(f"it takes longer than {limits.LONGEST_UPLOAD:g} s; make the surface coarser")
     finally:
         if child.poll() is None:

@@ -1,4 +1,4 @@
-"""Arrows that come and go."""
+"""A set of arrows that can change."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Arrows:
 
     Parameters
     ----------
-    scene : viser's scene; name : of the node; color : (r, g, b); size : length of a head [m]
+    scene : of viser; name : of the node; color : (r, g, b); size : length of a head [m]
     """
 
     def __init__(self, scene: Any, name: str, color: tuple[int, int, int], size: float) -> None:
@@ -30,7 +30,7 @@ class Arrows:
         )
 
     def update(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> None:
-        """Draw arrows between points (k, 3) [m]; those without length are left out."""
+        """Draw arrows between points (k, 3) [m]; those of length zero are not drawn."""
         some = np.linalg.norm(end - start, axis=1) > 0.0
         if some.any():
             self._handle.points = single(np.stack([start[some], end[some]], axis=1))
@@ -38,5 +38,5 @@ class Arrows:
             self._handle.visible = bool(some.any())
 
     def remove(self) -> None:
-        """Take them off the page."""
+        """Remove them from the page."""
         self._handle.remove()

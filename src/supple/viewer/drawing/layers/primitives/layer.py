@@ -1,4 +1,4 @@
-"""A layer of the picture: something drawn from a moment."""
+"""The base class of layers, which draw one part of a moment."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from supple.viewer.drawing.moments.model import Moment
 
 
 class Layer(ABC):
-    """Something that stands on the page until it is removed. `scene` is viser's scene, wherever it is drawn to."""
+    """A drawn part of the picture, until `remove`. The `scene` of a layer is that of viser."""
 
     @abstractmethod
     def update(self, moment: Moment) -> None:
@@ -20,7 +20,7 @@ class Layer(ABC):
 
     @abstractmethod
     def remove(self) -> None:
-        """Take it off the page."""
+        """Remove it from the page."""
 
     @property
     def handles(self) -> list[Any]:
@@ -29,5 +29,5 @@ class Layer(ABC):
 
 
 def single(values: NDArray[np.float64]) -> NDArray[np.float32]:
-    """As the browser wants numbers."""
+    """Values in the precision that the browser uses."""
     return np.ascontiguousarray(values, dtype=np.float32)

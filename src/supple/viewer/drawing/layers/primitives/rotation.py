@@ -1,4 +1,4 @@
-"""Rotations as the browser wants them."""
+"""Rotations in the form that the browser uses."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def quaternion(R: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def turning_z_to(direction: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(w, x, y, z) of a rotation that takes the z axis to `direction` (3,), a unit vector."""
+    """(w, x, y, z) of a rotation of the z axis to `direction` (3,), a unit vector."""
     from scipy.spatial.transform import Rotation
 
     return Rotation.align_vectors([direction], [[0.0, 0.0, 1.0]])[0].as_quat()[[3, 0, 1, 2]]

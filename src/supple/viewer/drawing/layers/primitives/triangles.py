@@ -1,6 +1,6 @@
-"""Triangles each with a color of its own.
+"""Triangles with individual colors.
 
-The page's meshes have one color each, so triangles are sorted by color into as many meshes as there are colors.
+A mesh of the page has one color, so that the triangles are sorted into one mesh for each color.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from supple.viewer.drawing.layers.primitives.layer import single
 
-_LEAST = 16  # room for triangles, at least
+_LEAST = 16  # smallest capacity of a mesh, in triangles
 
 
 class ColoredTriangles:
@@ -20,7 +20,7 @@ class ColoredTriangles:
 
     Parameters
     ----------
-    scene : viser's scene; name : of the meshes, which get a number each; colors : (c, 3) from 0 to 255
+    scene : of viser; name : of the meshes, which get a number each; colors : (c, 3) from 0 to 255
     """
 
     def __init__(self, scene: Any, name: str, colors: NDArray[np.uint8]) -> None:
@@ -48,7 +48,7 @@ class ColoredTriangles:
                 if handle.visible:
                     handle.visible = False
                 continue
-            # Room in powers of two: the browser makes new buffers only where it changes.
+            # The capacity is a power of two: the browser creates new buffers only where it changes.
             room = max(_LEAST, 1 << (len(mine) - 1).bit_length())
             points = np.repeat(mine[:1, :1], 3 * room, axis=0).reshape(-1, 3)
             points[: 3 * len(mine)] = mine.reshape(-1, 3)
@@ -60,7 +60,7 @@ class ColoredTriangles:
                 handle.visible = True
 
     def remove(self) -> None:
-        """Take them off the page."""
+        """Remove them from the page."""
         for handle in self.handles:
             handle.remove()
 
