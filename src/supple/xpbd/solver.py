@@ -24,6 +24,7 @@ from supple.xpbd.constraints.registry import ConstraintSet, build_constraint_set
 from supple.xpbd.constraints.stitch_anchors import StitchAnchors
 from supple.xpbd.constraints.stitches import stitch_constraints
 from supple.xpbd.contact.collisions import Collisions
+from supple.xpbd.contact.memory import ContactMemory
 from supple.xpbd.contact.settings import XPBDContact
 from supple.xpbd.external_forces import ExternalForces
 from supple.xpbd.integration import (
@@ -151,7 +152,8 @@ class XPBD(Solver):
         _load(ws, state)
         targets = _pin_targets(ws.system, state.time, h, self.substeps)
         if ws.collisions:
-            ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt)
+            memory = state.memory if isinstance(state.memory, ContactMemory) else None
+            ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt, memory)
         with _threads(self.threads):
             for k in range(self.substeps):
                 started = perf_counter()
@@ -241,7 +243,7 @@ def _collide(ws: XPBDWorkspace, time: float, h: float) -> bool:
 def _unload(ws: XPBDWorkspace, time: float) -> State:
     to_world(ws.points, ws.origins, ws.world)
     new = ws.layout.new_from_old
-    return State(time, ws.world[new], ws.velocities[new])
+    return State(time, ws.world[new], ws.velocities[new], ws.collisions.memory(ws.world))
 
 
 def _pin_targets(system: System, time: float, h: float, substeps: int) -> NDArray[np.float64]:

@@ -14,7 +14,6 @@ from supple.mesh.topology import connected_components
 from supple.scene.contact_pairs import PairTable
 from supple.scene.obstacles import Box, Obstacle, Sphere, TriangleObstacle
 from supple.system import System
-from supple.xpbd.contact.settings import XPBDContact
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,9 +73,21 @@ class _Piece:
 
 
 def build_surfaces(
-    system: System, table: PairTable, settings: XPBDContact | None, thickness: float, edge_length: float
+    system: System,
+    table: PairTable,
+    body_collision: bool,
+    self_collision: bool,
+    thickness: float,
+    edge_length: float,
 ) -> ContactSurfaces:
-    """Collect what may touch. `edge_length` [m] is the mean of the bodies' surfaces."""
+    """Collect what may touch.
+
+    Parameters
+    ----------
+    table : which bodies and obstacles may touch, and with which friction
+    body_collision, self_collision : whether bodies touch each other, and themselves
+    thickness : the gap that surfaces keep [m]; edge_length : mean edge length of the bodies' surfaces [m]
+    """
     obstacles = _obstacle_parts(system.obstacles, len(system.bodies), edge_length)
     pieces, rows, body_piece, triangles = _body_parts(system)
     points, owners, point_piece = [np.zeros((0, 3))], [np.zeros(0, np.int32)], [body_piece]
@@ -92,7 +103,7 @@ def build_surfaces(
         piece_parts.append(part["triangle_piece"] + offset)
         count += len(part["points"])
     fixed = np.concatenate(points)
-    allowed, gaps, friction = _rules(pieces, table, settings, thickness)
+    allowed, gaps, friction = _rules(pieces, table, body_collision, self_collision, thickness)
     return ContactSurfaces(
         rows=rows,
         fixed_points=fixed,
@@ -184,17 +195,16 @@ def _is_closed(triangles: NDArray[np.int32]) -> bool:
 
 
 def _rules(
-    pieces: Sequence[_Piece], table: PairTable, settings: XPBDContact | None, thickness: float
+    pieces: Sequence[_Piece], table: PairTable, body_collision: bool, self_collision: bool, thickness: float
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.float64]]:
-    """(p, p) arrays: may touch, gap, friction. What the table lets touch, the settings may still switch off."""
+    """(p, p) arrays: may touch, gap, friction. See `build_surfaces`."""
     owner = np.array([piece.owner for piece in pieces])
     fixed = owner >= table.bodies
     gap = np.array([thickness if piece.gap is None else piece.gap for piece in pieces])
     same = np.eye(len(pieces), dtype=np.bool_)
     both_bodies = ~fixed[:, None] & ~fixed[None, :]
     allowed = fixed[:, None] ^ fixed[None, :]
-    if settings is not None:
-        allowed |= both_bodies & ((same & settings.self_collision) | (~same & settings.body_collision))
+    allowed |= both_bodies & ((same & self_collision) | (~same & body_collision))
     gaps = np.where(fixed[:, None], gap[:, None], gap[None, :])
     pairs = np.ix_(owner, owner)
     allowed &= table.collide[pairs]

@@ -12,6 +12,7 @@ from supple.contact.search.reach import outran, reach_from_velocities
 from supple.contact.search.surfaces import build_surfaces
 from supple.scene.contact_pairs import pair_table
 from supple.system import System
+from supple.xpbd.contact.memory import ContactMemory
 from supple.xpbd.contact.obstacle_contacts import ObstacleContacts
 from supple.xpbd.contact.obstacle_shapes import build_shapes
 from supple.xpbd.contact.settings import XPBDContact
@@ -50,7 +51,9 @@ class Collisions:
         self.obstacles = ObstacleContacts(build_shapes(system.obstacles), self.poses, system, table)
         thickness = settings.thickness if settings is not None else None
         self.thickness = thickness if thickness is not None else DEFAULT_THICKNESS * self.edge_length
-        surfaces = build_surfaces(system, table, settings, self.thickness, self.edge_length)
+        among_bodies = settings is not None and settings.body_collision
+        with_themselves = settings is not None and settings.self_collision
+        surfaces = build_surfaces(system, table, among_bodies, with_themselves, self.thickness, self.edge_length)
         self.surfaces = (
             SurfaceCollisions(system, surfaces, self.poses, self.edge_length) if surfaces.is_needed else None
         )
@@ -69,18 +72,26 @@ class Collisions:
     def min_distance(self) -> float | None:
         return self._smallest if math.isfinite(self._smallest) else None
 
-    def begin_step(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float, dt: float) -> None:
+    def begin_step(
+        self,
+        x: NDArray[np.float64],
+        v: NDArray[np.float64],
+        time: float,
+        dt: float,
+        memory: ContactMemory | None = None,
+    ) -> None:
         """Look for what may touch within the frame.
 
         Parameters
         ----------
         x, v : (n, 3) positions [m] and velocities [m/s] at the beginning of the frame.
         time : beginning of the frame [s]; dt : its length [s].
+        memory : what the frame before has left, see `memory`; None where the past is not known.
         """
         self._smallest = math.inf
         self._dt = dt
         if self.surfaces is not None:
-            self.surfaces.begin_step(x, v, time, dt)
+            self.surfaces.begin_step(x, v, time, dt, memory)
         if self.obstacles:
             self._gather_obstacles(x, v, time)
 
@@ -104,9 +115,11 @@ class Collisions:
             if outran(x, self._gathered, self._reach):
                 self._gather_obstacles(x, (x - x_prev) / h, time)
             self._count(self.obstacles.project(x, x_prev, (time - h, time), limit, NEAR * self.edge_length))
-        if self.surfaces is not None:
-            self.surfaces.remember(x)
         return self.contacts
+
+    def memory(self, x: NDArray[np.float64]) -> ContactMemory | None:
+        """What the next frame must know beside positions and velocities; `x` (n, 3) as at the end of this one [m]."""
+        return None if self.surfaces is None else self.surfaces.memory(x)
 
     def _gather_obstacles(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float) -> None:
         falling = 0.5 * float(np.linalg.norm(self.system.gravity)) * self._dt**2

@@ -1,4 +1,4 @@
-"""Surfaces of bodies and of triangle obstacles, followed through the substeps of a frame."""
+"""Contact between surfaces of bodies and of triangle obstacles, over the substeps of a frame."""
 
 from __future__ import annotations
 
@@ -13,15 +13,19 @@ from supple.contact.search.spatial_hash import PairFinder
 from supple.contact.search.stitch_masks import stitched_points
 from supple.contact.search.surfaces import ContactSurfaces
 from supple.system import System
+from supple.xpbd.contact.memory import ContactMemory
 from supple.xpbd.contact.surface_contacts import project_surfaces
 
-# Of the mean surface edge: what a point may move at least, and at most, before lists are made anew, and up to which
-# gaps distances are reported.
+# Of the mean surface edge: the least and the largest motion of a point that lists of candidates allow for, and the
+# largest gap that is reported.
 LEAST_REACH, MOST_REACH, NEAR = 0.1, 0.5, 1.0
 
 
 class SurfaceCollisions:
-    """Points against triangles, with lists of candidates that are renewed when something has moved too far."""
+    """Points against triangles. The lists of candidates are renewed when a point has moved too far.
+
+    `begin_step` sets everything that a substep reads, from its arguments alone.
+    """
 
     def __init__(self, system: System, surfaces: ContactSurfaces, poses: ObstaclePoses, edge_length: float) -> None:
         self.surfaces = s = surfaces
@@ -47,19 +51,19 @@ class SurfaceCollisions:
         )
         self._far, self._near = np.zeros((n, 3)), np.zeros((n, 3))
         self._drifts = np.zeros((pieces + 1, 3))
-        # What stands still keeps everything else from sharing a motion.
+        # Obstacles stand still, so that no motion is common to all points where there is one.
         self._all_share = len(s.fixed_points) == 0
-        self._excursions = np.zeros(n)
-        # How deep a point is inside a body, and inside an obstacle.
-        self._depth = np.zeros((2, n))
-        self._entered = np.full(n, -1, dtype=np.int32)
         self._complete = np.zeros(n)
         self._gap = np.where(s.allowed, s.gaps, 0.0).max(axis=1)[s.point_piece]
-        self._known = np.zeros((len(s.rows), 3))
-        self._has_past = False
+        # See `ContactMemory`.
+        self._depth = np.zeros((2, n))
+        self._entered = np.zeros(n, dtype=np.int32)
+        self._excursions = np.zeros(n)
         self._dt = 0.0
 
-    def begin_step(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float, dt: float) -> None:
+    def begin_step(
+        self, x: NDArray[np.float64], v: NDArray[np.float64], time: float, dt: float, memory: ContactMemory | None
+    ) -> None:
         """See `Collisions.begin_step`."""
         bodies = len(self.surfaces.rows)
         self._dt = dt
@@ -70,9 +74,7 @@ class SurfaceCollisions:
         motions[bodies:] -= self._x[bodies:]
         motions[:bodies] = v[self.surfaces.rows] * dt
         self._before[:] = self._x
-        moved = np.abs(self._x[:bodies] - self._known).max()
-        if not (self._has_past and moved <= LEAST_REACH * self.edge_length):
-            self._look_for_overlaps()
+        self._recall(memory)
         self._gather(motions)
         self._excursions[:] = 0.0
 
@@ -104,10 +106,34 @@ class SurfaceCollisions:
         x_prev[s.rows] = self._before[:bodies]
         return contacts, smallest
 
-    def remember(self, x: NDArray[np.float64]) -> None:
-        """Take note of where everything is (n, 3) [m] after all contacts: whoever goes on from there knows its past."""
-        np.take(x, self.surfaces.rows, axis=0, out=self._known)
-        self._has_past = True
+    def memory(self, x: NDArray[np.float64]) -> ContactMemory:
+        """What the next step must know. `x` (n, 3) are the positions at the end of this one, after all contacts [m]."""
+        s = self.surfaces
+        positions = np.concatenate([x[s.rows], self._x[len(s.rows) :]])
+        return ContactMemory(
+            s.triangles[: s.body_triangles],
+            positions,
+            self._depth.copy(),
+            self._entered.copy(),
+            self._excursions.copy(),
+        )
+
+    def _recall(self, memory: ContactMemory | None) -> None:
+        """Take over what `memory` knows of points that are still where it has left them; look for the rest."""
+        s = self.surfaces
+        known = 0
+        if memory is not None:
+            triangles = s.triangles[: s.body_triangles]
+            known = memory.matching_points(triangles, self._x, LEAST_REACH * self.edge_length)
+        self._entered[:] = -1
+        self._excursions[:] = 0.0
+        if memory is not None:
+            self._entered[:known] = memory.entered[:known]
+            self._excursions[:known] = memory.excursions[:known]
+        if memory is not None and known == len(self._x):
+            self._depth[:] = memory.depth
+        else:
+            self._look_for_overlaps()
 
     def _gather(self, motions: NDArray[np.float64]) -> None:
         """List what may touch while nothing gets further than it would in a frame of these motions (n, 3) [m]."""
@@ -124,12 +150,9 @@ class SurfaceCollisions:
         self._gathered[:] = self._x
 
     def _look_for_overlaps(self) -> None:
+        """Set how deep each point is inside other pieces, from positions alone."""
         s = self.surfaces
         boxes = bounds_of_pieces(self._x, s.point_piece, len(s.closed))
-        found = np.zeros(len(self._x))
-        self._depth[:] = 0.0
         for kind, meant in enumerate((slice(0, s.body_triangles), slice(s.body_triangles, None))):
             shapes = (self._x, s.point_piece, s.triangles[meant], s.triangle_piece[meant])
-            depths_inside(shapes, s.closed, s.allowed, boxes, found)
-            self._depth[kind] = found
-        self._entered[:] = -1
+            depths_inside(shapes, s.closed, s.allowed, boxes, self._depth[kind])
