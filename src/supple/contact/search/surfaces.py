@@ -1,4 +1,4 @@
-"""All surfaces of a scene that can touch: points and triangles of bodies and of triangle obstacles, as flat arrays."""
+"""All surfaces of a scene that can touch, as flat arrays: points and triangles of bodies and of triangle obstacles."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from supple.system import System
 class ContactSurfaces:
     """Points and triangles, and which of them may touch. A piece is a connected part of one body or one obstacle.
 
-    The bodies' points come first, then those of obstacles: vertices of triangle obstacles, corners of blocks, and the
-    centers of balls that are small beside the bodies' triangles (they touch at a gap of their radius).
+    The bodies' points come first, then those of obstacles: vertices of triangle obstacles, corners of boxes, and the
+    centers of spheres that are small compared with the bodies' triangles (contact at a gap of their radius).
 
     Attributes
     ----------
-    rows : (nb,) which vertices of the system the bodies' points are
-    fixed_points : (no, 3) obstacles' points at time 0 [m]; fixed_owners : (no,) which obstacle each belongs to
+    rows : (nb,) vertices of the system that are the bodies' points
+    fixed_points : (no, 3) obstacles' points at time 0 [m]; fixed_owners : (no,) the obstacle of each
     inverse_masses : (n,) 1/m [1/kg] with n = nb + no
     point_piece : (n,)
-    triangles : (t, 3) indices of points, pieces one after the other, those of bodies first; triangle_piece : (t,)
-    body_triangles : how many triangles belong to bodies
+    triangles : (t, 3) indices of points, sorted by piece, those of bodies first; triangle_piece : (t,)
+    body_triangles : number of triangles of bodies
     closed : (p,) whether a piece has an inside
     allowed : (p, p) whether points of the first piece may touch triangles of the second
-    gaps : (p, p) the gap that is kept between the two [m]; friction : (p, p) Coulomb coefficients
+    gaps : (p, p) gap that is kept between the two [m]; friction : (p, p) Coulomb coefficients
     """
 
     rows: NDArray[np.int32]
@@ -51,11 +51,11 @@ class ContactSurfaces:
 
     @property
     def is_needed(self) -> bool:
-        """Whether anything here may touch anything."""
+        """Whether any contact is possible."""
         return bool(self.allowed.any()) and len(self.triangles) > 0
 
     def place_obstacles(self, poses: ObstaclePoses, time: float, out: NDArray[np.float64]) -> None:
-        """Write where the obstacles' points are at `time` [s] into the last rows of out (n, 3)."""
+        """Write the positions of the obstacles' points at `time` [s] into the last rows of out (n, 3)."""
         if len(self.fixed_points):
             R, t = poses.at(time)
             out[len(self.rows) :] = (
@@ -65,7 +65,7 @@ class ContactSurfaces:
 
 @dataclass
 class _Piece:
-    """What decides how a piece meets others: `owner` is the row of its body or obstacle in the scene's `PairTable`."""
+    """The contact rules of a piece: `owner` is the row of its body or obstacle in the scene's `PairTable`."""
 
     owner: int
     closed: bool = True

@@ -1,4 +1,4 @@
-"""What contact must know of the past beside positions and velocities. It travels in `State.memory`."""
+"""What contact needs of earlier steps beside positions and velocities. It is stored in `State.memory`."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ class ContactMemory:
     excursions: NDArray[np.float64]
 
     def matching_points(self, triangles: NDArray[np.int32], positions: NDArray[np.float64], tolerance: float) -> int:
-        """How many of the points, from the first one on, this memory describes: n, those of bodies, or 0.
+        """How many of a scene's points, counted from the first one, this memory describes: all, the bodies', or none.
 
-        A scene may have other obstacles than the one that the memory comes from, and a state may have been changed.
+        The memory may come from a scene with other obstacles, and positions may have been changed since.
 
         Parameters
         ----------
-        triangles, positions : of the scene that is to be continued
-        tolerance : how far points may be from where they were [m]
+        triangles, positions : (t, 3) of the bodies, and (n, 3) of all points [m], of the scene that continues
+        tolerance : largest change of a coordinate [m]
         """
         if not np.array_equal(self.triangles, triangles):
             return 0

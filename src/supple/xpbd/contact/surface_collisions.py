@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from supple.contact.obstacle_poses import ObstaclePoses
 from supple.contact.search.excluded_pairs import excluded_pairs
 from supple.contact.search.point_inside import bounds_of_pieces, depths_inside
-from supple.contact.search.reach import looking_out, mean_motions, outran_pieces
+from supple.contact.search.reach import mean_motions, outran_pieces, search_radii
 from supple.contact.search.spatial_hash import PairFinder
 from supple.contact.search.stitch_masks import stitched_points
 from supple.contact.search.surfaces import ContactSurfaces
@@ -24,7 +24,7 @@ LEAST_REACH, MOST_REACH, NEAR = 0.1, 0.5, 1.0
 class SurfaceCollisions:
     """Points against triangles. The lists of candidates are renewed when a point has moved too far.
 
-    `begin_step` sets everything that a substep reads, from its arguments alone.
+    `begin_step` sets all that substeps read, from its arguments alone.
     """
 
     def __init__(self, system: System, surfaces: ContactSurfaces, poses: ObstaclePoses, edge_length: float) -> None:
@@ -40,15 +40,7 @@ class SurfaceCollisions:
         self._finder = PairFinder(n, pieces, edge_length)
         self._x, self._before, self._gathered = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
         self._shapes = (self._x, s.point_piece, s.triangles, s.triangle_piece)
-        self._described = (
-            s.inverse_masses,
-            s.point_piece,
-            s.triangles,
-            s.triangle_piece,
-            s.closed,
-            s.gaps,
-            s.friction,
-        )
+        self._pieces = (s.inverse_masses, s.point_piece, s.triangles, s.triangle_piece, s.closed, s.gaps, s.friction)
         self._far, self._near = np.zeros((n, 3)), np.zeros((n, 3))
         self._drifts = np.zeros((pieces + 1, 3))
         # Obstacles stand still, so that no motion is common to all points where there is one.
@@ -94,12 +86,12 @@ class SurfaceCollisions:
         lists = (finder.n_active, finder.active, finder.starts, finder.triangles)
         scales = (limit, NEAR * self.edge_length)
         contacts, smallest = 0, np.inf
-        # Obstacles last: they do not give way.
-        for kind, meant in enumerate(((0, s.body_triangles), (s.body_triangles, len(s.triangles)))):
-            if meant[0] < meant[1] and finder.n_active:
+        # Obstacles come last because they cannot be moved.
+        for kind, part in enumerate(((0, s.body_triangles), (s.body_triangles, len(s.triangles)))):
+            if part[0] < part[1] and finder.n_active:
                 memory = (self._depth[kind], self._entered, self._complete)
                 found = project_surfaces(
-                    self._x, self._before, lists, self._described, memory, scales, meant, self._stitched
+                    self._x, self._before, lists, self._pieces, memory, scales, part, self._stitched
                 )
                 contacts, smallest = contacts + found[0], min(smallest, found[1])
         x[s.rows] = self._x[:bodies]
@@ -107,7 +99,7 @@ class SurfaceCollisions:
         return contacts, smallest
 
     def memory(self, x: NDArray[np.float64]) -> ContactMemory:
-        """What the next step must know. `x` (n, 3) are the positions at the end of this one, after all contacts [m]."""
+        """What the next step needs; `x` (n, 3) are the positions at the end of this one, after all contacts [m]."""
         s = self.surfaces
         positions = np.concatenate([x[s.rows], self._x[len(s.rows) :]])
         return ContactMemory(
@@ -119,40 +111,36 @@ class SurfaceCollisions:
         )
 
     def _recall(self, memory: ContactMemory | None) -> None:
-        """Take over what `memory` knows of points that are still where it has left them; look for the rest."""
+        """Restore what `memory` holds of points that are still where they were, and find the overlaps of the others."""
         s = self.surfaces
+        self._entered[:], self._excursions[:] = -1, 0.0
         known = 0
         if memory is not None:
             triangles = s.triangles[: s.body_triangles]
             known = memory.matching_points(triangles, self._x, LEAST_REACH * self.edge_length)
-        self._entered[:] = -1
-        self._excursions[:] = 0.0
-        if memory is not None:
             self._entered[:known] = memory.entered[:known]
             self._excursions[:known] = memory.excursions[:known]
-        if memory is not None and known == len(self._x):
-            self._depth[:] = memory.depth
-        else:
-            self._look_for_overlaps()
+            self._depth[:, :known] = memory.depth[:, :known]
+        if known < len(self._x):
+            self._find_overlaps()
 
     def _gather(self, motions: NDArray[np.float64]) -> None:
-        """List what may touch while nothing gets further than it would in a frame of these motions (n, 3) [m]."""
+        """List what may touch while no point moves farther than in a frame of these motions (n, 3) [m]."""
         s = self.surfaces
         mean_motions(motions, s.point_piece, self._all_share, self._drifts)
         scales = (LEAST_REACH * self.edge_length, MOST_REACH * self.edge_length)
-        come = self._x - self._before
-        points = (come, self._excursions, s.point_piece)
-        looking_out(motions, *points, self._drifts, scales, self._far, self._near)
+        points = (self._x - self._before, self._excursions, s.point_piece)
+        search_radii(motions, *points, self._drifts, scales, self._far, self._near)
         self._complete[:] = self._gap + LEAST_REACH * self.edge_length + self._depth.max(axis=0)
         self._far[:, 0] += self._complete
         self._near[:, 0] += self._complete
         self._finder.gather(self._shapes, (self._far, self._near), self._rules)
         self._gathered[:] = self._x
 
-    def _look_for_overlaps(self) -> None:
+    def _find_overlaps(self) -> None:
         """Set how deep each point is inside other pieces, from positions alone."""
         s = self.surfaces
         boxes = bounds_of_pieces(self._x, s.point_piece, len(s.closed))
-        for kind, meant in enumerate((slice(0, s.body_triangles), slice(s.body_triangles, None))):
-            shapes = (self._x, s.point_piece, s.triangles[meant], s.triangle_piece[meant])
+        for kind, part in enumerate((slice(0, s.body_triangles), slice(s.body_triangles, None))):
+            shapes = (self._x, s.point_piece, s.triangles[part], s.triangle_piece[part])
             depths_inside(shapes, s.closed, s.allowed, boxes, self._depth[kind])
