@@ -65,16 +65,10 @@ class Layout:
         return order, chunk[order].astype(np.int32)
 
 
-def make_layout(system: System, extra: tuple[NDArray[np.int32], ...] = ()) -> Layout:
-    """Number the vertices of a system and divide it into chunks.
-
-    Parameters
-    ----------
-    system : in the numbering of the scene.
-    extra : constraints (m, k) that couple vertices beside the edges of the meshes.
-    """
+def make_layout(system: System) -> Layout:
+    """Number the vertices of a system and divide it into chunks."""
     n = len(system.masses)
-    order, level_of_old = breadth_first_order([system.edges, *extra], n)
+    order, level_of_old = breadth_first_order([system.edges], n)
     rank_of_old = np.empty(n, dtype=np.int32)
     rank_of_old[order] = np.arange(n, dtype=np.int32)
     body_of_old = np.zeros(n, dtype=np.int32)
