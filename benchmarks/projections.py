@@ -1,14 +1,14 @@
 """Constraint projections per second, compared with plain C: `python -m benchmarks.projections [--busy] [--quick]`.
 
-The programs run alternately on the same mesh, and the fastest round counts. C is compiled in the same run. Columns:
+All variants run in turn on the same mesh, and the fastest round is reported. C is compiled in the same run. Columns:
 
     tets         size of the box mesh
     C            edges + volume in plain C, one thread                       [million projections / s]
     1, 2         edges + volume in Supple on one and two threads             [million projections / s]
     /C           the ratio to C
-    ns/tet       of a sweep over edges and volumes on two threads, and how much of it on one
+    ns/tet 1, 2  time of a sweep over edges and volumes per tet               [ns]
     snh 1, 2     stable Neo-Hookean tets per second                          [million / s]
-    step 1, 2    edges + volume with all that belongs to a substep           [million projections / s]
+    step 1, 2    edges + volume in complete substeps                         [million projections / s]
 """
 
 from __future__ import annotations
@@ -87,13 +87,13 @@ def our_substep(system: System, threads: int, substeps: int) -> Callable[[], Non
     return lambda: (solver.step(system, state, substeps * H, workspace), None)[1]
 
 
-def fastest(programs: dict[str, Callable[[], None]], repeats: int, rounds: int) -> dict[str, float]:
-    """Seconds of one call of each program; they run alternately, and the fastest round counts."""
-    for run in programs.values():
+def fastest(variants: dict[str, Callable[[], None]], repeats: int, rounds: int) -> dict[str, float]:
+    """Seconds of one call of each variant: they run in turn, and the fastest round is returned."""
+    for run in variants.values():
         run()
-    best = dict.fromkeys(programs, np.inf)
+    best = dict.fromkeys(variants, np.inf)
     for _ in range(rounds):
-        for name, run in programs.items():
+        for name, run in variants.items():
             start = time.perf_counter()
             for _ in range(repeats):
                 run()
@@ -109,14 +109,14 @@ def measure(divisions: int, reference: ctypes.CDLL | None, rounds: int) -> dict[
     count = len(mesh.edges) + len(mesh.tets)
     repeats = max(1, round(2e6 / count))
     substeps = max(2, min(20, repeats))
-    programs: dict[str, Callable[[], None]] = {}
+    variants: dict[str, Callable[[], None]] = {}
     if reference is not None:
-        programs["C"] = reference_sweep(reference, classic)
+        variants["C"] = reference_sweep(reference, classic)
     for threads in thread_counts():
-        programs[f"{threads}"] = our_sweep(classic, threads)
-        programs[f"snh {threads}"] = our_sweep(neo_hookean, threads)
-        programs[f"step {threads}"] = our_substep(classic, threads, substeps)
-    seconds = fastest(programs, repeats, rounds)
+        variants[f"{threads}"] = our_sweep(classic, threads)
+        variants[f"snh {threads}"] = our_sweep(neo_hookean, threads)
+        variants[f"step {threads}"] = our_substep(classic, threads, substeps)
+    seconds = fastest(variants, repeats, rounds)
     rates = {name: count / s / 1e6 for name, s in seconds.items()}
     for threads in thread_counts():
         rates[f"snh {threads}"] = len(mesh.tets) / seconds[f"snh {threads}"] / 1e6
@@ -137,7 +137,7 @@ def main(busy: bool = False, quick: bool = False) -> None:
     with tempfile.TemporaryDirectory() as folder, busy_core(busy):
         reference = compile_reference(Path(folder))
         if reference is None:
-            print("no gcc: the columns of C are left out")
+            print("no gcc: the columns of C are omitted")
         header = ["tets", "C", *(f"{t}" for t in thread_counts()), *(f"{t} /C" for t in thread_counts())]
         header += [f"{what} {t}" for what in ("ns/tet", "snh", "step") for t in thread_counts()]
         print("  ".join(f"{name:>8}" for name in header))

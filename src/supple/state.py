@@ -36,7 +36,7 @@ class State:
     ----------
     time : [s]
     positions, velocities : (n_vertices, 3) float64 [m], [m/s]
-    memory : what a multi-step integrator keeps between steps; None for a state that comes from outside.
+    memory : what a solver must know of earlier steps (BDF2, contact of XPBD); None for a state that comes from outside.
     """
 
     time: float

@@ -1,4 +1,4 @@
-"""The gates of the momentum restore: a free body neither drifts nor spins up, in 60 s, 100 m from the origin."""
+"""Limits of the momentum restore: a free body gains no drift and no spin in 60 s, 100 m from the origin."""
 
 import numpy as np
 import pytest
@@ -16,13 +16,13 @@ CLASSIC = sp.EdgesAndVolume(edge_compliance=1e-4)
 
 
 def run(scene, solver, steps, **start):
-    """The first and the last state; steps without a report for every frame, which would take most of the time."""
+    """The first and the last state. Calls the solver directly, because reports of all frames take most of the time."""
     system = build_system(scene)
     workspace = solver.prepare(system)
     state = begin = initial_state(scene, **start)
     for _ in range(steps):
-        state, said = solver.step(system, state, DT, workspace)
-        assert said.status == "converged", said.message
+        state, report = solver.step(system, state, DT, workspace)
+        assert report.status == "converged", report.message
     return system, begin, state
 
 
@@ -69,10 +69,10 @@ def test_a_squashed_and_released_sphere_does_not_spin(material, height, substeps
     system, _, state = run(scene, XPBD(substeps=substeps, contact=None), 3600, positions=start)
     assert np.linalg.norm(spin(system, state)) <= 1e-9
     assert drift(system, state) <= 1e-10
-    assert measure(system, state).min_det_F > 0.9, "it has recovered"
+    assert measure(system, state).min_det_F > 0.9, "the sphere has recovered"
 
 
-def test_without_the_cure_it_spins():
+def test_a_sphere_spins_without_momentum_restore():
     scene, start = squashed(CLASSIC, 0.5, np.zeros(3))
     system, _, state = run(scene, XPBD(momentum_restore=False, contact=None), 120, positions=start)
     assert np.linalg.norm(spin(system, state)) > 0.1
@@ -81,7 +81,7 @@ def test_without_the_cure_it_spins():
 @pytest.mark.parametrize(
     ("substeps", "seed", "seconds"), [(5, None, 60), (20, 1, 20), (80, 2, 3)], ids=["5 substeps", "20", "80"]
 )
-def test_frictionless_plates_do_not_pump_a_spin(substeps, seed, seconds):
+def test_frictionless_plates_cause_no_spin(substeps, seed, seconds):
     """With the constraints in the mesh's order and in random ones."""
     mesh = SPHERE
     if seed is not None:
@@ -103,11 +103,11 @@ def test_frictionless_plates_do_not_pump_a_spin(substeps, seed, seconds):
     for _ in range(60 * seconds):
         state, _ = solver.step(system, state, DT, workspace)
         L, inertia = angular_momentum_and_inertia(system, state)
-        # About the other axes the plates may turn it: their forces need not be in line.
+        # The forces of the plates may have a moment about the other axes.
         worst = max(worst, abs(L[1]) / inertia[1, 1])
         lowest = min(lowest, np.ptp(state.positions[:, 1]))
     assert worst <= 1e-10
-    assert lowest < 0.75, "the plates have squeezed it"
+    assert lowest < 0.75, "the plates have compressed the sphere"
 
 
 @pytest.mark.parametrize("position", [(0.0, 0.0, 0.0), FAR], ids=["origin", "far"])
@@ -119,7 +119,7 @@ def test_a_free_spin_keeps_its_angular_momentum(position):
     assert np.linalg.norm(final - first) <= 1e-9 * np.linalg.norm(first)
 
 
-def test_without_the_cure_a_rigid_spin_decays_as_predicted():
+def test_a_rigid_spin_without_momentum_restore_decays_as_predicted():
     """1 / w^2 = 1 / w0^2 + 2 h t."""
     substeps, seconds, w0 = 20, 10.0, 5.0
     body = sp.Body("ball", SPHERE, sp.EdgesAndVolume(), angular_velocity=(0.0, w0, 0.0))
@@ -129,7 +129,7 @@ def test_without_the_cure_a_rigid_spin_decays_as_predicted():
     assert np.linalg.norm(spin(system, state)) == pytest.approx(expected, rel=0.01)
 
 
-def test_every_component_is_cured_and_pinned_ones_are_left_alone():
+def test_momentum_is_restored_for_every_free_component_and_no_pinned_one():
     """Two free balls in one body and a pinned one in another: gravity acts on all, momentum is exact for the free."""
     two = sp.TetMesh(
         np.concatenate([SPHERE.vertices, np.add(SPHERE.vertices, (3.0, 0.0, 0.0))]),

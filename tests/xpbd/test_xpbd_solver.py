@@ -1,4 +1,4 @@
-"""The XPBD solver as a whole: parameters, pins, mixed scenes, threads, and states that cannot go on."""
+"""The XPBD solver as a whole: parameters, pins, mixed scenes, threads, and states that cannot be continued."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ CLASSIC = sp.EdgesAndVolume(edge_compliance=1e-4)
 
 
 @pytest.mark.parametrize(
-    ("parameters", "says"),
+    ("parameters", "message"),
     [
         ({"substeps": 0}, "substeps is 0"),
         ({"substeps": 2.5}, "substeps is 2.5"),
@@ -30,8 +30,8 @@ CLASSIC = sp.EdgesAndVolume(edge_compliance=1e-4)
         ({"contact": True}, "contact is True"),
     ],
 )
-def test_wrong_parameters_are_refused(parameters, says):
-    with pytest.raises(SolverError, match=says):
+def test_wrong_parameters_raise_an_error(parameters, message):
+    with pytest.raises(SolverError, match=message):
         XPBD(**parameters)
 
 
@@ -42,7 +42,7 @@ def test_a_solver_is_frozen_and_keeps_its_contact_settings():
         XPBD().substeps = 3  # pyright: ignore[reportAttributeAccessIssue]
 
 
-def test_a_material_without_constraints_names_the_body():
+def test_an_error_names_the_body_whose_material_has_no_constraints():
     scene = sp.Scene(bodies=[sp.Body("pillow", CUBE, sp.ARAP(youngs=1e4, poisson=0.3))])
     with pytest.raises(
         SolverError, match=r"^XPBD: body .pillow. has the material ARAP, .* use EdgesAndVolume or StableNeoHookean, or"
@@ -73,7 +73,7 @@ def test_pins_are_exact_and_moved_every_substep():
         np.testing.assert_allclose(frame.velocities["cube"][held], (targets - before) / (DT / 7), atol=1e-8)
 
 
-def test_a_step_leaves_the_given_state_alone_and_starts_from_any():
+def test_a_step_does_not_change_the_given_state_and_starts_from_any():
     scene = sp.Scene(bodies=[sp.Body("cube", CUBE, JELLY, angular_velocity=(0, 3, 0))])
     system, solver = build_system(scene), XPBD()
     state = initial_state(scene)
@@ -88,8 +88,8 @@ def test_a_step_leaves_the_given_state_alone_and_starts_from_any():
     np.testing.assert_array_equal(first.velocities, again.velocities)
 
 
-def test_mixed_materials_behave_as_each_does_alone():
-    """Bodies that do not touch share kernels, colors and threads, but no motion."""
+def test_bodies_of_mixed_materials_behave_as_each_alone():
+    """Bodies that do not touch share kernels, colors and threads, and do not influence each other."""
     soft = sp.EdgesAndVolume(edge_compliance=1e-2, damping=0.02)
     damped = sp.StableNeoHookean(youngs=5e4, poisson=0.3, damping=0.01)
     kinds = {"classic": CLASSIC, "soft": soft, "jelly": JELLY, "damped": damped}
@@ -106,7 +106,7 @@ def test_mixed_materials_behave_as_each_does_alone():
     assert moved[1] > 1.05 * moved[0]
 
 
-def test_threads_do_not_change_a_bit(monkeypatch):
+def test_the_number_of_threads_does_not_change_a_bit(monkeypatch):
     monkeypatch.setattr(ordering, "SMALLEST_CHUNK", 100)
     materials = {
         "jelly": sp.StableNeoHookean(youngs=1e5, poisson=0.4, damping=0.002),
@@ -127,7 +127,7 @@ def test_threads_do_not_change_a_bit(monkeypatch):
 
 
 @pytest.mark.parametrize("material", [JELLY, CLASSIC], ids=["neo-hookean", "edges+volume"])
-def test_positions_that_blow_up_end_the_simulation_with_the_last_good_state(material):
+def test_diverging_positions_end_the_simulation_with_the_last_good_state(material):
     other = sp.Body("other", CUBE, JELLY, position=(5.0, 0.0, 0.0))
     scene = sp.Scene(bodies=[other, sp.Body("cube", CUBE, material)], obstacles=[sp.HalfSpace(point=(0, -9, 0))])
     v = np.zeros_like(CUBE.vertices)
@@ -140,18 +140,18 @@ def test_positions_that_blow_up_end_the_simulation_with_the_last_good_state(mate
     assert np.isfinite(frames[0].state.positions).all()
 
 
-def test_a_broken_state_from_outside_is_reported():
+def test_a_state_that_is_not_finite_is_reported():
     scene = sp.Scene(bodies=[sp.Body("cube", CUBE, JELLY)], obstacles=[sp.HalfSpace()])
     system, solver = build_system(scene), XPBD()
     state = initial_state(scene)
     x = state.positions.copy()
     x[5, 1] = np.nan
-    _, said = solver.step(system, State(0.0, x, state.velocities), DT, solver.prepare(system))
-    assert said.status == "not_finite"
+    _, report = solver.step(system, State(0.0, x, state.velocities), DT, solver.prepare(system))
+    assert report.status == "not_finite"
 
 
 def test_edges_and_volume_without_volume_compliance_keep_the_volume():
-    """A ball squeezed to half its height between plates: total volume within 1 % in every frame."""
+    """A ball compressed to half its height between plates: its volume stays within 1 % in every frame."""
     ball = sp.shapes.sphere(radius=0.5, edge_length=0.2)
 
     def plate(side):
@@ -169,7 +169,7 @@ def test_edges_and_volume_without_volume_compliance_keep_the_volume():
 
 
 def clocked(pace, seconds, count=4000):
-    """What a pace chooses over substeps that take seconds(k, way)."""
+    """The choices of a `Pace` over substeps that take seconds(k, way)."""
     choices = []
     for k in range(count):
         way = pace.choose()

@@ -1,4 +1,4 @@
-"""What acts on a scene from outside beside gravity and contact: forces on vertices, and springs to places."""
+"""External loads beside gravity and contact: forces on vertices, and springs to target positions."""
 
 from __future__ import annotations
 
@@ -34,7 +34,8 @@ class ExternalForces:
     ) -> None:
         """Project the springs: C = x - target with compliance 1 / k, all three components at once.
 
-        Dlam = -C / (w + 1 / (k h^2)), as for any XPBD constraint. From outside, so after the momentum restore.
+        Dlam = -C / (w + 1 / (k h^2)), as for any XPBD constraint. These forces are external, so they act after the
+        momentum restore.
         """
         for target in self.targets:
             places = np.ascontiguousarray(target.targets(time))

@@ -1,7 +1,7 @@
-"""The parts of a substep around the constraints: prediction, velocities, and the exchange of positions with the world.
+"""The parts of a substep around the constraints: prediction, velocities, and conversion to world coordinates.
 
-Inside a frame every connected component is kept in coordinates of its own origin, near its center of mass. Positions
-far from the world's origin have few digits left for the small differences that velocities are made of: at 100 m, a
+Within a frame the coordinates of every connected component are relative to its own origin, near its center of mass.
+Positions far from the world's origin have few digits left for the small differences that give velocities: at 100 m, a
 substep of 0.2 ms turns the round-off of a position into 7e-11 m/s.
 """
 
@@ -13,13 +13,13 @@ from supple.numerics.kernel_cache import njit, prange
 from supple.xpbd.sweeps.compilation import serial_and_parallel
 
 BLOCK = 4096
-# Positions beyond are lost, whether or not they are finite: at this distance [m] round-off is a tenth of a millimetre.
+# Positions beyond this distance [m] are lost, finite or not: round-off is a tenth of a millimetre there.
 FARTHEST = 1e12
 
 
 @njit(cache=True)
 def origins_of_components(positions, components, origins):
-    """A point near the vertices of each component (n, 3): the mean of them, the same for all vertices of one."""
+    """The origin (n, 3) of each vertex: the rounded mean of the vertices of its component."""
     count = 0
     for i in range(len(components)):
         count = max(count, components[i] + 1)
@@ -54,7 +54,7 @@ def predict(points, previous, velocities, gravity, h):
 
     Parameters
     ----------
-    points : (n, 4) positions [m] and inverse masses [1/kg]; a vertex without one is left to its pin.
+    points : (n, 4) positions [m] and inverse masses [1/kg]; where the inverse mass is 0, a pin sets the position.
     previous, velocities : (n, 3) [m], [m/s]
     gravity : (3,) [m/s^2]
     h : length of the substep [s]
@@ -66,7 +66,7 @@ def predict(points, previous, velocities, gravity, h):
 
 @njit(cache=True)
 def accelerate(points, velocities, gravity, h):
-    """What `predict` does with gravity, for itself: v += h g, x += h^2 g."""
+    """The part of `predict` that is due to gravity: v += h g, x += h^2 g."""
     for i in range(len(points)):
         if points[i, 3] > 0.0:
             for j in range(3):
@@ -94,7 +94,7 @@ def first_lost(points, velocities):
 
 @njit(cache=True)
 def hold(points, vertices, targets, origins):
-    """Put pinned vertices (k,) where `targets` (k, 3) in the world wants them."""
+    """Put pinned vertices (k,) at `targets` (k, 3) in world coordinates."""
     for k in range(len(vertices)):
         i = vertices[k]
         for j in range(3):
@@ -114,9 +114,9 @@ def to_world(points, origins, world):
 
 @njit(cache=True)
 def take_changes(points, velocities, h, origins, previous, world, world_previous):
-    """Take over what contacts moved since `to_world`; what was not moved keeps every bit.
+    """Apply what contacts changed since `to_world`; what they did not change keeps every bit.
 
-    Positions at the end of the substep and at its beginning may both have been moved; the velocity gets the difference.
+    Positions at the end and at the beginning of the substep may both have changed; the velocity gets the difference.
     """
     for i in range(len(world)):
         for j in range(3):

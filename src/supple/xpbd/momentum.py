@@ -1,12 +1,12 @@
-"""Giving every free body back the momentum that constraint projection takes from it.
+"""Restoring the momentum that constraint projection takes from free bodies.
 
-A projection conserves the moment of its corrections about the positions that it sees. The velocity is (x - x_n) / h,
-though, so the arm that counts for angular momentum is x_n. The difference is of second order in the substep, it has a
-sign, and it adds up: a squashed sphere, released, begins to spin. More substeps make it worse.
+The corrections of a projection have no moment about the current positions. However, the velocity is (x - x_n) / h, so
+the lever arm of angular momentum is x_n. The difference is of second order in the substep, it has a sign, and it
+accumulates: a sphere that is squashed and released begins to spin. More substeps make it worse.
 
-The cure, once a substep after the internal constraints and before contacts, for every connected component (of bodies
-and stitches) that has no pinned vertex and is not stitched to an obstacle: with c and c' the centers of mass of x_n and
-x, r0 = x_n - c, r = x - c', and x* the predicted positions,
+The remedy is applied once per substep, after the internal constraints and before contacts, to every connected component
+(of bodies and stitches) that has no pinned vertex and is not stitched to an obstacle. With c and c' the centers of mass
+of x_n and x, r0 = x_n - c, r = x - c', and x* the predicted positions,
 
     P_err = sum m (x - x*),   L_err = sum m r0 x (x - x*),   A = sum m ((r0 . r) I - r r0^T),   A th = L_err,
     x  <-  x - P_err / M - th x r.
@@ -31,7 +31,7 @@ _SUMS = 21
 
 
 class MomentumRestore:
-    """The components of a system, and which of them are free. What stitches join is one component."""
+    """The components of a system, and which of them are free. Bodies joined by stitches are one component."""
 
     def __init__(self, system: System) -> None:
         labels = system.joined_components
@@ -61,15 +61,14 @@ class MomentumRestore:
     ) -> None:
         """End the internal part of a substep: v = (x - x_n) / h, and both momenta of every free component restored.
 
-        The correction goes into positions and velocities each for itself. Through the positions, velocities would take
-        over their round-off, divided by h; in 60 s of free motion at 80 substeps that has been seen to add up to 4e-9
-        rad/s.
+        Positions and velocities are corrected separately. Velocities derived from corrected positions would contain
+        their round-off divided by h, which accumulated to 4e-9 rad/s in 60 s of free motion at 80 substeps.
 
         Parameters
         ----------
         points : (n, 4) positions after the internal constraints [m], in the first three columns; changed in place.
         previous : (n, 3) positions at the beginning of the substep [m].
-        velocities : (n, 3) in: with which the substep's positions were predicted; out: at its end [m/s].
+        velocities : (n, 3) in: used to predict the positions of the substep; out: at its end [m/s].
         h : length of the substep [s].
         parallel : whether blocks of vertices run on several threads.
         """
@@ -160,7 +159,7 @@ def _rigid_corrections(blocks, totals, sums, motion):
         det = A[0, 0] * c0[0] + A[0, 1] * c0[1] + A[0, 2] * c0[2]
         motion[component, 0:3] = P / M
         motion[component, 6:9] = s
-        # A body in a line, or turned over within the substep, has no rotation to be given.
+        # Where all vertices are in a line, or the body turned over within the substep, no rotation is defined.
         if abs(det) > 1e-12 * abs(trace) ** 3:
             for i in range(3):
                 motion[component, 3 + i] = (c0[i] * L[0] + c1[i] * L[1] + c2[i] * L[2]) / det

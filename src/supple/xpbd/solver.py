@@ -5,8 +5,6 @@ Source: Macklin, Müller, Chentanez, "XPBD" (2016); Macklin et al., "Small Steps
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from time import perf_counter
 
@@ -16,8 +14,9 @@ from numba.core import config
 from numpy.typing import NDArray
 
 from supple.errors import SolverError
-from supple.numerics.thread_tuning import ThreadTuner
 from supple.numerics.interruption import interruption_point
+from supple.numerics.thread_tuning import ThreadTuner
+from supple.numerics.threads import numba_threads
 from supple.solver import Solver
 from supple.state import State, Status, StepReport
 from supple.system import System
@@ -25,6 +24,7 @@ from supple.xpbd.constraints.registry import ConstraintSet, build_constraint_set
 from supple.xpbd.constraints.stitch_anchors import StitchAnchors
 from supple.xpbd.constraints.stitches import stitch_constraints
 from supple.xpbd.contact.collisions import Collisions
+from supple.xpbd.contact.memory import ContactMemory
 from supple.xpbd.contact.settings import XPBDContact
 from supple.xpbd.details import XPBDDetails
 from supple.xpbd.external_forces import ExternalForces
@@ -41,21 +41,23 @@ from supple.xpbd.integration import (
 from supple.xpbd.momentum import MomentumRestore
 from supple.xpbd.sweeps.ordering import Layout, make_layout, reordered
 
-# Below this much work, in edges or volumes, a sweep is over before a second thread has woken up.
+# Below this much work, in edges or volumes, a sweep ends before a second thread has started.
 PARALLEL_FROM = 20_000
 _MOST_THREADS: int = config.NUMBA_NUM_THREADS  # pyright: ignore[reportAttributeAccessIssue]
 
 
 @dataclass(eq=False)
 class XPBDWorkspace:
-    """What is computed once for a system, and scratch arrays. All in the solver's own numbering of vertices.
+    """What is computed once for a system, and scratch arrays, in the solver's own numbering of vertices.
+
+    It caches and never remembers: a step reads nothing of an earlier step but the state.
 
     Attributes
     ----------
-    extended : (n + a, 4) positions about their component's origin [m] and inverse masses [1/kg], of the vertices and
-        then of the anchors, zero masses; extended_previous : (n + a, 3) positions when the substep began
-    points, previous : their rows of vertices
-    velocities, origins : (n, 3); world, world_previous : (n, 3) positions in the world, for contacts
+    extended : (n + a, 4) positions about the component's origin [m] and inverse masses [1/kg], of the vertices and then
+        of the anchors (inverse mass 0); extended_previous : (n + a, 3) positions at the beginning of the substep
+    points, previous : the rows of the vertices
+    velocities, origins : (n, 3); world, world_previous : (n, 3) positions in world coordinates, for contacts
     """
 
     system: System
@@ -85,16 +87,16 @@ class XPBDWorkspace:
 
 @dataclass(frozen=True)
 class XPBD(Solver):
-    """Extended position-based dynamics: fast, robust, approximate; more substeps come closer to the exact solution.
+    """Extended position-based dynamics: fast, robust and approximate. The error decreases with more substeps.
 
     Parameters
     ----------
     substeps : number of substeps of a frame, each with one sweep over all constraints.
-    momentum_restore : give free bodies back the momentum that constraint projection takes (see `supple.xpbd.momentum`).
-        False shows what XPBD does without.
-    contact : contact of bodies with each other and with themselves; None turns it off. Obstacles act in any case.
-    threads : number of threads, or None: one, or all of Numba's where the scene is large enough and they turn out to be
-        faster. The result has the same bits for any number.
+    momentum_restore : restore the momentum that constraint projection takes from free bodies (see
+        `supple.xpbd.momentum`). False shows the behaviour of plain XPBD.
+    contact : contact of bodies with each other and with themselves; None turns it off. Obstacles always act.
+    threads : number of threads. None: one, or all of Numba's where the scene is large enough and several threads are
+        measured to be faster. The result has the same bits for any number.
 
     Raises
     ------
@@ -121,7 +123,7 @@ class XPBD(Solver):
                 )
 
     def prepare(self, system: System) -> XPBDWorkspace:
-        """Number vertices, sort constraints into chunks, precompute their constants.
+        """Number the vertices, sort the constraints into chunks, and compute their constants.
 
         Raises
         ------
@@ -148,13 +150,14 @@ class XPBD(Solver):
         )
 
     def step(self, system: System, state: State, dt: float, workspace: XPBDWorkspace) -> tuple[State, StepReport]:
-        """Advance by `dt` [s] in `substeps` substeps. The state that is returned has arrays of its own."""
+        """Advance by `dt` [s] in `substeps` substeps. The returned state has its own arrays."""
         ws, h = workspace, dt / self.substeps
         _load(ws, state)
         targets = _pin_targets(ws.system, state.time, h, self.substeps)
         if ws.collisions:
-            ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt)
-        with _threads(self.threads):
+            memory = state.memory if isinstance(state.memory, ContactMemory) else None
+            ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt, memory)
+        with numba_threads(self.threads):
             for k in range(self.substeps):
                 interruption_point()
                 started = perf_counter()
@@ -174,7 +177,7 @@ class XPBD(Solver):
                     break
         lost = first_lost(ws.points, ws.velocities)
         if lost >= 0:
-            message = _what_is_lost(ws, lost, state.time + dt)
+            message = _lost_position_message(ws, lost, state.time + dt)
             return state, StepReport(Status.NOT_FINITE, self.substeps, message, details=XPBDDetails())
         details = XPBDDetails(ws.collisions.contacts, ws.collisions.smallest_gap)
         return _unload(ws, state.time + dt), StepReport(Status.CONVERGED, self.substeps, details=details)
@@ -189,20 +192,6 @@ def _check_count(name: str, value: object) -> None:
         raise SolverError(f"XPBD: {name} is {value!r}; give a whole number of one or more")
 
 
-@contextlib.contextmanager
-def _threads(wanted: int | None) -> Iterator[None]:
-    """Numba's number of threads set for a block, and set back after it."""
-    if wanted is None or wanted == 1:
-        yield
-        return
-    before = numba.get_num_threads()
-    numba.set_num_threads(wanted)
-    try:
-        yield
-    finally:
-        numba.set_num_threads(before)
-
-
 def _load(ws: XPBDWorkspace, state: State) -> None:
     old = ws.layout.old_from_new
     np.take(state.positions, old, axis=0, out=ws.world)
@@ -213,10 +202,10 @@ def _load(ws: XPBDWorkspace, state: State) -> None:
 
 
 def _begin_substep(ws: XPBDWorkspace, targets: NDArray[np.float64], end: float, h: float, parallel: bool) -> None:
-    """Predict positions, with pinned vertices where `targets` (k, 3) wants them, and damping taken from the velocities.
+    """Predict positions, with pinned vertices at `targets` (k, 3), and apply damping.
 
-    Damping comes before gravity, forces and constraints, and sees only the velocities that the substep begins with.
-    Later it would take from a resting body part of its load, or undo what constraints have done to their neighbours.
+    Damping acts before gravity, forces and constraints, on the velocities at the beginning of the substep only. Later
+    in the substep it would reduce the load of a resting body, or undo corrections of neighbouring constraints.
     """
     damped = [constraints for constraints in ws.sets if constraints.damped]
     gravity = ws.system.gravity
@@ -232,7 +221,7 @@ def _begin_substep(ws: XPBDWorkspace, targets: NDArray[np.float64], end: float, 
 
 
 def _collide(ws: XPBDWorkspace, time: float, h: float) -> bool:
-    """Contacts of one substep, in world coordinates. Returns False, with nothing done, where a position is lost."""
+    """Project the contacts of a substep, in the world. Returns False, without effect, where a position is lost."""
     if not to_world(ws.points, ws.origins, ws.world):
         return False
     to_world(ws.previous, ws.origins, ws.world_previous)
@@ -244,17 +233,17 @@ def _collide(ws: XPBDWorkspace, time: float, h: float) -> bool:
 def _unload(ws: XPBDWorkspace, time: float) -> State:
     to_world(ws.points, ws.origins, ws.world)
     new = ws.layout.new_from_old
-    return State(time, ws.world[new], ws.velocities[new])
+    return State(time, ws.world[new], ws.velocities[new], ws.collisions.memory(ws.world))
 
 
 def _pin_targets(system: System, time: float, h: float, substeps: int) -> NDArray[np.float64]:
-    """(substeps, k, 3) where pinned vertices must be at the end of each substep [m]."""
+    """(substeps, k, 3) positions of the pinned vertices at the end of each substep [m]."""
     if all(pin.pin.motion is None for pin in system.pins):
         return np.repeat(system.pin_targets(time)[None], substeps, axis=0)
     return np.stack([system.pin_targets(time + (k + 1) * h) for k in range(substeps)])
 
 
-def _what_is_lost(ws: XPBDWorkspace, vertex: int, time: float) -> str:
+def _lost_position_message(ws: XPBDWorkspace, vertex: int, time: float) -> str:
     part = next(p for p in ws.system.bodies if p.vertices.start <= vertex < p.vertices.stop)
     number = int(ws.layout.old_from_new[vertex]) - part.vertices.start
     return (

@@ -44,7 +44,7 @@ def find(points, triangles, far, near, pieces, edge, excluded=None):
 
 
 @pytest.mark.parametrize("edge", [0.05, 0.3, 5.0])
-def test_finds_each_near_pair_once_and_no_other(edge):
+def test_each_near_pair_is_found_once_and_no_other(edge):
     rng = np.random.default_rng(2)
     points = rng.uniform(-1, 1, size=(90, 3))
     triangles = np.arange(90, dtype=np.int32).reshape(-1, 3)
@@ -53,7 +53,7 @@ def test_finds_each_near_pair_once_and_no_other(edge):
     points[0:3] = [[-3, -0.1, -3], [3, -0.1, -3], [0, 0.1, 3]]  # one triangle far larger than a cell
     pieces = (np.arange(90) // 45).astype(np.int32)
     far, near = rng.uniform(0, 0.2, size=(90, 3)), rng.uniform(0, 0.1, size=(90, 3))
-    far[7, 0] = 2.5  # a point that looks far
+    far[7, 0] = 2.5  # a point with a large search radius
     expected = []
     for p in range(90):
         for t, corners in enumerate(triangles):
@@ -66,7 +66,7 @@ def test_finds_each_near_pair_once_and_no_other(edge):
     assert len(expected) > 60
 
 
-def test_leaves_out_excluded_pairs_and_positions_that_are_not_finite():
+def test_excluded_pairs_and_positions_that_are_not_finite_are_omitted():
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 0, 1], [0.2, 0.1, 0.2], [0.3, 0.1, 0.3]], dtype=float)
     triangles = np.array([[0, 1, 2]], dtype=np.int32)
     pieces = np.zeros(5, dtype=np.int32)

@@ -1,4 +1,4 @@
-"""Each constraint set for itself: rest, statics, oscillation and damping, against closed forms."""
+"""Each constraint set alone: rest, statics, oscillation and damping, against closed forms."""
 
 import logging
 
@@ -21,7 +21,7 @@ def held_tet(material, **more):
 
 
 def displacements(scene, solver, dt, steps, start):
-    """The top's displacement (steps, 3) after it was let go at `start` (3,) [m]."""
+    """The displacement of the top (steps, 3) after its release at `start` (3,) [m]."""
     x = TET.vertices.copy()
     x[TOP] += start
     system = build_system(scene)
@@ -34,7 +34,7 @@ def displacements(scene, solver, dt, steps, start):
 
 
 def decay_and_frequency(y, dt):
-    """Of a decaying cosine: rate [1/s] and angular frequency [rad/s], from its maxima."""
+    """Rate [1/s] and angular frequency [rad/s] of a decaying cosine, from its maxima."""
     peaks = [k for k in range(1, len(y) - 1) if y[k - 1] < y[k] >= y[k + 1]]
     assert len(peaks) >= 4
     times, tops = dt * np.array(peaks), np.log(y[peaks])
@@ -42,7 +42,7 @@ def decay_and_frequency(y, dt):
 
 
 def stiffness_of_top(name):
-    """(3, 3) [N/m] of small displacements of the top, the base being held; the tet's volume is 1/6, its height 1."""
+    """(3, 3) [N/m] of small displacements of the top, with a fixed base; the tet's volume is 1/6, its height 1."""
     if name == "neo-hookean":
         mu, lam = 1e5 / 2.6, 1e5 * 0.3 / (1.3 * 0.4)
         return np.diag([mu, lam + 2.0 * mu, mu]) / 6.0
@@ -59,7 +59,7 @@ MATERIALS = {
 @pytest.mark.parametrize("mode", [0, 2], ids=["softest mode", "stiffest mode"])
 @pytest.mark.parametrize("name", MATERIALS)
 def test_a_damped_oscillator_has_the_analytic_frequency_and_decay(name, mode):
-    """Kelvin-Voigt: x'' = -w^2 (x + tau x'), so the rate is tau w^2 / 2, beside XPBD's own of h w^2 / 2."""
+    """Kelvin-Voigt: x'' = -w^2 (x + tau x'), so the rate is tau w^2 / 2, plus that of the method, h w^2 / 2."""
     kind, constants = MATERIALS[name]
     squares, modes = np.linalg.eigh(stiffness_of_top(name) / (1000.0 / 24.0))
     omega = np.sqrt(squares[mode])
@@ -88,8 +88,8 @@ def test_a_force_deflects_a_tet_by_its_compliance(name):
 
 @pytest.mark.parametrize("tau", [0.0, 0.05])
 @pytest.mark.parametrize("kind", ["neo-hookean", "edges+volume"])
-def test_rest_is_exact_and_damping_spares_rigid_motion(kind, tau):
-    """A body that turns and flies without strain keeps its kinetic energy; at rest, nothing moves at all."""
+def test_rest_is_exact_and_damping_does_not_change_rigid_motion(kind, tau):
+    """A body in rigid motion keeps its kinetic energy; a body at rest does not move."""
     ball = sp.shapes.sphere(radius=0.5, edge_length=0.33)
     material = {
         "neo-hookean": sp.StableNeoHookean(youngs=1e6, poisson=0.4, damping=tau),
@@ -129,7 +129,7 @@ def test_regions_of_a_material_that_xpbd_cannot_simulate_are_an_error():
         XPBD().prepare(build_system(held_tet(mixed)))
 
 
-def test_a_body_too_stiff_for_its_substeps_is_said_to_be_so(caplog):
+def test_a_warning_names_a_body_too_stiff_for_its_substeps(caplog):
     scene = held_tet(sp.StableNeoHookean(youngs=1e12, poisson=0.3))
     with caplog.at_level(logging.WARNING, logger="supple"):
         frames = list(sp.simulate(scene, XPBD(substeps=2), 1 / 60, 3))
@@ -139,7 +139,7 @@ def test_a_body_too_stiff_for_its_substeps_is_said_to_be_so(caplog):
 
 @pytest.mark.parametrize("kind", ["neo-hookean", "edges+volume"])
 @pytest.mark.parametrize("start", ["flat", "inverted", "scrambled"])
-def test_it_recovers_from_any_start(kind, start):
+def test_a_body_recovers_from_any_start(kind, start):
     ball = sp.shapes.sphere(radius=0.5, edge_length=0.33)
     material = {
         "neo-hookean": sp.StableNeoHookean(youngs=1e5, poisson=0.4, damping=0.005),

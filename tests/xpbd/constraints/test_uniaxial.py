@@ -31,10 +31,10 @@ def last(frames):
 
 
 @pytest.mark.parametrize("stretch", TABLE)
-def test_a_stretched_bar_finds_the_closed_form(stretch):
-    """Held at its ends only, a disturbed bar comes to rest in the homogeneous state, and pulls as hard as it should.
+def test_a_stretched_bar_agrees_with_the_closed_form(stretch):
+    """A disturbed bar that is held at its ends only comes to rest in the homogeneous state, with the exact force.
 
-    The force is taken from the momentum that the bar gains in a very short step after one end has been let go.
+    The force is the momentum that the bar gains in a very short step after the release of one end, divided by time.
     """
     stress, across = TABLE[stretch]
     mesh, X = bar(0.2, (2, 4, 2))
@@ -53,18 +53,18 @@ def test_a_stretched_bar_finds_the_closed_form(stretch):
     shift = np.abs(rest - exact).max()
     assert shift <= min(1e-2 * abs(stretch - 1.0), 1e-3) * 0.2
     dt = 1e-6
-    let_go = last(sp.simulate(scene(bottom, 0.0), XPBD(substeps=1), dt, 1, initial_positions={"bar": rest}))
-    pull = -let_go.report.linear_momentum[1] / dt
+    released = last(sp.simulate(scene(bottom, 0.0), XPBD(substeps=1), dt, 1, initial_positions={"bar": rest}))
+    pull = -released.report.linear_momentum[1] / dt
     assert pull / WIDTH**2 == pytest.approx(stress, rel=0.01)
 
 
 def hanging_weight(substeps, damping=0.05):
-    """Stretch along and across the middle of a bar that a heavy end pulls to the table's 1.5, by gravity."""
+    """Stretch along and across the middle of a bar whose heavy end stretches it to 1.5 by gravity."""
     stress, across = TABLE[1.5]
     mesh, X = bar(0.4, (2, 8, 2))
     layer = X[mesh.tets][:, :, 1].max(axis=1) < 0.05 + 1e-9
     density = np.full(len(mesh.tets), 1000.0)
-    # Half of the bar hangs on its middle, too.
+    # The middle also carries half of the bar.
     density[layer] = (stress * WIDTH**2 / 9.81 - 1000.0 * WIDTH**2 * 0.15) / mesh.volumes[layer].sum()
     top = np.flatnonzero(X[:, 1] > 0.4 - 1e-9)
     material = sp.StableNeoHookean(youngs=YOUNGS, poisson=POISSON, density=density, damping=damping)
@@ -79,7 +79,7 @@ def hanging_weight(substeps, damping=0.05):
     return along, np.ptp(x[middle, 0]) / WIDTH
 
 
-def test_a_hanging_weight_stretches_the_bar_as_the_table_says_whatever_the_substeps():
+def test_a_hanging_weight_stretches_the_bar_by_the_closed_form_at_any_number_of_substeps():
     results = np.array([hanging_weight(substeps) for substeps in (20, 40, 80)])
     np.testing.assert_allclose(results, np.tile([1.5, TABLE[1.5][1]], (3, 1)), rtol=0.01)
     assert abs(results[2, 0] - results[1, 0]) < 0.001

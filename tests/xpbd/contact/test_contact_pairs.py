@@ -1,4 +1,4 @@
-"""Pairs named in a scene act in XPBD: what is excluded passes through, a pair's own friction decides."""
+"""Contact pairs of a scene in XPBD: excluded pairs pass through each other, and a pair's own friction is used."""
 
 import numpy as np
 import pytest
@@ -15,15 +15,15 @@ STIFF = sp.StableNeoHookean(youngs=1e6, poisson=0.3, density=1000)
 PLATE = sp.shapes.box_surface((2.0, 0.2, 2.0), (4, 1, 4))
 
 FLOORS = {
-    "plane": lambda **said: sp.HalfSpace(name="floor", **said),
-    "block": lambda **said: sp.Box(center=(0, -0.1, 0), size=(2, 0.2, 2), name="floor", **said),
-    "ball": lambda **said: sp.Sphere(center=(0, -3, 0), radius=3, name="floor", **said),
-    "room": lambda **said: sp.Box(center=(0, 1, 0), size=(2, 2, 2), inside=True, name="floor", **said),
-    "bowl": lambda **said: sp.Sphere(center=(0, 3, 0), radius=3, inside=True, name="floor", **said),
-    "triangles": lambda **said: sp.TriangleObstacle(
-        surface=PLATE.transformed(translation=(0, -0.1, 0)), name="floor", **said
+    "plane": lambda **options: sp.HalfSpace(name="floor", **options),
+    "block": lambda **options: sp.Box(center=(0, -0.1, 0), size=(2, 0.2, 2), name="floor", **options),
+    "ball": lambda **options: sp.Sphere(center=(0, -3, 0), radius=3, name="floor", **options),
+    "room": lambda **options: sp.Box(center=(0, 1, 0), size=(2, 2, 2), inside=True, name="floor", **options),
+    "bowl": lambda **options: sp.Sphere(center=(0, 3, 0), radius=3, inside=True, name="floor", **options),
+    "triangles": lambda **options: sp.TriangleObstacle(
+        surface=PLATE.transformed(translation=(0, -0.1, 0)), name="floor", **options
     ),
-    "small ball": lambda **said: sp.Sphere(center=(0, -0.01, 0), radius=0.01, name="floor", **said),
+    "small ball": lambda **options: sp.Sphere(center=(0, -0.01, 0), radius=0.01, name="floor", **options),
 }
 
 
@@ -51,23 +51,23 @@ def test_an_excluded_body_falls_through_an_obstacle_that_holds_the_other(kind):
 
 
 def test_excluded_bodies_pass_through_each_other_and_others_do_not():
-    bodies = [block("low", (0, 0.05, 0)), block("ghost", (0, 0.4, 0)), block("high", (0, 0.2, 0))]
-    pairs = [sp.ContactPair("ghost", ["low", "high"], collide=False)]
+    bodies = [block("low", (0, 0.05, 0)), block("excluded", (0, 0.4, 0)), block("high", (0, 0.2, 0))]
+    pairs = [sp.ContactPair("excluded", ["low", "high"], collide=False)]
     y = last_of(sp.Scene(bodies, [sp.HalfSpace()], contact_pairs=pairs), 40).positions
-    assert y["ghost"][:, 1].min() == pytest.approx(0.0, abs=5e-3)
+    assert y["excluded"][:, 1].min() == pytest.approx(0.0, abs=5e-3)
     assert y["high"][:, 1].min() > 0.09
 
 
-@pytest.mark.parametrize(("said", "touches"), [({}, True), ({"collide": False}, False)])
-def test_self_contact_is_switched_off_by_naming_a_body_twice(said, touches):
-    pairs = [sp.ContactPair("a", "a", **said)] if said else []
+@pytest.mark.parametrize(("options", "touches"), [({}, True), ({"collide": False}, False)])
+def test_a_pair_of_a_body_with_itself_turns_off_self_contact(options, touches):
+    pairs = [sp.ContactPair("a", "a", **options)] if options else []
     surfaces = Collisions(
         build_system(sp.Scene([block("a", (0, 0, 0))], contact_pairs=pairs)), sp.XPBDContact()
     ).surfaces
     assert (surfaces is not None) is touches
 
 
-def test_settings_still_switch_off_what_the_table_lets_touch():
+def test_settings_turn_off_contact_that_the_pairs_allow():
     scene = sp.Scene([block("a", (0, 0, 0)), block("b", (0, 1, 0))], contact_pairs=[sp.ContactPair("a", "b", 0.5)])
     settings = sp.XPBDContact(body_collision=False)
     surfaces = Collisions(build_system(scene), settings).surfaces
@@ -76,7 +76,7 @@ def test_settings_still_switch_off_what_the_table_lets_touch():
 
 
 @pytest.mark.parametrize("flat", [True, False], ids=["plane", "triangles"])
-def test_friction_of_a_pair_decides_on_a_slope_beside_a_body_without_a_rule(flat):
+def test_friction_of_a_pair_acts_on_a_slope_beside_a_body_without_a_pair(flat):
     if flat:
         floor = sp.HalfSpace(normal=NORMAL, friction=0.2, name="slope")
     else:
@@ -91,7 +91,7 @@ def test_friction_of_a_pair_decides_on_a_slope_beside_a_body_without_a_rule(flat
     assert travel["own"] == pytest.approx(0.5 * 9.81 * (np.sin(SLOPE) - 0.2 * np.cos(SLOPE)) * 0.4**2, rel=0.07)
 
 
-def test_friction_between_bodies_is_the_pairs_where_it_has_one():
+def test_friction_between_bodies_is_that_of_their_pair():
     plank = sp.Body("plank", sp.shapes.box((0.8, 0.1, 0.6), (6, 1, 6)), STIFF, position=0.05 * NORMAL,
                     rotation=(0, 0, -SLOPE), friction=0.04)  # fmt: skip
     riders = [block(n, 0.1565 * NORMAL + (0, 0, z), True, friction=1.0) for n, z in (("own", -0.16), ("pair", 0.16))]

@@ -1,4 +1,4 @@
-"""Coulomb friction: sticking and sliding on slopes, carried by what moves, between bodies."""
+"""Coulomb friction: sticking and sliding on slopes, on moving obstacles, and between bodies."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def centers(scene, steps, substeps=20, dt=1 / 60):
     return np.array(rows)
 
 
-def test_correction_stays_in_the_cone_and_never_overshoots():
+def test_the_correction_is_in_the_friction_cone_and_at_most_the_slip():
     n, slip = (0.0, 1.0, 0.0), (3.0, 0.7, -4.0)
     assert friction_correction(slip, n, 0.5, 2.0) == pytest.approx((-0.6, 0, 0.8))
     assert friction_correction(slip, n, 10.0, 2.0) == pytest.approx((-3, 0, 4))
@@ -52,7 +52,7 @@ def on_slope():
 def test_block_sticks_where_mu_is_above_the_slope(on_slope):
     travel = on_slope(0.6, 120)
     assert abs(travel[-1]) < 1e-3
-    assert abs(travel[-1] - travel[29]) < 1e-4  # what there is comes from shearing at the beginning
+    assert abs(travel[-1] - travel[29]) < 1e-4  # the rest is shear deformation at the beginning
 
 
 @pytest.mark.parametrize("mu", [0.4, 0.0])
@@ -64,7 +64,7 @@ def test_block_slides_with_the_analytic_acceleration(on_slope, mu):
     assert fitted == pytest.approx(expected, rel=0.02)
 
 
-def test_a_moving_floor_drags_a_block_along():
+def test_a_block_moves_with_a_slow_floor():
     # 1 m/s^2 is below mu g: the block keeps up with the floor.
     floor = sp.HalfSpace(friction=0.5, motion=lambda t: (0.5 * t * t, 0, 0))
     moved = centers(sp.Scene([block((0, 0.05, 0))], [floor]), 60)[-1, 0]
@@ -72,13 +72,13 @@ def test_a_moving_floor_drags_a_block_along():
     assert abs(moved[2]) < 1e-3
 
 
-def test_a_floor_that_starts_too_fast_slides_under_the_block():
+def test_a_block_slides_on_a_floor_that_starts_too_fast():
     floor = sp.HalfSpace(friction=0.2, motion=lambda t: (10 * t, 0, 0))
     moved = centers(sp.Scene([block((0, 0.05, 0))], [floor]), 30)[-1, 0]
     assert moved[0] == pytest.approx(0.5 * 0.2 * 9.81 * 0.5**2, rel=0.05)
 
 
-def test_a_turntable_carries_a_block_around():
+def test_a_block_moves_with_a_turntable():
     turn = sp.Keyframes([0, 2], angles=[0, 1.0], axis=(0, 1, 0))
     table = sp.Box(center=(0, -0.1, 0), size=(2, 0.2, 2), friction=0.8, motion=turn)
     moved = centers(sp.Scene([block((0.5, 0.05, 0))], [table]), 120)[-1, 0]
@@ -86,7 +86,7 @@ def test_a_turntable_carries_a_block_around():
 
 
 @pytest.mark.parametrize(("mu", "sticks"), [(0.6, True), (0.2, False)])
-def test_bodies_rub_on_each_other_with_the_geometric_mean(mu, sticks):
+def test_friction_between_bodies_uses_the_geometric_mean(mu, sticks):
     plank = block(0.05 * NORMAL, size=(0.6, 0.1, 0.3), divisions=(5, 1, 3), friction=mu**2, tilted=True, name="plank")
     rider = block(0.1565 * NORMAL, friction=1.0, tilted=True, name="rider")
     x = centers(sp.Scene([plank, rider], [sp.HalfSpace(normal=NORMAL, friction=2.0)]), 24)

@@ -13,7 +13,7 @@ SOFT = sp.StableNeoHookean(youngs=5e4, poisson=0.4, density=1000)
 
 
 def inside_tets(points, x, tets, shrink=1e-9):
-    """How many of the points (k, 3) are inside a tet, by barycentric coordinates."""
+    """Number of the points (k, 3) inside a tet, from barycentric coordinates."""
     base = x[tets[:, 0]]
     inverse = np.linalg.inv(np.moveaxis(x[tets[:, 1:]] - base[:, None], 1, 2))
     inside = np.zeros(len(points), dtype=bool)
@@ -55,12 +55,12 @@ def test_two_balls_collide_and_keep_their_momentum(offset):
         assert np.abs(now - moment).max() < 2e-4 * scale
     last = frames[-1]
     apart = last.velocities["b"].mean(axis=0) - last.velocities["a"].mean(axis=0)
-    assert apart @ [1, 0, 0] > 0.3  # they have parted again
+    assert apart @ [1, 0, 0] > 0.3  # they are moving apart again
     assert min(f.report.details.smallest_gap for f in frames if f.report.details.smallest_gap is not None) > 0
 
 
 @pytest.mark.parametrize("speed", [1.0, 4.0])
-def test_thin_plates_do_not_fly_through_each_other(speed):
+def test_thin_plates_do_not_pass_through_each_other(speed):
     def plate(name, y, v):
         return sp.Body(name, sp.shapes.box((0.2, 0.01, 0.2), (4, 1, 4)), SOFT, position=(0, y, 0), velocity=(0, v, 0))
 
@@ -70,7 +70,7 @@ def test_thin_plates_do_not_fly_through_each_other(speed):
         assert below < above
 
 
-def test_bodies_that_start_deep_inside_each_other_part_gently():
+def test_bodies_that_start_deep_inside_each_other_separate_slowly():
     scene = sp.Scene([ball("a", (0, 0, 0)), ball("b", (0.11, 0.02, 0.01))], gravity=(0, 0, 0))
     fastest, frame = 0.0, None
     for frame in sp.simulate(scene, XPBD(substeps=10), 1 / 60, 120):
@@ -92,7 +92,7 @@ def test_a_heap_comes_to_rest_without_overlaps():
 
 
 def arch(name="arch"):
-    """A U of soft material, open to the top."""
+    """A U of soft material, open at the top."""
     mesh = sp.shapes.box((0.3, 0.03, 0.05), (24, 2, 2))
     x = mesh.vertices.copy()
     radius = 0.3 / (2 * np.pi) * 1.15
@@ -102,7 +102,7 @@ def arch(name="arch"):
 
 
 def crossing_of_legs(frame):
-    """How far the left leg's end is to the right of the right leg's end, at the most [m]."""
+    """Largest distance of the left leg's end beyond the right leg's end [m]."""
     body = frame.system.bodies[0].body
     rest = body.mesh.vertices
     left, right = (rest[:, 1] > 0.0) & (rest[:, 0] < 0), (rest[:, 1] > 0.0) & (rest[:, 0] > 0)
@@ -160,7 +160,7 @@ def test_a_contact_conserves_momentum_exactly_and_moves_by_inverse_mass():
     assert light_moved[system.rest_positions[system.bodies[0].vertices, 1] < 0].min() > -0.01
 
 
-def test_switches_and_pins():
+def test_contact_settings_decide_whether_a_body_passes_a_pinned_one():
     scene = sp.Scene(
         [ball("a", (-0.12, 0, 0), (3, 0, 0)), ball("b", (0.12, 0, 0))],
         pins=[sp.Pin("b", np.arange(len(ball("b", (0, 0, 0)).mesh.vertices)))],

@@ -13,14 +13,14 @@ def fill(out, value):
         out[k] = value + k
 
 
-def test_both_do_the_same_under_names_of_their_own():
-    said = []
+def test_both_kernels_do_the_same_and_have_different_names():
+    results = []
     for parallel in (False, True):
         out = np.zeros(1000)
         fill[parallel](out, 2.0)
-        said.append(out)
-    assert np.array_equal(*said)
-    assert np.array_equal(said[0], 2.0 + np.arange(1000))
-    # The cache is kept by name: under one name, either would be taken for the other.
+        results.append(out)
+    assert np.array_equal(*results)
+    assert np.array_equal(results[0], 2.0 + np.arange(1000))
+    # The cache distinguishes kernels by name only.
     assert [kernel.py_func.__qualname__ for kernel in fill] == ["fill", "fill_parallel"]
     assert [bool(kernel.targetoptions.get("parallel")) for kernel in fill] == [False, True]

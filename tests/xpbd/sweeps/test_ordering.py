@@ -1,4 +1,4 @@
-"""Levels, chunks and colors: what may run side by side really is independent."""
+"""Levels, chunks and colors: constraints that may run in parallel are independent."""
 
 import numpy as np
 import pytest
@@ -94,7 +94,7 @@ def test_the_reordered_system_is_the_same_system(two_bodies):
     np.testing.assert_array_equal(inner.pin_targets(0.0), two_bodies.pin_targets(0.0))
 
 
-def test_the_order_brings_neighbours_near(two_bodies):
+def test_the_order_reduces_the_distance_of_neighbours_in_memory(two_bodies):
     inner = reordered(two_bodies, make_layout(two_bodies))
     part = two_bodies.bodies[1]
     assert np.ptp(inner.tets[part.tets], axis=1).mean() < 0.3 * np.ptp(two_bodies.tets[part.tets], axis=1).mean()

@@ -1,4 +1,4 @@
-"""Pairs of points and triangles of one body that may not collide: they belong together, or touch at rest."""
+"""Pairs of points and triangles of one body that never collide: neighbours in the mesh, or close at rest."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ def excluded_pairs(
 ) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
     """For each triangle, the points that it never collides with: starts (t + 1,) and points.
 
-    These are its own corners, all points that an edge joins to one of them, and all points of the same piece that are
-    closer than `closer_than` [m] to it at rest.
+    These are its own corners, all points that share an edge with one of them, and all points of the same piece that are
+    closer to it than `closer_than` [m] at rest.
 
     Parameters
     ----------
@@ -46,11 +46,11 @@ def excluded_pairs(
 def pairs_closer_than(
     surfaces: ContactSurfaces, positions: NDArray[np.float64], closer_than: float, pieces: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """(q,) points and (q,) triangles that are closer than that to each other [m].
+    """(q,) points and (q,) triangles whose distance is below `closer_than` [m].
 
     Parameters
     ----------
-    positions : (n, 3) of all points [m]; pieces : (p, p) of which pieces the points and the triangles may be
+    positions : (n, 3) of all points [m]; pieces : (p, p) whether points of one piece and triangles of another count
     """
     n, t = len(surfaces.point_piece), len(surfaces.triangles)
     finder = PairFinder(n, len(surfaces.closed), closer_than)

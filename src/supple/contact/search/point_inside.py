@@ -1,4 +1,4 @@
-"""Which points are inside closed surfaces at the beginning, and how deep: overlaps that nobody has watched coming."""
+"""Which points are inside closed surfaces, and how deep, from positions alone: for overlaps without a known history."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from supple.numerics.mat3 import dot, row, subtract
 
 @njit
 def _crosses_above(y, z, p, q):
-    """Whether the segment p q, seen along x, crosses the line of this y above z; the same for q p, bit for bit."""
+    """Whether the segment p q, projected along x, crosses the line of this y above z; for q p the same, bit for bit."""
     if (p[1] > y) == (q[1] > y):
         return False
     if p[1] > q[1]:
@@ -23,7 +23,7 @@ def _crosses_above(y, z, p, q):
 
 @njit
 def _ray_hits(q, a, b, c):
-    """Whether the ray from q along +x goes through the triangle; neighbours share every decision at their edge."""
+    """Whether the ray from q along +x crosses the triangle; neighbours decide in the same way at their common edge."""
     if max(a[0], b[0], c[0]) < q[0]:
         return False
     hit = _crosses_above(q[1], q[2], a, b)
@@ -42,7 +42,7 @@ def _ray_hits(q, a, b, c):
 
 @njit(cache=True)
 def depths_inside(shapes, closed, allowed, boxes, out):
-    """Write how deep each point is inside another piece that it may touch into out (n,) [m]; 0 outside of all.
+    """Write into out (n,) how deep each point is inside another piece that it may touch [m]; 0 outside of all pieces.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How far vertices may move before lists of what is near them must be made anew."""
+"""How far vertices may move before the lists of what is near them must be renewed."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from supple.numerics.kernel_cache import njit
 
 @njit(cache=True)
 def reach_from_velocities(velocities, dt, least, out):
-    """out (n,) [m]: how far each vertex may get within dt [s], at least `least`."""
+    """out (n,) [m]: how far each vertex may move within dt [s], at least `least`."""
     for i in range(len(velocities)):
         a, b, c = velocities[i, 0], velocities[i, 1], velocities[i, 2]
         out[i] = least + 1.2 * dt * math.sqrt(a * a + b * b + c * c)
@@ -19,10 +19,10 @@ def reach_from_velocities(velocities, dt, least, out):
 
 @njit(cache=True)
 def outran(x, x_gathered, reach):
-    """Whether some vertex is further than its reach (n,) from where it was."""
+    """Whether some vertex is farther than its reach (n,) from where it was."""
     for i in range(len(x)):
         a, b, c = x[i, 0] - x_gathered[i, 0], x[i, 1] - x_gathered[i, 1], x[i, 2] - x_gathered[i, 2]
-        # Written so that a position that is not finite outruns everything.
+        # The negated form is also true for positions that are not finite.
         if not a * a + b * b + c * c <= reach[i] * reach[i]:
             return True
     return False
@@ -30,7 +30,7 @@ def outran(x, x_gathered, reach):
 
 @njit(cache=True)
 def mean_motions(motions, pieces, all_share, out):
-    """Mean of the motions (n, 3) of each piece; in the last row that of everything, or zero unless `all_share`."""
+    """Mean of the motions (n, 3) of each piece; the last row is the mean of all points, or zero unless `all_share`."""
     out[:] = 0.0
     counts = np.zeros(len(out))
     for i in range(len(motions)):
@@ -48,18 +48,19 @@ def mean_motions(motions, pieces, all_share, out):
 
 
 @njit(cache=True)
-def looking_out(motions, come, excursions, pieces, drifts, scales, far, near):
-    """How far points may get, from their velocities; the arguments `far` and `near` of `spatial_hash.find_pairs`.
+def search_radii(motions, come, excursions, pieces, drifts, scales, far, near):
+    """How far points may move, from their velocities: the arguments `far` and `near` of `spatial_hash.find_pairs`.
 
     Parameters
     ----------
-    motions : (n, 3) velocity times the time ahead [m]; come : (n, 3) how they have come since the substep began [m]
-    excursions : (n,) how far they went in a substep before contact held them [m]
+    motions : (n, 3) expected motion: velocity times the time ahead [m]
+    come : (n, 3) motion since the beginning of the substep [m]
+    excursions : (n,) largest motion of a point in a substep before contact stopped it [m]
     pieces : (n,)
-    drifts : (p + 1, 3): motion that pairs of one piece share, for each piece, and that all pairs share, in the last row
+    drifts : (p + 1, 3) common motion of each piece; in the last row the common motion of all points [m]
     scales : least, most [m]
-    far, near : (n, 3): how far a point looks out, without the gap, how far it may carry a triangle, and how far it may
-        move on before this must be done anew; `near` is relative to its piece
+    far, near : (n, 3) the search radius of a point, without the gap; how far it may move a triangle; and how far it may
+        move before the search must be repeated. `near` is relative to the motion of its piece [m]
     """
     least, most = scales
     for i in range(len(motions)):
@@ -79,14 +80,14 @@ def looking_out(motions, come, excursions, pieces, drifts, scales, far, near):
 
 @njit(cache=True)
 def outran_pieces(x, x_prev, x_gathered, far, near, pieces, all_share, drifts, excursions):
-    """Whether some point has moved further than `looking_out` allowed, absolutely or relative to its piece.
+    """Whether some point has moved farther than `search_radii` allowed, absolutely or relative to its piece.
 
     Parameters
     ----------
     x, x_prev, x_gathered : (n, 3) now, at the beginning of the substep, and when lists were made [m]
-    far, near : from `looking_out`; pieces : (n,); all_share : see `mean_motions`
+    far, near : from `search_radii`; pieces : (n,); all_share : see `mean_motions`
     drifts : (p + 1, 3) scratch memory, see `mean_motions`
-    excursions : (n,) raised to how far each point wanted to go within this substep [m]
+    excursions : (n,) increased to the motion of each point within this substep, where that is larger [m]
     """
     for i in range(len(x)):
         square = 0.0
@@ -101,7 +102,7 @@ def outran_pieces(x, x_prev, x_gathered, far, near, pieces, all_share, drifts, e
         for j in range(3):
             absolute += (moved[i, j] - drifts[-1, j]) ** 2
             relative += (moved[i, j] - drifts[k, j]) ** 2
-        # Written so that a position that is not finite outruns everything.
+        # The negated form is also true for positions that are not finite.
         if not (absolute <= far[i, 2] ** 2 and relative <= near[i, 2] ** 2):
             return True
     return False

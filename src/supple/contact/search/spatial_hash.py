@@ -1,9 +1,10 @@
 """Points in a hashed grid, and the triangles that are near them.
 
-A triangle visits the cells that its box meets, widened by as much as most points look out; a point is entered in its
-own cell, and where it looks further than most, in all that the rest of its box meets. So one point that looks far makes
-nothing dearer for the others. A pair is tested in one cell only: the first that both boxes meet. The grid is filled by
-a counting sort, so the order of everything depends on the input alone.
+A triangle visits the cells that its box overlaps, enlarged by the common search radius, which suffices for most points.
+A point is entered in its own cell. Where its search radius is larger than the common one, it is entered in all cells
+that the remainder of its box overlaps, so that one point with a large radius does not slow down the others. A pair is
+tested in one cell only: the first that both boxes overlap. The grid is filled by a counting sort, so the order of all
+results depends on the input alone.
 
 Source: Teschner et al., "Optimized Spatial Hashing for Collision Detection of Deformable Objects" (2003).
 """
@@ -19,12 +20,12 @@ from supple.numerics.geometry.closest_point import closest_on_triangle, combine
 from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import dot, row, subtract
 
-# Cells along the longest side of everything: beyond this, cells grow. Three cell numbers then fit into 63 bits.
+# Largest number of cells along the longest side; cells grow where there would be more. Three numbers fit into 63 bits.
 MOST_CELLS = 1 << 20
-# A point that looks out over more cells than this is kept apart and meets every triangle.
+# A point whose box overlaps more cells than this is not entered in the grid and is tested against every triangle.
 WIDE = 1000
-# How many of a hundred points look no further than what triangles are widened by.
-MOST = 90.0
+# Percentile of the search radii that is the common one, by which triangles are enlarged.
+COMMON_PERCENTILE = 90.0
 
 
 @njit
@@ -45,7 +46,7 @@ def _cell(coordinate, low, size):
 
 @njit(cache=True)
 def boxes_of_pieces(points, point_piece, pad, low, high):
-    """Bounds low, high (p, 3) of each piece's points, each widened by its first entry in pad (n, 3)."""
+    """Bounds low, high (p, 3) of each piece's points, each point enlarged by its first entry in pad (n, 3)."""
     low[:] = np.inf
     high[:] = -np.inf
     for i in range(len(points)):
@@ -56,7 +57,7 @@ def boxes_of_pieces(points, point_piece, pad, low, high):
 
 
 @njit
-def _meets_another(low, high, piece, partners, boxes):
+def _overlaps_another(low, high, piece, partners, boxes):
     """Whether a box of one piece overlaps that of another piece that it may touch."""
     piece_low, piece_high = boxes
     for k in range(len(piece_low)):
@@ -76,15 +77,15 @@ def _meets_another(low, high, piece, partners, boxes):
 
 @njit(cache=True)
 def hash_points(shapes, radii, rules, boxes, lattice, around, first, last, starts):
-    """Which cells points meet.
+    """Find the cells of points.
 
-    Writes the box around each point into around (n, 6), its cells into first, last (n, 3), and how many entries come
-    before each bucket into starts.
+    Writes the box around each point into around (n, 6), the range of its cells into first, last (n, 3), and the number
+    of entries before each bucket into starts.
 
     Parameters
     ----------
     shapes, radii, rules, boxes : see `find_pairs`
-    lattice : edge of a cell [m]; how far most points look [m]; the grid's origin (3,) [m]
+    lattice : edge of a cell [m]; common search radius [m]; origin of the grid (3,) [m]
     starts : (buckets + 1,) with a power of two of buckets
 
     Returns
@@ -101,7 +102,7 @@ def hash_points(shapes, radii, rules, boxes, lattice, around, first, last, start
         for j in range(3):
             box_low[j], box_high[j] = points[p, j] - far[p, 0], points[p, j] + far[p, 0]
         r = near[p, 0]
-        if _meets_another(box_low, box_high, point_piece[p], rules[0], boxes):
+        if _overlaps_another(box_low, box_high, point_piece[p], rules[0], boxes):
             r = max(r, far[p, 0])
         count = 1.0
         for j in range(3):
@@ -138,7 +139,7 @@ def fill_buckets(first, last, starts, entries, keys):
 
 @njit
 def is_excluded(point, triangle, excluded_starts, excluded_points):
-    """Whether a pair is masked: the point belongs to the triangle or to its neighbourhood."""
+    """Whether the point is in the triangle's list of excluded points."""
     for e in range(excluded_starts[triangle], excluded_starts[triangle + 1]):  # noqa: SIM110
         if excluded_points[e] == point:
             return True
@@ -146,8 +147,8 @@ def is_excluded(point, triangle, excluded_starts, excluded_points):
 
 
 @njit
-def _meets(around, p, low, high):
-    """Whether the box around point p meets another."""
+def _overlaps(around, p, low, high):
+    """Whether the box around point p overlaps another."""
     return (
         around[p, 0] <= high[0]
         and around[p, 3] >= low[0]
@@ -160,16 +161,16 @@ def _meets(around, p, low, high):
 
 @njit(cache=True)
 def find_pairs(shapes, radii, rules, boxes, grid, wide, out):
-    """Pairs (point, triangle) that may touch, triangle by triangle. Returns how many there are; writes what fits.
+    """Find pairs (point, triangle) that may touch, triangle by triangle. Writes as many as fit; returns their number.
 
     Parameters
     ----------
     shapes : points (n, 3), point_piece (n,), triangles (t, 3), triangle_piece (t,)
-    radii : two (n, 2) arrays, for pairs of different pieces and of one piece: how far a point looks out for triangles
-        (with its own motion), and how far its motion may carry a triangle's corner [m]
+    radii : two (n, 2) arrays, for pairs of different pieces and for pairs of one piece: the search radius of a point
+        (with its own motion), and how far its motion may move a corner of a triangle [m]
     rules : partners (p, p), whether two pieces may touch either way; allowed (p, p), whether points of the first may
         touch triangles of the second; and the excluded points of each triangle as starts (t + 1,) and points
-    boxes : low, high (p, 3), from `boxes_of_pieces`, widened by how far points look
+    boxes : low, high (p, 3), from `boxes_of_pieces`, enlarged by the search radii
     grid : size, common, low, around, first, starts, entries, keys, from `hash_points` and `fill_buckets`
     wide : points that are not in the grid
     out : two int32 arrays for points and triangles
@@ -191,7 +192,7 @@ def find_pairs(shapes, radii, rules, boxes, grid, wide, out):
         for j in range(3):
             low[j] = min(points[a, j], points[b, j], points[c, j]) - moves_far
             high[j] = max(points[a, j], points[b, j], points[c, j]) + moves_far
-        if _meets_another(low, high, its, partners, boxes):
+        if _overlaps_another(low, high, its, partners, boxes):
             more = max(0.0, moves_near - moves_far)
         elif allowed[its, its]:
             more = moves_near - moves_far
@@ -204,15 +205,15 @@ def find_pairs(shapes, radii, rules, boxes, grid, wide, out):
             begin[j] = _cell(low[j] - common, origin[j], size)
             end[j] = _cell(high[j] + common, origin[j], size)
             volume *= end[j] - begin[j] + 1.0
-        close = 0  # points whose box meets the triangle's
+        close = 0  # points whose box overlaps the triangle's
         if volume > len(points):
             for p in range(len(points)):
-                if _meets(around, p, low, high):
+                if _overlaps(around, p, low, high):
                     found[close] = p
                     close += 1
         else:
             for p in wide:
-                if _meets(around, p, low, high):
+                if _overlaps(around, p, low, high):
                     found[close] = p
                     close += 1
             for i in range(begin[0], end[0] + 1):
@@ -223,7 +224,7 @@ def find_pairs(shapes, radii, rules, boxes, grid, wide, out):
                             p = entries[e]
                             if (
                                 keys[e] == key
-                                and _meets(around, p, low, high)
+                                and _overlaps(around, p, low, high)
                                 and max(first[p, 0], begin[0]) == i
                                 and max(first[p, 1], begin[1]) == j
                                 and max(first[p, 2], begin[2]) == k
@@ -250,7 +251,7 @@ def find_pairs(shapes, radii, rules, boxes, grid, wide, out):
 
 @njit(cache=True)
 def group_by_point(pair_points, pair_triangles, count, starts, active, triangles):
-    """Order pairs by point, then triangle: starts (n + 1,), active points, triangles. Returns how many are active."""
+    """Sort pairs by point, then triangle: starts (n + 1,), active points, triangles. Returns how many are active."""
     starts[:] = 0
     for e in range(count):
         starts[pair_points[e] + 1] += 1
@@ -269,7 +270,7 @@ def group_by_point(pair_points, pair_triangles, count, starts, active, triangles
 
 
 class PairFinder:
-    """Lists of triangles near each point, made again and again in the same memory.
+    """Lists of triangles near each point. Every search reuses the same memory.
 
     After `gather`, the triangles near point p are `triangles[starts[p]:starts[p + 1]]` in ascending order, and
     `active[:n_active]` are the points that have any.
@@ -298,7 +299,7 @@ class PairFinder:
             self.n_active = self.count = 0
             return
         low = points.min(axis=0)
-        common = float(np.percentile(radii[0][:, 0], MOST))
+        common = float(np.percentile(radii[0][:, 0], COMMON_PERCENTILE))
         size = max(0.8 * (self.edge_length + 2.0 * common), 2.0 * float((points.max(axis=0) - low).max()) / MOST_CELLS)
         boxes, rules = (self._low, self._high), (rules[0] | rules[0].T, *rules)
         boxes_of_pieces(points, shapes[1], radii[0], *boxes)

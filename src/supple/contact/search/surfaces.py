@@ -1,4 +1,4 @@
-"""All surfaces of a scene that can touch: points and triangles of bodies and of triangle obstacles, as flat arrays."""
+"""All surfaces of a scene that can touch, as flat arrays: points and triangles of bodies and of triangle obstacles."""
 
 from __future__ import annotations
 
@@ -14,27 +14,26 @@ from supple.mesh.topology import connected_components
 from supple.scene.contact_pairs import PairTable
 from supple.scene.obstacles import Box, Obstacle, Sphere, TriangleObstacle
 from supple.system import System
-from supple.xpbd.contact.settings import XPBDContact
 
 
 @dataclass(frozen=True, eq=False)
 class ContactSurfaces:
     """Points and triangles, and which of them may touch. A piece is a connected part of one body or one obstacle.
 
-    The bodies' points come first, then those of obstacles: vertices of triangle obstacles, corners of blocks, and the
-    centers of balls that are small beside the bodies' triangles (they touch at a gap of their radius).
+    The bodies' points come first, then those of obstacles: vertices of triangle obstacles, corners of boxes, and the
+    centers of spheres that are small compared with the bodies' triangles (contact at a gap of their radius).
 
     Attributes
     ----------
-    rows : (nb,) which vertices of the system the bodies' points are
-    fixed_points : (no, 3) obstacles' points at time 0 [m]; fixed_owners : (no,) which obstacle each belongs to
+    rows : (nb,) vertices of the system that are the bodies' points
+    fixed_points : (no, 3) obstacles' points at time 0 [m]; fixed_owners : (no,) the obstacle of each
     inverse_masses : (n,) 1/m [1/kg] with n = nb + no
     point_piece : (n,)
-    triangles : (t, 3) indices of points, pieces one after the other, those of bodies first; triangle_piece : (t,)
-    body_triangles : how many triangles belong to bodies
+    triangles : (t, 3) indices of points, sorted by piece, those of bodies first; triangle_piece : (t,)
+    body_triangles : number of triangles of bodies
     closed : (p,) whether a piece has an inside
     allowed : (p, p) whether points of the first piece may touch triangles of the second
-    gaps : (p, p) the gap that is kept between the two [m]; friction : (p, p) Coulomb coefficients
+    gaps : (p, p) gap that is kept between the two [m]; friction : (p, p) Coulomb coefficients
     """
 
     rows: NDArray[np.int32]
@@ -52,11 +51,11 @@ class ContactSurfaces:
 
     @property
     def is_needed(self) -> bool:
-        """Whether anything here may touch anything."""
+        """Whether any contact is possible."""
         return bool(self.allowed.any()) and len(self.triangles) > 0
 
     def place_obstacles(self, poses: ObstaclePoses, time: float, out: NDArray[np.float64]) -> None:
-        """Write where the obstacles' points are at `time` [s] into the last rows of out (n, 3)."""
+        """Write the positions of the obstacles' points at `time` [s] into the last rows of out (n, 3)."""
         if len(self.fixed_points):
             R, t = poses.at(time)
             out[len(self.rows) :] = (
@@ -66,7 +65,7 @@ class ContactSurfaces:
 
 @dataclass
 class _Piece:
-    """What decides how a piece meets others: `owner` is the row of its body or obstacle in the scene's `PairTable`."""
+    """The contact rules of a piece: `owner` is the row of its body or obstacle in the scene's `PairTable`."""
 
     owner: int
     closed: bool = True
@@ -74,9 +73,21 @@ class _Piece:
 
 
 def build_surfaces(
-    system: System, table: PairTable, settings: XPBDContact | None, thickness: float, edge_length: float
+    system: System,
+    table: PairTable,
+    body_collision: bool,
+    self_collision: bool,
+    thickness: float,
+    edge_length: float,
 ) -> ContactSurfaces:
-    """Collect what may touch. `edge_length` [m] is the mean of the bodies' surfaces."""
+    """Collect what may touch.
+
+    Parameters
+    ----------
+    table : which bodies and obstacles may touch, and with which friction
+    body_collision, self_collision : whether bodies touch each other, and themselves
+    thickness : the gap that surfaces keep [m]; edge_length : mean edge length of the bodies' surfaces [m]
+    """
     obstacles = _obstacle_parts(system.obstacles, len(system.bodies), edge_length)
     pieces, rows, body_piece, triangles = _body_parts(system)
     points, owners, point_piece = [np.zeros((0, 3))], [np.zeros(0, np.int32)], [body_piece]
@@ -92,7 +103,7 @@ def build_surfaces(
         piece_parts.append(part["triangle_piece"] + offset)
         count += len(part["points"])
     fixed = np.concatenate(points)
-    allowed, gaps, friction = _rules(pieces, table, settings, thickness)
+    allowed, gaps, friction = _rules(pieces, table, body_collision, self_collision, thickness)
     return ContactSurfaces(
         rows=rows,
         fixed_points=fixed,
@@ -184,17 +195,16 @@ def _is_closed(triangles: NDArray[np.int32]) -> bool:
 
 
 def _rules(
-    pieces: Sequence[_Piece], table: PairTable, settings: XPBDContact | None, thickness: float
+    pieces: Sequence[_Piece], table: PairTable, body_collision: bool, self_collision: bool, thickness: float
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.float64]]:
-    """(p, p) arrays: may touch, gap, friction. What the table lets touch, the settings may still switch off."""
+    """(p, p) arrays: may touch, gap, friction. See `build_surfaces`."""
     owner = np.array([piece.owner for piece in pieces])
     fixed = owner >= table.bodies
     gap = np.array([thickness if piece.gap is None else piece.gap for piece in pieces])
     same = np.eye(len(pieces), dtype=np.bool_)
     both_bodies = ~fixed[:, None] & ~fixed[None, :]
     allowed = fixed[:, None] ^ fixed[None, :]
-    if settings is not None:
-        allowed |= both_bodies & ((same & settings.self_collision) | (~same & settings.body_collision))
+    allowed |= both_bodies & ((same & self_collision) | (~same & body_collision))
     gaps = np.where(fixed[:, None], gap[:, None], gap[None, :])
     pairs = np.ix_(owner, owner)
     allowed &= table.collide[pairs]

@@ -1,4 +1,4 @@
-"""What a constraint set is, and which material has which one.
+"""The interface of a constraint set, and the constraint sets of each material.
 
 A new constraint set is one file with one class, and one line in `CONSTRAINT_SETS`.
 """
@@ -27,7 +27,7 @@ class ConstraintSet(Protocol):
     """All constraints of one kind in a scene, sorted for projection."""
 
     count: int
-    work: int  # what a sweep costs, in edges or volumes
+    work: int  # cost of a sweep, in edges or volumes
     damped: bool
 
     def project(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:
@@ -35,21 +35,21 @@ class ConstraintSet(Protocol):
 
         Parameters
         ----------
-        points : (n, 4) positions [m] and inverse masses [1/kg], solver's numbering.
+        points : (n, 4) positions [m] and inverse masses [1/kg], in the solver's numbering.
         h : length of the substep [s].
         parallel : whether independent chunks run on several threads.
         """
         ...
 
     def damp(self, points: NDArray[np.float64], previous: NDArray[np.float64], h: float, parallel: bool) -> None:
-        """Take from a motion previous -> points what Kelvin-Voigt damping takes in a substep, in place.
+        """Apply the Kelvin-Voigt damping of a substep to the motion from `previous` to `points`, in place.
 
-        Forth and back over all constraints, half of it each time: only a symmetric operator takes energy from every
-        mode.
+        The sweep goes forward and backward over all constraints, with half of the damping each time: only a symmetric
+        operator dissipates energy in every mode.
 
         Parameters
         ----------
-        points : (n, 4) as in `project`, moved on with the velocities of the beginning of the substep.
+        points : (n, 4) as in `project`, predicted with the velocities at the beginning of the substep.
         previous : (n, 3) positions at the beginning of the substep [m].
         h, parallel : as in `project`.
         """
@@ -62,7 +62,7 @@ class _Entry:
     sets: tuple[Callable[[System, list[BodyRange], Layout], ConstraintSet], ...]
 
     def takes(self, material: Material) -> bool:
-        """Whether a body of this material is handled here: of this kind, or of regions that all are."""
+        """Whether this entry handles the material: it is of this kind, or all of its regions are."""
         if isinstance(material, Regions):
             return all(type(each) is self.material for each in material.materials)
         return type(material) is self.material
@@ -75,12 +75,12 @@ CONSTRAINT_SETS = (
 
 
 def build_constraint_sets(system: System, layout: Layout) -> list[ConstraintSet]:
-    """The constraint sets of all bodies, each kind once, however many bodies share it.
+    """The constraint sets of all bodies: one of each kind, for all bodies that need it.
 
     Parameters
     ----------
     system : in the solver's numbering (`supple.xpbd.sweeps.ordering.reordered`).
-    layout : the same numbering.
+    layout : of this numbering.
 
     Raises
     ------

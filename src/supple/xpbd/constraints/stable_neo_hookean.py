@@ -1,9 +1,9 @@
 """The stable Neo-Hookean constraint set: C_D = sqrt(tr F^T F), C_H = J - (1 + mu / lam), of each tet together.
 
 With alpha_D = 1 / (mu V), alpha_H = 1 / (lam V) their energy is V (mu/2 Ic + lam/2 (J - 1 - mu/lam)^2): that of
-`StableNeoHookean`, up to a constant. Neither constraint is zero at rest, only the sum of their forces is; taking one
-after the other leaves a residual that depends on the substep and makes the body too soft. Here both are taken in one
-step, which is exactly zero at rest (derivation: docs/xpbd.md, "The block of two").
+`StableNeoHookean`, up to a constant. At rest neither constraint is zero; only the sum of their forces is. Projection
+of one after the other leaves a residual that depends on the substep and makes the body too soft. Here both are
+projected in one step, which is exactly zero at rest (derivation: docs/xpbd.md, "The block of two").
 
 Source of the constraints: Macklin and Müller, "A Constraint-based Formulation of Stable Neo-Hookean Materials" (2021).
 """
@@ -26,12 +26,12 @@ logger = logging.getLogger(__name__)
 
 
 class BlocksOfTwo:
-    """Both constraints of any tetrahedra, in an order that is given.
+    """Both constraints of any tetrahedra, in a given order.
 
     Parameters
     ----------
     tets : (m, 4); Dm_inv : (m, 3, 3) [1/m]; volumes : (m,) at rest [m^3]
-    moduli : mu and lam, (m,) each, as they stand in the energy density, above zero [Pa]
+    moduli : mu and lam of the energy density, (m,) each, above zero [Pa]
     inverse_masses : of all vertices [1/kg]
     segments : the order of the tets; damping : Kelvin-Voigt time of each of its kinds [s]
     """
@@ -51,7 +51,7 @@ class BlocksOfTwo:
         self.segments = segments
         self.corners = np.ascontiguousarray(corners, dtype=np.uint32)
         self.count = len(order)
-        # A sweep takes about three times as long for one of these tets as for an edge or a volume.
+        # The projection of one of these tets costs about three times as much as that of an edge or a volume.
         self.work = 3 * self.count
         gradients, self.curvatures = _principal_axes(Dm_inv, inverse_masses[corners])
         # The columns of `data`: 9 shape gradients, mu V, lam V, 1 + mu/lam, step length, 3 curvatures: two cache lines.
@@ -79,7 +79,7 @@ class BlocksOfTwo:
         sweep_viscous[parallel](points, previous, self.corners, self.data, h, pointers, bounds, gammas)
 
     def _prepare(self, h: float) -> None:
-        """Step lengths for substeps of h: h^2 phi with phi the largest length at which a tet cannot overshoot."""
+        """Step lengths for substeps of h [s]: h^2 phi, with phi the largest factor at which a tet cannot overshoot."""
         stiffness = 2.0 * self.data[:, 9] * self.curvatures[:, 2] * h**2
         self.data[:, 12] = h**2 * (1.0 / np.maximum(1.0, stiffness))
         self._prepared_for = h
@@ -115,10 +115,10 @@ def _principal_axes(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Shape gradients in the axes in which sum_i w_i b_i b_i^T is diagonal, and that diagonal.
 
-    The energy is isotropic, so each tet may have rest coordinates of its own; these make the matrix that couples the
-    two constraints diagonal, three numbers instead of six.
+    The energy is isotropic, so each tet may have its own rest coordinates. In these the matrix that couples the two
+    constraints is diagonal: three numbers instead of six.
     """
     b = np.concatenate([-Dm_inv.sum(axis=1, keepdims=True), Dm_inv], axis=1)
     curvatures, axes = np.linalg.eigh(np.einsum("tn,tni,tnj->tij", w, b, b))
-    axes[np.linalg.det(axes) < 0.0, :, 0] *= -1.0  # rotations only: a reflection would turn the sign of J
+    axes[np.linalg.det(axes) < 0.0, :, 0] *= -1.0  # rotations only: a reflection would change the sign of J
     return Dm_inv @ axes, np.maximum(curvatures, 0.0)

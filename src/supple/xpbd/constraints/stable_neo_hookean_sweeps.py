@@ -12,7 +12,7 @@ from supple.xpbd.sweeps.compilation import FLAGS, serial_and_parallel
 
 @njit(fastmath=FLAGS, error_model="numpy", inline="always")
 def _edges_times(x, p0, p1, p2, p3, b):
-    """F = Ds [b_1, b_2, b_3]^T of a tet with these corners, row after row."""
+    """F = Ds [b_1, b_2, b_3]^T of a tet with these corners, row by row."""
     b10, b11, b12 = b[0], b[1], b[2]
     b20, b21, b22 = b[3], b[4], b[5]
     b30, b31, b32 = b[6], b[7], b[8]
@@ -34,7 +34,7 @@ def _edges_times(x, p0, p1, p2, p3, b):
 
 @njit(cache=True, fastmath=FLAGS, error_model="numpy")
 def _push(points, p0, p1, p2, p3, b, S, step):
-    """dx_i = -w_i step S b_i, with b_0 = -(b_1 + b_2 + b_3), for a stress S, row after row."""
+    """dx_i = -w_i step S b_i, with b_0 = -(b_1 + b_2 + b_3), for a stress S, row by row."""
     b10, b11, b12 = b[0], b[1], b[2]
     b20, b21, b22 = b[3], b[4], b[5]
     b30, b31, b32 = b[6], b[7], b[8]
@@ -84,7 +84,7 @@ def _elastic_chunk(points, corners, data, first, last, bounds):
             k0, k1, k2 = b[13], b[14], b[15]
 
             f00, f01, f02, f10, f11, f12, f20, f21, f22 = _edges_times(points, p0, p1, p2, p3, b)
-            # dJ/dF, by columns
+            # dJ/dF by columns
             c00, c10, c20 = f11 * f22 - f21 * f12, f21 * f02 - f01 * f22, f01 * f12 - f11 * f02
             c01, c11, c21 = f12 * f20 - f22 * f10, f22 * f00 - f02 * f20, f02 * f10 - f12 * f00
             c02, c12, c22 = f10 * f21 - f20 * f11, f20 * f01 - f00 * f21, f00 * f11 - f10 * f01
@@ -109,8 +109,7 @@ def _elastic_chunk(points, corners, data, first, last, bounds):
 @njit(cache=True, fastmath=FLAGS, error_model="numpy")
 def _viscous_chunk(points, previous, corners, data, h, first, last, bounds, gammas, backwards):
     for s in range(last - 1, first - 1, -1) if backwards else range(first, last):
-        # Half of it in each of the two sweeps
-        gamma = 0.5 * gammas[s]
+        gamma = 0.5 * gammas[s]  # half in each of the two sweeps
         if gamma == 0.0:
             continue
         low, high = bounds[s, 0], bounds[s, 1]
@@ -136,8 +135,8 @@ def _viscous_chunk(points, previous, corners, data, h, first, last, bounds, gamm
             q01 = g00 * g01 + g10 * g11 + g20 * g21
             q02 = g00 * g02 + g10 * g12 + g20 * g22
             q12 = g01 * g02 + g11 * g12 + g21 * g22
-            # The length of the viscous step, by the rule for the elastic one (k2 is the largest curvature), less the
-            # square of the largest stretch, before or after: row sums bound it, and are 1 at rest.
+            # The length of the viscous step follows the rule of the elastic one (k2 is the largest curvature), divided
+            # by the square of the largest stretch, before or after. Row sums are an upper bound of it, and 1 at rest.
             stretched = max(
                 max(abs(r00) + abs(r01) + abs(r02), abs(r01) + abs(r11) + abs(r12), abs(r02) + abs(r12) + abs(r22)),
                 max(abs(q00) + abs(q01) + abs(q02), abs(q01) + abs(q11) + abs(q12), abs(q02) + abs(q12) + abs(q22)),
@@ -148,7 +147,7 @@ def _viscous_chunk(points, previous, corners, data, h, first, last, bounds, gamm
             third = (e00 + e11 + e22) / 3.0
             e00, e11, e22 = e00 - third, e11 - third, e22 - third
             shear = 2.0 * mu * gamma
-            # Of a stitch, lam may be below mu / 3; damping gives no energy even so.
+            # The lam of a stitch may be below mu / 3; damping must not add energy there either.
             bulk = max(lam - mu / 3.0, 0.0) * gamma
             c00, c10, c20 = f11 * f22 - f21 * f12, f21 * f02 - f01 * f22, f01 * f12 - f11 * f02
             c01, c11, c21 = f12 * f20 - f22 * f10, f22 * f00 - f02 * f20, f02 * f10 - f12 * f00
@@ -192,7 +191,7 @@ def _viscous_chunk(points, previous, corners, data, h, first, last, bounds, gamm
 
 @serial_and_parallel
 def sweep_elastic(points, corners, data, pointers, bounds):
-    """The even chunks, then the odd ones."""
+    """Project the even chunks, then the odd ones."""
     n_chunks = len(pointers) - 1
     for parity in range(2):
         for k in prange((n_chunks + 1 - parity) // 2):
@@ -202,7 +201,7 @@ def sweep_elastic(points, corners, data, pointers, bounds):
 
 @serial_and_parallel
 def sweep_viscous(points, previous, corners, data, h, pointers, bounds, gammas):
-    """The even chunks, the odd ones, and all of them back."""
+    """Damp the even chunks, the odd ones, then both backward."""
     n_chunks = len(pointers) - 1
     for turn in range(4):
         parity = 0 if turn == 0 or turn == 3 else 1

@@ -12,27 +12,26 @@ from supple.contact.search.reach import outran, reach_from_velocities
 from supple.contact.search.surfaces import build_surfaces
 from supple.scene.contact_pairs import pair_table
 from supple.system import System
+from supple.xpbd.contact.memory import ContactMemory
 from supple.xpbd.contact.obstacle_contacts import ObstacleContacts
 from supple.xpbd.contact.obstacle_shapes import build_shapes
 from supple.xpbd.contact.settings import XPBDContact
 from supple.xpbd.contact.surface_collisions import SurfaceCollisions
 
-# Of the mean surface edge: what a vertex at rest may move before lists are made anew.
+# Fraction of the mean surface edge that a vertex at rest may move before lists are renewed.
 LEAST_REACH = 0.1
-# Of the mean surface edge: how much of an old overlap is mended in one frame (faster, and bodies would jump apart);
-# up to which gaps distances are reported.
-MENDED_PER_FRAME, NEAR = 0.05, 1.0
-# Of the mean surface edge.
-DEFAULT_THICKNESS = 0.05
+# Fractions of the mean surface edge: how much of an old overlap is removed in one frame (a faster removal would make
+# bodies jump apart), the largest gap that is reported, and the default thickness.
+REMOVED_PER_FRAME, NEAR, DEFAULT_THICKNESS = 0.05, 1.0, 0.05
 
 
 class Collisions:
-    """Contact for the substeps of a frame. Positions are projected in place.
+    """Contact during the substeps of a frame. Positions are projected in place.
 
     Parameters
     ----------
-    system : what moves, in the numbering that `project` gets.
-    settings : None switches contact of bodies with each other and with themselves off; obstacles act in any case.
+    system : the bodies, in the numbering of the arrays that `project` receives.
+    settings : None turns off contact of bodies with each other and with themselves; obstacles always act.
 
     Attributes
     ----------
@@ -49,7 +48,8 @@ class Collisions:
         self.obstacles = ObstacleContacts(build_shapes(system.obstacles), self.poses, system, table)
         thickness = settings.thickness if settings is not None else None
         self.thickness = thickness if thickness is not None else DEFAULT_THICKNESS * self.edge_length
-        surfaces = build_surfaces(system, table, settings, self.thickness, self.edge_length)
+        switches = (False, False) if settings is None else (settings.body_collision, settings.self_collision)
+        surfaces = build_surfaces(system, table, *switches, self.thickness, self.edge_length)
         self.surfaces = (
             SurfaceCollisions(system, surfaces, self.poses, self.edge_length) if surfaces.is_needed else None
         )
@@ -61,33 +61,41 @@ class Collisions:
         self._gathered = np.zeros((count, 3))
 
     def __bool__(self) -> bool:
-        """Whether there is anything to collide with."""
+        """Whether any contact is possible."""
         return bool(self.obstacles) or self.surfaces is not None
 
     @property
     def smallest_gap(self) -> float | None:
         return self._smallest if math.isfinite(self._smallest) else None
 
-    def begin_step(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float, dt: float) -> None:
-        """Look for what may touch within the frame.
+    def begin_step(
+        self,
+        x: NDArray[np.float64],
+        v: NDArray[np.float64],
+        time: float,
+        dt: float,
+        memory: ContactMemory | None = None,
+    ) -> None:
+        """Find what may touch within the frame.
 
         Parameters
         ----------
         x, v : (n, 3) positions [m] and velocities [m/s] at the beginning of the frame.
         time : beginning of the frame [s]; dt : its length [s].
+        memory : see `memory`, of the frame before; None where there is none.
         """
         self._smallest = math.inf
         self._dt = dt
         if self.surfaces is not None:
-            self.surfaces.begin_step(x, v, time, dt)
+            self.surfaces.begin_step(x, v, time, dt, memory)
         if self.obstacles:
             self._gather_obstacles(x, v, time)
 
     def project(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], time: float, h: float) -> int:
-        """Resolve all contacts of one substep, in place. Returns how many there were.
+        """Resolve all contacts of one substep, in place. Returns their number.
 
-        Overlaps that were there when the substep began are mended in `x` and `x_prev` alike, so that no velocity
-        (x - x_prev) / h comes of them: take both over.
+        An overlap that existed when the substep began is removed from `x` and from `x_prev` alike, so that it causes no
+        velocity (x - x_prev) / h. The caller must use both arrays afterwards.
 
         Parameters
         ----------
@@ -96,16 +104,18 @@ class Collisions:
         time : end of the substep [s]; h : its length [s].
         """
         self.contacts = 0
-        limit = MENDED_PER_FRAME * self.edge_length * min(1.0, h / self._dt)
+        limit = REMOVED_PER_FRAME * self.edge_length * min(1.0, h / self._dt)
         if self.surfaces is not None:
             self._count(self.surfaces.project(x, x_prev, (time - h, time), limit))
         if self.obstacles:
             if outran(x, self._gathered, self._reach):
                 self._gather_obstacles(x, (x - x_prev) / h, time)
             self._count(self.obstacles.project(x, x_prev, (time - h, time), limit, NEAR * self.edge_length))
-        if self.surfaces is not None:
-            self.surfaces.remember(x)
         return self.contacts
+
+    def memory(self, x: NDArray[np.float64]) -> ContactMemory | None:
+        """What the next frame needs beside positions and velocities; `x` (n, 3) are the final positions [m]."""
+        return None if self.surfaces is None else self.surfaces.memory(x)
 
     def _gather_obstacles(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float) -> None:
         falling = 0.5 * math.hypot(*self.system.gravity) * self._dt**2

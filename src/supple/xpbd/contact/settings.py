@@ -1,4 +1,4 @@
-"""What a user may say about contact of bodies with each other and with themselves."""
+"""User settings for contact of bodies with each other and with themselves."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from supple.errors import SolverError
 
 @dataclass(frozen=True)
 class XPBDContact:
-    """Contact of surfaces in XPBD. Obstacles act with or without it.
+    """Contact of surfaces in XPBD. Obstacles always act.
 
     Parameters
     ----------
-    thickness : [m] the gap that is kept between surfaces: of bodies, and of bodies and triangle obstacles. None: a
-        twentieth of the mean edge length of all the bodies' surfaces.
+    thickness : gap that is kept between surfaces of bodies, and between bodies and triangle obstacles [m]. None: a
+        twentieth of the mean edge length of the surfaces of all bodies.
     body_collision : whether bodies collide with each other.
     self_collision : whether a body collides with itself.
 

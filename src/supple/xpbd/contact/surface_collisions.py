@@ -1,4 +1,4 @@
-"""Surfaces of bodies and of triangle obstacles, followed through the substeps of a frame."""
+"""Contact between surfaces of bodies and of triangle obstacles, over the substeps of a frame."""
 
 from __future__ import annotations
 
@@ -8,20 +8,24 @@ from numpy.typing import NDArray
 from supple.contact.obstacle_poses import ObstaclePoses
 from supple.contact.search.excluded_pairs import excluded_pairs
 from supple.contact.search.point_inside import bounds_of_pieces, depths_inside
-from supple.contact.search.reach import looking_out, mean_motions, outran_pieces
+from supple.contact.search.reach import mean_motions, outran_pieces, search_radii
 from supple.contact.search.spatial_hash import PairFinder
 from supple.contact.search.stitch_masks import stitched_points
 from supple.contact.search.surfaces import ContactSurfaces
 from supple.system import System
+from supple.xpbd.contact.memory import ContactMemory
 from supple.xpbd.contact.surface_contacts import project_surfaces
 
-# Of the mean surface edge: what a point may move at least, and at most, before lists are made anew, and up to which
-# gaps distances are reported.
+# Of the mean surface edge: the least and the largest motion of a point that lists of candidates allow for, and the
+# largest gap that is reported.
 LEAST_REACH, MOST_REACH, NEAR = 0.1, 0.5, 1.0
 
 
 class SurfaceCollisions:
-    """Points against triangles, with lists of candidates that are renewed when something has moved too far."""
+    """Points against triangles. The lists of candidates are renewed when a point has moved too far.
+
+    `begin_step` sets all that substeps read, from its arguments alone.
+    """
 
     def __init__(self, system: System, surfaces: ContactSurfaces, poses: ObstaclePoses, edge_length: float) -> None:
         self.surfaces = s = surfaces
@@ -36,30 +40,22 @@ class SurfaceCollisions:
         self._finder = PairFinder(n, pieces, edge_length)
         self._x, self._before, self._gathered = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
         self._shapes = (self._x, s.point_piece, s.triangles, s.triangle_piece)
-        self._described = (
-            s.inverse_masses,
-            s.point_piece,
-            s.triangles,
-            s.triangle_piece,
-            s.closed,
-            s.gaps,
-            s.friction,
-        )
+        self._pieces = (s.inverse_masses, s.point_piece, s.triangles, s.triangle_piece, s.closed, s.gaps, s.friction)
         self._far, self._near = np.zeros((n, 3)), np.zeros((n, 3))
         self._drifts = np.zeros((pieces + 1, 3))
-        # What stands still keeps everything else from sharing a motion.
+        # Obstacles stand still, so that no motion is common to all points where there is one.
         self._all_share = len(s.fixed_points) == 0
-        self._excursions = np.zeros(n)
-        # How deep a point is inside a body, and inside an obstacle.
-        self._depth = np.zeros((2, n))
-        self._entered = np.full(n, -1, dtype=np.int32)
         self._complete = np.zeros(n)
         self._gap = np.where(s.allowed, s.gaps, 0.0).max(axis=1)[s.point_piece]
-        self._known = np.zeros((len(s.rows), 3))
-        self._has_past = False
+        # See `ContactMemory`.
+        self._depth = np.zeros((2, n))
+        self._entered = np.zeros(n, dtype=np.int32)
+        self._excursions = np.zeros(n)
         self._dt = 0.0
 
-    def begin_step(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float, dt: float) -> None:
+    def begin_step(
+        self, x: NDArray[np.float64], v: NDArray[np.float64], time: float, dt: float, memory: ContactMemory | None
+    ) -> None:
         """See `Collisions.begin_step`."""
         bodies = len(self.surfaces.rows)
         self._dt = dt
@@ -70,9 +66,7 @@ class SurfaceCollisions:
         motions[bodies:] -= self._x[bodies:]
         motions[:bodies] = v[self.surfaces.rows] * dt
         self._before[:] = self._x
-        moved = np.abs(self._x[:bodies] - self._known).max()
-        if not (self._has_past and moved <= LEAST_REACH * self.edge_length):
-            self._look_for_overlaps()
+        self._recall(memory)
         self._gather(motions)
         self._excursions[:] = 0.0
 
@@ -92,44 +86,61 @@ class SurfaceCollisions:
         lists = (finder.n_active, finder.active, finder.starts, finder.triangles)
         scales = (limit, NEAR * self.edge_length)
         contacts, smallest = 0, np.inf
-        # Obstacles last: they do not give way.
-        for kind, meant in enumerate(((0, s.body_triangles), (s.body_triangles, len(s.triangles)))):
-            if meant[0] < meant[1] and finder.n_active:
+        # Obstacles come last because they cannot be moved.
+        for kind, part in enumerate(((0, s.body_triangles), (s.body_triangles, len(s.triangles)))):
+            if part[0] < part[1] and finder.n_active:
                 memory = (self._depth[kind], self._entered, self._complete)
                 found = project_surfaces(
-                    self._x, self._before, lists, self._described, memory, scales, meant, self._stitched
+                    self._x, self._before, lists, self._pieces, memory, scales, part, self._stitched
                 )
                 contacts, smallest = contacts + found[0], min(smallest, found[1])
         x[s.rows] = self._x[:bodies]
         x_prev[s.rows] = self._before[:bodies]
         return contacts, smallest
 
-    def remember(self, x: NDArray[np.float64]) -> None:
-        """Take note of where everything is (n, 3) [m] after all contacts: whoever goes on from there knows its past."""
-        np.take(x, self.surfaces.rows, axis=0, out=self._known)
-        self._has_past = True
+    def memory(self, x: NDArray[np.float64]) -> ContactMemory:
+        """What the next step needs; `x` (n, 3) are the positions at the end of this one, after all contacts [m]."""
+        s = self.surfaces
+        positions = np.concatenate([x[s.rows], self._x[len(s.rows) :]])
+        return ContactMemory(
+            s.triangles[: s.body_triangles],
+            positions,
+            self._depth.copy(),
+            self._entered.copy(),
+            self._excursions.copy(),
+        )
+
+    def _recall(self, memory: ContactMemory | None) -> None:
+        """Restore what `memory` holds of points that are still where they were, and find the overlaps of the others."""
+        s = self.surfaces
+        self._entered[:], self._excursions[:] = -1, 0.0
+        known = 0
+        if memory is not None:
+            triangles = s.triangles[: s.body_triangles]
+            known = memory.matching_points(triangles, self._x, LEAST_REACH * self.edge_length)
+            self._entered[:known] = memory.entered[:known]
+            self._excursions[:known] = memory.excursions[:known]
+            self._depth[:, :known] = memory.depth[:, :known]
+        if known < len(self._x):
+            self._find_overlaps()
 
     def _gather(self, motions: NDArray[np.float64]) -> None:
-        """List what may touch while nothing gets further than it would in a frame of these motions (n, 3) [m]."""
+        """List what may touch while no point moves farther than in a frame of these motions (n, 3) [m]."""
         s = self.surfaces
         mean_motions(motions, s.point_piece, self._all_share, self._drifts)
         scales = (LEAST_REACH * self.edge_length, MOST_REACH * self.edge_length)
-        come = self._x - self._before
-        points = (come, self._excursions, s.point_piece)
-        looking_out(motions, *points, self._drifts, scales, self._far, self._near)
+        points = (self._x - self._before, self._excursions, s.point_piece)
+        search_radii(motions, *points, self._drifts, scales, self._far, self._near)
         self._complete[:] = self._gap + LEAST_REACH * self.edge_length + self._depth.max(axis=0)
         self._far[:, 0] += self._complete
         self._near[:, 0] += self._complete
         self._finder.gather(self._shapes, (self._far, self._near), self._rules)
         self._gathered[:] = self._x
 
-    def _look_for_overlaps(self) -> None:
+    def _find_overlaps(self) -> None:
+        """Set how deep each point is inside other pieces, from positions alone."""
         s = self.surfaces
         boxes = bounds_of_pieces(self._x, s.point_piece, len(s.closed))
-        found = np.zeros(len(self._x))
-        self._depth[:] = 0.0
-        for kind, meant in enumerate((slice(0, s.body_triangles), slice(s.body_triangles, None))):
-            shapes = (self._x, s.point_piece, s.triangles[meant], s.triangle_piece[meant])
-            depths_inside(shapes, s.closed, s.allowed, boxes, found)
-            self._depth[kind] = found
-        self._entered[:] = -1
+        for kind, part in enumerate((slice(0, s.body_triangles), slice(s.body_triangles, None))):
+            shapes = (self._x, s.point_piece, s.triangles[part], s.triangle_piece[part])
+            depths_inside(shapes, s.closed, s.allowed, boxes, self._depth[kind])

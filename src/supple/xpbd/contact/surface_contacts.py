@@ -1,16 +1,16 @@
 """Points against triangles: of other bodies, of the same body, of triangle obstacles.
 
-Of all triangles of a piece that are near a point, one decides (`_decide`):
+Of all triangles of a piece that are near a point, one is selected (`_select_triangle`):
 
-1. One that the point has come through during the substep, from outside in; for an open sheet, from either side. Fast
-   points are caught by this, however thin the piece is.
-2. Else the nearest one. The side of a closed piece that the point is on is the side of the nearest triangle; where
-   several are equally near (at an edge or a corner) the one that faces the point most squarely knows.
-3. In one and the same piece a point can be near the back of a triangle without any harm: the other face of a thin part.
-   So there only triangles count that the point was outside of when the substep began, or was caught coming through.
+1. One that the point has passed through during the substep, from outside to inside; for an open sheet, from either
+   side. This detects fast points, however thin the piece is.
+2. Otherwise the nearest one. The side of this triangle tells whether the point is inside a closed piece. Where several
+   are equally near (at an edge or a corner), the one whose normal is closest to the direction of the point is used.
+3. A point may be behind a nearby triangle of its own piece without contact: it is on the other face of a thin part. So
+   within one piece, only triangles count that the point was outside of when the substep began, or has passed through.
 
-The point and the triangle are then moved apart along the line between them, by their inverse masses: linear momentum is
-conserved exactly; the moment too, up to the turning of the contact within one substep.
+The point and the triangle are then moved apart along the line between them, according to their inverse masses. Linear
+momentum is conserved exactly; angular momentum up to the rotation of the contact within one substep.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from supple.numerics.mat3 import dot, row, subtract
 from supple.xpbd.contact.friction import friction_correction
 from supple.xpbd.contact.overlap import split_overlap
 
-# Squared distances that agree to this share are equal: the point is nearest to a common edge or corner.
+# Squared distances with a relative difference below this are equal: the point is nearest to a common edge or corner.
 TIE = 1e-9
 
 
@@ -35,7 +35,7 @@ def _corners(x, triangles, t):
 
 @njit
 def _passage(p, p0, corners, corners0, both_ways):
-    """When in the substep (0..1) the point came through the triangle, else 2; from which side; and where.
+    """The time in the substep (0..1) at which the point passed through the triangle, otherwise 2; the side; the place.
 
     The point and the corners move on straight lines; the heights above the triangle at both ends give the time.
     """
@@ -57,31 +57,31 @@ def _passage(p, p0, corners, corners0, both_ways):
     off = subtract(q, combine(where, u, v, w))
     m = area_normal(u, v, w)
     aside = dot(off, off) - dot(off, m) ** 2 / max(dot(m, m), 1e-300)
-    # On the triangle but for round-off. Too generous would catch what passes beside an edge of a sheet.
+    # On the triangle up to round-off. A larger tolerance would include what passes beside an edge of a sheet.
     if aside > 1e-10 * max(length, length0):
         return 2.0, 1.0, nowhere
     return t, (1.0 if d0 >= 0.0 else -1.0), where
 
 
 @njit
-def _decide(x, x_prev, p, triangles, near, same, closed, entered, reach):
-    """The triangle that decides on point p, the barycentric point on it, the side that p is on, and how near it is.
+def _select_triangle(x, x_prev, p, triangles, near, same, closed, entered, reach):
+    """The triangle for the contact of point p, the barycentric point on it, the side of p, and the distance.
 
     Parameters
     ----------
     near : triangles of one piece; same : whether p is a point of that piece; closed : whether it has an inside
-    entered : the triangle of the same piece that p has come through and is still behind, or -1
-    reach : among the triangles up to this distance, none is missing from `near` [m]
+    entered : the triangle of the same piece that p has passed through and is still behind, or -1
+    reach : `near` contains all triangles up to this distance [m]
 
     Returns
     -------
     triangle : -1 for none
     where : barycentric coordinates
-    side : 1 outside, -1 inside or behind: where the point is now
+    side : 1 where the point is outside now, -1 where it is inside or behind
     distance : [m], or inf where the point has passed through the triangle
     """
     q, q0 = row(x, p), row(x_prev, p)
-    first, best, side, facing, least = 2.0, -1, 1.0, -1.0, math.inf
+    first, best, side, best_alignment, least = 2.0, -1, 1.0, -1.0, math.inf
     where = (1.0, 0.0, 0.0)
     for t in near:
         corners, corners0 = _corners(x, triangles, t), _corners(x_prev, triangles, t)
@@ -98,7 +98,7 @@ def _decide(x, x_prev, p, triangles, near, same, closed, entered, reach):
             continue
         if same:
             if entered >= 0:
-                # Only what faces the same way as the triangle that the point is behind.
+                # Only triangles that face in the same direction as the one that the point is behind.
                 u, v, w = _corners(x, triangles, entered)
                 if dot(area_normal(u, v, w), n) <= 0.0:
                     continue
@@ -110,11 +110,11 @@ def _decide(x, x_prev, p, triangles, near, same, closed, entered, reach):
         place = closest_on_triangle(q, a, b, c)
         off = subtract(q, combine(place, a, b, c))
         square = dot(off, off)
-        squarely = abs(height) / (length * math.sqrt(square)) if square > 0.0 else 1.0
+        alignment = abs(height) / (length * math.sqrt(square)) if square > 0.0 else 1.0
         nearer = square < least * (1.0 - TIE)
-        tie = not nearer and square <= least * (1.0 + TIE) and squarely > facing
+        tie = not nearer and square <= least * (1.0 + TIE) and alignment > best_alignment
         if nearer or tie:
-            best, where, facing = t, place, squarely
+            best, where, best_alignment = t, place, alignment
             least = min(least, square)
             side = -1.0 if height < 0.0 else 1.0
     if first <= 1.0:
@@ -123,11 +123,11 @@ def _decide(x, x_prev, p, triangles, near, same, closed, entered, reach):
 
 
 @njit
-def _start(x_prev, p, corners, where):
-    """The place on a triangle's face that was below the point when the substep began, else `where`.
+def _place_at_start(x_prev, p, corners, where):
+    """The place on a triangle's face that was below the point when the substep began, otherwise `where`.
 
-    Moments of impulses are about those positions, so an impulse there, along the normal, changes no angular momentum;
-    and along a face the gap is the same everywhere.
+    The lever arms of impulses are these positions, so an impulse there, along the normal, does not change the angular
+    momentum. Along a face the gap is the same everywhere.
     """
     if min(where[0], where[1], where[2]) <= 0.0:
         return where
@@ -139,7 +139,7 @@ def _start(x_prev, p, corners, where):
 
 @njit
 def _direction(x, p, triangle, where, passed, side, open_sheet):
-    """The unit vector along which the point is to be away from the triangle, pointing out of the piece."""
+    """The unit normal of the contact, out of the piece."""
     a, b, c = triangle
     n = area_normal(a, b, c)
     length = math.sqrt(dot(n, n))
@@ -154,13 +154,13 @@ def _direction(x, p, triangle, where, passed, side, open_sheet):
 
 @njit
 def _relative(x, p, corners, where):
-    """The point, seen from the place on the triangle."""
+    """The point relative to the place on the triangle [m]."""
     return subtract(row(x, p), combine(where, corners[0], corners[1], corners[2]))
 
 
 @njit
 def _move(x, w, p, t, triangles, where, d):
-    """Change the relative position by d, times the sum of inverse masses that the caller has divided by."""
+    """Change the relative position by d times the sum of the weighted inverse masses."""
     for j in range(3):
         x[p, j] += w[p] * d[j]
         for i in range(3):
@@ -170,7 +170,7 @@ def _move(x, w, p, t, triangles, where, d):
 
 @njit
 def _resolve(x, x_prev, w, p, t, triangles, where, n, gap, mu, limit):
-    """Push point and triangle apart to the wanted gap, with friction. Returns the gap that there was before [m]."""
+    """Push point and triangle apart to the gap, with friction. Returns their distance when the substep began [m]."""
     now = _relative(x, p, _corners(x, triangles, t), where)
     before = _relative(x_prev, p, _corners(x_prev, triangles, t), where)
     impulse, shift = split_overlap(dot(now, n) - gap, dot(before, n) - gap, limit)
@@ -188,8 +188,8 @@ def _resolve(x, x_prev, w, p, t, triangles, where, n, gap, mu, limit):
 
 
 @njit(cache=True)
-def project_surfaces(x, x_prev, lists, surfaces, memory, scales, meant, stitched):
-    """Keep points and triangles apart, in place. Returns the number of contacts and the smallest gap before (or inf).
+def project_surfaces(x, x_prev, lists, surfaces, memory, scales, part, stitched):
+    """Keep points and triangles apart, in place. Returns the number of contacts and the smallest previous gap (or inf).
 
     Parameters
     ----------
@@ -197,12 +197,12 @@ def project_surfaces(x, x_prev, lists, surfaces, memory, scales, meant, stitched
     lists : n_active, active points, starts (n + 1,), triangles: see `PairFinder`
     surfaces : inverse_masses (n,), point_piece (n,), triangles (t, 3), triangle_piece (t,), closed (p,), gaps (p, p),
         friction (p, p): see `ContactSurfaces`
-    memory : depth (n,) [m], how deep a point is inside a piece of those meant; entered (n,), the triangle of its own
-        piece that it has come through, or -1; complete (n,) [m], up to which distance its list of triangles is complete
+    memory : depth (n,) [m], how deep a point is inside a piece of this part; entered (n,), see `ContactMemory`;
+        complete (n,) [m], the distance up to which its list of triangles is complete
     scales : limit, see `split_overlap`; near, gaps above this are not reported [m]
-    meant : (first, end) of the triangles that are meant: those of bodies, or those of obstacles
-    stitched : starts (t + 1,) and points: those stitched to each triangle. A triangle that a point is stitched to
-        decides about it as any other does, but does not push.
+    part : (first, end) of the triangles to be considered: those of bodies, or those of obstacles
+    stitched : starts (t + 1,) and points: those stitched to each triangle. A triangle that a point is stitched to can
+        be selected as any other, but does not push the point.
     """
     n_active, active, starts, listed = lists
     w, point_piece, triangles, triangle_piece, closed, gaps, friction = surfaces
@@ -219,12 +219,12 @@ def project_surfaces(x, x_prev, lists, surfaces, memory, scales, meant, stitched
             begin = i
             while i < end and triangle_piece[listed[i]] == its:
                 i += 1
-            if not meant[0] <= listed[begin] < meant[1]:
+            if not part[0] <= listed[begin] < part[1]:
                 continue
             same = mine == its
             gap = gaps[mine, its]
             held = entered[p] if same else -1
-            t, where, side, distance = _decide(
+            t, where, side, distance = _select_triangle(
                 x, x_prev, p, triangles, listed[begin:i], same, closed[its], held, complete[p]
             )
             if same and held >= 0 and (t < 0 or side > 0.0):
@@ -234,7 +234,7 @@ def project_surfaces(x, x_prev, lists, surfaces, memory, scales, meant, stitched
             passed = distance == math.inf
             inside = closed[its] and side < 0.0 and not passed
             if inside and distance > complete[p]:
-                # So far away its sign says nothing, unless the point has been inside all the time.
+                # At this distance the sign is not reliable, unless the point was inside before.
                 if was_inside > 0.0 and not same:
                     depth[p] = max(depth[p], distance)
                 continue
@@ -243,7 +243,7 @@ def project_surfaces(x, x_prev, lists, surfaces, memory, scales, meant, stitched
                     smallest = min(smallest, distance)
                 continue
             n = _direction(x, p, _corners(x, triangles, t), where, passed, side, not closed[its])
-            where = _start(x_prev, p, _corners(x_prev, triangles, t), where)
+            where = _place_at_start(x_prev, p, _corners(x_prev, triangles, t), where)
             if passed and same:
                 entered[p] = t
             before = _resolve(x, x_prev, w, p, t, triangles, where, n, gap, friction[mine, its], limit)

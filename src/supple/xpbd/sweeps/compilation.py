@@ -1,4 +1,4 @@
-"""How kernels are compiled: what the compiler may do to sums, and one loop for one thread and for several."""
+"""How kernels are compiled: permitted floating-point transformations, and a serial and a parallel form of a loop."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 
 from supple.numerics.kernel_cache import njit
 
-# No flag that assumes finite numbers (NaN must be seen) and none that reorders sums (same bits for any thread count).
+# No flag that assumes finite numbers (NaN must be detected) and none that reorders sums (same bits on any threads).
 FLAGS = {"contract", "arcp", "nsz"}
 
 
 class SerialAndParallel(NamedTuple):
-    """The two kernels of a loop, by whether they may use several threads: `sweep[parallel](...)`."""
+    """The two kernels of a loop, selected by whether several threads may be used: `sweep[parallel](...)`."""
 
     serial: Callable[..., Any]
     parallel: Callable[..., Any]
@@ -22,8 +22,8 @@ class SerialAndParallel(NamedTuple):
 def serial_and_parallel(loop: FunctionType) -> SerialAndParallel:
     """Compile a loop over `prange` for one thread and for several.
 
-    A parallel kernel costs some microseconds even on one thread, which is as much as a whole sweep of a small scene.
-    The copy has a name of its own because Numba's cache tells kernels apart by name, not by their flags.
+    A call of a parallel kernel costs some microseconds even on one thread, as much as a whole sweep of a small scene.
+    The copy has its own name because Numba's cache distinguishes kernels by name, not by flags.
     """
     copy = FunctionType(loop.__code__, loop.__globals__, f"{loop.__name__}_parallel", loop.__defaults__)
     copy.__qualname__ = f"{loop.__qualname__}_parallel"

@@ -1,13 +1,12 @@
-"""The solver's own numbering of vertices and its split of the constraints into chunks that can run side by side.
+"""The solver's own numbering of vertices, and the division of constraints into chunks that can run in parallel.
 
-Vertices are numbered along breadth-first levels, body by body: neighbours in space become neighbours in memory.
-Cutting the levels into consecutive chunks gives a chunk graph that is a path, because a constraint spans at most two
-neighbouring levels. Two colors are enough for a path: all even chunks may run at the same time, then all odd ones.
-One sweep over a constraint set takes two parallel regions, whatever the mesh; a colored sweep of single constraints
-takes about forty.
+Vertices are numbered along breadth-first levels, body by body: neighbours in space become neighbours in memory. The
+levels are divided into consecutive chunks. A constraint spans at most two neighbouring levels, so the graph of chunks
+is a path, and two colors are enough: all even chunks run at the same time, then all odd ones. A sweep over a constraint
+set takes two parallel regions for any mesh; a sweep with a coloring of single constraints takes about forty.
 
-The chunks depend on the mesh only, never on the number of threads, and inside a chunk the order is fixed: the result
-has the same bits on any number of threads.
+The chunks depend on the mesh only, and the order within a chunk is fixed: the result has the same bits on any number of
+threads.
 """
 
 from __future__ import annotations
@@ -20,23 +19,22 @@ from numpy.typing import NDArray
 from supple.numerics.coloring import breadth_first_order, greedy_colors
 from supple.system import System
 
-# A chunk is worth a thread's while from about this many constraints on (some 10 us).
+# Chunks of fewer constraints (about 10 us) are not worth the start of a thread.
 SMALLEST_CHUNK = 1024
 MOST_CHUNKS = 64
-# Inside a chunk constraints are interleaved over runs of this length: long enough to find some twenty independent
-# ones in a row (a processor works on several at once), short enough for the run's vertices to stay in the first
-# cache.
+# Within a chunk, constraints are interleaved over runs of this length: long enough for about twenty independent
+# constraints in sequence (a processor overlaps them), short enough for the run's vertices to stay in the first cache.
 RUN_LENGTH = 1024
 
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """Where the solver keeps what.
+    """The numbering of vertices and their chunks.
 
     Attributes
     ----------
     old_from_new, new_from_old : (n,) int32, between the System's vertex numbers and the solver's.
-    rank : (n,) int32, place of each vertex (solver's number) along the levels.
+    rank : (n,) int32, position of each vertex (solver's number) along the levels.
     chunk : (n,) int32, the chunk of each vertex (solver's number); a constraint belongs to its lowest vertex's chunk.
     n_chunks : number of chunks.
     """
@@ -48,10 +46,10 @@ class Layout:
     n_chunks: int
 
     def sort(self, constraints: NDArray[np.int32], kind: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-        """The order of constraints (m, k), given in the solver's numbers, and the chunk of each one in that order.
+        """The order of constraints (m, k) of the solver's vertex numbers, and the chunk of each one in that order.
 
-        Sorted by chunk, then `kind` (m,) (constraints of one kind share their constants), then along the levels,
-        interleaved.
+        They are sorted by chunk, then by `kind` (m,) (constraints of one kind share their constants), then along the
+        levels, interleaved.
         """
         if len(constraints) == 0:
             return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int32)
@@ -61,28 +59,22 @@ class Layout:
         order = np.lexsort((ranks.min(axis=1), kind, chunk))
         colors = greedy_colors(np.ascontiguousarray(constraints[order]), len(self.rank), RUN_LENGTH)
         run = np.arange(len(order)) // RUN_LENGTH
-        # Runs are cut without regard to chunk and kind, so these come first in the final order.
+        # Runs do not respect chunk and kind, so these come first in the final order.
         interleaved = np.lexsort((colors, run, kind[order], chunk[order]))
         order = order[interleaved]
         return order, chunk[order].astype(np.int32)
 
 
-def make_layout(system: System, extra: tuple[NDArray[np.int32], ...] = ()) -> Layout:
-    """Number the vertices of a system and cut it into chunks.
-
-    Parameters
-    ----------
-    system : what to lay out.
-    extra : constraints (m, k) that join vertices beside the tets of the meshes.
-    """
+def make_layout(system: System) -> Layout:
+    """Number the vertices of a system and divide it into chunks."""
     n = len(system.masses)
-    order, level_of_old = breadth_first_order([system.edges, *extra], n)
+    order, level_of_old = breadth_first_order([system.edges], n)
     rank_of_old = np.empty(n, dtype=np.int32)
     rank_of_old[order] = np.arange(n, dtype=np.int32)
     body_of_old = np.zeros(n, dtype=np.int32)
     for k, part in enumerate(system.bodies):
         body_of_old[part.vertices] = k
-    # Bodies stay contiguous, as their ranges say; inside a body, vertices follow the levels.
+    # The vertices of a body stay contiguous, as its range requires, and follow the levels.
     old_from_new = np.lexsort((rank_of_old, body_of_old)).astype(np.int32)
     new_from_old = np.empty(n, dtype=np.int32)
     new_from_old[old_from_new] = np.arange(n, dtype=np.int32)
@@ -91,7 +83,7 @@ def make_layout(system: System, extra: tuple[NDArray[np.int32], ...] = ()) -> La
     work = work + np.bincount(np.minimum.reduce(level_of_old[system.edges], axis=1), minlength=levels.max() + 1)
     size = max(SMALLEST_CHUNK, -(-int(work.sum()) // MOST_CHUNKS))
     chunk_of_level = (np.concatenate([[0], np.cumsum(work)[:-1]]) // size).astype(np.int64)
-    # A level larger than a chunk skips numbers; the remaining ones are made consecutive.
+    # A level larger than a chunk skips chunk numbers; they are made consecutive.
     chunk_of_level = np.unique(chunk_of_level, return_inverse=True)[1].astype(np.int32)
     return Layout(
         old_from_new=old_from_new,
@@ -103,7 +95,7 @@ def make_layout(system: System, extra: tuple[NDArray[np.int32], ...] = ()) -> La
 
 
 def reordered(system: System, layout: Layout) -> System:
-    """The same system in the solver's numbers: vertices permuted inside their bodies, everything else in its place."""
+    """The same system in the solver's numbering: vertices are permuted within their bodies, nothing else changes."""
     old, new = layout.old_from_new, layout.new_from_old
     return replace(
         system,

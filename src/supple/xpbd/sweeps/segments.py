@@ -1,4 +1,4 @@
-"""Constraints sorted for projection: chunks, and inside them runs of constraints that share their constants."""
+"""Constraints sorted for projection: into chunks, and within these into runs that share their constants."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from supple.xpbd.sweeps.ordering import Layout
 
 @dataclass(frozen=True, eq=False)
 class Segments:
-    """Runs of constraints of one kind inside one chunk.
+    """Runs of constraints of one kind within one chunk.
 
     Attributes
     ----------
-    order : (m,) which constraint comes when
+    order : (m,) the constraints in the order of projection
     chunk_pointers : (n_chunks + 1,) the segments of chunk c are chunk_pointers[c] .. chunk_pointers[c + 1]
     bounds : (s, 2) first constraint of a segment, and the one after its last
     kinds : (s,) the kind of each segment
@@ -48,16 +48,16 @@ def sort_into_segments(layout: Layout, constraints: NDArray[np.int32], kind: NDA
 def gather(
     parts: list[BodyRange], which: str, constants: list[NDArray[np.float64]]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
-    """The constraints of several bodies, and which constants are whose.
+    """The constraints of several bodies, and the constants of each.
 
     Parameters
     ----------
     parts : the bodies; which : "edges" or "tets"
-    constants : of each body (c,), or (count, c) of each of its constraints.
+    constants : for each body, (c,) for all of its constraints or (count, c) for each of them.
 
     Returns
     -------
-    rows : (m,) of the System's edges or tets; kind : (m,) rows of the table; table : (kinds, c), each once.
+    rows : (m,) of the System's edges or tets; kind : (m,) rows of the table; table : (kinds, c) distinct constants.
     """
     ranges = [getattr(part, which) for part in parts]
     rows = np.concatenate([np.arange(r.start, r.stop) for r in ranges])
