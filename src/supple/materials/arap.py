@@ -15,7 +15,7 @@ from supple.materials.stretches import StretchFunctions, distance_from_rotations
 
 
 @njit(error_model="numpy")
-def _density(s, mu, lam):
+def _density(F, s, mu, lam):
     return mu * distance_from_rotations(s)
 
 
@@ -44,4 +44,4 @@ class ARAP(Elastic):
     ratio 0 and Young's modulus 2 mu.
     """
 
-    stretch_functions = StretchFunctions(_density, _gradient, _curvature, _quotients)
+    stretch_functions = StretchFunctions(_density, _gradient, _curvature, _quotients, density_of_stretches=True)

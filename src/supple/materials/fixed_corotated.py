@@ -14,7 +14,7 @@ from supple.materials.stretches import StretchFunctions, distance_from_rotations
 
 
 @njit(error_model="numpy")
-def _density(s, mu, lam):
+def _density(F, s, mu, lam):
     j = volume_change(s)
     return mu * distance_from_rotations(s) + 0.5 * lam * j * j
 
@@ -64,4 +64,4 @@ def _quotients(s, mu, lam):
 class FixedCorotated(Elastic):
     """Fixed corotated: linear in the stretches, with a volume term that stays finite for inverted elements."""
 
-    stretch_functions = StretchFunctions(_density, _gradient, _curvature, _quotients)
+    stretch_functions = StretchFunctions(_density, _gradient, _curvature, _quotients, density_of_stretches=True)

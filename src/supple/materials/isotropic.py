@@ -44,11 +44,14 @@ curvature = dispatch("curvature", [kind.stretch_functions.curvature for kind in 
 quotients = dispatch("quotients", [kind.stretch_functions.quotients for kind in ELASTIC_MATERIALS], UNKNOWN_SIX)
 
 
+_OF_STRETCHES = np.array([kind.stretch_functions.density_of_stretches for kind in ELASTIC_MATERIALS])
+
+
 @njit(error_model="numpy")
 def energy_density(F, kind, mu, lam):
     """psi of one F."""
-    _, s, _ = decompose(F)
-    return density(kind, s, mu, lam)
+    s = decompose(F)[1] if _OF_STRETCHES[kind] else (0.0, 0.0, 0.0)
+    return density(kind, F, s, mu, lam)
 
 
 @njit(error_model="numpy")

@@ -13,7 +13,8 @@ import numpy as np
 from numba import njit
 
 from supple.materials.material import Elastic
-from supple.materials.stretches import StretchFunctions, shape_energy, volume_change
+from supple.materials.stretches import StretchFunctions, shape_and_volume, volume_change
+from supple.numerics.mat3 import det
 
 
 @njit(error_model="numpy")
@@ -24,11 +25,12 @@ def _log_J(s):
 
 
 @njit(error_model="numpy")
-def _density(s, mu, lam):
-    if s[2] <= 0.0:
+def _density(F, s, mu, lam):
+    shape, j = shape_and_volume(F)
+    if j <= -1.0:
         return np.inf
-    log_J = _log_J(s)
-    return mu * (shape_energy(s) + (volume_change(s) - log_J)) + 0.5 * lam * log_J * log_J
+    log_J = math.log1p(j) if j > -0.5 else math.log(det(F))
+    return mu * (shape + (j - log_J)) + 0.5 * lam * log_J * log_J
 
 
 @njit(error_model="numpy")

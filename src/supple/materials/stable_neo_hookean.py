@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from supple.materials.lame import lame_from_engineering
 from supple.materials.material import Elastic
-from supple.materials.stretches import StretchFunctions, shape_energy, volume_change
+from supple.materials.stretches import StretchFunctions, shape_and_volume, volume_change
 
 
 @njit(error_model="numpy")
-def _density(s, mu, lam):
-    j = volume_change(s)
-    return mu * shape_energy(s) + 0.5 * lam * j * j
+def _density(F, s, mu, lam):
+    shape, j = shape_and_volume(F)
+    return mu * shape + 0.5 * lam * j * j
 
 
 @njit(error_model="numpy")
@@ -70,10 +70,3 @@ class StableNeoHookean(Elastic):
     def lame_parameters(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         mu, lam = lame_from_engineering(self.youngs, self.poisson)
         return mu, lam + mu
-
-    def total_energy(self, F: NDArray[np.float64], J: NDArray[np.float64], volumes: NDArray[np.float64]) -> float:
-        """Strain energy of all tets of a body, zero at rest [J], from invariants: no decomposition needed."""
-        mu, lam = self.lame_parameters()
-        grown = J - 1.0
-        shape = 0.5 * (np.einsum("tij,tij->t", F, F) - 3.0) - grown
-        return float((mu * shape + 0.5 * lam * grown * grown) @ volumes)

@@ -7,28 +7,33 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
+from supple.numerics.mat3 import det
+
 
 class StretchFunctions(NamedTuple):
-    """A material as four compiled functions of (s, mu, lam).
+    """A material as four compiled functions of (s, mu, lam), the first also of F.
 
-    s : the principal stretches (s0, s1, s2), s2 with the sign of J.
+    s : the principal stretches (s0, s1, s2), s2 with the sign of J. F : nine numbers, row after row.
 
     All results are floats, and all formulas must be free of the division 0/0 that finite differences of gradients have
     where two stretches meet.
 
     Attributes
     ----------
-    density : -> psi [Pa], zero at rest
+    density : (F, s, mu, lam) -> psi [Pa], zero at rest
     gradient : -> (psi_0, psi_1, psi_2), psi_i = d psi / d s_i
     curvature : -> (psi_00, psi_11, psi_22, psi_12, psi_02, psi_01)
     quotients : -> (d_12, d_02, d_01, t_12, t_02, t_01) with d_ij = (psi_i - psi_j) / (s_i - s_j), the stiffness against
         a symmetric in-plane change, and t_ij = (psi_i + psi_j) / (s_i + s_j), the stiffness against an in-plane twist
+    density_of_stretches : whether `density` reads s. False for energies of the invariants of F^T F: without derivatives,
+        they are then computed without a decomposition of F.
     """
 
     density: Any
     gradient: Any
     curvature: Any
     quotients: Any
+    density_of_stretches: bool = False
 
 
 @njit(error_model="numpy")
@@ -39,11 +44,34 @@ def volume_change(s):
 
 
 @njit(error_model="numpy")
-def shape_energy(s):
-    """(Ic - 3) / 2 - (J - 1), without cancellation where all stretches are near 1: the part of the neo-Hookean energies
-    that stands with mu."""
-    a, b, c = s[0] - 1.0, s[1] - 1.0, s[2] - 1.0
-    return 0.5 * (a * a + b * b + c * c) - (a * b + b * c + c * a) - a * b * c
+def green_strain(F):
+    """E = (F^T F - I) / 2 as (E00, E11, E22, E12, E02, E01)."""
+    return (
+        0.5 * (F[0] * F[0] + F[3] * F[3] + F[6] * F[6] - 1.0),
+        0.5 * (F[1] * F[1] + F[4] * F[4] + F[7] * F[7] - 1.0),
+        0.5 * (F[2] * F[2] + F[5] * F[5] + F[8] * F[8] - 1.0),
+        0.5 * (F[1] * F[2] + F[4] * F[5] + F[7] * F[8]),
+        0.5 * (F[0] * F[2] + F[3] * F[5] + F[6] * F[8]),
+        0.5 * (F[0] * F[1] + F[3] * F[4] + F[6] * F[7]),
+    )
+
+
+@njit(error_model="numpy")
+def shape_and_volume(F):
+    """(Ic - 3) / 2 - (J - 1), the part of the neo-Hookean energies that stands with mu, and J - 1; no decomposition of F.
+
+    At small strains the two terms of the first cancel. With the invariants I = tr E, II, III = det E of the Green strain,
+    J^2 = 1 + 2 I + 4 II + 8 III gives it as (I (J - 1) - 4 II - 8 III) / (J + 1), in which nothing cancels.
+    """
+    J = det(F)
+    a, b, c, d, e, f = green_strain(F)
+    trace = a + b + c
+    if J > 0.0 and a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f) < 0.25:
+        third = 8.0 * (a * (b * c - d * d) - f * (f * c - d * e) + e * (f * d - b * e))
+        rest = 4.0 * (a * b + b * c + c * a - d * d - e * e - f * f) + third
+        j = (2.0 * trace + rest) / (J + 1.0)
+        return (trace * j - rest) / (J + 1.0), j
+    return trace - (J - 1.0), J - 1.0
 
 
 @njit(error_model="numpy")
@@ -68,7 +96,7 @@ def rotation_quotients(s):
 
 
 def dispatch(name: str, functions: list[Any], unknown: Any) -> Any:
-    """One compiled function (kind, s, mu, lam) that calls `functions[kind]`, or `unknown` for any other kind.
+    """One compiled function (kind, *arguments) that calls `functions[kind]`, or returns `unknown` for any other kind.
 
     Parameters
     ----------
@@ -82,7 +110,7 @@ def dispatch(name: str, functions: list[Any], unknown: Any) -> Any:
 
 
 def _otherwise(name: str, unknown: Any) -> Any:
-    def otherwise(kind, s, mu, lam):
+    def otherwise(kind, *arguments):
         return unknown
 
     otherwise.__qualname__ = otherwise.__name__ = f"{name}_of_unknown"
@@ -90,10 +118,10 @@ def _otherwise(name: str, unknown: Any) -> Any:
 
 
 def _first_or_rest(name: str, own_kind: int, first: Any, rest: Any) -> Any:
-    def choose(kind, s, mu, lam):
+    def choose(kind, *arguments):
         if kind == own_kind:
-            return first(s, mu, lam)
-        return rest(kind, s, mu, lam)
+            return first(*arguments)
+        return rest(kind, *arguments)
 
     choose.__qualname__ = choose.__name__ = f"{name}_or_rest"
     return njit(error_model="numpy")(choose)

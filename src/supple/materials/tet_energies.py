@@ -133,9 +133,10 @@ def _build_kernels(version: int) -> _Kernels:
     def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, energies, gradients, hessians):
         _ = version
         for e in prange(len(tets)):
-            U, s, V = decompose(deformation_gradient(x, tets, Dm_inv, e))
+            F = deformation_gradient(x, tets, Dm_inv, e)
+            U, s, V = decompose(F)
             B = load_mat(Dm_inv, e)
-            energies[e] = volumes[e] * density(kind[e], s, mu[e], lam[e])
+            energies[e] = volumes[e] * density(kind[e], F, s, mu[e], lam[e])
             put_gradient(stress(U, s, V, kind[e], mu[e], lam[e]), B, volumes[e], gradients, e)
             if second:
                 _put_hessian(U, s, V, B, volumes[e], kind[e], mu[e], lam[e], project, hessians, e)
