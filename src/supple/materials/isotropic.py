@@ -37,6 +37,7 @@ from supple.numerics.threads import threads_for
 
 if TYPE_CHECKING:
     from supple.materials.material import Elastic
+    from supple.materials.per_tet import TetMaterial
 
 density = dispatch("density", [kind.stretch_functions.density for kind in ELASTIC_MATERIALS], UNKNOWN_ONE)
 gradient = dispatch("gradient", [kind.stretch_functions.gradient for kind in ELASTIC_MATERIALS], UNKNOWN_THREE)
@@ -140,6 +141,7 @@ def hessian_block(U, A, alpha, beta, g, h):
 
 
 class _Kernels(NamedTuple):
+    rest_moduli: Any
     densities: Any
     piolas: Any
     hessians: Any
@@ -147,6 +149,15 @@ class _Kernels(NamedTuple):
 
 def _build_kernels(version: int) -> _Kernels:
     """The compiled loops. `version` is in their closures, so that no cached kernel outlives a change of a material."""
+
+    @njit(cache=True, error_model="numpy")
+    def rest_moduli(kind, mu, lam, rest_mu, rest_lam):
+        _ = version
+        for e in range(len(kind)):
+            # psi_ii = lam_L + 2 mu_L, psi_ij = lam_L at s = (1, 1, 1)
+            A = curvature(kind[e], (1.0, 1.0, 1.0), mu[e], lam[e])
+            rest_mu[e] = 0.5 * (A[0] - A[3])
+            rest_lam[e] = A[3]
 
     @njit(parallel=True, cache=True, error_model="numpy")
     def densities(F, kind, mu, lam, out):
@@ -175,10 +186,17 @@ def _build_kernels(version: int) -> _Kernels:
                             out[e, 3 * i + j, 3 * n + k] = K[3 * i + n]
                             out[e, 3 * n + k, 3 * i + j] = K[3 * i + n]
 
-    return _Kernels(densities, piolas, hessians)
+    return _Kernels(rest_moduli, densities, piolas, hessians)
 
 
 _KERNELS = _build_kernels(fingerprint([*Path(__file__).parent.glob("*.py"), Path(mat3.__file__), Path(svd3.__file__)]))
+
+
+def rest_lame_parameters(material: TetMaterial) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """mu_L and lam_L (m,) of every tet's own linearization at rest [Pa]."""
+    mu, lam = np.empty_like(material.mu), np.empty_like(material.lam)
+    _KERNELS.rest_moduli(material.kind, material.mu, material.lam, mu, lam)
+    return mu, lam
 
 
 def _flat(material: Elastic, F: ArrayLike) -> tuple[NDArray[np.float64], tuple[int, ...], Any]:

@@ -25,8 +25,8 @@ class StretchFunctions(NamedTuple):
     curvature : -> (psi_00, psi_11, psi_22, psi_12, psi_02, psi_01)
     quotients : -> (d_12, d_02, d_01, t_12, t_02, t_01) with d_ij = (psi_i - psi_j) / (s_i - s_j), the stiffness against
         a symmetric in-plane change, and t_ij = (psi_i + psi_j) / (s_i + s_j), the stiffness against an in-plane twist
-    density_of_stretches : whether `density` reads s. False for energies of the invariants of F^T F: without derivatives,
-        they are then computed without a decomposition of F.
+    density_of_stretches : whether `density` reads s. False for energies of the invariants of F^T F, which need no
+        decomposition of F.
     """
 
     density: Any
@@ -58,10 +58,10 @@ def green_strain(F):
 
 @njit(error_model="numpy")
 def shape_and_volume(F):
-    """(Ic - 3) / 2 - (J - 1), the part of the neo-Hookean energies that stands with mu, and J - 1; no decomposition of F.
+    """(Ic - 3) / 2 - (J - 1), the part of the neo-Hookean energies that stands with mu, and J - 1.
 
-    At small strains the two terms of the first cancel. With the invariants I = tr E, II, III = det E of the Green strain,
-    J^2 = 1 + 2 I + 4 II + 8 III gives it as (I (J - 1) - 4 II - 8 III) / (J + 1), in which nothing cancels.
+    At small strains the two terms of the first cancel. With the invariants I = tr E, II, III = det E of the Green
+    strain, J^2 = 1 + 2 I + 4 II + 8 III gives it as (I (J - 1) - 4 II - 8 III) / (J + 1), in which nothing cancels.
     """
     J = det(F)
     a, b, c, d, e, f = green_strain(F)

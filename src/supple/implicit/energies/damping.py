@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 
 from supple.implicit.energies.elasticity import SERIAL_TETS, Elasticity, gather_gradients
 from supple.implicit.energies.potential import HessianBlocks, Potential
-from supple.materials.lame import lame_from_engineering
-from supple.materials.material import Elastic
+from supple.materials.isotropic import rest_lame_parameters
 from supple.materials.tet_energies import deformation_gradient, edge_matrix, put_gradient
 from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed, transpose
 from supple.numerics.threads import threads_for
@@ -43,7 +42,7 @@ class Viscosity:
 
     Attributes
     ----------
-    mu, lam : (m,) tau times the Lamé parameters of small strains [Pa s]
+    mu, lam : (m,) tau times the Lamé parameters of the material's linearization at rest [Pa s]
     """
 
     elasticity: Elasticity
@@ -76,11 +75,7 @@ def viscosity_of(elasticity: Elasticity) -> Viscosity | None:
     tau = elasticity.material.damping
     if not tau.any():
         return None
-    mu, lam = np.empty_like(tau), np.empty_like(tau)
-    for part in elasticity.system.bodies:
-        material = part.body.material
-        assert isinstance(material, Elastic)
-        mu[part.tets], lam[part.tets] = lame_from_engineering(material.youngs, material.poisson)
+    mu, lam = rest_lame_parameters(elasticity.material)
     return Viscosity(elasticity, tau * mu, tau * lam)
 
 
