@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from supple.implicit.contact.model import ContactModel
 from supple.implicit.energies.damping import Viscosity
 from supple.implicit.energies.elasticity import Elasticity
-from supple.implicit.energies.regularization import Stabilizer
+from supple.implicit.energies.regularization import Regularization
 from supple.implicit.energies.stitch_damping import StitchViscosity
 from supple.implicit.energies.stitches import StitchEnergy
-from supple.implicit.newton.minimize import Tools
+from supple.implicit.newton.direction import Tools
 from supple.state import State
 from supple.system import System
 
@@ -35,7 +35,7 @@ class Workspace:
     viscosity: Viscosity | None
     tools: Tools
     diagonal: float
-    stabilizer: Stabilizer
+    regularization: Regularization
     stitches: StitchEnergy | None
     stitch_viscosity: StitchViscosity | None
     last: NDArray[np.float64] | None = None
@@ -45,7 +45,7 @@ class Workspace:
         """The first vertex that is an obstacle's."""
         return max(part.vertices.stop for part in self.system.bodies)
 
-    def taken_in(self, state: State) -> State:
+    def with_obstacles(self, state: State) -> State:
         """A state with the obstacles' vertices after the bodies'.
 
         Raises

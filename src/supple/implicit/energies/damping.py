@@ -20,7 +20,7 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from supple.implicit.energies.elasticity import SERIAL_TETS, Elasticity, gather_gradients
-from supple.implicit.energies.potential import HessianBlocks, Potential
+from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
 from supple.materials.isotropic import rest_lame_parameters
 from supple.materials.tet_energies import deformation_gradient, edge_matrix, put_gradient
 from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed, transpose
@@ -100,6 +100,7 @@ class Damping(Potential):
     viscosity: Viscosity
     rate: StrainRate
     label = "elasticity"
+    projection = Projection.RELEASED_FIRST
 
     def value(self, x: NDArray[np.float64]) -> float:
         s = self.viscosity.elasticity.system

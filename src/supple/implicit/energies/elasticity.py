@@ -9,7 +9,7 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from supple.errors import SolverError
-from supple.implicit.energies.potential import HessianBlocks, Potential
+from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
 from supple.materials.material import Elastic
 from supple.materials.per_tet import TetMaterial
 from supple.materials.tet_energies import element_energies, element_gradients, element_hessians, element_models
@@ -36,6 +36,7 @@ class Elasticity(Potential):
     start: NDArray[np.int32]
     incidence: NDArray[np.int32]
     label = "elasticity"
+    projection = Projection.RELEASED_FIRST
 
     def value(self, x: NDArray[np.float64]) -> float:
         s = self.system
@@ -52,10 +53,10 @@ class Elasticity(Potential):
             gather_gradients(self.start, self.incidence, gradients, out)
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
-        """The Hessian; *overwrites* the tets' matrices in `out`, so that they need no clearing."""
         s = self.system
+        tets = x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters()
         with threads_for(len(s.tets), SERIAL_TETS):
-            element_hessians(x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters(), project, out.tets)
+            out.add_tets(lambda blocks: element_hessians(*tets, project, blocks))
 
     def add_model(
         self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
@@ -63,19 +64,12 @@ class Elasticity(Potential):
         s = self.system
         energies = np.empty(len(s.tets))
         gradients = np.empty((len(s.tets), 4, 3))
+        tets = x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters()
         with threads_for(len(s.tets), SERIAL_TETS):
-            element_models(
-                x,
-                s.tets,
-                s.rest_shape_inverse,
-                s.rest_volumes,
-                *self._parameters(),
-                hessian is not None,
-                project,
-                energies,
-                gradients,
-                _NOTHING if hessian is None else hessian.tets,
-            )
+            if hessian is None:
+                element_models(*tets, False, project, energies, gradients, _NO_HESSIANS)
+            else:
+                hessian.add_tets(lambda blocks: element_models(*tets, True, project, energies, gradients, blocks))
             gather_gradients(self.start, self.incidence, gradients, gradient)
         return float(energies.sum())
 
@@ -83,7 +77,7 @@ class Elasticity(Potential):
         return self.material.kind, self.material.mu, self.material.lam
 
 
-_NOTHING = np.zeros((0, 12, 12))
+_NO_HESSIANS = np.zeros((0, 12, 12))
 
 
 def elasticity_of(system: System) -> Elasticity:

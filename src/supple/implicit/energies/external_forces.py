@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.energies.potential import HessianBlocks, Potential
+from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
 from supple.system import System
 
 
@@ -22,6 +22,7 @@ class ExternalForces(Potential):
 
     forces: NDArray[np.float64]
     origin: NDArray[np.float64]
+    projection = Projection.UNNEEDED
 
     def value(self, x: NDArray[np.float64]) -> float:
         return -float(np.einsum("ij,ij->", self.forces, x - self.origin))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.energies.potential import HessianBlocks, Potential
+from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +23,7 @@ class Gravity(Potential):
     masses: NDArray[np.float64]
     acceleration: NDArray[np.float64]
     origin: NDArray[np.float64]
+    projection = Projection.UNNEEDED
 
     def value(self, x: NDArray[np.float64]) -> float:
         return -float((self.masses @ (x - self.origin)) @ self.acceleration)

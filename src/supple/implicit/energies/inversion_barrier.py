@@ -1,12 +1,12 @@
-"""A barrier against inversion, for materials that have none: felt only where a tet has lost nine tenths of its volume.
+"""A barrier against inversion, for materials that have none: it acts only on tets that have lost most of their volume.
 
 Stable Neo-Hookean and the corotated materials have a finite energy at J = 0: pressed hard enough, the minimum of their
 energy lies beyond inversion, and a step filter alone would stop Newton's method in front of it without a minimum to
-converge to. With y = J / J0, J0 = 0.1,
+converge to. With y = J / J0 and the onset J0,
 
     B = V kappa b(y),    b(y) = -(y - 1)^2 ln y for y < 1, else 0,    kappa = J0 (mu + lam),
 
-the minimum exists again. b has two continuous derivatives. Above a tenth of its rest volume a tet does not feel it.
+the minimum exists again. b has two continuous derivatives. A tet with J >= J0 does not feel it.
 
 Source of b: Li et al., "Incremental Potential Contact" (2020), equation 6, with the volume in place of the distance.
 """
@@ -21,11 +21,9 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from supple.implicit.energies.elasticity import SERIAL_TETS, Elasticity, gather_gradients
-from supple.implicit.energies.potential import HessianBlocks, Potential
+from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
 from supple.materials.registry import needs_positive_volume
 from supple.numerics.threads import threads_for
-
-ONSET = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,17 +33,20 @@ class InversionBarrier(Potential):
     Attributes
     ----------
     stiffness : (m,) kappa V [J], zero for tets without a barrier
+    onset : J0 [-]
     """
 
     elasticity: Elasticity
     stiffness: NDArray[np.float64]
+    onset: float
     label = "elasticity"
+    projection = Projection.RELEASED_FIRST
 
     def value(self, x: NDArray[np.float64]) -> float:
         s = self.elasticity.system
         out = np.empty(len(s.tets))
         with threads_for(len(s.tets), SERIAL_TETS):
-            _energies(x, s.tets, s.rest_volumes, self.stiffness, out)
+            _energies(x, s.tets, s.rest_volumes, self.stiffness, self.onset, out)
         return float(out.sum())
 
     def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
@@ -54,24 +55,24 @@ class InversionBarrier(Potential):
             return
         gradients = np.empty((len(s.tets), 4, 3))
         with threads_for(len(s.tets), SERIAL_TETS):
-            _gradients(x, s.tets, s.rest_volumes, self.stiffness, gradients)
+            _gradients(x, s.tets, s.rest_volumes, self.stiffness, self.onset, gradients)
             gather_gradients(self.elasticity.start, self.elasticity.incidence, gradients, out)
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
         """With `project`, without the term of the second derivative of J, whose factor is negative."""
         s = self.elasticity.system
         with threads_for(len(s.tets), SERIAL_TETS):
-            _hessians(x, s.tets, s.rest_volumes, self.stiffness, project, out.tets)
+            _hessians(x, s.tets, s.rest_volumes, self.stiffness, self.onset, project, out.tets)
 
 
-def inversion_barrier(elasticity: Elasticity, guarded: NDArray[np.bool_]) -> InversionBarrier | None:
-    """The barrier of the guarded tets whose material has none; None where there is no such tet."""
+def inversion_barrier(elasticity: Elasticity, guarded: NDArray[np.bool_], onset: float) -> InversionBarrier | None:
+    """The barrier below J = `onset` of the guarded tets whose material has none; None where there is no such tet."""
     material = elasticity.material
     wanted = guarded & ~needs_positive_volume(material.kind)
     if not wanted.any():
         return None
-    kappa = ONSET * (material.mu + np.abs(material.lam))
-    return InversionBarrier(elasticity, np.where(wanted, kappa * elasticity.system.rest_volumes, 0.0))
+    kappa = onset * (material.mu + np.abs(material.lam))
+    return InversionBarrier(elasticity, np.where(wanted, kappa * elasticity.system.rest_volumes, 0.0), onset)
 
 
 @njit(cache=True, error_model="numpy")
@@ -91,21 +92,21 @@ def _areas(x, tets, e):
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def _energies(x, tets, volumes, stiffness, out):
+def _energies(x, tets, volumes, stiffness, onset, out):
     for e in prange(len(tets)):
         out[e] = 0.0
         if stiffness[e] > 0.0:
             u, _, _, vw, _, _ = _areas(x, tets, e)
-            y = (u[0] * vw[0] + u[1] * vw[1] + u[2] * vw[2]) / (6.0 * volumes[e] * ONSET)
+            y = (u[0] * vw[0] + u[1] * vw[1] + u[2] * vw[2]) / (6.0 * volumes[e] * onset)
             if y < 1.0:
                 out[e] = -stiffness[e] * (y - 1.0) * (y - 1.0) * math.log(y) if y > 0.0 else math.inf
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def _gradients(x, tets, volumes, stiffness, out):
+def _gradients(x, tets, volumes, stiffness, onset, out):
     for e in prange(len(tets)):
         u, _, _, vw, wu, uv = _areas(x, tets, e)
-        dy = 1.0 / (6.0 * volumes[e] * ONSET)
+        dy = 1.0 / (6.0 * volumes[e] * onset)
         y = dy * (u[0] * vw[0] + u[1] * vw[1] + u[2] * vw[2])
         f = 0.0
         if stiffness[e] > 0.0 and 0.0 < y < 1.0:
@@ -116,12 +117,12 @@ def _gradients(x, tets, volumes, stiffness, out):
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def _hessians(x, tets, volumes, stiffness, project, out):
+def _hessians(x, tets, volumes, stiffness, onset, project, out):
     for e in prange(len(tets)):
         if stiffness[e] == 0.0:
             continue
         u, v, w, vw, wu, uv = _areas(x, tets, e)
-        dy = 1.0 / (6.0 * volumes[e] * ONSET)
+        dy = 1.0 / (6.0 * volumes[e] * onset)
         y = dy * (u[0] * vw[0] + u[1] * vw[1] + u[2] * vw[2])
         if not 0.0 < y < 1.0:
             continue

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.energies.potential import HessianBlocks, Potential
+from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
 from supple.system import System
 
 
@@ -23,6 +23,7 @@ class SoftTargets(Potential):
     vertices: NDArray[np.int32]
     stiffness: NDArray[np.float64]
     targets: NDArray[np.float64]
+    projection = Projection.UNNEEDED
 
     def value(self, x: NDArray[np.float64]) -> float:
         d = x[self.vertices] - self.targets

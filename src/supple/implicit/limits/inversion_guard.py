@@ -18,7 +18,7 @@ from supple.system import System
 
 
 @dataclass(eq=False)
-class Guard:
+class InversionGuard:
     """The step filter on all tets of every body that has no inverted one; others are free to recover first.
 
     A body is guarded as a whole: guarding only its positive tets would lock it, since on the way back from a tangle
@@ -26,24 +26,26 @@ class Guard:
 
     Attributes
     ----------
-    guarded : (m,) bool; complete : whether that is all of them
+    guarded : (m,) bool; keep : share of its volume that a tet keeps at least in one step, in (0, 1)
+    complete : whether all tets are guarded
     """
 
     system: System
     guarded: NDArray[np.bool_]
+    keep: float = KEEP
     complete: bool = False
 
     @classmethod
-    def at(cls, system: System, x: NDArray[np.float64]) -> Guard:
+    def at(cls, system: System, x: NDArray[np.float64], keep: float = KEEP) -> InversionGuard:
         """Guard the bodies that have no flat or inverted tet at x."""
-        guard = cls(system, np.zeros(len(system.tets), dtype=np.bool_))
+        guard = cls(system, np.zeros(len(system.tets), dtype=np.bool_), keep)
         guard.widen(x)
         return guard
 
     def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, int]:
         """How far along `direction`, at most 1, and the tet that allows no more (-1 where nothing limits)."""
         with threads_for(len(self.system.tets), SERIAL_TETS):
-            step, tet = noninverting_step(x, direction, self.system.tets, self.guarded, KEEP)
+            step, tet = noninverting_step(x, direction, self.system.tets, self.guarded, self.keep)
         return float(step), int(tet)
 
     def allows(self, x: NDArray[np.float64]) -> bool:

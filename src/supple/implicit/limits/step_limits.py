@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.implicit.contact.model import ContactModel
-from supple.implicit.limits.inversion_guard import Guard
+from supple.implicit.limits.inversion_guard import InversionGuard
 from supple.implicit.timings import Clock
 
 
@@ -16,7 +16,7 @@ from supple.implicit.timings import Clock
 class StepLimits:
     """Both bounds together."""
 
-    guard: Guard
+    guard: InversionGuard
     contact: ContactModel | None
     clock: Clock
 

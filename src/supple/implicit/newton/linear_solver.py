@@ -140,19 +140,19 @@ class LinearSolver:
         Parameters
         ----------
         force : (n, 3), of which the free rows are read; tolerance : relative, for CG
-        convex : whether the Hessian is known to be positive semi-definite; where that is not known and CG finds that it
-            is not so, None is returned at once
+        convex : whether the Hessian is known to be positive semi-definite. Where that is not known, every method checks
+            it: CG the curvature along its directions, the factorization the signs of all eigenvalues
 
         Returns
         -------
-        p : (n, 3), zero where pinned; None where the system could not be solved
+        p : (n, 3), zero where pinned; None where the system could not be solved, or was found to be indefinite
         """
         began = perf_counter()
         with one_thread(not self.parallel):
-            p, said = self._solve(force, tolerance, convex)
+            p, report = self._solve(force, tolerance, convex)
         seconds = self.spent + perf_counter() - began
-        self.pace.note(self.parallel, seconds / (_ASSEMBLY + said.iterations))
-        return p, said
+        self.pace.note(self.parallel, seconds / (_ASSEMBLY + report.iterations))
+        return p, report
 
     def _solve(
         self, force: NDArray[np.float64], tolerance: float, convex: bool
@@ -184,7 +184,7 @@ class LinearSolver:
             if self.kind == "pcg":
                 return None, LinearReport("pcg", iterations, first_norm)
             logger.debug("CG stalled after %d iterations; factorizing", iterations)
-        solution = solve_directly(self.rows, self.matrix, b)
+        solution = solve_directly(self.rows, self.matrix, b, require_definite=not convex)
         if solution is None:
             return None, LinearReport("direct", iterations, first_norm)
         p[self.order.vertices] = solution

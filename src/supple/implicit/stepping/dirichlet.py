@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.implicit.limits.step_limits import StepLimits
-from supple.implicit.newton.minimize import Outcome, Problem, Tools
+from supple.implicit.newton.direction import Tools
+from supple.implicit.newton.minimize import Outcome, Problem
 from supple.implicit.newton.trace import NewtonRow
 from supple.state import Status
 from supple.system import System
@@ -57,7 +58,7 @@ def move_pins(
         for coupling in tools.hessian.couplings:
             pull += (coupling @ way.ravel()).reshape(-1, 3)
         with tools.clock.of("linear_solve"):
-            direction, said = tools.linear_solver.solve(-(gradient + pull), _TOLERANCE)
+            direction, report = tools.linear_solver.solve(-(gradient + pull), _TOLERANCE)
         if direction is None or not np.isfinite(direction).all():
             text = "the linear system that moves the pins could not be solved"
             return x, Outcome(Status.NOT_FINITE, here, text, rows)
@@ -69,8 +70,8 @@ def move_pins(
                 energy=float("nan"),
                 force=float(np.abs(gradient).max(initial=0.0)),
                 direction=float(np.abs(direction).max(initial=0.0)),
-                linear_solver=said.method,
-                linear_iterations=said.iterations,
+                linear_solver=report.method,
+                linear_iterations=report.iterations,
                 linear_tolerance=_TOLERANCE,
                 filter=step,
                 step=step,

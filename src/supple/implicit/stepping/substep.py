@@ -15,8 +15,9 @@ from supple.implicit.energies.inversion_barrier import inversion_barrier
 from supple.implicit.energies.potential import Potential
 from supple.implicit.energies.soft_targets import soft_targets_at
 from supple.implicit.energies.stitch_damping import StitchDamping
-from supple.implicit.limits.inversion_guard import Guard
+from supple.implicit.limits.inversion_guard import InversionGuard
 from supple.implicit.limits.step_limits import StepLimits
+from supple.implicit.newton.convergence import Convergence
 from supple.implicit.newton.minimize import Outcome, Problem, minimize
 from supple.implicit.newton.objective import Objective
 from supple.implicit.newton.trace import NewtonRow
@@ -27,14 +28,15 @@ from supple.implicit.workspace import Workspace
 from supple.state import State, Status
 from supple.system import System
 
+# The defaults of `Implicit.tolerance`. Halving the first is meant to move results by less than 1e-4; an equilibrium has
+# no later steps that would make up for the rest.
 _DYNAMIC_TOLERANCE = 1e-3
 _STATIC_TOLERANCE = 1e-9
 
-# Of the displacement below which friction is static: Newton's method has to see the difference.
-_FRICTION_SHARE = 1e-2
-
-# Of the distance at which contact begins.
+# Of `dhat`, over which contact's force goes from zero to its full size, and of the displacement below which friction is
+# static: steps have to resolve both.
 _DHAT_SHARE = 0.1
+_FRICTION_SHARE = 1e-2
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,10 @@ class StepSettings:
 
     integrator: Integrator
     tolerance: float | None
+    force_tolerance: float
     max_iterations: int
+    volume_kept: float
+    barrier_onset: float
 
     def shortest(self, workspace: Workspace, h: float) -> float:
         """The length of Newton's step [m] below which the minimum of a step of h [s] is reached."""
@@ -78,14 +83,17 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
         state.velocities[workspace.bodies_end :] = (targets[-obstacles:] - state.positions[-obstacles:]) / h
     plan = settings.integrator.plan(system, state, h, lambda start: _acceleration(system, start, workspace))
     forces = total_forces(system, end)
-    guard = Guard.at(system, state.positions)
+    guard = InversionGuard.at(system, state.positions, settings.volume_kept)
     limits = StepLimits(guard, workspace.contact, tools.clock)
-    base = _objective(system, state, end, plan, forces, guard, workspace)
+    base = _objective(system, state, end, plan, forces, workspace)
+    barrier = inversion_barrier(workspace.elasticity, guard.guarded, settings.barrier_onset)
+    if barrier is not None:
+        base = replace(base, terms=[*base.terms, barrier])
     contact = ContactStep.of(workspace.contact, state.positions, (state.time, end), plan.contact_weight)
     problem = Problem(
         contact.added_to(base, state.positions),
         plan.scale,
-        settings.shortest(workspace, h),
+        Convergence(settings.shortest(workspace, h), settings.force_tolerance),
         settings.max_iterations,
         workspace.diagonal,
     )
@@ -132,15 +140,11 @@ def _objective(
     end: float,
     plan: Plan,
     forces: NDArray[np.float64],
-    guard: Guard,
     workspace: Workspace,
 ) -> Objective:
     terms = _potentials(system, state.positions, end, forces, workspace)
-    barrier = inversion_barrier(workspace.elasticity, guard.guarded)
-    if barrier is not None:
-        terms.append(barrier)
     if plan.scale is None:
-        terms.append(workspace.stabilizer)
+        terms.append(workspace.regularization)
     else:
         terms.append(Inertia(system.masses, plan.predicted, plan.scale))
         if workspace.viscosity is not None:
