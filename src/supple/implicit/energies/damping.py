@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from supple.implicit.energies.elasticity import SERIAL_TETS, Elasticity, gather_gradients
 from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
 from supple.materials.isotropic import rest_lame_parameters
+from supple.materials.stretches import green_strain
 from supple.materials.tet_energies import deformation_gradient, edge_matrix, put_gradient
 from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed, transpose
 from supple.numerics.threads import threads_for
@@ -134,15 +135,9 @@ def _symmetric_part(M):
 
 
 @njit(cache=True, error_model="numpy")
-def _strain(F):
-    C = mat_mul(transpose(F), F)
-    return (0.5 * (C[0] - 1.0), 0.5 * (C[4] - 1.0), 0.5 * (C[8] - 1.0), 0.5 * C[5], 0.5 * C[2], 0.5 * C[1])
-
-
-@njit(cache=True, error_model="numpy")
 def _stress(F, reference, e, factor, mu, lam):
     """The viscous second Piola-Kirchhoff stress of tet e, and its strain rate times that, halved and divided by c."""
-    E = _strain(F)
+    E = green_strain(F)
     r0 = factor * (E[0] - reference[e, 0])
     r1 = factor * (E[1] - reference[e, 1])
     r2 = factor * (E[2] - reference[e, 2])
@@ -169,7 +164,7 @@ def _strains(x, v, tets, Dm_inv, rates, out):
         if rates:
             E = _symmetric_part(mat_mul(transpose(F), mat_mul(edge_matrix(v, tets, e), B)))
         else:
-            E = _strain(F)
+            E = green_strain(F)
         for k in range(6):
             out[e, k] = E[k]
 

@@ -1,4 +1,4 @@
-"""Dead loads on vertices as a potential: -f . x."""
+"""Dead loads on vertices, gravity among them, as a potential: -f . x."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class ExternalForces(Potential):
 
 
 def total_forces(system: System, time: float) -> NDArray[np.float64]:
-    """(n, 3) sum of the scene's forces on each vertex at `time` [N]."""
-    total = np.zeros_like(system.rest_positions)
+    """(n, 3) weight and sum of the scene's forces on each vertex at `time` [N]."""
+    total = system.masses[:, None] * system.gravity
     for part in system.forces:
         total[part.vertices] += part.per_vertex(time)
     return total

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from supple.errors import SolverError
 from supple.implicit.energies.elasticity import SERIAL_TETS
-from supple.implicit.limits.step_filter import KEEP, min_det, noninverting_step
+from supple.implicit.limits.step_filter import KEEP, min_det, noninverting_step, volume_signs
 from supple.materials.per_tet import TetMaterial
 from supple.materials.registry import needs_positive_volume
 from supple.numerics.threads import threads_for
@@ -58,7 +57,7 @@ class InversionGuard:
         """Guard from now on the bodies that have no flat or inverted tet at x, too."""
         if self.complete:
             return
-        positive = _positive(x, self.system.tets, self.system.rest_shape_inverse)
+        positive = volume_signs(x, self.system.tets) > 0.0
         for part in self.system.bodies:
             if positive[part.tets].all():
                 self.guarded[part.tets] = True
@@ -72,7 +71,7 @@ def refuse_inverted(system: System, material: TetMaterial, x: NDArray[np.float64
     ------
     SolverError : names the body and its tets.
     """
-    bad = needs_positive_volume(material.kind) & ~_positive(x, system.tets, system.rest_shape_inverse)
+    bad = needs_positive_volume(material.kind) & ~(volume_signs(x, system.tets) > 0.0)
     if not bad.any():
         return
     for part in system.bodies:
@@ -84,16 +83,3 @@ def refuse_inverted(system: System, material: TetMaterial, x: NDArray[np.float64
                 f"the start (tets {names}), where {type(part.body.material).__name__} has no finite energy; start "
                 "un-inverted, or use StableNeoHookean, which recovers"
             )
-
-
-@njit(cache=True, error_model="numpy")
-def _positive(x, tets, Dm_inv):
-    """(m,) whether J > 0; Dm has a positive determinant, so the sign is that of the edges' determinant."""
-    out = np.empty(len(tets), dtype=np.bool_)
-    for e in range(len(tets)):
-        a, b, c, d = tets[e, 0], tets[e, 1], tets[e, 2], tets[e, 3]
-        u0, u1, u2 = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
-        v0, v1, v2 = x[c, 0] - x[a, 0], x[c, 1] - x[a, 1], x[c, 2] - x[a, 2]
-        w0, w1, w2 = x[d, 0] - x[a, 0], x[d, 1] - x[a, 1], x[d, 2] - x[a, 2]
-        out[e] = u0 * (v1 * w2 - v2 * w1) - u1 * (v0 * w2 - v2 * w0) + u2 * (v0 * w1 - v1 * w0) > 0.0
-    return out

@@ -68,14 +68,6 @@ class Objective:
                 values.append(term.add_model(x, gradient, hessian, projected.includes(term.projection)))
         return Model(x, sum(values), sum(abs(value) for value in values), gradient)
 
-    def hessian(
-        self, x: NDArray[np.float64], out: HessianBlocks, projected: ProjectedTerms = ProjectedTerms.ALL
-    ) -> None:
-        """The Hessian [N/m] into `out`, whatever it held."""
-        out.clear()
-        for term in self.terms:
-            term.add_hessian(x, out, projected.includes(term.projection))
-
 
 def _gradient(terms: Sequence[Potential], x: NDArray[np.float64]) -> NDArray[np.float64]:
     out = np.zeros_like(x)

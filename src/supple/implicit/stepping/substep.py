@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.energies.damping import Damping, StrainRate
+from supple.implicit.energies.damping import Damping, Strained, StrainRate
 from supple.implicit.energies.external_forces import ExternalForces, total_forces
-from supple.implicit.energies.gravity import Gravity
 from supple.implicit.energies.inertia import Inertia
 from supple.implicit.energies.inversion_barrier import inversion_barrier
 from supple.implicit.energies.potential import Potential
@@ -125,9 +125,7 @@ def _potentials(
     terms: list[Potential] = [workspace.elasticity]
     if workspace.stitches is not None:
         terms.append(workspace.stitches.at(time))
-    if system.gravity.any():
-        terms.append(Gravity(system.masses, system.gravity, x))
-    if system.forces:
+    if forces.any():
         terms.append(ExternalForces(forces, x))
     if system.soft_targets:
         terms.append(soft_targets_at(system, time))
@@ -147,12 +145,17 @@ def _objective(
         terms.append(workspace.regularization)
     else:
         terms.append(Inertia(system.masses, plan.predicted, plan.scale))
-        if workspace.viscosity is not None:
-            terms.append(Damping(workspace.viscosity, plan.strain_rate(workspace.viscosity)))
-        if workspace.stitch_viscosity is not None:
-            rate = plan.strain_rate(workspace.stitch_viscosity)
-            terms.append(StitchDamping.of(workspace.stitch_viscosity, rate))
+        terms += _damping(workspace, plan.strain_rate)
     return Objective(terms, workspace.tools.clock)
+
+
+def _damping(workspace: Workspace, strain_rate: Callable[[Strained], StrainRate]) -> list[Potential]:
+    terms: list[Potential] = []
+    if workspace.viscosity is not None:
+        terms.append(Damping(workspace.viscosity, strain_rate(workspace.viscosity)))
+    if workspace.stitch_viscosity is not None:
+        terms.append(StitchDamping.of(workspace.stitch_viscosity, strain_rate(workspace.stitch_viscosity)))
+    return terms
 
 
 def _acceleration(system: System, state: State, workspace: Workspace) -> NDArray[np.float64]:
@@ -163,13 +166,7 @@ def _acceleration(system: System, state: State, workspace: Workspace) -> NDArray
     """
     x, v = state.positions, state.velocities
     terms = _potentials(system, x, state.time, total_forces(system, state.time), workspace)
-    viscosity, of_stitches = workspace.viscosity, workspace.stitch_viscosity
-    if viscosity is not None:
-        rate = StrainRate(1.0, viscosity.strains(x) - viscosity.strain_rates(x, v))
-        terms.append(Damping(viscosity, rate))
-    if of_stitches is not None:
-        rate = StrainRate(1.0, of_stitches.strains(x) - of_stitches.strain_rates(x, v))
-        terms.append(StitchDamping.of(of_stitches, rate))
+    terms += _damping(workspace, lambda damped: StrainRate(1.0, damped.strains(x) - damped.strain_rates(x, v)))
     return -Objective(terms).gradient(x) / system.masses[:, None]
 
 
@@ -185,7 +182,7 @@ def _first_guess(
     """Where the vertices would go without elasticity, as far as the filter allows, or x where that has less energy."""
     if plan.scale is None:
         return x
-    ahead = plan.predicted + plan.scale * (system.gravity + forces / system.masses[:, None])
+    ahead = plan.predicted + plan.scale * forces / system.masses[:, None]
     ahead[pinned] = x[pinned]
     step, _ = limits.largest_step(x, ahead - x)
     if step < 1.0:
