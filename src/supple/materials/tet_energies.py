@@ -9,9 +9,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 from numba import njit, prange
 
-from supple.materials.isotropic import density, energy_density, first_piola, hessian_block, principal_hessian, stress
+from supple.materials.isotropic import density, energy_density, hessian_block, principal_hessian, stress
 from supple.numerics import mat3, svd3
 from supple.numerics.kernel_cache import fingerprint
 from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed
@@ -122,8 +123,6 @@ def _put_hessian(U, s, V, B, volume, kind, mu, lam, project, out, e):
 class _Kernels(NamedTuple):
     element_models: Any
     element_energies: Any
-    element_gradients: Any
-    element_hessians: Any
 
 
 def _build_kernels(version: int) -> _Kernels:
@@ -148,29 +147,15 @@ def _build_kernels(version: int) -> _Kernels:
             F = deformation_gradient(x, tets, Dm_inv, e)
             out[e] = volumes[e] * energy_density(F, kind[e], mu[e], lam[e])
 
-    @njit(parallel=True, cache=True, error_model="numpy")
-    def element_gradients(x, tets, Dm_inv, volumes, kind, mu, lam, out):
-        _ = version
-        for e in prange(len(tets)):
-            P = first_piola(deformation_gradient(x, tets, Dm_inv, e), kind[e], mu[e], lam[e])
-            put_gradient(P, load_mat(Dm_inv, e), volumes[e], out, e)
-
-    @njit(parallel=True, cache=True, error_model="numpy")
-    def element_hessians(x, tets, Dm_inv, volumes, kind, mu, lam, project, out):
-        _ = version
-        for e in prange(len(tets)):
-            U, s, V = decompose(deformation_gradient(x, tets, Dm_inv, e))
-            _put_hessian(U, s, V, load_mat(Dm_inv, e), volumes[e], kind[e], mu[e], lam[e], project, out, e)
-
-    return _Kernels(element_models, element_energies, element_gradients, element_hessians)
+    return _Kernels(element_models, element_energies)
 
 
 _KERNELS = _build_kernels(fingerprint([*Path(__file__).parent.glob("*.py"), Path(mat3.__file__), Path(svd3.__file__)]))
 
 
 def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, energies, gradients, hessians) -> None:
-    """Energies (m,), gradients (m, 4, 3) and, with `second`, Hessians (m, 12, 12) of all tets at once: one
-    decomposition of each F serves all three.
+    """Energies (m,), gradients (m, 4, 3) and, with `second`, Hessians (m, 12, 12) of all tets from one decomposition
+    of each F.
 
     Parameters
     ----------
@@ -197,7 +182,8 @@ def element_gradients(x, tets, Dm_inv, volumes, kind, mu, lam, out) -> None:
 
     Parameters as of `element_energies`.
     """
-    _KERNELS.element_gradients(x, tets, Dm_inv, volumes, kind, mu, lam, out)
+    tet = x, tets, Dm_inv, volumes, kind, mu, lam
+    element_models(*tet, False, False, np.empty(len(tets)), out, np.empty((0, 12, 12)))
 
 
 def element_hessians(x, tets, Dm_inv, volumes, kind, mu, lam, project, out) -> None:
@@ -206,4 +192,5 @@ def element_hessians(x, tets, Dm_inv, volumes, kind, mu, lam, project, out) -> N
 
     Other parameters as of `element_energies`.
     """
-    _KERNELS.element_hessians(x, tets, Dm_inv, volumes, kind, mu, lam, project, out)
+    tet = x, tets, Dm_inv, volumes, kind, mu, lam
+    element_models(*tet, True, project, np.empty(len(tets)), np.empty((len(tets), 4, 3)), out)

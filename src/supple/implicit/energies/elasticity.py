@@ -12,7 +12,7 @@ from supple.errors import SolverError
 from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
 from supple.materials.material import Elastic
 from supple.materials.per_tet import TetMaterial
-from supple.materials.tet_energies import element_energies, element_gradients, element_hessians, element_models
+from supple.materials.tet_energies import element_energies, element_models
 from supple.numerics.sparse.block_csr import incidences
 from supple.numerics.threads import threads_for
 from supple.system import System
@@ -46,17 +46,10 @@ class Elasticity(Potential):
         return float(energies.sum())
 
     def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-        s = self.system
-        gradients = np.empty((len(s.tets), 4, 3))
-        with threads_for(len(s.tets), SERIAL_TETS):
-            element_gradients(x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters(), gradients)
-            gather_gradients(self.start, self.incidence, gradients, out)
+        self.add_model(x, out, None, project=False)
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
-        s = self.system
-        tets = x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters()
-        with threads_for(len(s.tets), SERIAL_TETS):
-            out.add_tets(lambda blocks: element_hessians(*tets, project, blocks))
+        self.add_model(x, np.zeros_like(x), out, project)
 
     def add_model(
         self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool

@@ -76,29 +76,14 @@ def search(
     """
     if not (slope < 0.0 and largest > 0.0):
         return start, 0.0, 0
-    end, step, cuts = _backtrack(objective, start, direction, slope, largest, hessian, projected)
-    while step > 0.0 and not states.allows(end.positions):
-        end, step, more = _backtrack(objective, start, direction, slope, _SHRINK * step, hessian, projected)
-        cuts += more + 1
-    return end, step, cuts
-
-
-def _backtrack(
-    objective: Objective,
-    start: Model,
-    direction: NDArray[np.float64],
-    slope: float,
-    largest: float,
-    hessian: HessianBlocks | None,
-    projected: ProjectedTerms,
-) -> tuple[Model, float, int]:
     step = largest
     for cuts in range(_MOST_CUTS):
         moved = start.positions + step * direction
         # Nearly always the first try is good, and then nothing is left to do.
         model = objective.model(moved, hessian, projected) if cuts == 0 else None
         energy, size = (model.energy, model.size) if model is not None else objective.value_and_size(moved)
-        if energy <= start.energy + _SUFFICIENT * step * slope + _ROUND_OFF * max(size, start.size):
+        enough = energy <= start.energy + _SUFFICIENT * step * slope + _ROUND_OFF * max(size, start.size)
+        if enough and states.allows(moved):
             return model or objective.model(moved, hessian, projected), step, cuts
         step *= _SHRINK
     if hessian is not None:
