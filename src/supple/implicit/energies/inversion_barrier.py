@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from supple.implicit.energies.elasticity import SERIAL_TETS, Elasticity, gather_gradients
 from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
 from supple.materials.registry import needs_positive_volume
-from supple.materials.tet_energies import deformation_gradient, put_gradient
+from supple.materials.tet_energies import deformation_gradient, edge_matrix, put_gradient
 from supple.numerics.mat3 import cross, det, dot, load_mat
 from supple.numerics.threads import threads_for
 
@@ -78,6 +78,12 @@ def inversion_barrier(elasticity: Elasticity, guarded: NDArray[np.bool_], onset:
 
 
 @njit(cache=True, error_model="numpy")
+def _volume_ratio(x, tets, Dm_inv, e):
+    """J of tet e."""
+    return det(edge_matrix(x, tets, e)) * det(load_mat(Dm_inv, e))
+
+
+@njit(cache=True, error_model="numpy")
 def _derivatives(J, onset):
     """b and its first and second derivative by J."""
     y = J / onset
@@ -95,15 +101,14 @@ def _energies(x, tets, Dm_inv, stiffness, onset, out):
     for e in prange(len(tets)):
         out[e] = 0.0
         if stiffness[e] > 0.0:
-            out[e] = stiffness[e] * _derivatives(det(deformation_gradient(x, tets, Dm_inv, e)), onset)[0]
+            out[e] = stiffness[e] * _derivatives(_volume_ratio(x, tets, Dm_inv, e), onset)[0]
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def _gradients(x, tets, Dm_inv, stiffness, onset, out):
     for e in prange(len(tets)):
-        F = deformation_gradient(x, tets, Dm_inv, e)
-        _, first, _ = _derivatives(det(F), onset)
-        C = _cofactors(F)
+        _, first, _ = _derivatives(_volume_ratio(x, tets, Dm_inv, e), onset)
+        C = _cofactors(deformation_gradient(x, tets, Dm_inv, e))
         f = first * stiffness[e]
         P = (f * C[0], f * C[1], f * C[2], f * C[3], f * C[4], f * C[5], f * C[6], f * C[7], f * C[8])
         put_gradient(P, load_mat(Dm_inv, e), 1.0, out, e)
@@ -113,11 +118,11 @@ def _gradients(x, tets, Dm_inv, stiffness, onset, out):
 def _hessians(x, tets, Dm_inv, stiffness, onset, project, out):
     """For nodes p and q with shape gradients g and h: b'' (C g)(C h)^T + b' [F (g x h)]_x, C the cofactors of F."""
     for e in prange(len(tets)):
-        F = deformation_gradient(x, tets, Dm_inv, e)
-        _, first, second = _derivatives(det(F), onset)
+        _, first, second = _derivatives(_volume_ratio(x, tets, Dm_inv, e), onset)
         if stiffness[e] == 0.0 or second == 0.0:
             continue
-        B, C = load_mat(Dm_inv, e), _cofactors(F)
+        F, B = deformation_gradient(x, tets, Dm_inv, e), load_mat(Dm_inv, e)
+        C = _cofactors(F)
         g = (-(B[0] + B[3] + B[6]), -(B[1] + B[4] + B[7]), -(B[2] + B[5] + B[8])), B[:3], B[3:6], B[6:]
         for p in range(4):
             a = _times(C, g[p])
