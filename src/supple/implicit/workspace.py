@@ -1,4 +1,4 @@
-"""What `Implicit.prepare` computes once for a system."""
+"""The data that `Implicit.prepare` computes once for a system."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from supple.system import System
 
 @dataclass(eq=False)
 class Workspace:
-    """What `Implicit.prepare` computes once.
+    """The data that `Implicit.prepare` computes once.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Workspace:
 
         Raises
         ------
-        SolverError : where a state from outside has surfaces that intersect; what a step ended with has none.
+        SolverError : where a state from outside has surfaces that intersect; the end of a step has none.
         """
         if self.contact is None:
             return state

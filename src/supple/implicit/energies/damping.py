@@ -7,7 +7,7 @@ With the Green strain E(F) = (F^T F - I)/2 and a rate E' = c (E(F) - E^), the di
 whose gradient by x is the force of the viscous stress tau C : E'. For backward Euler c = 1/h and E^ is the strain at
 the start of the step; other integrators choose c and E^ as they choose the velocity. The strain does not change in a
 rigid motion of any size, so that a spinning body keeps spinning. (The quadratic form of the lagged stiffness matrix,
-which is often used, sees the chord of a rotation as a compression, and brakes it.)
+which is often used, takes the chord of a rotation for a compression, and damps the rotation.)
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class Viscosity:
 
 
 class Strained(Protocol):
-    """Something whose strain is damped; strains are arrays of any shape."""
+    """An element type whose strain is damped; strains are arrays of any shape."""
 
     def strains(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """At positions x (n, 3) [m]."""

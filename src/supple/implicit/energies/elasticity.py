@@ -17,7 +17,7 @@ from supple.numerics.sparse.block_csr import incidences
 from supple.numerics.threads import threads_for
 from supple.system import System
 
-# Fewer tets than this are worked on by one thread.
+# Fewer tets than this are processed by one thread: a pass of 1 ms is too short to share.
 SERIAL_TETS = 2_000
 
 

@@ -12,7 +12,7 @@ from supple.implicit.energies.potential import HessianBlocks, Potential, Project
 
 @dataclass(frozen=True, eq=False)
 class Inertia(Potential):
-    """Pulls every vertex to where it would be without forces.
+    """The energy whose minimum is the predicted state, which every vertex would reach without forces.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Springs from vertices to places: k/2 |x - target|^2."""
+"""Springs from vertices to target positions: k/2 |x - target|^2."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class SoftTargets(Potential):
 
 
 def soft_targets_at(system: System, time: float) -> SoftTargets:
-    """The scene's soft targets as they pull at `time`."""
+    """The scene's soft targets with their positions at `time` [s]."""
     parts = system.soft_targets
     return SoftTargets(
         np.concatenate([part.vertices for part in parts]),

@@ -1,4 +1,4 @@
-"""Keeps tetrahedra from inverting: which bodies are guarded, how far a step may go, and the check after it."""
+"""Prevents the inversion of tets: which bodies are guarded, how far a step may go, and the check after it."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from supple.system import System
 
 @dataclass(eq=False)
 class InversionGuard:
-    """The step filter on all tets of every body that has no inverted one; others are free to recover first.
+    """The step filter on all tets of every body that has no inverted one. Other bodies may recover first.
 
-    A body is guarded as a whole: guarding only its positive tets would lock it, since on the way back from a tangle
-    some of them have to pass through zero.
+    A body is guarded as a whole. A guard on its positive tets alone would lock it: to untangle, some of them have to
+    pass through zero volume.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class InversionGuard:
         return guard
 
     def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, int]:
-        """How far along `direction`, at most 1, and the tet that allows no more (-1 where nothing limits)."""
+        """The largest step along `direction`, at most 1, and the tet that limits it (-1 where none does)."""
         with threads_for(len(self.system.tets), SERIAL_TETS):
             step, tet = noninverting_step(x, direction, self.system.tets, self.guarded, self.keep)
         return float(step), int(tet)
@@ -54,7 +54,7 @@ class InversionGuard:
         return bool(smallest > 0.0)
 
     def widen(self, x: NDArray[np.float64]) -> None:
-        """Guard from now on the bodies that have no flat or inverted tet at x, too."""
+        """From now on, also guard the bodies that have no flat or inverted tet at x."""
         if self.complete:
             return
         positive = volume_signs(x, self.system.tets) > 0.0
@@ -65,11 +65,11 @@ class InversionGuard:
 
 
 def refuse_inverted(system: System, material: TetMaterial, x: NDArray[np.float64]) -> None:
-    """Raise where a tet whose material has no energy at J <= 0 is flat or inverted at x.
+    """Check that no tet whose material has no energy at J <= 0 is flat or inverted at x.
 
     Raises
     ------
-    SolverError : names the body and its tets.
+    SolverError : where one is; the text names the body and its tets.
     """
     bad = needs_positive_volume(material.kind) & ~(volume_signs(x, system.tets) > 0.0)
     if not bad.any():

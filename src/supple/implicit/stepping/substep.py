@@ -66,7 +66,7 @@ class StepSettings:
 
 @dataclass(frozen=True, eq=False)
 class Substep:
-    """What came of a step: the state at its end, how Newton's method went, and the contact there."""
+    """The result of a step: the state at its end, the course of Newton's method, and the contact at the end."""
 
     state: State
     outcome: Outcome
@@ -79,7 +79,7 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     targets = system.pin_targets(end)
     obstacles = len(state.positions) - workspace.bodies_end
     if obstacles:
-        # What moves by script arrives by script: its inertia then plays no part.
+        # What a script moves has the script's velocity, so that its inertia plays no part.
         state.velocities[workspace.bodies_end :] = (targets[-obstacles:] - state.positions[-obstacles:]) / h
     plan = settings.integrator.plan(system, state, h, lambda start: _acceleration(system, start, workspace))
     forces = total_forces(system, end)
@@ -91,7 +91,7 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
         base = replace(base, terms=[*base.terms, barrier])
     contact = ContactStep.of(workspace.contact, state.positions, (state.time, end), plan.contact_weight)
     problem = Problem(
-        contact.added_to(base, state.positions),
+        contact.with_contact(base, state.positions),
         plan.scale,
         Convergence(settings.shortest(workspace, h), settings.force_tolerance),
         settings.max_iterations,
@@ -103,17 +103,17 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     if np.array_equal(targets, x[tools.pinned]):
         x = _first_guess(system, problem, x, plan, forces, limits, tools.pinned)
     else:
-        x, carried = move_pins(system, problem, x, targets, limits, tools)
-        rows = carried.rows
-        if carried.status is not Status.CONVERGED:
-            return Substep(state, carried, contact)
+        x, moved = move_pins(system, problem, x, targets, limits, tools)
+        rows = moved.rows
+        if moved.status is not Status.CONVERGED:
+            return Substep(state, moved, contact)
     while True:
         outcome = minimize(problem, x, limits, tools)
         rows = rows + outcome.rows
         x = outcome.end.positions
-        if outcome.status is not Status.CONVERGED or not contact.refine(x):
+        if outcome.status is not Status.CONVERGED or not contact.needs_update(x):
             break
-        problem = replace(problem, objective=contact.added_to(base, x))
+        problem = replace(problem, objective=contact.with_contact(base, x))
     outcome = contact.verified(replace(outcome, rows=rows))
     return Substep(State(end, x, plan.velocity(x), plan.memory), outcome, contact)
 
@@ -121,7 +121,7 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
 def _potentials(
     system: System, x: NDArray[np.float64], time: float, forces: NDArray[np.float64], workspace: Workspace
 ) -> list[Potential]:
-    """Everything but inertia and damping, at `time`; energies of loads are zero at x."""
+    """All energies but inertia and damping, at `time`; energies of loads are zero at x."""
     terms: list[Potential] = [workspace.elasticity]
     if workspace.stitches is not None:
         terms.append(workspace.stitches.at(time))
@@ -161,8 +161,8 @@ def _damping(workspace: Workspace, strain_rate: Callable[[Strained], StrainRate]
 def _acceleration(system: System, state: State, workspace: Workspace) -> NDArray[np.float64]:
     """(n, 3) of a state by its forces, pins aside [m/s^2].
 
-    The inversion barrier is left out: it is a guard at the end of a step, and so stiff that the trapezoidal rule, which
-    does not damp what is stiff, would throw its force back in the next step.
+    The inversion barrier is left out: it bounds the end of a step, and is so stiff that the trapezoidal rule, which
+    does not damp stiff forces, would return its force in the next step.
     """
     x, v = state.positions, state.velocities
     terms = _potentials(system, x, state.time, total_forces(system, state.time), workspace)
@@ -179,7 +179,7 @@ def _first_guess(
     limits: StepLimits,
     pinned: NDArray[np.int32],
 ) -> NDArray[np.float64]:
-    """Where the vertices would go without elasticity, as far as the filter allows, or x where that has less energy."""
+    """The positions without elasticity, as far as the filters allow; x where that has less energy."""
     if plan.scale is None:
         return x
     ahead = plan.predicted + plan.scale * forces / system.masses[:, None]
