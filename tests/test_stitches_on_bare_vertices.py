@@ -7,11 +7,13 @@ import supple as sp
 from supple.implicit.energies.inertia import Inertia
 from supple.implicit.energies.potential import HessianBlocks
 from supple.implicit.energies.stitches import StitchEnergy
-from supple.implicit.limits.inversion_guard import Guard
+from supple.implicit.limits.inversion_guard import InversionGuard
 from supple.implicit.limits.step_limits import StepLimits
+from supple.implicit.newton.convergence import Convergence
+from supple.implicit.newton.direction import Tools
 from supple.implicit.newton.free_motion import FreeMotion
 from supple.implicit.newton.linear_solver import LinearSolver
-from supple.implicit.newton.minimize import Problem, Tools, minimize
+from supple.implicit.newton.minimize import Problem, minimize
 from supple.implicit.newton.objective import Objective
 from supple.scene.stitches.elements import Springs
 from supple.scene.stitches.side import Side
@@ -64,13 +66,13 @@ def by_newton(system, x, h=0.05, steps=200):
     hessian = HessianBlocks.zeros(0, len(x), len(system.stitching))
     tools = Tools(linear, hessian, system.pinned_vertices, FreeMotion.of(system))
     # There is no tet to guard: stitch tets are not.
-    limits = StepLimits(Guard(system, np.zeros(0, dtype=np.bool_), complete=True), None, tools.clock)
+    limits = StepLimits(InversionGuard(system, np.zeros(0, dtype=np.bool_), complete=True), None, tools.clock)
     stitches = StitchEnergy.of(system.stitching, 0.0)
     v = np.zeros_like(x)
     way = [x]
     for _ in range(steps):
         objective = Objective([stitches, Inertia(system.masses, x + h * v, h * h)])
-        outcome = minimize(Problem(objective, h * h, 1e-10, 60, 1.0), x, limits, tools)
+        outcome = minimize(Problem(objective, h * h, Convergence(1e-10, 1e-4), 60, 1.0), x, limits, tools)
         assert outcome.status is Status.CONVERGED, outcome.message
         v = (outcome.end.positions - x) / h
         x = outcome.end.positions

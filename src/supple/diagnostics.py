@@ -75,7 +75,7 @@ def _elastic_energy(system: System, part: BodyRange, x: NDArray, F: NDArray, J: 
             energy += 0.5 * float(C @ C) / material.volume_compliance
         return energy
     if isinstance(material, Elastic):
-        return material.total_energy(F, J, volumes)
+        return float(material.energy_density(F) @ volumes)
     return 0.0
 
 

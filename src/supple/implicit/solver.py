@@ -15,18 +15,19 @@ from supple.implicit.details import ImplicitDetails
 from supple.implicit.energies.damping import viscosity_of
 from supple.implicit.energies.elasticity import elasticity_of
 from supple.implicit.energies.potential import HessianBlocks
-from supple.implicit.energies.regularization import stabilizer_of
+from supple.implicit.energies.regularization import regularization_of
 from supple.implicit.energies.stitch_damping import StitchViscosity
 from supple.implicit.energies.stitches import StitchEnergy
 from supple.implicit.limits.inversion_guard import refuse_inverted
+from supple.implicit.limits.step_filter import KEEP
+from supple.implicit.newton.direction import Tools
 from supple.implicit.newton.free_motion import FreeMotion
 from supple.implicit.newton.linear_solver import LinearSolver
-from supple.implicit.newton.minimize import Tools
 from supple.implicit.newton.trace import NewtonRow
 from supple.implicit.stepping.integrators import Integrator, Static, integrator_of
 from supple.implicit.stepping.reactions import reaction_forces
 from supple.implicit.stepping.substep import StepSettings, Substep, take_substep
-from supple.implicit.stepping.substepping import Division
+from supple.implicit.stepping.substepping import Substepping
 from supple.implicit.timings import PARTS
 from supple.implicit.workspace import Workspace
 from supple.solver import Solver
@@ -35,8 +36,6 @@ from supple.system import System
 
 logger = logging.getLogger(__name__)
 
-_DYNAMIC_TOLERANCE = 1e-3
-_STATIC_TOLERANCE = 1e-9
 _LINEAR_SOLVERS = ("auto", "pcg", "direct")
 
 
@@ -48,11 +47,19 @@ class Implicit(Solver):
     ----------
     integrator : "backward_euler", "bdf2", "newmark" (trapezoidal), "static", or an `Integrator`.
     tolerance : Newton stops when no vertex's step is longer than this share of the (smallest) body's diagonal, per
-        second of the step; for "static", than this share of the diagonal. None: 1e-3 1/s, or 1e-9.
+        second of the step [1/s]; for "static", than this share of the diagonal [-]. None: 1e-3 1/s or 1e-9, and where
+        there is contact no longer than a tenth of `dhat`, with friction than a hundredth of `friction_velocity`.
+    force_tolerance : where surfaces touch, Newton also goes on until the forces left over are below this share of
+        contact's [-].
     max_iterations : of Newton in one (sub)step.
     linear_solver : "pcg", "direct", or "auto": CG, and a factorization where CG stalls.
     max_substeps : a step that fails is halved until it would take more substeps than this. Steps in which scripts turn
         far are first divided into straight pieces (1024 at most), each of which may take so many. 1: never divided.
+    path_tolerance : how far a script may go off the straight line within a piece, as a share of the (smallest) body's
+        diagonal [-].
+    volume_kept : share of its volume that a tet keeps at least in one Newton iteration, above 0 and below 1 [-].
+    barrier_onset : J = det F below which a barrier against inversion acts on materials that have a finite energy at
+        J = 0, above 0 and at most 1 [-]. Stress and energy are the material's alone above it.
     contact : of bodies with each other, with themselves and with obstacles; None turns it off.
 
     Raises
@@ -64,17 +71,30 @@ class Implicit(Solver):
 
     integrator: str | Integrator = "backward_euler"
     tolerance: float | None = None
+    force_tolerance: float = 1e-4
     max_iterations: int = 120
     linear_solver: str = "auto"
     max_substeps: int = 64
+    path_tolerance: float = 0.05
+    volume_kept: float = KEEP
+    barrier_onset: float = 0.1
     contact: IPCContact | None = field(default_factory=IPCContact)
 
     def __post_init__(self) -> None:
         integrator_of(self.integrator)
-        if self.tolerance is not None and not (
-            isinstance(self.tolerance, (int, float)) and 0.0 < self.tolerance < np.inf
+        for key, limit, wanted in (
+            ("tolerance", np.inf, "a finite number above zero"),
+            ("force_tolerance", 1.0, "a share above 0 and below 1"),
+            ("path_tolerance", np.inf, "a finite number above zero"),
+            ("volume_kept", 1.0, "a share above 0 and below 1"),
+            ("barrier_onset", np.nextafter(1.0, 2.0), "a number above 0 and at most 1"),
         ):
-            raise SolverError(f"Implicit: tolerance is {self.tolerance!r}; give a finite number above zero")
+            value = getattr(self, key)
+            if value is None and key == "tolerance":
+                continue
+            number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
+            if not (number and 0.0 < value < limit):
+                raise SolverError(f"Implicit: {key} is {value!r}; give {wanted}")
         for key in ("max_iterations", "max_substeps"):
             value = getattr(self, key)
             if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
@@ -101,8 +121,8 @@ class Implicit(Solver):
                 elasticity = elasticity_of(system)
         elif system.obstacles:
             raise SolverError(
-                f"{system.obstacles[0].label}: with contact=None obstacles do nothing; give contact=IPCContact(), or take "
-                "them out"
+                f"{system.obstacles[0].label}: with contact=None obstacles have no effect; give contact=IPCContact(), or "
+                "remove them"
             )
         method = integrator_of(self.integrator)
         free_motion = FreeMotion.of(system)
@@ -131,7 +151,7 @@ class Implicit(Solver):
             viscosity,
             tools,
             diagonal,
-            stabilizer_of(elasticity),
+            regularization_of(elasticity),
             stitches,
             damped,
         )
@@ -172,26 +192,35 @@ class Implicit(Solver):
             self.check(system, state, workspace)
         n = len(state.positions)
         state = workspace.with_obstacles(state)
-        division = Division.of(workspace.system, state.time, dt, workspace.diagonal, self.max_substeps)
+        substepping = Substepping.of(
+            workspace.system, state.time, dt, self.path_tolerance * workspace.diagonal, self.max_substeps
+        )
         now = state
-        settings = StepSettings(integrator_of(self.integrator), self.tolerance, self.max_iterations)
+        settings = StepSettings(
+            integrator_of(self.integrator),
+            self.tolerance,
+            self.force_tolerance,
+            self.max_iterations,
+            self.volume_kept,
+            self.barrier_onset,
+        )
         rows: list[NewtonRow] = []
         substeps = 0
         worst, message = Status.CONVERGED, ""
         last: Substep | None = None
-        while not division.over:
-            taken = take_substep(now, division.end, division.length, settings, workspace)
+        while not substepping.over:
+            taken = take_substep(now, substepping.end, substepping.length, settings, workspace)
             rows += [replace(row, substep=substeps) for row in taken.outcome.rows]
             if taken.outcome.status is not Status.CONVERGED:
-                logger.debug("step of %g s: %s", division.length, taken.outcome.status)
-                if division.halve():
+                logger.debug("step of %g s: %s", substepping.length, taken.outcome.status)
+                if substepping.halve():
                     continue
-                worst, message = taken.outcome.status, _limit_message(taken.outcome.message, division)
+                worst, message = taken.outcome.status, _limit_message(taken.outcome.message, substepping)
                 if not worst.can_go_on:
                     break
             now, last = taken.state, taken
             substeps += 1
-            division.advance()
+            substepping.advance()
         now = replace(now, positions=now.positions[:n], velocities=now.velocities[:n])
         workspace.checked = now.positions
         details = ImplicitDetails.of_rows(rows, substeps)
@@ -204,8 +233,9 @@ class Implicit(Solver):
         return now, StepReport(worst, details.newton_iterations, message, nearest, details, contacts)
 
 
-def _limit_message(message: str, division: Division) -> str:
-    """Why a substep failed that may not be divided any more."""
-    if division.halves == 1:
+def _limit_message(message: str, substepping: Substepping) -> str:
+    """Why a substep failed that may not be shorter."""
+    if substepping.halves == 1:
         return message
-    return f"{message}; in a substep of {division.length:.3g} s, which max_substeps lets be no shorter"
+    return f"{message}; in a substep of {substepping.length:.3g} s, the shortest that max_substeps allows"
+

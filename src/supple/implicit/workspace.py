@@ -1,4 +1,4 @@
-"""What `Implicit.prepare` computes once for a system."""
+"""The data that `Implicit.prepare` computes once for a system."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 from supple.implicit.contact.model import ContactModel
 from supple.implicit.energies.damping import Viscosity
 from supple.implicit.energies.elasticity import Elasticity
-from supple.implicit.energies.regularization import Stabilizer
+from supple.implicit.energies.regularization import Regularization
 from supple.implicit.energies.stitch_damping import StitchViscosity
 from supple.implicit.energies.stitches import StitchEnergy
-from supple.implicit.newton.minimize import Tools
+from supple.implicit.newton.direction import Tools
 from supple.state import State
 from supple.system import System
 
 
 @dataclass(eq=False)
 class Workspace:
-    """What `Implicit.prepare` computes once.
+    """The data that `Implicit.prepare` computes once.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Workspace:
     viscosity: Viscosity | None
     tools: Tools
     diagonal: float
-    stabilizer: Stabilizer
+    regularization: Regularization
     stitches: StitchEnergy | None
     stitch_viscosity: StitchViscosity | None
     checked: NDArray[np.float64] | None = None

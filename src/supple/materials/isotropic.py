@@ -37,13 +37,14 @@ density = dispatch("density", [energy.density for energy in STRETCH_ENERGIES], U
 gradient = dispatch("gradient", [energy.gradient for energy in STRETCH_ENERGIES], UNKNOWN_THREE)
 curvature = dispatch("curvature", [energy.curvature for energy in STRETCH_ENERGIES], UNKNOWN_SIX)
 quotients = dispatch("quotients", [energy.quotients for energy in STRETCH_ENERGIES], UNKNOWN_SIX)
+_OF_STRETCHES = np.array([energy.density_of_stretches for energy in STRETCH_ENERGIES])
 
 
 @njit(error_model="numpy")
 def energy_density(F, kind, mu, lam):
     """psi of one F."""
-    _, s, _ = decompose(F)
-    return density(kind, s, mu, lam)
+    s = decompose(F)[1] if _OF_STRETCHES[kind] else (0.0, 0.0, 0.0)
+    return density(kind, F, s, mu, lam)
 
 
 @njit(error_model="numpy")
@@ -131,6 +132,15 @@ def hessian_block(U, A, alpha, beta, g, h):
     return mat_mul_transposed(mat_mul(U, K), U)
 
 
+@njit(cache=True, error_model="numpy")
+def _rest_moduli(kind, mu, lam, rest_mu, rest_lam):
+    for e in range(len(kind)):
+        # psi_ii = lam_L + 2 mu_L, psi_ij = lam_L at s = (1, 1, 1)
+        A = curvature(kind[e], (1.0, 1.0, 1.0), mu[e], lam[e])
+        rest_mu[e] = 0.5 * (A[0] - A[3])
+        rest_lam[e] = A[3]
+
+
 @njit(parallel=True, cache=True, error_model="numpy")
 def _densities(F, kind, mu, lam, out):
     for e in prange(len(F)):
@@ -156,6 +166,13 @@ def _hessians(F, kind, mu, lam, project, out):
                     for n in range(3):
                         out[e, 3 * i + j, 3 * n + k] = K[3 * i + n]
                         out[e, 3 * n + k, 3 * i + j] = K[3 * i + n]
+
+
+def rest_lame_parameters(material: TetMaterial) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """mu_L and lam_L (m,) of every tet's own linearization at rest [Pa]."""
+    mu, lam = np.empty_like(material.mu), np.empty_like(material.lam)
+    _rest_moduli(material.kind, material.mu, material.lam, mu, lam)
+    return mu, lam
 
 
 def _flat(F: ArrayLike) -> tuple[NDArray[np.float64], tuple[int, ...]]:

@@ -148,15 +148,6 @@ class Elastic(Material):
         """
         return batch_energy_densities(F, self.per_tet)
 
-    def total_energy(self, F: NDArray[np.float64], J: NDArray[np.float64], volumes: NDArray[np.float64]) -> float:
-        """Strain energy of all tets of a body, zero at rest [J].
-
-        Parameters
-        ----------
-        F : (m, 3, 3) deformation gradients; J : (m,) their determinants; volumes : (m,) at rest [m^3]
-        """
-        return float(self.energy_density(F) @ volumes)
-
     def first_piola(self, F: ArrayLike) -> NDArray[np.float64]:
         """First Piola-Kirchhoff stress P = d psi / d F.
 

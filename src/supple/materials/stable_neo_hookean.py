@@ -25,10 +25,3 @@ class StableNeoHookean(Elastic):
     def lame_parameters(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         mu, lam = lame_from_engineering(self.youngs, self.poisson)
         return mu, lam + mu
-
-    def total_energy(self, F: NDArray[np.float64], J: NDArray[np.float64], volumes: NDArray[np.float64]) -> float:
-        """Strain energy of all tets of a body, zero at rest [J], from invariants: no decomposition needed."""
-        mu, lam = self.lame_parameters()
-        change = J - 1.0
-        shape = 0.5 * (np.einsum("tij,tij->t", F, F) - 3.0) - change
-        return float((mu * shape + 0.5 * lam * change * change) @ volumes)

@@ -6,7 +6,9 @@ contracted with the shape gradients, block by block (formulas per F: `isotropic.
 
 from __future__ import annotations
 
-from supple.materials.isotropic import density, energy_density, first_piola, hessian_block, principal_hessian, stress
+import numpy as np
+
+from supple.materials.isotropic import density, energy_density, hessian_block, principal_hessian, stress
 from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed, transpose
 from supple.numerics.svd3 import svd3 as decompose
@@ -115,8 +117,8 @@ def _put_hessian(U, s, V, B, volume, kind, mu, lam, project, out, e):
 
 @njit(parallel=True, cache=True, error_model="numpy")
 def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, energies, gradients, hessians):
-    """Energies (m,), gradients (m, 4, 3) and, with `second`, Hessians (m, 12, 12) of all tets at once: one
-    decomposition of each F serves all three.
+    """Energies (m,), gradients (m, 4, 3) and, with `second`, Hessians (m, 12, 12) of all tets from one decomposition
+    of each F.
 
     Parameters
     ----------
@@ -125,9 +127,10 @@ def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, ene
     project : see `element_hessians`
     """
     for e in prange(len(tets)):
-        U, s, V = decompose(deformation_gradient(x, tets, Dm_inv, e))
+        F = deformation_gradient(x, tets, Dm_inv, e)
+        U, s, V = decompose(F)
         B = load_mat(Dm_inv, e)
-        energies[e] = volumes[e] * density(kind[e], s, mu[e], lam[e])
+        energies[e] = volumes[e] * density(kind[e], F, s, mu[e], lam[e])
         put_gradient(stress(U, s, V, kind[e], mu[e], lam[e]), B, volumes[e], gradients, e)
         if second:
             _put_hessian(U, s, V, B, volumes[e], kind[e], mu[e], lam[e], project, hessians, e)
@@ -147,24 +150,20 @@ def element_energies(x, tets, Dm_inv, volumes, kind, mu, lam, out):
         out[e] = volumes[e] * energy_density(F, kind[e], mu[e], lam[e])
 
 
-@njit(parallel=True, cache=True, error_model="numpy")
-def element_gradients(x, tets, Dm_inv, volumes, kind, mu, lam, out):
+def element_gradients(x, tets, Dm_inv, volumes, kind, mu, lam, out) -> None:
     """Gradient of every tet's energy by its four nodes [N] (minus the elastic forces), into out (m, 4, 3).
 
     Parameters as of `element_energies`.
     """
-    for e in prange(len(tets)):
-        P = first_piola(deformation_gradient(x, tets, Dm_inv, e), kind[e], mu[e], lam[e])
-        put_gradient(P, load_mat(Dm_inv, e), volumes[e], out, e)
+    tet = x, tets, Dm_inv, volumes, kind, mu, lam
+    element_models(*tet, False, False, np.empty(len(tets)), out, np.empty((0, 12, 12)))
 
 
-@njit(parallel=True, cache=True, error_model="numpy")
-def element_hessians(x, tets, Dm_inv, volumes, kind, mu, lam, project, out):
+def element_hessians(x, tets, Dm_inv, volumes, kind, mu, lam, project, out) -> None:
     """Hessian of every tet's energy [N/m] into out (m, 12, 12): entry (3 p + i, 3 q + k) for coordinate i of node p and
     coordinate k of node q. With `project`, of the nearest convex energy: eigenvalues of d^2 psi / dF^2 are clamped.
 
     Other parameters as of `element_energies`.
     """
-    for e in prange(len(tets)):
-        U, s, V = decompose(deformation_gradient(x, tets, Dm_inv, e))
-        _put_hessian(U, s, V, load_mat(Dm_inv, e), volumes[e], kind[e], mu[e], lam[e], project, out, e)
+    tet = x, tets, Dm_inv, volumes, kind, mu, lam
+    element_models(*tet, True, project, np.empty(len(tets)), np.empty((len(tets), 4, 3)), out)

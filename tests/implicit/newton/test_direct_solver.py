@@ -41,3 +41,25 @@ def test_pardiso_answers_as_superlu_on_one_system(monkeypatch: pytest.MonkeyPatc
     solved = direct_solver.solve_directly(pattern, np.ascontiguousarray(data), b)
     assert solved is not None
     np.testing.assert_allclose(dense @ solved.ravel(), b.ravel(), atol=1e-10)
+
+
+@pytest.mark.parametrize("factorization", ["pardiso", "superlu"])
+@pytest.mark.parametrize(("integrator", "dt"), [("backward_euler", 0.25), ("static", 1.0)])
+def test_a_bar_that_buckles_converges_with_a_factorization(factorization, integrator, dt, monkeypatch) -> None:
+    """Pressed to 40 % of its length, the straight bar is a saddle: its true Hessian has negative eigenvalues."""
+    if factorization == "pardiso":
+        pytest.importorskip("pypardiso")
+    else:
+        monkeypatch.setattr(direct_solver, "_pardiso", lambda: None)
+    mesh = sp.shapes.box((1, 0.25, 0.25), (8, 2, 2))
+    x = mesh.vertices[:, 0]
+    press = sp.Keyframes(times=[0, 4 * dt], displacements=[[0, 0, 0], [-0.6, 0, 0]])
+    body = sp.Body("bar", mesh, sp.StableNeoHookean(youngs=1e5, poisson=0.45))
+    ends = [sp.Pin("bar", np.flatnonzero(x == x.min())), sp.Pin("bar", np.flatnonzero(x == x.max()), press)]
+    scene = sp.Scene([body], pins=ends, gravity=(0, -0.1, 0))
+    solver = sp.Implicit(contact=None, linear_solver="direct", max_substeps=1, integrator=integrator)
+    frames = list(sp.simulate(scene, solver, dt, 4))
+    assert [frame.report.status for frame in frames] == ["converged"] * 4
+    middle = np.abs(x) < 1e-12
+    sideways = frames[-1].positions["bar"][middle].mean(axis=0)[1:]
+    assert np.linalg.norm(sideways) > 0.1, "it has left the saddle"

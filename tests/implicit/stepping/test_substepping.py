@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.implicit.stepping.substepping import Division
+from supple.implicit.stepping.substepping import Substepping
 from supple.system import build_system, initial_state
 
 
@@ -22,13 +22,13 @@ def turning_bar(turns: float, side: float = 0.1) -> sp.Scene:
     )
 
 
-def division(turns: float, side: float = 0.1, max_substeps: int = 4, dt: float = 1.0) -> Division:
+def substepping(turns: float, side: float = 0.1, max_substeps: int = 4, dt: float = 1.0) -> Substepping:
     scene = turning_bar(turns, side)
-    return Division.of(build_system(scene, initial_state(scene)), 0.0, dt, 1.0, max_substeps)
+    return Substepping.of(build_system(scene, initial_state(scene)), 0.0, dt, 0.05, max_substeps)
 
 
 def test_a_step_without_turns_is_one_piece():
-    whole = division(0.2)
+    whole = substepping(0.2)
     assert (whole.length, whole.end) == (1.0, 1.0)
     whole.advance()
     assert whole.over
@@ -37,7 +37,7 @@ def test_a_step_without_turns_is_one_piece():
 @pytest.mark.parametrize("side", [0.1, 1e-4])
 def test_turns_are_followed_whatever_the_thickness(side: float):
     pieces = []
-    step = division(4.0, side)
+    step = substepping(4.0, side)
     while not step.over:
         pieces.append(step.length)
         step.advance()
@@ -46,7 +46,7 @@ def test_turns_are_followed_whatever_the_thickness(side: float):
 
 
 def test_each_piece_may_be_halved_as_often():
-    step = division(4.0, max_substeps=4)
+    step = substepping(4.0, max_substeps=4)
     piece = step.length
     assert step.halve()
     assert step.halve()
@@ -67,7 +67,7 @@ def test_a_script_that_jumps_is_followed_all_the_same():
         [sp.Body("cube", mesh, sp.NeoHookean(youngs=1e5, poisson=0.4))],
         pins=[sp.Pin("cube", [0], lambda t: (0.0, 3.0 * (t > 0.3), 0.0))],
     )
-    step = Division.of(build_system(scene, initial_state(scene)), 0.0, 1.0, 1.0, 64)
+    step = Substepping.of(build_system(scene, initial_state(scene)), 0.0, 1.0, 0.05, 64)
     count = 0
     while not step.over:
         count += 1

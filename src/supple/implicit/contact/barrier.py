@@ -16,18 +16,16 @@ from numpy.typing import NDArray
 
 from supple.contact.collision_mesh.collisions import Collisions
 from supple.errors import SolverError
-from supple.implicit.energies.potential import HessianBlocks, Potential
+from supple.implicit.energies.potential import ContactPotential, HessianBlocks
 
 
-class Barrier(Potential):
+class Barrier(ContactPotential):
     """Between triangles of bodies and obstacles.
 
     Parameters
     ----------
     stiffness : kappa [Pa]
     """
-
-    label = "contact"
 
     def __init__(self, collisions: Collisions, stiffness: float) -> None:
         import ipctk

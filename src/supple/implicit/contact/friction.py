@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.implicit.contact.barrier import Barrier
-from supple.implicit.energies.potential import HessianBlocks, Potential
+from supple.implicit.energies.potential import ContactPotential, HessianBlocks
 
 
-class Friction(Potential):
+class Friction(ContactPotential):
     """Of the contacts that a barrier has at one state.
 
     Parameters
@@ -26,8 +26,6 @@ class Friction(Potential):
     coefficients : (p, p) between owners of the surface
     slow : eps_v [m/s]
     """
-
-    label = "contact"
 
     def __init__(
         self,

@@ -14,7 +14,7 @@ from scipy.sparse import bsr_matrix
 
 from supple.contact.collision_mesh.contact_surface import ContactSurface
 from supple.contact.obstacle_vertices import ObstacleRange
-from supple.implicit.energies.potential import HessianBlocks, Potential
+from supple.implicit.energies.potential import ContactPotential, HessianBlocks
 
 # A step leaves at least this share of every distance: conservative, as the bound for triangles is.
 _KEEP = 0.1
@@ -123,12 +123,11 @@ def barrier_terms(
 
 
 @dataclass(frozen=True, eq=False)
-class PlaneBarrier(Potential):
+class PlaneBarrier(ContactPotential):
     """The barrier between vertices and half-spaces; stiffness : kappa [Pa]."""
 
     planes: Planes
     stiffness: float
-    label = "contact"
 
     def value(self, x: NDArray[np.float64]) -> float:
         d, _ = self.planes.distances(x)
@@ -176,7 +175,7 @@ class PlaneBarrier(Potential):
 
 
 @dataclass(frozen=True, eq=False)
-class PlaneFriction(Potential):
+class PlaneFriction(ContactPotential):
     """Lagged friction between vertices and half-spaces (see `friction`).
 
     Attributes
@@ -193,7 +192,6 @@ class PlaneFriction(Potential):
     normals: NDArray[np.float64]
     start: NDArray[np.float64]
     reach: float
-    label = "contact"
 
     def value(self, x: NDArray[np.float64]) -> float:
         _, y = self._slip(x)

@@ -7,7 +7,7 @@ With the Green strain E(F) = (F^T F - I)/2 and a rate E' = c (E(F) - E^), the di
 whose gradient by x is the force of the viscous stress tau C : E'. For backward Euler c = 1/h and E^ is the strain at
 the start of the step; other integrators choose c and E^ as they choose the velocity. The strain does not change in a
 rigid motion of any size, so that a spinning body keeps spinning. (The quadratic form of the lagged stiffness matrix,
-which is often used, sees the chord of a rotation as a compression, and brakes it.)
+which is often used, takes the chord of a rotation for a compression, and damps the rotation.)
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.implicit.energies.elasticity import SERIAL_TETS, Elasticity, gather_gradients
-from supple.implicit.energies.potential import HessianBlocks, Potential
-from supple.materials.lame import lame_from_engineering
-from supple.materials.material import Elastic
+from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
+from supple.materials.isotropic import rest_lame_parameters
+from supple.materials.stretches import green_strain
 from supple.materials.tet_energies import deformation_gradient, edge_matrix, put_gradient
 from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed, transpose
@@ -43,7 +43,7 @@ class Viscosity:
 
     Attributes
     ----------
-    mu, lam : (m,) tau times the Lamé parameters of small strains [Pa s]
+    mu, lam : (m,) tau times the Lamé parameters of the material's linearization at rest [Pa s]
     """
 
     elasticity: Elasticity
@@ -60,7 +60,7 @@ class Viscosity:
 
 
 class Strained(Protocol):
-    """Something whose strain is damped; strains are arrays of any shape."""
+    """An element type whose strain is damped; strains are arrays of any shape."""
 
     def strains(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """At positions x (n, 3) [m]."""
@@ -76,11 +76,7 @@ def viscosity_of(elasticity: Elasticity) -> Viscosity | None:
     tau = elasticity.material.damping
     if not tau.any():
         return None
-    mu, lam = np.empty_like(tau), np.empty_like(tau)
-    for part in elasticity.system.bodies:
-        material = part.body.material
-        assert isinstance(material, Elastic)
-        mu[part.tets], lam[part.tets] = lame_from_engineering(material.youngs, material.poisson)
+    mu, lam = rest_lame_parameters(elasticity.material)
     return Viscosity(elasticity, tau * mu, tau * lam)
 
 
@@ -105,6 +101,7 @@ class Damping(Potential):
     viscosity: Viscosity
     rate: StrainRate
     label = "elasticity"
+    projection = Projection.RELEASED_FIRST
 
     def value(self, x: NDArray[np.float64]) -> float:
         s = self.viscosity.elasticity.system
@@ -138,15 +135,9 @@ def _symmetric_part(M):
 
 
 @njit(cache=True, error_model="numpy")
-def _strain(F):
-    C = mat_mul(transpose(F), F)
-    return (0.5 * (C[0] - 1.0), 0.5 * (C[4] - 1.0), 0.5 * (C[8] - 1.0), 0.5 * C[5], 0.5 * C[2], 0.5 * C[1])
-
-
-@njit(cache=True, error_model="numpy")
 def _stress(F, reference, e, factor, mu, lam):
     """The viscous second Piola-Kirchhoff stress of tet e, and its strain rate times that, halved and divided by c."""
-    E = _strain(F)
+    E = green_strain(F)
     r0 = factor * (E[0] - reference[e, 0])
     r1 = factor * (E[1] - reference[e, 1])
     r2 = factor * (E[2] - reference[e, 2])
@@ -173,7 +164,7 @@ def _strains(x, v, tets, Dm_inv, rates, out):
         if rates:
             E = _symmetric_part(mat_mul(transpose(F), mat_mul(edge_matrix(v, tets, e), B)))
         else:
-            E = _strain(F)
+            E = green_strain(F)
         for k in range(6):
             out[e, k] = E[k]
 

@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SolverError
-from supple.implicit.energies.potential import HessianBlocks, Potential
+from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
 from supple.materials.material import Elastic
 from supple.materials.per_tet import TetMaterial
-from supple.materials.tet_energies import element_energies, element_gradients, element_hessians, element_models
+from supple.materials.tet_energies import element_energies, element_models
 from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.sparse.block_csr import incidences
 from supple.numerics.threads import threads_for
 from supple.system import System
 
-# Fewer tets than this are worked on by one thread.
+# Fewer tets than this are processed by one thread: a pass of 1 ms is too short to share.
 SERIAL_TETS = 2_000
 
 
@@ -36,6 +36,7 @@ class Elasticity(Potential):
     start: NDArray[np.int32]
     incidence: NDArray[np.int32]
     label = "elasticity"
+    projection = Projection.RELEASED_FIRST
 
     def value(self, x: NDArray[np.float64]) -> float:
         s = self.system
@@ -45,17 +46,10 @@ class Elasticity(Potential):
         return float(energies.sum())
 
     def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-        s = self.system
-        gradients = np.empty((len(s.tets), 4, 3))
-        with threads_for(len(s.tets), SERIAL_TETS):
-            element_gradients(x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters(), gradients)
-            gather_gradients(self.start, self.incidence, gradients, out)
+        self.add_model(x, out, None, project=False)
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
-        """The Hessian; *overwrites* the tets' matrices in `out`, so that they need no clearing."""
-        s = self.system
-        with threads_for(len(s.tets), SERIAL_TETS):
-            element_hessians(x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters(), project, out.tets)
+        self.add_model(x, np.zeros_like(x), out, project)
 
     def add_model(
         self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
@@ -63,19 +57,12 @@ class Elasticity(Potential):
         s = self.system
         energies = np.empty(len(s.tets))
         gradients = np.empty((len(s.tets), 4, 3))
+        tets = x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters()
         with threads_for(len(s.tets), SERIAL_TETS):
-            element_models(
-                x,
-                s.tets,
-                s.rest_shape_inverse,
-                s.rest_volumes,
-                *self._parameters(),
-                hessian is not None,
-                project,
-                energies,
-                gradients,
-                _NOTHING if hessian is None else hessian.tets,
-            )
+            if hessian is None:
+                element_models(*tets, False, project, energies, gradients, _NO_HESSIANS)
+            else:
+                hessian.add_tets(lambda blocks: element_models(*tets, True, project, energies, gradients, blocks))
             gather_gradients(self.start, self.incidence, gradients, gradient)
         return float(energies.sum())
 
@@ -83,7 +70,7 @@ class Elasticity(Potential):
         return self.material.kind, self.material.mu, self.material.lam
 
 
-_NOTHING = np.zeros((0, 12, 12))
+_NO_HESSIANS = np.zeros((0, 12, 12))
 
 
 def elasticity_of(system: System) -> Elasticity:

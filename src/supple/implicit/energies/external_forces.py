@@ -1,4 +1,4 @@
-"""Dead loads on vertices as a potential: -f . x."""
+"""Dead loads on vertices, gravity among them, as a potential: -f . x."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.energies.potential import HessianBlocks, Potential
+from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
 from supple.system import System
 
 
@@ -22,6 +22,7 @@ class ExternalForces(Potential):
 
     forces: NDArray[np.float64]
     origin: NDArray[np.float64]
+    projection = Projection.UNNEEDED
 
     def value(self, x: NDArray[np.float64]) -> float:
         return -float(np.einsum("ij,ij->", self.forces, x - self.origin))
@@ -34,8 +35,8 @@ class ExternalForces(Potential):
 
 
 def total_forces(system: System, time: float) -> NDArray[np.float64]:
-    """(n, 3) sum of the scene's forces on each vertex at `time` [N]."""
-    total = np.zeros_like(system.rest_positions)
+    """(n, 3) weight and sum of the scene's forces on each vertex at `time` [N]."""
+    total = system.masses[:, None] * system.gravity
     for part in system.forces:
         total[part.vertices] += part.per_vertex(time)
     return total

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.energies.potential import HessianBlocks, Potential
+from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
 
 
 @dataclass(frozen=True, eq=False)
 class Inertia(Potential):
-    """Pulls every vertex to where it would be without forces.
+    """The energy whose minimum is the predicted state, which every vertex would reach without forces.
 
     Parameters
     ----------
@@ -26,6 +26,7 @@ class Inertia(Potential):
     masses: NDArray[np.float64]
     predicted: NDArray[np.float64]
     scale: float
+    projection = Projection.UNNEEDED
 
     def value(self, x: NDArray[np.float64]) -> float:
         d = x - self.predicted

@@ -1,37 +1,61 @@
-"""What an energy must answer to be part of the objective."""
+"""What an energy must provide to be a term of the objective."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from enum import Enum
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_matrix
 
 
-@dataclass(frozen=True, eq=False)
+class Projection(Enum):
+    """When a term's Hessian is projected to be positive semi-definite; every term declares it."""
+
+    UNNEEDED = 0  # it is positive semi-definite everywhere
+    RELEASED_FIRST = 1  # projected while Newton's method is far from the minimum
+    RELEASED_LAST = 2  # projected until all other terms' true Hessians have not been enough
+
+
+@dataclass(eq=False)
 class HessianBlocks:
     """A sum of Hessians, not yet assembled.
 
     Attributes
     ----------
-    elements : (m + k, 12, 12) one matrix for each tet, then one for each stitch, coordinate i of node p in row 3 p + i
-        [N/m]
+    memory : (m + k, 12, 12) of `elements`
     vertices : (n, 3, 3) one matrix for each vertex with itself [N/m]
     tet_count : m
-    couplings : (3 n, 3 n) matrices between vertices that no tet joins, in blocks of 3 x 3 [N/m]
+    couplings : (3 n, 3 n) matrices between vertices that no element joins, in blocks of 3 x 3 [N/m]
+    blank : whether nothing has been added to `elements`, whatever the memory holds
     """
 
-    elements: NDArray[np.float64]
+    memory: NDArray[np.float64]
     vertices: NDArray[np.float64]
     tet_count: int
     couplings: list[bsr_matrix] = field(default_factory=list)
+    blank: bool = False
 
     def clear(self) -> None:
-        """Empty all but the tets' matrices, which elasticity overwrites."""
+        """Start a new sum."""
         self.vertices[:] = 0.0
         self.couplings.clear()
+        self.blank = True
+
+    @property
+    def elements(self) -> NDArray[np.float64]:
+        """(m + k, 12, 12) one matrix for each tet, then one for each stitch, to which terms add [N/m].
+
+        Coordinate i of node p is row 3 p + i.
+        """
+        if self.blank:
+            self.memory[:] = 0.0
+            self.blank = False
+        return self.memory
 
     @property
     def tets(self) -> NDArray[np.float64]:
@@ -43,18 +67,34 @@ class HessianBlocks:
         """(k, 12, 12) the stitches' part of `elements`."""
         return self.elements[self.tet_count :]
 
+    def add_tets(self, write: Callable[[NDArray[np.float64]], None]) -> None:
+        """Add the matrices (m, 12, 12) that `write` fills in completely; the first ones need no cleared memory."""
+        tets = self.memory[: self.tet_count]
+        if self.blank:
+            self.memory[self.tet_count :] = 0.0
+            self.blank = False
+            write(tets)
+        else:
+            more = np.empty_like(tets)
+            write(more)
+            tets += more
+
     @classmethod
     def zeros(cls, n_tets: int, n_vertices: int, n_stitches: int = 0) -> HessianBlocks:
-        return cls(np.zeros((n_tets + n_stitches, 12, 12)), np.zeros((n_vertices, 3, 3)), n_tets)
+        return cls(np.zeros((n_tets + n_stitches, 12, 12)), np.zeros((n_vertices, 3, 3)), n_tets, blank=True)
 
 
 class Potential(ABC):
     """An energy of the positions x (n, 3) of all vertices, pinned ones included.
 
-    `label` says under which name the time that it takes is counted.
+    Attributes
+    ----------
+    label : the name under which the time that it takes is counted
+    projection : when its Hessian is projected
     """
 
-    label = "other"
+    label: ClassVar[str] = "other"
+    projection: ClassVar[Projection]
 
     @abstractmethod
     def value(self, x: NDArray[np.float64]) -> float:
@@ -71,7 +111,7 @@ class Potential(ABC):
     def add_model(
         self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
     ) -> float:
-        """The energy; its gradient and, where asked for, its Hessian added to what is given.
+        """The energy; its gradient and, where it is given, its Hessian are added to the arguments.
 
         The same as the three methods above, for potentials that save work by doing all at once.
         """
@@ -79,3 +119,10 @@ class Potential(ABC):
         if hessian is not None:
             self.add_hessian(x, hessian, project)
         return self.value(x)
+
+
+class ContactPotential(Potential):
+    """A term of contact: so stiff that the length of a Newton step says little about the forces left over."""
+
+    label = "contact"
+    projection = Projection.RELEASED_LAST

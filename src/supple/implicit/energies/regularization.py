@@ -1,6 +1,7 @@
-"""A hair of stiffness in the Hessian of a static problem, none in its energy: where it ends does not change.
+"""Regularization of a static problem: a little stiffness in the Hessian, none in the energy.
 
-Without inertia, a body that hangs on one vertex can turn at no cost, and its Hessian is singular.
+Without inertia, a body that hangs on one vertex can turn at no cost, and its Hessian is singular. The stiffness changes
+the directions of Newton's method, not the minimum.
 """
 
 from __future__ import annotations
@@ -11,17 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.implicit.energies.elasticity import Elasticity
-from supple.implicit.energies.potential import HessianBlocks, Potential
+from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
 
-# Relative to the vertex's own elastic stiffness: far below what can slow Newton's method down.
+# Relative to the vertex's own elastic stiffness: far above its round-off (1e-16), and far below what slows Newton's
+# method down.
 _SHARE = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
-class Stabilizer(Potential):
-    """No energy, no force; stiffness : (n,) [N/m] on the diagonal of the convex model."""
+class Regularization(Potential):
+    """No energy, no force; stiffness : (n,) [N/m] on the diagonal of the projected Hessian."""
 
     stiffness: NDArray[np.float64]
+    projection = Projection.RELEASED_FIRST
 
     def value(self, x: NDArray[np.float64]) -> float:
         return 0.0
@@ -35,10 +38,10 @@ class Stabilizer(Potential):
                 out.vertices[:, k, k] += self.stiffness
 
 
-def stabilizer_of(elasticity: Elasticity) -> Stabilizer:
+def regularization_of(elasticity: Elasticity) -> Regularization:
     """In proportion to mu V |g|^2, summed over a vertex's tets, with shape gradients g."""
     system = elasticity.system
     squares = np.einsum("eij,eij->e", system.rest_shape_inverse, system.rest_shape_inverse)
     share = _SHARE * elasticity.material.mu * system.rest_volumes * squares
     stiffness = np.bincount(system.tets.ravel(), weights=np.repeat(share, 4), minlength=len(system.rest_positions))
-    return Stabilizer(stiffness.astype(np.float64))
+    return Regularization(stiffness.astype(np.float64))

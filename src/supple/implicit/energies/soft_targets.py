@@ -1,4 +1,4 @@
-"""Springs from vertices to places: k/2 |x - target|^2."""
+"""Springs from vertices to target positions: k/2 |x - target|^2."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.energies.potential import HessianBlocks, Potential
+from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
 from supple.system import System
 
 
@@ -23,6 +23,7 @@ class SoftTargets(Potential):
     vertices: NDArray[np.int32]
     stiffness: NDArray[np.float64]
     targets: NDArray[np.float64]
+    projection = Projection.UNNEEDED
 
     def value(self, x: NDArray[np.float64]) -> float:
         d = x[self.vertices] - self.targets
@@ -36,7 +37,7 @@ class SoftTargets(Potential):
 
 
 def soft_targets_at(system: System, time: float) -> SoftTargets:
-    """The scene's soft targets as they pull at `time`."""
+    """The scene's soft targets with their positions at `time` [s]."""
     parts = system.soft_targets
     return SoftTargets(
         np.concatenate([part.vertices for part in parts]),

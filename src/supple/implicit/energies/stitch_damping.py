@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from supple.implicit.energies.damping import Damping, StrainRate, Viscosity, green_strain_rates, green_strains
 from supple.implicit.energies.elasticity import Elasticity
-from supple.implicit.energies.potential import HessianBlocks, Potential
+from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
 from supple.implicit.energies.stitch_springs import spring_energies, spring_gradients, spring_hessians
 from supple.numerics.sparse.block_csr import incidences
 from supple.scene.stitches.elements import Springs
@@ -71,6 +71,7 @@ class StitchDamping(Potential):
 
     tets: Damping
     springs: Springs
+    projection = Projection.RELEASED_FIRST
 
     @classmethod
     def of(cls, viscosity: StitchViscosity, rate: StrainRate) -> StitchDamping:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.implicit.energies.elasticity import SERIAL_TETS, gather_gradients
-from supple.implicit.energies.potential import HessianBlocks, Potential
+from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
 from supple.implicit.energies.stitch_springs import spring_energies, spring_gradients, spring_hessians
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.materials.tet_energies import element_energies, element_gradients, element_hessians
@@ -32,6 +32,7 @@ class StitchEnergy(Potential):
     stitching: Stitching
     anchors: NDArray[np.float64]
     gathering: tuple[NDArray[np.int32], NDArray[np.int32]] = field(repr=False)
+    projection = Projection.RELEASED_FIRST
 
     @classmethod
     def of(cls, stitching: Stitching, time: float) -> StitchEnergy:
@@ -63,11 +64,12 @@ class StitchEnergy(Potential):
             gather_gradients(*self.gathering, gradients, out)
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
-        """The Hessian; *overwrites* the stitches' matrices in `out`, so that they need no clearing."""
         points, count = self._points(x), len(self.stitching.tets)
+        blocks = np.empty((len(self.stitching), 12, 12))
         with threads_for(count, SERIAL_TETS):
-            element_hessians(points, *self._tets, project, out.stitches[:count])
-        spring_hessians(self.stitching.springs, points, project, out.stitches[count:])
+            element_hessians(points, *self._tets, project, blocks[:count])
+        spring_hessians(self.stitching.springs, points, project, blocks[count:])
+        out.stitches[:] += blocks
 
     def _points(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.concatenate([x[: self.stitching.body_vertices], self.anchors]) if len(self.anchors) else x

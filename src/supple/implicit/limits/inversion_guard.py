@@ -1,4 +1,4 @@
-"""Keeps tetrahedra from inverting: which bodies are guarded, how far a step may go, and the check after it."""
+"""Prevents the inversion of tets: which bodies are guarded, how far a step may go, and the check after it."""
 
 from __future__ import annotations
 
@@ -9,41 +9,42 @@ from numpy.typing import NDArray
 
 from supple.errors import SolverError
 from supple.implicit.energies.elasticity import SERIAL_TETS
-from supple.implicit.limits.step_filter import KEEP, min_det, noninverting_step
+from supple.implicit.limits.step_filter import KEEP, min_det, noninverting_step, volume_signs
 from supple.materials.kinds import needs_positive_volume
 from supple.materials.per_tet import TetMaterial
-from supple.numerics.kernel_cache import njit
 from supple.numerics.threads import threads_for
 from supple.system import System
 
 
 @dataclass(eq=False)
-class Guard:
-    """The step filter on all tets of every body that has no inverted one; others are free to recover first.
+class InversionGuard:
+    """The step filter on all tets of every body that has no inverted one. Other bodies may recover first.
 
-    A body is guarded as a whole: guarding only its positive tets would lock it, since on the way back from a tangle
-    some of them have to pass through zero.
+    A body is guarded as a whole. A guard on its positive tets alone would lock it: to untangle, some of them have to
+    pass through zero volume.
 
     Attributes
     ----------
-    guarded : (m,) bool; complete : whether that is all of them
+    guarded : (m,) bool; keep : share of its volume that a tet keeps at least in one step, in (0, 1)
+    complete : whether all tets are guarded
     """
 
     system: System
     guarded: NDArray[np.bool_]
+    keep: float = KEEP
     complete: bool = False
 
     @classmethod
-    def at(cls, system: System, x: NDArray[np.float64]) -> Guard:
+    def at(cls, system: System, x: NDArray[np.float64], keep: float = KEEP) -> InversionGuard:
         """Guard the bodies that have no flat or inverted tet at x."""
-        guard = cls(system, np.zeros(len(system.tets), dtype=np.bool_))
+        guard = cls(system, np.zeros(len(system.tets), dtype=np.bool_), keep)
         guard.widen(x)
         return guard
 
     def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, int]:
-        """How far along `direction`, at most 1, and the tet that allows no more (-1 where nothing limits)."""
+        """The largest step along `direction`, at most 1, and the tet that limits it (-1 where none does)."""
         with threads_for(len(self.system.tets), SERIAL_TETS):
-            step, tet = noninverting_step(x, direction, self.system.tets, self.guarded, KEEP)
+            step, tet = noninverting_step(x, direction, self.system.tets, self.guarded, self.keep)
         return float(step), int(tet)
 
     def allows(self, x: NDArray[np.float64]) -> bool:
@@ -53,10 +54,10 @@ class Guard:
         return bool(smallest > 0.0)
 
     def widen(self, x: NDArray[np.float64]) -> None:
-        """Guard from now on the bodies that have no flat or inverted tet at x, too."""
+        """From now on, also guard the bodies that have no flat or inverted tet at x."""
         if self.complete:
             return
-        positive = _positive(x, self.system.tets, self.system.rest_shape_inverse)
+        positive = volume_signs(x, self.system.tets) > 0.0
         for part in self.system.bodies:
             if positive[part.tets].all():
                 self.guarded[part.tets] = True
@@ -64,13 +65,13 @@ class Guard:
 
 
 def refuse_inverted(system: System, material: TetMaterial, x: NDArray[np.float64]) -> None:
-    """Raise where a tet whose material has no energy at J <= 0 is flat or inverted at x.
+    """Check that no tet whose material has no energy at J <= 0 is flat or inverted at x.
 
     Raises
     ------
-    SolverError : names the body and its tets.
+    SolverError : where one is; the text names the body and its tets.
     """
-    bad = needs_positive_volume(material.kind) & ~_positive(x, system.tets, system.rest_shape_inverse)
+    bad = needs_positive_volume(material.kind) & ~(volume_signs(x, system.tets) > 0.0)
     if not bad.any():
         return
     for part in system.bodies:
@@ -82,16 +83,3 @@ def refuse_inverted(system: System, material: TetMaterial, x: NDArray[np.float64
                 f"the start (tets {names}), where {type(part.body.material).__name__} has no finite energy; start "
                 "un-inverted, or use StableNeoHookean, which recovers"
             )
-
-
-@njit(cache=True, error_model="numpy")
-def _positive(x, tets, Dm_inv):
-    """(m,) whether J > 0; Dm has a positive determinant, so the sign is that of the edges' determinant."""
-    out = np.empty(len(tets), dtype=np.bool_)
-    for e in range(len(tets)):
-        a, b, c, d = tets[e, 0], tets[e, 1], tets[e, 2], tets[e, 3]
-        u0, u1, u2 = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
-        v0, v1, v2 = x[c, 0] - x[a, 0], x[c, 1] - x[a, 1], x[c, 2] - x[a, 2]
-        w0, w1, w2 = x[d, 0] - x[a, 0], x[d, 1] - x[a, 1], x[d, 2] - x[a, 2]
-        out[e] = u0 * (v1 * w2 - v2 * w1) - u1 * (v0 * w2 - v2 * w0) + u2 * (v0 * w1 - v1 * w0) > 0.0
-    return out

@@ -200,7 +200,7 @@ def min_det(x, tets, Dm_inv, guarded):
 
 
 @njit(cache=True, error_model="numpy")
-def _volume_signs(x, tets):
+def volume_signs(x, tets):
     """Six times the volumes, precise enough that slivers have the right sign."""
     out = np.empty(len(tets))
     for e in range(len(tets)):
@@ -239,7 +239,7 @@ def largest_noninverting_step(
     Source: Li, Jiang, Luo, "Physics-Based Simulation", section 23.3.
     """
     x, p, cells, guarded = _checked(vertices, direction, tets, keep, ignore)
-    volumes = _volume_signs(x, cells)
+    volumes = volume_signs(x, cells)
     bad = np.flatnonzero(guarded & ~(volumes > 0.0))
     if len(bad):
         names = ", ".join(str(e) for e in bad[:8]) + (", ..." if len(bad) > 8 else "")
@@ -248,7 +248,7 @@ def largest_noninverting_step(
             "guarded; start un-inverted, or pass them as ignore="
         )
     step = noninverting_step(x, p, cells, guarded, float(keep))[0]
-    while step > 0.0 and not (_volume_signs(x + step * p, cells)[guarded] > 0.0).all():
+    while step > 0.0 and not (volume_signs(x + step * p, cells)[guarded] > 0.0).all():
         step *= 0.5
     if not step > 0.0:
         raise SolverError(

@@ -1,4 +1,4 @@
-"""Translations of pieces that nothing holds: known exactly, whatever the accuracy of the linear solver.
+"""Translations of pieces that nothing holds are known exactly, independent of the accuracy of the linear solver.
 
 Elastic and damping forces do not change when a piece is shifted. Its center of mass therefore moves under inertia,
 gravity and loads alone, and the shift that minimizes the objective is -s sum(gradient) / sum(mass).
@@ -19,7 +19,7 @@ from supple.system import System
 
 @dataclass(frozen=True, eq=False)
 class FreeMotion:
-    """The pieces of a system that hang on no pin, no soft target and no obstacle. What stitches join is one piece.
+    """The pieces of a system that no pin, soft target or stitch to an obstacle holds. Stitched bodies are one piece.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class FreeMotion:
         return cls(piece, system.masses, np.bincount(piece[inside], weights=system.masses[inside]).astype(np.float64))
 
     def joined(self, couplings: Sequence[bsr_matrix]) -> FreeMotion:
-        """Pieces that touch each other as one, none of those that touch something held."""
+        """The same with pieces in contact as one piece, without those in contact with something held."""
         if not couplings or len(self.totals) == 0:
             return self
         held = len(self.totals)

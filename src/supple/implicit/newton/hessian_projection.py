@@ -1,7 +1,7 @@
-"""Which terms of the objective are modelled convex, from iteration to iteration of Newton's method.
+"""Which terms' Hessians are projected to be positive semi-definite, from iteration to iteration of Newton's method.
 
-Far from the minimum all are. Near it, and where a body buckles, convexity costs the quadratic rate of convergence: then
-the true Hessian is tried, first with contact still convex, which is what most often makes it indefinite.
+Far from the minimum all are. Near it, and where a body buckles, projection costs the quadratic rate of convergence:
+then the true Hessian is tried, first with contact still projected, which most often makes it indefinite.
 """
 
 from __future__ import annotations
@@ -9,49 +9,56 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
-# After the true Hessian was indefinite: so many slow iterations until it is tried again, twice as many each time, at
-# most. Trying is cheap, since CG finds out before it has converged.
-_MOST_PATIENCE = 4
+from supple.implicit.energies.potential import Projection
+
+# After the true Hessian was indefinite: the number of slow iterations until it is tried again. It doubles with every
+# failure, up to this. A trial is cheap with CG, which finds out before it has converged.
+_LONGEST_WAIT = 4
 
 
-class Convexity(IntEnum):
-    """The terms whose Hessians are projected to be positive semi-definite."""
+class ProjectedTerms(IntEnum):
+    """The terms whose Hessians are projected in an iteration."""
 
     ALL = 0
-    CONTACT = 1
+    RELEASED_LAST = 1
     NONE = 2
 
-    def projects(self, label: str) -> bool:
-        """Whether a term with this `Potential.label` is projected."""
-        return self is Convexity.ALL or (self is Convexity.CONTACT and label == "contact")
+    def includes(self, projection: Projection) -> bool:
+        """Whether a term that declares this `Potential.projection` is projected."""
+        if projection is Projection.RELEASED_LAST:
+            return self is not ProjectedTerms.NONE
+        return self is ProjectedTerms.ALL and projection is Projection.RELEASED_FIRST
 
 
 @dataclass(eq=False)
-class ConvexityChoice:
-    """What one minimization has learnt.
+class ProjectionPolicy:
+    """What one minimization has found out.
 
     Attributes
     ----------
-    now : what to use next; patience : slow iterations to wait after the last failure; remaining : of them
+    now : the terms to project next
+    wait : slow iterations between a failure of the true Hessian and its next trial; remaining : of them
     """
 
-    now: Convexity = Convexity.ALL
-    patience: int = 1
+    now: ProjectedTerms = ProjectedTerms.ALL
+    wait: int = 1
     remaining: int = 1
 
     def note(self, slow: bool, touching: bool) -> None:
-        """After an iteration: whether it converged slowly, and whether there is contact."""
+        """After an iteration: whether it converged slowly, and whether surfaces touch."""
         if not slow:
             self.remaining = max(self.remaining, 1)
             return
         self.remaining -= 1
-        if self.remaining > 0 or self.now is Convexity.NONE:
+        if self.remaining > 0 or self.now is ProjectedTerms.NONE:
             return
-        self.now = Convexity.CONTACT if touching and self.now is Convexity.ALL else Convexity.NONE
-        self.remaining = self.patience
+        first = touching and self.now is ProjectedTerms.ALL
+        self.now = ProjectedTerms.RELEASED_LAST if first else ProjectedTerms.NONE
+        self.remaining = self.wait
 
-    def refuse(self, touching: bool) -> None:
-        """The Hessian of what is chosen now turned out not to be positive definite."""
-        self.now = Convexity.CONTACT if touching and self.now is Convexity.NONE else Convexity.ALL
-        self.patience = min(2 * self.patience, _MOST_PATIENCE)
-        self.remaining = self.patience
+    def step_back(self, touching: bool) -> None:
+        """The Hessian with the present choice is not positive definite: project more terms."""
+        some = touching and self.now is ProjectedTerms.NONE
+        self.now = ProjectedTerms.RELEASED_LAST if some else ProjectedTerms.ALL
+        self.wait = min(2 * self.wait, _LONGEST_WAIT)
+        self.remaining = self.wait

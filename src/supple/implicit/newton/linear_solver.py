@@ -24,18 +24,24 @@ from supple.system import System
 
 logger = logging.getLogger(__name__)
 
-# Where CG has not converged after so many iterations, factorizing is likely faster.
+# Where CG has not converged after this many iterations, a factorization is likely faster: usual systems take 10 to 60,
+# thin bodies of nearly incompressible material more than 500 (docs/implicit.md).
 _STALLED = 400
 
-# After so many systems the slower number of threads is tried again (see `ThreadTuner`); a system is as much work as its
-# iterations, and its assembly as much as so many of them.
+# After this many systems the slower number of threads is tried again (see `ThreadTuner`). The work of a system is counted in
+# iterations of CG; its assembly is worth about ten.
 _REST = 40
 _ASSEMBLY = 10
+
+# The coarse level of the preconditioner is renewed where CG takes so many times its first number of iterations, and so
+# many more: a renewal costs about as much as the iterations that it saves.
+_AGED_RATIO = 1.5
+_AGED_EXTRA = 4
 
 
 @dataclass(frozen=True)
 class LinearReport:
-    """How a solve went: its method, its CG iterations, and the residual's preconditioned norm at the start."""
+    """The method of a solve, its CG iterations, and the residual's preconditioned norm at the start."""
 
     method: str
     iterations: int
@@ -50,8 +56,8 @@ class LinearSolver:
     ----------
     kind : "auto" (CG, and a factorization where CG stalls), "pcg" or "direct"
     order : which vertex each row belongs to; row_of : (n,) row of each vertex, -1 where it is pinned
-    age, fresh_iterations : how often CG has run on the coarse level as it is, and how many iterations its first run
-        took
+    age, fresh_iterations : the number of runs of CG on the present coarse level (-1: none), and the iterations of the
+        first one
     """
 
     kind: str
@@ -88,11 +94,11 @@ class LinearSolver:
         self.pace = ThreadTuner(choice, choice, _REST)
 
     def begin_step(self) -> None:
-        """Forget what earlier steps left behind, so that a step depends on its state alone."""
+        """Discard the coarse level of earlier steps, so that a step depends on its state alone."""
         self.age = -1
 
     def assemble(self, hessian: HessianBlocks) -> None:
-        """Take over a new Hessian."""
+        """Assemble the matrix of a new Hessian, and update the preconditioner."""
         began = perf_counter()
         self.parallel = self.pace.choose()
         with one_thread(not self.parallel):
@@ -106,7 +112,7 @@ class LinearSolver:
             self.preconditioner.update(self.matrix, coarse=self.age < 0)
 
     def _add_couplings(self, couplings: list[bsr_matrix]) -> None:
-        """Add what couples vertices that no element joins; the joint pattern is made anew where that has changed."""
+        """Add couplings of vertices that no element joins; the joint pattern is rebuilt where theirs has changed."""
         if not couplings:
             if self.joint is not None:
                 self.joint, self.joined, self.age = None, None, -1
@@ -129,7 +135,7 @@ class LinearSolver:
 
     @property
     def rows(self) -> BlockRows:
-        """Where the matrix has its blocks now."""
+        """The present pattern of the matrix."""
         return self.preconditioner.pattern
 
     def solve(
@@ -140,19 +146,19 @@ class LinearSolver:
         Parameters
         ----------
         force : (n, 3), of which the free rows are read; tolerance : relative, for CG
-        convex : whether the Hessian is known to be positive semi-definite; where that is not known and CG finds that it
-            is not so, None is returned at once
+        convex : whether the Hessian is known to be positive semi-definite. Where that is not known, every method checks
+            it: CG the curvature along its directions, the factorization the signs of all eigenvalues
 
         Returns
         -------
-        p : (n, 3), zero where pinned; None where the system could not be solved
+        p : (n, 3), zero where pinned; None where the system could not be solved, or was found to be indefinite
         """
         began = perf_counter()
         with one_thread(not self.parallel):
-            p, said = self._solve(force, tolerance, convex)
+            p, report = self._solve(force, tolerance, convex)
         seconds = self.spent + perf_counter() - began
-        self.pace.note(self.parallel, seconds / (_ASSEMBLY + said.iterations))
-        return p, said
+        self.pace.note(self.parallel, seconds / (_ASSEMBLY + report.iterations))
+        return p, report
 
     def _solve(
         self, force: NDArray[np.float64], tolerance: float, convex: bool
@@ -177,24 +183,24 @@ class LinearSolver:
                 result = conjugate_gradients(self.matrix, self.preconditioner, b, x, tolerance, most)
             iterations += result.iterations
             first_norm = result.first_norm
-            self._grow_old(result.iterations)
+            self._age_by(result.iterations)
             if result.converged or (self.kind == "pcg" and np.isfinite(x).all() and x.any()):
                 p[self.order.vertices] = x
                 return p, LinearReport("pcg", iterations, first_norm)
             if self.kind == "pcg":
                 return None, LinearReport("pcg", iterations, first_norm)
             logger.debug("CG stalled after %d iterations; factorizing", iterations)
-        solution = solve_directly(self.rows, self.matrix, b)
+        solution = solve_directly(self.rows, self.matrix, b, require_definite=not convex)
         if solution is None:
             return None, LinearReport("direct", iterations, first_norm)
         p[self.order.vertices] = solution
         return p, LinearReport("direct", iterations, first_norm)
 
-    def _grow_old(self, iterations: int) -> None:
-        """Keep the coarse level until CG takes clearly longer than when it was new."""
+    def _age_by(self, iterations: int) -> None:
+        """After a run of CG: keep the coarse level unless it has become too old."""
         if self.age < 0:
             self.fresh_iterations = iterations
             self.age = 0
         self.age += 1
-        if iterations > 1.5 * self.fresh_iterations + 4:
+        if iterations > _AGED_RATIO * self.fresh_iterations + _AGED_EXTRA:
             self.age = -1

@@ -1,4 +1,4 @@
-"""The objective of a step: one sum of potentials."""
+"""The objective of a step: one sum of potentials, in any order."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.energies.potential import HessianBlocks, Potential
-from supple.implicit.newton.hessian_projection import Convexity
+from supple.implicit.energies.potential import ContactPotential, HessianBlocks, Potential
+from supple.implicit.newton.hessian_projection import ProjectedTerms
 from supple.implicit.timings import Clock
 
 
@@ -30,8 +30,8 @@ class Model:
 
 
 @dataclass(frozen=True, eq=False)
-class Objective(Potential):
-    """The sum of its terms, each an energy [J]. Elasticity comes first: it overwrites the tets' matrices."""
+class Objective:
+    """The sum of its terms, each an energy [J]."""
 
     terms: Sequence[Potential]
     clock: Clock = field(default_factory=Clock)
@@ -49,40 +49,28 @@ class Objective(Potential):
 
     def contact_gradient(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(n, 3) of the contact terms alone [N]."""
-        out = np.zeros_like(x)
-        for term in self.terms:
-            if term.label == "contact":
-                term.add_gradient(x, out)
-        return out
+        return _gradient([term for term in self.terms if isinstance(term, ContactPotential)], x)
 
     def gradient(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(n, 3) [N]."""
-        out = np.zeros_like(x)
-        self.add_gradient(x, out)
-        return out
-
-    def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-        for term in self.terms:
-            term.add_gradient(x, out)
+        return _gradient(self.terms, x)
 
     def model(
-        self, x: NDArray[np.float64], hessian: HessianBlocks | None, convexity: Convexity = Convexity.ALL
+        self, x: NDArray[np.float64], hessian: HessianBlocks | None, projected: ProjectedTerms = ProjectedTerms.ALL
     ) -> Model:
-        """Energy and gradient at x; the Hessian into `hessian`, where given, of a model as convex as asked for."""
+        """Energy and gradient at x; the Hessian with some terms projected into `hessian`, where that is given."""
         gradient = np.zeros_like(x)
         if hessian is not None:
             hessian.clear()
         values = []
         for term in self.terms:
             with self.clock.of(term.label):
-                values.append(term.add_model(x, gradient, hessian, convexity.projects(term.label)))
+                values.append(term.add_model(x, gradient, hessian, projected.includes(term.projection)))
         return Model(x, sum(values), sum(abs(value) for value in values), gradient)
 
-    def hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool = True) -> None:
-        """The Hessian [N/m] into `out`, whatever it held."""
-        out.clear()
-        self.add_hessian(x, out, project)
 
-    def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
-        for term in self.terms:
-            term.add_hessian(x, out, project)
+def _gradient(terms: Sequence[Potential], x: NDArray[np.float64]) -> NDArray[np.float64]:
+    out = np.zeros_like(x)
+    for term in terms:
+        term.add_gradient(x, out)
+    return out

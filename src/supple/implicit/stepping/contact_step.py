@@ -1,4 +1,4 @@
-"""Contact within one step: its terms of the objective, and whether they have to be refined before the step is done."""
+"""Contact within one step: its terms of the objective, and whether they have to be updated before the step is done."""
 
 from __future__ import annotations
 
@@ -20,15 +20,19 @@ from supple.state import Status
 
 FindContacts = Callable[[], ContactPoints] | None
 
-# Surfaces nearer than this share of dhat: an adaptive barrier becomes stiffer.
+# An adaptive barrier becomes ten times stiffer where surfaces are nearer than this share of dhat, so that distances
+# stay far above round-off. Six increases are for bodies up to 1e6 times as stiff as the softest, which sets the scale.
 _TOO_NEAR = 1e-2
-_STIFFER = 10.0
-_MOST_RAISES = 6
-_HELPS = 2.0
+_STIFFENING = 10.0
+_MOST_INCREASES = 6
 
-# Friction is brought up to date while normal forces change by more than this share, and so often at most.
-_PRESSED_DIFFERENTLY = 0.1
-_MOST_LAGS = 5
+# What scripts press together stays together, however stiff the barrier is: an increase has to double the distance.
+_LEAST_GAIN = 2.0
+
+# The default of `Contact.friction_iterations`: friction's normal forces are updated while they change by more than this
+# share, and at most this often. More updates cost time and change little.
+_FORCE_CHANGE = 0.1
+_MOST_UPDATES = 5
 
 
 @dataclass(eq=False)
@@ -38,8 +42,8 @@ class ContactStep:
     Attributes
     ----------
     stiffness : of the barrier now [Pa], the integrator's weight included
-    raises : how often it was raised; nearest : the smallest distance before the latest raise [m]
-    lagged : how often friction has been brought up to date; pressing : (n, 3) the barriers' gradient that it knows [N]
+    stiffness_increases : their number; nearest : the smallest distance before the latest one [m]
+    friction_updates : their number; normal_gradient : (n, 3) of the barriers at the latest one [N]
     """
 
     model: ContactModel | None
@@ -47,12 +51,12 @@ class ContactStep:
     times: tuple[float, float]
     weight: float
     stiffness: float = 0.0
-    raises: int = 0
+    stiffness_increases: int = 0
     nearest: float = 0.0
-    lagged: int = 0
+    friction_updates: int = 0
     barriers: Barriers | None = None
     frictions: list[Friction | PlaneFriction] | None = None
-    pressing: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
+    normal_gradient: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
 
     @classmethod
     def of(
@@ -60,47 +64,47 @@ class ContactStep:
     ) -> ContactStep:
         return cls(model, start, times, weight, model.scales.stiffness * weight if model is not None else 0.0)
 
-    def added_to(self, objective: Objective, x: NDArray[np.float64]) -> Objective:
+    def with_contact(self, objective: Objective, x: NDArray[np.float64]) -> Objective:
         """The objective with barriers, and with friction whose normal forces are those at x (n, 3)."""
         if self.model is None:
             return objective
         self.barriers = self.model.barriers(self.stiffness)
         self.frictions = self.model.frictions(self.barriers, x, self.start, self.times)
         if self.model.coefficients.any():
-            self.pressing = Objective(self.barriers.terms).gradient(x)
+            self.normal_gradient = Objective(self.barriers.terms).gradient(x)
         return Objective([*objective.terms, *self.barriers.terms, *self.frictions], objective.clock)
 
-    def refine(self, x: NDArray[np.float64]) -> bool:
-        """Whether the step has to go on from x with a stiffer barrier or newer normal forces of friction."""
+    def needs_update(self, x: NDArray[np.float64]) -> bool:
+        """Whether to continue from x (n, 3) with a stiffer barrier or with friction of the normal forces there."""
         if self.model is None:
             return False
         scales = self.model.scales
         nearest = self.model.smallest_distance(x)
-        # What scripts press together stays together, however stiff the barrier is.
-        helps = self.raises == 0 or nearest > _HELPS * self.nearest
-        if scales.adaptive and self.raises < _MOST_RAISES and nearest < _TOO_NEAR * scales.dhat and helps:
-            self.stiffness *= _STIFFER
-            self.raises += 1
+        increases = self.stiffness_increases
+        allowed = increases == 0 or (increases < _MOST_INCREASES and nearest > _LEAST_GAIN * self.nearest)
+        if scales.adaptive and allowed and nearest < _TOO_NEAR * scales.dhat:
+            self.stiffness *= _STIFFENING
+            self.stiffness_increases += 1
             self.nearest = nearest
             return True
-        if self.model.coefficients.any() and self._friction_is_old(x):
-            self.lagged += 1
+        if self.model.coefficients.any() and self._friction_is_outdated(x):
+            self.friction_updates += 1
             return True
         return False
 
-    def _friction_is_old(self, x: NDArray[np.float64]) -> bool:
-        """Whether friction has to be brought up to date with the normal forces at x (n, 3)."""
+    def _friction_is_outdated(self, x: NDArray[np.float64]) -> bool:
+        """Whether friction has to be updated with the normal forces at x (n, 3)."""
         assert self.model is not None
         assert self.barriers is not None
         wanted = self.model.friction_iterations
-        if self.lagged + 1 >= (_MOST_LAGS if wanted is None else wanted):
+        if self.friction_updates + 1 >= (_MOST_UPDATES if wanted is None else wanted):
             return False
         now = Objective(self.barriers.terms).gradient(x)
-        changed = float(np.linalg.norm(now - self.pressing))
-        return wanted is not None or changed > _PRESSED_DIFFERENTLY * float(np.linalg.norm(now))
+        change = float(np.linalg.norm(now - self.normal_gradient))
+        return wanted is not None or change > _FORCE_CHANGE * float(np.linalg.norm(now))
 
     def verified(self, outcome: Outcome) -> Outcome:
-        """The outcome, or a failure where rounding has let surfaces through each other after all."""
+        """The outcome, or a failure where surfaces intersect because of rounding."""
         if self.model is None or outcome.status is not Status.CONVERGED:
             return outcome
         if self.model.collisions.intersect(outcome.end.positions):

@@ -1,8 +1,8 @@
-"""Brings pinned vertices to where they must be at the end of a step, through states without inverted tets.
+"""Moves pinned vertices to their positions at the end of a step, through states without inverted tets.
 
-Each iteration extends the pins' remaining way into the body: with the Hessian H of the objective, free vertices f and
-pinned ones p, it solves H_ff d_f = -(gradient_f + H_fp d_p), one Newton step with the pins' displacement prescribed. As
-much of it is taken as the step filter allows. After the last one Newton's method goes on with the pins in place.
+Each iteration extends the pins' remaining displacement d_p into the body: with the Hessian H of the objective, free
+vertices f and pinned ones p, it solves H_ff d_f = -(gradient_f + H_fp d_p), one Newton step with d_p prescribed. The
+step filter limits how much of it is taken. Afterwards Newton's method continues with the pins in place.
 """
 
 from __future__ import annotations
@@ -11,15 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.implicit.limits.step_limits import StepLimits
-from supple.implicit.newton.minimize import Outcome, Problem, Tools
+from supple.implicit.newton.direction import Tools
+from supple.implicit.newton.minimize import Outcome, Problem
 from supple.implicit.newton.trace import NewtonRow
 from supple.state import Status
 from supple.system import System
 
+# A smaller share of the remaining displacement is not worth an iteration: a shorter time step helps more. Neither are
+# more iterations than this.
+_SMALLEST_SHARE = 0.02
 _MOST_ITERATIONS = 25
 
-# A share of the remaining way so small is not worth an iteration: shorter time steps help more.
-_SMALLEST_SHARE = 0.02
+# Relative, of the linear solver. The minimization that follows corrects what is left.
 _TOLERANCE = 1e-3
 
 
@@ -31,37 +34,37 @@ def move_pins(
     limits: StepLimits,
     tools: Tools,
 ) -> tuple[NDArray[np.float64], Outcome]:
-    """Carry the pinned vertices from where they are in x to `targets` (k, 3).
+    """Move the pinned vertices from their positions in x to `targets` (k, 3).
 
     Returns
     -------
     positions, outcome : `converged` with pins exactly at their targets; `blocked`, with a message that names the pin,
-        where the filter lets them go only so far.
+        where the filters do not let them arrive.
     """
     pinned = tools.pinned
     near = np.flatnonzero(np.isin(system.elements, pinned).any(axis=1))
     nodes = system.elements[near]
     rows: list[NewtonRow] = []
     for iteration in range(_MOST_ITERATIONS):
-        way = np.zeros_like(x)
-        way[pinned] = targets - x[pinned]
+        displacement = np.zeros_like(x)
+        displacement[pinned] = targets - x[pinned]
         here = problem.objective.model(x, tools.hessian)
         gradient = here.gradient
         with tools.clock.of("linear_solve"):
             tools.linear_solver.assemble(tools.hessian)
         # One row more, for the nodes without a vertex, number -1.
-        pull, longer = np.zeros((len(x) + 1, 3)), np.concatenate([way, np.zeros((1, 3))])
-        moved = np.einsum("eij,ej->ei", tools.hessian.elements[near], longer[nodes].reshape(-1, 12))
+        pull, extended = np.zeros((len(x) + 1, 3)), np.concatenate([displacement, np.zeros((1, 3))])
+        moved = np.einsum("eij,ej->ei", tools.hessian.elements[near], extended[nodes].reshape(-1, 12))
         np.add.at(pull, nodes, moved.reshape(-1, 4, 3))
         pull = pull[:-1]
         for coupling in tools.hessian.couplings:
-            pull += (coupling @ way.ravel()).reshape(-1, 3)
+            pull += (coupling @ displacement.ravel()).reshape(-1, 3)
         with tools.clock.of("linear_solve"):
-            direction, said = tools.linear_solver.solve(-(gradient + pull), _TOLERANCE)
+            direction, report = tools.linear_solver.solve(-(gradient + pull), _TOLERANCE)
         if direction is None or not np.isfinite(direction).all():
             text = "the linear system that moves the pins could not be solved"
             return x, Outcome(Status.NOT_FINITE, here, text, rows)
-        direction[pinned] = way[pinned]
+        direction[pinned] = displacement[pinned]
         step, tet = limits.largest_step(x, direction)
         rows.append(
             NewtonRow(
@@ -69,8 +72,8 @@ def move_pins(
                 energy=float("nan"),
                 force=float(np.abs(gradient).max(initial=0.0)),
                 direction=float(np.abs(direction).max(initial=0.0)),
-                linear_solver=said.method,
-                linear_iterations=said.iterations,
+                linear_solver=report.method,
+                linear_iterations=report.iterations,
                 linear_tolerance=_TOLERANCE,
                 filter=step,
                 step=step,
@@ -96,21 +99,19 @@ def move_pins(
 def _blocked_message(
     system: System, x: NDArray[np.float64], targets: NDArray[np.float64], tet: int, limits: StepLimits
 ) -> str:
-    """Which pin is blocked: one that holds a node of the limiting tet, or else the one with the longest way to go."""
+    """Which pin is blocked: one that holds a node of the limiting tet, otherwise the one farthest from its target."""
     remaining = np.linalg.norm(targets - x[system.pinned_vertices], axis=1)
-    best, way = None, -1.0
-    first = 0
+    best, rank, first = None, (False, -1.0), 0
     for pin in system.pins:
         left = float(remaining[first : first + len(pin.vertices)].max())
         first += len(pin.vertices)
-        if tet >= 0 and left > 0.0 and np.isin(system.tets[tet], pin.vertices).any():
-            left += 1e300
-        if left > way:
-            best, way = pin, left
+        limits_it = tet >= 0 and left > 0.0 and bool(np.isin(system.tets[tet], pin.vertices).any())
+        if (limits_it, left) > rank:
+            best, rank = pin, (limits_it, left)
     assert best is not None
     if tet < 0 and limits.contact is not None:
-        return f"{best.label} is blocked: moving it on would press {limits.contact.nearest(x)} into each other"
-    return f"{best.label} is blocked: moving it on would invert tet {tet} of {_owner(system, tet)}"
+        return f"{best.label} is blocked: any farther, it would press {limits.contact.nearest(x)} into each other"
+    return f"{best.label} is blocked: any farther, it would invert tet {tet} of {_owner(system, tet)}"
 
 
 def _owner(system: System, tet: int) -> str:

@@ -1,7 +1,7 @@
 """Whether scripts go straight within a step.
 
-A step carries pins and obstacles to where they are at its end along straight lines. Where the script turns far in
-between, as half a turn and more of an end does, the step is divided.
+A step moves pins and obstacles to their places at its end along straight lines. Where the script turns far in between,
+as half a turn and more of an end does, the step is divided.
 """
 
 from __future__ import annotations
@@ -10,19 +10,17 @@ import numpy as np
 
 from supple.system import System
 
-# How far off the straight line a script may go within a step, as a share of the smallest body's diagonal.
-_OFF = 0.05
-
-# The same for points of one pin against each other, as a share of the pin's own size: half a turn is 0.5. However thin
-# what turns is, a turn is one.
+# How far the points of one pin may go off the straight line against each other, as a share of the pin's own size.
+# Half a turn is 0.5. The points of a thin pin that turns stay within the tolerance in metres.
 _TURNED = 0.4
 
-# Where a script is looked at. Not the middle alone: a full turn is back there, too. Nor simple fractions.
+# The shares of the step at which a script is evaluated. Not the middle alone: a full turn is back there, too. Nor
+# simple fractions, where several turns are back.
 _AT = (0.2113, 0.5, 0.7265)
 
 
-def bends(system: System, begin: float, end: float, diagonal: float) -> bool:
-    """Whether some pin or obstacle goes far off the straight line between two times [s]; diagonal : [m]."""
+def turns(system: System, begin: float, end: float, tolerance: float) -> bool:
+    """Whether some pin goes farther than `tolerance` [m] off the straight line between two times [s]."""
     for pin in system.pins:
         if pin.motion is None:
             continue
@@ -30,8 +28,8 @@ def bends(system: System, begin: float, end: float, diagonal: float) -> bool:
         size = float(np.linalg.norm(np.ptp(first, axis=0)))
         for share in _AT:
             off = pin.targets(begin + share * (end - begin)) - (first + share * (last - first))
-            # Also along the line: a step may end where it began, and have been elsewhere.
-            if float(np.abs(off).max(initial=0.0)) > _OFF * diagonal:
+            # Also along the line: a script may leave a place and come back to it within a step.
+            if float(np.abs(off).max(initial=0.0)) > tolerance:
                 return True
             among = off - off.mean(axis=0)
             if float(np.linalg.norm(among, axis=1).max(initial=0.0)) > _TURNED * size:

@@ -31,10 +31,10 @@ class Plan:
     scale : s [s^2]; None where there is no inertia
     predicted : x~ (n, 3) [m]
     velocity : positions at the end (n, 3) -> velocities at the end [m/s]
-    strain_rate : what is damped -> how its strain rate is written
+    strain_rate : the damped elements -> their strain rate at the end as a function of the strain there
     contact_weight : factor of the contact energies. The force s a of the trapezoidal rule counts a half at either end;
         contact acts at the end alone, and twice (Kane et al., "Finite element analysis of nonsmooth contact", 1999)
-    memory : what the next step must know of this one
+    memory : the data of this step that the next one needs
     """
 
     scale: float | None
@@ -47,7 +47,7 @@ class Plan:
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """The state before the last step, and how long that step was: what BDF2 remembers."""
+    """The state before the last step, and the length of that step [s], for BDF2."""
 
     positions: NDArray[np.float64]
     velocities: NDArray[np.float64]
@@ -89,8 +89,8 @@ class BackwardEuler(Integrator):
 class BDF2(Integrator):
     """Backward differences over two steps, whose lengths may differ: second order, stable, loses little energy.
 
-    Begins with a step of backward Euler where the state has no history, or where the last step was so much shorter that
-    the method would lose its stability.
+    Takes a step of backward Euler where the state has no history, or where the last step was less than half as long:
+    the method is stable up to a ratio of 1 + sqrt(2).
     """
 
     name = "bdf2"

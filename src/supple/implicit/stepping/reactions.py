@@ -1,4 +1,4 @@
-"""What pins do to the bodies that they hold."""
+"""Reaction forces of pins on the bodies that they hold."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ def reaction_forces(system: System, gradient: NDArray[np.float64]) -> tuple[dict
     Parameters
     ----------
     gradient : (n, 3) of the whole objective at the end of a step, pinned vertices included [N]: mass times acceleration
-        minus all other forces, which is what the pin must add.
+        minus all other forces, which is the force of the pin.
 
     Returns
     -------
-    totals, by_vertex : by the pin's label, (3,) and (k, 3) [N]; labels that occur again get a number.
+    totals, by_vertex : by the pin's label, (3,) and (k, 3) [N]; repeated labels get a number.
     """
     totals: dict[str, NDArray] = {}
     by_vertex: dict[str, NDArray] = {}

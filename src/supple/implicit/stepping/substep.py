@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.energies.damping import Damping, StrainRate
+from supple.implicit.energies.damping import Damping, Strained, StrainRate
 from supple.implicit.energies.external_forces import ExternalForces, total_forces
-from supple.implicit.energies.gravity import Gravity
 from supple.implicit.energies.inertia import Inertia
 from supple.implicit.energies.inversion_barrier import inversion_barrier
 from supple.implicit.energies.potential import Potential
 from supple.implicit.energies.soft_targets import soft_targets_at
 from supple.implicit.energies.stitch_damping import StitchDamping
-from supple.implicit.limits.inversion_guard import Guard
+from supple.implicit.limits.inversion_guard import InversionGuard
 from supple.implicit.limits.step_limits import StepLimits
+from supple.implicit.newton.convergence import Convergence
 from supple.implicit.newton.minimize import Outcome, Problem, minimize
 from supple.implicit.newton.objective import Objective
 from supple.implicit.newton.trace import NewtonRow
@@ -27,14 +28,15 @@ from supple.implicit.workspace import Workspace
 from supple.state import State, Status
 from supple.system import System
 
+# The defaults of `Implicit.tolerance`. Halving the first is meant to move results by less than 1e-4; an equilibrium has
+# no later steps that would make up for the rest.
 _DYNAMIC_TOLERANCE = 1e-3
 _STATIC_TOLERANCE = 1e-9
 
-# Of the displacement below which friction is static: Newton's method has to see the difference.
-_FRICTION_SHARE = 1e-2
-
-# Of the distance at which contact begins.
+# Of `dhat`, over which contact's force goes from zero to its full size, and of the displacement below which friction is
+# static: steps have to resolve both.
 _DHAT_SHARE = 0.1
+_FRICTION_SHARE = 1e-2
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,10 @@ class StepSettings:
 
     integrator: Integrator
     tolerance: float | None
+    force_tolerance: float
     max_iterations: int
+    volume_kept: float
+    barrier_onset: float
 
     def shortest(self, workspace: Workspace, h: float) -> float:
         """The length of Newton's step [m] below which the minimum of a step of h [s] is reached."""
@@ -61,7 +66,7 @@ class StepSettings:
 
 @dataclass(frozen=True, eq=False)
 class Substep:
-    """What came of a step: the state at its end, how Newton's method went, and the contact there."""
+    """The result of a step: the state at its end, the course of Newton's method, and the contact at the end."""
 
     state: State
     outcome: Outcome
@@ -74,18 +79,21 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     targets = system.pin_targets(end)
     obstacles = len(state.positions) - workspace.bodies_end
     if obstacles:
-        # What moves by script arrives by script: its inertia then plays no part.
+        # What a script moves has the script's velocity, so that its inertia plays no part.
         state.velocities[workspace.bodies_end :] = (targets[-obstacles:] - state.positions[-obstacles:]) / h
     plan = settings.integrator.plan(system, state, h, lambda start: _acceleration(system, start, workspace))
     forces = total_forces(system, end)
-    guard = Guard.at(system, state.positions)
+    guard = InversionGuard.at(system, state.positions, settings.volume_kept)
     limits = StepLimits(guard, workspace.contact, tools.clock)
-    base = _objective(system, state, end, plan, forces, guard, workspace)
+    base = _objective(system, state, end, plan, forces, workspace)
+    barrier = inversion_barrier(workspace.elasticity, guard.guarded, settings.barrier_onset)
+    if barrier is not None:
+        base = replace(base, terms=[*base.terms, barrier])
     contact = ContactStep.of(workspace.contact, state.positions, (state.time, end), plan.contact_weight)
     problem = Problem(
-        contact.added_to(base, state.positions),
+        contact.with_contact(base, state.positions),
         plan.scale,
-        settings.shortest(workspace, h),
+        Convergence(settings.shortest(workspace, h), settings.force_tolerance),
         settings.max_iterations,
         workspace.diagonal,
     )
@@ -95,17 +103,17 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     if np.array_equal(targets, x[tools.pinned]):
         x = _first_guess(system, problem, x, plan, forces, limits, tools.pinned)
     else:
-        x, carried = move_pins(system, problem, x, targets, limits, tools)
-        rows = carried.rows
-        if carried.status is not Status.CONVERGED:
-            return Substep(state, carried, contact)
+        x, moved = move_pins(system, problem, x, targets, limits, tools)
+        rows = moved.rows
+        if moved.status is not Status.CONVERGED:
+            return Substep(state, moved, contact)
     while True:
         outcome = minimize(problem, x, limits, tools)
         rows = rows + outcome.rows
         x = outcome.end.positions
-        if outcome.status is not Status.CONVERGED or not contact.refine(x):
+        if outcome.status is not Status.CONVERGED or not contact.needs_update(x):
             break
-        problem = replace(problem, objective=contact.added_to(base, x))
+        problem = replace(problem, objective=contact.with_contact(base, x))
     outcome = contact.verified(replace(outcome, rows=rows))
     return Substep(State(end, x, plan.velocity(x), plan.memory), outcome, contact)
 
@@ -113,13 +121,11 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
 def _potentials(
     system: System, x: NDArray[np.float64], time: float, forces: NDArray[np.float64], workspace: Workspace
 ) -> list[Potential]:
-    """Everything but inertia and damping, at `time`; energies of loads are zero at x."""
+    """All energies but inertia and damping, at `time`; energies of loads are zero at x."""
     terms: list[Potential] = [workspace.elasticity]
     if workspace.stitches is not None:
         terms.append(workspace.stitches.at(time))
-    if system.gravity.any():
-        terms.append(Gravity(system.masses, system.gravity, x))
-    if system.forces:
+    if forces.any():
         terms.append(ExternalForces(forces, x))
     if system.soft_targets:
         terms.append(soft_targets_at(system, time))
@@ -132,40 +138,35 @@ def _objective(
     end: float,
     plan: Plan,
     forces: NDArray[np.float64],
-    guard: Guard,
     workspace: Workspace,
 ) -> Objective:
     terms = _potentials(system, state.positions, end, forces, workspace)
-    barrier = inversion_barrier(workspace.elasticity, guard.guarded)
-    if barrier is not None:
-        terms.append(barrier)
     if plan.scale is None:
-        terms.append(workspace.stabilizer)
+        terms.append(workspace.regularization)
     else:
         terms.append(Inertia(system.masses, plan.predicted, plan.scale))
-        if workspace.viscosity is not None:
-            terms.append(Damping(workspace.viscosity, plan.strain_rate(workspace.viscosity)))
-        if workspace.stitch_viscosity is not None:
-            rate = plan.strain_rate(workspace.stitch_viscosity)
-            terms.append(StitchDamping.of(workspace.stitch_viscosity, rate))
+        terms += _damping(workspace, plan.strain_rate)
     return Objective(terms, workspace.tools.clock)
+
+
+def _damping(workspace: Workspace, strain_rate: Callable[[Strained], StrainRate]) -> list[Potential]:
+    terms: list[Potential] = []
+    if workspace.viscosity is not None:
+        terms.append(Damping(workspace.viscosity, strain_rate(workspace.viscosity)))
+    if workspace.stitch_viscosity is not None:
+        terms.append(StitchDamping.of(workspace.stitch_viscosity, strain_rate(workspace.stitch_viscosity)))
+    return terms
 
 
 def _acceleration(system: System, state: State, workspace: Workspace) -> NDArray[np.float64]:
     """(n, 3) of a state by its forces, pins aside [m/s^2].
 
-    The inversion barrier is left out: it is a guard at the end of a step, and so stiff that the trapezoidal rule, which
-    does not damp what is stiff, would throw its force back in the next step.
+    The inversion barrier is left out: it bounds the end of a step, and is so stiff that the trapezoidal rule, which
+    does not damp stiff forces, would return its force in the next step.
     """
     x, v = state.positions, state.velocities
     terms = _potentials(system, x, state.time, total_forces(system, state.time), workspace)
-    viscosity, of_stitches = workspace.viscosity, workspace.stitch_viscosity
-    if viscosity is not None:
-        rate = StrainRate(1.0, viscosity.strains(x) - viscosity.strain_rates(x, v))
-        terms.append(Damping(viscosity, rate))
-    if of_stitches is not None:
-        rate = StrainRate(1.0, of_stitches.strains(x) - of_stitches.strain_rates(x, v))
-        terms.append(StitchDamping.of(of_stitches, rate))
+    terms += _damping(workspace, lambda damped: StrainRate(1.0, damped.strains(x) - damped.strain_rates(x, v)))
     return -Objective(terms).gradient(x) / system.masses[:, None]
 
 
@@ -178,10 +179,10 @@ def _first_guess(
     limits: StepLimits,
     pinned: NDArray[np.int32],
 ) -> NDArray[np.float64]:
-    """Where the vertices would go without elasticity, as far as the filter allows, or x where that has less energy."""
+    """The positions without elasticity, as far as the filters allow; x where that has less energy."""
     if plan.scale is None:
         return x
-    ahead = plan.predicted + plan.scale * (system.gravity + forces / system.masses[:, None])
+    ahead = plan.predicted + plan.scale * forces / system.masses[:, None]
     ahead[pinned] = x[pinned]
     step, _ = limits.largest_step(x, ahead - x)
     if step < 1.0:

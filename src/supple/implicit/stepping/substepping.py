@@ -1,44 +1,46 @@
-"""How a step is divided: into pieces that scripts ask for, and those into halves where a substep fails.
+"""The substeps of a step: pieces in which scripts go straight, and halves of them where a substep fails.
 
-Everything is counted in units of the shortest substep that there may be, of which a step has a power of two.
+Everything is counted in units of the shortest substep that is possible, of which a step has a power of two.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from supple.implicit.stepping.dirichlet_paths import bends
+from supple.implicit.stepping.dirichlet_paths import turns
 from supple.system import System
 
-# A script that never goes straight, one that jumps for instance, is followed in at most so many pieces of the step.
+# A script that never goes straight, such as one that jumps, is followed in at most this many pieces of the step. With
+# less than half a turn in each, that follows up to 500 turns in a step.
 _MOST_PIECES = 1024
 
 
 @dataclass(eq=False)
-class Division:
+class Substepping:
     """The substeps of a step of dt [s] from `begin` [s].
 
     Attributes
     ----------
-    diagonal : of the smallest body [m]; halves : a power of two, how many substeps one piece may take
-    done, size : units that are behind, and that the next substep takes; piece : (first, last) unit of the piece now
+    tolerance : how far a script may go off the straight line within a piece [m]
+    halves : a power of two, the number of substeps that one piece may take
+    done, size : units that are behind, and that the next substep takes; piece : (first, last) unit of the present piece
     """
 
     system: System
     begin: float
     dt: float
-    diagonal: float
+    tolerance: float
     halves: int
     done: int = 0
     size: int = 0
     piece: tuple[int, int] = (0, 0)
 
     @classmethod
-    def of(cls, system: System, begin: float, dt: float, diagonal: float, max_substeps: int) -> Division:
-        """A step whose pieces may take so many substeps each."""
-        division = cls(system, begin, dt, diagonal, 1 << (int(max_substeps).bit_length() - 1))
-        division._find_piece()
-        return division
+    def of(cls, system: System, begin: float, dt: float, tolerance: float, max_substeps: int) -> Substepping:
+        """A step each of whose pieces may take `max_substeps` substeps."""
+        substepping = cls(system, begin, dt, tolerance, 1 << (int(max_substeps).bit_length() - 1))
+        substepping._find_piece()
+        return substepping
 
     @property
     def units(self) -> int:
@@ -70,7 +72,7 @@ class Division:
         return True
 
     def advance(self) -> None:
-        """The substep has been taken: the next is longer again where it can be."""
+        """After a substep: the next one is twice as long where that fits the piece."""
         self.done += self.size
         first, last = self.piece
         if self.done == last:
@@ -81,9 +83,9 @@ class Division:
             self.size *= 2
 
     def _find_piece(self) -> None:
-        """The longest straight piece from here on, of those that halving the step again and again gives."""
+        """The longest straight piece from here on, of those that repeated halving of the step gives."""
         size = self.done & -self.done or self.units
         begin = self.time(self.done)
-        while size > self.halves and bends(self.system, begin, self.time(self.done + size), self.diagonal):
+        while size > self.halves and turns(self.system, begin, self.time(self.done + size), self.tolerance):
             size //= 2
         self.piece, self.size = (self.done, self.done + size), size

@@ -11,7 +11,7 @@ from supple.numerics.kernel_cache import njit
 
 
 @njit(error_model="numpy")
-def _density(s, mu, lam):
+def _density(F, s, mu, lam):
     return mu * distance_from_rotations(s)
 
 
@@ -32,4 +32,4 @@ def _quotients(s, mu, lam):
     return (2.0 * mu, 2.0 * mu, 2.0 * mu, 2.0 * mu * q[0], 2.0 * mu * q[1], 2.0 * mu * q[2])
 
 
-FUNCTIONS = StretchFunctions(_density, _gradient, _curvature, _quotients)
+FUNCTIONS = StretchFunctions(_density, _gradient, _curvature, _quotients, density_of_stretches=True)

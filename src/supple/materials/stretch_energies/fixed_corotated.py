@@ -10,7 +10,7 @@ from supple.numerics.kernel_cache import njit
 
 
 @njit(error_model="numpy")
-def _density(s, mu, lam):
+def _density(F, s, mu, lam):
     j = volume_change(s)
     return mu * distance_from_rotations(s) + 0.5 * lam * j * j
 
@@ -56,4 +56,4 @@ def _quotients(s, mu, lam):
     )
 
 
-FUNCTIONS = StretchFunctions(_density, _gradient, _curvature, _quotients)
+FUNCTIONS = StretchFunctions(_density, _gradient, _curvature, _quotients, density_of_stretches=True)

@@ -10,8 +10,9 @@ import math
 
 import numpy as np
 
-from supple.materials.stretches import StretchFunctions, shape_energy, volume_change
+from supple.materials.stretches import StretchFunctions, shape_and_volume, volume_change
 from supple.numerics.kernel_cache import njit
+from supple.numerics.mat3 import det
 
 
 @njit(error_model="numpy")
@@ -22,16 +23,17 @@ def _log_J(s):
 
 
 @njit(error_model="numpy")
-def _density(s, mu, lam):
-    if s[2] <= 0.0:
+def _density(F, s, mu, lam):
+    shape, j = shape_and_volume(F)
+    if j <= -1.0:
         return np.inf
-    log_J = _log_J(s)
-    return mu * (shape_energy(s) + (volume_change(s) - log_J)) + 0.5 * lam * log_J * log_J
+    log_J = math.log1p(j) if j > -0.5 else math.log(det(F))
+    return mu * (shape + (j - log_J)) + 0.5 * lam * log_J * log_J
 
 
 @njit(error_model="numpy")
 def _tension(s, mu, lam):
-    """c = lam ln J - mu, the factor of 1 / s_i in the stress; not-a-number for J <= 0, where no stress exists."""
+    """c = lam ln J - mu, which stands with 1 / s_i in the stress; not-a-number for J <= 0, where there is no stress."""
     if s[2] <= 0.0:
         return np.nan
     return lam * _log_J(s) - mu

@@ -5,7 +5,7 @@ Source: Bonet, Wood, "Nonlinear Continuum Mechanics for Finite Element Analysis"
 
 from __future__ import annotations
 
-from supple.materials.stretches import StretchFunctions
+from supple.materials.stretches import StretchFunctions, green_strain
 from supple.numerics.kernel_cache import njit
 
 
@@ -19,10 +19,11 @@ def _green_strains(s):
 
 
 @njit(error_model="numpy")
-def _density(s, mu, lam):
-    e = _green_strains(s)
-    trace = e[0] + e[1] + e[2]
-    return mu * (e[0] * e[0] + e[1] * e[1] + e[2] * e[2]) + 0.5 * lam * trace * trace
+def _density(F, s, mu, lam):
+    """mu |E|^2 + lam/2 (tr E)^2"""
+    a, b, c, d, e, f = green_strain(F)
+    trace = a + b + c
+    return mu * (a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f)) + 0.5 * lam * trace * trace
 
 
 @njit(error_model="numpy")

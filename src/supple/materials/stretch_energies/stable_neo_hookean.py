@@ -5,14 +5,14 @@ Source: Smith, de Goes, Kim, "Stable Neo-Hookean Flesh Simulation" (2018), witho
 
 from __future__ import annotations
 
-from supple.materials.stretches import StretchFunctions, shape_energy, volume_change
+from supple.materials.stretches import StretchFunctions, shape_and_volume, volume_change
 from supple.numerics.kernel_cache import njit
 
 
 @njit(error_model="numpy")
-def _density(s, mu, lam):
-    j = volume_change(s)
-    return mu * shape_energy(s) + 0.5 * lam * j * j
+def _density(F, s, mu, lam):
+    shape, j = shape_and_volume(F)
+    return mu * shape + 0.5 * lam * j * j
 
 
 @njit(error_model="numpy")

@@ -95,12 +95,24 @@ def build_pattern(elements: NDArray[np.int32], rows: int) -> BlockPattern:
     elements : (m, 4) row of each node; negative where the node has no row (it is held).
     rows : number of block rows n.
     """
-    elements = np.ascontiguousarray(elements, dtype=np.int32)
-    start, incidence = incidences(elements, rows)
-    row_start = _count_columns(elements, start, incidence, rows)
-    columns, diagonal = _fill_columns(elements, start, incidence, row_start)
-    mirror, entry_start, entries = _gather_map(elements, start, incidence, row_start, columns)
-    return BlockPattern(row_start, columns, diagonal, mirror, entry_start, entries)
+    elements = np.asarray(elements, dtype=np.int64)
+    # Entry 16 e + 4 a + c couples row i, of node a, with row j, of node c.
+    i, j = np.repeat(elements, 4, axis=1).ravel(), np.tile(elements, (1, 4)).ravel()
+    entries = np.flatnonzero((i >= 0) & (j >= 0))
+    i, j = i[entries], j[entries]
+    both, block = np.unique(np.concatenate([np.arange(rows) * (rows + 1), i * rows + j]), return_inverse=True)
+    row, columns = np.divmod(both, max(rows, 1))
+    upper = np.flatnonzero(j >= i)
+    of_upper = block[rows:][upper]
+    order = np.argsort(of_upper, kind="stable")
+    return BlockPattern(
+        row_start=np.searchsorted(row, np.arange(rows + 1)).astype(np.int32),
+        columns=columns.astype(np.int32),
+        diagonal=block[:rows].astype(np.int32),
+        mirror=np.searchsorted(both, columns * rows + row).astype(np.int32),
+        entry_start=np.searchsorted(of_upper[order], np.arange(len(both) + 1)).astype(np.int32),
+        entries=entries[upper][order].astype(np.int32),
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -122,89 +134,6 @@ def incidences(elements, rows):
                 incidence[fill[i]] = 4 * e + a
                 fill[i] += 1
     return start, incidence
-
-
-@njit(cache=True, error_model="numpy")
-def _count_columns(elements, start, incidence, rows):
-    row_start = np.zeros(rows + 1, dtype=np.int32)
-    seen = np.full(rows, -1, dtype=np.int32)
-    for i in range(rows):
-        seen[i] = i
-        count = 1
-        for p in range(start[i], start[i + 1]):
-            e = incidence[p] // 4
-            for c in range(4):
-                j = elements[e, c]
-                if j >= 0 and seen[j] != i:
-                    seen[j] = i
-                    count += 1
-        row_start[i + 1] = row_start[i] + count
-    return row_start
-
-
-@njit(cache=True, error_model="numpy")
-def _fill_columns(elements, start, incidence, row_start):
-    rows = len(row_start) - 1
-    columns = np.empty(row_start[rows], dtype=np.int32)
-    diagonal = np.empty(rows, dtype=np.int32)
-    seen = np.full(rows, -1, dtype=np.int32)
-    for i in range(rows):
-        seen[i] = i
-        k = row_start[i]
-        columns[k] = i
-        k += 1
-        for p in range(start[i], start[i + 1]):
-            e = incidence[p] // 4
-            for c in range(4):
-                j = elements[e, c]
-                if j >= 0 and seen[j] != i:
-                    seen[j] = i
-                    columns[k] = j
-                    k += 1
-        columns[row_start[i] : k].sort()
-        for q in range(row_start[i], k):
-            if columns[q] == i:
-                diagonal[i] = q
-    return columns, diagonal
-
-
-@njit(cache=True, error_model="numpy")
-def _gather_map(elements, start, incidence, row_start, columns):
-    rows = len(row_start) - 1
-    blocks = len(columns)
-    mirror = np.empty(blocks, dtype=np.int32)
-    entry_start = np.zeros(blocks + 1, dtype=np.int32)
-    where = np.full(rows, -1, dtype=np.int32)
-    # Columns ascend, so walking the rows meets the transposed blocks of every column in ascending order too.
-    next_in_row = row_start[:rows].copy()
-    for i in range(rows):
-        for q in range(row_start[i], row_start[i + 1]):
-            j = columns[q]
-            mirror[q] = next_in_row[j]
-            next_in_row[j] += 1
-            where[j] = q
-        for p in range(start[i], start[i + 1]):
-            e = incidence[p] // 4
-            for c in range(4):
-                j = elements[e, c]
-                if j >= i:
-                    entry_start[where[j] + 1] += 1
-    for q in range(blocks):
-        entry_start[q + 1] += entry_start[q]
-    fill = entry_start[:blocks].copy()
-    entries = np.empty(entry_start[blocks], dtype=np.int32)
-    for i in range(rows):
-        for q in range(row_start[i], row_start[i + 1]):
-            where[columns[q]] = q
-        for p in range(start[i], start[i + 1]):
-            e = incidence[p] // 4
-            a = incidence[p] % 4
-            for c in range(4):
-                j = elements[e, c]
-                if j >= i:
-                    entries[fill[where[j]]] = 16 * e + 4 * a + c
-                    fill[where[j]] += 1
-    return mirror, entry_start, entries
 
 
 @njit(cache=True, error_model="numpy")

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
+from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from supple.numerics.kernel_cache import njit, prange
@@ -64,10 +64,12 @@ def order_rows(
     for g, members in enumerate(groups):
         group_of[vertices[members]] = g
     near = group_of[elements]
-    pairs = np.concatenate([near[:, [a, b]] for a in range(4) for b in range(4)])
-    pairs = np.unique(pairs[(pairs >= 0).all(axis=1)], axis=0)
-    pairs = np.concatenate([pairs, np.repeat(np.arange(len(groups))[:, None], 2, axis=1)])
-    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(groups), len(groups))).tocsr()
+    coupled = np.eye(len(groups), dtype=bool)
+    for a in range(4):
+        for b in range(4):
+            both = (near[:, a] >= 0) & (near[:, b] >= 0)
+            coupled[near[both, a], near[both, b]] = True
+    graph = csr_matrix(coupled)
     sequence = reverse_cuthill_mckee(graph, symmetric_mode=True) if len(groups) > 1 else np.arange(len(groups))
     ordered = [vertices[np.sort(groups[g])] for g in sequence]
     start = np.concatenate([[0], np.cumsum([len(members) for members in ordered])])

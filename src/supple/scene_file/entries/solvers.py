@@ -12,6 +12,7 @@ from supple.scene_file.model import Model, Positive
 from supple.solver import Solver
 
 Iterations = Annotated[int, Field(ge=1, le=100_000)]
+Share = Annotated[float, Field(gt=0, lt=1)]
 
 
 class XPBDContactModel(Model):
@@ -68,9 +69,13 @@ class ImplicitModel(Model):
     tolerance: Positive | None = Field(
         default=None, description="of Newton's step, relative to the smallest body [1/s]"
     )
+    force_tolerance: Share = Field(default=1e-4, description="forces left over where surfaces touch, over contact's")
     max_iterations: Iterations = Field(default=120, description="of Newton in one step")
     linear_solver: Literal["auto", "pcg", "direct"] = Field(default="auto")
     max_substeps: Iterations = Field(default=64, description="a failed step is halved, up to this number of substeps")
+    path_tolerance: Positive = Field(default=0.05, description="how far scripts go off a line, over the smallest body")
+    volume_kept: Share = Field(default=0.2, description="share of its volume that a tet keeps in one iteration")
+    barrier_onset: float = Field(default=0.1, gt=0, le=1, description="J below which a barrier against inversion acts")
     contact: ContactModel | None = Field(
         default_factory=ContactModel, description="of bodies with all obstacles, each other and themselves; null: none"
     )
