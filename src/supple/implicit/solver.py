@@ -44,7 +44,7 @@ class Implicit(Solver):
 
     Parameters
     ----------
-    integrator : "backward_euler", "bdf2", "newmark" (trapezoidal), "static", or an `Integrator`.
+    integrator : "backward_euler", "bdf2", "newmark" (midpoint), "static", or an `Integrator`.
     tolerance : Newton stops when no vertex's step is longer than this share of the (smallest) body's diagonal, per
         second of the step; for "static", than this share of the diagonal. None: 1e-3 1/s, or 1e-9.
     max_iterations : of Newton in one (sub)step.
@@ -170,7 +170,7 @@ class Implicit(Solver):
         details = _details(rows, substeps)
         report = StepReport(worst, sum(row.kind == "newton" for row in rows), message, details=details)
         if last is not None:
-            gradient = last.outcome.end.gradient
+            gradient = last.outcome.end.gradient / last.contact.weight
             details["reaction_forces"], details["reaction_forces_by_vertex"] = reaction_forces(system, gradient)
             report = last.contact.completed(report, last.state.positions)
         report.details["seconds"] = workspace.tools.clock.shares()

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.energies.damping import Damping, StrainRate
+from supple.implicit.energies.damping import Damping
 from supple.implicit.energies.external_forces import ExternalForces, total_forces
 from supple.implicit.energies.gravity import Gravity
 from supple.implicit.energies.inertia import Inertia
@@ -20,9 +20,11 @@ from supple.implicit.limits.step_limits import StepLimits
 from supple.implicit.newton.minimize import Outcome, Problem, minimize
 from supple.implicit.newton.objective import Objective
 from supple.implicit.newton.trace import NewtonRow
+from supple.implicit.stepping.conservation import Conservation
 from supple.implicit.stepping.contact_step import ContactStep
 from supple.implicit.stepping.dirichlet import move_pins
 from supple.implicit.stepping.integrators import Integrator, Plan, Static
+from supple.implicit.stepping.midpoint import acting_at
 from supple.implicit.workspace import Workspace
 from supple.state import State, Status
 from supple.system import System
@@ -76,11 +78,12 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     if obstacles:
         # What moves by script arrives by script: its inertia then plays no part.
         state.velocities[workspace.bodies_end :] = (targets[-obstacles:] - state.positions[-obstacles:]) / h
-    plan = settings.integrator.plan(system, state, h, lambda start: _acceleration(system, start, workspace))
-    forces = total_forces(system, end)
+    plan = settings.integrator.plan(system, state, h)
+    middle = end - (1.0 - plan.place) * h
+    forces = total_forces(system, middle)
     guard = Guard.at(system, state.positions)
     limits = StepLimits(guard, workspace.contact, tools.clock)
-    base = _objective(system, state, end, plan, forces, guard, workspace)
+    base = _objective(system, state, middle, plan, forces, guard, workspace)
     contact = ContactStep.of(workspace.contact, state.positions, (state.time, end), plan.contact_weight)
     problem = Problem(
         contact.added_to(base, state.positions),
@@ -107,13 +110,23 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
             break
         problem = replace(problem, objective=contact.added_to(base, x))
     outcome = contact.verified(replace(outcome, rows=rows))
-    return Substep(State(end, x, plan.velocity(x), plan.memory), outcome, contact)
+    after = State(end, x, plan.velocity(x), plan.memory)
+    conservation = Conservation.of(workspace.elasticity, workspace.stitches, tools.free_motion)
+    residual = plan.place * outcome.end.gradient
+    return Substep(settings.integrator.finish(plan, state, after, residual, conservation), outcome, contact)
 
 
-def _potentials(
-    system: System, x: NDArray[np.float64], time: float, forces: NDArray[np.float64], workspace: Workspace
-) -> list[Potential]:
-    """Everything but inertia and damping, at `time`; energies of loads are zero at x."""
+def _objective(
+    system: System,
+    state: State,
+    time: float,
+    plan: Plan,
+    forces: NDArray[np.float64],
+    guard: Guard,
+    workspace: Workspace,
+) -> Objective:
+    """All but contact, with the loads of `time` [s]; energies of loads are zero at the start."""
+    x = state.positions
     terms: list[Potential] = [workspace.elasticity]
     if workspace.stitches is not None:
         terms.append(workspace.stitches.at(time))
@@ -123,50 +136,17 @@ def _potentials(
         terms.append(ExternalForces(forces, x))
     if system.soft_targets:
         terms.append(soft_targets_at(system, time))
-    return terms
-
-
-def _objective(
-    system: System,
-    state: State,
-    end: float,
-    plan: Plan,
-    forces: NDArray[np.float64],
-    guard: Guard,
-    workspace: Workspace,
-) -> Objective:
-    terms = _potentials(system, state.positions, end, forces, workspace)
+    if plan.scale is not None and workspace.viscosity is not None:
+        terms.append(Damping(workspace.viscosity, plan.strain_rate(workspace.viscosity)))
+    if plan.scale is not None and workspace.stitch_viscosity is not None:
+        rate = plan.strain_rate(workspace.stitch_viscosity)
+        terms.append(StitchDamping.of(workspace.stitch_viscosity, rate))
+    terms = [acting_at(plan.place, term, x) for term in terms]
     barrier = inversion_barrier(workspace.elasticity, guard.guarded)
     if barrier is not None:
         terms.append(barrier)
-    if plan.scale is None:
-        terms.append(workspace.stabilizer)
-    else:
-        terms.append(Inertia(system.masses, plan.predicted, plan.scale))
-        if workspace.viscosity is not None:
-            terms.append(Damping(workspace.viscosity, plan.strain_rate(workspace.viscosity)))
-        if workspace.stitch_viscosity is not None:
-            rate = plan.strain_rate(workspace.stitch_viscosity)
-            terms.append(StitchDamping.of(workspace.stitch_viscosity, rate))
+    terms.append(workspace.stabilizer if plan.scale is None else Inertia(system.masses, plan.predicted, plan.scale))
     return Objective(terms, workspace.tools.clock)
-
-
-def _acceleration(system: System, state: State, workspace: Workspace) -> NDArray[np.float64]:
-    """(n, 3) of a state by its forces, pins aside [m/s^2].
-
-    The inversion barrier is left out: it is a guard at the end of a step, and so stiff that the trapezoidal rule, which
-    does not damp what is stiff, would throw its force back in the next step.
-    """
-    x, v = state.positions, state.velocities
-    terms = _potentials(system, x, state.time, total_forces(system, state.time), workspace)
-    viscosity, of_stitches = workspace.viscosity, workspace.stitch_viscosity
-    if viscosity is not None:
-        rate = StrainRate(1.0, viscosity.strains(x) - viscosity.strain_rates(x, v))
-        terms.append(Damping(viscosity, rate))
-    if of_stitches is not None:
-        rate = StrainRate(1.0, of_stitches.strains(x) - of_stitches.strain_rates(x, v))
-        terms.append(StitchDamping.of(of_stitches, rate))
-    return -Objective(terms).gradient(x) / system.masses[:, None]
 
 
 def _first_guess(
@@ -181,7 +161,7 @@ def _first_guess(
     """Where the vertices would go without elasticity, as far as the filter allows, or x where that has less energy."""
     if plan.scale is None:
         return x
-    ahead = plan.predicted + plan.scale * (system.gravity + forces / system.masses[:, None])
+    ahead = plan.predicted + plan.scale / plan.place * (system.gravity + forces / system.masses[:, None])
     ahead[pinned] = x[pinned]
     step, _ = limits.largest_step(x, ahead - x)
     if step < 1.0:
