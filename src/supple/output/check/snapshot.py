@@ -8,10 +8,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.output.check.checks.seams import with_seams
 from supple.output.check.elastic_energy import elastic_energy, stiffness_scale
 from supple.output.check.geometry.box_tree import build_tree, triangle_boxes
 from supple.output.check.geometry.orientation import volume_signs
 from supple.output.check.geometry.surface_pairs import meeting_pairs
+from supple.output.check.stitch_energy import stitch_energy, stitch_scale
 from supple.output.check.surfaces import Surfaces, surfaces_of
 from supple.output.recording.reader import RecordedFrame, Recording
 
@@ -32,7 +34,7 @@ class Scene:
 
     @classmethod
     def of(cls, recording: Recording) -> Scene:
-        return cls(recording, surfaces_of(recording))
+        return cls(recording, with_seams(recording, surfaces_of(recording)))
 
     @cached_property
     def rest_inverse(self) -> NDArray[np.float64]:
@@ -49,6 +51,11 @@ class Scene:
     def stiffness_scale(self) -> float:
         """An energy [J] that round-off of the elastic energy is told by."""
         return stiffness_scale(self.recording)
+
+    @cached_property
+    def stitch_scale(self) -> float:
+        """An energy [J] that round-off of the stitch energy is measured by."""
+        return stitch_scale(self.recording)
 
     def name_tet(self, row: int) -> str:
         """A tet as messages call it: its number within its body."""
@@ -106,6 +113,11 @@ class Snapshot:
     def elastic_energy(self) -> float | None:
         """[J], zero at rest; None where the recording does not tell the law of a body."""
         return elastic_energy(self.scene.recording, self.positions, self.J, self.scene.rest_inverse)
+
+    @cached_property
+    def stitch_energy(self) -> float | None:
+        """[J], zero at rest; None where the recording does not contain the laws of its stitches."""
+        return stitch_energy(self.scene.recording, self.positions, self.poses)
 
     @cached_property
     def points(self) -> NDArray[np.float64]:

@@ -45,6 +45,7 @@ class Surfaces:
     triangles : (t, 3) those of bodies first; owners : (t,); first_triangle : (p,) the first one of each owner
     vertex_owners : (n,) of the bodies' vertices; first_vertex : (p,) the first vertex of each body
     allowed : (p, p) which owners' surfaces must stay apart; ignored : sorted keys of pairs of triangles that may meet
+    stitched : (k, 4) points of each stitch, some of them twice where it has fewer
     fixed : (obstacle, its points at time 0, its first row) of obstacles made of triangles; points : number of all rows
     pieces : see `Piece`
     """
@@ -58,6 +59,7 @@ class Surfaces:
     first_vertex: NDArray[np.int64]
     allowed: NDArray[np.bool_]
     ignored: NDArray[np.int64]
+    stitched: NDArray[np.int64]
     fixed: tuple[tuple[int, NDArray[np.float64], int], ...]
     points: int
     pieces: tuple[Piece, ...]
@@ -120,6 +122,7 @@ def surfaces_of(recording: Recording) -> Surfaces:
     all_triangles = np.ascontiguousarray(np.concatenate(triangles).reshape(-1, 3))
     # Owners are in order, so the first triangle of each is where it would be inserted.
     first = np.searchsorted(owner, np.arange(len(names)))
+    stitched = _stitched_points(recording, {obstacle: row for obstacle, _, row in fixed})
     return Surfaces(
         names=names,
         bodies=nb,
@@ -129,7 +132,8 @@ def surfaces_of(recording: Recording) -> Surfaces:
         vertex_owners=vertex_owners,
         first_vertex=first_vertex,
         allowed=_allowed(recording, nb, len(names)),
-        ignored=_ignored_keys(recording, all_triangles, {obstacle: row for obstacle, _, row in fixed}),
+        ignored=_ignored_keys(stitched, all_triangles),
+        stitched=stitched,
         fixed=tuple(fixed),
         points=row,
         pieces=_pieces(recording, all_triangles, owner, row),
@@ -139,8 +143,8 @@ def surfaces_of(recording: Recording) -> Surfaces:
 def _mesh_of(obstacle: RecordedObstacle) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     if obstacle.kind == "TriangleObstacle":
         return obstacle.vertices, obstacle.triangles.astype(np.int64)
-    said = obstacle.parameters
-    points = (_BOX_CORNERS * np.asarray(said["size"])) @ np.asarray(said["orientation"]).T + np.asarray(said["center"])
+    box = obstacle.parameters
+    points = (_BOX_CORNERS * np.asarray(box["size"])) @ np.asarray(box["orientation"]).T + np.asarray(box["center"])
     return points, np.array(_BOX_FACES, dtype=np.int64)
 
 
@@ -153,14 +157,16 @@ def _allowed(recording: Recording, bodies: int, owners: int) -> NDArray[np.bool_
     return allowed
 
 
-def _ignored_keys(recording: Recording, triangles: NDArray[np.int64], first_rows: dict[int, int]) -> NDArray[np.int64]:
+def _stitched_points(recording: Recording, first_rows: dict[int, int]) -> NDArray[np.int64]:
+    """(k, 4) the points of each stitch; obstacles' points begin at these rows."""
+    untouching = recording.untouching
+    anchors = [first_rows.get(int(i), 0) + int(k) for i, k in untouching.anchors]
+    number = np.concatenate([np.arange(len(recording.rest_positions)), anchors]).astype(np.int64)
+    return number[untouching.stitched]
+
+
+def _ignored_keys(stitched: NDArray[np.int64], triangles: NDArray[np.int64]) -> NDArray[np.int64]:
     """Stitches as pairs of triangles that may meet: all around the stitched vertex, with those it is stitched to."""
-    said = recording.untouching
-    if len(said.stitched) == 0:
-        return np.zeros(0, dtype=np.int64)
-    number = np.concatenate(
-        [np.arange(len(recording.rest_positions)), [first_rows.get(int(i), 0) + int(k) for i, k in said.anchors]]
-    ).astype(np.int64)
     order = np.argsort(triangles.ravel(), kind="stable")
     corners = triangles.ravel()[order]
 
@@ -169,7 +175,7 @@ def _ignored_keys(recording: Recording, triangles: NDArray[np.int64], first_rows
         return order[begin:end] // 3
 
     keys = [np.zeros(0, dtype=np.int64)]
-    for vertex, *others in number[said.stitched]:
+    for vertex, *others in stitched:
         second = around(others[0])
         for other in others[1:]:
             second = np.intersect1d(second, around(other))

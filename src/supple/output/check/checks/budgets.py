@@ -117,7 +117,7 @@ class Spin(FrameCheck):
 
 
 class Energy(FrameCheck):
-    """Kinetic, elastic and potential energy together never exceed those at the start, where nothing does work."""
+    """Kinetic, elastic, stitch and potential energy together never exceed those at the start, where nothing does work."""
 
     name = "energy"
 
@@ -132,8 +132,8 @@ class Energy(FrameCheck):
             self._why_not = "forces or soft targets do work"
         elif physics.scripted_pins:
             self._why_not = "scripted pins do work"
-        elif physics.stitches:
-            self._why_not = "stitches store energy that is not computed here"
+        elif physics.stitches and recording.stitches.laws is None:
+            self._why_not = "the recording does not contain the laws of its stitches: an older version wrote it"
         self._first: Snapshot | None = None
         self._rows: list[tuple[Moment, float, float]] = []
 
@@ -152,7 +152,7 @@ class Energy(FrameCheck):
             elastic = at.elastic_energy
             if elastic is None:
                 elastic = float(recording.series("elastic_energy")[at.number])
-            moved = 0.5 * float(m @ np.einsum("ij,ij->i", v, v)) + elastic
+            moved = 0.5 * float(m @ np.einsum("ij,ij->i", v, v)) + elastic + (at.stitch_energy or 0.0)
             fallen = at.positions - self._first.positions
             self._rows.append((Moment(at.number, at.time), moved, -float((m @ fallen) @ recording.gravity)))
 
