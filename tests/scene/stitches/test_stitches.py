@@ -61,6 +61,42 @@ def test_the_same_pairs_are_found_far_from_the_origin(gap, pairing):
         assert np.array_equal(there, here)
 
 
+@pytest.mark.parametrize("turned", [(0, 0, 0), (0.3, -1.0, 2.0)])
+@pytest.mark.parametrize(("shift", "size"), [((0, 0, 0), 1.0), ((3, -2, 5), 1.0), ((0, 0, 0), 0.03)])
+def test_faces_that_touch_are_paired_with_each_other(turned, shift, size):
+    """All triangles around a corner are at the distance 0, and all heights are 0: the vertex's normal decides."""
+    mesh = sp.shapes.box((0.5 * size, 0.1 * size, 0.1 * size), (5, 3, 3))
+    R = rotation_matrix(turned)
+    bodies = [
+        sp.Body(name, mesh, SOFT, position=R @ [x * size, 0, 0] + shift, rotation=turned)
+        for name, x in (("a", 0.25), ("b", 0.75))
+    ]
+    (part,) = sp.Scene(bodies, stitches=[soft("a", "b", max_distance=1e-6 * size)]).stitching.ranges
+    assert len(part.pairs.rows) == 16
+    end = mesh.vertices[:, 0] < -0.2499 * size
+    assert end[mesh.surface.triangles[part.pairs.rows]].all()
+
+
+def test_the_default_distance_is_a_hundredth_of_the_mean_edge():
+    for scale in (1.0, 0.03):
+        box = sp.shapes.box((0.2 * scale, 0.2 * scale, 0.2 * scale), (2, 2, 2))
+        bodies = [sp.Body("low", box, SOFT), sp.Body("high", box, SOFT, position=(0, 0.2 * scale, 0))]
+        tets = sp.Scene(bodies, stitches=[soft(max_distance=1e-6 * scale)]).stitching.tets
+        assert tets.offset.all()
+        heights = 3.0 * tets.rest_volumes / (0.5 * (0.1 * scale) ** 2)
+        of_triangle = 0.1 * scale * (2 + np.sqrt(2)) / 3
+        assert heights.max() == pytest.approx(0.01 * of_triangle, rel=1e-9)
+        # At some vertices of the upper box the mean edge is shorter.
+        assert heights.min() >= 0.01 * 0.1 * scale
+
+
+def test_the_default_distance_to_a_large_triangle_is_that_of_the_fine_mesh():
+    sheet = sp.TriangleObstacle(name="sheet", surface=SHEET)
+    tets = scene(soft("low", "sheet", max_distance=1e-6), obstacles=[sheet]).stitching.tets
+    assert tets.offset.all()
+    assert (3.0 * tets.rest_volumes / 2.0).max() <= 0.01 * 0.1 * np.sqrt(2)
+
+
 def test_all_in_reach_are_more():
     pairs = scene(soft(max_distance=0.0101, pairing="all")).stitching.ranges[0].pairs
     top = np.flatnonzero(np.all(BOX.vertices[BOX.surface.triangles][:, :, 1] > 0.099, axis=1))

@@ -1,4 +1,4 @@
-"""What a recording keeps of stitches: what holds on to what, so that they can be drawn, and how much energy they store."""
+"""What a recording contains about stitches: what they join, so that they can be drawn, and the laws of their energy."""
 
 from __future__ import annotations
 

@@ -30,6 +30,23 @@ class Side:
     edges: NDArray[np.int32]
     surface_vertices: NDArray[np.int32]
 
+    def vertex_normals(self) -> NDArray[np.float64]:
+        """(n, 3) outward unit normals: area-weighted means of the triangles around each vertex; zero inside."""
+        a, b, c = self.points[self.triangles].transpose(1, 0, 2)
+        doubled = np.repeat(np.cross(b - a, c - a), 3, axis=0)
+        out = np.zeros_like(self.points)
+        np.add.at(out, self.triangles.ravel(), doubled)
+        lengths = np.linalg.norm(out, axis=1)
+        return out / np.where(lengths > 0.0, lengths, 1.0)[:, None]
+
+    def mean_edges(self) -> NDArray[np.float64]:
+        """(n,) mean length of the surface's edges at each vertex [m]; infinite inside."""
+        ends = self.edges.ravel()
+        lengths = np.linalg.norm(self.points[self.edges[:, 0]] - self.points[self.edges[:, 1]], axis=1)
+        counts = np.bincount(ends, minlength=len(self.points))
+        sums = np.bincount(ends, weights=np.repeat(lengths, 2), minlength=len(self.points))
+        return np.where(counts > 0, sums, np.inf) / np.maximum(counts, 1)
+
 
 def side_of(thing: Body | Obstacle) -> Side:
     """A body as the scene places it, or a triangle obstacle at time 0.

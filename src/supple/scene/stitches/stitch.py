@@ -31,8 +31,9 @@ class Stitch(ABC):
     second : name of what they are stitched to: another body, or else a TriangleObstacle, static or scripted
     pairs : (n, 2) vertex of the first body's mesh, and what of the second (its kind says)
     max_distance : for each vertex of the first body's surface up to this distance of the second's [m]
-    pairing : "closest", a vertex's nearest one; where several are equally near, the one that faces it most squarely,
-        and of these the one of lowest number; or "all" in reach
+    pairing : "closest", a vertex's nearest one; of several that are equally near, the one with the largest distance of
+        the vertex from its plane; of several with the same (0, where surfaces touch), the one whose normal is most
+        opposed to that of the vertex's own surface; and of these the one of lowest number; or "all" in reach
     damping : Kelvin-Voigt time of the stitches [s]
     name : stands in messages
     """
@@ -115,7 +116,8 @@ class Stitch(ABC):
         if self.pairing == "all":
             queries, rows, distances = tree.all_within(points, self.max_distance)
         else:
-            rows, distances = tree.nearest(points, self.max_distance)
+            normals = first.vertex_normals()[first.surface_vertices]
+            rows, distances = tree.nearest(points, self.max_distance, normals)
             queries = np.flatnonzero(rows >= 0)
             rows, distances = rows[queries], distances[queries]
         if len(rows) == 0:

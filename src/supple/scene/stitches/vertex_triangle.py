@@ -16,6 +16,10 @@ from supple.scene.stitches.elements import Pairs, StitchTets
 from supple.scene.stitches.side import Side
 from supple.scene.stitches.stitch import Stitch
 
+# Of the mean edge at a pair: the default rest distance. Two half bars, joined by stitches as stiff as they are, then bend
+# 0.2 % further than one bar (docs/stitches.md).
+_DISTANCE_SHARE = 0.01
+
 _MODULI = {"mu": "Pa", "lam": "Pa", "youngs": "Pa", "poisson": "-"}
 
 
@@ -36,7 +40,8 @@ class SoftVertexTriangleStitch(Stitch):
     ----------
     mu, lam : as they stand in psi [Pa]; or
     youngs, poisson : Young's modulus [Pa] and Poisson's ratio, from which mu and lam are the Lamé parameters.
-    min_separate_distance : d [m]
+    min_separate_distance : d [m]; None: a hundredth of the mean edge of the pair's triangle, or of the mean
+        edge of the first surface at the vertex, whichever is shorter
 
     Each is one number, or one for each pair.
 
@@ -51,7 +56,7 @@ class SoftVertexTriangleStitch(Stitch):
     lam: float | NDArray[np.float64] | None = field(default=None, kw_only=True)
     youngs: float | NDArray[np.float64] | None = field(default=None, kw_only=True)
     poisson: float | NDArray[np.float64] | None = field(default=None, kw_only=True)
-    min_separate_distance: float | NDArray[np.float64] = field(default=1e-3, kw_only=True)
+    min_separate_distance: float | NDArray[np.float64] | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -72,8 +77,9 @@ class SoftVertexTriangleStitch(Stitch):
         else:
             said = " and ".join(given) or "neither"
             raise SceneError(f"{self.label}: give mu and lam, or youngs and poisson (given: {said})")
-        distance = self.checked_numbers(self.min_separate_distance, "min_separate_distance", "m")
-        object.__setattr__(self, "min_separate_distance", distance)
+        if self.min_separate_distance is not None:
+            distance = self.checked_numbers(self.min_separate_distance, "min_separate_distance", "m")
+            object.__setattr__(self, "min_separate_distance", distance)
 
     def _converted(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """mu and lam of youngs and poisson."""
@@ -123,20 +129,24 @@ class SoftVertexTriangleStitch(Stitch):
         """
         count = len(pairs.vertices)
         corners = second.triangles[pairs.rows]
-        d = self.per_pair(self.min_separate_distance, count, "min_separate_distance")
         for key in ("youngs", "poisson"):
             if getattr(self, key) is not None:
                 self.per_pair(getattr(self, key), count, key)
         x0, (x1, x2, x3) = first.points[pairs.vertices], second.points[corners].transpose(1, 0, 2)
         n = np.cross(x2 - x1, x3 - x1)
         length = np.linalg.norm(n, axis=1)
-        flat = np.flatnonzero(~(length > 1e-12 * _longest_edge(x1, x2, x3) ** 2))
+        edges = np.linalg.norm([x2 - x1, x3 - x2, x1 - x3], axis=2)
+        flat = np.flatnonzero(~(length > 1e-12 * edges.max(axis=0) ** 2))
         if len(flat):
             raise SceneError(
                 f"{self.label}: triangle {pairs.rows[flat[0]]} of {second.label} has no area, so that nothing can be "
                 "stitched to it; mend the mesh"
             )
         n /= length[:, None]
+        chosen = self.min_separate_distance
+        if chosen is None:
+            chosen = _DISTANCE_SHARE * np.minimum(edges.mean(axis=0), first.mean_edges()[pairs.vertices])
+        d = self.per_pair(chosen, count, "min_separate_distance")
         s = np.einsum("ij,ij->i", n, x0 - x1)
         # Faces that touch are at 0, on the side +1, whatever the sign that round-off gives it.
         round_off = 8.0 * np.finfo(np.float64).eps * np.max(np.abs([x0, x1, x2, x3]), axis=(0, 2))
@@ -163,10 +173,6 @@ class SoftVertexTriangleStitch(Stitch):
             damping=np.full(count, self.damping),
             offset=near,
         )
-
-
-def _longest_edge(a: NDArray, b: NDArray, c: NDArray) -> NDArray[np.float64]:
-    return np.max([np.linalg.norm(b - a, axis=1), np.linalg.norm(c - b, axis=1), np.linalg.norm(a - c, axis=1)], axis=0)
 
 
 def _same_count(stitch: SoftVertexTriangleStitch, one: str, other: str) -> None:

@@ -42,7 +42,10 @@ class SoftVertexTriangleModel(_StitchModel):
     poisson: PerPair | None = Field(default=None, description="Poisson's ratio, below 0.5; one, or one per pair")
     mu: PerPair | None = Field(default=None, description="instead: as it stands in the energy [Pa]")
     lam: PerPair | None = Field(default=None, description="as it stands in the energy [Pa]")
-    min_separate_distance: PerPair = Field(default=1e-3, description="least distance at rest [m]; one, or one per pair")
+    min_separate_distance: PerPair | None = Field(
+        default=None,
+        description="least distance at rest [m]; one, or one per pair; null: 1 % of the mean edge",
+    )
 
     def build(self) -> Stitch:
         return SoftVertexTriangleStitch(**self.shared())

@@ -117,7 +117,7 @@ class Spin(FrameCheck):
 
 
 class Energy(FrameCheck):
-    """Kinetic, elastic, stitch and potential energy together never exceed those at the start, where nothing does work."""
+    """The sum of kinetic, elastic, stitch and potential energy does not grow where nothing does work."""
 
     name = "energy"
 
