@@ -11,6 +11,7 @@ import numpy as np
 from supple.errors import SolverError
 from supple.implicit.contact.build import contact_model
 from supple.implicit.contact.settings import IPCContact
+from supple.implicit.contact.threads import one_contact_thread
 from supple.implicit.energies.damping import viscosity_of
 from supple.implicit.energies.elasticity import elasticity_of
 from supple.implicit.energies.potential import HessianBlocks
@@ -134,6 +135,7 @@ class Implicit(Solver):
             damped,
         )
 
+    @one_contact_thread()
     def step(self, system: System, state: State, dt: float, workspace: Workspace) -> tuple[State, StepReport]:
         """Advance by dt, in as many substeps as it takes; see `Solver.step`.
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.collision_mesh.contact_surface import ContactSurface
+from supple.numerics.geometry.triangle_crossings import crossing_triangles
 
 if TYPE_CHECKING:
     import ipctk
@@ -101,14 +102,17 @@ class Collisions:
         return float(np.sqrt(found.compute_minimum_distance(self.surface.mesh, self.points(x))))
 
     def intersect(self, x: NDArray[np.float64]) -> bool:
-        """Whether any two triangles cross at x; False where that cannot be known, since sewn ones touch anyway."""
+        """Whether any two triangles that may not cross do so at x."""
         import ipctk
 
-        stitched = self.surface.stitched
-        if stitched is not None and stitched.touches:
-            return False
-        mesh = self.surface.mesh if stitched is None else stitched.without_neighbours
-        return bool(ipctk.has_intersections(mesh, self.points(x)))
+        surface, points = self.surface, self.points(x)
+        if surface.stitched is None:
+            return bool(ipctk.has_intersections(surface.mesh, points))
+        # The library's test leaves out pairs of vertices only, and counts seams, whose sides touch.
+        faces = np.ascontiguousarray(surface.mesh.faces)
+        points = np.ascontiguousarray(points)
+        pairs, _ = crossing_triangles(points, faces, surface.owner[faces[:, 0]], surface.collide)
+        return len(surface.stitched.exclude(pairs, len(faces))) > 0
 
     def _look(self, begin: NDArray[np.float64], end: NDArray[np.float64]) -> None:
         import ipctk

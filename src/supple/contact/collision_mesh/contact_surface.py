@@ -31,6 +31,7 @@ class ContactSurface:
     owner : (s + k,) which body, or len(bodies) + which obstacle, each belongs to
     areas : (s,) a third of the adjacent triangles' area at rest [m^2]
     body_count : how many of the owners are bodies; names : of all owners
+    collide : (p, p) which owners may touch
     stitched : what of the mesh does not collide because it is stitched together
     """
 
@@ -41,6 +42,7 @@ class ContactSurface:
     areas: NDArray[np.float64]
     body_count: int
     names: tuple[str, ...]
+    collide: NDArray[np.bool_]
     stitched: StitchedContacts | None
 
     def points(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -99,11 +101,6 @@ def contact_surface(
     """
     import ipctk
 
-    # With several threads the library finds contacts in an order, and rounds its sums in a way, that differs from run
-    # to run; with one, the same scene gives the same bits.
-    ipctk.set_num_threads(1)
-    # It writes warnings to standard output, where they say nothing to a user.
-    ipctk.set_logger_level(ipctk.LoggerLevel.error)
     parts = [system.triangles] + [part.triangles for part in obstacles if not part.is_plane]
     triangles = np.concatenate(parts)
     vertices = np.unique(triangles).astype(np.int32)
@@ -131,7 +128,9 @@ def contact_surface(
     nodes = np.append(number, -1)[system.stitching.nodes()]
     stitched = StitchedContacts.of(mesh, nodes, owner, np.asfortranarray(start[vertices]))
     names = tuple(part.name for part in system.bodies) + tuple(str(o.name) for o in system.obstacles)
-    return ContactSurface(mesh, vertices, middles, owner, areas.astype(np.float64), len(system.bodies), names, stitched)
+    return ContactSurface(
+        mesh, vertices, middles, owner, areas.astype(np.float64), len(system.bodies), names, collide, stitched
+    )
 
 
 def _filter(owner: NDArray[np.int32], body_count: int, collide: NDArray[np.bool_]) -> ipctk.CollisionFilter:

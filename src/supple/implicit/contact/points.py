@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 from supple.contact_points import ContactPoints
 from supple.implicit.contact.half_spaces import barrier_terms
 from supple.implicit.contact.model import Barriers, ContactModel
+from supple.implicit.contact.threads import one_contact_thread
 
 
+@one_contact_thread()
 def contact_points(model: ContactModel, barriers: Barriers, x: NDArray[np.float64], weight: float) -> ContactPoints:
     """All contacts at x (n, 3), obstacles' vertices included.
 

@@ -42,13 +42,15 @@ def stitched_edges(nodes: NDArray[np.integer], edges: NDArray[np.integer], n: in
     return both.row.astype(np.int64), both.col.astype(np.int64)
 
 
-def stitched_neighbours(nodes: NDArray[np.integer], edges: NDArray[np.integer], n: int) -> NDArray[np.int64]:
-    """(q, 2) pairs of vertices: a stitched one, or its neighbour along an edge, with what the first is stitched to."""
+def stitched_crossings(nodes: NDArray[np.integer], triangles: NDArray[np.integer], n: int) -> csr_array:
+    """(t, t) non-zero for the triangles around a stitched vertex with those that hold all that it is stitched to."""
     vertex, held = _ends(nodes, n)
-    ends = _incidence(edges, n)
-    near = _ones(_ones(vertex @ ends.T) @ ends + vertex)
-    pairs = (near.T @ held).tocoo()
-    return np.column_stack([pairs.row, pairs.col]).astype(np.int64)
+    corners = _incidence(triangles, n)
+    whole = (held @ corners.T).tocoo()
+    inside = whole.data == held.sum(axis=1)[whole.row]
+    rows, columns = whole.row[inside], whole.col[inside]
+    partners = csr_array((np.ones(len(rows), dtype=np.int32), (rows, columns)), shape=whole.shape)
+    return csr_array((vertex @ corners.T).T @ partners)
 
 
 def _ends(nodes: NDArray[np.integer], n: int) -> tuple[csr_array, csr_array]:

@@ -16,8 +16,8 @@ from supple.scene.stitches.elements import Pairs, StitchTets
 from supple.scene.stitches.side import Side
 from supple.scene.stitches.stitch import Stitch
 
-# Of the mean edge at a pair: the default rest distance. Two half bars, joined by stitches as stiff as they are, then bend
-# 0.2 % further than one bar (docs/stitches.md).
+# The default rest distance, as a share of the mean edge at a pair. Two half bars, joined by stitches as stiff as they
+# are, then bend 0.3 % further than one bar (docs/stitches.md).
 _DISTANCE_SHARE = 0.01
 
 _MODULI = {"mu": "Pa", "lam": "Pa", "youngs": "Pa", "poisson": "-"}
