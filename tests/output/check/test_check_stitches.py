@@ -56,20 +56,20 @@ def test_energy_of_stitches_to_an_obstacle_is_counted(tmp_path):
     assert report["records"].worst < 1e-9
 
 
-def test_bodies_that_meet_beside_their_seam(tmp_path, spoilt):
+def test_bodies_that_meet_beside_their_seam(tmp_path, corrupted):
     path = recorded(tmp_path / "r.vtkhdf", stitched(0.0), sp.XPBD(substeps=20))
 
     def push_in(file, n):
         file[X][4 * n : 4 * n + n // 2] -= np.array([0, 0.06, 0])
 
-    assert failures(spoilt(path, push_in), only=["intersection"]) == {"intersection": 4}
+    assert failures(corrupted(path, push_in), only=["intersection"]) == {"intersection": 4}
 
 
-def test_energy_that_only_the_stitches_have(seam, spoilt):
+def test_energy_that_only_the_stitches_have(seam, corrupted):
     def pull_apart(file, n):
         file[X][4 * n : 4 * n + n // 2] += np.array([0, 0.05, 0])
 
-    assert failures(spoilt(seam, pull_apart), only=["energy", "records"]) == {"energy": 4, "records": 4}
+    assert failures(corrupted(seam, pull_apart), only=["energy", "records"]) == {"energy": 4, "records": 4}
 
 
 @dataclass(frozen=True)
@@ -89,19 +89,19 @@ def test_energy_that_an_integrator_makes(tmp_path, gap):
     assert "energy" in failures(path)
 
 
-def test_a_stitch_energy_that_was_changed(seam, spoilt):
+def test_a_stitch_energy_that_was_changed(seam, corrupted):
     def change(file, n):
         file["supple/frames/stitch_energy"][2] *= 1.0 + 1e-5
 
-    assert failures(spoilt(seam, change)) == {"records": 2}
+    assert failures(corrupted(seam, change)) == {"records": 2}
 
 
-def test_a_recording_without_the_laws_of_stitches(seam, spoilt):
+def test_a_recording_without_the_laws_of_stitches(seam, corrupted):
     def age(file, n):
         for name in ("moduli", "springs", "rest_shape_inverse"):
             del file[f"supple/stitches/{name}"]
 
-    report = sp.check_recording(spoilt(seam, age))
+    report = sp.check_recording(corrupted(seam, age))
     assert report.ok
     assert str(report["energy"].verdict) == "skipped"
-    assert "older version" in report["energy"].said
+    assert "older version" in report["energy"].message

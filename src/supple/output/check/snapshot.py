@@ -1,4 +1,4 @@
-"""One frame of a recording as the checks see it: read once, and measured once."""
+"""One frame of a recording as the checks use it: read once, and measured once."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _MOST_PAIRS = 1000
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What does not change from frame to frame.
+    """The data that all frames share.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class Scene:
 
     @cached_property
     def rest_inverse(self) -> NDArray[np.float64]:
-        """(m, 3, 3) Dm^-1 [1/m]; not a number where a tet is flat at rest."""
+        """(m, 3, 3) Dm^-1 [1/m]; NaN where a tet is flat at rest."""
         return _inverses(edge_vectors(self.recording.rest_positions, self.recording.tets))
 
     @cached_property
@@ -49,7 +49,7 @@ class Scene:
 
     @cached_property
     def stiffness_scale(self) -> float:
-        """An energy [J] that round-off of the elastic energy is told by."""
+        """An energy [J] that round-off of the elastic energy is measured by."""
         return stiffness_scale(self.recording)
 
     @cached_property
@@ -71,7 +71,7 @@ class Snapshot:
 
     Attributes
     ----------
-    scene : what it belongs to; number, time : of the frame, [s]
+    scene : of the frame; number, time : of the frame, [s]
     positions, velocities : (n, 3) [m], [m/s]; det_F : (m,) as recorded; poses : (obstacles, 3, 4)
     """
 
@@ -90,7 +90,7 @@ class Snapshot:
 
     @cached_property
     def finite(self) -> bool:
-        """Whether positions, velocities and poses are numbers to compute with."""
+        """Whether positions, velocities and poses are finite."""
         return all(bool(np.isfinite(values).all()) for values in (self.positions, self.velocities, self.poses))
 
     @cached_property
@@ -111,7 +111,7 @@ class Snapshot:
 
     @cached_property
     def elastic_energy(self) -> float | None:
-        """[J], zero at rest; None where the recording does not tell the law of a body."""
+        """[J], zero at rest; None where the recording does not contain the law of a body."""
         return elastic_energy(self.scene.recording, self.positions, self.J, self.scene.rest_inverse)
 
     @cached_property
@@ -126,7 +126,7 @@ class Snapshot:
 
     @cached_property
     def tree(self) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray, NDArray]:
-        """The boxes around the triangles, and a tree of them: what `meeting_pairs` wants last."""
+        """The boxes around the triangles, and the tree over them: the last arguments of `meeting_pairs`."""
         low, high = triangle_boxes(self.points, self.scene.surfaces.triangles)
         return (low, high, *build_tree(low, high))
 

@@ -37,7 +37,7 @@ class Piece:
 
 @dataclass(frozen=True, eq=False)
 class Surfaces:
-    """What may meet what.
+    """All surfaces, and which of them must stay apart.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class Surfaces:
 
 
 def moved(points: NDArray[np.float64], pose: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Points (k, 3), given at time 0, under a pose (3, 4); untouched, to the last bit, where nothing moves."""
+    """Points (k, 3) of time 0 under a pose (3, 4); the same bits where the pose is the identity."""
     R, t = pose[:, :3], pose[:, 3]
     if np.array_equal(R, np.eye(3)) and not t.any():
         return points
@@ -93,7 +93,7 @@ def moved(points: NDArray[np.float64], pose: NDArray[np.float64]) -> NDArray[np.
 
 
 def is_mesh(obstacle: RecordedObstacle) -> bool:
-    """Whether an obstacle is checked as triangles; others, by their formula."""
+    """Whether an obstacle is checked as triangles; others are checked by their formula."""
     return obstacle.kind == "TriangleObstacle" or (
         obstacle.kind == "Box" and not obstacle.parameters.get("inside", False)
     )
@@ -149,7 +149,7 @@ def _mesh_of(obstacle: RecordedObstacle) -> tuple[NDArray[np.float64], NDArray[n
 
 
 def _allowed(recording: Recording, bodies: int, owners: int) -> NDArray[np.bool_]:
-    """(p, p): what must stay apart: not obstacles from each other, nor what the scene excludes."""
+    """(p, p) which owners must stay apart: all but two obstacles, and pairs that the scene excludes."""
     is_body = np.arange(owners) < bodies
     allowed = is_body[:, None] | is_body[None, :]
     for i, j in recording.untouching.pairs:
@@ -188,7 +188,7 @@ def _ignored_keys(stitched: NDArray[np.int64], triangles: NDArray[np.int64]) -> 
 def _pieces(
     recording: Recording, triangles: NDArray[np.int64], owners: NDArray[np.int64], points: int
 ) -> tuple[Piece, ...]:
-    """Bodies fall apart along their tets, so that a cavity belongs to its piece; obstacles along triangles."""
+    """Pieces of bodies are connected by tets, so that a cavity belongs to its piece; those of obstacles by triangles."""
     tets = recording.tets.astype(np.int64)
     parts = [tets[:, [0, k]] for k in (1, 2, 3)] + [triangles[:, [0, 1]], triangles[:, [1, 2]]]
     ends = np.concatenate(parts)
@@ -204,6 +204,6 @@ def _pieces(
 
 
 def _is_closed(triangles: NDArray[np.int64]) -> bool:
-    """Whether every side belongs to an even number of triangles: a ray's crossings tell the inside then."""
+    """Whether every side belongs to an even number of triangles: crossings of a ray then determine the inside."""
     sides = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
     return bool((np.unique(sides, axis=0, return_counts=True)[1] % 2 == 0).all())

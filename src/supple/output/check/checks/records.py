@@ -1,4 +1,4 @@
-"""Whether what was measured when a frame was recorded is what its positions and velocities give."""
+"""Compares recorded measures with those of the recorded positions and velocities."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from supple.output.check.settings import CheckSettings
 from supple.output.check.snapshot import Scene, Snapshot, edge_vectors
 from supple.output.check.tally import Tally
 
-# Of the natural size of each quantity; both sides are computed in double precision.
+# Allowed difference, as a share of the natural size of each quantity; both sides are computed in double precision.
 _SAME = 1e-9
 _NOTHING = 1e-300
 
@@ -28,7 +28,7 @@ class Records(FrameCheck):
         self._inverse_sizes = np.linalg.norm(scene.rest_inverse, axis=(1, 2))
 
     def see(self, at: Snapshot) -> None:
-        # What is not a number is told by another check.
+        # Another check finds numbers that are not finite.
         differences = [(value, where) for value, where in self._differences(at) if np.isfinite(value)]
         value, where = max(differences, default=(0.0, ""))
         self._tally.see(at, value, value > _SAME, where)
