@@ -63,5 +63,5 @@ class Workspace:
                 velocities=np.concatenate([state.velocities, np.zeros_like(there)]),
             )
         if not known:
-            self.contact.refuse_intersecting(state.positions, state.time)
+            self.contact.raise_if_intersecting(state.positions, state.time)
         return state

@@ -139,7 +139,7 @@ def test_a_body_in_an_obstacle_that_is_a_formula(around, corrupted, name):
     assert found.worst < 0.0
 
 
-def test_just_over_the_floor_and_just_past_the_moving_door_is_fine(around, corrupted):
+def test_a_body_just_above_the_floor_and_just_beside_the_moving_door_passes(around, corrupted):
     assert failures(corrupted(around, move_to([-0.5, 1e-12, -0.5])), only=["obstacles", "distance"]) == {}
     door = -2.0 - 0.5 * 3 / 60
     assert failures(corrupted(around, move_to([door + 1e-9, 1.0, 0.0])), only=["obstacles"]) == {}
@@ -188,7 +188,7 @@ def test_contact_that_never_intersects_passes(tmp_path):
     assert report["distance"].frame > 0
 
 
-def test_what_the_scene_lets_touch_is_recorded(tmp_path):
+def test_excluded_and_stitched_pairs_are_recorded(tmp_path):
     cube = sp.shapes.box((1, 1, 1), (1, 1, 1))
     rock = octahedron((0.5, 0.5, 2.5), 1.0)
     scene = sp.Scene(

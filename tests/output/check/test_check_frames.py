@@ -31,20 +31,20 @@ def nan_mass(file, n):
     ("change", "frame"),
     [(nan_position, 3), (nan_velocity, 2), (nan_report, 5), (nan_determinant, 1)],
 )
-def test_one_number_that_is_none(free, corrupted, change, frame):
+def test_one_number_that_is_not_finite(free, corrupted, change, frame):
     path = corrupted(free, change)
     assert failures(path) == {"finite": frame}
     assert sp.check_recording(path)["finite"].failed_frames == 1
 
 
-def test_a_mass_that_is_no_number(free, corrupted):
+def test_a_mass_that_is_not_finite(free, corrupted):
     report = sp.check_recording(corrupted(free, nan_mass))
     assert report["finite"].verdict == "fail"
     assert report["finite"].where == "masses"
     assert {result.verdict for result in report.results if result.name != "finite"} == {"skipped"}
 
 
-def test_no_frame_that_can_be_computed_with(free, corrupted):
+def test_no_frame_is_finite(free, corrupted):
     def change(file, n):
         file[X][:] = np.nan
 
@@ -57,7 +57,7 @@ def test_no_frame_that_can_be_computed_with(free, corrupted):
     }
 
 
-def test_names_say_where(free, corrupted):
+def test_results_name_the_place(free, corrupted):
     report = sp.check_recording(corrupted(free, nan_position))
     assert report["finite"].message == "not finite: 1 number (position of vertex 4 of left); in 1 frame, first 3"
     assert (report["finite"].frame, report["finite"].time) == (3, pytest.approx(3 / 60))
@@ -130,7 +130,7 @@ def repeat(file, n, source, target, *, but=()):
             data[target] = data[source]
 
 
-def test_a_frame_twice(free, corrupted):
+def test_a_repeated_frame(free, corrupted):
     found = failures(corrupted(free, lambda file, n: repeat(file, n, 3, 4)))
     assert found == {"sequence": 4}
     report = sp.check_recording(corrupted(free, lambda file, n: repeat(file, n, 3, 4, but=("time", "index"))))
@@ -138,7 +138,7 @@ def test_a_frame_twice(free, corrupted):
     assert {result.name: result.first_failure for result in report.failures} == {"sequence": 4, "momentum": 4}
 
 
-def test_a_frame_left_out(free, corrupted):
+def test_a_missing_frame(free, corrupted):
     def change(file, n):
         file["supple/frames/index"][4:] = file["supple/frames/index"][4:] + 1
 
@@ -153,7 +153,7 @@ def landing(folder):
 
 
 def test_frames_in_another_order(landing, corrupted):
-    """All that stands in a frame is true, but its time."""
+    """Everything in the frames is correct except their times."""
 
     def change(file, n):
         copies = {k: [data[k * rows : (k + 1) * rows] for data, rows in parts(file, n)] for k in (1, 2)}

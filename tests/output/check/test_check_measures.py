@@ -1,4 +1,4 @@
-"""Momentum, spin and energy out of nowhere; measures that do not fit what was recorded."""
+"""Momentum, spin and energy without a cause; measures that differ from the recorded states."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ def consistently(file, n, frame, velocities):
     file["supple/frames/angular_momentum"][frame] = m @ np.cross(x - center, velocities - P / m.sum())
 
 
-def test_momentum_out_of_nowhere(free, corrupted):
+def test_momentum_without_a_force(free, corrupted):
     def push(file, n):
         consistently(file, n, 6, file[V][6 * n : 7 * n] + np.array([1e-4, 0, 0]))
 
     assert failures(corrupted(free, push)) == {"momentum": 6}
 
 
-def test_spin_out_of_nowhere(free, corrupted):
+def test_spin_without_a_torque(free, corrupted):
     def turn(file, n):
         x, v = file[X][6 * n : 7 * n], file[V][6 * n : 7 * n]
         m = file["supple/masses"][:]
@@ -36,7 +36,7 @@ def test_spin_out_of_nowhere(free, corrupted):
     assert failures(corrupted(free, turn)) == {"spin": 6}
 
 
-def test_energy_out_of_nowhere(free, corrupted):
+def test_energy_without_work(free, corrupted):
     def stir(file, n):
         rng = np.random.default_rng(2)
         consistently(file, n, 4, file[V][4 * n : 5 * n] + rng.normal(scale=2.0, size=(n, 3)))

@@ -1,4 +1,4 @@
-"""Contacts that are none, because their two sides are stitched together."""
+"""Excludes contacts between parts that are stitched to each other."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     import ipctk
 
 
-# Of the mean edge: what is nearer than that at the start touches.
+# Parts that are nearer than this share of the mean edge at the start touch.
 _TOUCHING = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class StitchedContacts:
+class StitchFilter:
     """Pairs that the library's own filters cannot exclude: those filters know pairs of vertices only.
 
     Excluded are pairs that are stitched to each other. Excluded are also pairs with a stitched vertex that touch at the
@@ -46,7 +46,7 @@ class StitchedContacts:
         nodes: NDArray[np.int32],
         owner: NDArray[np.int32],
         start: NDArray[np.float64],
-    ) -> StitchedContacts | None:
+    ) -> StitchFilter | None:
         """Of stitches with nodes (k, 4) in the mesh's numbers, -1 for none; None where there are no stitches.
 
         Parameters
@@ -72,7 +72,7 @@ class StitchedContacts:
         return pairs[~np.isin(codes, self.crossing)]
 
     def drop_from(self, candidates: ipctk.Candidates) -> None:
-        """Take the stitched ones out of what the broad phase has found."""
+        """Remove excluded pairs from the result of the broad phase."""
         s, e = self.sizes
         faces = candidates.fv_candidates
         codes = np.fromiter((c.face_id * s + c.vertex_id for c in faces), dtype=np.int64, count=len(faces))
@@ -107,7 +107,7 @@ def _touching(
 
     ends = start[mesh.edges]
     reach = _TOUCHING * float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean())
-    sewn = set(nodes[nodes >= 0].tolist())
+    stitched = set(nodes[nodes >= 0].tolist())
     joined = {(owner[v], owner[w]) for v, *others in nodes.tolist() for w in others if v >= 0 and w >= 0}
     joined |= {(b, a) for a, b in joined}
     candidates = ipctk.Candidates()
@@ -117,7 +117,7 @@ def _touching(
     def touch(candidate: ipctk.CollisionStencil, one: list[int], two: list[int]) -> bool:
         return (
             (owner[one[0]], owner[two[0]]) in joined
-            and not sewn.isdisjoint((*one, *two))
+            and not stitched.isdisjoint((*one, *two))
             and candidate.compute_distance(start, mesh.edges, mesh.faces) < reach * reach
         )
 

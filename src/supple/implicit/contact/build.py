@@ -1,4 +1,4 @@
-"""Makes the contact model of a system."""
+"""Builds the contact model of a system."""
 
 from __future__ import annotations
 
@@ -64,6 +64,6 @@ def _contact_model(system: System, settings: IPCContact, shear_moduli: NDArray[n
 
 
 def _gap(planes: Planes, x: NDArray[np.float64]) -> float:
-    """The smallest distance from a plane in front of it [m]; what is behind one is refused later."""
+    """The smallest distance of a vertex in front of a plane [m]; those behind one are an error that is found later."""
     distances, _ = planes.distances(x)
     return float(distances[distances > 0.0].min(initial=np.inf))

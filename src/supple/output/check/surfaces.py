@@ -188,7 +188,7 @@ def _ignored_keys(stitched: NDArray[np.int64], triangles: NDArray[np.int64]) -> 
 def _pieces(
     recording: Recording, triangles: NDArray[np.int64], owners: NDArray[np.int64], points: int
 ) -> tuple[Piece, ...]:
-    """Pieces of bodies are connected by tets, so that a cavity belongs to its piece; those of obstacles by triangles."""
+    """Pieces of bodies are connected by tets, so that cavities belong to them; those of obstacles by triangles."""
     tets = recording.tets.astype(np.int64)
     parts = [tets[:, [0, k]] for k in (1, 2, 3)] + [triangles[:, [0, 1]], triangles[:, [1, 2]]]
     ends = np.concatenate(parts)

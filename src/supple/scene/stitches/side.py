@@ -1,4 +1,4 @@
-"""What a stitch sees of the two things that it joins: a body, or a triangle obstacle, where it is at time 0."""
+"""The two things that a stitch joins, each a body or a triangle obstacle, where they are at time 0."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from supple.scene.obstacles import Obstacle, TriangleObstacle
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """One of the two.
+    """One of the two things.
 
     Attributes
     ----------
-    label : how messages call it
-    points : (n, 3) all its vertices in the world [m]
+    label : its name in messages
+    points : (n, 3) of all its vertices, in world coordinates [m]
     triangles : (t, 3) of its surface; edges : (e, 2) of its surface, sorted; surface_vertices : (s,)
     """
 
@@ -58,7 +58,7 @@ def side_of(thing: Body | Obstacle) -> Side:
     if isinstance(thing, Body):
         return _side(f"body {thing.name!r}", thing.mesh.surface, thing.place(thing.mesh.vertices))
     if not isinstance(thing, TriangleObstacle) or thing.surface is None:
-        raise SceneError(f"{thing.label} is a {type(thing).__name__}; stitches hold on to bodies and TriangleObstacles")
+        raise SceneError(f"{thing.label} is a {type(thing).__name__}; stitches join bodies and TriangleObstacles")
     R, t = thing.pose(0.0)
     return _side(thing.label, thing.surface, thing.surface.vertices @ R.T + t)
 

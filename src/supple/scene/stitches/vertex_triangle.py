@@ -38,7 +38,7 @@ class SoftVertexTriangleStitch(Stitch):
 
     Parameters
     ----------
-    mu, lam : as they stand in psi [Pa]; or
+    mu, lam : as in psi [Pa]; or
     youngs, poisson : Young's modulus [Pa] and Poisson's ratio, from which mu and lam are the Lamé parameters.
     min_separate_distance : d [m]; None: a hundredth of the mean edge of the pair's triangle, or of the mean
         edge of the first surface at the vertex, whichever is shorter
@@ -67,7 +67,7 @@ class SoftVertexTriangleStitch(Stitch):
             _same_count(self, "mu", "lam")
         elif given in (["youngs", "poisson"], list(_MODULI)):
             mu, lam = self._converted()
-            # All four are there where a stitch is made from another one by `dataclasses.replace`.
+            # All four are given where `dataclasses.replace` makes a stitch from another one.
             if len(given) == 4 and not (
                 np.array_equal(mu, np.asarray(self.mu)) and np.array_equal(lam, np.asarray(self.lam))
             ):
@@ -75,8 +75,8 @@ class SoftVertexTriangleStitch(Stitch):
             object.__setattr__(self, "mu", mu)
             object.__setattr__(self, "lam", lam)
         else:
-            said = " and ".join(given) or "neither"
-            raise SceneError(f"{self.label}: give mu and lam, or youngs and poisson (given: {said})")
+            named = " and ".join(given) or "neither"
+            raise SceneError(f"{self.label}: give mu and lam, or youngs and poisson (given: {named})")
         if self.min_separate_distance is not None:
             distance = self.checked_numbers(self.min_separate_distance, "min_separate_distance", "m")
             object.__setattr__(self, "min_separate_distance", distance)
@@ -121,11 +121,11 @@ class SoftVertexTriangleStitch(Stitch):
         return second.triangles
 
     def join(self, first: Side, second: Side, pairs: Pairs) -> StitchTets:
-        """See `Stitch`. A tet's triangle is turned where its volume would be negative: above it.
+        """See `Stitch`. Where the volume of a tet would be negative, two corners of its triangle change places.
 
         Raises
         ------
-        SceneError : where a triangle has no area, or a tet no height that round-off leaves.
+        SceneError : where a triangle has no area, or the height of a tet is lost in round-off.
         """
         count = len(pairs.vertices)
         corners = second.triangles[pairs.rows]
@@ -140,7 +140,7 @@ class SoftVertexTriangleStitch(Stitch):
         if len(flat):
             raise SceneError(
                 f"{self.label}: triangle {pairs.rows[flat[0]]} of {second.label} has no area, so that nothing can be "
-                "stitched to it; mend the mesh"
+                "stitched to it; repair the mesh"
             )
         n /= length[:, None]
         chosen = self.min_separate_distance
@@ -148,7 +148,7 @@ class SoftVertexTriangleStitch(Stitch):
             chosen = _DISTANCE_SHARE * np.minimum(edges.mean(axis=0), first.mean_edges()[pairs.vertices])
         d = self.per_pair(chosen, count, "min_separate_distance")
         s = np.einsum("ij,ij->i", n, x0 - x1)
-        # Faces that touch are at 0, on the side +1, whatever the sign that round-off gives it.
+        # Faces that touch count as height 0, on the side +1, also where round-off gives another sign.
         round_off = 8.0 * np.finfo(np.float64).eps * np.max(np.abs([x0, x1, x2, x3]), axis=(0, 2))
         above = s >= -round_off
         near = np.abs(s) < d - round_off

@@ -70,8 +70,9 @@ class Spin(FrameCheck):
     """Angular momentum about the center of mass, from frame to frame, where no other force acts.
 
     Implicit integrators conserve it only up to an error that falls with the step. With r' = r + h v' and forces without
-    a torque about r', backward Euler gives L' - L = h sum m (v' - v) x v, with velocities relative to the center of mass.
-    Others give terms of the same size: an implicit recording may change L by as much as h sum m |v' - v| (|v| + |v'|) in a step.
+    a torque about r', backward Euler gives L' - L = h sum m (v' - v) x v, velocities relative to the center of mass.
+    Others give terms of at most the same size. A recording of the implicit solver may change L by
+    h sum m |v' - v| (|v| + |v'|) in a step.
     """
 
     name = "spin"
@@ -83,7 +84,7 @@ class Spin(FrameCheck):
         self._why_not = external_action(recording)
         self._implicit = (recording.solver or "").startswith("Implicit")
         if self._why_not is None and self._implicit and settings.every > 1:
-            self._why_not = "an implicit integrator's own change is known from one frame to the next only"
+            self._why_not = "the error of an implicit integrator is known from one frame to the next only"
         self._last: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
         self._drift, self._scale = 0.0, 0.0
 
