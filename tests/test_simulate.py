@@ -153,13 +153,13 @@ def test_the_implicit_solver_checks_a_start_before_any_sink_begins(case):
 
 def test_a_start_is_checked_once(monkeypatch):
     checked = []
-    plain = ContactModel.refuse_intersecting
+    plain = ContactModel.raise_if_intersecting
 
     def check(self, x, time):
         checked.append(time)
         plain(self, x, time)
 
-    monkeypatch.setattr(ContactModel, "refuse_intersecting", check)
+    monkeypatch.setattr(ContactModel, "raise_if_intersecting", check)
     frames = list(sp.simulate(scene(), sp.Implicit(), 0.01, 3))
     assert [frame.report.status for frame in frames] == ["converged"] * 3
     assert checked == [0.0]

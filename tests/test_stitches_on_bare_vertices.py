@@ -31,7 +31,7 @@ def side(points, triangles=()):
     return Side("side", points, triangles, edges, np.arange(len(points), dtype=np.int32))
 
 
-def sewn(vertices, triangle, **stitch):
+def stitched_system(vertices, triangle, **stitch):
     """A System of the vertices [1 kg], then the triangle's, which are pinned; and where everything is."""
     described = sp.SoftVertexTriangleStitch("vertices", "triangle", youngs=1.2e5, poisson=0.49, **stitch)
     first, second = side(vertices), side(triangle, [[0, 1, 2]])
@@ -61,7 +61,7 @@ def sewn(vertices, triangle, **stitch):
 
 
 def by_newton(system, x, h=0.05, steps=200):
-    """Backward Euler, which loses energy; every position on the way."""
+    """Backward Euler, which loses energy; all positions."""
     linear = LinearSolver.of(system, "direct")
     hessian = HessianBlocks.zeros(0, len(x), len(system.stitching))
     tools = Tools(linear, hessian, system.pinned_vertices, FreeMotion.of(system))
@@ -69,15 +69,15 @@ def by_newton(system, x, h=0.05, steps=200):
     limits = StepLimits(InversionGuard(system, np.zeros(0, dtype=np.bool_), complete=True), None, tools.clock)
     stitches = StitchEnergy.of(system.stitching, 0.0)
     v = np.zeros_like(x)
-    way = [x]
+    path = [x]
     for _ in range(steps):
         objective = Objective([stitches, Inertia(system.masses, x + h * v, h * h)])
         outcome = minimize(Problem(objective, h * h, Convergence(1e-10, 1e-4), 60, 1.0), x, limits, tools)
         assert outcome.status is Status.CONVERGED, outcome.message
         v = (outcome.end.positions - x) / h
         x = outcome.end.positions
-        way.append(x)
-    return np.array(way)
+        path.append(x)
+    return np.array(path)
 
 
 def by_xpbd(system, x, h=1 / 1200, steps=12_000):
@@ -85,15 +85,15 @@ def by_xpbd(system, x, h=1 / 1200, steps=12_000):
     (constraints,) = stitch_constraints(system, w)
     assert constraints.damped
     points, v = np.column_stack([x, w]), np.zeros_like(x)
-    way = [x]
+    path = [x]
     for _ in range(steps):
         before = points[:, :3].copy()
         points[:, :3] += h * v
         constraints.damp(points, before, h, False)
         constraints.project(points, h, False)
         v = (points[:, :3] - before) / h
-        way.append(points[:, :3].copy())
-    return np.array(way)
+        path.append(points[:, :3].copy())
+    return np.array(path)
 
 
 SOLVERS = pytest.mark.parametrize(("solve", "damping"), [(by_newton, 0.0), (by_xpbd, 0.02)], ids=["implicit", "xpbd"])
@@ -102,27 +102,27 @@ SOLVERS = pytest.mark.parametrize(("solve", "damping"), [(by_newton, 0.0), (by_x
 @SOLVERS
 def test_a_vertex_in_the_plane_settles_at_the_separate_distance_along_the_normal(solve, damping):
     triangle = [(-0.5, 1, -0.5), (0.5, 1, -0.5), (-0.5, 1, 0.5)]  # its normal is -y
-    system, x, _ = sewn(
+    system, x, _ = stitched_system(
         [(0, 1, 0)], triangle, pairs=[[0, 0]], min_separate_distance=0.05, damping=damping, name="in plane"
     )
     assert system.stitching.tets.offset.all()
-    way = solve(system, x)
-    assert np.array_equal(way[:, 1:], np.broadcast_to(x[1:], way[:, 1:].shape))
-    assert np.abs(way[:, 0, [0, 2]]).max() < 1e-3
-    assert way[-1, 0, 1] == pytest.approx(0.95, abs=1e-3)
-    assert np.abs(way[-1] - way[-2]).max() < 1e-6, "it has settled"
+    path = solve(system, x)
+    assert np.array_equal(path[:, 1:], np.broadcast_to(x[1:], path[:, 1:].shape))
+    assert np.abs(path[:, 0, [0, 2]]).max() < 1e-3
+    assert path[-1, 0, 1] == pytest.approx(0.95, abs=1e-3)
+    assert np.abs(path[-1] - path[-2]).max() < 1e-6, "it has settled"
 
 
 @SOLVERS
 def test_three_of_four_stay_and_the_one_in_the_plane_settles_at_the_distance(solve, damping):
     triangle = [(0, 1, 0), (1, 1, 0), (0, 1, 1)]
     vertices = np.array([(0.25, 0.5, 0.25), (0.5, 0.7, 0.1), (0.1, 0.6, 0.5), (0.3, 1, 0.3)])
-    system, x, pairs = sewn(vertices, triangle, max_distance=1.0, min_separate_distance=0.1, damping=damping)
+    system, x, pairs = stitched_system(vertices, triangle, max_distance=1.0, min_separate_distance=0.1, damping=damping)
     assert pairs.vertices.tolist() == [0, 1, 2, 3]
     assert pairs.rows.tolist() == [0, 0, 0, 0]
     assert pairs.distances == pytest.approx([0.5, 0.3, 0.4, 0.0])
     assert system.stitching.tets.offset.tolist() == [False, False, False, True]
-    way = solve(system, x)
-    assert np.abs(way[:, :3] - vertices[:3]).max() < 1e-9
-    assert way[-1, 3] == pytest.approx([0.3, 0.9, 0.3], abs=1e-3)
-    assert np.abs(way[:, 3, [0, 2]] - 0.3).max() < 1e-3
+    path = solve(system, x)
+    assert np.abs(path[:, :3] - vertices[:3]).max() < 1e-9
+    assert path[-1, 3] == pytest.approx([0.3, 0.9, 0.3], abs=1e-3)
+    assert np.abs(path[:, 3, [0, 2]] - 0.3).max() < 1e-3

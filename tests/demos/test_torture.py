@@ -27,7 +27,7 @@ def assert_holds(demo, path):
         assert frame.report.min_det_F > 0.0
         assert frame.report.min_distance is None or frame.report.min_distance > 0.0
     checked = sp.check_recording(path)
-    assert [f"{result.name}: {result.said}" for result in checked.results if result.verdict is Verdict.FAIL] == []
+    assert [f"{result.name}: {result.message}" for result in checked.results if result.verdict is Verdict.FAIL] == []
     assert checked.ok
     assert checked["intersection"].verdict is Verdict.PASS
     assert checked["inversion"].verdict is Verdict.PASS

@@ -55,7 +55,7 @@ def test_linear_momentum_is_kept(integrator):
     assert np.abs(momenta - momenta[0]).max() < 1e-10 * np.linalg.norm(momenta[0])
 
 
-@pytest.mark.parametrize(("integrator", "order"), [("backward_euler", 1), ("bdf2", 2), ("newmark", 2)])
+@pytest.mark.parametrize(("integrator", "order"), [("backward_euler", 1), ("bdf2", 2)])
 def test_angular_momentum_error_falls_at_the_expected_order(integrator, order):
     body = cube(angular_velocity=(0, 4, 0), youngs=5e4)
     scene = sp.Scene([body], gravity=(0, 0, 0))
@@ -67,6 +67,15 @@ def test_angular_momentum_error_falls_at_the_expected_order(integrator, order):
     rate = np.log2(errors[0] / errors[2]) / 2
     assert rate > order - 0.25
     assert errors[-1] < 0.05 * np.linalg.norm(L0)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.02])
+def test_newmark_keeps_angular_momentum(damping):
+    body = cube(angular_velocity=(0, 4, 1), youngs=5e4, damping=damping)
+    scene = sp.Scene([body], gravity=(0, 0, 0))
+    L0 = angular_momentum_at_start(body)
+    for frame in run(scene, Implicit(integrator="newmark"), 1 / 60, 30):
+        assert np.linalg.norm(frame.report.angular_momentum - L0) < 1e-12 * np.linalg.norm(L0)
 
 
 def angular_momentum_at_start(body):

@@ -11,6 +11,7 @@ from supple.errors import SolverError
 from supple.implicit.contact.build import contact_model
 from supple.implicit.contact.points import forces_on_owners
 from supple.implicit.contact.settings import IPCContact
+from supple.implicit.contact.threads import one_contact_thread
 from supple.implicit.details import ImplicitDetails
 from supple.implicit.energies.damping import viscosity_of
 from supple.implicit.energies.elasticity import elasticity_of
@@ -45,7 +46,7 @@ class Implicit(Solver):
 
     Parameters
     ----------
-    integrator : "backward_euler", "bdf2", "newmark" (trapezoidal), "static", or an `Integrator`.
+    integrator : "backward_euler", "bdf2", "newmark" (midpoint), "static", or an `Integrator`.
     tolerance : Newton stops when no vertex's step is longer than this share of the (smallest) body's diagonal, per
         second of the step [1/s]; for "static", than this share of the diagonal [-]. None: 1e-3 1/s or 1e-9, and where
         there is contact no longer than a tenth of `dhat`, with friction than a hundredth of `friction_velocity`.
@@ -121,8 +122,8 @@ class Implicit(Solver):
                 elasticity = elasticity_of(system)
         elif system.obstacles:
             raise SolverError(
-                f"{system.obstacles[0].label}: with contact=None obstacles have no effect; give contact=IPCContact(), or "
-                "remove them"
+                f"{system.obstacles[0].label}: with contact=None obstacles have no effect; give contact=IPCContact(), "
+                "or remove them"
             )
         method = integrator_of(self.integrator)
         free_motion = FreeMotion.of(system)
@@ -166,7 +167,7 @@ class Implicit(Solver):
         """
         refuse_inverted(system, workspace.elasticity.material, state.positions)
         if workspace.contact is not None:
-            workspace.contact.refuse_intersecting(workspace.with_obstacles(state).positions, state.time)
+            workspace.contact.raise_if_intersecting(workspace.with_obstacles(state).positions, state.time)
         workspace.checked = state.positions
 
     def initial_details(self, system: System, workspace: Workspace) -> ImplicitDetails:
@@ -180,6 +181,7 @@ class Implicit(Solver):
             seconds=dict.fromkeys((*PARTS, "other"), 0.0),
         )
 
+    @one_contact_thread()
     def step(self, system: System, state: State, dt: float, workspace: Workspace) -> tuple[State, StepReport]:
         """Advance by dt, in as many substeps as it takes; see `Solver.step`.
 
@@ -226,7 +228,7 @@ class Implicit(Solver):
         details = ImplicitDetails.of_rows(rows, substeps)
         nearest, contacts = None, None
         if last is not None:
-            totals, by_vertex = reaction_forces(system, last.outcome.end.gradient)
+            totals, by_vertex = reaction_forces(system, last.outcome.end.gradient / last.contact.weight)
             details = replace(details, reaction_forces=totals, reaction_forces_by_vertex=by_vertex)
             details, nearest, contacts = last.contact.measured(details, last.state.positions)
         details = replace(details, seconds=workspace.tools.clock.shares())

@@ -1,10 +1,10 @@
-"""Squares cut evenly for contact: the surface stays what it is, and equal boxes above each other stay there."""
+"""Quads split for contact: the surface does not change, and equal boxes above each other stay there."""
 
 import numpy as np
 import pytest
 
 import supple as sp
-from supple.contact.collision_mesh.quad_split import cut_evenly
+from supple.contact.collision_mesh.quad_split import split_quads
 from supple.implicit.contact.barrier import Barrier
 from supple.implicit.contact.build import contact_model
 from supple.implicit.contact.settings import IPCContact
@@ -14,7 +14,7 @@ SIDE = 0.1
 
 
 def cut(points, faces):
-    return cut_evenly(points, faces, np.zeros(len(points), dtype=np.int32))
+    return split_quads(points, faces, np.zeros(len(points), dtype=np.int32))
 
 
 def areas(points, faces):
@@ -22,7 +22,7 @@ def areas(points, faces):
     return 0.5 * np.cross(b - a, c - a)
 
 
-def test_a_box_has_both_diagonals_in_every_square():
+def test_a_box_has_both_diagonals_in_every_quad():
     surface = sp.shapes.box((3.0, 2.0, 1.0), (3, 4, 2)).surface
     faces, diagonals = cut(surface.vertices, surface.triangles)
     squares = 2 * (3 * 4 + 4 * 2 + 2 * 3)
@@ -38,7 +38,7 @@ def test_a_box_has_both_diagonals_in_every_square():
     assert np.linalg.norm(areas(points, faces), axis=1).sum() == pytest.approx(22.0)
 
 
-def test_a_bent_surface_stays_where_it_is():
+def test_a_bent_surface_does_not_change():
     surface = sp.shapes.box((1.0, 1.0, 1.0), (3, 3, 3)).surface
     faces, diagonals = cut(surface.vertices, surface.triangles)
     bent = surface.vertices + 0.1 * np.sin(5.0 * surface.vertices[:, [1, 2, 0]])
@@ -47,7 +47,7 @@ def test_a_bent_surface_stays_where_it_is():
     assert np.linalg.norm(new, axis=1).sum() == pytest.approx(np.linalg.norm(old, axis=1).sum(), rel=1e-12)
 
 
-def test_what_is_no_rectangle_is_left_alone():
+def test_quads_that_are_no_flat_rectangles_are_not_split():
     ball = sp.shapes.sphere(radius=0.5, edge_length=0.2).surface
     faces, diagonals = cut(ball.vertices, ball.triangles)
     assert len(diagonals) == 0
@@ -70,7 +70,7 @@ def two_cubes(divisions, gap=1e-4):
 
 
 def push(model, x):
-    """Force (3,) on the upper cube, and its moment about its own axis, as shares of what presses."""
+    """Force (3,) on the upper cube, and its moment about its own axis, as shares of the pressing force."""
     barrier = Barrier(model.collisions, 1e6)
     gradient = np.zeros_like(x)
     barrier.add_gradient(np.ascontiguousarray(x), gradient)
@@ -81,8 +81,8 @@ def push(model, x):
 
 
 @pytest.mark.parametrize("divisions", [4, 5, 8])
-def test_equal_cubes_above_each_other_are_held_there(divisions):
-    """Without the second diagonal, a shift by d is driven on by 700 d / m of what presses."""
+def test_equal_cubes_above_each_other_are_pushed_back(divisions):
+    """Without the second diagonal, a shift by d is increased by 700 d / m of the pressing force."""
     model, x = two_cubes(divisions)
     upper = slice(len(x) // 2, None)
     share, turn = push(model, x)
@@ -103,7 +103,7 @@ def test_equal_cubes_above_each_other_are_held_there(divisions):
         assert -2000 < push(model, moved)[1] / d < -100
 
 
-def test_the_barrier_of_cut_squares_has_the_right_derivatives():
+def test_the_barrier_of_split_quads_has_the_right_derivatives():
     model, x = two_cubes(3)
     assert len(model.surface.middles) == 2 * 54
     chance = np.random.default_rng(3)

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.contact.start.intersections import find_intersections
+from supple.contact.start.intersections import intersections_of
 from supple.contact.start.separation import default_gap, separate
+from supple.contact.start.surfaces import start_surfaces
 from supple.errors import SceneError
 from supple.scene.contact_pairs import pair_table
 from supple.system import build_system, initial_state
@@ -21,10 +22,10 @@ def cube(name, position, size=1.0, rotation=(0, 0, 0), density=1000.0):
 
 def apart(scene, positions=None):
     x = initial_state(scene, positions).positions
-    return find_intersections(build_system(scene), x, 0.0, pair_table(scene)) == []
+    return intersections_of(start_surfaces(build_system(scene), x, 0.0), pair_table(scene)) == []
 
 
-def test_what_is_apart_is_left_alone():
+def test_separate_scenes_are_not_changed():
     scene = sp.Scene([cube("a", (0, 0.6, 0))], [sp.HalfSpace()])
     result = separate(scene)
     assert result.moves == ()
@@ -73,7 +74,7 @@ def test_out_of_every_kind_of_obstacle(obstacle, position, up):
     assert apart(result.scene)
 
 
-def test_balls_part_along_the_line_of_their_centers():
+def test_balls_separate_along_the_line_of_their_centers():
     mesh = sp.shapes.sphere(radius=0.5, edge_length=0.12)
     bodies = [sp.Body(n, mesh, RUBBER, position=p) for n, p in (("a", (0, 0, 0)), ("b", (0.5, 0.5, 0.5)))]
     result = separate(sp.Scene(bodies))
@@ -107,7 +108,7 @@ def test_deformed_starts_and_chosen_vertices_move_along():
     assert apart(result.scene, result.initial_positions)
 
 
-HOPELESS = {
+NOT_SEPARABLE = {
     "one inside the other": (lambda: sp.Scene([cube("a", (0, 0, 0)), cube("b", (0, 0, 0), 0.2)]), "body 'b'"),
     "the same place": (lambda: sp.Scene([cube("a", (0, 0, 0)), cube("b", (0, 0, 0))]), "cannot be separated by"),
     "both pinned": (
@@ -126,10 +127,10 @@ HOPELESS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("what", HOPELESS)
-def test_hopeless_scenes_are_refused_in_one_line_that_names_the_two(what):
-    make, said = HOPELESS[what]
-    with pytest.raises(sp.SceneError, match=said) as caught:
+@pytest.mark.parametrize("what", NOT_SEPARABLE)
+def test_the_error_for_scenes_that_cannot_be_separated_names_the_two(what):
+    make, message = NOT_SEPARABLE[what]
+    with pytest.raises(sp.SceneError, match=message) as caught:
         separate(make())
     text = str(caught.value)
     assert "\n" not in text
@@ -141,14 +142,14 @@ def test_the_gap_is_a_hundredth_of_an_edge():
     assert default_gap(system) == pytest.approx(0.01 * (2 * 0.5 + np.sqrt(0.5)) / 3)
 
 
-def sewn(low, high, first="low", second="high"):
-    """Two cubes a hundredth apart, one upon the other, sewn where they face each other."""
+def stitched_cubes(low, high, first="low", second="high"):
+    """Two cubes a hundredth apart, one upon the other, stitched where they face each other."""
     stitch = sp.SoftVertexTriangleStitch(first, second, max_distance=0.05, youngs=1e5, poisson=0.4)
     return [cube("low", low), cube("high", high)], stitch
 
 
-def test_what_is_stitched_together_moves_as_one():
-    bodies, stitch = sewn((0, 0.4, 0), (0, 1.41, 0))
+def test_stitched_bodies_move_as_one():
+    bodies, stitch = stitched_cubes((0, 0.4, 0), (0, 1.41, 0))
     scene = sp.Scene(bodies, [sp.HalfSpace()], stitches=[stitch])
     result = separate(scene, gap=0.001)
     assert [move.body for move in result.moves] == ["low", "high"]
@@ -159,28 +160,28 @@ def test_what_is_stitched_together_moves_as_one():
     assert after.tets.rest_shape_inverse == pytest.approx(before.tets.rest_shape_inverse, rel=1e-9, abs=1e-9)
 
 
-def test_the_lighter_of_two_is_what_is_stitched_together():
-    bodies, stitch = sewn((0, 0, 0), (0, 1.01, 0))
+def test_stitched_bodies_are_weighed_together():
+    bodies, stitch = stitched_cubes((0, 0, 0), (0, 1.01, 0))
     heavier = cube("third", (0.9, 0.5, 0), density=1500.0)
     result = separate(sp.Scene([*bodies, heavier], stitches=[stitch]), gap=0.001)
     assert [move.body for move in result.moves] == ["third"]
     assert apart(result.scene)
 
 
-def test_what_is_stitched_together_and_intersects_is_refused():
-    bodies, stitch = sewn((0, 0, 0), (0, 0.97, 0))
+def test_stitched_bodies_that_intersect_are_an_error():
+    bodies, stitch = stitched_cubes((0, 0, 0), (0, 0.97, 0))
     with pytest.raises(SceneError, match=r"'low' overlaps body 'high' .* they are stitched together, and move as one"):
         separate(sp.Scene(bodies, stitches=[stitch]))
 
 
-def test_what_is_stitched_to_something_pinned_stays():
-    bodies, stitch = sewn((0, 0.4, 0), (0, 1.41, 0))
+def test_bodies_stitched_to_a_pinned_one_stay():
+    bodies, stitch = stitched_cubes((0, 0.4, 0), (0, 1.41, 0))
     pin = sp.Pin("high", vertices=[0])
     with pytest.raises(SceneError, match="pins or stitches hold what would have to move"):
         separate(sp.Scene(bodies, [sp.HalfSpace()], stitches=[stitch], pins=[pin]))
 
 
-def test_what_is_stitched_to_an_obstacle_stays():
+def test_bodies_stitched_to_an_obstacle_stay():
     corners = [(-5, -0.51, -5), (0, -0.51, 9), (9, -0.51, -5)]
     sheet = sp.TriangleObstacle(surface=sp.SurfaceMesh(corners, [[0, 1, 2]]), name="sheet")
     stitch = sp.SoftVertexTriangleStitch("a", "sheet", max_distance=0.05, youngs=1e5, poisson=0.4)

@@ -51,8 +51,8 @@ def test_a_collision_keeps_linear_momentum(integrator):
 
 
 @pytest.mark.parametrize("integrator", ["backward_euler", "bdf2", "newmark"])
-def test_the_forces_of_a_collision_have_no_moment(integrator):
-    """Angular momentum: contact adds none, whatever the time integrator does to it."""
+def test_contact_forces_have_no_total_moment(integrator):
+    """Contact adds no angular momentum; the time integrator may."""
     for frame in collide(oblique(), 0.005, 50, integrator=integrator)[1:]:
         forces = frame.report.details.contact_forces
         total = np.linalg.norm(forces["one"])
@@ -106,7 +106,7 @@ def test_fast_bodies_do_not_pass_through_each_other(dt):
         assert not ipctk.has_intersections(check, np.asfortranarray(frame.state.positions))
 
 
-def test_what_is_folded_onto_itself_does_not_cross_itself():
+def test_a_folded_strip_does_not_cross_itself():
     """A thin strip, clamped at one end, whose other end is pressed onto it."""
     mesh = sp.shapes.box((1.0, 0.05, 0.1), (20, 1, 2))
     material = sp.StableNeoHookean(youngs=1e4, poisson=0.3, density=1000.0)

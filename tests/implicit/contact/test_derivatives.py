@@ -46,7 +46,7 @@ def random_turn(rng):
 
 
 def model_of(bodies, size, obstacles=(), friction=0.3):
-    """A contact model of tets that are placed where they are."""
+    """A contact model of tets at the given places."""
     made = []
     for k, points in enumerate(bodies):
         mesh = sp.TetMesh(points, np.array([[0, 1, 2, 3]]))

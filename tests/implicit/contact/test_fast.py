@@ -25,7 +25,7 @@ def test_head_on_cubes_converge_and_keep_their_momentum(dt: float):
     assert np.abs(masses @ frame.state.velocities).max() < 1e-6 * masses.sum() * 20.0
 
 
-def test_what_hits_a_floor_at_fifty_metres_a_second_stays_above_it():
+def test_a_cube_that_hits_a_floor_at_50_m_per_s_stays_above_it():
     body = sp.Body("cube", CUBE, RUBBER, position=(0, 1, 0), velocity=(3, -50, 0))
     for frame in sp.simulate(sp.Scene([body], [sp.HalfSpace(friction=0.5)]), sp.Implicit(), 0.2, 3):
         assert frame.report.status == "converged", frame.report.message
@@ -33,7 +33,7 @@ def test_what_hits_a_floor_at_fifty_metres_a_second_stays_above_it():
         assert frame.positions["cube"][:, 1].min() > 0.0
 
 
-def test_what_rests_is_not_divided_in_long_steps():
+def test_long_steps_of_a_resting_cube_are_not_divided():
     body = sp.Body("cube", CUBE, RUBBER, position=(0, 0.1001, 0))
     for frame in sp.simulate(sp.Scene([body], [sp.HalfSpace()]), sp.Implicit(), 2.0, 3):
         assert frame.report.status == "converged"

@@ -43,7 +43,7 @@ def slide(scene, time=TIME, dt=DT, **contact):
 
 
 def way_down(mu, time=TIME, dt=DT):
-    """Backward Euler's way under constant acceleration, once static friction is overcome."""
+    """The displacement that backward Euler gives under constant acceleration, once static friction is overcome."""
     return 0.5 * GRAVITY * (np.sin(ANGLE) - mu * np.cos(ANGLE)) * time * (time + dt)
 
 
@@ -56,14 +56,14 @@ def test_a_block_on_a_slope_sticks_at_the_angle_of_friction(kind):
 
 
 @pytest.mark.parametrize("kind", ["half-space", "box", "sheet"])
-def test_a_block_on_a_slope_slides_as_coulomb_says(kind):
+def test_a_block_on_a_slope_slides_by_coulombs_law(kind):
     _, way = slide(sp.Scene([block()], obstacles=[downhill(0.49)[kind]]))
     assert way == pytest.approx(way_down(0.49), rel=0.02)
     assert way == pytest.approx(0.2742, rel=0.02)
 
 
-def test_bodies_rub_by_the_geometric_mean_of_their_coefficients():
-    """On a pinned slab of .2 and with .8 of its own the block feels .4; it feels the slab's alone on obstacles."""
+def test_friction_of_two_bodies_is_the_geometric_mean_of_their_coefficients():
+    """A block of coefficient .8 on a pinned slab of .2 has .4; on an obstacle it has that of the obstacle."""
     slab_mesh = sp.shapes.box((2.4, 0.1, 0.6), (12, 1, 3))
     material = sp.StableNeoHookean(youngs=1e9, poisson=0.3, density=1000.0)
     slab = sp.Body("slab", slab_mesh, material, position=-0.05 * NORMAL, rotation=TURN, friction=0.2)
@@ -81,7 +81,7 @@ def test_an_obstacles_coefficient_holds_for_all_bodies():
 
 @pytest.mark.parametrize("iterations", [1, 3, None])
 def test_friction_brakes_a_sliding_block(iterations):
-    """On a level floor: v0^2 / (2 mu g), with normal forces of any age."""
+    """On a level floor: v0^2 / (2 mu g), with any number of friction iterations."""
     material = sp.StableNeoHookean(youngs=1e6, poisson=0.3, density=1000.0)
     mesh = sp.shapes.box((0.2, 0.1, 0.2), (1, 1, 1))
     body = sp.Body("block", mesh, material, position=(0, 0.0501, 0), velocity=(1, 0, 0))

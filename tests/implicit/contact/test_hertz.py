@@ -42,7 +42,7 @@ def pressed(across, layers):
     return force / (4.0 / 3.0 * modulus * np.sqrt(RADIUS) * d**1.5), radius / np.sqrt(RADIUS * d)
 
 
-def test_a_ball_on_a_half_space_comes_near_to_hertz():
+def test_a_ball_on_a_half_space_agrees_with_hertz():
     """A block held 8 radii of contact away is stiffer than half a space by some 5 %, and coarse tets are, too."""
     coarse, _ = pressed(8, 6)
     fine, radius = pressed(16, 10)

@@ -51,8 +51,8 @@ def test_a_ball_presses_on_the_ball_below():
 
 
 @pytest.mark.parametrize("integrator", ["bdf2", "newmark"])
-def test_second_order_integrators_carry_the_weight_too(integrator):
-    """Newmark's method counts contact twice at the end of a step: the reported force must not."""
+def test_second_order_integrators_report_the_weight(integrator):
+    """Newmark's method multiplies contact energies by two; the reported force must not be."""
     material = sp.StableNeoHookean(youngs=2e4, poisson=0.3, density=1000.0, damping=0.02)
     body = sp.Body("cube", sp.shapes.box((0.2, 0.2, 0.2), (2, 2, 2)), material, position=(0, 0.1002, 0))
     scene = sp.Scene([body], obstacles=[sp.HalfSpace()])
@@ -63,7 +63,7 @@ def test_second_order_integrators_carry_the_weight_too(integrator):
 
 
 def test_statics_presses_until_the_forces_balance():
-    """A held block pressed against the floor by a soft target: three forces that add up to nothing."""
+    """A held block pressed against the floor by a soft target: three forces whose sum is zero."""
     body = block(position=(0, 0.101, 0))
     mesh = body.mesh
     top = np.flatnonzero(mesh.vertices[:, 1] > 0.09)

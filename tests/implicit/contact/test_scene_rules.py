@@ -38,7 +38,7 @@ def run(scene, dt, steps, solver=None, **start):
         ({"friction_iterations": True}, "friction_iterations is True"),
     ],
 )
-def test_settings_out_of_range_are_refused(given, complaint):
+def test_settings_out_of_range_are_errors(given, complaint):
     with pytest.raises(sp.SolverError, match=rf"IPCContact: {complaint}") as caught:
         sp.IPCContact(**given)
     assert "\n" not in str(caught.value)
@@ -141,17 +141,17 @@ print(hashlib.sha256(frames[-1].state.positions.tobytes()).hexdigest())
 
 def test_the_same_bits_whatever_the_number_of_threads():
     environment = {**os.environ, "NUMBA_NUM_THREADS": "2"}
-    said = [
+    results = [
         subprocess.run(
             [sys.executable, "-c", _BITS, threads], capture_output=True, text=True, env=environment, check=True
         ).stdout.split()[-1]
         for threads in ("1", "2", "2")
     ]
-    assert len(set(said)) == 1
+    assert len(set(results)) == 1
 
 
 def test_a_scene_goes_from_xpbd_to_implicit_and_back():
-    """The fast solver lets a cube fall and come to rest, the exact one goes on from there, and the fast one again."""
+    """A cube falls with XPBD, continues with the implicit solver, and with XPBD again."""
     scene = sp.Scene([cube(position=(0, 0.15, 0))], obstacles=[sp.HalfSpace(friction=0.3)])
     first = run(scene, 1 / 60, 6, sp.XPBD())[-1]
     assert first.positions["cube"][:, 1].min() > 0.0
@@ -163,7 +163,7 @@ def test_a_scene_goes_from_xpbd_to_implicit_and_back():
     assert np.abs(again[-1].positions["cube"] - exact[-1].positions["cube"]).max() < 5e-3
 
 
-def test_a_frame_that_intersects_is_refused_with_the_mend():
+def test_a_frame_that_intersects_is_an_error_with_a_remedy():
     one, two = cube("one"), cube("two", position=(0.15, 0.02, 0.01))
     overlap = sp.Scene([one, two], gravity=(0, 0, 0))
     frame = list(sp.simulate(overlap, sp.XPBD(contact=None), 1 / 60, 1))[-1]
@@ -173,7 +173,7 @@ def test_a_frame_that_intersects_is_refused_with_the_mend():
     assert "\n" not in str(caught.value)
 
 
-def test_a_frame_with_inverted_tets_is_refused_where_the_material_has_no_energy_there():
+def test_a_frame_with_inverted_tets_is_an_error_where_the_material_has_no_energy():
     material = sp.NeoHookean(youngs=2e4, poisson=0.3, density=1000.0)
     mesh = sp.shapes.box((0.2, 0.2, 0.2), (1, 1, 1))
     scene = sp.Scene([sp.Body("cube", mesh, material)], gravity=(0, 0, 0))

@@ -52,7 +52,7 @@ def is_kept(x, direction, step):
 
 
 def random_scene(rng, count, scale, away, turning):
-    """Vertices before a plane, and a direction; the plane shifts, and turns if asked."""
+    """Vertices before a plane, and a direction; the plane shifts, and turns where `turning`."""
     normal = rng.normal(size=3)
     normal /= np.linalg.norm(normal)
     base = scale * rng.normal(size=3) + away * rng.normal(size=3)
@@ -153,7 +153,7 @@ def test_no_two_triangles_cross_within_a_step(seed, speed):
 
 
 @pytest.mark.parametrize("way", [0.1, 1.0, 49.0, 1e3, 1e9])
-def test_bodies_that_part_may_go_as_far_as_is_looked(way):
+def test_bodies_that_separate_may_move_as_far_as_the_search_covers(way):
     model, x = two_boxes()
     direction = np.zeros_like(x)
     direction[len(x) // 2 :, 1] = way
@@ -164,7 +164,7 @@ def test_bodies_that_part_may_go_as_far_as_is_looked(way):
 
 
 @pytest.mark.parametrize("way", [1.0, 10.0, 40.0, 1e4])
-def test_a_long_way_stops_before_what_lies_on_it(way):
+def test_a_long_step_stops_before_a_body_in_its_way(way):
     """A body flies at another one across many times its size."""
     model, x = two_boxes(gap=8.0)
     direction = np.zeros_like(x)
@@ -179,8 +179,8 @@ def test_a_long_way_stops_before_what_lies_on_it(way):
         assert step * way > 6.5
 
 
-def test_a_whole_way_in_many_pieces_is_one():
-    """Shares of a way must not add up to a little less than all of it: pins have to arrive."""
+def test_a_complete_step_in_many_pieces_is_exactly_one():
+    """Shares must not add up to slightly less than one: pins must arrive."""
     model, x = two_boxes()
     direction = np.zeros_like(x)
     for way in np.linspace(40.0, 60.0, 12):
@@ -188,7 +188,7 @@ def test_a_whole_way_in_many_pieces_is_one():
         assert model.largest_step(x, direction) == 1.0
 
 
-def test_nothing_goes_along_a_direction_that_is_not_finite():
+def test_the_step_along_a_direction_that_is_not_finite_is_zero():
     model, x = two_boxes()
     direction = np.zeros_like(x)
     direction[0, 0] = np.nan
@@ -196,7 +196,7 @@ def test_nothing_goes_along_a_direction_that_is_not_finite():
 
 
 def test_surfaces_are_found_wherever_the_line_search_goes():
-    """Contacts of a point on a searched way are those of a fresh look at that point."""
+    """Contacts at a point of a searched step are those of a new search at that point."""
     model, x = two_boxes(gap=0.01)
     direction = np.zeros_like(x)
     direction[len(x) // 2 :, 1] = -1.0

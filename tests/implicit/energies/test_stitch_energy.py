@@ -105,7 +105,7 @@ def assert_close(found, wanted):
 
 @pytest.mark.parametrize("permutation", list(itertools.permutations(range(3))))
 @pytest.mark.parametrize("multiple", [0.0, 0.5, -0.5, 1.0, -1.0, 2.0, -2.0])
-def test_a_tet_is_what_dense_numpy_says(multiple, permutation):
+def test_tets_agree_with_dense_numpy(multiple, permutation):
     rest = vertex_over_triangle(multiple * D, permutation)
     stitching = stitching_of(rest)
     energy = StitchEnergy.of(stitching, 0.0)
@@ -157,7 +157,7 @@ def dense_spring_energy(springs, x):
 
 
 @pytest.mark.parametrize("rest_lengths", [(0.0, 0.0, 0.0), (0.4, 0.2, 3.0)])
-def test_springs_have_the_energy_they_say_and_slope_two(rest_lengths):
+def test_springs_have_their_energy_and_slope_two(rest_lengths):
     stitching = springs_of(rest_lengths)
     energy = StitchEnergy.of(stitching, 0.0)
     x = vertex_over_triangle(0.4)
@@ -189,7 +189,7 @@ def _slope_two(energy, x):
             assert 1.9 < np.polyfit(np.log(steps), np.log(wrong), 1)[0] < 2.1
 
 
-def test_a_spring_without_length_pushes_nowhere():
+def test_a_spring_of_zero_length_has_no_force():
     stitching = springs_of((0.4, 0.2, 0.1))
     x = np.zeros((4, 3))
     energy = StitchEnergy.of(stitching, 0.0)
@@ -197,7 +197,7 @@ def test_a_spring_without_length_pushes_nowhere():
     assert np.isfinite(hessian_of(energy, x, True)).all()
 
 
-def test_pairs_may_be_made_up_by_hand():
+def test_pairs_may_be_given():
     pairs = Pairs(np.array([0], np.int32), np.array([0], np.int32), np.array([0.1]))
     stitch = sp.SoftVertexTriangleStitch("a", "b", pairs=[[0, 0]], youngs=1e5, poisson=0.25)
     tets = stitch.join(side([[0.2, 0.1, 0.2]]), side([[0, 0, 0], [1, 0, 0], [0, 0, 1]], [[0, 1, 2]]), pairs)

@@ -1,4 +1,4 @@
-"""Recordings to check, copies of them that are spoilt on purpose, and what checking them says."""
+"""Recordings to check, copies of them that are corrupted on purpose, and the results of checks."""
 
 from __future__ import annotations
 
@@ -64,17 +64,17 @@ def around(folder):
 
 
 @pytest.fixture
-def spoilt(tmp_path):
-    """spoilt(path, change): a copy, changed by change(file, n), n being the number of vertices."""
+def corrupted(tmp_path):
+    """corrupted(path, change): a copy, changed by change(file, n), n being the number of vertices."""
 
-    def spoil(path, change):
-        copy = tmp_path / "spoilt.vtkhdf"
+    def corrupt(path, change):
+        copy = tmp_path / "corrupted.vtkhdf"
         shutil.copy(path, copy)
         with h5py.File(copy, "r+") as file:
             change(file, len(file["supple/rest_positions"]))
         return copy
 
-    return spoil
+    return corrupt
 
 
 def failures(path, **settings):

@@ -1,4 +1,4 @@
-"""Bodies and obstacles that meet, swallow each other or come near, where they may and where they may not."""
+"""Bodies and obstacles that meet, contain each other or come near, where they may and where they may not."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def apart(file, n, frame, gap):
 
 
 @pytest.mark.parametrize("gap", [1e-9, -1e-9, 0.0])
-def test_a_surface_pushed_through_another(free, spoilt, gap):
-    path = spoilt(free, lambda file, n: apart(file, n, 2, gap))
+def test_a_surface_pushed_through_another(free, corrupted, gap):
+    path = corrupted(free, lambda file, n: apart(file, n, 2, gap))
     if gap > 0.0:
         assert failures(path, only=CONTACT) == {}
         report = sp.check_recording(path)
@@ -36,7 +36,7 @@ def test_a_surface_pushed_through_another(free, spoilt, gap):
         assert "of left and triangle" in sp.check_recording(path)["intersection"].where
 
 
-def test_a_body_that_meets_itself(free, spoilt):
+def test_a_body_that_meets_itself(free, corrupted):
     def change(file, n):
         # The left block's end is pulled through its middle.
         x = file[X][n : 2 * n]
@@ -45,12 +45,12 @@ def test_a_body_that_meets_itself(free, spoilt):
         x[: n // 2][end] -= [1.0, 0.1, 0.1]
         file[X][n : 2 * n] = x
 
-    assert failures(spoilt(free, change), only=["intersection"]) == {"intersection": 1}
+    assert failures(corrupted(free, change), only=["intersection"]) == {"intersection": 1}
 
 
 @pytest.mark.parametrize("tip", range(4))
-def test_what_is_sewn_on_by_its_tip_is_not_swallowed(tmp_path, spoilt, tip):
-    """A vertex a hair below the surface that it is sewn to is not all of its body."""
+def test_a_body_stitched_at_its_tip_is_not_contained(tmp_path, corrupted, tip):
+    """A stitched vertex 1e-9 m below its surface does not make the body contained."""
     material = sp.StableNeoHookean(youngs=1e5, poisson=0.3)
     low = sp.Body("low", sp.shapes.box((0.1, 0.1, 0.1), (1, 1, 1)), material)
     corners = np.roll([[0.0, 0.0, 0.0], [0.01, 0.02, 0.0], [-0.01, 0.02, 0.01], [-0.01, 0.02, -0.01]], tip, axis=0)
@@ -65,31 +65,31 @@ def test_what_is_sewn_on_by_its_tip_is_not_swallowed(tmp_path, spoilt, tip):
         x[n - 4 :, 1] -= 1e-9
         file[X][n : 2 * n] = x
 
-    pushed = spoilt(path, push_in)
+    pushed = corrupted(path, push_in)
     assert failures(pushed, only=["intersection", "containment"]) == {}
 
 
-def test_a_body_swallowed_whole(free, spoilt):
+def test_a_body_completely_inside_another(free, corrupted):
     def change(file, n):
         x = file[X][2 * n : 3 * n]
         left, right = x[: n // 2], x[n // 2 :]
         x[n // 2 :] = (right - right.mean(axis=0)) * 0.3 + left.mean(axis=0)
         file[X][2 * n : 3 * n] = x
 
-    report = sp.check_recording(spoilt(free, change), sp.CheckSettings(only=CONTACT))
+    report = sp.check_recording(corrupted(free, change), sp.CheckSettings(only=CONTACT))
     assert [(result.name, result.first_failure) for result in report.failures] == [("containment", 2)]
     assert report["containment"].where == "right in left"
 
 
-def test_pairs_that_the_scene_lets_pass_are_left_out(free, spoilt):
+def test_excluded_pairs_are_left_out(free, corrupted):
     def overlap(file, n):
         apart(file, n, 2, -0.1)
         set_header(file, lambda header: header["physics"].update(untouching=[[1, 0]]))
 
-    assert failures(spoilt(free, overlap), only=CONTACT) == {}
+    assert failures(corrupted(free, overlap), only=CONTACT) == {}
 
 
-def test_vertices_that_may_touch_a_triangle_are_left_out(free, spoilt):
+def test_vertices_that_may_touch_a_triangle_are_left_out(free, corrupted):
     def touch(file, n, exempt):
         """One vertex of the right block on the middle of a triangle of the left one."""
         triangles = file["supple/triangles"][:]
@@ -104,8 +104,10 @@ def test_vertices_that_may_touch_a_triangle_are_left_out(free, spoilt):
             del file["supple/physics/stitched"]
             file["supple/physics/stitched"] = np.array([[vertex, *triangles[facing[0]]]])
 
-    assert failures(spoilt(free, lambda file, n: touch(file, n, False)), only=["intersection"]) == {"intersection": 2}
-    assert failures(spoilt(free, lambda file, n: touch(file, n, True)), only=["intersection"]) == {}
+    assert failures(corrupted(free, lambda file, n: touch(file, n, False)), only=["intersection"]) == {
+        "intersection": 2
+    }
+    assert failures(corrupted(free, lambda file, n: touch(file, n, True)), only=["intersection"]) == {}
 
 
 def move_to(lowest, frame=3):
@@ -129,24 +131,24 @@ BY_FORMULA = {
 
 
 @pytest.mark.parametrize("name", BY_FORMULA)
-def test_a_body_in_an_obstacle_that_is_a_formula(around, spoilt, name):
-    report = sp.check_recording(spoilt(around, move_to(BY_FORMULA[name])), sp.CheckSettings(only=["obstacles"]))
+def test_a_body_in_an_obstacle_that_is_a_formula(around, corrupted, name):
+    report = sp.check_recording(corrupted(around, move_to(BY_FORMULA[name])), sp.CheckSettings(only=["obstacles"]))
     found = report["obstacles"]
     assert (found.verdict, found.first_failure, found.failed_frames) == ("fail", 3, 1)
     assert name in found.where
     assert found.worst < 0.0
 
 
-def test_just_over_the_floor_and_just_past_the_moving_door_is_fine(around, spoilt):
-    assert failures(spoilt(around, move_to([-0.5, 1e-12, -0.5])), only=["obstacles", "distance"]) == {}
+def test_a_body_just_above_the_floor_and_just_beside_the_moving_door_passes(around, corrupted):
+    assert failures(corrupted(around, move_to([-0.5, 1e-12, -0.5])), only=["obstacles", "distance"]) == {}
     door = -2.0 - 0.5 * 3 / 60
-    assert failures(spoilt(around, move_to([door + 1e-9, 1.0, 0.0])), only=["obstacles"]) == {}
-    assert failures(spoilt(around, move_to([door - 1e-9, 1.0, 0.0])), only=["obstacles"]) == {"obstacles": 3}
+    assert failures(corrupted(around, move_to([door + 1e-9, 1.0, 0.0])), only=["obstacles"]) == {}
+    assert failures(corrupted(around, move_to([door - 1e-9, 1.0, 0.0])), only=["obstacles"]) == {"obstacles": 3}
 
 
 @pytest.mark.parametrize(("lowest", "name"), [([-0.2, 0.9, -2.3], "crate"), ([0.3, 2.0, 0.2], "rock")])
-def test_a_body_that_meets_an_obstacle_made_of_triangles(around, spoilt, lowest, name):
-    report = sp.check_recording(spoilt(around, move_to(lowest)), sp.CheckSettings(only=["intersection"]))
+def test_a_body_that_meets_an_obstacle_made_of_triangles(around, corrupted, lowest, name):
+    report = sp.check_recording(corrupted(around, move_to(lowest)), sp.CheckSettings(only=["intersection"]))
     assert report["intersection"].first_failure == 3
     assert f"obstacle {name}" in report["intersection"].where
 
@@ -160,13 +162,13 @@ def test_a_body_that_meets_an_obstacle_made_of_triangles(around, spoilt, lowest,
         ([-2.0, 0.0, 0.5], 4.0, "ball in cube"),
     ],
 )
-def test_what_swallows_or_is_swallowed_by_an_obstacle(around, spoilt, lowest, size, where):
+def test_bodies_inside_obstacles_and_obstacles_inside_bodies(around, corrupted, lowest, size, where):
     def change(file, n):
         x = file["supple/rest_positions"][:]
         x = (x - x.min(axis=0)) * size + np.asarray(lowest)
         file[X][5 * n : 6 * n] = x
 
-    report = sp.check_recording(spoilt(around, change), sp.CheckSettings(only=["containment"]))
+    report = sp.check_recording(corrupted(around, change), sp.CheckSettings(only=["containment"]))
     assert report["containment"].first_failure == 5
     assert report["containment"].where == where
 
@@ -186,7 +188,7 @@ def test_contact_that_never_intersects_passes(tmp_path):
     assert report["distance"].frame > 0
 
 
-def test_what_the_scene_lets_touch_is_recorded(tmp_path):
+def test_excluded_and_stitched_pairs_are_recorded(tmp_path):
     cube = sp.shapes.box((1, 1, 1), (1, 1, 1))
     rock = octahedron((0.5, 0.5, 2.5), 1.0)
     scene = sp.Scene(
@@ -205,14 +207,17 @@ def test_what_the_scene_lets_touch_is_recorded(tmp_path):
     )
     path = tmp_path / "r.vtkhdf"
     with sp.read_recording(recorded(path, scene, sp.XPBD(substeps=2))) as recording:
-        said = recording.untouching
+        untouching = recording.untouching
         n = len(recording.rest_positions)
-        assert {(0, 1), (0, 2), (1, 2), (2, 2)} <= set(said.pairs)
-        assert not {(0, 0), (1, 1), (0, 3), (3, 4)} & set(said.pairs)
+        assert {(0, 1), (0, 2), (1, 2), (2, 2)} <= set(untouching.pairs)
+        assert not {(0, 0), (1, 1), (0, 3), (3, 4)} & set(untouching.pairs)
         a = scene.bodies[0].mesh.surface.triangles[3]
-        assert [row.tolist() for row in np.sort(said.stitched)] == [[*sorted(a), 2 * n // 3], [n // 3 + 1, n, n, n]]
-        assert said.stitched[:, 0].tolist() == [2 * n // 3, n // 3 + 1]
-        np.testing.assert_array_equal(said.anchors, [[1, 4]])
+        assert [row.tolist() for row in np.sort(untouching.stitched)] == [
+            [*sorted(a), 2 * n // 3],
+            [n // 3 + 1, n, n, n],
+        ]
+        assert untouching.stitched[:, 0].tolist() == [2 * n // 3, n // 3 + 1]
+        np.testing.assert_array_equal(untouching.anchors, [[1, 4]])
         assert recording.physics.stitches == 2
     # a and b overlap, and may.
     assert failures(path, only=CONTACT) == {}

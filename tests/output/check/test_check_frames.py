@@ -31,24 +31,24 @@ def nan_mass(file, n):
     ("change", "frame"),
     [(nan_position, 3), (nan_velocity, 2), (nan_report, 5), (nan_determinant, 1)],
 )
-def test_one_number_that_is_none(free, spoilt, change, frame):
-    path = spoilt(free, change)
+def test_one_number_that_is_not_finite(free, corrupted, change, frame):
+    path = corrupted(free, change)
     assert failures(path) == {"finite": frame}
     assert sp.check_recording(path)["finite"].failed_frames == 1
 
 
-def test_a_mass_that_is_no_number(free, spoilt):
-    report = sp.check_recording(spoilt(free, nan_mass))
+def test_a_mass_that_is_not_finite(free, corrupted):
+    report = sp.check_recording(corrupted(free, nan_mass))
     assert report["finite"].verdict == "fail"
     assert report["finite"].where == "masses"
     assert {result.verdict for result in report.results if result.name != "finite"} == {"skipped"}
 
 
-def test_no_frame_that_can_be_computed_with(free, spoilt):
+def test_no_frame_is_finite(free, corrupted):
     def change(file, n):
         file[X][:] = np.nan
 
-    report = sp.check_recording(spoilt(free, change))
+    report = sp.check_recording(corrupted(free, change))
     assert [(result.name, result.first_failure) for result in report.failures] == [("finite", 0)]
     assert {result.name for result in report.results if result.verdict == "pass"} == {
         "sequence",
@@ -57,18 +57,18 @@ def test_no_frame_that_can_be_computed_with(free, spoilt):
     }
 
 
-def test_names_say_where(free, spoilt):
-    report = sp.check_recording(spoilt(free, nan_position))
-    assert report["finite"].said == "not finite: 1 number (position of vertex 4 of left); in 1 frame, first 3"
+def test_results_name_the_place(free, corrupted):
+    report = sp.check_recording(corrupted(free, nan_position))
+    assert report["finite"].message == "not finite: 1 number (position of vertex 4 of left); in 1 frame, first 3"
     assert (report["finite"].frame, report["finite"].time) == (3, pytest.approx(3 / 60))
 
 
 @pytest.mark.parametrize("distance", [1e-5, 1e-7])
-def test_one_vertex_moved(free, spoilt, distance):
+def test_one_vertex_moved(free, corrupted, distance):
     def change(file, n):
         file[X][4 * n + 7, 2] += distance
 
-    path = spoilt(free, change)
+    path = corrupted(free, change)
     assert failures(path) == {"records": 4}
     assert "det F" in sp.check_recording(path)["records"].where
 
@@ -85,8 +85,8 @@ def flip(file, n, share):
     return tet
 
 
-def test_one_tet_flipped(free, spoilt):
-    path = spoilt(free, lambda file, n: flip(file, n, 2.0))
+def test_one_tet_flipped(free, corrupted):
+    path = corrupted(free, lambda file, n: flip(file, n, 2.0))
     report = sp.check_recording(path)
     assert report["inversion"].verdict == "fail"
     assert (report["inversion"].first_failure, report["inversion"].failed_frames) == (3, 1)
@@ -95,23 +95,23 @@ def test_one_tet_flipped(free, spoilt):
     assert failures(path)["records"] == 3
 
 
-def test_one_tet_exactly_flat(free, spoilt):
+def test_one_tet_exactly_flat(free, corrupted):
     def change(file, n):
         a, b, c, d = file["supple/tets"][11]
         file[X][3 * n + d] = 0.5 * file[X][3 * n + a] + 0.5 * file[X][3 * n + b]
         file[X][3 * n + c] = file[X][3 * n + c]
 
-    assert failures(spoilt(free, change), only=["inversion"]) == {"inversion": 3}
+    assert failures(corrupted(free, change), only=["inversion"]) == {"inversion": 3}
 
 
-def test_a_tet_inverted_at_rest(free, spoilt):
+def test_a_tet_inverted_at_rest(free, corrupted):
     def change(file, n):
         tet = file["supple/tets"][5]
         file["supple/tets"][5] = tet[[1, 0, 2, 3]]
 
-    report = sp.check_recording(spoilt(free, change))
+    report = sp.check_recording(corrupted(free, change))
     assert report["rest shape"].verdict == "fail"
-    assert "tet 5 of left" in report["rest shape"].said
+    assert "tet 5 of left" in report["rest shape"].message
     assert report["rest shape"].frame is None
     assert failures(report.path, only=["inversion"]) == {"inversion": 0}
 
@@ -130,30 +130,30 @@ def repeat(file, n, source, target, *, but=()):
             data[target] = data[source]
 
 
-def test_a_frame_twice(free, spoilt):
-    found = failures(spoilt(free, lambda file, n: repeat(file, n, 3, 4)))
+def test_a_repeated_frame(free, corrupted):
+    found = failures(corrupted(free, lambda file, n: repeat(file, n, 3, 4)))
     assert found == {"sequence": 4}
-    report = sp.check_recording(spoilt(free, lambda file, n: repeat(file, n, 3, 4, but=("time", "index"))))
+    report = sp.check_recording(corrupted(free, lambda file, n: repeat(file, n, 3, 4, but=("time", "index"))))
     assert report["sequence"].where == "repeats frame 3 although it moves"
     assert {result.name: result.first_failure for result in report.failures} == {"sequence": 4, "momentum": 4}
 
 
-def test_a_frame_left_out(free, spoilt):
+def test_a_missing_frame(free, corrupted):
     def change(file, n):
         file["supple/frames/index"][4:] = file["supple/frames/index"][4:] + 1
 
-    assert failures(spoilt(free, change)) == {"sequence": 4}
+    assert failures(corrupted(free, change)) == {"sequence": 4}
 
 
 @pytest.fixture(scope="module")
 def landing(folder):
-    """A cube that falls on a floor; nothing but the floor tells when."""
+    """A cube that falls on a floor; only the floor determines when it stops."""
     cube = sp.Body("cube", sp.shapes.box((0.2, 0.2, 0.2), (1, 1, 1)), JELLY, position=(0, 0.105, 0))
     return recorded(folder / "landing.vtkhdf", sp.Scene([cube], [sp.HalfSpace()]), sp.Implicit())
 
 
-def test_frames_in_another_order(landing, spoilt):
-    """All that stands in a frame is true, but its time."""
+def test_frames_in_another_order(landing, corrupted):
+    """Everything in the frames is correct except their times."""
 
     def change(file, n):
         copies = {k: [data[k * rows : (k + 1) * rows] for data, rows in parts(file, n)] for k in (1, 2)}
@@ -167,14 +167,14 @@ def test_frames_in_another_order(landing, spoilt):
         return [(file[X], n), (file[V], n), (file["VTKHDF/CellData/det_F"], m), *((data, 1) for data in kept)]
 
     assert failures(landing) == {}
-    report = sp.check_recording(spoilt(landing, change))
+    report = sp.check_recording(corrupted(landing, change))
     assert [(result.name, result.first_failure) for result in report.failures] == [("sequence", 2)]
-    assert "elsewhere than its velocities say" in report["sequence"].where
+    assert "from where its velocities lead" in report["sequence"].where
 
 
-def test_a_step_that_did_not_converge(free, spoilt):
+def test_a_step_that_did_not_converge(free, corrupted):
     def change(file, n):
         file["supple/frames/status"][5] = 1
 
-    report = sp.check_recording(spoilt(free, change))
+    report = sp.check_recording(corrupted(free, change))
     assert [(r.name, r.first_failure, r.where) for r in report.failures] == [("status", 5, "iteration_limit")]

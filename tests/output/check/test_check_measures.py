@@ -1,4 +1,4 @@
-"""Momentum, spin and energy out of nowhere; measures that do not fit what was recorded."""
+"""Momentum, spin and energy without a cause; measures that differ from the recorded states."""
 
 from __future__ import annotations
 
@@ -20,51 +20,51 @@ def consistently(file, n, frame, velocities):
     file["supple/frames/angular_momentum"][frame] = m @ np.cross(x - center, velocities - P / m.sum())
 
 
-def test_momentum_out_of_nowhere(free, spoilt):
+def test_momentum_without_a_force(free, corrupted):
     def push(file, n):
         consistently(file, n, 6, file[V][6 * n : 7 * n] + np.array([1e-4, 0, 0]))
 
-    assert failures(spoilt(free, push)) == {"momentum": 6}
+    assert failures(corrupted(free, push)) == {"momentum": 6}
 
 
-def test_spin_out_of_nowhere(free, spoilt):
+def test_spin_without_a_torque(free, corrupted):
     def turn(file, n):
         x, v = file[X][6 * n : 7 * n], file[V][6 * n : 7 * n]
         m = file["supple/masses"][:]
         consistently(file, n, 6, v + np.cross([0, 1e-3, 0], x - m @ x / m.sum()))
 
-    assert failures(spoilt(free, turn)) == {"spin": 6}
+    assert failures(corrupted(free, turn)) == {"spin": 6}
 
 
-def test_energy_out_of_nowhere(free, spoilt):
+def test_energy_without_work(free, corrupted):
     def stir(file, n):
         rng = np.random.default_rng(2)
         consistently(file, n, 4, file[V][4 * n : 5 * n] + rng.normal(scale=2.0, size=(n, 3)))
 
-    assert failures(spoilt(free, stir), only=["energy", "records"]) == {"energy": 4}
-    assert failures(spoilt(free, stir), only=["energy"], max_energy_gain=1e3) == {}
+    assert failures(corrupted(free, stir), only=["energy", "records"]) == {"energy": 4}
+    assert failures(corrupted(free, stir), only=["energy"], max_energy_gain=1e3) == {}
 
 
-def test_a_velocity_that_was_not_measured(free, spoilt):
+def test_a_velocity_that_was_not_measured(free, corrupted):
     def change(file, n):
         file[V][5 * n + 3, 0] += 1e-6
 
-    assert failures(spoilt(free, change), only=["records"]) == {"records": 5}
+    assert failures(corrupted(free, change), only=["records"]) == {"records": 5}
 
 
 @pytest.mark.parametrize("name", ["kinetic_energy", "elastic_energy", "potential_energy", "min_det_F"])
-def test_a_measure_that_was_changed(free, spoilt, name):
+def test_a_measure_that_was_changed(free, corrupted, name):
     def change(file, n):
         file[f"supple/frames/{name}"][2] *= 1.0 + 1e-5
 
-    assert failures(spoilt(free, change)) == {"records": 2}
+    assert failures(corrupted(free, change)) == {"records": 2}
 
 
-def test_volume(free, spoilt):
+def test_volume(free, corrupted):
     def squeeze(file, n):
         file[X][4 * n : 5 * n] = file[X][4 * n : 5 * n] * [1.0, 0.4, 1.0]
 
     assert failures(free, max_volume_change=1e-3) == {"volume": 0}
     assert sp.check_recording(free)["volume"].worst == pytest.approx(0.1, rel=1e-6)
-    assert failures(spoilt(free, squeeze), only=["volume"]) == {"volume": 4}
-    assert failures(spoilt(free, squeeze), only=["volume"], max_volume_change=0.7) == {}
+    assert failures(corrupted(free, squeeze), only=["volume"]) == {"volume": 4}
+    assert failures(corrupted(free, squeeze), only=["volume"], max_volume_change=0.7) == {}

@@ -1,4 +1,4 @@
-"""`check_recording` on good recordings; what is asked of it, and how it answers."""
+"""`check_recording` on good recordings: settings, results, and the shell."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_a_good_recording_passes_everything_that_can_be_checked(free, around):
     assert verdicts(around) == {name: why_not.get(name, "pass") for name in NAMES}
     report = sp.check_recording(around)
     assert (report.frames, report.frames_checked) == (FRAMES, FRAMES)
-    assert report["energy"].said == "obstacles move, which does work"
+    assert report["energy"].message == "obstacles move, which does work"
     assert (report["intersection"].worst, report["intersection"].frame) == (0.0, None)
     # The cube falls a few centimetres; the ball is nearest to it at the start, or the floor later.
     assert 0.0 < report["distance"].worst < 1.0
@@ -58,20 +58,20 @@ def test_bodies_of_edges_and_volumes_pass(tmp_path):
     assert sp.check_recording(path)["records"].worst < 1e-12
 
 
-def test_a_recording_without_physics_is_read_and_says_what_is_not_known(free, spoilt):
+def test_a_recording_without_physics_is_read_and_unknown_checks_are_skipped(free, corrupted):
     def age(file, n):
         set_header(file, lambda header: header.pop("physics"))
         del file["supple/physics"]
 
-    report = sp.check_recording(spoilt(free, age))
+    report = sp.check_recording(corrupted(free, age))
     assert report.ok
     skipped = {result.name for result in report.results if result.verdict == "skipped"}
     assert skipped == {"obstacles", "momentum", "spin", "energy"}
-    assert "older version" in report["energy"].said
+    assert "older version" in report["energy"].message
 
 
 @pytest.mark.parametrize(
-    ("change", "says"),
+    ("change", "message"),
     [
         (lambda header: header["physics"].update(untouching=[[0, 7]]), "not there"),
         (lambda header: header["physics"].update(untouching=3), "not described"),
@@ -79,13 +79,13 @@ def test_a_recording_without_physics_is_read_and_says_what_is_not_known(free, sp
         (lambda header: header["physics"].update(compliances=[]), "another number of bodies"),
     ],
 )
-def test_physics_that_contradict_themselves(free, spoilt, change, says):
-    with pytest.raises(OutputError, match=says):
-        sp.check_recording(spoilt(free, lambda file, n: set_header(file, change)))
+def test_inconsistent_physics_is_an_error(free, corrupted, change, message):
+    with pytest.raises(OutputError, match=message):
+        sp.check_recording(corrupted(free, lambda file, n: set_header(file, change)))
 
 
-def test_every_kth_frame_and_the_last(free, spoilt):
-    path = spoilt(free, nan_position)
+def test_every_kth_frame_and_the_last(free, corrupted):
+    path = corrupted(free, nan_position)
     report = sp.check_recording(path, sp.CheckSettings(every=4))
     assert (report.frames, report.frames_checked, report.ok) == (FRAMES, 3, True)
     assert failures(path, every=3) == {"finite": 3}
@@ -95,7 +95,7 @@ def test_every_kth_frame_and_the_last(free, spoilt):
 
 
 @pytest.mark.parametrize(
-    ("settings", "says"),
+    ("settings", "message"),
     [
         ({"only": ["inversions"]}, "no check 'inversions'"),
         ({"skip": list(NAMES)}, "nothing is left"),
@@ -103,20 +103,20 @@ def test_every_kth_frame_and_the_last(free, spoilt):
         ({"max_energy_gain": -1.0}, "max_energy_gain is -1"),
     ],
 )
-def test_settings_that_make_no_sense(settings, says):
-    with pytest.raises(OutputError, match=says):
+def test_invalid_settings(settings, message):
+    with pytest.raises(OutputError, match=message):
         sp.CheckSettings(**settings)
 
 
-def test_the_shell(free, spoilt, tmp_path, capsys, monkeypatch):
+def test_the_shell(free, corrupted, tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "160")
     assert main(["check", str(free), "--json", str(tmp_path / "out" / "r.json")]) == 0
     out = capsys.readouterr().out
     assert all(name in out for name in NAMES)
-    said = json.loads((tmp_path / "out" / "r.json").read_text())
-    assert said["ok"] is True
-    assert [result["name"] for result in said["results"]] == list(NAMES)
-    path = str(spoilt(free, nan_position))
+    content = json.loads((tmp_path / "out" / "r.json").read_text())
+    assert content["ok"] is True
+    assert [result["name"] for result in content["results"]] == list(NAMES)
+    path = str(corrupted(free, nan_position))
     assert main(["check", path]) == 1
     assert "fail" in capsys.readouterr().out
     assert main(["check", path, "--skip", "finite"]) == 0

@@ -118,7 +118,7 @@ def has_area(A):
 
 @settings(max_examples=200, deadline=None)
 @given(points(6))
-def test_strange_triangles_meet_exactly_where_they_have_a_point_in_common(x):
+def test_degenerate_triangles_meet_exactly_where_they_have_a_common_point(x):
     if has_area(x[:3]) and has_area(x[3:]):
         s, t = np.array([0, 1, 2]), np.array([3, 4, 5])
         assert triangles_meet(x, s, t) == bool(common_part(x[:3], x[3:]))

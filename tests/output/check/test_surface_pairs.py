@@ -32,7 +32,7 @@ def searched(x, triangles, owners, allowed, ignored=()):
 
 
 @pytest.mark.parametrize("size", [0.02, 0.3])
-def test_nothing_is_overlooked(size):
+def test_all_pairs_are_found(size):
     x, triangles, owners = soup(3, size=size)
     allowed = np.ones((3, 3), dtype=bool)
     allowed[0, 0] = allowed[1, 2] = allowed[2, 1] = False

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from supple.mesh import shapes
-from supple.scene.stitches.masks import stitched_edges, stitched_neighbours, stitched_triangles
+from supple.scene.stitches.masks import stitched_crossings, stitched_edges, stitched_triangles
 
 SURFACE = shapes.box((1, 1, 1), (2, 2, 2)).surface.compact()
 TRIANGLES, EDGES, N = SURFACE.triangles, SURFACE.edges, len(SURFACE.vertices)
@@ -50,11 +50,10 @@ def test_edges(chosen):
 
 
 @CASES
-def test_neighbours(chosen):
+def test_crossings(chosen):
     wanted = set()
     for node in NODES[chosen]:
-        if node[0] >= 0:
-            near = {int(node[0])} | {int(v) for ends in EDGES if node[0] in ends for v in ends}
-            wanted |= set(itertools.product(near, held(node)))
-    found = stitched_neighbours(NODES[chosen], EDGES, N)
-    assert set(map(tuple, found.tolist())) == wanted
+        theirs = [t for t, corners in enumerate(TRIANGLES) if held(node) and held(node) <= set(corners.tolist())]
+        wanted |= set(itertools.product([t for t, corners in enumerate(TRIANGLES) if node[0] in corners], theirs))
+    one, other = stitched_crossings(NODES[chosen], TRIANGLES, N).nonzero()
+    assert set(zip(one.tolist(), other.tolist(), strict=True)) == wanted

@@ -1,4 +1,4 @@
-"""What a user says of stitches: pairs given and found, numbers, rest shapes; and what is refused."""
+"""Stitches of a scene: given and found pairs, numbers, rest shapes, and errors."""
 
 from dataclasses import replace
 
@@ -17,7 +17,7 @@ SHEET = sp.SurfaceMesh([[9, 9, 9], [-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1
 
 
 def scene(*stitches, gap=0.01, turned=(0, 0, 0), shift=(0, 0, 0), obstacles=()):
-    """Two boxes, one `gap` above the other, the whole turned and shifted."""
+    """Two boxes, one `gap` above the other, both turned and shifted."""
     R = rotation_matrix(turned)
     bodies = [
         sp.Body(name, BOX, SOFT, position=R @ [0, y, 0] + shift, rotation=turned)
@@ -61,7 +61,43 @@ def test_the_same_pairs_are_found_far_from_the_origin(gap, pairing):
         assert np.array_equal(there, here)
 
 
-def test_all_in_reach_are_more():
+@pytest.mark.parametrize("turned", [(0, 0, 0), (0.3, -1.0, 2.0)])
+@pytest.mark.parametrize(("shift", "size"), [((0, 0, 0), 1.0), ((3, -2, 5), 1.0), ((0, 0, 0), 0.03)])
+def test_faces_that_touch_are_paired_with_each_other(turned, shift, size):
+    """All triangles around a corner are at the distance 0, and all heights are 0: the vertex's normal decides."""
+    mesh = sp.shapes.box((0.5 * size, 0.1 * size, 0.1 * size), (5, 3, 3))
+    R = rotation_matrix(turned)
+    bodies = [
+        sp.Body(name, mesh, SOFT, position=R @ [x * size, 0, 0] + shift, rotation=turned)
+        for name, x in (("a", 0.25), ("b", 0.75))
+    ]
+    (part,) = sp.Scene(bodies, stitches=[soft("a", "b", max_distance=1e-6 * size)]).stitching.ranges
+    assert len(part.pairs.rows) == 16
+    end = mesh.vertices[:, 0] < -0.2499 * size
+    assert end[mesh.surface.triangles[part.pairs.rows]].all()
+
+
+def test_the_default_distance_is_a_hundredth_of_the_mean_edge():
+    for scale in (1.0, 0.03):
+        box = sp.shapes.box((0.2 * scale, 0.2 * scale, 0.2 * scale), (2, 2, 2))
+        bodies = [sp.Body("low", box, SOFT), sp.Body("high", box, SOFT, position=(0, 0.2 * scale, 0))]
+        tets = sp.Scene(bodies, stitches=[soft(max_distance=1e-6 * scale)]).stitching.tets
+        assert tets.offset.all()
+        heights = 3.0 * tets.rest_volumes / (0.5 * (0.1 * scale) ** 2)
+        of_triangle = 0.1 * scale * (2 + np.sqrt(2)) / 3
+        assert heights.max() == pytest.approx(0.01 * of_triangle, rel=1e-9)
+        # At some vertices of the upper box the mean edge is shorter.
+        assert heights.min() >= 0.01 * 0.1 * scale
+
+
+def test_the_default_distance_to_a_large_triangle_is_that_of_the_fine_mesh():
+    sheet = sp.TriangleObstacle(name="sheet", surface=SHEET)
+    tets = scene(soft("low", "sheet", max_distance=1e-6), obstacles=[sheet]).stitching.tets
+    assert tets.offset.all()
+    assert (3.0 * tets.rest_volumes / 2.0).max() <= 0.01 * 0.1 * np.sqrt(2)
+
+
+def test_pairing_all_finds_every_triangle_in_reach():
     pairs = scene(soft(max_distance=0.0101, pairing="all")).stitching.ranges[0].pairs
     top = np.flatnonzero(np.all(BOX.vertices[BOX.surface.triangles][:, :, 1] > 0.099, axis=1))
     wanted = set()
@@ -73,7 +109,7 @@ def test_all_in_reach_are_more():
     assert len(wanted) > len(top)
 
 
-def test_siblings_join_vertices_and_edges():
+def test_springs_join_vertices_and_edges():
     vertex = sp.VertexVertexStitch("high", "low", max_distance=0.0101, stiffness=10.0)
     edge = sp.VertexEdgeStitch("high", "low", max_distance=0.0101, stiffness=10.0, rest_length=0.02)
     given = sp.VertexEdgeStitch("high", "low", pairs=[[0, 3], [1, 5]], stiffness=[1.0, 2.0], rest_length=[0.0, 0.1])
@@ -105,8 +141,8 @@ def test_values_may_be_given_for_each_pair():
 
 @pytest.mark.parametrize("shift", [(0, 0, 0), (100, -70, 30)])
 @pytest.mark.parametrize("given", [{"max_distance": 1e-6}, {"pairs": [[k, 0] for k in range(27)]}])
-def test_what_touches_is_at_no_distance(shift, given):
-    """Else springs of 1e-17 m would report stretches of 1e13."""
+def test_touching_pairs_have_the_distance_zero(shift, given):
+    """Otherwise springs of 1e-17 m would report stretches of 1e13."""
     touching = sp.VertexEdgeStitch("high", "low", stiffness=1.0, **given)
     one = scene(touching, gap=0.0, turned=(0.3, -1.0, 2.0), shift=shift)
     (part,) = one.stitching.ranges
@@ -124,13 +160,13 @@ def test_a_stitch_can_be_made_from_another_one():
         replace(harder, youngs=2e5)
 
 
-def test_a_density_wants_deformation_gradients():
+def test_energy_density_checks_the_shape_of_F():
     for wrong in ("x", [[1, 2], [3]], np.eye(2)):
         with pytest.raises(sp.SceneError, match="its last two axes must be"):
             soft(pairs=[[0, 1]]).energy_density(wrong)
 
 
-def test_rest_shapes_are_those_of_the_scene_whatever_state_a_simulation_begins_with():
+def test_rest_shapes_do_not_depend_on_the_start_of_the_simulation():
     one = scene(soft(max_distance=0.0101))
     squashed = initial_state(one, {"low": BOX.vertices * [1, 0.5, 1] + [0, -0.3, 0]})
     assert np.array_equal(build_system(one, squashed).stitching.tets.vertices, one.stitching.tets.vertices)
@@ -139,7 +175,7 @@ def test_rest_shapes_are_those_of_the_scene_whatever_state_a_simulation_begins_w
     )
 
 
-def test_obstacles_of_triangles_are_held_on_to_and_move():
+def test_stitches_to_triangle_obstacles_follow_their_motion():
     moving = sp.Keyframes([0, 1], [[0, 0, 0], [0, 0, 2]])
     sheet = sp.TriangleObstacle(name="sheet", surface=SHEET, motion=moving)
     one = scene(soft("low", "sheet", max_distance=1e-6), gap=1.0, obstacles=[sp.HalfSpace(point=(0, -9, 0)), sheet])
@@ -158,7 +194,7 @@ def test_obstacles_of_triangles_are_held_on_to_and_move():
     assert joined.max() == 1, "the box above is not joined"
 
 
-def test_bodies_hang_together_through_stitches():
+def test_stitched_bodies_are_one_component():
     third = sp.Body("third", BOX, SOFT, position=(5, 0, 0))
     bodies = [*scene().bodies, third]
     system = build_system(sp.Scene(bodies, stitches=[soft(max_distance=0.02)]))
@@ -169,12 +205,12 @@ def test_bodies_hang_together_through_stitches():
     assert joined[system.bodies[2].vertices][0] != joined[0]
 
 
-def test_nothing_in_reach_is_an_error_that_says_what_would_be():
-    with pytest.raises(sp.SceneError) as refused:
+def test_the_error_for_nothing_in_reach_names_the_smallest_distance():
+    with pytest.raises(sp.SceneError) as caught:
         build_system(scene(soft(max_distance=0.005, name="seam")))
-    assert "stitch 'seam'" in str(refused.value)
-    assert "smallest distance there is is 0.01 m" in str(refused.value)
-    assert "\n" not in str(refused.value)
+    assert "stitch 'seam'" in str(caught.value)
+    assert "smallest distance is 0.01 m" in str(caught.value)
+    assert "\n" not in str(caught.value)
 
 
 LOWEST = BOX.vertices[6] - [0, 0.1, 0]
@@ -212,26 +248,26 @@ REFUSED = {
     "edge": (lambda: sp.VertexEdgeStitch("high", "low", pairs=[[0, 999]], stiffness=1.0), "number 999 of 72 edges"),
     "count": (lambda: soft(pairs=[[0, 0], [1, 1]], youngs=[1.0, 2.0, 3.0]), "3 values for 2 pairs"),
     "unlike": (lambda: soft(pairs=[[0, 0]], youngs=[1.0, 2.0], poisson=[0.1] * 3), "youngs has 2 values and poisson 3"),
-    "said": (lambda: soft(pairs=[[0, 0], [1, 1]], youngs=[1.0] * 3), "youngs has 3 values for 2 pairs"),
+    "counts": (lambda: soft(pairs=[[0, 0], [1, 1]], youngs=[1.0] * 3), "youngs has 3 values for 2 pairs"),
     "thin": (
         lambda: soft("low", "flat", pairs=[[6, 2]], min_separate_distance=1e-18),
         "in the plane of triangle 2",
     ),
     "body": (lambda: soft("top", pairs=[[0, 0]]), "no body 'top'"),
     "second": (lambda: soft("low", "top", pairs=[[0, 0]]), "no body or obstacle 'top'"),
-    "floor": (lambda: soft("low", "floor", pairs=[[0, 0]]), "hold on to bodies and TriangleObstacles"),
+    "floor": (lambda: soft("low", "floor", pairs=[[0, 0]]), "stitches join bodies and TriangleObstacles"),
     "flat": (lambda: soft("low", "flat", pairs=[[0, 0]]), "triangle 0 of obstacle 'flat' has no area"),
 }
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_refused(case):
+def test_errors(case):
     make, text = REFUSED[case]
     obstacles = [sp.HalfSpace(name="floor", point=(0, -5, 0)), sp.TriangleObstacle(name="flat", surface=FLAT)]
-    with pytest.raises(sp.SceneError) as refused:
+    with pytest.raises(sp.SceneError) as caught:
         build_system(scene(make(), obstacles=obstacles))
-    assert text in str(refused.value)
-    assert "\n" not in str(refused.value)
+    assert text in str(caught.value)
+    assert "\n" not in str(caught.value)
 
 
 def test_every_kind_is_registered_and_public():

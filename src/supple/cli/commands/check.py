@@ -98,7 +98,7 @@ def _print(report: CheckReport, *, only_failures: bool) -> None:
         table.add_row(
             result.name,
             f"[{colors[result.verdict]}]{result.verdict}[/]",
-            escape(result.said),
+            escape(result.message),
             "" if result.frame is None else str(result.frame),
             "" if result.time is None else f"{result.time:.6g}",
         )

@@ -1,7 +1,7 @@
-"""What is near what at a point of the search, and how far a step may go before anything touches.
+"""Pairs of near primitives at a point of the search, and how far a step may go before anything touches.
 
 The broad phase runs once for a step of Newton's method, on the boxes that surfaces sweep; the line search along that
-step looks only at what was found.
+step uses only the pairs that were found.
 """
 
 from __future__ import annotations
@@ -12,16 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.collision_mesh.contact_surface import ContactSurface
+from supple.numerics.geometry.triangle_crossings import crossing_triangles
 
 if TYPE_CHECKING:
     import ipctk
 
-# Swept boxes of a long way overlap everything: it is looked at in pieces, each as long as this share of the mean edge.
+# Swept boxes of a long way overlap everything. It is divided into pieces of this many mean edges.
 _PIECE = 2.0
-# Of one pair. Where two have come as near as round-off, ten million, the library's own limit, take minutes; wherever it
-# stops, it is on the safe side.
-_MOST_ADVANCES = 100_000
-_MOST_PIECES = 64
+# Iterations for one pair. Where two surfaces are as near as round-off, the library's own limit of ten million takes
+# minutes. The result is conservative wherever the iteration stops.
+_MAX_ITERATIONS = 100_000
+_MAX_PIECES = 64
 
 
 class Collisions:
@@ -38,9 +39,9 @@ class Collisions:
         self.surface = surface
         self.dhat = dhat
         # The library's default continuous detection takes minutes on aligned cubes; this one milliseconds.
-        self._ccd = ipctk.AdditiveCCD(max_iterations=_MOST_ADVANCES)
+        self._ccd = ipctk.AdditiveCCD(max_iterations=_MAX_ITERATIONS)
         mesh = surface.mesh
-        # Of the bodies' own edges: where squares are cut evenly, a diagonal counts as one.
+        # Edges of the bodies' own meshes: the diagonal of a split square counts as one edge.
         own = mesh.edges[(mesh.edges < len(surface.vertices)).all(axis=1)]
         ends = mesh.rest_positions[np.concatenate([own, surface.middles])]
         self._piece = _PIECE * float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean()) if len(ends) else np.inf
@@ -63,7 +64,7 @@ class Collisions:
         points = self.points(x)
         if self._found is None:
             if not self._covers(points):
-                self._look(points, points)
+                self._find_candidates(points, points)
             found = ipctk.NormalCollisions()
             found.use_area_weighting = True
             # The plain set counts a vertex above a vertex once for each triangle around it: aligned bodies would slip.
@@ -79,17 +80,17 @@ class Collisions:
         longest = float(np.sqrt(np.einsum("ij,ij->i", way, way).max(initial=0.0)))
         if not np.isfinite(longest):
             return 0.0
-        pieces = max(1, int(np.ceil(min(longest / self._piece, _MOST_PIECES))))
+        pieces = max(1, int(np.ceil(min(longest / self._piece, _MAX_PIECES))))
         length = min(1.0, self._piece * pieces / longest) / pieces if longest > 0.0 else 1.0
         for k in range(pieces):
             begin = start if k == 0 else np.asfortranarray(start + (k * length) * way)
             end = np.asfortranarray(start + ((k + 1) * length) * way)
-            self._look(begin, end)
+            self._find_candidates(begin, end)
             assert self._candidates is not None
             share = self._candidates.compute_collision_free_stepsize(self.surface.mesh, begin, end, 0.0, self._ccd)
             if share < 1.0:
                 return (k + share) * length
-        # A whole way must count as one: pieces * (1 / pieces) can be a little less.
+        # A complete way must give exactly 1: pieces * (1 / pieces) can be slightly less.
         return 1.0 if longest <= pieces * self._piece else pieces * length
 
     def smallest_distance(self, x: NDArray[np.float64]) -> float:
@@ -101,16 +102,19 @@ class Collisions:
         return float(np.sqrt(found.compute_minimum_distance(self.surface.mesh, self.points(x))))
 
     def intersect(self, x: NDArray[np.float64]) -> bool:
-        """Whether any two triangles cross at x; False where that cannot be known, since sewn ones touch anyway."""
+        """Whether any two triangles that may not cross do so at x."""
         import ipctk
 
-        stitched = self.surface.stitched
-        if stitched is not None and stitched.touches:
-            return False
-        mesh = self.surface.mesh if stitched is None else stitched.without_neighbours
-        return bool(ipctk.has_intersections(mesh, self.points(x)))
+        surface, points = self.surface, self.points(x)
+        if surface.stitched is None:
+            return bool(ipctk.has_intersections(surface.mesh, points))
+        # The library's test leaves out pairs of vertices only, and counts seams, whose sides touch.
+        faces = np.ascontiguousarray(surface.mesh.faces)
+        points = np.ascontiguousarray(points)
+        pairs, _ = crossing_triangles(points, faces, surface.owner[faces[:, 0]], surface.collide)
+        return len(surface.stitched.exclude(pairs, len(faces))) > 0
 
-    def _look(self, begin: NDArray[np.float64], end: NDArray[np.float64]) -> None:
+    def _find_candidates(self, begin: NDArray[np.float64], end: NDArray[np.float64]) -> None:
         import ipctk
 
         candidates = ipctk.Candidates()
@@ -121,7 +125,7 @@ class Collisions:
         self._box = np.minimum(begin, end), np.maximum(begin, end)
 
     def _covers(self, points: NDArray[np.float64]) -> bool:
-        """Whether the broad phase has looked at where these points are."""
+        """Whether the latest broad phase covers these points."""
         if self._box is None:
             return False
         low, high = self._box

@@ -1,4 +1,4 @@
-"""The surfaces that may touch, as the contact library sees them."""
+"""The surfaces that may touch, as a collision mesh of the contact library."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_matrix, coo_matrix, csc_matrix, csr_matrix, identity, kron
 
-from supple.contact.collision_mesh.quad_split import cut_evenly
-from supple.contact.collision_mesh.stitch_filter import StitchedContacts
+from supple.contact.collision_mesh.quad_split import split_quads
+from supple.contact.collision_mesh.stitch_filter import StitchFilter
 from supple.contact.obstacle_vertices import ObstacleRange
 from supple.system import System
 
@@ -27,11 +27,12 @@ class ContactSurface:
     ----------
     mesh : the collision mesh, in numbers of its own: first vertices of the solver, then middles
     vertices : (s,) the solver's vertex of each of the mesh's first, ascending
-    middles : (k, 2) which of those each of the further points lies between (see `even_squares`)
-    owner : (s + k,) which body, or len(bodies) + which obstacle, each belongs to
+    middles : (k, 2) which of those each of the further points lies between (see `split_quads`)
+    owner : (s + k,) number of the body, or len(bodies) + number of the obstacle, of each point
     areas : (s,) a third of the adjacent triangles' area at rest [m^2]
     body_count : how many of the owners are bodies; names : of all owners
-    stitched : what of the mesh does not collide because it is stitched together
+    collide : (p, p) which owners may touch
+    stitched : pairs that do not collide because they are stitched to each other
     """
 
     mesh: ipctk.CollisionMesh
@@ -41,10 +42,11 @@ class ContactSurface:
     areas: NDArray[np.float64]
     body_count: int
     names: tuple[str, ...]
-    stitched: StitchedContacts | None
+    collide: NDArray[np.bool_]
+    stitched: StitchFilter | None
 
     def points(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Points of the mesh, or ways that they go, from those of all vertices x (n, 3), laid out for the library."""
+        """Points of the mesh, or displacements, from those of all vertices x (n, 3), in the library's memory layout."""
         own = x[self.vertices]
         if len(self.middles):
             own = np.concatenate([own, 0.5 * (own[self.middles[:, 0]] + own[self.middles[:, 1]])])
@@ -90,7 +92,7 @@ def contact_surface(
     collide: NDArray[np.bool_],
     start: NDArray[np.float64],
 ) -> ContactSurface:
-    """Join the surfaces of a system whose obstacles are vertices (see `kinematic`).
+    """Join the surfaces of a system whose obstacles are vertices (see `with_obstacles`).
 
     Parameters
     ----------
@@ -99,11 +101,6 @@ def contact_surface(
     """
     import ipctk
 
-    # With several threads the library finds contacts in an order, and rounds its sums in a way, that differs from run
-    # to run; with one, the same scene gives the same bits.
-    ipctk.set_num_threads(1)
-    # It writes warnings to standard output, where they say nothing to a user.
-    ipctk.set_logger_level(ipctk.LoggerLevel.error)
     parts = [system.triangles] + [part.triangles for part in obstacles if not part.is_plane]
     triangles = np.concatenate(parts)
     vertices = np.unique(triangles).astype(np.int32)
@@ -121,21 +118,23 @@ def contact_surface(
     doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     areas = np.bincount(faces.ravel(order="C"), weights=np.repeat(doubled / 6.0, 3), minlength=len(vertices))
     middles = np.zeros((0, 2), dtype=np.int32)
-    if not len(system.stitching):  # what is stitched is told by vertices, edges and triangles of the bodies
-        faces, middles = cut_evenly(rest, faces, owner)
+    if not len(system.stitching):  # stitches name vertices, edges and triangles of the bodies' own meshes
+        faces, middles = split_quads(rest, faces, owner)
         rest = np.concatenate([rest, rest[middles].mean(axis=1)])
         owner = np.concatenate([owner, owner[middles[:, 0]]])
     faces = np.asfortranarray(faces, dtype=np.int32)
     mesh = ipctk.CollisionMesh(np.asfortranarray(rest), ipctk.edges(faces), faces)
     mesh.can_collide = _filter(owner, len(system.bodies), collide)
     nodes = np.append(number, -1)[system.stitching.nodes()]
-    stitched = StitchedContacts.of(mesh, nodes, owner, np.asfortranarray(start[vertices]))
+    stitched = StitchFilter.of(mesh, nodes, owner, np.asfortranarray(start[vertices]))
     names = tuple(part.name for part in system.bodies) + tuple(str(o.name) for o in system.obstacles)
-    return ContactSurface(mesh, vertices, middles, owner, areas.astype(np.float64), len(system.bodies), names, stitched)
+    return ContactSurface(
+        mesh, vertices, middles, owner, areas.astype(np.float64), len(system.bodies), names, collide, stitched
+    )
 
 
 def _filter(owner: NDArray[np.int32], body_count: int, collide: NDArray[np.bool_]) -> ipctk.CollisionFilter:
-    """Who may touch whom, built from the library's own filters: it asks them from many threads at once."""
+    """Which vertices may touch, built from the library's own filters: it calls them from several threads at once."""
     import ipctk
 
     other_owner = ipctk.make_vertex_patches_filter(owner)

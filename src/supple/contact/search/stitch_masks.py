@@ -1,8 +1,8 @@
-"""Which of the points and triangles that may touch are stitched to each other.
+"""Pairs of points and triangles that do not collide because they are stitched to each other.
 
-Beside what `supple.scene.stitches.masks` says, that is what is nearer at the start than the gap that contact keeps,
-between things that are stitched to each other, where the point is stitched, or all of the triangle is: contact would
-push a seam apart that is sewn face to face.
+These are the pairs of `supple.scene.stitches.masks`. Between things that are stitched to each other, they are also the
+pairs that are nearer at the start than the gap of contact, where the point or all corners of the triangle are stitched:
+otherwise contact would push faces apart that are stitched to each other.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from supple.system import System
 
 def stitched_contacts(system: System, surfaces: ContactSurfaces, poses: ObstaclePoses) -> Pair:
     """(q,) points and (q,) triangles of `surfaces` that never collide."""
-    # The last one for what is no node.
+    # The last entry is for nodes that do not exist.
     nodes = np.append(_points_of_vertices(system, surfaces), -1)[system.stitching.nodes()]
     points, triangles = stitched_triangles(nodes, surfaces.triangles, len(surfaces.point_piece))
     near_points, near_triangles = _touching(system, surfaces, poses, nodes)
@@ -38,7 +38,7 @@ def stitched_points(
 
 
 def _touching(system: System, surfaces: ContactSurfaces, poses: ObstaclePoses, nodes: NDArray[np.int64]) -> Pair:
-    """Those of things that stitches with these nodes (k, 4) join, which are too near at the start; see the module."""
+    """Pairs of things that stitches with these nodes (k, 4) join, which are near at the start; see the module."""
     first, second = np.repeat(nodes[:, 0], 3), nodes[:, 1:].ravel()
     both = (first >= 0) & (second >= 0)
     one, other = surfaces.point_piece[first[both]], surfaces.point_piece[second[both]]
@@ -53,9 +53,9 @@ def _touching(system: System, surfaces: ContactSurfaces, poses: ObstaclePoses, n
     start[: len(surfaces.rows)] = placed[surfaces.rows]
     surfaces.place_obstacles(poses, 0.0, start)
     points, triangles = pairs_closer_than(surfaces, start, float(surfaces.gaps[joined].max()), joined)
-    sewn = np.zeros(len(start), dtype=np.bool_)
-    sewn[nodes[nodes >= 0]] = True
-    kept = sewn[points] | sewn[surfaces.triangles[triangles]].all(axis=1)
+    stitched = np.zeros(len(start), dtype=np.bool_)
+    stitched[nodes[nodes >= 0]] = True
+    kept = stitched[points] | stitched[surfaces.triangles[triangles]].all(axis=1)
     return points[kept].astype(np.int64), triangles[kept].astype(np.int64)
 
 

@@ -1,20 +1,18 @@
-"""Whether surfaces intersect at the start: incremental potential contact keeps them apart only if they begin apart."""
+"""Intersections at the start: incremental potential contact keeps surfaces apart only if they start apart."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.start.surfaces import StartSurfaces, start_surfaces, winding_number
+from supple.contact.start.surfaces import StartSurfaces, winding_number
 from supple.numerics.geometry.triangle_crossings import CROSSING, crossing_triangles
 from supple.scene.contact_pairs import PairTable
-from supple.system import System
 
-# Of a thing's size: how far its surface is drawn in to see whether it only touches.
-_DRAWN_IN = 1e-9
+# How far a surface is moved inwards to test whether it only touches, as a share of its size.
+_INWARD_SHARE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,13 +21,12 @@ class Intersection:
 
     Attributes
     ----------
-    first, second : which things: bodies in the scene's order, then obstacles. The first is a body.
+    first, second : numbers of things: bodies in the scene's order, then obstacles. The first is a body.
     kind : "overlaps"; "touches", where the distance is zero and nothing is inside anything; "is inside", where the
-        first is wholly inside the second; "is around", the other way round; "is outside" of a room
+        first is completely inside the second; "is around", where the second is inside the first; "is outside" of a room
     triangles : (k, 2) rows of the first's and of the second's own triangles that meet; -1 for a plane, which has none;
-        none at all where the surfaces do not meet
-    point : (3,) where, one of the places [m]
-    depth : roughly how deep [m]
+        empty where the surfaces do not meet
+    point : (3,) one of the places [m]; depth : approximate depth [m]
     """
 
     first: int
@@ -40,46 +37,27 @@ class Intersection:
     depth: float
 
 
-def find_intersections(
-    system: System,
-    positions: NDArray[np.float64],
-    time: float,
-    table: PairTable,
-    ignored: Collection[tuple[int, int]] = (),
-) -> list[Intersection]:
+def intersections_of(surfaces: StartSurfaces, table: PairTable) -> list[Intersection]:
     """Every pair of things of a scene whose surfaces are not apart, bodies first.
 
-    Pairs of triangles are tested exactly; a distance of zero is no distance. Triangles of one body that share a vertex
-    are not tested at that vertex. Pairs of things that do not collide are left out.
+    Pairs of triangles are tested exactly; a distance of zero counts as touching. Triangles of one body that share a
+    vertex are not tested at that vertex.
 
     Parameters
     ----------
-    positions : (n, 3) of the system's vertices [m]; time : [s], where scripted obstacles are
-    table : which things collide
-    ignored : pairs (vertex, row of `system.triangles`) that may intersect, with all triangles at that vertex
+    table : which things collide; the other pairs are left out
     """
-    return intersections_of(start_surfaces(system, positions, time), table, ignored)
-
-
-def intersections_of(
-    surfaces: StartSurfaces, table: PairTable, ignored: Collection[tuple[int, int]] = ()
-) -> list[Intersection]:
-    """The same for surfaces that are collected already."""
-    met, found = _meeting(surfaces, table, ignored)
+    met, found = _meeting(surfaces, table)
     found += _nested(surfaces, table, met)
     found += _behind_planes(surfaces, table)
     return sorted(found, key=lambda item: (item.first, item.second))
 
 
-def _meeting(
-    s: StartSurfaces, table: PairTable, ignored: Collection[tuple[int, int]]
-) -> tuple[set[tuple[int, int]], list[Intersection]]:
-    """Pairs of things whose triangles meet, ignored ones too; and those that count."""
+def _meeting(s: StartSurfaces, table: PairTable) -> tuple[set[tuple[int, int]], list[Intersection]]:
+    """Pairs of things whose triangles meet; and where they do."""
     pairs, kinds = crossing_triangles(s.points, s.triangles, s.owner, table.collide)
     things = np.sort(s.owner[pairs], axis=1)
     met = {(int(a), int(b)) for a, b in np.unique(things, axis=0)} if len(things) else set()
-    counts = ~_are_ignored(s, pairs, ignored)
-    pairs, kinds, things = pairs[counts], kinds[counts], things[counts]
     found = []
     for a, b in np.unique(things, axis=0):
         mine = (things == (a, b)).all(axis=1)
@@ -94,21 +72,8 @@ def _meeting(
     return met, found
 
 
-def _are_ignored(s: StartSurfaces, pairs: NDArray[np.int64], ignored: Collection[tuple[int, int]]) -> NDArray[np.bool_]:
-    """(k,) whether one triangle of a pair is an ignored vertex's, and the other the one it may meet."""
-    out = np.zeros(len(pairs), dtype=np.bool_)
-    if not ignored or not len(pairs):
-        return out
-    count = np.int64(len(s.triangles))
-    allowed = np.unique([vertex * count + row for vertex, row in ignored])
-    for one, other in ((0, 1), (1, 0)):
-        keys = s.triangles[pairs[:, one]].astype(np.int64) * count + pairs[:, other, None]
-        out |= np.isin(keys, allowed).any(axis=1)
-    return out
-
-
 def _still_meets(s: StartSurfaces, a: int, b: int) -> bool:
-    """Whether a still meets b, or is inside it, with its surface drawn in by next to nothing."""
+    """Whether a meets b, or is inside it, also with its surface moved inwards by a tiny distance."""
     mine, theirs = s.of(a), s.of(b)
     x = s.points.copy()
     corners = x[mine]
@@ -119,7 +84,7 @@ def _still_meets(s: StartSurfaces, a: int, b: int) -> bool:
     length = np.linalg.norm(inwards, axis=1)
     rows = np.flatnonzero(length > 0.0)
     size = np.linalg.norm(np.ptp(x[mine.ravel()], axis=0)) + np.abs(x[mine.ravel()]).max() * 1e-3
-    x[rows] += _DRAWN_IN * size * inwards[rows] / length[rows, None]
+    x[rows] += _INWARD_SHARE * size * inwards[rows] / length[rows, None]
     triangles = np.concatenate([mine, theirs])
     owner = np.repeat(np.array([0, 1], dtype=np.int32), [len(mine), len(theirs)])
     pairs, _ = crossing_triangles(x, triangles, owner, np.array([[False, True], [True, False]]))
@@ -129,7 +94,7 @@ def _still_meets(s: StartSurfaces, a: int, b: int) -> bool:
 
 
 def _depths(first: NDArray[np.float64], second: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """How far (k,) each pair of triangles (k, 3, 3) goes through each other, and about where (k, 3)."""
+    """How deep (k,) the triangles (k, 3, 3) of each pair go through each other, and approximately where (k, 3)."""
     behind = []
     for one, other in ((first, second), (second, first)):
         normal = np.cross(other[:, 1] - other[:, 0], other[:, 2] - other[:, 0])
@@ -142,7 +107,7 @@ def _depths(first: NDArray[np.float64], second: NDArray[np.float64]) -> tuple[ND
 
 
 def _nested(s: StartSurfaces, table: PairTable, met: set[tuple[int, int]]) -> list[Intersection]:
-    """Surfaces that do not meet, but one of them is wholly inside the other, or outside of a room."""
+    """Surfaces that do not meet, of which one is completely inside the other, or outside a room."""
     low, high = _boxes(s)
     none = np.zeros((0, 2), dtype=np.int64)
     found: dict[tuple[int, int, str], Intersection] = {}

@@ -1,4 +1,4 @@
-"""Moving bodies apart that intersect at the start, each as a whole and no further than a little."""
+"""Moves bodies apart that intersect at the start, each as a whole and by a small translation."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from supple.scene.contact_pairs import PairTable, pair_table
 from supple.scene.scene import Scene
 from supple.system import PinRange, System, build_system, initial_state
 
-# Of a body's diagonal: how far it may be moved.
+# How far a body may be moved, as a share of its diagonal.
 FURTHEST = 0.5
-# Of the mean surface edge: the gap that is left between bodies that are moved apart.
+# The gap between bodies that were moved apart, as a share of the mean surface edge.
 GAP = 0.01
 _PUSHES, _HALVINGS, _ROUNDS = 8, 8, 60
-# A way that is this many times longer is taken if it does not lead downwards.
-_DOWNWARDS_COSTS = 2.0
+# Lengths of translations that lead downwards are multiplied by this before they are compared.
+_DOWNWARD_COST = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Separation:
 
     Attributes
     ----------
-    scene : with the moved bodies' positions; initial_positions : those that were given, moved along
+    scene : with the moved bodies' positions; initial_positions : the given ones, moved with their bodies
     moves : which bodies were moved, and how far
     """
 
@@ -60,18 +60,18 @@ def separate(
 ) -> Separation:
     """Move bodies apart that intersect, or touch, at the start.
 
-    Bodies are moved as a whole, each by no more than half its diagonal, upwards rather than downwards, and the upper or
-    the lighter of two. Bodies that are stitched together move as one. Pinned bodies, what is stitched to an obstacle,
-    and obstacles stay where they are.
+    Bodies are moved as a whole, each by no more than half its diagonal, upwards rather than downwards. Of two bodies
+    the upper or the lighter one is moved. Bodies that are stitched together move as one. Pinned bodies, bodies that are
+    stitched to an obstacle, and obstacles are not moved.
 
     Parameters
     ----------
-    gap : left between what is moved apart [m]; None: see `default_gap`
+    gap : between bodies that were moved apart [m]; None: see `default_gap`
     initial_positions : as for `simulate`
 
     Raises
     ------
-    SceneError : where that does not separate them; the text names two that still intersect.
+    SceneError : where that does not separate them; the message names two that still intersect.
     """
     system = build_system(scene)
     start = initial_state(scene, initial_positions)
@@ -87,18 +87,18 @@ def separate(
         for item in found:
             if moved & {item.first, item.second}:
                 continue
-            way = mover.way_out(surfaces, item)
-            if way is None:
-                raise SceneError(f"{mover.say(item)}; {mover.why_not(item)}")
-            body, shift = way
+            move = mover.separating_move(surfaces, item)
+            if move is None:
+                raise SceneError(f"{mover.description(item)}; {mover.remedy(item)}")
+            body, shift = move
             together = np.flatnonzero(mover.group == mover.group[body])
             total[together] += shift
             if np.linalg.norm(total[body]) > mover.limits[body]:
-                raise SceneError(f"{mover.say(item)}; {mover.why_not(item)}")
+                raise SceneError(f"{mover.description(item)}; {mover.remedy(item)}")
             for one in together.tolist():
                 surfaces = shifted(system, surfaces, one, shift)
             moved.update(together.tolist())
-    raise SceneError(f"{mover.say(found[0])}; {mover.why_not(found[0])}")
+    raise SceneError(f"{mover.description(found[0])}; {mover.remedy(found[0])}")
 
 
 def _applied(scene: Scene, given: Mapping[str, ArrayLike], total: NDArray[np.float64]) -> Separation:
@@ -113,7 +113,7 @@ def _applied(scene: Scene, given: Mapping[str, ArrayLike], total: NDArray[np.flo
         moves.append(Move(body.name, shift))
         if body.name in starts:
             starts[body.name] = starts[body.name] + shift
-        for items in loads.values():  # whatever box they were chosen by, the vertices stay the same
+        for items in loads.values():  # loads keep their vertices, also where a box chose them
             for k, item in enumerate(items):
                 if item.body == body.name:
                     items[k] = replace(item, vertices=item.select(body.place(body.mesh.vertices)))
@@ -130,18 +130,18 @@ def shifted(system: System, s: StartSurfaces, body: int, shift: NDArray[np.float
 
 
 class Mover:
-    """Finds the way out of an intersection.
+    """Finds translations that separate things.
 
     Parameters
     ----------
-    gap : that is left [m]
+    gap : between the two afterwards [m]
 
     Attributes
     ----------
-    group : (b,) what each body belongs to: those that are stitched together are one
-    masses, limits, free : (b,) of each body's group: its mass [kg], how far it may be moved [m], and whether nothing
-        holds it
-    held : (b,) the same of each body alone: whether it is pinned, or stitched to an obstacle
+    group : (b,) number of each body's group; bodies that are stitched together are one group
+    masses, limits, free : (b,) of each body's group: its mass [kg], how far it may be moved [m], and whether no member
+        is held
+    held : (b,) whether the body itself is pinned, or stitched to an obstacle
     """
 
     def __init__(self, system: System, table: PairTable, gap: float) -> None:
@@ -153,7 +153,7 @@ class Mover:
         spans, self.masses = [], []
         for together in members:
             rows = np.concatenate([np.arange(len(positions))[system.bodies[k].vertices] for k in together])
-            # Alone, a body is as long as it was made; together, they are as long as they begin.
+            # A single body has the size of its rest shape; a group has its size at the start.
             points = system.rest_positions if len(together) == 1 else positions
             spans.append(np.ptp(points[rows], axis=0))
             self.masses.append(float(system.masses[rows].sum()))
@@ -162,7 +162,7 @@ class Mover:
         size = float(np.linalg.norm(system.gravity))
         self.up = -system.gravity / size if size > 0.0 else np.array([0.0, 1.0, 0.0])
 
-    def way_out(self, s: StartSurfaces, item: Intersection) -> tuple[int, NDArray[np.float64]] | None:
+    def separating_move(self, s: StartSurfaces, item: Intersection) -> tuple[int, NDArray[np.float64]] | None:
         """Which body to move, and by how much (3,) [m]; None where no small translation separates the two."""
         a, b = item.first, item.second
         bodies = [k for k in (a, b) if k < len(self.masses) and self.free[k]]
@@ -173,8 +173,8 @@ class Mover:
         best: tuple[float, int, float, NDArray[np.float64], float] | None = None
         ways = []
         for direction in self._directions(s, item):
-            mover, sign = self._who(bodies, a, direction)
-            cost = _DOWNWARDS_COSTS if sign * direction @ self.up < -0.1 else 1.0
+            mover, sign = self._moved_body(bodies, a, direction)
+            cost = _DOWNWARD_COST if sign * direction @ self.up < -0.1 else 1.0
             ways.append((cost * self._push(pair, item, direction, [item]), cost, mover, sign, direction))
         for least, cost, mover, sign, direction in sorted(ways, key=lambda way: way[0]):
             if best is not None and least >= best[0]:
@@ -192,8 +192,8 @@ class Mover:
         """Whether two things are bodies that are stitched together."""
         return a < len(self.group) and b < len(self.group) and bool(self.group[a] == self.group[b])
 
-    def say(self, item: Intersection) -> str:
-        """What is wrong, in words."""
+    def description(self, item: Intersection) -> str:
+        """What intersects, for messages."""
         first, second = self.names[item.first], self.names[item.second]
         where = "({:.4g}, {:.4g}, {:.4g})".format(*(item.point + 0.0))
         if item.first == item.second:
@@ -202,8 +202,8 @@ class Mover:
             text = f"{first} {item.kind} {second} at the start"
         return f"{text}{_triangles(item)} near {where} m"
 
-    def why_not(self, item: Intersection) -> str:
-        """Why nothing can be moved, and what to do instead."""
+    def remedy(self, item: Intersection) -> str:
+        """Why nothing can be moved, and what the user can do."""
         if item.first == item.second:
             return "no translation separates a body from itself: change its mesh, or how it starts"
         if self.together(item.first, item.second):
@@ -218,7 +218,7 @@ class Mover:
             "they cannot be separated by a small translation (half a body's diagonal): change their places in the scene"
         )
 
-    def _who(self, bodies: list[int], a: int, direction: NDArray[np.float64]) -> tuple[int, float]:
+    def _moved_body(self, bodies: list[int], a: int, direction: NDArray[np.float64]) -> tuple[int, float]:
         """Which of the bodies is moved, and whether along (1) or against (-1) the direction in which `a` would go."""
         if len(bodies) == 1:
             return bodies[0], 1.0 if bodies[0] == a else -1.0
@@ -243,7 +243,7 @@ class Mover:
         )
 
     def _directions(self, s: StartSurfaces, item: Intersection) -> list[NDArray[np.float64]]:
-        """Where the first thing might go (unit vectors); the most likely ones first."""
+        """Candidates (unit vectors) for the translation of the first thing; the most likely ones first."""
         for thing, _, normal in s.planes:
             if thing == item.second:
                 return [normal]
@@ -281,7 +281,7 @@ class Mover:
     def _shortened(
         self, pair: StartSurfaces, item: Intersection, direction: NDArray[np.float64], length: float
     ) -> float:
-        """A way that leads out after `length`, as short as a few bisections make it, and the gap [m]."""
+        """A separating length, shortened from `length` by a few bisections, plus the gap [m]."""
         if any(plane[0] == item.second for plane in pair.planes):
             return length
         table = self._only(item)
@@ -300,21 +300,21 @@ class Mover:
     def _push(
         self, pair: StartSurfaces, item: Intersection, direction: NDArray[np.float64], found: list[Intersection]
     ) -> float:
-        """How far the first thing must go at least, by the triangles that meet now [m]."""
+        """The least translation of the first thing that separates the triangles that meet now [m]."""
         a, b = item.first, item.second
         for thing, point, normal in pair.planes:
             if thing == b:
                 return self.gap - float(((pair.points[pair.of(a)] - point) @ normal).min())
         heights = pair.points @ direction
         mine, theirs = pair.of(a), pair.of(b)
-        whole = float(heights[theirs].max() - heights[mine].min()) + self.gap
+        complete = float(heights[theirs].max() - heights[mine].min()) + self.gap
         rows = [other.triangles for other in found if len(other.triangles)]
         if not rows:
-            return whole
+            return complete
         met = np.concatenate(rows)
         local = heights[theirs[met[:, 1]]].max(axis=1) - heights[mine[met[:, 0]]].min(axis=1)
         push = max(float(local.max()), 0.0) + self.gap
-        return push if b in pair.rooms else min(push, whole)
+        return push if b in pair.rooms else min(push, complete)
 
     def _only(self, item: Intersection) -> PairTable:
         """The table for the contact of two things with each other, and for no other."""
@@ -324,9 +324,9 @@ class Mover:
 
 
 def _groups(system: System) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
-    """(b,) which bodies are stitched together, and (b,) which of them something holds."""
+    """(b,) the group of each body, those that are stitched together; and (b,) which bodies are held."""
     number = {part.name: k for k, part in enumerate(system.bodies)}
-    # Obstacles may be among the pins here: the solver moves their vertices in the same way.
+    # The solver adds obstacles to the pins, since it moves their vertices in the same way.
     pinned = {pin.pin.body for pin in system.pins if isinstance(pin, PinRange)}
     held = np.array([part.name in pinned for part in system.bodies])
     joins = []

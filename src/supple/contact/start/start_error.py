@@ -1,4 +1,4 @@
-"""The one line that says why a scene cannot start, and how to mend it."""
+"""The error message for a scene whose surfaces intersect at the start."""
 
 from __future__ import annotations
 
@@ -15,39 +15,40 @@ from supple.scene.contact_pairs import PairTable
 from supple.system import System
 
 
-def refuse_intersecting(
+def raise_if_intersecting(
     system: System,
     positions: NDArray[np.float64],
     time: float,
     table: PairTable,
-    ignored: Collection[tuple[int, int]] = (),
-    sewn: Collection[tuple[int, int]] = (),
+    stitched: Collection[tuple[int, int]] = (),
 ) -> None:
-    """Raise where surfaces are not apart at the start. Other parameters: see `find_intersections`.
+    """Raise where surfaces are not apart at the start.
 
     Parameters
     ----------
-    sewn : pairs of things, ascending, that may meet where they are stitched; named only where nothing else is wrong
+    positions : (n, 3) of the system's vertices [m]; time : [s], where scripted obstacles are
+    table : which things collide
+    stitched : ascending pairs of things that are stitched to each other; named only where no other pair intersects
 
     Raises
     ------
-    SceneError : one line: which things, which triangles, where, how deep, and the mend.
+    SceneError : one line: which things, which triangles, where, how deep, and the remedy.
     """
     surfaces = start_surfaces(system, positions, time)
-    found = intersections_of(surfaces, table, ignored)
+    found = intersections_of(surfaces, table)
     if not found:
         return
-    found = [item for item in found if (item.first, item.second) not in sewn] or found
+    found = [item for item in found if (item.first, item.second) not in stitched] or found
     mover = Mover(system, table, default_gap(system))
     worst = next((item for item in found if item.kind != "touches"), found[0])
-    way = mover.way_out(surfaces, worst)
+    move = mover.separating_move(surfaces, worst)
     deep = f", about {worst.depth:.2g} m deep" if worst.depth > 0.0 else ""
     more = f" ({len(found) - 1} more such {'pair' if len(found) == 2 else 'pairs'})" if len(found) > 1 else ""
-    if way is None:
-        mend = mover.why_not(worst)
+    if move is None:
+        remedy = mover.remedy(worst)
     else:
-        body, shift = way
+        body, shift = move
         deep = f", about {max(float(np.linalg.norm(shift)) - mover.gap, 0.0):.2g} m deep" if deep else ""
         by = "({:.4g}, {:.4g}, {:.4g})".format(*(shift + 0.0))
-        mend = f"move {mover.names[body]} by {by}, or let `supple run --separate` move it"
-    raise SceneError(f"{mover.say(worst)}{deep}; {mend}{more}")
+        remedy = f"move {mover.names[body]} by {by}, or run `supple run --separate`, which moves it"
+    raise SceneError(f"{mover.description(worst)}{deep}; {remedy}{more}")

@@ -1,4 +1,4 @@
-"""The surfaces of a scene at its start, as one list of triangles, and which points are inside of them."""
+"""The surfaces of a scene at its start as one list of triangles, and whether points are inside them."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from supple.system import System
 
 @dataclass(frozen=True, eq=False)
 class StartSurfaces:
-    """Surfaces as the implicit solver has them: round obstacles are made of triangles. Things: bodies, then obstacles.
+    """Surfaces as the implicit solver uses them: spheres consist of triangles. Things: bodies, then obstacles.
 
     Attributes
     ----------
     points : (n, 3) [m], the system's vertices first; triangles : (t, 3), the system's first
-    owner : (t,) which thing a triangle is of; first_row : (p,) the row of each thing's first triangle
+    owner : (t,) the thing of each triangle; first_row : (p,) the row of each thing's first triangle
     pieces : (s, 2) for each connected part of a surface its thing and one of its vertices
     planes : half-spaces, as (thing, point (3,), normal (3,))
-    rooms : obstacles that keep bodies in; solid : (p,) whether a thing has an inside that nothing may be in
+    rooms : obstacles that contain bodies; solid : (p,) whether a thing has an inside where nothing may be
     """
 
     points: NDArray[np.float64]
@@ -92,7 +92,7 @@ def _pieces(triangles: NDArray[np.int32], owner: NDArray[np.int32], n: int) -> N
 
 @njit(cache=True, error_model="numpy")
 def winding_number(x, triangles, q):
-    """How often a closed surface of triangles of x (n, 3) goes around the point q: 0 outside.
+    """The winding number of a closed surface of triangles of x (n, 3) about the point q: 0 outside.
 
     Source: van Oosterom, Strackee, "The solid angle of a plane triangle" (1983).
     """

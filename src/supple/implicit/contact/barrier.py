@@ -55,7 +55,7 @@ class Barrier(ContactPotential):
             try:
                 hessian = self.potential.hessian(found, surface.mesh, self.collisions.points(x), method)
             except RuntimeError:
-                # The library's words for a distance of zero, or numbers beyond its reach.
+                # The library raises this for a distance of zero and for numbers out of range.
                 raise SolverError(
                     "contact: surfaces touch, or their distances leave what double precision can hold; start with a gap"
                 ) from None

@@ -1,7 +1,8 @@
-"""Makes the contact model of a system."""
+"""Builds the contact model of a system."""
 
 from __future__ import annotations
 
+from importlib import import_module
 from importlib.util import find_spec
 
 import numpy as np
@@ -15,6 +16,7 @@ from supple.implicit.contact.half_spaces import Planes
 from supple.implicit.contact.model import ContactModel
 from supple.implicit.contact.scales import largest_dhat, scales_of
 from supple.implicit.contact.settings import IPCContact
+from supple.implicit.contact.threads import one_contact_thread
 from supple.scene.contact_pairs import pair_table
 from supple.system import System, initial_state
 
@@ -35,6 +37,12 @@ def contact_model(system: System, settings: IPCContact, shear_moduli: NDArray[np
             "Implicit: contact needs the package ipctk, which is not installed (it has no wheels for Linux on ARM); "
             "build it with `pip install 'ipctk>=1.6.1,<1.7'`, give contact=None, or use XPBD"
         )
+    import_module("ipctk")
+    with one_contact_thread():
+        return _contact_model(system, settings, shear_moduli)
+
+
+def _contact_model(system: System, settings: IPCContact, shear_moduli: NDArray[np.float64]) -> ContactModel:
     extended, obstacles = with_obstacles(system)
     table = pair_table(system.scene)
     start = np.concatenate([initial_state(system.scene).positions, obstacle_positions(obstacles, 0.0)])
@@ -56,6 +64,6 @@ def contact_model(system: System, settings: IPCContact, shear_moduli: NDArray[np
 
 
 def _gap(planes: Planes, x: NDArray[np.float64]) -> float:
-    """The smallest distance from a plane in front of it [m]; what is behind one is refused later."""
+    """The smallest distance of a vertex in front of a plane [m]; those behind one are an error that is found later."""
     distances, _ = planes.distances(x)
     return float(distances[distances > 0.0].min(initial=np.inf))

@@ -21,7 +21,7 @@ class Friction(ContactPotential):
 
     Parameters
     ----------
-    lagged : (n, 3) where normal forces and tangents are taken from
+    lagged : (n, 3) positions of which normal forces and tangents are used
     start : (n, 3) where the step began; h : its length [s]
     coefficients : (p, p) between owners of the surface
     slow : eps_v [m/s]
@@ -48,7 +48,7 @@ class Friction(ContactPotential):
             owner = self.surface.owner.astype(np.float64)
 
             def blend(a: float, b: float) -> float:
-                """The library blends one number of each vertex; here they are owners, whose pair is looked up."""
+                """The library combines numbers of vertices. Here these are owners, and the pair is looked up."""
                 return float(coefficients[round(a), round(b)])
 
             points = barrier.collisions.points(lagged)

@@ -1,4 +1,4 @@
-"""Contact of one scene: what may touch, from which distance on, how stiff, with how much friction."""
+"""Contact of one scene: pairs, distances, stiffness and friction."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from supple.contact.collision_mesh.collisions import Collisions
 from supple.contact.collision_mesh.contact_surface import ContactSurface
 from supple.contact.obstacle_vertices import ObstacleRange, obstacle_positions
-from supple.contact.start.start_error import refuse_intersecting
+from supple.contact.start.start_error import raise_if_intersecting
 from supple.errors import SolverError
 from supple.implicit.contact.barrier import Barrier
 from supple.implicit.contact.friction import Friction
@@ -37,11 +37,11 @@ class Barriers:
 
 @dataclass(frozen=True, eq=False)
 class ContactModel:
-    """What does not change from step to step.
+    """The part of contact that does not change from step to step.
 
     Attributes
     ----------
-    table : who may touch whom with how much friction, bodies before obstacles
+    table : which owners may touch, and their friction, bodies before obstacles
     """
 
     system: System
@@ -104,18 +104,18 @@ class ContactModel:
         nearest = min(self.planes.smallest_distance(x), self.collisions.smallest_distance(x))
         return nearest if nearest < self.scales.dhat else np.inf
 
-    def refuse_intersecting(self, x: NDArray[np.float64], time: float) -> None:
+    def raise_if_intersecting(self, x: NDArray[np.float64], time: float) -> None:
         """Raise where surfaces intersect or touch, or bodies are inside of something solid, at x (n, 3).
 
         Raises
         ------
-        SceneError, SolverError : say what is where.
+        SceneError, SolverError : where they are not apart; names the pair and the place.
         """
         stitching = self.system.stitching
         apart = self.allows(x) and not self.collisions.intersect(x) and self.smallest_distance(x) > 0.0
         if len(stitching) and apart:
             return
-        refuse_intersecting(self.system, x, time, self.table, sewn=self._sewn_things())
+        raise_if_intersecting(self.system, x, time, self.table, stitched=self._stitched_things())
         if not apart:
             raise SolverError("the scene starts with surfaces that touch; move them apart, or give contact=None")
 
@@ -141,8 +141,8 @@ class ContactModel:
                 names = self._names([self.planes.owner[k], self.surface.body_count + self.planes.obstacle[k]])
         return names
 
-    def _sewn_things(self) -> set[tuple[int, int]]:
-        """Which things a stitch joins: bodies in the scene's order, then obstacles."""
+    def _stitched_things(self) -> set[tuple[int, int]]:
+        """Ascending pairs of things that stitches join: bodies in the scene's order, then obstacles."""
         names = self.surface.names
         return {
             (min(pair), max(pair))

@@ -1,4 +1,4 @@
-"""Contacts of a state, one by one."""
+"""The list of all contacts of a state."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 from supple.contact_points import ContactPoints
 from supple.implicit.contact.half_spaces import barrier_terms
 from supple.implicit.contact.model import Barriers, ContactModel
+from supple.implicit.contact.threads import one_contact_thread
 
 
+@one_contact_thread()
 def contact_points(model: ContactModel, barriers: Barriers, x: NDArray[np.float64], weight: float) -> ContactPoints:
     """All contacts at x (n, 3), obstacles' vertices included.
 
@@ -61,7 +63,7 @@ def contact_points(model: ContactModel, barriers: Barriers, x: NDArray[np.float6
 def forces_on_owners(model: ContactModel, gradient: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
     """Minus the gradient (n, 3) of a contact energy, summed over each body and obstacle: (3,) by name [N].
 
-    An obstacle that has a body's name is called `obstacle NAME`.
+    An obstacle with the name of a body gets the key `obstacle NAME`.
     """
     bodies = model.system.bodies
     totals = {part.name: -gradient[part.vertices].sum(axis=0) for part in bodies}

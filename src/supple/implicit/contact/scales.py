@@ -14,9 +14,9 @@ from supple.implicit.contact.settings import IPCContact
 from supple.system import System
 
 _DHAT_SHARE = 1e-3  # of the smallest body's diagonal
-_EDGE_SHARE = 0.25  # of the short surface edges: contacts of a surface with itself at rest are none
-_SHORT_EDGES = 2.0  # [%] which edges count as the short ones
-_SMALLEST_SHARE = 1e-5  # of the diagonal: gaps at the start do not push dhat below it
+_EDGE_SHARE = 0.25  # of the short surface edges: a surface at rest then has no contacts with itself
+_SHORT_EDGES = 2.0  # [%] percentile of the edge lengths that counts as short
+_SMALLEST_SHARE = 1e-5  # of the diagonal: gaps at the start do not reduce dhat below it
 _STIFFNESS_SHARE = 1.0  # of the softest body's modulus
 _SLOW_SHARE = 1e-3  # of the diagonal, per second
 
@@ -57,7 +57,7 @@ def scales_of(settings: IPCContact, system: System, shear_moduli: NDArray[np.flo
 
 
 def largest_dhat(system: System) -> float:
-    """The default where nothing is near anything at the start [m]."""
+    """The default of dhat where no surfaces are near each other at the start [m]."""
     diagonals = [float(np.linalg.norm(np.ptp(system.rest_positions[p.vertices], axis=0))) for p in system.bodies]
     a, b, c = system.rest_positions[system.triangles].transpose(1, 0, 2)
     edges = np.concatenate(

@@ -1,4 +1,4 @@
-"""What a user may say about contact in the implicit solver."""
+"""The user's settings for contact in the implicit solver."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ class IPCContact:
         times as much. "adaptive": from the bodies' moduli, and raised within a step where surfaces come very close.
     friction_velocity : relative velocity below which friction is static [m/s]: a sticking contact creeps with a part of
         it. None: a thousandth of the smallest body's diagonal per second.
-    friction_iterations : how often in a step the normal forces that friction depends on are taken anew. 1: from the
-        beginning of the step alone. None: until they change by less than a tenth, at most five times.
+    friction_iterations : how often in a step the normal forces of friction are computed. 1: only at the beginning of
+        the step. None: until they change by less than a tenth, at most five times.
 
     Raises
     ------

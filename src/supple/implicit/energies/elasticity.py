@@ -39,11 +39,15 @@ class Elasticity(Potential):
     projection = Projection.RELEASED_FIRST
 
     def value(self, x: NDArray[np.float64]) -> float:
+        return float(self.energies(x).sum())
+
+    def energies(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(m,) of each tet [J]."""
         s = self.system
         energies = np.empty(len(s.tets))
         with threads_for(len(s.tets), SERIAL_TETS):
             element_energies(x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters(), energies)
-        return float(energies.sum())
+        return energies
 
     def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
         self.add_model(x, out, None, project=False)

@@ -1,4 +1,4 @@
-"""Kelvin-Voigt damping of stitches: of tets as of those of bodies, of springs by the rate of their length."""
+"""Kelvin-Voigt damping of stitches: tets as those of bodies, springs by the rate of their length."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from supple.scene.stitches.stitching import Stitching
 
 @dataclass(frozen=True, eq=False)
 class _Tets:
-    """Stitch tets under the names that a system has for those of bodies."""
+    """Stitch tets under the names of a system's tets."""
 
     tets: NDArray[np.int32]
     rest_shape_inverse: NDArray[np.float64]
@@ -28,7 +28,7 @@ class _Tets:
 
 @dataclass(frozen=True, eq=False)
 class StitchViscosity:
-    """What is damped of a system's stitches.
+    """The damped stitches of a system.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class StitchViscosity:
 
 @dataclass(frozen=True, eq=False)
 class StitchDamping(Potential):
-    """The dissipation potential of one step. A spring's is k tau c/2 (length - reference)^2: that of a spring."""
+    """The dissipation potential of one step; for a spring, k tau c/2 (length - reference)^2."""
 
     tets: Damping
     springs: Springs

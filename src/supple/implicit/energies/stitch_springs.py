@@ -4,7 +4,7 @@ With d = sum_p c_p x_p, c = (1, t - 1, -t), the block of nodes p and q is c_p c_
 
     K = k n n^T + k (1 - l / |d|) (I - n n^T),    n = d / |d|.
 
-Projection leaves the second term out where it is negative: where the spring is shorter than at rest.
+Projection omits the second term where it is negative: where the spring is shorter than at rest.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def spring_energies(springs: Springs, points: NDArray[np.float64]) -> NDArray[np
 
 
 def spring_gradients(springs: Springs, points: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-    """By the nodes [N], into out (k, 4, 3); the fourth is no node. A spring without length has no direction to push."""
+    """By the nodes [N], into out (k, 4, 3); the fourth is no node. A spring of zero length has no force."""
     d = springs.extensions(points)
     lengths = np.linalg.norm(d, axis=1)
     share = springs.rest_lengths / np.where(lengths > 0.0, lengths, np.inf)
@@ -45,7 +45,7 @@ def spring_hessians(springs: Springs, points: NDArray[np.float64], project: bool
 
 
 def _coefficients(springs: Springs) -> NDArray[np.float64]:
-    """(k, 4) of each node in d. Where both ends of the edge are one vertex, all of it is in the first."""
+    """(k, 4) of each node in d. Where both ends of the edge are one vertex, the first has the whole coefficient."""
     c = np.zeros((len(springs), 4))
     alone = springs.vertices[:, 1] == springs.vertices[:, 2]
     c[:, 0] = 1.0

@@ -1,7 +1,7 @@
 """Energy of stitches: tetrahedra of stable Neo-Hookean material, and springs.
 
-Neither is guarded against inversion: a stitch may begin flat. Corners on obstacles are not minimized over; they are
-where the obstacle is at the end of the step.
+Stitch tets may start flat, so that no filter prevents their inversion. Corners on obstacles are not unknowns; they move
+with the obstacle.
 
 Source: "Soft Vertex Triangle Stitch", the documentation of libuipc's constitution #30; the constant of its energy
 density is left out, so that the energy is zero at rest.
@@ -36,7 +36,7 @@ class StitchEnergy(Potential):
 
     @classmethod
     def of(cls, stitching: Stitching, time: float) -> StitchEnergy:
-        """As it is at `time` [s]."""
+        """The energy at `time` [s]."""
         gathering = incidences(stitching.elements(), stitching.body_vertices)
         return cls(stitching, stitching.anchors.at(time), gathering)
 

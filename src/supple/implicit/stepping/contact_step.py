@@ -104,8 +104,11 @@ class ContactStep:
         return wanted is not None or change > _FORCE_CHANGE * float(np.linalg.norm(now))
 
     def verified(self, outcome: Outcome) -> Outcome:
-        """The outcome, or a failure where surfaces intersect because of rounding."""
-        if self.model is None or outcome.status is not Status.CONVERGED:
+        """The outcome, or a failure where surfaces intersect because of rounding.
+
+        Every state that the next step may start from is tested, whether Newton's method has converged or not.
+        """
+        if self.model is None or not outcome.status.can_go_on:
             return outcome
         if self.model.collisions.intersect(outcome.end.positions):
             return replace(outcome, status=Status.LINE_SEARCH_FAILED, message="two surfaces intersect after the step")

@@ -1,23 +1,26 @@
 """Time integrators: each turns a step into the minimization of |x - x~|^2_M / (2 s) plus the potential energy.
 
-With M a = -grad(energy) at the end of the step, every method here is x = x~ + s a for a prediction x~ that is known at
-the start. The velocity at the end is v = c (x - x^), and strain rates are c (E(x) - E^) likewise.
+With M a = -grad(energy), every method here is x = x~ + s a / p for a prediction x~ that is known at the start. The
+forces of a act at the end of the step (p = 1), or at a place p of the way to it. The velocity at the end is
+v = c (x - x^), and strain rates are c (E - E^) likewise.
 
 Sources: Hairer, Wanner, "Solving Ordinary Differential Equations II" (1996), sections III.5 for BDF with variable
-steps; Hughes, "The Finite Element Method" (2000), section 9.1 for Newmark's method.
+steps; Simo, Tarnow, Wong, "Exact energy-momentum conserving algorithms and symplectic schemes for nonlinear dynamics"
+(1992), section 3, for Newmark's method with forces in the middle of a step.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SolverError
 from supple.implicit.energies.damping import Strained, StrainRate
+from supple.implicit.stepping.conservation import Conservation
 from supple.state import State
 from supple.system import System
 
@@ -32,9 +35,9 @@ class Plan:
     predicted : x~ (n, 3) [m]
     velocity : positions at the end (n, 3) -> velocities at the end [m/s]
     strain_rate : the damped elements -> their strain rate at the end as a function of the strain there
-    contact_weight : factor of the contact energies. The force s a of the trapezoidal rule counts a half at either end;
-        contact acts at the end alone, and twice (Kane et al., "Finite element analysis of nonsmooth contact", 1999)
     memory : the data of this step that the next one needs
+    place : p, where all forces but those of contact act, as a share of the step's way and time. The objective is
+        multiplied by 1 / p, so that the Hessian of an energy enters it as it is (see `ActingWithin`)
     """
 
     scale: float | None
@@ -42,7 +45,13 @@ class Plan:
     velocity: Callable[[NDArray[np.float64]], NDArray[np.float64]]
     strain_rate: Callable[[Strained], StrainRate]
     memory: History | None = None
-    contact_weight: float = 1.0
+    place: float = 1.0
+
+    @property
+    def contact_weight(self) -> float:
+        """Factor of contact energies in the objective. Contact acts at the end of a step in every method (Kane et al.,
+        "Finite element analysis of nonsmooth contact", 1999)."""
+        return 1.0 / self.place
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,18 +63,25 @@ class History:
     step: float
 
 
-# The acceleration (n, 3) [m/s^2] of a state, for integrators that need it at the start of a step.
-Acceleration = Callable[[State], NDArray[np.float64]]
-
-
 class Integrator(ABC):
     """A method; immutable."""
 
     name: str
 
     @abstractmethod
-    def plan(self, system: System, state: State, h: float, acceleration: Acceleration) -> Plan:
+    def plan(self, system: System, state: State, h: float) -> Plan:
         """A step of length h [s] from `state`."""
+
+    def finish(self, plan: Plan, before: State, end: State, residual: NDArray[np.float64], at: Conservation) -> State:
+        """The state after a planned step.
+
+        Parameters
+        ----------
+        end : with the velocities of the plan
+        residual : (n, 3) the forces that Newton's method left unbalanced [N]
+        at : what the pieces of the system conserve
+        """
+        return end
 
 
 @dataclass(frozen=True)
@@ -74,7 +90,7 @@ class BackwardEuler(Integrator):
 
     name = "backward_euler"
 
-    def plan(self, system: System, state: State, h: float, acceleration: Acceleration) -> Plan:
+    def plan(self, system: System, state: State, h: float) -> Plan:
         x, v = state.positions, state.velocities
         return Plan(
             scale=h * h,
@@ -95,10 +111,10 @@ class BDF2(Integrator):
 
     name = "bdf2"
 
-    def plan(self, system: System, state: State, h: float, acceleration: Acceleration) -> Plan:
+    def plan(self, system: System, state: State, h: float) -> Plan:
         past = state.memory
         if not isinstance(past, History) or h > 2.0 * past.step or past.positions.shape != state.positions.shape:
-            return BackwardEuler().plan(system, state, h, acceleration)
+            return BackwardEuler().plan(system, state, h)
         x, v = state.positions, state.velocities
         w = h / past.step
         # y + ... = (1 + w)/(1 + 2 w) h y': from the parabola through the last two values and the new one.
@@ -122,32 +138,38 @@ class BDF2(Integrator):
 
 @dataclass(frozen=True)
 class Newmark(Integrator):
-    """The trapezoidal rule (beta = 1/4, gamma = 1/2): second order, keeps the energy of a linear system exactly."""
+    """Newmark's method (beta = 1/4, gamma = 1/2) with forces taken in the middle of the step: the midpoint rule.
+
+    x = x_n + h (v_n + v) / 2 and M (v - v_n) = h f((x_n + x) / 2). Second order. Keeps linear and angular momentum, and
+    the energy of a linear system; what it adds to the energy of another one is limited, see `Conservation`. The
+    mean of the forces at the two ends of the step, the trapezoidal rule, would turn free bodies: its forces do not act
+    where the mean of the positions is.
+    """
 
     name = "newmark"
 
-    def plan(self, system: System, state: State, h: float, acceleration: Acceleration) -> Plan:
+    def plan(self, system: System, state: State, h: float) -> Plan:
         x, v = state.positions, state.velocities
-        s = 0.25 * h * h
         half = x + 0.5 * h * v
         pinned = system.pinned_vertices
 
         def velocity(end: NDArray[np.float64]) -> NDArray[np.float64]:
             at_end = (end - half) * (2.0 / h)
-            # A scripted vertex obeys no equation of motion: the trapezoidal rule would let its velocity ring.
+            # A scripted vertex obeys no equation of motion: its velocity would alternate about that of the script.
             at_end[pinned] = (end[pinned] - x[pinned]) / h
             return at_end
 
         def strain_rate(damped: Strained) -> StrainRate:
-            return StrainRate(2.0 / h, damped.strains(x) + 0.5 * h * damped.strain_rates(x, v))
+            # The difference quotient over half a step belongs to its middle. The last terms move the rate to its end.
+            strains = damped.strains(x)
+            curvature = damped.strains(half) - strains - 0.5 * h * damped.strain_rates(x, v)
+            return StrainRate(2.0 / h, strains - curvature)
 
-        return Plan(
-            scale=s,
-            predicted=x + h * v + s * acceleration(state),
-            velocity=velocity,
-            strain_rate=strain_rate,
-            contact_weight=2.0,
-        )
+        return Plan(scale=0.25 * h * h, predicted=x + h * v, velocity=velocity, strain_rate=strain_rate, place=0.5)
+
+    def finish(self, plan: Plan, before: State, end: State, residual: NDArray[np.float64], at: Conservation) -> State:
+        at.restore_momentum(before, end, residual)
+        return replace(end, memory=at.limit_energy(before, end))
 
 
 @dataclass(frozen=True)
@@ -156,7 +178,7 @@ class Static(Integrator):
 
     name = "static"
 
-    def plan(self, system: System, state: State, h: float, acceleration: Acceleration) -> Plan:
+    def plan(self, system: System, state: State, h: float) -> Plan:
         x = state.positions
         nothing = StrainRate(0.0, np.zeros((0, 6)))
         return Plan(scale=None, predicted=x, velocity=np.zeros_like, strain_rate=lambda damped: nothing)

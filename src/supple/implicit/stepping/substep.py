@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.energies.damping import Damping, Strained, StrainRate
+from supple.implicit.energies.damping import Damping
 from supple.implicit.energies.external_forces import ExternalForces, total_forces
 from supple.implicit.energies.inertia import Inertia
 from supple.implicit.energies.inversion_barrier import inversion_barrier
@@ -21,9 +20,11 @@ from supple.implicit.newton.convergence import Convergence
 from supple.implicit.newton.minimize import Outcome, Problem, minimize
 from supple.implicit.newton.objective import Objective
 from supple.implicit.newton.trace import NewtonRow
+from supple.implicit.stepping.conservation import Conservation
 from supple.implicit.stepping.contact_step import ContactStep
 from supple.implicit.stepping.dirichlet import move_pins
 from supple.implicit.stepping.integrators import Integrator, Plan, Static
+from supple.implicit.stepping.midpoint import acting_at
 from supple.implicit.workspace import Workspace
 from supple.state import State, Status
 from supple.system import System
@@ -81,11 +82,12 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     if obstacles:
         # What a script moves has the script's velocity, so that its inertia plays no part.
         state.velocities[workspace.bodies_end :] = (targets[-obstacles:] - state.positions[-obstacles:]) / h
-    plan = settings.integrator.plan(system, state, h, lambda start: _acceleration(system, start, workspace))
-    forces = total_forces(system, end)
+    plan = settings.integrator.plan(system, state, h)
+    middle = end - (1.0 - plan.place) * h
+    forces = total_forces(system, middle)
     guard = InversionGuard.at(system, state.positions, settings.volume_kept)
     limits = StepLimits(guard, workspace.contact, tools.clock)
-    base = _objective(system, state, end, plan, forces, workspace)
+    base = _objective(system, state.positions, middle, plan, forces, workspace)
     barrier = inversion_barrier(workspace.elasticity, guard.guarded, settings.barrier_onset)
     if barrier is not None:
         base = replace(base, terms=[*base.terms, barrier])
@@ -115,13 +117,16 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
             break
         problem = replace(problem, objective=contact.with_contact(base, x))
     outcome = contact.verified(replace(outcome, rows=rows))
-    return Substep(State(end, x, plan.velocity(x), plan.memory), outcome, contact)
+    after = State(end, x, plan.velocity(x), plan.memory)
+    conservation = Conservation.of(workspace.elasticity, workspace.stitches, tools.free_motion)
+    residual = plan.place * outcome.end.gradient
+    return Substep(settings.integrator.finish(plan, state, after, residual, conservation), outcome, contact)
 
 
-def _potentials(
-    system: System, x: NDArray[np.float64], time: float, forces: NDArray[np.float64], workspace: Workspace
-) -> list[Potential]:
-    """All energies but inertia and damping, at `time`; energies of loads are zero at x."""
+def _objective(
+    system: System, x: NDArray[np.float64], time: float, plan: Plan, forces: NDArray[np.float64], workspace: Workspace
+) -> Objective:
+    """All but contact and the inversion barrier, with the loads of `time` [s]; energies of loads are zero at x."""
     terms: list[Potential] = [workspace.elasticity]
     if workspace.stitches is not None:
         terms.append(workspace.stitches.at(time))
@@ -129,45 +134,16 @@ def _potentials(
         terms.append(ExternalForces(forces, x))
     if system.soft_targets:
         terms.append(soft_targets_at(system, time))
-    return terms
-
-
-def _objective(
-    system: System,
-    state: State,
-    end: float,
-    plan: Plan,
-    forces: NDArray[np.float64],
-    workspace: Workspace,
-) -> Objective:
-    terms = _potentials(system, state.positions, end, forces, workspace)
-    if plan.scale is None:
-        terms.append(workspace.regularization)
-    else:
-        terms.append(Inertia(system.masses, plan.predicted, plan.scale))
-        terms += _damping(workspace, plan.strain_rate)
+    if plan.scale is not None and workspace.viscosity is not None:
+        terms.append(Damping(workspace.viscosity, plan.strain_rate(workspace.viscosity)))
+    if plan.scale is not None and workspace.stitch_viscosity is not None:
+        rate = plan.strain_rate(workspace.stitch_viscosity)
+        terms.append(StitchDamping.of(workspace.stitch_viscosity, rate))
+    terms = [acting_at(plan.place, term, x) for term in terms]
+    terms.append(
+        workspace.regularization if plan.scale is None else Inertia(system.masses, plan.predicted, plan.scale)
+    )
     return Objective(terms, workspace.tools.clock)
-
-
-def _damping(workspace: Workspace, strain_rate: Callable[[Strained], StrainRate]) -> list[Potential]:
-    terms: list[Potential] = []
-    if workspace.viscosity is not None:
-        terms.append(Damping(workspace.viscosity, strain_rate(workspace.viscosity)))
-    if workspace.stitch_viscosity is not None:
-        terms.append(StitchDamping.of(workspace.stitch_viscosity, strain_rate(workspace.stitch_viscosity)))
-    return terms
-
-
-def _acceleration(system: System, state: State, workspace: Workspace) -> NDArray[np.float64]:
-    """(n, 3) of a state by its forces, pins aside [m/s^2].
-
-    The inversion barrier is left out: it bounds the end of a step, and is so stiff that the trapezoidal rule, which
-    does not damp stiff forces, would return its force in the next step.
-    """
-    x, v = state.positions, state.velocities
-    terms = _potentials(system, x, state.time, total_forces(system, state.time), workspace)
-    terms += _damping(workspace, lambda damped: StrainRate(1.0, damped.strains(x) - damped.strain_rates(x, v)))
-    return -Objective(terms).gradient(x) / system.masses[:, None]
 
 
 def _first_guess(
@@ -182,7 +158,7 @@ def _first_guess(
     """The positions without elasticity, as far as the filters allow; x where that has less energy."""
     if plan.scale is None:
         return x
-    ahead = plan.predicted + plan.scale * forces / system.masses[:, None]
+    ahead = plan.predicted + plan.scale / plan.place * forces / system.masses[:, None]
     ahead[pinned] = x[pinned]
     step, _ = limits.largest_step(x, ahead - x)
     if step < 1.0:

@@ -22,6 +22,8 @@ _DEPTH = 64  # of a balanced tree; more than any memory can hold
 # fraction ROUND_OFF of the coordinates. A point above a common edge is then equally near to both triangles, also far
 # from the origin.
 TIE, ROUND_OFF = 1e-12, 1e-14
+# Cosines between normals that agree to this are equal.
+SAME_FACING = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,15 +53,18 @@ class TriangleTree:
         levels = max(0, int(np.ceil(np.log2(max(1, len(triangles)) / _LEAF))))
         return cls(points, triangles, *_build(boxes, levels))
 
-    def nearest(self, queries: NDArray[np.float64], within: float = np.inf) -> tuple[NDArray, NDArray]:
+    def nearest(
+        self, queries: NDArray[np.float64], within: float = np.inf, normals: NDArray[np.float64] | None = None
+    ) -> tuple[NDArray, NDArray]:
         """The nearest triangle to each point, within a distance.
 
-        Among several equally near triangles (up to round-off), the one from whose plane the point is farthest wins: it
-        faces the point most directly. Among these, the lowest number wins.
+        Among several equally near triangles (up to round-off), the one from whose plane the point is farthest wins.
+        Among these, the one whose normal is most opposed to that of the point wins, and then the lowest number.
 
         Parameters
         ----------
         queries : (q, 3) [m]; within : [m]
+        normals : (q, 3) unit normals of the surface that the points belong to, zero where there is none
 
         Returns
         -------
@@ -67,7 +72,9 @@ class TriangleTree:
         """
         found = np.full(len(queries), -1, dtype=np.int64)
         squares = np.full(len(queries), np.inf)
-        _nearest(np.ascontiguousarray(queries, dtype=np.float64), within, *self._arrays(), found, squares)
+        queries = np.ascontiguousarray(queries, dtype=np.float64)
+        own = np.zeros_like(queries) if normals is None else np.ascontiguousarray(normals, dtype=np.float64)
+        _nearest(queries, own, within, *self._arrays(), found, squares)
         return found, np.sqrt(squares)
 
     def all_within(self, queries: NDArray[np.float64], within: float) -> tuple[NDArray, NDArray, NDArray]:
@@ -171,12 +178,15 @@ def _pair_distances(queries, points, triangles, out):
 
 
 @njit(error_model="numpy")
-def _square_height(p, points, triangles, t):
-    """Square of the distance from the triangle's plane; 0 for a triangle without area."""
+def _square_height(p, points, triangles, t, normal):
+    """Square of the distance from the triangle's plane, and the cosine between its normal and another one; 0, 0 for a
+    triangle without area."""
     a, b, c = row(points, triangles[t, 0]), row(points, triangles[t, 1]), row(points, triangles[t, 2])
     n = cross(subtract(b, a), subtract(c, a))
     area = dot(n, n)
-    return dot(n, subtract(p, a)) ** 2 / area if area > 0.0 else 0.0
+    if area == 0.0:
+        return 0.0, 0.0
+    return dot(n, subtract(p, a)) ** 2 / area, dot(n, normal) / np.sqrt(area)
 
 
 @njit(error_model="numpy")
@@ -193,20 +203,25 @@ def _slack(square, p, largest):
 
 
 @njit(error_model="numpy")
-def _comes_first(p, points, triangles, t, best, largest):
+def _comes_first(p, normal, points, triangles, t, best, largest):
     """Whether triangle t is preferred to `best`, which is equally near."""
     if best < 0:
         return True
-    one, other = _square_height(p, points, triangles, t), _square_height(p, points, triangles, best)
+    one, facing = _square_height(p, points, triangles, t, normal)
+    other, facing_best = _square_height(p, points, triangles, best, normal)
     margin = 1e-6 * (one + other) + _slack(max(one, other), p, largest)
-    return one > other + margin or (one >= other - margin and t < best)
+    if abs(one - other) > margin:
+        return one > other
+    if abs(facing - facing_best) > SAME_FACING:
+        return facing < facing_best
+    return t < best
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def _nearest(queries, within, points, triangles, order, bounds, boxes, found, squares):
+def _nearest(queries, normals, within, points, triangles, order, bounds, boxes, found, squares):
     largest = _largest(boxes)
     for q in prange(len(queries)):
-        p = row(queries, q)
+        p, normal = row(queries, q), row(normals, q)
         stack = np.empty(_DEPTH, dtype=np.int64)
         stack[0] = 0
         depth = 1
@@ -230,7 +245,7 @@ def _nearest(queries, within, points, triangles, order, bounds, boxes, found, sq
                 t = order[k]
                 square = _square_to_triangle(p, points, triangles, t)
                 tie = square <= least + slack
-                if square < least - slack or (tie and _comes_first(p, points, triangles, t, best, largest)):
+                if square < least - slack or (tie and _comes_first(p, normal, points, triangles, t, best, largest)):
                     best, least = t, min(square, least)
                     slack = _slack(least, p, largest)
         if best >= 0:

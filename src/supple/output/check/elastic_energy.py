@@ -19,7 +19,7 @@ def elastic_energy(
     J: NDArray[np.float64],
     rest_inverse: NDArray[np.float64],
 ) -> float | None:
-    """[J], zero at rest; None where the recording does not tell the law of a body.
+    """[J], zero at rest; None where the recording does not contain the law of a body.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def elastic_energy(
 
 
 def stiffness_scale(recording: Recording) -> float:
-    """An energy [J] that tells round-off of the elastic energy: of strains of a few percent everywhere."""
+    """An energy [J] that round-off of the elastic energy is measured by: of strains of a few percent everywhere."""
     physics = recording.physics
     if physics is None:
         return 0.0

@@ -1,4 +1,4 @@
-"""The shape of a check: it sees every frame, then says what it found."""
+"""The base class of checks: a check sees every frame, then returns its result."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ class FrameCheck(ABC):
 
     Attributes
     ----------
-    name : one of `settings.NAMES`; sees_all : whether it also sees frames that hold numbers that are not finite
-    needs_frames : whether it says nothing where it has seen no frame
+    name : one of `settings.NAMES`; sees_all : whether it also sees frames with numbers that are not finite
+    needs_frames : whether its result needs at least one frame
     """
 
     name: ClassVar[str]
@@ -35,8 +35,8 @@ class FrameCheck(ABC):
 
     @abstractmethod
     def see(self, at: Snapshot) -> None:
-        """Look at a frame; they come in order."""
+        """Check a frame; frames come in order."""
 
     @abstractmethod
     def result(self) -> CheckResult:
-        """What was found."""
+        """The result of all frames."""

@@ -1,4 +1,4 @@
-"""What came out of a check of a recording."""
+"""The results of a check of a recording."""
 
 from __future__ import annotations
 
@@ -26,17 +26,16 @@ class CheckResult:
     Attributes
     ----------
     name : of the check; verdict : pass, fail or skipped
-    said : what was found, or why nothing was looked for
-    worst : the number closest to failing, or beyond; None where there is none; unit : of it, "" for a ratio
-    frame, time : where that was, counted from 0, [s]; None where it belongs to no frame
+    message : what was found, or why the check was skipped
+    worst : the number closest to failing, or furthest beyond; None where there is none; unit : its unit, "" for a ratio
+    frame, time : of that number, frames counted from 0, [s]; None where it belongs to no frame
     where : the body, and its tet, triangle or vertex
-    failed_frames : in how many of the frames that were looked at it failed
-    first_failure : the first of them, or None
+    failed_frames : number of checked frames in which the check failed; first_failure : the first of them, or None
     """
 
     name: str
     verdict: Verdict
-    said: str
+    message: str
     worst: float | None = None
     unit: str = ""
     frame: int | None = None
@@ -52,7 +51,7 @@ class CheckReport:
 
     Attributes
     ----------
-    path : of the recording; frames : how many it has; frames_checked : how many were looked at
+    path : of the recording; frames : how many it has; frames_checked : number of frames that were checked
     results : one for each check, in order
     """
 
@@ -80,25 +79,25 @@ class CheckReport:
 
     def __str__(self) -> str:
         lines = [f"{self.path}: {self.frames_checked} of {self.frames} frames checked"]
-        lines += [f"{result.verdict:>7}  {result.name}: {result.said}" for result in self.results]
+        lines += [f"{result.verdict:>7}  {result.name}: {result.message}" for result in self.results]
         return "\n".join(lines)
 
     def to_json(self) -> str:
-        """The report as JSON; numbers that are not finite as texts."""
-        said = asdict(self) | {"path": str(self.path), "ok": self.ok}
-        for result in said["results"]:
+        """The report as JSON; numbers that are not finite are written as text."""
+        content = asdict(self) | {"path": str(self.path), "ok": self.ok}
+        for result in content["results"]:
             for key in ("worst", "time"):
                 value = result[key]
                 if value is not None and not math.isfinite(value):
                     result[key] = str(value)
-        return json.dumps(said, indent=2, allow_nan=False) + "\n"
+        return json.dumps(content, indent=2, allow_nan=False) + "\n"
 
     def save(self, path: str | Path) -> Path:
-        """Write the report as JSON, whole or not at all.
+        """Write the report as JSON, completely or not at all.
 
         Raises
         ------
-        OutputError : where the system refuses.
+        OutputError : where the file cannot be written.
         """
         path = Path(path)
         with whole_file(path) as fresh:

@@ -1,4 +1,4 @@
-"""What `check_recording` is asked to do."""
+"""The settings of `check_recording`."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ NAMES = {
     "rest shape": "no tet is inverted or flat at rest; volumes and masses are above zero",
     "inversion": "no tet is inverted or flat, by the exact sign of its determinant",
     "intersection": "no two surfaces meet, by exact tests of their triangles",
-    "obstacles": "no body is in a half-space, in a ball, or out of its room",
-    "containment": "nothing is swallowed whole",
-    "distance": "surfaces keep a distance above zero",
-    "volume": "nearly incompressible bodies keep most of their volume",
+    "obstacles": "no body is in a half-space, in a sphere, or outside its room",
+    "containment": "nothing is completely inside another thing",
+    "distance": "the distance of surfaces is above zero",
+    "volume": "nearly incompressible bodies keep at least half of their volume",
     "momentum": "without loads, momentum changes by gravity alone",
     "spin": "without loads, angular momentum about the center of mass does not grow",
     "energy": "where nothing does work, energy does not grow",
@@ -35,14 +35,14 @@ class CheckSettings:
     ----------
     only, skip : names of checks; see `NAMES`. Without `only`, all but those in `skip`.
     every : check each k-th frame, and the last.
-    max_volume_change : how far a body's volume may go from the one at rest, as a share of it. None: 0.5 for bodies
-        with a Poisson's ratio of 0.45 or more, any for others.
-    max_energy_gain : how far the energy may go above that at the start, as a share of what is moved about.
-    max_momentum_change : how far momenta may change without a cause, as a share of what is there.
+    max_volume_change : how far a body's volume may differ from that at rest, as a share of it. None: 0.5 for bodies
+        with a Poisson's ratio of 0.45 or more, unlimited for others.
+    max_energy_gain : how far the energy may exceed that at the start, as a share of the energy in motion.
+    max_momentum_change : how far momenta may change without a force, as a share of the momentum present.
 
     Raises
     ------
-    OutputError : where a name is unknown, or a number out of range.
+    OutputError : where a name is unknown, or a number is out of range.
     """
 
     only: Sequence[str] = ()

@@ -1,4 +1,4 @@
-"""One frame of a recording as the checks see it: read once, and measured once."""
+"""One frame of a recording as the checks use it: read once, and measured once."""
 
 from __future__ import annotations
 
@@ -8,10 +8,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.output.check.checks.seams import with_seams
 from supple.output.check.elastic_energy import elastic_energy, stiffness_scale
 from supple.output.check.geometry.box_tree import build_tree, triangle_boxes
 from supple.output.check.geometry.orientation import volume_signs
 from supple.output.check.geometry.surface_pairs import meeting_pairs
+from supple.output.check.stitch_energy import stitch_energy, stitch_scale
 from supple.output.check.surfaces import Surfaces, surfaces_of
 from supple.output.recording.reader import RecordedFrame, Recording
 
@@ -20,7 +22,7 @@ _MOST_PAIRS = 1000
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What does not change from frame to frame.
+    """The data that all frames share.
 
     Attributes
     ----------
@@ -32,11 +34,11 @@ class Scene:
 
     @classmethod
     def of(cls, recording: Recording) -> Scene:
-        return cls(recording, surfaces_of(recording))
+        return cls(recording, with_seams(recording, surfaces_of(recording)))
 
     @cached_property
     def rest_inverse(self) -> NDArray[np.float64]:
-        """(m, 3, 3) Dm^-1 [1/m]; not a number where a tet is flat at rest."""
+        """(m, 3, 3) Dm^-1 [1/m]; NaN where a tet is flat at rest."""
         return _inverses(edge_vectors(self.recording.rest_positions, self.recording.tets))
 
     @cached_property
@@ -47,8 +49,13 @@ class Scene:
 
     @cached_property
     def stiffness_scale(self) -> float:
-        """An energy [J] that round-off of the elastic energy is told by."""
+        """An energy [J] that round-off of the elastic energy is measured by."""
         return stiffness_scale(self.recording)
+
+    @cached_property
+    def stitch_scale(self) -> float:
+        """An energy [J] that round-off of the stitch energy is measured by."""
+        return stitch_scale(self.recording)
 
     def name_tet(self, row: int) -> str:
         """A tet as messages call it: its number within its body."""
@@ -64,7 +71,7 @@ class Snapshot:
 
     Attributes
     ----------
-    scene : what it belongs to; number, time : of the frame, [s]
+    scene : of the frame; number, time : of the frame, [s]
     positions, velocities : (n, 3) [m], [m/s]; det_F : (m,) as recorded; poses : (obstacles, 3, 4)
     """
 
@@ -83,7 +90,7 @@ class Snapshot:
 
     @cached_property
     def finite(self) -> bool:
-        """Whether positions, velocities and poses are numbers to compute with."""
+        """Whether positions, velocities and poses are finite."""
         return all(bool(np.isfinite(values).all()) for values in (self.positions, self.velocities, self.poses))
 
     @cached_property
@@ -104,8 +111,13 @@ class Snapshot:
 
     @cached_property
     def elastic_energy(self) -> float | None:
-        """[J], zero at rest; None where the recording does not tell the law of a body."""
+        """[J], zero at rest; None where the recording does not contain the law of a body."""
         return elastic_energy(self.scene.recording, self.positions, self.J, self.scene.rest_inverse)
+
+    @cached_property
+    def stitch_energy(self) -> float | None:
+        """[J], zero at rest; None where the recording does not contain the laws of its stitches."""
+        return stitch_energy(self.scene.recording, self.positions, self.poses)
 
     @cached_property
     def points(self) -> NDArray[np.float64]:
@@ -114,7 +126,7 @@ class Snapshot:
 
     @cached_property
     def tree(self) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray, NDArray]:
-        """The boxes around the triangles, and a tree of them: what `meeting_pairs` wants last."""
+        """The boxes around the triangles, and the tree over them: the last arguments of `meeting_pairs`."""
         low, high = triangle_boxes(self.points, self.scene.surfaces.triangles)
         return (low, high, *build_tree(low, high))
 

@@ -37,7 +37,7 @@ class Piece:
 
 @dataclass(frozen=True, eq=False)
 class Surfaces:
-    """What may meet what.
+    """All surfaces, and which of them must stay apart.
 
     Attributes
     ----------
@@ -45,6 +45,7 @@ class Surfaces:
     triangles : (t, 3) those of bodies first; owners : (t,); first_triangle : (p,) the first one of each owner
     vertex_owners : (n,) of the bodies' vertices; first_vertex : (p,) the first vertex of each body
     allowed : (p, p) which owners' surfaces must stay apart; ignored : sorted keys of pairs of triangles that may meet
+    stitched : (k, 4) points of each stitch, some of them twice where it has fewer
     fixed : (obstacle, its points at time 0, its first row) of obstacles made of triangles; points : number of all rows
     pieces : see `Piece`
     """
@@ -58,6 +59,7 @@ class Surfaces:
     first_vertex: NDArray[np.int64]
     allowed: NDArray[np.bool_]
     ignored: NDArray[np.int64]
+    stitched: NDArray[np.int64]
     fixed: tuple[tuple[int, NDArray[np.float64], int], ...]
     points: int
     pieces: tuple[Piece, ...]
@@ -83,7 +85,7 @@ class Surfaces:
 
 
 def moved(points: NDArray[np.float64], pose: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Points (k, 3), given at time 0, under a pose (3, 4); untouched, to the last bit, where nothing moves."""
+    """Points (k, 3) of time 0 under a pose (3, 4); the same bits where the pose is the identity."""
     R, t = pose[:, :3], pose[:, 3]
     if np.array_equal(R, np.eye(3)) and not t.any():
         return points
@@ -91,7 +93,7 @@ def moved(points: NDArray[np.float64], pose: NDArray[np.float64]) -> NDArray[np.
 
 
 def is_mesh(obstacle: RecordedObstacle) -> bool:
-    """Whether an obstacle is checked as triangles; others, by their formula."""
+    """Whether an obstacle is checked as triangles; others are checked by their formula."""
     return obstacle.kind == "TriangleObstacle" or (
         obstacle.kind == "Box" and not obstacle.parameters.get("inside", False)
     )
@@ -120,6 +122,7 @@ def surfaces_of(recording: Recording) -> Surfaces:
     all_triangles = np.ascontiguousarray(np.concatenate(triangles).reshape(-1, 3))
     # Owners are in order, so the first triangle of each is where it would be inserted.
     first = np.searchsorted(owner, np.arange(len(names)))
+    stitched = _stitched_points(recording, {obstacle: row for obstacle, _, row in fixed})
     return Surfaces(
         names=names,
         bodies=nb,
@@ -129,7 +132,8 @@ def surfaces_of(recording: Recording) -> Surfaces:
         vertex_owners=vertex_owners,
         first_vertex=first_vertex,
         allowed=_allowed(recording, nb, len(names)),
-        ignored=_ignored_keys(recording, all_triangles, {obstacle: row for obstacle, _, row in fixed}),
+        ignored=_ignored_keys(stitched, all_triangles),
+        stitched=stitched,
         fixed=tuple(fixed),
         points=row,
         pieces=_pieces(recording, all_triangles, owner, row),
@@ -139,13 +143,13 @@ def surfaces_of(recording: Recording) -> Surfaces:
 def _mesh_of(obstacle: RecordedObstacle) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     if obstacle.kind == "TriangleObstacle":
         return obstacle.vertices, obstacle.triangles.astype(np.int64)
-    said = obstacle.parameters
-    points = (_BOX_CORNERS * np.asarray(said["size"])) @ np.asarray(said["orientation"]).T + np.asarray(said["center"])
+    box = obstacle.parameters
+    points = (_BOX_CORNERS * np.asarray(box["size"])) @ np.asarray(box["orientation"]).T + np.asarray(box["center"])
     return points, np.array(_BOX_FACES, dtype=np.int64)
 
 
 def _allowed(recording: Recording, bodies: int, owners: int) -> NDArray[np.bool_]:
-    """(p, p): what must stay apart: not obstacles from each other, nor what the scene excludes."""
+    """(p, p) which owners must stay apart: all but two obstacles, and pairs that the scene excludes."""
     is_body = np.arange(owners) < bodies
     allowed = is_body[:, None] | is_body[None, :]
     for i, j in recording.untouching.pairs:
@@ -153,14 +157,16 @@ def _allowed(recording: Recording, bodies: int, owners: int) -> NDArray[np.bool_
     return allowed
 
 
-def _ignored_keys(recording: Recording, triangles: NDArray[np.int64], first_rows: dict[int, int]) -> NDArray[np.int64]:
+def _stitched_points(recording: Recording, first_rows: dict[int, int]) -> NDArray[np.int64]:
+    """(k, 4) the points of each stitch; obstacles' points begin at these rows."""
+    untouching = recording.untouching
+    anchors = [first_rows.get(int(i), 0) + int(k) for i, k in untouching.anchors]
+    number = np.concatenate([np.arange(len(recording.rest_positions)), anchors]).astype(np.int64)
+    return number[untouching.stitched]
+
+
+def _ignored_keys(stitched: NDArray[np.int64], triangles: NDArray[np.int64]) -> NDArray[np.int64]:
     """Stitches as pairs of triangles that may meet: all around the stitched vertex, with those it is stitched to."""
-    said = recording.untouching
-    if len(said.stitched) == 0:
-        return np.zeros(0, dtype=np.int64)
-    number = np.concatenate(
-        [np.arange(len(recording.rest_positions)), [first_rows.get(int(i), 0) + int(k) for i, k in said.anchors]]
-    ).astype(np.int64)
     order = np.argsort(triangles.ravel(), kind="stable")
     corners = triangles.ravel()[order]
 
@@ -169,7 +175,7 @@ def _ignored_keys(recording: Recording, triangles: NDArray[np.int64], first_rows
         return order[begin:end] // 3
 
     keys = [np.zeros(0, dtype=np.int64)]
-    for vertex, *others in number[said.stitched]:
+    for vertex, *others in stitched:
         second = around(others[0])
         for other in others[1:]:
             second = np.intersect1d(second, around(other))
@@ -182,7 +188,7 @@ def _ignored_keys(recording: Recording, triangles: NDArray[np.int64], first_rows
 def _pieces(
     recording: Recording, triangles: NDArray[np.int64], owners: NDArray[np.int64], points: int
 ) -> tuple[Piece, ...]:
-    """Bodies fall apart along their tets, so that a cavity belongs to its piece; obstacles along triangles."""
+    """Pieces of bodies are connected by tets, so that cavities belong to them; those of obstacles by triangles."""
     tets = recording.tets.astype(np.int64)
     parts = [tets[:, [0, k]] for k in (1, 2, 3)] + [triangles[:, [0, 1]], triangles[:, [1, 2]]]
     ends = np.concatenate(parts)
@@ -198,6 +204,6 @@ def _pieces(
 
 
 def _is_closed(triangles: NDArray[np.int64]) -> bool:
-    """Whether every side belongs to an even number of triangles: a ray's crossings tell the inside then."""
+    """Whether every side belongs to an even number of triangles: crossings of a ray then determine the inside."""
     sides = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
     return bool((np.unique(sides, axis=0, return_counts=True)[1] % 2 == 0).all())

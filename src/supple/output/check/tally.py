@@ -7,7 +7,7 @@ from typing import Protocol
 
 from supple.output.check.report import CheckResult, Verdict
 
-# Units of numbers that count what is wrong.
+# Units of numbers that count errors.
 COUNTED = ("numbers", "pairs", "pieces")
 
 
@@ -40,8 +40,10 @@ class Tally:
         self._last_failure: int | None = None
 
     def see(self, at: InTime | None, value: float, failed: bool, where: str | Callable[[], str] = "") -> None:
-        """Add a number of a frame, None for what belongs to no frame; frames may come several times, one after the
-        other. Failures count as worse than others."""
+        """Add a number of a frame, or of no frame (None). A frame may come several times in succession.
+
+        Failures count as worse than other numbers.
+        """
         worse = self.worst is None or (value < self.worst if self._lowest else value > self.worst)
         if failed and self.failed_frames == 0:
             worse = True
@@ -59,7 +61,7 @@ class Tally:
             self.where = where() if callable(where) else where
 
     def result(self, good: str, bad: str) -> CheckResult:
-        """The result: `good` or `bad` says what the worst number means; `{worst}` stands for it."""
+        """The result. `good` and `bad` describe the worst number, for which `{worst}` stands."""
         failed = self.failed_frames > 0
         if self.worst == 0.0 and self.unit in COUNTED:
             # Nothing was found in any frame: no frame is worse than another.

@@ -43,11 +43,6 @@ class RecordedPhysics:
     scripted_pins: int
     stitches: int
 
-    @property
-    def has_known_energy(self) -> bool:
-        """Whether tets and edges store all elastic energy."""
-        return self.stitches == 0
-
     def knows_law(self, body: int, tets: slice) -> bool:
         """Whether the elastic energy of a body can be computed."""
         return self.compliances[body] is not None or bool((self.kind[tets] != NOT_KNOWN).all())

@@ -1,4 +1,4 @@
-"""Stitches as flat arrays: what solvers see."""
+"""Stitches as flat arrays, as solvers use them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """What is stitched to what.
+    """The pairs of a stitch.
 
     Attributes
     ----------
@@ -26,7 +26,7 @@ class Pairs:
 
 @dataclass(frozen=True, eq=False)
 class _Elements:
-    """Arrays with one row per stitch, whose `vertices` begin with the first side's; the rest are the second's."""
+    """Arrays with one row per stitch. The first of its `vertices` is of the first side, the others of the second."""
 
     vertices: NDArray[np.int32]
 
@@ -34,7 +34,7 @@ class _Elements:
         return len(self.vertices)
 
     def numbered(self, first: int, second: NDArray[np.int32]) -> Self:
-        """The same with other numbers: the first side's plus `first`, the second side's looked up in `second`."""
+        """The same in other numbers: the first side's plus `first`, the second side's by the table `second`."""
         vertices = np.column_stack([self.vertices[:, 0] + first, second[self.vertices[:, 1:]]])
         return replace(self, vertices=vertices.astype(np.int32))
 
@@ -51,7 +51,7 @@ class StitchTets(_Elements):
     Attributes
     ----------
     vertices : (k, 4); rest_shape_inverse : (k, 3, 3) Dm^-1 [1/m]; rest_volumes : (k,) [m^3]
-    mu, lam : (k,) as they stand in the energy density [Pa]; damping : (k,) Kelvin-Voigt time [s]
+    mu, lam : (k,) as in the energy density [Pa]; damping : (k,) Kelvin-Voigt time [s]
     offset : (k,) whether the rest vertex was moved away from its triangle
     """
 

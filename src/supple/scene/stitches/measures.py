@@ -1,4 +1,4 @@
-"""What stitches store and how far they are stretched, and where to draw them."""
+"""Energies and stretches of stitches, and where to draw them."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ def stitch_energy(stitching: Stitching, points: NDArray[np.float64]) -> float:
 
 
 def largest_stitch_stretch(stitching: Stitching, points: NDArray[np.float64]) -> float | None:
-    """The largest of: principal stretches of stitch tets, and lengths of springs as a share of their rest lengths.
+    """The largest of the principal stretches of stitch tets and of the lengths of springs over their rest lengths.
 
     1 at rest. A tet whose vertex moves off its triangle is stretched in proportion to its rest distance, which is at
-    least `min_separate_distance`. Springs of rest length zero have no stretch. None where nothing has one.
+    least `min_separate_distance`. Springs of rest length zero have no stretch. None where no stitch has one.
     """
     F, springs = _deformation_gradients(stitching, points), stitching.springs
     long = springs.rest_lengths > 0.0
@@ -36,8 +36,8 @@ def largest_stitch_stretch(stitching: Stitching, points: NDArray[np.float64]) ->
 
 
 def attachments(stitching: Stitching, points: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Where each stitch holds on: nodes (k, 4), the vertex first, and weights (k, 3) of the others at the place nearest
-    to it; points (n + a, 3) at the start [m]."""
+    """The ends of each stitch: nodes (k, 4), the vertex first, and weights (k, 3) of the others at the point nearest to
+    it; points (n + a, 3) at the start [m]."""
     springs = stitching.springs
     others = np.concatenate([stitching.tets.vertices[:, 1:], springs.vertices[:, [1, 2, 2]]])
     vertex = np.concatenate([stitching.tets.vertices[:, 0], springs.vertices[:, 0]])

@@ -1,4 +1,4 @@
-"""All kinds of stitches. A new kind is one file, and one line here (and one in `supple.scene_file.entries.stitches`)."""
+"""All kinds of stitches. A new kind is one file and one line here, and one in `scene_file/entries/stitches.py`."""
 
 from __future__ import annotations
 

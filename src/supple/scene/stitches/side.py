@@ -1,4 +1,4 @@
-"""What a stitch sees of the two things that it joins: a body, or a triangle obstacle, where it is at time 0."""
+"""The two things that a stitch joins, each a body or a triangle obstacle, where they are at time 0."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from supple.scene.obstacles import Obstacle, TriangleObstacle
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """One of the two.
+    """One of the two things.
 
     Attributes
     ----------
-    label : how messages call it
-    points : (n, 3) all its vertices in the world [m]
+    label : its name in messages
+    points : (n, 3) of all its vertices, in world coordinates [m]
     triangles : (t, 3) of its surface; edges : (e, 2) of its surface, sorted; surface_vertices : (s,)
     """
 
@@ -29,6 +29,23 @@ class Side:
     triangles: NDArray[np.int32]
     edges: NDArray[np.int32]
     surface_vertices: NDArray[np.int32]
+
+    def vertex_normals(self) -> NDArray[np.float64]:
+        """(n, 3) outward unit normals: area-weighted means of the triangles around each vertex; zero inside."""
+        a, b, c = self.points[self.triangles].transpose(1, 0, 2)
+        doubled = np.repeat(np.cross(b - a, c - a), 3, axis=0)
+        out = np.zeros_like(self.points)
+        np.add.at(out, self.triangles.ravel(), doubled)
+        lengths = np.linalg.norm(out, axis=1)
+        return out / np.where(lengths > 0.0, lengths, 1.0)[:, None]
+
+    def mean_edges(self) -> NDArray[np.float64]:
+        """(n,) mean length of the surface's edges at each vertex [m]; infinite inside."""
+        ends = self.edges.ravel()
+        lengths = np.linalg.norm(self.points[self.edges[:, 0]] - self.points[self.edges[:, 1]], axis=1)
+        counts = np.bincount(ends, minlength=len(self.points))
+        sums = np.bincount(ends, weights=np.repeat(lengths, 2), minlength=len(self.points))
+        return np.where(counts > 0, sums, np.inf) / np.maximum(counts, 1)
 
 
 def side_of(thing: Body | Obstacle) -> Side:
@@ -41,7 +58,7 @@ def side_of(thing: Body | Obstacle) -> Side:
     if isinstance(thing, Body):
         return _side(f"body {thing.name!r}", thing.mesh.surface, thing.place(thing.mesh.vertices))
     if not isinstance(thing, TriangleObstacle) or thing.surface is None:
-        raise SceneError(f"{thing.label} is a {type(thing).__name__}; stitches hold on to bodies and TriangleObstacles")
+        raise SceneError(f"{thing.label} is a {type(thing).__name__}; stitches join bodies and TriangleObstacles")
     R, t = thing.pose(0.0)
     return _side(thing.label, thing.surface, thing.surface.vertices @ R.T + t)
 

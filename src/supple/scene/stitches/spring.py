@@ -1,4 +1,4 @@
-"""What stitches made of springs share: a stiffness and a rest length."""
+"""The base class of stitches that are springs: a stiffness and a rest length."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class SpringStitch(Stitch):
 
 
 def places_on_edges(first: Side, second: Side, pairs: Pairs, ends: NDArray[np.int32]) -> NDArray[np.float64]:
-    """(k,) where on its edge, from 0 to 1, the point nearest to each vertex is."""
+    """(k,) the place on the edge, from 0 to 1, of the point nearest to each vertex."""
     a, b = second.points[ends].transpose(1, 0, 2)
     along, off = b - a, first.points[pairs.vertices] - a
     squares = np.einsum("ij,ij->i", along, along)

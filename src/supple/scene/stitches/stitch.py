@@ -1,4 +1,4 @@
-"""What all stitches share: which two things they join, and how the pairs are given or found."""
+"""The base class of stitches: the two things that they join, and how pairs are given or found."""
 
 from __future__ import annotations
 
@@ -22,22 +22,23 @@ PAIRINGS = ("closest", "all")
 class Stitch(ABC):
     """Joins vertices of a body to something of another body, or of a triangle obstacle.
 
-    Give `pairs`, or let them be found within `max_distance`, in the world, where the scene places bodies and obstacles
-    at the start. Initial positions or a start from another frame change neither pairs nor rest shapes.
+    Give `pairs`, or `max_distance`; then pairs are found in the world, where the scene places bodies and obstacles at
+    the start. Initial positions or a start from another frame change neither pairs nor rest shapes.
 
     Parameters
     ----------
     first : name of the body whose vertices are stitched
-    second : name of what they are stitched to: another body, or else a TriangleObstacle, static or scripted
-    pairs : (n, 2) vertex of the first body's mesh, and what of the second (its kind says)
-    max_distance : for each vertex of the first body's surface up to this distance of the second's [m]
-    pairing : "closest", a vertex's nearest one; where several are equally near, the one that faces it most squarely,
-        and of these the one of lowest number; or "all" in reach
+    second : name of what they are stitched to: another body, or a TriangleObstacle, static or scripted
+    pairs : (n, 2) vertex of the first body's mesh, and number of the partner in the second (see the kind of stitch)
+    max_distance : vertices of the first body's surface up to this distance from the second are stitched [m]
+    pairing : "closest", a vertex's nearest one; of several that are equally near, the one with the largest distance of
+        the vertex from its plane; of several with the same (0, where surfaces touch), the one whose normal is most
+        opposed to that of the vertex's own surface; and of these the one of lowest number; or "all" in reach
     damping : Kelvin-Voigt time of the stitches [s]
-    name : stands in messages
+    name : used in messages
     """
 
-    partner: ClassVar[str]  # what of the second a pair names
+    partner: ClassVar[str]  # the kind of the second part of a pair, in the plural
 
     first: str
     second: str
@@ -66,18 +67,18 @@ class Stitch(ABC):
 
     @property
     def label(self) -> str:
-        """How messages call this stitch."""
+        """The name of this stitch in messages."""
         return f"stitch {self.name!r}" if self.name else f"stitch of {self.first!r} to {self.second!r}"
 
     @abstractmethod
     def partners(self, second: Side) -> NDArray[np.int32]:
-        """(t, 3) everything of the second side that a pair may name, in the order of its numbers, as triangles.
+        """(t, 3) all possible partners in the second side, in the order of their numbers, as triangles.
 
-        Of an edge two corners coincide, of a vertex all three.
+        An edge has two equal corners, a vertex three.
         """
 
     def surface_partners(self, second: Side) -> NDArray[np.int32]:
-        """(r,) those of them that are looked at when pairs have to be found, ascending."""
+        """(r,) the partners among which pairs are found, ascending."""
         return np.arange(len(self.partners(second)), dtype=np.int32)
 
     @abstractmethod
@@ -94,7 +95,7 @@ class Stitch(ABC):
 
         Raises
         ------
-        SceneError : where a number is out of range, or nothing is within reach; the text says the smallest distance.
+        SceneError : where a number is out of range, or nothing is within reach; the message has the smallest distance.
         """
         partners = self.partners(second)
         if self.pairs is not None:
@@ -109,23 +110,24 @@ class Stitch(ABC):
             distances = pair_distances(first.points[vertices], second.points, partners[rows])
             return Pairs(vertices.astype(np.int32), rows.astype(np.int32), _without_round_off(distances, first, second))
         assert self.max_distance is not None
-        looked_at = self.surface_partners(second)
-        tree = TriangleTree.of(second.points, partners[looked_at])
+        candidates = self.surface_partners(second)
+        tree = TriangleTree.of(second.points, partners[candidates])
         points = first.points[first.surface_vertices]
         if self.pairing == "all":
             queries, rows, distances = tree.all_within(points, self.max_distance)
         else:
-            rows, distances = tree.nearest(points, self.max_distance)
+            normals = first.vertex_normals()[first.surface_vertices]
+            rows, distances = tree.nearest(points, self.max_distance, normals)
             queries = np.flatnonzero(rows >= 0)
             rows, distances = rows[queries], distances[queries]
         if len(rows) == 0:
             smallest = float(tree.nearest(points)[1].min())
             raise SceneError(
                 f"{self.label}: no vertex of {first.label} is within max_distance = {self.max_distance:g} m of "
-                f"{second.label}; the smallest distance there is is {smallest:.6g} m"
+                f"{second.label}; the smallest distance is {smallest:.6g} m"
             )
         vertices = first.surface_vertices[queries].astype(np.int32)
-        return Pairs(vertices, looked_at[rows].astype(np.int32), _without_round_off(distances, first, second))
+        return Pairs(vertices, candidates[rows].astype(np.int32), _without_round_off(distances, first, second))
 
     def _checked_pairs(self) -> NDArray[np.int64]:
         try:
@@ -147,7 +149,7 @@ class Stitch(ABC):
 
         Raises
         ------
-        SceneError : where there is another number of them.
+        SceneError : where the number of values is another one.
         """
         values = np.asarray(value, dtype=np.float64)
         if values.ndim and values.shape != (count,):
@@ -170,6 +172,6 @@ class Stitch(ABC):
 
 
 def _without_round_off(distances: NDArray[np.float64], first: Side, second: Side) -> NDArray[np.float64]:
-    """What touches is at the distance zero: a spring of 1e-17 m would be stretched a billionfold by nothing."""
+    """Zero for pairs that touch: round-off would stretch a spring of 1e-17 m by a factor of 1e9."""
     size = max(float(np.abs(side.points).max(initial=0.0)) for side in (first, second))
     return np.where(distances <= 8.0 * np.finfo(np.float64).eps * size, 0.0, distances)

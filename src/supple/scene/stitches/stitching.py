@@ -1,7 +1,7 @@
-"""All stitches of a scene: pairs found, rest shapes computed, everything numbered as the whole scene is.
+"""All stitches of a scene: their pairs and rest shapes, in the vertex numbers of the whole scene.
 
-Vertices of bodies come first, in the order of the scene. Obstacles' vertices that something is stitched to follow: the
-anchors. They go where the obstacle goes, whatever pulls at them.
+Vertices of bodies come first, in the order of the scene. Then follow the anchors: vertices of obstacles that something
+is stitched to. Anchors move with their obstacle; forces on them have no effect.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from supple.scene.suggestion import suggestion
 
 
 class StitchError(SceneError):
-    """One of a scene's stitches is wrong: the one of that `number`."""
+    """One stitch of a scene is wrong: the one with that `number`."""
 
     def __init__(self, number: int, message: str) -> None:
         super().__init__(message)
@@ -33,7 +33,7 @@ class StitchError(SceneError):
 
 @dataclass(frozen=True, eq=False)
 class StitchRange:
-    """One stitch of the scene, its pairs, and which tets or springs are its own."""
+    """One stitch of the scene, its pairs, and the rows of its tets or springs."""
 
     stitch: Stitch
     pairs: Pairs
@@ -43,11 +43,11 @@ class StitchRange:
 
 @dataclass(frozen=True, eq=False)
 class Anchors:
-    """Obstacles' vertices that something is stitched to.
+    """Vertices of obstacles that something is stitched to.
 
     Attributes
     ----------
-    obstacles : all of the scene; owner : (a,) which of them each belongs to
+    obstacles : all of the scene; owner : (a,) the number of each anchor's obstacle
     vertices : (a,) rows of its surface's vertices; points : (a, 3) in the obstacle's own coordinates [m]
     """
 
@@ -101,7 +101,7 @@ class Stitching:
         return np.concatenate([self.tets.vertices, springs]).astype(np.int32)
 
     def elements(self) -> NDArray[np.int32]:
-        """(k, 4) the nodes as solvers assemble them; -1 for one that is no vertex of a body, too."""
+        """(k, 4) the nodes as solvers assemble them; -1 also for nodes that are not vertices of bodies."""
         nodes = self.nodes()
         return np.where(nodes < self.body_vertices, nodes, -1).astype(np.int32)
 
@@ -138,7 +138,7 @@ class Stitching:
         return np.unique(joins[joins[:, 1] >= self.body_vertices, 0])
 
     def joined_components(self, components: NDArray[np.int32]) -> NDArray[np.int32]:
-        """(n,) pieces of bodies (n,), where those that stitches join, also by one vertex of an obstacle, are one."""
+        """(n,) pieces of bodies (n,); pieces that stitches join, also through one vertex of an obstacle, are one."""
         if not len(self):
             return components
         pieces = int(components.max()) + 1
@@ -156,11 +156,11 @@ def no_stitching(body_vertices: int) -> Stitching:
 
 
 def stitch_together(bodies: Sequence[Body], obstacles: Sequence[Obstacle], stitches: Sequence[Stitch]) -> Stitching:
-    """Find the pairs of all stitches, and number them. What they name is there: see `check_names`.
+    """Find the pairs of all stitches, and number them. All names must exist, see `check_names`.
 
     Raises
     ------
-    StitchError : where a thing cannot be held on to, a pair does not exist, or none is within reach.
+    StitchError : where a thing cannot be stitched to, a pair does not exist, or none is within reach.
     """
     starts = np.concatenate([[0], np.cumsum([len(body.mesh.vertices) for body in bodies])])
     n = int(starts[-1])
@@ -211,11 +211,11 @@ def _anchors(obstacles: Sequence[Obstacle], numbers: dict[tuple[int, int], int])
 
 
 def check_names(stitches: Sequence[Stitch], bodies: Sequence[str], obstacles: Sequence[str]) -> None:
-    """Raise where a stitch names what is not among the names of bodies, or of bodies and obstacles.
+    """Raise where a stitch names an unknown body or obstacle.
 
     Raises
     ------
-    StitchError : says what there is.
+    StitchError : names the known ones.
     """
     for number, stitch in enumerate(stitches):
         for name, what, known in (
@@ -223,5 +223,5 @@ def check_names(stitches: Sequence[Stitch], bodies: Sequence[str], obstacles: Se
             (stitch.second, "body or obstacle", [*bodies, *obstacles]),
         ):
             if name not in known:
-                mend = suggestion(name, known)
-                raise StitchError(number, f"{stitch.label}: there is no {what} {name!r}; {mend}")
+                remedy = suggestion(name, known)
+                raise StitchError(number, f"{stitch.label}: there is no {what} {name!r}; {remedy}")

@@ -14,7 +14,7 @@ from supple.scene.stitches.spring import SpringStitch, places_on_edges
 
 @dataclass(frozen=True, eq=False)
 class VertexEdgeStitch(SpringStitch):
-    """Springs from vertices to points of edges, which stay at their place along the edge. See `SpringStitch`.
+    """Springs from vertices to points of edges, which do not move along the edge. See `SpringStitch`.
 
     Pairs are (vertex of the first body, row of the second body's `mesh.surface.edges`, or of an obstacle's
     `surface.edges`).

@@ -16,6 +16,10 @@ from supple.scene.stitches.elements import Pairs, StitchTets
 from supple.scene.stitches.side import Side
 from supple.scene.stitches.stitch import Stitch
 
+# The default rest distance, as a share of the mean edge at a pair. Two half bars, joined by stitches as stiff as they
+# are, then bend 0.3 % further than one bar (docs/stitches.md).
+_DISTANCE_SHARE = 0.01
+
 _MODULI = {"mu": "Pa", "lam": "Pa", "youngs": "Pa", "poisson": "-"}
 
 
@@ -34,9 +38,10 @@ class SoftVertexTriangleStitch(Stitch):
 
     Parameters
     ----------
-    mu, lam : as they stand in psi [Pa]; or
+    mu, lam : as in psi [Pa]; or
     youngs, poisson : Young's modulus [Pa] and Poisson's ratio, from which mu and lam are the Lamé parameters.
-    min_separate_distance : d [m]
+    min_separate_distance : d [m]; None: a hundredth of the mean edge of the pair's triangle, or of the mean
+        edge of the first surface at the vertex, whichever is shorter
 
     Each is one number, or one for each pair.
 
@@ -51,7 +56,7 @@ class SoftVertexTriangleStitch(Stitch):
     lam: float | NDArray[np.float64] | None = field(default=None, kw_only=True)
     youngs: float | NDArray[np.float64] | None = field(default=None, kw_only=True)
     poisson: float | NDArray[np.float64] | None = field(default=None, kw_only=True)
-    min_separate_distance: float | NDArray[np.float64] = field(default=1e-3, kw_only=True)
+    min_separate_distance: float | NDArray[np.float64] | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -62,7 +67,7 @@ class SoftVertexTriangleStitch(Stitch):
             _same_count(self, "mu", "lam")
         elif given in (["youngs", "poisson"], list(_MODULI)):
             mu, lam = self._converted()
-            # All four are there where a stitch is made from another one by `dataclasses.replace`.
+            # All four are given where `dataclasses.replace` makes a stitch from another one.
             if len(given) == 4 and not (
                 np.array_equal(mu, np.asarray(self.mu)) and np.array_equal(lam, np.asarray(self.lam))
             ):
@@ -70,10 +75,11 @@ class SoftVertexTriangleStitch(Stitch):
             object.__setattr__(self, "mu", mu)
             object.__setattr__(self, "lam", lam)
         else:
-            said = " and ".join(given) or "neither"
-            raise SceneError(f"{self.label}: give mu and lam, or youngs and poisson (given: {said})")
-        distance = self.checked_numbers(self.min_separate_distance, "min_separate_distance", "m")
-        object.__setattr__(self, "min_separate_distance", distance)
+            named = " and ".join(given) or "neither"
+            raise SceneError(f"{self.label}: give mu and lam, or youngs and poisson (given: {named})")
+        if self.min_separate_distance is not None:
+            distance = self.checked_numbers(self.min_separate_distance, "min_separate_distance", "m")
+            object.__setattr__(self, "min_separate_distance", distance)
 
     def _converted(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """mu and lam of youngs and poisson."""
@@ -115,30 +121,34 @@ class SoftVertexTriangleStitch(Stitch):
         return second.triangles
 
     def join(self, first: Side, second: Side, pairs: Pairs) -> StitchTets:
-        """See `Stitch`. A tet's triangle is turned where its volume would be negative: above it.
+        """See `Stitch`. Where the volume of a tet would be negative, two corners of its triangle change places.
 
         Raises
         ------
-        SceneError : where a triangle has no area, or a tet no height that round-off leaves.
+        SceneError : where a triangle has no area, or the height of a tet is lost in round-off.
         """
         count = len(pairs.vertices)
         corners = second.triangles[pairs.rows]
-        d = self.per_pair(self.min_separate_distance, count, "min_separate_distance")
         for key in ("youngs", "poisson"):
             if getattr(self, key) is not None:
                 self.per_pair(getattr(self, key), count, key)
         x0, (x1, x2, x3) = first.points[pairs.vertices], second.points[corners].transpose(1, 0, 2)
         n = np.cross(x2 - x1, x3 - x1)
         length = np.linalg.norm(n, axis=1)
-        flat = np.flatnonzero(~(length > 1e-12 * _longest_edge(x1, x2, x3) ** 2))
+        edges = np.linalg.norm([x2 - x1, x3 - x2, x1 - x3], axis=2)
+        flat = np.flatnonzero(~(length > 1e-12 * edges.max(axis=0) ** 2))
         if len(flat):
             raise SceneError(
                 f"{self.label}: triangle {pairs.rows[flat[0]]} of {second.label} has no area, so that nothing can be "
-                "stitched to it; mend the mesh"
+                "stitched to it; repair the mesh"
             )
         n /= length[:, None]
+        chosen = self.min_separate_distance
+        if chosen is None:
+            chosen = _DISTANCE_SHARE * np.minimum(edges.mean(axis=0), first.mean_edges()[pairs.vertices])
+        d = self.per_pair(chosen, count, "min_separate_distance")
         s = np.einsum("ij,ij->i", n, x0 - x1)
-        # Faces that touch are at 0, on the side +1, whatever the sign that round-off gives it.
+        # Faces that touch count as height 0, on the side +1, also where round-off gives another sign.
         round_off = 8.0 * np.finfo(np.float64).eps * np.max(np.abs([x0, x1, x2, x3]), axis=(0, 2))
         above = s >= -round_off
         near = np.abs(s) < d - round_off
@@ -163,10 +173,6 @@ class SoftVertexTriangleStitch(Stitch):
             damping=np.full(count, self.damping),
             offset=near,
         )
-
-
-def _longest_edge(a: NDArray, b: NDArray, c: NDArray) -> NDArray[np.float64]:
-    return np.max([np.linalg.norm(b - a, axis=1), np.linalg.norm(c - b, axis=1), np.linalg.norm(a - c, axis=1)], axis=0)
 
 
 def _same_count(stitch: SoftVertexTriangleStitch, one: str, other: str) -> None:

@@ -23,7 +23,7 @@ class VertexVertexStitch(SpringStitch):
         return np.repeat(np.arange(len(second.points), dtype=np.int32)[:, None], 3, axis=1)
 
     def surface_partners(self, second: Side) -> NDArray[np.int32]:
-        """See `Stitch`. Vertices inside the second body can be named, but are never found."""
+        """See `Stitch`. Vertices inside the second body can be given as pairs, but are never found."""
         return second.surface_vertices
 
     def join(self, first: Side, second: Side, pairs: Pairs) -> Springs:

@@ -44,8 +44,9 @@ class SoftVertexTriangleModel(_StitchModel):
     poisson: PerPair | None = Field(default=None, description="Poisson's ratio, below 0.5; one, or one per pair")
     mu: PerPair | None = Field(default=None, description="instead of `youngs`: Lamé parameter mu [Pa]")
     lam: PerPair | None = Field(default=None, description="instead of `poisson`: Lamé parameter lambda [Pa]")
-    min_separate_distance: PerPair = Field(
-        default=1e-3, description="smallest distance at rest [m]; one, or one per pair"
+    min_separate_distance: PerPair | None = Field(
+        default=None,
+        description="smallest distance at rest [m]; one, or one per pair; null: 1 % of the mean edge",
     )
 
     def build(self) -> Stitch:

@@ -27,7 +27,7 @@ class Command:
 
     Raises
     ------
-    CommandError : where a value is of the wrong kind, not finite, or beyond its limit (`supple.viewer.protocol.limits`).
+    CommandError : where a value is of the wrong kind, not finite, or beyond its limit; see `limits.py`.
     """
 
 

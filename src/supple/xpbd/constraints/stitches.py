@@ -1,6 +1,6 @@
 """Constraints of stitches: two for each stitch tet, as for a tet of a body; one for each spring.
 
-Stitches are few. They are projected one after the other, after the bodies' own constraints, on one thread.
+Stitches are few. They are projected in sequence, after the bodies' own constraints, on one thread.
 
 A spring is C = |d| - l with d = x_0 - (1 - t) x_1 - t x_2 and the compliance 1 / k (see `constraints_edges_volume`).
 """
@@ -33,7 +33,7 @@ class StitchTetConstraints(BlocksOfTwo):
             (tets.vertices[movable], tets.rest_shape_inverse[movable], tets.rest_volumes[movable]),
             (tets.mu[movable], tets.lam[movable]),
             inverse_masses,
-            _one_after_the_other(kind.reshape(-1)),
+            _sequential(kind.reshape(-1)),
             damping,
         )
 
@@ -65,7 +65,7 @@ class StitchSpringConstraints:
 def stitch_constraints(
     system: System, inverse_masses: NDArray[np.float64]
 ) -> list[StitchTetConstraints | StitchSpringConstraints]:
-    """Those that a system needs.
+    """The constraints that a system needs.
 
     Parameters
     ----------
@@ -75,8 +75,8 @@ def stitch_constraints(
     return [constraints for constraints in made if constraints.count]
 
 
-def _one_after_the_other(kind: NDArray[np.int64]) -> Segments:
-    """One chunk; constraints of a kind in the order that they come in."""
+def _sequential(kind: NDArray[np.int64]) -> Segments:
+    """One chunk, in which the constraints of a kind keep their order."""
     order = np.argsort(kind, kind="stable")
     starts = np.flatnonzero(np.diff(kind[order], prepend=-1))
     bounds = np.column_stack([starts, np.append(starts[1:], len(order))[: len(starts)]])
@@ -97,7 +97,7 @@ def _extension(x, i, j, k, t):
 
 @njit(error_model="numpy")
 def _slope(points, i, j, k, t):
-    """sum w |grad C|^2; where both ends of the edge are one vertex, its two shares add up first."""
+    """sum w |grad C|^2; where both ends of the edge are one vertex, its shares are added first."""
     if j == k:
         return points[i, 3] + points[j, 3]
     return points[i, 3] + (1.0 - t) * (1.0 - t) * points[j, 3] + t * t * points[k, 3]
@@ -117,7 +117,7 @@ def _project_springs(points, ends, place, rest, alpha):
         i, j, k, t = ends[c, 0], ends[c, 1], ends[c, 2], place[c]
         d = _extension(points, i, j, k, t)
         length = math.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
-        # Coinciding ends have no direction to part in.
+        # Coinciding ends have no direction.
         if length > 0.0:
             _move(points, i, j, k, t, d, (rest[c] - length) / ((_slope(points, i, j, k, t) + alpha[c]) * length))
 

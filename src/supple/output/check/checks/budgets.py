@@ -1,4 +1,4 @@
-"""Checks of what motion must keep: momentum, angular momentum, and energy, as far as a recording lets one know."""
+"""Checks of conserved quantities: momentum, angular momentum and energy, as far as a recording determines them."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from supple.output.check.snapshot import Scene, Snapshot
 from supple.output.check.tally import Tally, skipped
 from supple.output.recording.reader import Recording
 
-_UNKNOWN = "the recording does not tell what acts on its bodies: an older version wrote it"
+_UNKNOWN = "the recording does not contain what acts on its bodies: an older version wrote it"
 # Motion slower than this share of a body's size per step, and energy of the same share, is round-off.
 _FLOOR = 1e-9
 
 
-def external_push(recording: Recording) -> str | None:
-    """What may push on the scene from outside, gravity apart, or None where nothing does."""
+def external_action(recording: Recording) -> str | None:
+    """What may act on the scene from outside besides gravity, or None."""
     physics = recording.physics
     if physics is None:
         return _UNKNOWN
@@ -32,14 +32,14 @@ def external_push(recording: Recording) -> str | None:
 
 
 class Momentum(FrameCheck):
-    """P(t) - P(0) = M g t, where nothing else pushes."""
+    """P(t) - P(0) = M g t, where no other force acts."""
 
     name = "momentum"
 
     def __init__(self, scene: Scene, settings: CheckSettings) -> None:
         super().__init__(scene, settings)
         self._tally = Tally(self.name)
-        self._why_not = external_push(scene.recording)
+        self._why_not = external_action(scene.recording)
         self._start: tuple[float, NDArray[np.float64]] | None = None
         self._scale = 0.0
 
@@ -62,16 +62,17 @@ class Momentum(FrameCheck):
         if self._why_not is not None:
             return skipped(self.name, self._why_not)
         return self._tally.result(
-            "changes by gravity alone, within {worst}", "changes by {worst} of itself without a cause"
+            "changes by gravity alone, within {worst}", "changes by {worst} of itself without a force"
         )
 
 
 class Spin(FrameCheck):
-    """Angular momentum about the center of mass, from frame to frame, where nothing else pushes.
+    """Angular momentum about the center of mass, from frame to frame, where no other force acts.
 
-    Implicit integrators keep it only as the steps shrink. With r' = r + h v' and forces without a torque about r',
-    backward Euler gives L' - L = h sum m (v' - v) x v, velocities relative to the center of mass. Others give terms of
-    the same size: an implicit recording may change L by as much as h sum m |v' - v| (|v| + |v'|) in a step.
+    Implicit integrators conserve it only up to an error that falls with the step. With r' = r + h v' and forces without
+    a torque about r', backward Euler gives L' - L = h sum m (v' - v) x v, velocities relative to the center of mass.
+    Others give terms of at most the same size. A recording of the implicit solver may change L by
+    h sum m |v' - v| (|v| + |v'|) in a step.
     """
 
     name = "spin"
@@ -80,10 +81,10 @@ class Spin(FrameCheck):
         super().__init__(scene, settings)
         self._tally = Tally(self.name)
         recording = scene.recording
-        self._why_not = external_push(recording)
+        self._why_not = external_action(recording)
         self._implicit = (recording.solver or "").startswith("Implicit")
         if self._why_not is None and self._implicit and settings.every > 1:
-            self._why_not = "an implicit integrator's own change is known from one frame to the next only"
+            self._why_not = "the error of an implicit integrator is known from one frame to the next only"
         self._last: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
         self._drift, self._scale = 0.0, 0.0
 
@@ -103,7 +104,7 @@ class Spin(FrameCheck):
             if self._implicit:
                 speeds = np.linalg.norm(v, axis=1) + np.linalg.norm(old_v, axis=1)
                 change -= recording.dt * float(m @ (np.linalg.norm(v - old_v, axis=1) * speeds))
-            # What single steps lose or gain beyond what is allowed adds up.
+            # Changes beyond the allowed ones add up over the steps.
             self._drift += max(0.0, change)
             share = self._drift / self._scale
             self._tally.see(at, share, not share <= self.settings.max_momentum_change)
@@ -112,12 +113,12 @@ class Spin(FrameCheck):
     def result(self) -> CheckResult:
         if self._why_not is not None:
             return skipped(self.name, self._why_not)
-        good = "kept within {worst}" + (", beyond what the integrator explains" if self._implicit else "")
-        return self._tally.result(good, "angular momentum changes by {worst} of what turns, without a cause")
+        good = "constant within {worst}" + (", beyond the error of the integrator" if self._implicit else "")
+        return self._tally.result(good, "angular momentum changes by {worst} of what turns, without a torque")
 
 
 class Energy(FrameCheck):
-    """Kinetic, elastic and potential energy together never exceed those at the start, where nothing does work."""
+    """The sum of kinetic, elastic, stitch and potential energy does not grow where nothing does work."""
 
     name = "energy"
 
@@ -132,8 +133,8 @@ class Energy(FrameCheck):
             self._why_not = "forces or soft targets do work"
         elif physics.scripted_pins:
             self._why_not = "scripted pins do work"
-        elif physics.stitches:
-            self._why_not = "stitches store energy that is not computed here"
+        elif physics.stitches and recording.stitches.laws is None:
+            self._why_not = "the recording does not contain the laws of its stitches: an older version wrote it"
         self._first: Snapshot | None = None
         self._rows: list[tuple[Moment, float, float]] = []
 
@@ -152,7 +153,7 @@ class Energy(FrameCheck):
             elastic = at.elastic_energy
             if elastic is None:
                 elastic = float(recording.series("elastic_energy")[at.number])
-            moved = 0.5 * float(m @ np.einsum("ij,ij->i", v, v)) + elastic
+            moved = 0.5 * float(m @ np.einsum("ij,ij->i", v, v)) + elastic + (at.stitch_energy or 0.0)
             fallen = at.positions - self._first.positions
             self._rows.append((Moment(at.number, at.time), moved, -float((m @ fallen) @ recording.gravity)))
 
@@ -160,7 +161,7 @@ class Energy(FrameCheck):
         if self._why_not is not None:
             return skipped(self.name, self._why_not)
         if not self._rows:
-            return skipped(self.name, "there is no frame to compute it from")
+            return skipped(self.name, "there is no frame")
         recording = self.scene.recording
         stored = np.array([row[1] for row in self._rows])
         height = np.array([row[2] for row in self._rows])

@@ -1,4 +1,4 @@
-"""Checks of surfaces: that they do not meet, are not swallowed, and how far apart they are."""
+"""Checks of surfaces: intersection, containment and distance."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Intersection(FrameCheck):
 
 
 def clearances(scene: Scene, at: Snapshot) -> Iterator[tuple[str, Clearance]]:
-    """How each body keeps away from each obstacle that is a formula: where, and how far."""
+    """The clearance of each body from each obstacle that is a formula: where, and how far."""
     surfaces = scene.surfaces
     for j, obstacle in enumerate(scene.recording.obstacles):
         if is_mesh(obstacle):
@@ -72,12 +72,12 @@ class Obstacles(FrameCheck):
 
     def result(self) -> CheckResult:
         if all(is_mesh(obstacle) for obstacle in self.scene.recording.obstacles):
-            return skipped(self.name, "the scene has no half-space, ball or room")
+            return skipped(self.name, "the scene has no half-space, sphere or room")
         return self._tally.result("closest {worst}", "a body is in an obstacle, at {worst}")
 
 
 class Containment(FrameCheck):
-    """Pieces of bodies and obstacles that are wholly inside of others, where no triangles meet."""
+    """Pieces of bodies and obstacles that are completely inside others, where no triangles meet."""
 
     name = "containment"
 
@@ -86,10 +86,10 @@ class Containment(FrameCheck):
         self._tally = Tally(self.name, "pieces")
 
     def see(self, at: Snapshot) -> None:
-        found = [*self._swallowed(at), *self._around_balls(at)]
+        found = [*self._contained(at), *self._spheres_in_bodies(at)]
         self._tally.see(at, len(found), bool(found), found[0] if found else "")
 
-    def _swallowed(self, at: Snapshot) -> Iterator[str]:
+    def _contained(self, at: Snapshot) -> Iterator[str]:
         surfaces, x = self.scene.surfaces, at.points
         owners = surfaces.owners
         crossing = {frozenset(pair) for pair in owners[at.meeting[1]].tolist()}
@@ -102,15 +102,15 @@ class Containment(FrameCheck):
                 pair = frozenset((piece.owner, solid.owner))
                 if piece is solid or not surfaces.allowed[piece.owner, solid.owner] or pair in crossing:
                     continue
-                # Of a whole piece inside nothing sticks out; its vertex alone may also lie on the surface.
-                whole = x[surfaces.triangles[piece.triangles].ravel()]
-                if (whole < low).any() or (whole > high).any():
+                # A contained piece is contained with its bounding box; a single vertex may also lie on the surface.
+                points = x[surfaces.triangles[piece.triangles].ravel()]
+                if (points < low).any() or (points > high).any():
                     continue
                 point = x[piece.vertex].copy()
                 if is_inside(x, point, surfaces.triangles, solid.triangles):
                     yield f"{surfaces.names[piece.owner]} in {surfaces.names[solid.owner]}"
 
-    def _around_balls(self, at: Snapshot) -> Iterator[str]:
+    def _spheres_in_bodies(self, at: Snapshot) -> Iterator[str]:
         surfaces = self.scene.surfaces
         for j, obstacle in enumerate(self.scene.recording.obstacles):
             if obstacle.kind != "Sphere" or obstacle.parameters.get("inside", False):
@@ -122,7 +122,7 @@ class Containment(FrameCheck):
                     yield f"{obstacle.name} in {surfaces.names[solid.owner]}"
 
     def result(self) -> CheckResult:
-        return self._tally.result("nothing is inside of another", "swallowed: {worst}")
+        return self._tally.result("nothing is inside another thing", "contained: {worst}")
 
 
 class Distance(FrameCheck):
@@ -145,7 +145,7 @@ class Distance(FrameCheck):
             return
         best = np.inf
         if self._last is not None:
-            # The closest pair of the last frame is close still: what is farther apart need not be looked at.
+            # The closest pair of the last frame is still close: boxes that are farther apart are not searched.
             first, second = (surfaces.triangles[row] for row in self._last)
             best = float(triangles_apart(at.points, first, second)) * (1.0 + 1e-12) + 1e-300
         squared, a, b = closest_pair(

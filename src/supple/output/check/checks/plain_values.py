@@ -1,4 +1,4 @@
-"""Checks of what a recording says plainly: numbers that are numbers, frames in order, steps that converged."""
+"""Checks of plain recorded values: finite numbers, the order of frames, the status of steps."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from supple.output.check.tally import Tally
 from supple.output.recording.recorder import REPORT_NUMBERS, REPORT_VECTORS
 from supple.state import Status
 
-# What all frames share.
+# Arrays that all frames share.
 CONSTANTS = ("rest_positions", "rest_volumes", "masses", "gravity")
-# Not a number stands for "not known" there.
+# These series use NaN for "not known".
 _MAY_BE_UNKNOWN = ("min_distance", "largest_stitch_stretch")
 _SAME_TIME = 1e-9
 _MOVING = 1e-9
 
-# Of the speed that a body has: by how much its way may differ from where its velocities lead. In recordings that nobody
-# touched it was less than 0.1.
-_ASTRAY = 0.75
+# How far the displacement of a body in a step may differ from that of its velocities, as a share of its speed times the
+# step. In unchanged recordings it was less than 0.1.
+_LARGEST_DEVIATION = 0.75
 
 
 class Finite(FrameCheck):
-    """Every number of the file, the reports' among them."""
+    """Every number of the file, those of the reports included."""
 
     name = "finite"
     sees_all = True
@@ -70,7 +70,7 @@ def _bad_count(values: NDArray[np.float64]) -> int:
 
 
 class Sequence(FrameCheck):
-    """Times and numbers of frames, for all frames; repetitions among those that are looked at."""
+    """Times and numbers of all frames; repetitions among the checked frames."""
 
     name = "sequence"
     needs_frames = False
@@ -80,7 +80,7 @@ class Sequence(FrameCheck):
         self._tally = Tally(self.name)
         self._last: Snapshot | None = None
         recording = scene.recording
-        # XPBD may stop within a frame what it has thrown out of something in the same frame.
+        # XPBD may push a body out of another one and stop it within the same frame.
         self._implicit = (recording.solver or "").startswith("Implicit")
         indices = np.array([frame.index for frame in recording])
         for k in range(1, len(recording)):
@@ -100,8 +100,8 @@ class Sequence(FrameCheck):
         if before is None:
             return
         if not np.array_equal(before.positions, at.positions):
-            whole = recording.statuses[at.number] is Status.CONVERGED
-            if self._implicit and whole and at.number == before.number + 1:
+            converged = recording.statuses[at.number] is Status.CONVERGED
+            if self._implicit and converged and at.number == before.number + 1:
                 self._follow(before, at)
             return
         slowest = min(float(np.abs(frame.velocities).max(initial=0.0)) for frame in (before, at))
@@ -109,7 +109,7 @@ class Sequence(FrameCheck):
             self._tally.see(at, slowest, True, f"repeats frame {before.number} although it moves")
 
     def _follow(self, before: Snapshot, at: Snapshot) -> None:
-        """Whether bodies went where their velocities, before and after the step, took them."""
+        """Whether the displacements of bodies agree with their velocities before and after the step."""
         recording = self.scene.recording
         step = at.time - before.time
         fall = float(np.linalg.norm(recording.gravity)) * abs(step)
@@ -118,14 +118,14 @@ class Sequence(FrameCheck):
             share = share / share.sum()
             speeds = [float(np.sqrt(share @ (frame.velocities[rows] ** 2).sum(axis=1))) for frame in (before, at)]
             first, last = (share @ frame.velocities[rows] for frame in (before, at))
-            went = share @ (at.positions[rows] - before.positions[rows]) / step
-            # The mean velocity of a step lies between that before and that after it; a statics solver leaves none.
+            mean = share @ (at.positions[rows] - before.positions[rows]) / step
+            # The mean velocity of a step is between those before and after it; a static solver leaves none.
             change = last - first
-            along = np.clip((went - first) @ change / max(float(change @ change), 1e-300), 0.0, 1.0)
-            off = float(np.linalg.norm(went - first - along * change))
+            along = np.clip((mean - first) @ change / max(float(change @ change), 1e-300), 0.0, 1.0)
+            off = float(np.linalg.norm(mean - first - along * change))
             rounding = _MOVING * self.scene.size / abs(step)
-            if max(speeds) > 0.0 and off > _ASTRAY * (max(speeds) + fall) + rounding:
-                where = f"{body.name} went {off * abs(step):.3g} m elsewhere than its velocities say"
+            if max(speeds) > 0.0 and off > _LARGEST_DEVIATION * (max(speeds) + fall) + rounding:
+                where = f"{body.name} is {off * abs(step):.3g} m from where its velocities lead"
                 self._tally.see(at, off, True, where)
 
     def result(self) -> CheckResult:
@@ -147,7 +147,7 @@ class Converged(FrameCheck):
                 self._tally.see(Moment(k, float(recording.times[k])), 1.0, True, str(status))
 
     def see(self, at: Snapshot) -> None:
-        """All is known from the start."""
+        """Nothing depends on frames."""
 
     def result(self) -> CheckResult:
         return self._tally.result("every step converged", "a step did not converge")

@@ -1,4 +1,4 @@
-"""Whether what was measured when a frame was recorded is what its positions and velocities give."""
+"""Compares recorded measures with those of the recorded positions and velocities."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from supple.output.check.settings import CheckSettings
 from supple.output.check.snapshot import Scene, Snapshot, edge_vectors
 from supple.output.check.tally import Tally
 
-# Of the natural size of each quantity; both sides are computed in double precision.
+# Allowed difference, as a share of the natural size of each quantity; both sides are computed in double precision.
 _SAME = 1e-9
 _NOTHING = 1e-300
 
@@ -28,7 +28,7 @@ class Records(FrameCheck):
         self._inverse_sizes = np.linalg.norm(scene.rest_inverse, axis=(1, 2))
 
     def see(self, at: Snapshot) -> None:
-        # What is not a number is told by another check.
+        # Another check finds numbers that are not finite.
         differences = [(value, where) for value, where in self._differences(at) if np.isfinite(value)]
         value, where = max(differences, default=(0.0, ""))
         self._tally.see(at, value, value > _SAME, where)
@@ -42,29 +42,31 @@ class Records(FrameCheck):
         apart[~np.isfinite(apart)] = 0.0
         row = int(np.argmax(apart))
         yield float(apart[row]), f"det F of {self.scene.name_tet(row)}"
-        said = recording.series("min_det_F")[k]
-        yield abs(said - at.J.min()) / sizes[int(np.argmin(at.J))], "smallest det F"
+        recorded = recording.series("min_det_F")[k]
+        yield abs(recorded - at.J.min()) / sizes[int(np.argmin(at.J))], "smallest det F"
         kinetic = 0.5 * float(m @ np.einsum("ij,ij->i", v, v))
-        said = recording.series("kinetic_energy")[k]
-        yield abs(said - kinetic) / (kinetic + _NOTHING), "kinetic energy"
+        recorded = recording.series("kinetic_energy")[k]
+        yield abs(recorded - kinetic) / (kinetic + _NOTHING), "kinetic energy"
         potential = -float((m @ x) @ recording.gravity)
         heights = float(m @ np.linalg.norm(x, axis=1)) * float(np.linalg.norm(recording.gravity))
-        said = recording.series("potential_energy")[k]
-        yield abs(said - potential) / (heights + _NOTHING), "potential energy"
-        if recording.physics is None or recording.physics.has_known_energy:
-            elastic = at.elastic_energy
-            if elastic is not None:
-                said = recording.series("elastic_energy")[k]
-                yield abs(said - elastic) / (abs(elastic) + self.scene.stiffness_scale + _NOTHING), "elastic energy"
+        recorded = recording.series("potential_energy")[k]
+        yield abs(recorded - potential) / (heights + _NOTHING), "potential energy"
+        for name, energy, scale in (
+            ("elastic energy", at.elastic_energy, self.scene.stiffness_scale),
+            ("stitch energy", at.stitch_energy, self.scene.stitch_scale),
+        ):
+            if energy is not None:
+                recorded = recording.series(name.replace(" ", "_"))[k]
+                yield abs(recorded - energy) / (abs(energy) + scale + _NOTHING), name
         momentum = m @ v
-        said = recording.series("linear_momentum")[k]
+        recorded = recording.series("linear_momentum")[k]
         speeds = np.linalg.norm(v, axis=1)
-        yield float(np.linalg.norm(said - momentum)) / (float(m @ speeds) + _NOTHING), "linear momentum"
+        yield float(np.linalg.norm(recorded - momentum)) / (float(m @ speeds) + _NOTHING), "linear momentum"
         r = x - m @ x / m.sum()
         spin = m @ np.cross(r, v - momentum / m.sum())
-        said = recording.series("angular_momentum")[k]
+        recorded = recording.series("angular_momentum")[k]
         turning = float(m @ (np.linalg.norm(r, axis=1) * speeds))
-        yield float(np.linalg.norm(said - spin)) / (turning + _NOTHING), "angular momentum"
+        yield float(np.linalg.norm(recorded - spin)) / (turning + _NOTHING), "angular momentum"
 
     def result(self) -> CheckResult:
         if self._tally.failed_frames == 0:

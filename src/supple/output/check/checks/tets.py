@@ -1,4 +1,4 @@
-"""Checks of the tetrahedra: at rest, in every frame, and of the volumes that they add up to."""
+"""Checks of the tetrahedra: at rest, in every frame, and of the volumes of the bodies."""
 
 from __future__ import annotations
 
@@ -37,23 +37,23 @@ class RestShape(FrameCheck):
         wrong = np.flatnonzero(~(np.abs(recording.rest_volumes - volumes) <= _SAME_VOLUME * sizes))
         if len(wrong):
             row = int(wrong[0])
-            said = f"{scene.name_tet(row)} is said to have {recording.rest_volumes[row]:.6g} m^3"
-            self._tally.see(None, volumes[row], True, said)
+            text = f"{scene.name_tet(row)} has a recorded volume of {recording.rest_volumes[row]:.6g} m^3"
+            self._tally.see(None, volumes[row], True, text)
         light = np.flatnonzero(~(recording.masses > 0.0))
         if len(light):
             row = int(light[0])
-            said = f"{scene.surfaces.name_vertex(row)} has a mass of {recording.masses[row]:.6g} kg"
-            self._tally.see(None, volumes.min(), True, said)
+            text = f"{scene.surfaces.name_vertex(row)} has a mass of {recording.masses[row]:.6g} kg"
+            self._tally.see(None, volumes.min(), True, text)
 
     def see(self, at: Snapshot) -> None:
-        """All is known from the start."""
+        """Nothing depends on frames."""
 
     def result(self) -> CheckResult:
         return self._tally.result("smallest tet at rest {worst}", "not a rest shape: {worst}")
 
 
 class Inversion(FrameCheck):
-    """The exact sign of every tet's determinant; the smallest det F is told."""
+    """The exact sign of every tet's determinant; the smallest det F is reported."""
 
     name = "inversion"
 
@@ -72,7 +72,7 @@ class Inversion(FrameCheck):
 
 
 class Volume(FrameCheck):
-    """How far each body's volume goes from the one at rest."""
+    """The change of each body's volume from that at rest."""
 
     name = "volume"
 
@@ -95,7 +95,7 @@ class Volume(FrameCheck):
             return np.inf
         laws = np.array([law is StableNeoHookean for law in ELASTIC_MATERIALS])[physics.kind[tets]]
         mu = physics.mu[tets]
-        # The lam of stable Neo-Hookean's density is lam + mu of Hooke's law.
+        # The lam of the stable Neo-Hookean density is lam + mu of Hooke's law.
         hooke = physics.lam[tets] - np.where(laws, mu, 0.0)
         poisson = hooke / (2.0 * (hooke + mu))
         return GENEROUS_VOLUME_CHANGE if (poisson >= NEARLY_INCOMPRESSIBLE - 1e-9).all() else np.inf

@@ -1,0 +1,42 @@
+"""Seams of bodies stitched face to face: their triangles touch in the first frame, and may go on doing so."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from supple.output.check.geometry.box_tree import build_tree, triangle_boxes
+from supple.output.check.geometry.surface_pairs import meeting_pairs
+from supple.output.check.surfaces import Surfaces
+from supple.output.recording.reader import Recording
+
+
+def with_seams(recording: Recording, surfaces: Surfaces) -> Surfaces:
+    """The surfaces, with the pairs of triangles ignored that meet in the first frame, belong to two things that are
+    stitched to each other, and have a stitched corner."""
+    stitched = surfaces.stitched
+    frame = recording[0]
+    if not len(stitched) or not np.isfinite(frame.state.positions).all() or not np.isfinite(frame.poses).all():
+        return surfaces
+    x, triangles, owners = surfaces.place(frame.state.positions, frame.poses), surfaces.triangles, surfaces.owners
+    thing = np.full(len(x), -1)
+    thing[triangles] = owners[:, None]
+    joined = np.zeros_like(surfaces.allowed)
+    ends = thing[stitched]
+    for k in range(1, stitched.shape[1]):
+        on_surface = (ends[:, 0] >= 0) & (ends[:, k] >= 0)
+        joined[ends[on_surface, 0], ends[on_surface, k]] = True
+    joined &= surfaces.allowed
+    joined |= joined.T
+    low, high = triangle_boxes(x, triangles)
+    tree = low, high, *build_tree(low, high)
+    pairs = np.zeros((0, 2), dtype=np.int64)
+    # The first pass counts, the second one writes.
+    for _ in range(2):
+        found = meeting_pairs(x, triangles, owners, joined, surfaces.ignored, *tree, pairs)
+        pairs = np.zeros((found, 2), dtype=np.int64) if len(pairs) < found else pairs
+    has_stitch = np.isin(triangles, stitched).any(axis=1)
+    pairs = np.sort(pairs[has_stitch[pairs].any(axis=1)], axis=1)
+    keys = pairs[:, 0] * len(triangles) + pairs[:, 1]
+    return replace(surfaces, ignored=np.union1d(surfaces.ignored, keys))
