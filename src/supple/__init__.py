@@ -13,19 +13,21 @@ from typing import TYPE_CHECKING, Any
 _HOME = {
     "ARAP": "supple.materials.arap",
     "Body": "supple.scene.body",
-    "Box": "supple.scene.obstacles",
+    "Box": "supple.scene.obstacles.box",
+    "Capsule": "supple.scene.obstacles.capsule",
     "CheckReport": "supple.output.check.report",
     "CheckResult": "supple.output.check.report",
     "CheckSettings": "supple.output.check.settings",
     "CommandError": "supple.errors",
     "ContactPair": "supple.scene.contact_pairs",
     "XPBDContact": "supple.xpbd.contact.settings",
+    "Cylinder": "supple.scene.obstacles.cylinder",
     "EdgesAndVolume": "supple.materials.edges_and_volume",
     "Embedding": "supple.mesh.skin",
     "FixedCorotated": "supple.materials.fixed_corotated",
     "Force": "supple.scene.forces",
     "Frame": "supple.simulate",
-    "HalfSpace": "supple.scene.obstacles",
+    "HalfSpace": "supple.scene.obstacles.half_space",
     "IPCContact": "supple.implicit.contact.settings",
     "ContactPoints": "supple.contact_points",
     "Implicit": "supple.implicit.solver",
@@ -47,7 +49,7 @@ _HOME = {
     "SoftTarget": "supple.scene.forces",
     "SoftVertexTriangleStitch": "supple.scene.stitches.vertex_triangle",
     "SolverError": "supple.errors",
-    "Sphere": "supple.scene.obstacles",
+    "Sphere": "supple.scene.obstacles.sphere",
     "StVenantKirchhoff": "supple.materials.st_venant_kirchhoff",
     "StableNeoHookean": "supple.materials.stable_neo_hookean",
     "State": "supple.state",
@@ -56,7 +58,7 @@ _HOME = {
     "SurfaceMesh": "supple.mesh.surface",
     "SurfaceReport": "supple.mesh.surface_checks",
     "TetMesh": "supple.mesh.tetmesh",
-    "TriangleObstacle": "supple.scene.obstacles",
+    "TriangleObstacle": "supple.scene.obstacles.triangle_obstacle",
     "VertexEdgeStitch": "supple.scene.stitches.vertex_edge",
     "VertexVertexStitch": "supple.scene.stitches.vertex_vertex",
     "XPBD": "supple.xpbd.solver",
@@ -152,7 +154,12 @@ if TYPE_CHECKING:
     from supple.scene.contact_pairs import ContactPair
     from supple.scene.forces import Force, SoftTarget
     from supple.scene.motion import Keyframes
-    from supple.scene.obstacles import Box, HalfSpace, Sphere, TriangleObstacle
+    from supple.scene.obstacles.box import Box
+    from supple.scene.obstacles.capsule import Capsule
+    from supple.scene.obstacles.cylinder import Cylinder
+    from supple.scene.obstacles.half_space import HalfSpace
+    from supple.scene.obstacles.sphere import Sphere
+    from supple.scene.obstacles.triangle_obstacle import TriangleObstacle
     from supple.scene.pins import Pin
     from supple.scene.scene import Scene
     from supple.scene.selection import InBox

@@ -19,7 +19,7 @@ from supple.errors import SceneError
 from supple.scene.body import Body
 from supple.scene.forces import Force, SoftTarget
 from supple.scene.motion import Motion, moved_points, points_at_origin
-from supple.scene.obstacles import Obstacle
+from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.scene.stitches.stitching import Stitching, no_stitching

@@ -12,6 +12,7 @@ from jsonschema import Draft202012Validator
 import supple as sp
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.scene.contact_pairs import pair_table
+from supple.scene.obstacles.registry import KINDS
 from supple.scene_file.document import SceneFileModel, json_schema
 from supple.scene_file.entries.materials import ELASTIC_KINDS
 from supple.scene_file.entries.solvers import solver_of_kind
@@ -237,7 +238,7 @@ def _family(name):
         return "shape"
     if name in ("XPBDModel", "ImplicitModel"):
         return "solver"
-    if name in ("HalfSpaceModel", "BoxModel", "SphereModel", "TrianglesModel"):
+    if name.removesuffix("Model") in KINDS:
         return "obstacle"
     if name in ("SoftVertexTriangleModel", "VertexVertexModel", "VertexEdgeModel"):
         return "stitch"

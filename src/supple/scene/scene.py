@@ -14,7 +14,7 @@ from supple.errors import SceneError
 from supple.scene.body import Body
 from supple.scene.contact_pairs import ContactPair, PairRules
 from supple.scene.forces import Force, SoftTarget
-from supple.scene.obstacles import Obstacle
+from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.pins import Pin
 from supple.scene.stitches.stitch import Stitch
 from supple.scene.stitches.stitching import Stitching, check_names, stitch_together

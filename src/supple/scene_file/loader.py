@@ -16,7 +16,7 @@ from pydantic import ValidationError
 from supple.errors import SceneError
 from supple.scene.body import Body
 from supple.scene.forces import Force, SoftTarget
-from supple.scene.obstacles import Obstacle
+from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.scene.selection import InBox

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.scene.obstacles import Sphere
+from supple.scene.obstacles.sphere import Sphere
 
 NAME = "pusher"
 # Of its radius: how far it moves in one step at most, so that it pushes vertices rather than jumping over them.
