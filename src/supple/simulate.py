@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -172,9 +172,9 @@ def first_frame(scene: Scene, start: Frame | State) -> Frame:
         raise SceneError(
             f"simulate: start has {len(state.positions)} vertices, the scene has {count}; give one of this scene"
         )
-    # A frame of this very scene brings the pins' anchors along, which could else be found again only up to round-off.
+    # A frame of this very scene has the pins' anchors, which otherwise could be found again only up to round-off.
     if isinstance(start, Frame) and start.system.scene is scene:
-        system = start.system
+        system = replace(start.system, start_states=(start.system.start_states[0], state))
     else:
         system = build_system(scene, state)
     return Frame(index, state, system, _report(system, state, StepReport(Status.CONVERGED, 0), 0.0))

@@ -1,4 +1,4 @@
-"""The shapes of all obstacles of a scene as rows of arrays. Obstacles of triangles are not here: see `contact_surfaces`."""
+"""The shapes of all obstacles of a scene as rows of arrays; for those of triangles, see `contact_surfaces`."""
 
 from __future__ import annotations
 

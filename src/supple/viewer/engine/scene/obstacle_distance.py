@@ -11,7 +11,7 @@ from supple.scene.obstacles.obstacle import Obstacle
 def signed_distance(
     obstacle: Obstacle, points: NDArray[np.float64], time: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Distances (k,) of points (k, 3) from an obstacle's surface at `time` [m], below zero in the solid; and normals."""
+    """Distances (k,) of points (k, 3) from an obstacle at `time` [m], below zero in the solid; and normals (k, 3)."""
     R, t = obstacle.pose(time)
     distances, normals = obstacle.signed_distance((points - t) @ R)
     return distances, normals @ R.T
