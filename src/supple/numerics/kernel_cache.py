@@ -42,7 +42,8 @@ def called_functions(function: FunctionType) -> list[FunctionType]:
 def fingerprint_of(functions: Iterable[FunctionType]) -> int:
     """A number that changes with which functions these are, and with the text of their source files."""
     digest = hashlib.sha256()
-    for path, name in sorted({(one.__code__.co_filename, one.__qualname__) for one in functions}):
-        digest.update(name.encode())
+    described = {(one.__code__.co_filename, one.__module__, one.__qualname__) for one in functions}
+    for path, module, name in sorted(described):
+        digest.update(f"{module}.{name}".encode())
         digest.update(Path(path).read_bytes() if Path(path).is_file() else b"")
     return int.from_bytes(digest.digest()[:7], "big")

@@ -59,7 +59,6 @@ def convex_contact(signed_distance: Callable[..., Any]) -> Callable[..., Any]:
     inside before leaves by the nearest way.
     """
 
-    @njit
     def contact(parameters, s0, s1):
         d1, n1 = signed_distance(parameters, s1)
         d0, n0 = signed_distance(parameters, s0)
@@ -86,17 +85,29 @@ def convex_contact(signed_distance: Callable[..., Any]) -> Callable[..., Any]:
                 return dot(subtract(s1, q), n), dot(subtract(s0, q), n), n
         return d1, d0, n1
 
-    return contact
+    return _compiled(contact, signed_distance)
 
 
 @cache
 def concave_contact(signed_distance: Callable[..., Any]) -> Callable[..., Any]:
     """Contact with the wall of a room whose inside is convex; `signed_distance` is that of the solid."""
 
-    @njit
     def contact(parameters, s0, s1):
         d1, n1 = signed_distance(parameters, s1)
         d0, _ = signed_distance(parameters, s0)
         return -d1, -d0, (-n1[0], -n1[1], -n1[2])
 
-    return contact
+    return _compiled(contact, signed_distance)
+
+
+def _compiled(contact: Any, signed_distance: Any) -> Callable[..., Any]:
+    """The function under a name of its own.
+
+    Cached kernels contain what they call under its name and a number that begins anew in every process. Of two functions
+    with the same name, kernels that were compiled in different processes would take the one for the other.
+    """
+    distance = signed_distance.py_func
+    contact.__qualname__ = f"{contact.__qualname__}.{distance.__module__}.{distance.__qualname__}".replace(
+        "<locals>.", ""
+    )
+    return njit(contact)
