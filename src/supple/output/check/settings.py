@@ -16,7 +16,7 @@ NAMES = {
     "rest shape": "no tet is inverted or flat at rest; volumes and masses are above zero",
     "inversion": "no tet is inverted or flat, by the exact sign of its determinant",
     "intersection": "no two surfaces meet, by exact tests of their triangles",
-    "obstacles": "no body is in a half-space, in a ball, or out of its room",
+    "obstacles": "no body is in a half-space or a round solid, or outside of its room",
     "containment": "nothing is swallowed whole",
     "distance": "surfaces keep a distance above zero",
     "volume": "nearly incompressible bodies keep most of their volume",

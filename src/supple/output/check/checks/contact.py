@@ -72,7 +72,7 @@ class Obstacles(FrameCheck):
 
     def result(self) -> CheckResult:
         if all(is_mesh(obstacle) for obstacle in self.scene.recording.obstacles):
-            return skipped(self.name, "the scene has no half-space, ball or room")
+            return skipped(self.name, "the scene has no half-space, round solid or room")
         return self._tally.result("closest {worst}", "a body is in an obstacle, at {worst}")
 
 
