@@ -107,7 +107,7 @@ def test_a_scripted_one_carries_the_cube(recorded):
 
 
 def test_a_recording_reads_it_back(recorded):
-    path, frames = recorded
+    path, _ = recorded
     with sp.read_recording(path) as recording:
         (found,) = recording.obstacles
         assert isinstance(found.obstacle, RoundedCube)

@@ -117,9 +117,7 @@ def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
             if obstacle.name is not None and any(obstacle.name == other.name for other in obstacles):
                 raise SceneError(f"another obstacle has the name {obstacle.name!r}; give each a name of its own")
             if obstacle.name in bodies:
-                raise SceneError(
-                    f"a body has the name {obstacle.name!r}; give each body and obstacle a name of its own"
-                )
+                raise SceneError(f"a body has the name {obstacle.name!r}; give each thing a name of its own")
             obstacles.append(obstacle)
     pins: list[Pin] = []
     held: dict[str, set[int]] = {}

@@ -22,8 +22,8 @@ def dhat_of(scene, start):
 
 
 def moved_up(scene, height):
-    positions = {"cube": scene.body("cube").place(scene.body("cube").mesh.vertices) + [0, height, 0]}
-    return initial_state(scene, positions)
+    placed = initial_state(scene).positions
+    return initial_state(scene, {"cube": placed + np.array([0, height, 0])})
 
 
 @pytest.mark.parametrize(("placed", "begins"), [(3e-6, 0.5), (0.5, 1e-4), (1e-4, 2e-4)])

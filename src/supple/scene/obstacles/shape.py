@@ -92,22 +92,20 @@ def convex_contact(signed_distance: Callable[..., Any]) -> Callable[..., Any]:
 def concave_contact(signed_distance: Callable[..., Any]) -> Callable[..., Any]:
     """Contact with the wall of a room whose inside is convex; `signed_distance` is that of the solid."""
 
-    def contact(parameters, s0, s1):
+    def contact_from_inside(parameters, s0, s1):
         d1, n1 = signed_distance(parameters, s1)
         d0, _ = signed_distance(parameters, s0)
         return -d1, -d0, (-n1[0], -n1[1], -n1[2])
 
-    return _compiled(contact, signed_distance)
+    return _compiled(contact_from_inside, signed_distance)
 
 
 def _compiled(contact: Any, signed_distance: Any) -> Callable[..., Any]:
     """The function under a name of its own.
 
-    Cached kernels contain what they call under its name and a number that begins anew in every process. Of two functions
-    with the same name, kernels that were compiled in different processes would take the one for the other.
+    Cached kernels contain what they call, under its name and a number that begins anew in every process. Kernels that
+    different processes have compiled would confuse two functions of the same name.
     """
     distance = signed_distance.py_func
-    contact.__qualname__ = f"{contact.__qualname__}.{distance.__module__}.{distance.__qualname__}".replace(
-        "<locals>.", ""
-    )
+    contact.__qualname__ = f"{contact.__name__}.{distance.__module__}.{distance.__qualname__}"
     return njit(contact)
