@@ -186,7 +186,7 @@ def first_frame(scene: Scene, start: StartFrame | State) -> Frame:
         )
     # A frame of this scene has the pins' anchors; computing them again would give them only up to round-off.
     if isinstance(start, Frame) and start.system.scene is scene:
-        system = start.system
+        system = replace(start.system, start_states=(start.system.start_states[0], state))
     else:
         system = build_system(scene, state)
     return Frame(index, state, system, _report(system, state, StepReport(Status.CONVERGED, 0), 0.0))

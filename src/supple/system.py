@@ -19,7 +19,7 @@ from supple.errors import SceneError
 from supple.scene.body import Body
 from supple.scene.forces import Force, SoftTarget
 from supple.scene.motion import Motion, moved_points, points_at_origin
-from supple.scene.obstacles import Obstacle
+from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.scene.stitches.stitching import Stitching, no_stitching
@@ -101,6 +101,7 @@ class System:
     components : (n,) which connected piece of a mesh a vertex belongs to
     gravity : (3,) [m/s^2]
     stitching : tets and springs that join bodies to each other, and to obstacles
+    start_states : where a simulation began; after it, where it is continued. Vertices in the scene's order.
     """
 
     scene: Scene
@@ -119,6 +120,7 @@ class System:
     forces: tuple[ForceRange, ...] = ()
     soft_targets: tuple[SoftTargetRange, ...] = ()
     stitching: Stitching = field(default_factory=lambda: no_stitching(0))
+    start_states: tuple[State, ...] = ()
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
@@ -200,7 +202,16 @@ def build_system(scene: Scene, start: State | None = None) -> System:
         forces=tuple(ForceRange(force, _chosen_vertices(force, ranges)) for force in scene.forces),
         soft_targets=_soft_target_ranges(scene, ranges, start),
         stitching=scene.stitching,
+        start_states=_start_states(scene, start),
     )
+
+
+def _start_states(scene: Scene, start: State | None) -> tuple[State, ...]:
+    """A start at a later time continues what the scene has begun."""
+    if start is not None and start.time == 0.0:
+        return (start,)
+    begun = initial_state(scene)
+    return (begun,) if start is None else (begun, start)
 
 
 def _lumped_masses(body: Body) -> NDArray[np.float64]:

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.contact.obstacle_vertices import icosphere, obstacle_positions, with_obstacles
+from supple.contact.obstacle_vertices import obstacle_positions, with_obstacles
+from supple.scene.obstacles.polyhedra import icosphere
 from supple.scene.rotation import rotation_matrix
 from supple.system import build_system
 

@@ -83,6 +83,14 @@ DAMAGES = {
     "no time step": (_header(dt=0.0), "no time step"),
     "bodies are no list of bodies": (_header(bodies=[1, 2]), "bodies in its header"),
     "obstacles are none": (_header(obstacles=[{}]), "obstacles in its header"),
+    "obstacles of no known kind": (
+        _header(obstacles=[{"name": "x", "kind": "Cone", "parameters": {}}]),
+        "obstacle 'x' is of an unknown kind, 'Cone'; register",
+    ),
+    "obstacles with impossible numbers": (
+        _header(obstacles=[{"name": "x", "kind": "Sphere", "parameters": {"radius": -1}}]),
+        "obstacles in its header",
+    ),
     "no points": (_delete("VTKHDF/Points"), "VTKHDF/Points is missing"),
     "points of text": (_set("VTKHDF/Points", "here"), "has shape"),
     "points of integers": (_set("VTKHDF/Points", np.zeros((25 * 54, 3), dtype=int)), "holds int64"),

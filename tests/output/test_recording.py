@@ -21,6 +21,7 @@ from supple.output.recording import recorder as recording_module
 from supple.output.recording.file import RecordingFile
 from supple.output.recording.reader import read_recording
 from supple.output.recording.recorder import Recorder
+from supple.output.recording.scene import RecordedObstacle
 from supple.simulate import simulate
 from supple.state import Status
 
@@ -70,6 +71,36 @@ def test_the_scene_reads_back_equal(recorded, recording):
     assert recording.solver == "Prescribed()"
     assert recording.supple_version == sp.__version__
     assert recording.dt == pytest.approx(1 / 30)
+
+
+def test_every_kind_of_obstacle_reads_back_equal(tmp_path, tools):
+    obstacles = [
+        sp.HalfSpace(name="floor", point=(0.1, -1, 0), normal=(0.1, 1, 0.2), friction=0.3),
+        sp.Box(center=(9, 0, 0), size=(1, 2, 3), rotation=(0.3, -0.2, 0.1)),
+        sp.Box(size=(99, 99, 99), inside=True),
+        sp.Sphere(center=(0, 9, 0), radius=0.3),
+        sp.Capsule(start=(0, 0, 9), end=(0.1, 0.2, 9.3), radius=0.2),
+        sp.Cylinder(start=(0, 0, -9), end=(1, 0.2, -9), radius=0.7, friction=0.1),
+        sp.TriangleObstacle(surface=tools.octahedron(0.2, (2.0, 2.0, 9.5))),
+    ]
+    scene = sp.Scene([sp.Body("cube", tools.box(), sp.EdgesAndVolume(density=1000.0))], obstacles)
+    path = tmp_path / "kinds.vtkhdf"
+    list(simulate(scene, tools.Prescribed(), 1 / 30, 1, sinks=[Recorder(path)]))
+    with read_recording(path) as recording:
+        found = [one.obstacle for one in recording.obstacles]
+    for one, other in zip(found, scene.obstacles, strict=True):
+        assert type(one) is type(other)
+        assert (one.name, one.friction, one.values()) == (other.name, other.friction, other.values())
+    np.testing.assert_array_equal(found[-1].triangles()[0], obstacles[-1].triangles()[0])
+
+
+def test_boxes_of_older_recordings_have_a_matrix():
+    turn = sp.Box(rotation=(0.3, -0.2, 0.1))
+    values = turn.values() | {"orientation": turn.orientation.tolist()}
+    del values["rotation"]
+    box = RecordedObstacle("b", "Box", {"friction": 0.5, **values}, np.zeros((0, 3)), np.zeros((0, 3), np.int32))
+    np.testing.assert_allclose(box.obstacle.orientation, turn.orientation, atol=1e-15)
+    assert box.obstacle.friction == 0.5
 
 
 def test_a_simulation_starts_from_a_recorded_frame(recording, tools):

@@ -95,9 +95,3 @@ def test_impossible_rules_are_refused_in_one_line(make, said):
     with pytest.raises(sp.SceneError, match=said) as caught:
         make()
     assert "\n" not in str(caught.value)
-
-
-def test_a_name_that_means_two_things_cannot_be_paired():
-    bodies = [sp.Body("x", CUBE, RUBBER)]
-    with pytest.raises(sp.SceneError, match="a body and an obstacle are both named 'x'; rename one"):
-        sp.Scene(bodies, [sp.Sphere(name="x")], contact_pairs=[sp.ContactPair("x", "x", collide=False)])

@@ -150,9 +150,13 @@ BAD_SCENES = [
     ({"bodies": []}, "there is no body"),
     ({"bodies": None}, "bodies is None"),
     ({"bodies": [MESH]}, r"bodies\[0\] is a TetMesh; give a Body"),
-    ({"bodies": [body(), body()]}, "two bodies are named 'cube'"),
+    ({"bodies": [body(), body()]}, "body 'cube' and body 'cube' have the same name; give each"),
     ({"obstacles": [sp.Pin("cube", [0])]}, r"obstacles\[0\] is a Pin; give a Obstacle"),
-    ({"obstacles": [sp.HalfSpace(name="floor"), sp.Sphere(name="floor")]}, "two obstacles are named 'floor'"),
+    (
+        {"obstacles": [sp.HalfSpace(name="floor"), sp.Sphere(name="floor")]},
+        "obstacle 'floor' and obstacle 'floor' have the same name",
+    ),
+    ({"obstacles": [sp.HalfSpace(name="cube")]}, "body 'cube' and obstacle 'cube' have the same name; give each body"),
     ({"pins": [sp.Pin("ball", [0])]}, "there is no such body; the scene has 'cube'"),
     ({"pins": [sp.Pin("cube", [8])]}, "vertex 8 does not exist; the body has 8"),
     ({"pins": [sp.Pin("cube", sp.InBox((5, 5, 5), (6, 6, 6)))]}, "its box holds no vertex; the body reaches from"),
@@ -176,6 +180,11 @@ def test_unnamed_obstacles_get_their_kind_and_number():
     assert [o.name for o in scene.obstacles] == ["HalfSpace 1", "HalfSpace 3", "Sphere 1", "HalfSpace 2"]
     assert [o.friction for o in scene.obstacles] == [0.0, 0.5, 0.0, 0.0]
     assert floor.name is None
+
+
+def test_unnamed_obstacles_get_a_name_that_no_body_has():
+    scene = sp.Scene([body(name="HalfSpace 1"), body(name="Sphere 2")], [sp.HalfSpace(), sp.Sphere(), sp.Sphere()])
+    assert [o.name for o in scene.obstacles] == ["HalfSpace 2", "Sphere 1", "Sphere 3"]
 
 
 def test_scenes_are_frozen():

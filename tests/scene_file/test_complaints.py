@@ -126,6 +126,7 @@ CASES = [
         "{kind: half_space, name: x}\n  - {kind: sphere, name: x}",
         "11: obstacles[1].name: another obstacle has the name 'x'",
     ),
+    ("{kind: half_space}", "{kind: half_space, name: cube}", "10: obstacles[0].name: a body has the name 'cube'; give"),
     ("body: cube", "body: cub", "12: pins[0].body: there is no body 'cub'; did you mean `cube`?"),
     ("vertices: [0]", "vertices: [8]", "12: pins[0].vertices: pin of body 'cube': vertex 8 does not exist"),
     ("vertices: [0]", "vertices: [-1]", "12: pins[0].vertices[0]: is -1; it must be at least 0"),

@@ -12,6 +12,7 @@ from jsonschema import Draft202012Validator
 import supple as sp
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.scene.contact_pairs import pair_table
+from supple.scene.obstacles.registry import KINDS
 from supple.scene_file.document import SceneFileModel, json_schema
 from supple.scene_file.entries.materials import ELASTIC_KINDS
 from supple.scene_file.entries.solvers import solver_of_kind
@@ -48,6 +49,9 @@ obstacles:
   - {{kind: box, center: [1, 1, 1], size: [9, 9, 9], rotation: [0, 0, 0.1], inside: true}}
   - {{kind: sphere, center: [0, 1, 0], radius: 8, inside: true,
      motion: {{times: [0, 1], displacements: [[0, 0, 0], [0, 1, 0]]}}}}
+  - {{kind: capsule, name: log, start: [0, -6, 0], end: [0, -6, 3], radius: 0.5, friction: 0.2}}
+  - {{kind: cylinder, start: [20, 0, 0], end: [20, 3, 0], radius: 2,
+     motion: {{times: [0, 1], angles: [0, 1], axis: [0, 1, 0], pivot: [20, 0, 0]}}}}
   - {{kind: triangles, surface: {{shape: {{kind: torus, radius: 2}}, scale: 2, position: [0, 0, 1]}},
      motion: {{times: [0, 2], angles: [0, 3], axis: [0, 1, 0], pivot: [1, 0, 0]}}}}
 pins:
@@ -85,13 +89,18 @@ def test_a_scene_file_covers_the_whole_api(load):
     np.testing.assert_allclose(scene.body("ring02").rotation, [1, 0, 0])
     np.testing.assert_allclose(scene.body("ring02").position, [0, 9, 0])
 
-    floor, room, bowl, ring = scene.obstacles
+    floor, room, bowl, log, drum, ring = scene.obstacles
     assert isinstance(floor, sp.HalfSpace)
     np.testing.assert_allclose(floor.normal, [0, 1, 0])
     assert isinstance(room, sp.Box)
     assert room.inside
     assert isinstance(bowl, sp.Sphere)
     np.testing.assert_allclose(bowl.pose(0.5)[1], [0, 0.5, 0])
+    assert isinstance(log, sp.Capsule)
+    assert (log.name, log.radius, log.friction, log.inside) == ("log", 0.5, 0.2, False)
+    np.testing.assert_array_equal(log.end, [0, -6, 3])
+    assert isinstance(drum, sp.Cylinder)
+    np.testing.assert_allclose(drum.pose(1.0)[0][0, 0], np.cos(1.0))
     assert isinstance(ring, sp.TriangleObstacle)
     np.testing.assert_allclose(ring.surface.bounds[1], [4.4, 0.4, 5.4], atol=0.05)
 
@@ -237,7 +246,7 @@ def _family(name):
         return "shape"
     if name in ("XPBDModel", "ImplicitModel"):
         return "solver"
-    if name in ("HalfSpaceModel", "BoxModel", "SphereModel", "TrianglesModel"):
+    if name.removesuffix("Model") in KINDS:
         return "obstacle"
     if name in ("SoftVertexTriangleModel", "VertexVertexModel", "VertexEdgeModel"):
         return "stitch"

@@ -83,10 +83,10 @@ class TestSolverChange:
 )
 def test_points_in_an_obstacle_are_moved_out_along_the_normal(obstacle, point):
     before = np.array([point, (0.0, 9.0, 0.0) if not getattr(obstacle, "inside", False) else (0.0, 0.0, 0.0)])
-    depth = -signed_distance(obstacle, before, 0.0)[0]
+    depth = -signed_distance(obstacle, before, 0.0)[0][0]
     assert depth > 0.0
     after = moved_out(obstacle, before, 0.0, 0.01)
-    assert signed_distance(obstacle, after, 0.0)[0] == pytest.approx(0.01, rel=0.02)
+    assert signed_distance(obstacle, after, 0.0)[0][0] == pytest.approx(0.01, rel=0.02)
     if not (isinstance(obstacle, sp.Box) and obstacle.inside):  # from a corner, points move along two faces
         assert np.linalg.norm(after[0] - before[0]) == pytest.approx(depth + 0.01, rel=0.02)
     assert np.array_equal(after[1], before[1])

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.scene.obstacles import Obstacle
+from supple.scene.obstacles.obstacle import Obstacle
 
 
 class ObstaclePoses:

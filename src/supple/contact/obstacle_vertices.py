@@ -12,14 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.errors import SolverError
-from supple.mesh import shapes
 from supple.scene.motion import Motion
-from supple.scene.obstacles import Box, HalfSpace, Obstacle, Sphere, TriangleObstacle
+from supple.scene.obstacles.obstacle import Obstacle
 from supple.system import System
-
-# An icosahedron's faces split into this many along each edge: faces stay within 0.2 % of the radius.
-_SPHERE_SPLITS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +43,7 @@ class ObstacleRange:
 
     @property
     def is_plane(self) -> bool:
-        return isinstance(self.obstacle, HalfSpace)
+        return self.obstacle.plane is not None
 
     def targets(self, time: float) -> NDArray[np.float64]:
         """Where the vertices (k, 3) are at `time` [m]."""
@@ -93,52 +88,7 @@ def obstacle_positions(ranges: tuple[ObstacleRange, ...], time: float) -> NDArra
 
 def _surface(obstacle: Obstacle, size: float) -> tuple[NDArray[np.float64], NDArray[np.integer]]:
     """Vertices (k, 3) at time 0 and triangles (t, 3)."""
-    if isinstance(obstacle, HalfSpace):
-        point, normal = np.asarray(obstacle.point), np.asarray(obstacle.normal)
-        return np.stack([point, point + size * normal]), np.zeros((0, 3), dtype=np.int64)
-    if isinstance(obstacle, TriangleObstacle):
-        assert obstacle.surface is not None
-        return obstacle.surface.vertices, obstacle.surface.triangles
-    if isinstance(obstacle, Box):
-        surface = shapes.box(tuple(np.asarray(obstacle.size, dtype=np.float64)), (1, 1, 1)).surface
-        points = surface.vertices @ obstacle.orientation.T + np.asarray(obstacle.center)
-        return points, surface.triangles
-    if isinstance(obstacle, Sphere):
-        directions, triangles = icosphere(_SPHERE_SPLITS)
-        corners = directions[triangles]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        nearest = np.abs(np.einsum("ij,ij->i", corners[:, 0], normals)) / np.linalg.norm(normals, axis=1)
-        # Bodies must not enter the true ball from outside, nor leave it from inside.
-        scale = 1.0 if obstacle.inside else 1.0 / float(nearest.min())
-        return np.asarray(obstacle.center) + obstacle.radius * scale * directions, triangles
-    raise SolverError(f"{obstacle.label}: Implicit does not know this kind of obstacle; use XPBD, or take it out")
-
-
-def icosphere(splits: int) -> tuple[NDArray[np.float64], NDArray[np.integer]]:
-    """An icosahedron with every edge split into `splits`, projected on the unit sphere: points and triangles."""
-    g = (1.0 + 5.0**0.5) / 2.0
-    corners = np.array([[-1, g, 0], [1, g, 0], [-1, -g, 0], [1, -g, 0]], dtype=np.float64)
-    corners = np.concatenate([corners, np.roll(corners, 1, axis=1), np.roll(corners, 2, axis=1)])
-    from scipy.spatial import ConvexHull
-
-    faces = ConvexHull(corners).simplices
-    points, triangles = [], []
-    count = 0
-    number = np.full((splits + 1, splits + 1), -1, dtype=np.int64)
-    for a, b, c in corners[faces]:
-        if np.dot(np.cross(b - a, c - a), a + b + c) < 0.0:
-            b, c = c, b
-        for i in range(splits + 1):
-            for j in range(splits + 1 - i):
-                points.append(a + (b - a) * (i / splits) + (c - a) * (j / splits))
-                number[i, j] = count
-                count += 1
-        for i in range(splits):
-            for j in range(splits - i):
-                triangles.append([number[i, j], number[i + 1, j], number[i, j + 1]])
-                if i + j < splits - 1:
-                    triangles.append([number[i + 1, j], number[i + 1, j + 1], number[i, j + 1]])
-    all_points = np.array(points)
-    all_points /= np.linalg.norm(all_points, axis=1)[:, None]
-    _, first, merged = np.unique(np.round(all_points, 9), axis=0, return_index=True, return_inverse=True)
-    return all_points[first], merged.reshape(-1)[np.array(triangles)]
+    if obstacle.plane is None:
+        return obstacle.triangles()
+    point, normal = obstacle.plane
+    return np.stack([point, point + size * normal]), np.zeros((0, 3), dtype=np.int64)

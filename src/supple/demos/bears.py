@@ -9,7 +9,7 @@ from supple.demos.motion_measures import volume
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
 from supple.scene.body import Body
-from supple.scene.obstacles import Sphere
+from supple.scene.obstacles.sphere import Sphere
 from supple.scene.scene import Scene
 from supple.simulate import Frame
 from supple.xpbd.solver import XPBD

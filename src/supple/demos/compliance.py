@@ -8,7 +8,7 @@ from supple.demos.demo import Claim, Demo, Measurement
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.mesh import shapes
 from supple.scene.body import Body
-from supple.scene.obstacles import HalfSpace
+from supple.scene.obstacles.half_space import HalfSpace
 from supple.scene.scene import Scene
 from supple.simulate import Frame
 from supple.xpbd.solver import XPBD

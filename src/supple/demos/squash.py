@@ -13,7 +13,7 @@ from supple.mesh import shapes
 from supple.scene.body import Body
 from supple.scene.forces import SoftTarget
 from supple.scene.motion import Keyframes
-from supple.scene.obstacles import HalfSpace
+from supple.scene.obstacles.half_space import HalfSpace
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.simulate import Frame

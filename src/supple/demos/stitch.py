@@ -11,7 +11,7 @@ from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
 from supple.numerics.geometry.triangle_tree import TriangleTree
 from supple.scene.body import Body
-from supple.scene.obstacles import HalfSpace
+from supple.scene.obstacles.half_space import HalfSpace
 from supple.scene.scene import Scene
 from supple.scene.stitches.vertex_triangle import SoftVertexTriangleStitch
 from supple.simulate import Frame

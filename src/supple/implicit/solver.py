@@ -240,4 +240,3 @@ def _limit_message(message: str, substepping: Substepping) -> str:
     if substepping.halves == 1:
         return message
     return f"{message}; in a substep of {substepping.length:.3g} s, the shortest that max_substeps allows"
-

@@ -31,7 +31,6 @@ OBSTACLE_COLOR = (176, 180, 188)
 STITCH_COLOR = (214, 40, 90)
 # A room is one surface between the eye and the bodies; walls can overlap, so that each must be more transparent.
 ROOM_OPACITY, WALL_OPACITY = 0.13, 0.05
-_SPHERE_RINGS, _SPHERE_SEGMENTS = 24, 48
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +122,7 @@ class ObstaclePicture:
     vertices: NDArray[np.float64]
     triangles: NDArray[np.int32]
     opacity: float
+    smooth: bool
 
     def at(self, frame: RecordedFrame) -> NDArray[np.float64]:
         """(k, 3) [m] in a frame."""
@@ -146,68 +146,13 @@ def obstacle_pictures(source: HasObstacles, view: View) -> list[ObstaclePicture]
     """
     made = []
     for number, obstacle in enumerate(source.obstacles):
-        surface = _surface(obstacle, view)
-        if surface is not None:
-            normal = obstacle.parameters.get("normal")
-            is_wall = normal is not None and float(np.dot(normal, view.up)) < 0.5
-            is_room = bool(obstacle.parameters.get("inside", False))
-            opacity = WALL_OPACITY if is_wall else ROOM_OPACITY if is_room else 1.0
-            made.append(ObstaclePicture(number, obstacle.name, *surface, opacity))
+        thing = obstacle.obstacle
+        vertices, triangles = thing.drawn(view.center, 2.5 * view.radius)
+        is_wall = thing.plane is not None and float(thing.plane[1] @ view.up) < 0.5
+        opacity = WALL_OPACITY if is_wall else ROOM_OPACITY if thing.is_room else 1.0
+        triangles = triangles.astype(np.int32)
+        made.append(ObstaclePicture(number, obstacle.name, vertices, triangles, opacity, thing.smooth))
     return made
-
-
-def _surface(obstacle: RecordedObstacle, view: View) -> tuple[NDArray[np.float64], NDArray[np.int32]] | None:
-    numbers = obstacle.parameters
-    if obstacle.kind == "TriangleObstacle":
-        return obstacle.vertices, obstacle.triangles
-    if obstacle.kind == "HalfSpace":
-        return _square(np.asarray(numbers["point"], dtype=float), np.asarray(numbers["normal"], dtype=float), view)
-    if obstacle.kind == "Box":
-        corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-        placed = corners * numbers["size"] @ np.asarray(numbers["orientation"]).T + numbers["center"]
-        return placed, _BOX
-    if obstacle.kind == "Sphere":
-        points, triangles = _ball()
-        return points * numbers["radius"] + numbers["center"], triangles
-    return None
-
-
-_BOX_QUADS = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-_BOX = np.array([[q[0], q[i], q[i + 1]] for q in _BOX_QUADS for i in (1, 2)], dtype=np.int32)
-
-
-def _square(point: NDArray, normal: NDArray, view: View) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    center = view.center - normal * float((view.center - point) @ normal)
-    a = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
-    a /= np.linalg.norm(a)
-    b = np.cross(normal, a)
-    reach = 2.5 * view.radius
-    corners = center + reach * np.array([-a - b, a - b, a + b, b - a])
-    return corners, np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
-
-
-def _ball() -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """The unit sphere, made of rings and segments; its poles are on y."""
-    rings, segments = _SPHERE_RINGS, _SPHERE_SEGMENTS
-    theta = np.linspace(0.0, np.pi, rings + 1)[1:-1, None]
-    phi = np.linspace(0.0, 2.0 * np.pi, segments, endpoint=False)[None]
-    body = np.stack([np.sin(theta) * np.cos(phi), np.cos(theta) + 0.0 * phi, np.sin(theta) * np.sin(phi)], axis=-1)
-    points = np.concatenate([[[0.0, 1.0, 0.0]], body.reshape(-1, 3), [[0.0, -1.0, 0.0]]])
-    last, triangles = len(points) - 1, []
-    for s in range(segments):
-        t = (s + 1) % segments
-        triangles.append([0, 1 + t, 1 + s])
-        for r in range(rings - 2):
-            a, b, c, d = (
-                1 + r * segments + s,
-                1 + r * segments + t,
-                1 + (r + 1) * segments + t,
-                1 + (r + 1) * segments + s,
-            )
-            triangles += [[a, b, c], [a, c, d]]
-        base = 1 + (rings - 2) * segments
-        triangles.append([last, base + s, base + t])
-    return points, np.array(triangles, dtype=np.int32)
 
 
 def vertex_normals(x: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float64]:

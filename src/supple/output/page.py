@@ -114,7 +114,7 @@ def _add_obstacles(server: Any, recording: Recording, view: View) -> dict[int, t
             obstacle.triangles,
             color=OBSTACLE_COLOR,
             opacity=obstacle.opacity if obstacle.opacity < 1.0 else None,
-            flat_shading=recording.obstacles[obstacle.number].kind != "Sphere",
+            flat_shading=not obstacle.smooth,
             side="double",
             wxyz=_quaternion(pose[:, :3]),
             position=pose[:, 3],

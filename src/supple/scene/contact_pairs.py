@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
+from supple.scene.body import Body
+from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.suggestion import suggestion
 from supple.scene.values import non_negative
-
-if TYPE_CHECKING:
-    from supple.scene.scene import Scene
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,15 +75,26 @@ class PairTable:
     bodies: int
 
 
+class HasContactPairs(Protocol):
+    """What this file uses of a scene."""
+
+    @property
+    def bodies(self) -> Sequence[Body]: ...
+    @property
+    def obstacles(self) -> Sequence[Obstacle]: ...
+    @property
+    def contact_pairs(self) -> Sequence[ContactPair]: ...
+
+
 class PairRules:
-    """The contact pairs of a scene, taken in one by one; each must be about things that exist, and contradict none.
+    """The contact pairs of a scene, added one by one; each must name existing things and contradict no earlier one.
 
     Parameters
     ----------
-    scene : its bodies and obstacles; its contact pairs are not looked at.
+    scene : its bodies and obstacles; its contact pairs are not read.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: HasContactPairs) -> None:
         self._bodies = len(scene.bodies)
         self._names = [body.name for body in scene.bodies] + [str(obstacle.name) for obstacle in scene.obstacles]
         self._pairs: list[ContactPair] = []
@@ -95,8 +105,7 @@ class PairRules:
 
         Raises
         ------
-        SceneError : where a name is unknown or means two things, two obstacles are paired, or an earlier rule
-            says something else about the same pair.
+        SceneError : where a name is unknown, two obstacles are paired, or an earlier rule contradicts this one.
         """
         first, second = self._found(pair, "first"), self._found(pair, "second")
         if first[-1] >= self._bodies and second[-1] >= self._bodies:
@@ -139,14 +148,11 @@ class PairRules:
             if not found:
                 mend = suggestion(name, self._names)
                 raise SceneError(f"{pair.label}: {key}: there is no body or obstacle {name!r}; {mend}")
-            if len({self._names[i] for i in found}) < len(found):
-                twice = next(self._names[i] for i in found if [self._names[j] for j in found].count(self._names[i]) > 1)
-                raise SceneError(f"{pair.label}: {key}: a body and an obstacle are both named {twice!r}; rename one")
             numbers.update(found)
         return sorted(numbers)
 
 
-def pair_table(scene: Scene) -> PairTable:
+def pair_table(scene: HasContactPairs) -> PairTable:
     """Which of a scene's things touch, and with how much friction.
 
     Without a rule everything touches; an obstacle's coefficient holds for all bodies, and two bodies, or a body and

@@ -14,7 +14,7 @@ from supple.errors import SceneError
 from supple.scene.body import Body
 from supple.scene.contact_pairs import ContactPair, PairRules
 from supple.scene.forces import Force, SoftTarget
-from supple.scene.obstacles import Obstacle
+from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.pins import Pin
 from supple.scene.stitches.stitch import Stitch
 from supple.scene.stitches.stitching import Stitching, check_names, stitch_together
@@ -37,8 +37,8 @@ class Scene:
 
     Parameters
     ----------
-    bodies : at least one; names are unique.
-    obstacles : rigid things that bodies collide with.
+    bodies : at least one.
+    obstacles : rigid things that bodies collide with. No two bodies or obstacles have the same name.
     pins : vertices held or scripted.
     gravity : (3,) acceleration [m/s^2].
     forces : loads on vertices; soft_targets : springs to places.
@@ -72,13 +72,14 @@ class Scene:
         if not self.bodies:
             raise SceneError("scene: there is no body; give at least one")
         object.__setattr__(self, "gravity", finite_vector(self.gravity, "scene: gravity"))
-        object.__setattr__(self, "obstacles", _all_named(self.obstacles))
-        for key in ("bodies", "obstacles"):
-            names = Counter(item.name for item in getattr(self, key) if item.name is not None)
-            twice = [name for name, count in names.items() if count > 1]
-            if twice:
-                raise SceneError(f"scene: two {key} are named {twice[0]!r}; give each a name of its own")
         known = [body.name for body in self.bodies]
+        object.__setattr__(self, "obstacles", _all_named(self.obstacles, known))
+        owners: dict[str | None, str] = {}
+        for thing, name in [("body", name) for name in known] + [("obstacle", item.name) for item in self.obstacles]:
+            if name in owners:
+                things = f"{owners[name]} {name!r} and {thing} {name!r}"
+                raise SceneError(f"scene: {things} have the same name; give each body and obstacle a name of its own")
+            owners[name] = thing
         held: dict[str, np.ndarray] = {}
         for pin in self.pins:
             if pin.body not in known:
@@ -125,9 +126,9 @@ class Scene:
         raise SceneError(f"scene: there is no body {name!r}; there are {', '.join(repr(b.name) for b in self.bodies)}")
 
 
-def _all_named(obstacles: Sequence[Obstacle]) -> tuple[Obstacle, ...]:
-    """The obstacles; those without a name get their kind and number, such as `HalfSpace 1`."""
-    taken = {obstacle.name for obstacle in obstacles}
+def _all_named(obstacles: Sequence[Obstacle], bodies: Sequence[str]) -> tuple[Obstacle, ...]:
+    """The obstacles; those without a name get a free one, their kind and number, such as `HalfSpace 1`."""
+    taken = {*bodies, *(obstacle.name for obstacle in obstacles)}
     numbers: Counter[str] = Counter()
     named = []
     for obstacle in obstacles:

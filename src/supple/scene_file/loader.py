@@ -16,7 +16,7 @@ from pydantic import ValidationError
 from supple.errors import SceneError
 from supple.scene.body import Body
 from supple.scene.forces import Force, SoftTarget
-from supple.scene.obstacles import Obstacle
+from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.scene.selection import InBox
@@ -116,6 +116,8 @@ def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
             obstacle = described.build(meshes)
             if obstacle.name is not None and any(obstacle.name == other.name for other in obstacles):
                 raise SceneError(f"another obstacle has the name {obstacle.name!r}; give each a different name")
+            if obstacle.name in bodies:
+                raise SceneError(f"a body has the name {obstacle.name!r}; give each thing a different name")
             obstacles.append(obstacle)
     pins: list[Pin] = []
     held: dict[str, set[int]] = {}

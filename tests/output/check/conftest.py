@@ -57,6 +57,9 @@ def around(folder):
         sp.Sphere(name="bowl", radius=9, inside=True),
         sp.Sphere(name="ball", center=(0, 1, 2), radius=0.4),
         sp.Box(name="crate", center=(0, 1, -2), size=(0.5, 0.5, 0.5), rotation=(0, 0.4, 0), motion=away),
+        sp.Capsule(name="log", start=(-3, 1, 4), end=(3, 1.5, 4), radius=0.4, motion=away),
+        sp.Cylinder(name="drum", start=(0, 3, 3), end=(0.5, 4, 3), radius=0.5),
+        sp.Cylinder(name="tank", start=(0, -12, 0), end=(0, 12, 0), radius=6, inside=True),
         sp.TriangleObstacle(name="rock", surface=octahedron((0.3, 3.0, 0.2), 0.4)),
     ]
     scene = sp.Scene([sp.Body("cube", sp.shapes.box((1, 1, 1), (2, 2, 2)), JELLY, position=(0, 1, 0))], obstacles)

@@ -127,6 +127,9 @@ BY_FORMULA = {
     "room": [0.0, 1.0, -6.5],
     "bowl": [0.0, 8.1, 0.0],
     "ball": [-0.5, 0.5, 1.65],
+    "log": [0.5, 0.5, 3.2],
+    "drum": [-0.5, 2.4, 2.9],
+    "tank": [-0.5, 1.0, 5.6],
 }
 
 
@@ -160,6 +163,7 @@ def test_a_body_that_meets_an_obstacle_made_of_triangles(around, corrupted, lowe
         ([0.25, 2.95, 0.15], 0.1, "cube in rock"),
         ([-0.5, 2.0, -0.5], 4.0, "rock in cube"),
         ([-2.0, 0.0, 0.5], 4.0, "ball in cube"),
+        ([-1.5, 2.0, 1.5], 4.0, "drum in cube"),
     ],
 )
 def test_bodies_inside_obstacles_and_obstacles_inside_bodies(around, corrupted, lowest, size, where):

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import supple as sp
+from supple.output.check.formula_obstacles import smallest_on_triangles
 from supple.output.check.geometry.box_tree import build_tree, triangle_boxes
 from supple.output.check.geometry.surface_pairs import closest_pair, meeting_pairs
-from supple.output.check.geometry.triangle_distance import distances_from, triangles_apart
+from supple.output.check.geometry.triangle_distance import point_triangle, triangles_apart
 from supple.output.check.geometry.triangle_pairs import triangles_meet
 
 
@@ -75,7 +77,10 @@ def test_distances_of_triangles():
         assert distance <= sampled + 1e-12
         assert sampled <= distance + 0.25
         point = x[3]
-        assert distances_from(point, x, s[None])[0] <= np.linalg.norm(weights @ x[s] - point, axis=1).min() + 1e-12
+        from_point = np.sqrt(point_triangle(*(tuple(corner) for corner in (point, *x[s]))))
+        assert from_point <= np.linalg.norm(weights @ x[s] - point, axis=1).min() + 1e-12
+        ball = sp.Sphere(center=point, radius=0.1)
+        assert smallest_on_triangles(ball.signed_distance, x[s][None])[0] == pytest.approx(from_point - 0.1, abs=1e-12)
 
 
 @pytest.mark.parametrize("scale", [1e-9, 1.0, 1e3])

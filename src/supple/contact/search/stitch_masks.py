@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from supple.contact.obstacle_poses import ObstaclePoses
 from supple.contact.search.excluded_pairs import pairs_closer_than
 from supple.contact.search.surfaces import ContactSurfaces
-from supple.scene.obstacles import TriangleObstacle
 from supple.scene.stitches.masks import Pair, stitched_triangles
 from supple.system import System
 
@@ -65,12 +64,11 @@ def _points_of_vertices(system: System, surfaces: ContactSurfaces) -> NDArray[np
     point = np.full(len(system.masses) + len(anchors), -1, dtype=np.int64)
     point[surfaces.rows] = np.arange(len(surfaces.rows))
     for k in np.unique(anchors.owner):
-        obstacle = anchors.obstacles[k]
-        assert isinstance(obstacle, TriangleObstacle)
-        assert obstacle.surface is not None
+        mesh = anchors.obstacles[k].surface_mesh
+        assert mesh is not None  # others cannot be stitched to
         first = len(surfaces.rows) + int(np.argmax(surfaces.fixed_owners == k))
         mine = np.flatnonzero(anchors.owner == k)
         # An obstacle's points are those of its vertices that triangles use, in order.
-        place = np.searchsorted(obstacle.surface.used_vertices, anchors.vertices[mine])
+        place = np.searchsorted(mesh.used_vertices, anchors.vertices[mine])
         point[len(system.masses) + mine] = first + place
     return point

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.obstacle_poses import ObstaclePoses
+from supple.mesh.surface import SurfaceMesh
 from supple.mesh.topology import connected_components
 from supple.scene.contact_pairs import PairTable
-from supple.scene.obstacles import Box, Obstacle, Sphere, TriangleObstacle
+from supple.scene.obstacles.obstacle import Obstacle
 from supple.system import System
 
 
@@ -20,8 +21,8 @@ from supple.system import System
 class ContactSurfaces:
     """Points and triangles, and which of them may touch. A piece is a connected part of one body or one obstacle.
 
-    The bodies' points come first, then those of obstacles: vertices of triangle obstacles, corners of boxes, and the
-    centers of spheres that are small compared with the bodies' triangles (contact at a gap of their radius).
+    The bodies' points come first, then those of obstacles: vertices of triangle obstacles, and the probes of others
+    (`Obstacle.probes`: corners of boxes, centers of small spheres, which touch at a gap of their radius).
 
     Attributes
     ----------
@@ -143,15 +144,12 @@ def _obstacle_parts(obstacles: Sequence[Obstacle], bodies: int, edge_length: flo
     parts = []
     for number, obstacle in enumerate(obstacles):
         owner = bodies + number
-        if isinstance(obstacle, TriangleObstacle):
-            parts.append((number, _triangle_part(owner, obstacle)))
-        elif isinstance(obstacle, Box) and not obstacle.inside:
-            signs = np.array([[i, j, k] for i in (-0.5, 0.5) for j in (-0.5, 0.5) for k in (-0.5, 0.5)])
-            corners = np.asarray(obstacle.center) + (signs * np.asarray(obstacle.size)) @ obstacle.orientation.T
-            parts.append((number, _points_part(_Piece(owner, gap=0.0), corners)))
-        elif isinstance(obstacle, Sphere) and not obstacle.inside and obstacle.radius < 2.0 * edge_length:
-            center = np.asarray(obstacle.center)[None]
-            parts.append((number, _points_part(_Piece(owner, gap=obstacle.radius), center)))
+        if obstacle.surface_mesh is not None:
+            parts.append((number, _triangle_part(owner, obstacle.surface_mesh)))
+            continue
+        points, gap = obstacle.probes(edge_length)
+        if len(points):
+            parts.append((number, _points_part(_Piece(owner, gap=gap), points)))
     return parts
 
 
@@ -166,9 +164,8 @@ def _points_part(piece: _Piece, points: NDArray[np.float64]) -> dict[str, Any]:
     }
 
 
-def _triangle_part(owner: int, obstacle: TriangleObstacle) -> dict[str, Any]:
-    assert obstacle.surface is not None  # the obstacle has checked it
-    surface = obstacle.surface.compact()
+def _triangle_part(owner: int, mesh: SurfaceMesh) -> dict[str, Any]:
+    surface = mesh.compact()
     triangles = surface.triangles
     count, labels = connected_components(triangles, len(surface.vertices))
     order = np.argsort(labels, kind="stable")

@@ -12,7 +12,6 @@ from scipy.sparse.csgraph import connected_components
 from supple.contact.obstacle_vertices import with_obstacles
 from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import cross, dot, row, subtract
-from supple.scene.obstacles import Box, HalfSpace, Sphere
 from supple.system import System
 
 
@@ -53,11 +52,11 @@ def start_surfaces(system: System, positions: NDArray[np.float64], time: float) 
     planes, rooms, solid = [], [], np.ones(count, dtype=np.bool_)
     for part in with_obstacles(system)[1]:
         thing, corners = bodies + part.index, part.targets(time)
-        if isinstance(part.obstacle, HalfSpace):
+        if part.is_plane:
             normal = corners[1] - corners[0]
             planes.append((thing, corners[0], normal / np.linalg.norm(normal)))
             continue
-        if isinstance(part.obstacle, (Box, Sphere)) and part.obstacle.inside:
+        if part.obstacle.is_room:
             rooms.append(thing)
             solid[thing] = False
         local = part.triangles - part.vertices[0]

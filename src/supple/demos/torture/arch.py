@@ -14,7 +14,7 @@ from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
 from supple.mesh.tetmesh import TetMesh
 from supple.scene.body import Body
-from supple.scene.obstacles import HalfSpace
+from supple.scene.obstacles.half_space import HalfSpace
 from supple.scene.scene import Scene
 
 BLOCKS, RADIUS, THICKNESS, DEPTH = 25, 1.0, 0.25, 0.3

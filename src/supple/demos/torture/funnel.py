@@ -16,7 +16,7 @@ from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.scene.body import Body
 from supple.scene.motion import Keyframes
-from supple.scene.obstacles import TriangleObstacle
+from supple.scene.obstacles.triangle_obstacle import TriangleObstacle
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 

@@ -10,7 +10,7 @@ from supple.implicit.solver import Implicit
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
 from supple.scene.body import Body
-from supple.scene.obstacles import HalfSpace
+from supple.scene.obstacles.half_space import HalfSpace
 from supple.scene.scene import Scene
 
 SIDE, DENSITY, GAP = 0.1, 1.0, 1e-3

@@ -14,7 +14,7 @@ from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
 from supple.mesh.surface import SurfaceMesh
 from supple.scene.body import Body
-from supple.scene.obstacles import TriangleObstacle
+from supple.scene.obstacles.triangle_obstacle import TriangleObstacle
 from supple.scene.scene import Scene
 
 SIZE = (0.6, 0.03, 0.3)

@@ -15,7 +15,7 @@ from supple.mesh import shapes
 from supple.mesh.surface import SurfaceMesh
 from supple.scene.body import Body
 from supple.scene.motion import Keyframes
-from supple.scene.obstacles import TriangleObstacle
+from supple.scene.obstacles.triangle_obstacle import TriangleObstacle
 from supple.scene.scene import Scene
 from supple.simulate import Frame
 

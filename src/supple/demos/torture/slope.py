@@ -15,7 +15,7 @@ from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
 from supple.scene.body import Body
 from supple.scene.contact_pairs import ContactPair
-from supple.scene.obstacles import HalfSpace
+from supple.scene.obstacles.half_space import HalfSpace
 from supple.scene.scene import Scene
 
 ANGLE = float(np.radians(26.565))

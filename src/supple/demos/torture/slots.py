@@ -15,7 +15,7 @@ from supple.mesh import shapes
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.scene.body import Body
-from supple.scene.obstacles import TriangleObstacle
+from supple.scene.obstacles.triangle_obstacle import TriangleObstacle
 from supple.scene.scene import Scene
 
 CLEARANCE = 1e-6

@@ -10,7 +10,7 @@ from supple.implicit.solver import Implicit
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh.tetmesh import TetMesh
 from supple.scene.body import Body
-from supple.scene.obstacles import HalfSpace
+from supple.scene.obstacles.half_space import HalfSpace
 from supple.scene.pins import InBox, Pin
 from supple.scene.scene import Scene
 from supple.simulate import Frame

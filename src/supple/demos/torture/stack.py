@@ -16,7 +16,7 @@ from supple.demos.torture.watch import ContactMeasurement, Torture, center, mass
 from supple.implicit.solver import Implicit
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.scene.body import Body
-from supple.scene.obstacles import HalfSpace
+from supple.scene.obstacles.half_space import HalfSpace
 from supple.scene.scene import Scene
 from supple.simulate import Frame
 

@@ -45,12 +45,16 @@ def contact_model(system: System, settings: IPCContact, shear_moduli: NDArray[np
 def _contact_model(system: System, settings: IPCContact, shear_moduli: NDArray[np.float64]) -> ContactModel:
     extended, obstacles = with_obstacles(system)
     table = pair_table(system.scene)
-    start = np.concatenate([initial_state(system.scene).positions, obstacle_positions(obstacles, 0.0)])
-    surface = contact_surface(extended, obstacles, table.collide, start)
+    placed = np.concatenate([initial_state(system.scene).positions, obstacle_positions(obstacles, 0.0)])
+    surface = contact_surface(extended, obstacles, table.collide, placed)
     widest = largest_dhat(system)
-    planes = Planes.of(surface, obstacles, table.collide, widest)
-    gap = min(Collisions(surface, widest).smallest_distance(start), _gap(planes, start))
-    scales = scales_of(settings, system, shear_moduli, gap)
+    planes, collisions = Planes.of(surface, obstacles, table.collide, widest), Collisions(surface, widest)
+    # A run that is continued keeps its dhat: what rests on something is nearer to it than at the start.
+    gaps = []
+    for start in system.start_states:
+        x = np.concatenate([start.positions, obstacle_positions(obstacles, start.time)])
+        gaps.append(min(collisions.smallest_distance(x), _gap(planes, x)))
+    scales = scales_of(settings, system, shear_moduli, max(gaps))
     return ContactModel(
         system=extended,
         obstacles=obstacles,

@@ -256,11 +256,8 @@ def plane_friction(
     carried = start[p.vertices[near]].copy()
     for index, part in p.ranges.items():
         rows = p.obstacle[near] == index
-        if part.obstacle.motion is not None and rows.any():
-            (turn0, shift0), (turn1, shift1) = (part.obstacle.pose(time) for time in times)
-            carried[rows] = (carried[rows] - shift0) @ turn0 @ turn1.T + shift1
         if rows.any():
-            carried[rows] -= part.targets(times[1])[0]
+            carried[rows] = part.obstacle.carried(carried[rows], *times) - part.targets(times[1])[0]
     return PlaneFriction(p.vertices[near], p.base[near], forces, normals[near], carried, reach)
 
 

@@ -61,13 +61,7 @@ def contact_points(model: ContactModel, barriers: Barriers, x: NDArray[np.float6
 
 
 def forces_on_owners(model: ContactModel, gradient: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-    """Minus the gradient (n, 3) of a contact energy, summed over each body and obstacle: (3,) by name [N].
-
-    An obstacle with the name of a body gets the key `obstacle NAME`.
-    """
-    bodies = model.system.bodies
-    totals = {part.name: -gradient[part.vertices].sum(axis=0) for part in bodies}
-    for part in model.obstacles:
-        name = str(part.obstacle.name)
-        totals[f"obstacle {name}" if name in totals else name] = -gradient[part.vertices].sum(axis=0)
-    return totals
+    """Minus the gradient (n, 3) of a contact energy, summed over each body and obstacle: (3,) by name [N]."""
+    bodies, obstacles = model.system.bodies, model.obstacles
+    named = [(part.name, part.vertices) for part in bodies] + [(str(o.obstacle.name), o.vertices) for o in obstacles]
+    return {name: -gradient[vertices].sum(axis=0) for name, vertices in named}

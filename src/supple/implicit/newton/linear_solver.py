@@ -28,8 +28,8 @@ logger = logging.getLogger(__name__)
 # thin bodies of nearly incompressible material more than 500 (docs/implicit.md).
 _STALLED = 400
 
-# After this many systems the slower number of threads is tried again (see `ThreadTuner`). The work of a system is counted
-# in iterations of CG; its assembly is worth about ten.
+# After this many systems the slower number of threads is tried again (see `ThreadTuner`). The work of a system is
+# counted in iterations of CG; its assembly is worth about ten.
 _REST = 40
 _ASSEMBLY = 10
 

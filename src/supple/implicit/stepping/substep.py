@@ -140,9 +140,7 @@ def _objective(
         rate = plan.strain_rate(workspace.stitch_viscosity)
         terms.append(StitchDamping.of(workspace.stitch_viscosity, rate))
     terms = [acting_at(plan.place, term, x) for term in terms]
-    terms.append(
-        workspace.regularization if plan.scale is None else Inertia(system.masses, plan.predicted, plan.scale)
-    )
+    terms.append(workspace.regularization if plan.scale is None else Inertia(system.masses, plan.predicted, plan.scale))
     return Objective(terms, workspace.tools.clock)
 
 

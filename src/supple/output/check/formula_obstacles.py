@@ -1,19 +1,21 @@
-"""How far bodies are from obstacles that are formulas: half-spaces, balls, and rooms that keep bodies in."""
+"""How far bodies are from obstacles that are formulas: half-spaces, convex solids, and rooms that keep bodies in."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.output.check.geometry.orientation import plane_sides
-from supple.output.check.geometry.triangle_distance import distances_from
-from supple.output.check.surfaces import moved
+from supple.output.check.surfaces import moved, moved_back
 from supple.output.recording.scene import RecordedObstacle
 
 # A moved obstacle, and every distance from a ball or a wall, is rounded a few times.
 _ROUNDINGS = 16.0
+# Halvings of triangles, and how many triangles may be left: one that lies along a cylinder is divided all along it.
+_LEVELS, _MOST_TRIANGLES = 26, 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,43 +43,65 @@ def clearance(
 ) -> Clearance:
     """How a surface, its `vertices` and `triangles` being rows of x, keeps away from an obstacle at a pose (3, 4).
 
-    A half-space that stands still is decided exactly, by the point and the normal that the recording has.
+    A half-space that stands still is decided exactly, by the point and the normal that the recording has. Of a room,
+    vertices decide; of a solid, whole triangles, to some 1e-6 of their size where they lie along its surface.
     """
-    said = obstacle.parameters
-    R = pose[:, :3]
-    if obstacle.kind == "HalfSpace":
-        given, normal = np.asarray(said["point"], dtype=np.float64), np.asarray(said["normal"], dtype=np.float64)
+    thing, R, t = obstacle.obstacle, pose[:, :3], pose[:, 3]
+    points = x[vertices]
+    if thing.plane is not None:
+        given, normal = thing.plane
         point = moved(given[None], pose)[0]
         turned = moved(normal[None], np.column_stack([R, np.zeros(3)]))[0]
-        values = (x[vertices] - point) @ turned
+        values = (points - point) @ turned
         worst = int(np.argmin(values))
-        if point is given or np.array_equal(point, given):
+        if np.array_equal(point, given):
             behind = plane_sides(x, vertices, point, turned) < 0
             if behind.any():
                 worst = int(np.argmin(np.where(behind, values, np.inf)))
             entered = bool(behind.any())
         else:
-            entered = bool(values[worst] < -_rounding(x[vertices], point))
+            entered = bool(values[worst] < -_rounding(points, point))
         return Clearance(float(values[worst]), int(vertices[worst]), True, entered)
-    center = moved(np.asarray(said["center"], dtype=np.float64)[None], pose)[0]
-    if obstacle.kind == "Sphere":
-        radius = float(said["radius"])
-        if said.get("inside", False):
-            values = radius - np.linalg.norm(x[vertices] - center, axis=1)
-            return _rounded(values, vertices, True, _rounding(x[vertices], center) + _rounding(radius))
-        values = distances_from(center, x, triangles) - radius
-        return _rounded(values, np.arange(len(triangles)), False, _rounding(x[vertices], center) + _rounding(radius))
-    # The walls of a room.
-    local = (x[vertices] - center) @ (R @ np.asarray(said["orientation"], dtype=np.float64))
-    values = (0.5 * np.asarray(said["size"], dtype=np.float64) - np.abs(local)).min(axis=1)
-    return _rounded(values, vertices, True, _rounding(x[vertices], center) + _rounding(said["size"]))
+    tolerance = _rounding(points, t) + _rounding(thing.triangles()[0])
+    if thing.is_room:  # the distance from its wall is concave: smallest at a vertex
+        values, _ = thing.signed_distance(moved_back(points, pose))
+        worst = int(np.argmin(values))
+        return Clearance(float(values[worst]), int(vertices[worst]), True, bool(values[worst] < -tolerance))
+    smallest, row = smallest_on_triangles(thing.signed_distance, moved_back(x, pose)[triangles])
+    return Clearance(smallest, row, False, smallest < -tolerance)
+
+
+def smallest_on_triangles(
+    signed_distance: Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]],
+    corners: NDArray[np.float64],
+) -> tuple[float, int]:
+    """The smallest distance from a convex solid of triangles with these corners (t, 3, 3), and whose row it is.
+
+    The distance from a convex solid is convex, so on a triangle it is nowhere below the plane that touches its graph at
+    the middle. Triangles that this bound does not rule out are divided in four, which brings the bound four times
+    nearer, until round-off or too many of them end it.
+    """
+    rows = np.arange(len(corners))
+    best, row = np.inf, -1
+    for _ in range(_LEVELS):
+        distances = signed_distance(corners.reshape(-1, 3))[0].reshape(-1, 3).min(axis=1)
+        nearest = int(np.argmin(distances))
+        if distances[nearest] < best:
+            best, row = float(distances[nearest]), int(rows[nearest])
+        middles = corners.mean(axis=1)
+        values, normals = signed_distance(middles)
+        slopes = np.einsum("tij,tj->ti", corners - middles[:, None], normals)
+        kept = values + slopes.min(axis=1) < best - 1e-14 * np.abs(corners).max(initial=0.0)
+        corners, rows = corners[kept], np.repeat(rows[kept], 4)
+        if not 0 < len(corners) <= _MOST_TRIANGLES:
+            break
+        a, b, c = corners.transpose(1, 0, 2)
+        ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
+        parts = [np.stack(part, axis=1) for part in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
+        corners = np.stack(parts, axis=1).reshape(-1, 3, 3)
+    return best, row
 
 
 def _rounding(*values: object) -> float:
     largest = sum(float(np.abs(np.asarray(value, dtype=np.float64)).max()) for value in values)
     return _ROUNDINGS * float(np.finfo(np.float64).eps) * largest
-
-
-def _rounded(values: NDArray[np.float64], rows: NDArray[np.int64], by_vertex: bool, tolerance: float) -> Clearance:
-    worst = int(np.argmin(values))
-    return Clearance(float(values[worst]), int(rows[worst]), by_vertex, bool(values[worst] < -tolerance))

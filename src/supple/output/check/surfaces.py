@@ -12,12 +12,6 @@ from scipy.sparse.csgraph import connected_components
 from supple.output.recording.reader import Recording
 from supple.output.recording.scene import RecordedObstacle
 
-_BOX_CORNERS = np.array([[i, j, k] for i in (-0.5, 0.5) for j in (-0.5, 0.5) for k in (-0.5, 0.5)])
-_BOX_FACES = (
-    *((0, 1, 3), (0, 3, 2), (4, 7, 5), (4, 6, 7), (0, 5, 1), (0, 4, 5)),
-    *((2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)),
-)
-
 
 @dataclass(frozen=True, eq=False)
 class Piece:
@@ -92,11 +86,15 @@ def moved(points: NDArray[np.float64], pose: NDArray[np.float64]) -> NDArray[np.
     return points @ R.T + t
 
 
+def moved_back(points: NDArray[np.float64], pose: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The inverse of `moved`: points (k, 3) under a pose (3, 4), where they were at time 0."""
+    R, t = pose[:, :3], pose[:, 3]
+    return points if np.array_equal(R, np.eye(3)) and not t.any() else (points - t) @ R
+
+
 def is_mesh(obstacle: RecordedObstacle) -> bool:
     """Whether an obstacle is checked as triangles; others are checked by their formula."""
-    return obstacle.kind == "TriangleObstacle" or (
-        obstacle.kind == "Box" and not obstacle.parameters.get("inside", False)
-    )
+    return obstacle.obstacle.has_exact_triangles
 
 
 def surfaces_of(recording: Recording) -> Surfaces:
@@ -113,9 +111,9 @@ def surfaces_of(recording: Recording) -> Surfaces:
     fixed, row = [], n
     for j, obstacle in enumerate(recording.obstacles):
         if is_mesh(obstacle):
-            points, faces = _mesh_of(obstacle)
+            points, faces = obstacle.obstacle.triangles()
             fixed.append((j, points, row))
-            triangles.append(faces + row)
+            triangles.append(faces.astype(np.int64) + row)
             owners.append(np.full(len(faces), nb + j))
             row += len(points)
     owner = np.concatenate(owners).astype(np.int64)
@@ -138,14 +136,6 @@ def surfaces_of(recording: Recording) -> Surfaces:
         points=row,
         pieces=_pieces(recording, all_triangles, owner, row),
     )
-
-
-def _mesh_of(obstacle: RecordedObstacle) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    if obstacle.kind == "TriangleObstacle":
-        return obstacle.vertices, obstacle.triangles.astype(np.int64)
-    box = obstacle.parameters
-    points = (_BOX_CORNERS * np.asarray(box["size"])) @ np.asarray(box["orientation"]).T + np.asarray(box["center"])
-    return points, np.array(_BOX_FACES, dtype=np.int64)
 
 
 def _allowed(recording: Recording, bodies: int, owners: int) -> NDArray[np.bool_]:

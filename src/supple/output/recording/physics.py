@@ -95,7 +95,8 @@ def _anchors(system: System) -> NDArray[np.int64]:
     anchors = system.stitching.anchors
     out = np.zeros((len(anchors), 2), dtype=np.int64)
     for k, (owner, point) in enumerate(zip(anchors.owner, anchors.points, strict=True)):
-        surface = getattr(anchors.obstacles[owner], "surface")  # noqa: B009 (a TriangleObstacle: others have no vertices)
+        surface = anchors.obstacles[owner].surface_mesh
+        assert surface is not None  # others cannot be stitched to
         out[k] = owner, np.flatnonzero((surface.compact().vertices == point).all(axis=1))[0]
     return out
 

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.errors import MeshError, SceneError
 from supple.mesh.skin import Embedding
+from supple.mesh.surface import SurfaceMesh
 from supple.output.recording.checked_hdf5 import CheckedFile
 from supple.output.recording.physics import write_physics
 from supple.output.recording.skinned_surface import SkinnedSurface
 from supple.output.recording.stitches import write_stitches
-from supple.scene.obstacles import Box, HalfSpace, Obstacle, Sphere, TriangleObstacle
+from supple.scene.obstacles.obstacle import Obstacle
+from supple.scene.obstacles.registry import KINDS, restored_obstacle
 from supple.simulate import Frame
 from supple.state import Status
 from supple.system import BodyRange
@@ -50,8 +54,8 @@ class RecordedObstacle:
 
     Attributes
     ----------
-    name : of the obstacle; kind : "HalfSpace", "Box", "Sphere" or "TriangleObstacle"
-    parameters : of the obstacle: point, normal; center, size, orientation, inside; radius
+    name : of the obstacle; kind : the name of its class, such as "HalfSpace"
+    parameters : friction, and what it was made with
     vertices, triangles : of a TriangleObstacle, otherwise empty
     """
 
@@ -60,6 +64,19 @@ class RecordedObstacle:
     parameters: dict[str, Any]
     vertices: NDArray[np.float64]
     triangles: NDArray[np.int32]
+
+    @cached_property
+    def obstacle(self) -> Obstacle:
+        """The obstacle itself, without its motion.
+
+        Raises
+        ------
+        KeyError, TypeError, ValueError, SuppleError : where no known kind of obstacle has these parameters.
+        """
+        values = {"name": self.name, **self.parameters}
+        if len(self.triangles):
+            values["surface"] = SurfaceMesh(self.vertices, self.triangles)
+        return restored_obstacle(self.kind, values)
 
 
 def write_scene(file: h5py.File, first: Frame, facts: dict[str, Any], scene_text: str | None) -> None:
@@ -95,8 +112,8 @@ def write_scene(file: h5py.File, first: Frame, facts: dict[str, Any], scene_text
             group["corners"], group["weights"] = attached.corners, attached.weights
             group["triangles"] = skin.triangles
     for i, obstacle in enumerate(system.obstacles):
-        if isinstance(obstacle, TriangleObstacle) and obstacle.surface is not None:
-            surface = obstacle.surface.compact()
+        if obstacle.surface_mesh is not None:
+            surface = obstacle.surface_mesh.compact()
             group = own.create_group(f"obstacles/{i}")
             group["vertices"], group["triangles"] = surface.vertices, surface.triangles
 
@@ -136,23 +153,8 @@ def _one_line(thing: object) -> str:
 
 
 def _describe_obstacle(obstacle: Obstacle) -> dict[str, Any]:
-    numbers: dict[str, Any] = {"friction": float(obstacle.friction)}
-    if isinstance(obstacle, HalfSpace):
-        numbers |= {"point": _floats(obstacle.point), "normal": _floats(obstacle.normal)}
-    elif isinstance(obstacle, Box):
-        numbers |= {"center": _floats(obstacle.center), "size": _floats(obstacle.size)}
-        numbers |= {"orientation": obstacle.orientation.tolist(), "inside": bool(obstacle.inside)}
-    elif isinstance(obstacle, Sphere):
-        numbers |= {
-            "center": _floats(obstacle.center),
-            "radius": float(obstacle.radius),
-            "inside": bool(obstacle.inside),
-        }
+    numbers = {"friction": float(obstacle.friction), **obstacle.values()}
     return {"name": obstacle.name or obstacle.label, "kind": type(obstacle).__name__, "parameters": numbers}
-
-
-def _floats(value: Any) -> list[float]:
-    return np.asarray(value, dtype=np.float64).tolist()
 
 
 def read_header(file: CheckedFile) -> dict[str, Any]:
@@ -221,12 +223,14 @@ def read_obstacles(file: CheckedFile, header: dict[str, Any]) -> tuple[RecordedO
     try:
         for i, described in enumerate(header["obstacles"]):
             vertices, triangles = np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32)
-            if described["kind"] == "TriangleObstacle":
-                vertices = file.array(f"supple/obstacles/{i}/vertices", "f", (None, 3))
-                triangles = file.indices(f"supple/obstacles/{i}/triangles", 3, len(vertices))
-            name, kind = str(described["name"]), str(described["kind"])
-            made = RecordedObstacle(name, kind, dict(described["parameters"]), vertices, triangles)
-            obstacles.append(made)
-    except (KeyError, TypeError, ValueError):
+            name, kind, path = str(described["name"]), str(described["kind"]), f"supple/obstacles/{i}"
+            if kind not in KINDS:
+                raise file.broken(f"obstacle {name!r} is of an unknown kind, {kind!r}; register the kind first")
+            if any(one.kind == "surface" for one in KINDS[kind].parameters().values()):
+                vertices = file.array(f"{path}/vertices", "f", (None, 3))
+                triangles = file.indices(f"{path}/triangles", 3, len(vertices))
+            obstacles.append(RecordedObstacle(name, kind, dict(described["parameters"]), vertices, triangles))
+            _ = obstacles[-1].obstacle
+    except (KeyError, TypeError, ValueError, SceneError, MeshError):
         raise file.broken("the obstacles in its header are not described as they should be") from None
     return tuple(obstacles)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from supple.errors import SceneError
 from supple.mesh.surface import SurfaceMesh
 from supple.scene.body import Body
-from supple.scene.obstacles import Obstacle, TriangleObstacle
+from supple.scene.obstacles.obstacle import Obstacle
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,10 +57,11 @@ def side_of(thing: Body | Obstacle) -> Side:
     """
     if isinstance(thing, Body):
         return _side(f"body {thing.name!r}", thing.mesh.surface, thing.place(thing.mesh.vertices))
-    if not isinstance(thing, TriangleObstacle) or thing.surface is None:
+    surface = thing.surface_mesh
+    if surface is None:
         raise SceneError(f"{thing.label} is a {type(thing).__name__}; stitches join bodies and TriangleObstacles")
     R, t = thing.pose(0.0)
-    return _side(thing.label, thing.surface, thing.surface.vertices @ R.T + t)
+    return _side(thing.label, surface, surface.vertices @ R.T + t)
 
 
 def _side(label: str, surface: SurfaceMesh, points: NDArray[np.float64]) -> Side:

@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import connected_components
 
 from supple.errors import SceneError
 from supple.scene.body import Body
-from supple.scene.obstacles import Obstacle
+from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.stitches.elements import Pairs, Springs, StitchTets
 from supple.scene.stitches.side import Side, side_of
 from supple.scene.stitches.stitch import Stitch

@@ -1,77 +1,61 @@
-"""Obstacles of a scene file, by `kind`."""
+"""Obstacles of a scene file, by `kind`: a model for each registered kind, made of the parameters that it declares."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from dataclasses import fields
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
-from pydantic import Field
+from pydantic import Field, create_model
 
-from supple.scene.obstacles import Box, HalfSpace, Obstacle, Sphere, TriangleObstacle
+from supple.scene.obstacles.obstacle import Obstacle
+from supple.scene.obstacles.registry import KINDS
 from supple.scene_file.entries.mesh_sources import MeshStore, SurfaceModel
 from supple.scene_file.entries.motions import KeyframesModel
 from supple.scene_file.located import at
 from supple.scene_file.model import Model, Name, NonNegative, Positive, Vector
 
 Extents = Annotated[list[Positive], Field(min_length=3, max_length=3)]
+_TYPES: dict[str, Any] = {
+    "vector": Vector,
+    "direction": Vector,
+    "extents": Extents,
+    "positive": Positive,
+    "flag": bool,
+    "surface": SurfaceModel,
+}
+_CLASSES = {one.file_kind: one for one in KINDS.values()}
 
 
 class _ObstacleModel(Model):
+    kind: str
     name: Name | None = Field(default=None, description="stands in messages and exports")
     friction: NonNegative = Field(default=0.0, description="Coulomb coefficient against every body")
     motion: KeyframesModel | None = Field(default=None, description="scripted motion; it stands still without it")
 
-    def shared(self) -> dict[str, Any]:
+    def build(self, meshes: MeshStore) -> Obstacle:
         with at("motion"):
             motion = self.motion.build() if self.motion else None
-        return {"name": self.name, "friction": self.friction, "motion": motion}
+        values = {key: getattr(self, key) for key in _CLASSES[self.kind].parameters()}
+        for key, value in values.items():
+            if isinstance(value, SurfaceModel):
+                with at(key):
+                    values[key] = meshes.surface(value)
+        return _CLASSES[self.kind](name=self.name, friction=self.friction, motion=motion, **values)
 
 
-class HalfSpaceModel(_ObstacleModel):
-    """Everything behind a plane: a floor, a wall."""
-
-    kind: Literal["half_space"]
-    point: Vector = Field(default=[0.0, 0.0, 0.0], description="a point of the plane [m]")
-    normal: Vector = Field(default=[0.0, 1.0, 0.0], description="towards the free side")
-
-    def build(self, meshes: MeshStore) -> Obstacle:
-        return HalfSpace(point=self.point, normal=self.normal, **self.shared())
-
-
-class BoxModel(_ObstacleModel):
-    """A solid box, or a room that keeps bodies in."""
-
-    kind: Literal["box"]
-    center: Vector = Field(default=[0.0, 0.0, 0.0], description="[m]")
-    size: Extents = Field(default=[1.0, 1.0, 1.0], description="full edge lengths [m]")
-    rotation: Vector = Field(default=[0.0, 0.0, 0.0], description="rotation vector about the center [rad]")
-    inside: bool = Field(default=False, description="true where bodies live inside")
-
-    def build(self, meshes: MeshStore) -> Obstacle:
-        return Box(center=self.center, size=self.size, rotation=self.rotation, inside=self.inside, **self.shared())
+def _model_of(obstacle: type[Obstacle]) -> type[_ObstacleModel]:
+    keys: dict[str, Any] = {"kind": (Literal[obstacle.file_kind], ...)}  # pyright: ignore[reportInvalidTypeForm]
+    defaults = {field.name: field.default for field in fields(obstacle)}
+    for key, declared in obstacle.parameters().items():
+        default = defaults[key]
+        default = ... if default is None else list(default) if isinstance(default, tuple) else default
+        keys[key] = (_TYPES[declared.kind], Field(default=default, description=declared.description))
+    doc = (obstacle.__doc__ or "").partition("\n")[0]
+    return create_model(f"{obstacle.__name__}Model", __base__=_ObstacleModel, __doc__=doc, __module__=__name__, **keys)
 
 
-class SphereModel(_ObstacleModel):
-    """A solid ball, or a bowl that keeps bodies in."""
-
-    kind: Literal["sphere"]
-    center: Vector = Field(default=[0.0, 0.0, 0.0], description="[m]")
-    radius: Positive = Field(default=1.0, description="[m]")
-    inside: bool = Field(default=False, description="true where bodies live inside")
-
-    def build(self, meshes: MeshStore) -> Obstacle:
-        return Sphere(center=self.center, radius=self.radius, inside=self.inside, **self.shared())
-
-
-class TrianglesModel(_ObstacleModel):
-    """A rigid triangle mesh: solid where it is closed, a two-sided sheet where it is open."""
-
-    kind: Literal["triangles"]
-    surface: SurfaceModel = Field(description="where it is at time 0 [m]")
-
-    def build(self, meshes: MeshStore) -> Obstacle:
-        with at("surface"):
-            surface = meshes.surface(self.surface)
-        return TriangleObstacle(surface=surface, **self.shared())
-
-
-ObstacleModel = Annotated[HalfSpaceModel | BoxModel | SphereModel | TrianglesModel, Field(discriminator="kind")]
+if TYPE_CHECKING:
+    ObstacleModel = _ObstacleModel
+else:
+    _MODELS = tuple(_model_of(one) for one in KINDS.values())
+    ObstacleModel = Annotated[Union[_MODELS], Field(discriminator="kind")]  # noqa: UP007

@@ -47,9 +47,8 @@ class ObstacleDescription:
 
     Attributes
     ----------
-    kind : "HalfSpace", "Box", "Sphere" or "TriangleObstacle"
-    shape : the parameters of the obstacle: point and normal; center, size, rotation; center, radius; inside;
-        vertices and triangles
+    kind : the name of its class, such as "HalfSpace"
+    shape : its own parameters, and vertices and triangles where it is made of them
     """
 
     name: str

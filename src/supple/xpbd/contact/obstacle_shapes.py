@@ -1,20 +1,17 @@
-"""Obstacles of simple shape as rows of arrays: planes, solid balls, bowls and solid boxes.
-
-A room (`Box(inside=True)`) is six planes. Triangle obstacles are not here: they are surfaces (`contact_surfaces`).
-"""
+"""The shapes of all obstacles of a scene as rows of arrays; for those of triangles, see `contact_surfaces`."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.obstacle_poses import ObstaclePoses
-from supple.scene.obstacles import Box, HalfSpace, Obstacle, Sphere
-
-PLANE, BALL, BOWL, BLOCK = 0, 1, 2, 3
+from supple.scene.obstacles.obstacle import Obstacle
+from supple.scene.obstacles.shape import PARAMETERS
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,17 +20,17 @@ class ObstacleShapes:
 
     Attributes
     ----------
-    kinds : (k,) PLANE, BALL, BOWL or BLOCK
+    contacts : (k,) how a point meets each shape; see `supple.scene.obstacles.shape.Shape`
     owners : (k,) which obstacle of the scene a shape belongs to
-    frames : (k, 4, 3) an anchor point [m], then three axes, row by row; a plane's first axis is its normal
-    extents : (k, 3) half edge lengths of a block, radius of a ball or bowl in the first entry [m]
+    frames : (k, 4, 3) an anchor point [m], then three axes, row by row
+    parameters : (k, PARAMETERS) numbers of each shape
     moving : (k,) whether the shape is scripted
     """
 
-    kinds: NDArray[np.int32]
+    contacts: tuple[Callable[..., Any], ...]
     owners: NDArray[np.int32]
     frames: NDArray[np.float64]
-    extents: NDArray[np.float64]
+    parameters: NDArray[np.float64]
     moving: NDArray[np.bool_]
 
     def placed(self, poses: ObstaclePoses, time: float) -> NDArray[np.float64]:
@@ -48,36 +45,15 @@ class ObstacleShapes:
 
 
 def build_shapes(obstacles: Sequence[Obstacle]) -> ObstacleShapes:
-    """The shapes of all obstacles but triangle obstacles."""
-    rows: list[tuple[int, int, NDArray[np.float64], NDArray[np.float64]]] = []
-    for k, obstacle in enumerate(obstacles):
-        if isinstance(obstacle, HalfSpace):
-            rows.append((PLANE, k, _plane_frame(np.asarray(obstacle.point), np.asarray(obstacle.normal)), np.zeros(3)))
-        elif isinstance(obstacle, Sphere):
-            frame = np.vstack([np.asarray(obstacle.center), np.eye(3)])
-            rows.append((BOWL if obstacle.inside else BALL, k, frame, np.array([obstacle.radius, 0.0, 0.0])))
-        elif isinstance(obstacle, Box):
-            center, half, axes = np.asarray(obstacle.center), 0.5 * np.asarray(obstacle.size), obstacle.orientation.T
-            if obstacle.inside:
-                for i in range(3):
-                    for side in (-1.0, 1.0):
-                        rows.append(
-                            (PLANE, k, _plane_frame(center + side * half[i] * axes[i], -side * axes[i]), np.zeros(3))
-                        )
-            else:
-                rows.append((BLOCK, k, np.vstack([center, axes]), half))
+    """The shapes of all obstacles, in their order."""
+    rows = [(k, shape) for k, obstacle in enumerate(obstacles) for shape in obstacle.shapes()]
+    parameters = np.zeros((len(rows), PARAMETERS))
+    for row, (_, shape) in zip(parameters, rows, strict=True):
+        row[: len(shape.parameters)] = shape.parameters
     return ObstacleShapes(
-        kinds=np.array([row[0] for row in rows], dtype=np.int32),
-        owners=np.array([row[1] for row in rows], dtype=np.int32),
-        frames=np.array([row[2] for row in rows], dtype=np.float64).reshape(-1, 4, 3),
-        extents=np.array([row[3] for row in rows], dtype=np.float64).reshape(-1, 3),
-        moving=np.array([obstacles[row[1]].motion is not None for row in rows], dtype=np.bool_),
+        contacts=tuple(shape.contact for _, shape in rows),
+        owners=np.array([k for k, _ in rows], dtype=np.int32),
+        frames=np.array([shape.frame for _, shape in rows], dtype=np.float64).reshape(-1, 4, 3),
+        parameters=parameters,
+        moving=np.array([obstacles[k].motion is not None for k, _ in rows], dtype=np.bool_),
     )
-
-
-def _plane_frame(point: NDArray[np.float64], normal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """An anchor and a right-handed frame whose first axis is the normal, bit for bit."""
-    helper = np.eye(3)[int(np.abs(normal).argmin())]
-    second = np.cross(normal, helper)
-    second /= np.linalg.norm(second)
-    return np.array([point, normal, second, np.cross(normal, second)], dtype=np.float64)

@@ -72,7 +72,7 @@ class Obstacles(FrameCheck):
 
     def result(self) -> CheckResult:
         if all(is_mesh(obstacle) for obstacle in self.scene.recording.obstacles):
-            return skipped(self.name, "the scene has no half-space, sphere or room")
+            return skipped(self.name, "the scene has no half-space, round solid or room")
         return self._tally.result("closest {worst}", "a body is in an obstacle, at {worst}")
 
 
@@ -86,7 +86,7 @@ class Containment(FrameCheck):
         self._tally = Tally(self.name, "pieces")
 
     def see(self, at: Snapshot) -> None:
-        found = [*self._contained(at), *self._spheres_in_bodies(at)]
+        found = [*self._contained(at), *self._solids_in_bodies(at)]
         self._tally.see(at, len(found), bool(found), found[0] if found else "")
 
     def _contained(self, at: Snapshot) -> Iterator[str]:
@@ -110,12 +110,14 @@ class Containment(FrameCheck):
                 if is_inside(x, point, surfaces.triangles, solid.triangles):
                     yield f"{surfaces.names[piece.owner]} in {surfaces.names[solid.owner]}"
 
-    def _spheres_in_bodies(self, at: Snapshot) -> Iterator[str]:
+    def _solids_in_bodies(self, at: Snapshot) -> Iterator[str]:
         surfaces = self.scene.surfaces
         for j, obstacle in enumerate(self.scene.recording.obstacles):
-            if obstacle.kind != "Sphere" or obstacle.parameters.get("inside", False):
+            thing = obstacle.obstacle
+            if is_mesh(obstacle) or thing.is_room or thing.plane is not None:
                 continue
-            center = moved(np.asarray(obstacle.parameters["center"], dtype=np.float64)[None], at.poses[j])[0]
+            # Of a convex solid, the mean of points about it is inside.
+            center = moved(thing.triangles()[0].mean(axis=0)[None], at.poses[j])[0]
             for solid in surfaces.pieces:
                 allowed = solid.owner < surfaces.bodies and surfaces.allowed[solid.owner, surfaces.bodies + j]
                 if allowed and solid.closed and is_inside(at.points, center, surfaces.triangles, solid.triangles):

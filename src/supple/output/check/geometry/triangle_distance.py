@@ -92,14 +92,3 @@ def triangles_apart(x, s, t):
         for j in range(3):
             best = min(best, segment_segment(A[i], A[(i + 1) % 3], B[j], B[(j + 1) % 3]))
     return best
-
-
-@njit(cache=True, error_model="numpy")
-def distances_from(point, x, triangles):
-    """(t,) distance of each triangle (t, 3) from a point (3,)."""
-    p = (point[0], point[1], point[2])
-    out = np.empty(len(triangles))
-    for t in range(len(triangles)):
-        A = _corners(x, triangles[t])
-        out[t] = np.sqrt(point_triangle(p, A[0], A[1], A[2]))
-    return out

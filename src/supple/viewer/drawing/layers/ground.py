@@ -18,11 +18,8 @@ class Ground(Layer):
     def __init__(self, scene: Any, moment: Moment) -> None:
         model = moment.model
         view, up = model.view, model.view.up
-        floors = [
-            np.asarray(obstacle.parameters["point"], dtype=float)
-            for obstacle in model.obstacles
-            if obstacle.kind == "HalfSpace" and float(np.dot(obstacle.parameters["normal"], up)) > 0.99
-        ]
+        planes = [one.obstacle.plane for one in model.obstacles]
+        floors = [plane[0] for plane in planes if plane is not None and float(plane[1] @ up) > 0.99]
         lowest = float(np.min([corner @ up for corner in _corners(view.low, view.high)]))
         height = max((float(point @ up) for point in floors), default=lowest)
         # Slightly above the floor, because two surfaces in the same plane flicker.

@@ -26,7 +26,7 @@ class ObstacleView(Layer):
                 picture.triangles.astype(np.uint32),
                 color=OBSTACLE_COLOR,
                 opacity=picture.opacity if picture.opacity < 1.0 else None,
-                flat_shading=model.obstacles[picture.number].kind != "Sphere",
+                flat_shading=not picture.smooth,
                 side="double",
                 wxyz=quaternion(pose[:, :3]),
                 position=pose[:, 3],

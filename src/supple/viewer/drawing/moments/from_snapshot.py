@@ -13,7 +13,6 @@ from supple.mesh.tetmesh import TetMesh
 from supple.output.drawing import View
 from supple.output.recording.scene import RecordedObstacle
 from supple.output.recording.skinned_surface import SkinnedSurface
-from supple.scene.rotation import rotation_matrix
 from supple.viewer.drawing.moments.model import Model, ModelBody, Moment, colors_of
 from supple.viewer.protocol.snapshots import PUSHER, BodyDescription, ObstacleDescription, SceneDescription, Snapshot
 
@@ -100,8 +99,9 @@ def _view_of(scene: SceneDescription) -> View:
     low, high, up = np.asarray(scene.low), np.asarray(scene.high), np.asarray(scene.up)
     bodies = View(low, high, up)
     for obstacle in scene.obstacles:
-        if obstacle.kind == "HalfSpace" and float(np.dot(obstacle.shape["normal"], up)) > 0.99:
-            below = float((bodies.center - np.asarray(obstacle.shape["point"])) @ up)
+        plane = _obstacle(obstacle).obstacle.plane
+        if plane is not None and float(plane[1] @ up) > 0.99:
+            below = float((bodies.center - plane[0]) @ up)
             if 0.0 < below < 4.0 * bodies.radius:
                 floor = bodies.center - below * up
                 low, high = np.minimum(low, floor), np.maximum(high, floor)
@@ -116,6 +116,4 @@ def _obstacle(obstacle: ObstacleDescription) -> RecordedObstacle:
     shape = dict(obstacle.shape)
     vertices = np.asarray(shape.pop("vertices", np.zeros((0, 3))), dtype=np.float64)
     triangles = np.asarray(shape.pop("triangles", np.zeros((0, 3))), dtype=np.int32)
-    if "rotation" in shape:
-        shape["orientation"] = rotation_matrix(shape.pop("rotation"))
     return RecordedObstacle(obstacle.name, obstacle.kind, shape, vertices, triangles)

@@ -7,7 +7,6 @@ from importlib.util import find_spec
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.scene.obstacles import TriangleObstacle
 from supple.system import System
 from supple.viewer.engine.scene.obstacle_distance import signed_distance
 from supple.viewer.protocol import limits
@@ -24,8 +23,10 @@ def contact_points(system: System, positions: NDArray[np.float64], time: float) 
     """
     near = NEAR * _mean_edge(system)
     skin = np.unique(system.triangles)
-    points = [positions[skin][signed_distance(obstacle, positions[skin], time) < near] for obstacle in system.obstacles]
-    points.append(_between_surfaces(system, positions, time, near))
+    points = [_between_surfaces(system, positions, time, near)]
+    for obstacle in system.obstacles:
+        if obstacle.surface_mesh is None:
+            points.append(positions[skin][signed_distance(obstacle, positions[skin], time)[0] < near])
     found = np.concatenate([np.zeros((0, 3)), *points])
     stride = -(-len(found) // limits.MOST_CONTACT_POINTS)
     return np.ascontiguousarray(found[:: max(stride, 1)])
@@ -44,11 +45,12 @@ def _between_surfaces(system: System, positions: NDArray[np.float64], time: floa
     vertices, triangles = [positions], [system.triangles]
     count = len(positions)
     for obstacle in system.obstacles:
-        if isinstance(obstacle, TriangleObstacle) and obstacle.surface is not None:
+        mesh = obstacle.surface_mesh
+        if mesh is not None:
             R, t = obstacle.pose(time)
-            vertices.append(obstacle.surface.vertices @ R.T + t)
-            triangles.append(obstacle.surface.triangles + count)
-            count += len(obstacle.surface.vertices)
+            vertices.append(mesh.vertices @ R.T + t)
+            triangles.append(mesh.triangles + count)
+            count += len(mesh.vertices)
     F = np.concatenate(triangles).astype(np.int32)
     used, compact = np.unique(F, return_inverse=True)
     X = np.asfortranarray(np.concatenate(vertices)[used])

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.diagnostics import measure
-from supple.scene.obstacles import Box, HalfSpace, Obstacle, Sphere, TriangleObstacle
+from supple.scene.obstacles.obstacle import Obstacle
 from supple.state import State
 from supple.system import BodyRange, System
 from supple.viewer.engine.scene.live_scene import LiveScene
@@ -70,21 +70,9 @@ def _material_values(material: Any) -> dict[str, Value]:
 
 
 def _obstacle(obstacle: Obstacle) -> ObstacleDescription:
-    shape: dict[str, Any] = {}
-    match obstacle:
-        case HalfSpace():
-            shape = {"point": np.asarray(obstacle.point), "normal": np.asarray(obstacle.normal)}
-        case Box():
-            shape = {
-                "center": np.asarray(obstacle.center),
-                "size": np.asarray(obstacle.size),
-                "rotation": np.asarray(obstacle.rotation),
-                "inside": obstacle.inside,
-            }
-        case Sphere():
-            shape = {"center": np.asarray(obstacle.center), "radius": obstacle.radius, "inside": obstacle.inside}
-        case TriangleObstacle(surface=surface) if surface is not None:
-            shape = {"vertices": surface.vertices, "triangles": surface.triangles.astype(np.int32)}
+    shape, mesh = obstacle.values(), obstacle.surface_mesh
+    if mesh is not None:
+        shape |= {"vertices": mesh.vertices, "triangles": mesh.triangles.astype(np.int32)}
     name = obstacle.name or obstacle.label
     return ObstacleDescription(name, type(obstacle).__name__, shape, obstacle.motion is not None, obstacle.friction)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.scene.obstacles import Sphere
+from supple.scene.obstacles.sphere import Sphere
 from supple.viewer.protocol.snapshots import PUSHER
 
 # Longest motion in one step, as a share of the radius: otherwise the ball could jump over vertices.

@@ -1,0 +1,96 @@
+"""A solid box, or a room with six walls."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from supple.mesh import shapes
+from supple.numerics.kernel_cache import njit
+from supple.scene.obstacles.half_space import plane_contact
+from supple.scene.obstacles.obstacle import Obstacle, distances_from_corner
+from supple.scene.obstacles.parameters import parameter
+from supple.scene.obstacles.shape import Shape, convex_contact, frame_of
+from supple.scene.rotation import rotation_matrix
+
+
+@njit
+def _signed_distance(half, s):
+    """Of the box with the half edge lengths `half` about the origin, and the normal."""
+    e = (abs(s[0]) - half[0], abs(s[1]) - half[1], abs(s[2]) - half[2])
+    sign = (math.copysign(1.0, s[0]), math.copysign(1.0, s[1]), math.copysign(1.0, s[2]))
+    a, b, c = max(e[0], 0.0), max(e[1], 0.0), max(e[2], 0.0)
+    d = math.sqrt(a * a + b * b + c * c)
+    if d > 0.0:
+        return d, (sign[0] * a / d, sign[1] * b / d, sign[2] * c / d)
+    if e[0] >= e[1] and e[0] >= e[2]:
+        return e[0], (sign[0], 0.0, 0.0)
+    if e[1] >= e[2]:
+        return e[1], (0.0, sign[1], 0.0)
+    return e[2], (0.0, 0.0, sign[2])
+
+
+@dataclass(frozen=True, eq=False)
+class Box(Obstacle):
+    """A solid box, or with `inside=True` a room that keeps bodies in.
+
+    Parameters
+    ----------
+    center : (3,) [m]; size : (3,) full edge lengths [m]; rotation : (3,) rotation vector about the center [rad].
+    inside : True where bodies live inside the box.
+    """
+
+    center: ArrayLike = field(default=(0.0, 0.0, 0.0), metadata=parameter("vector", "[m]"))
+    size: ArrayLike = field(default=(1.0, 1.0, 1.0), metadata=parameter("extents", "full edge lengths [m]"))
+    rotation: ArrayLike = field(
+        default=(0.0, 0.0, 0.0), metadata=parameter("vector", "rotation vector about the center [rad]")
+    )
+    inside: bool = field(default=False, metadata=parameter("flag", "true where bodies live inside"))
+
+    file_kind: ClassVar[str] = "box"
+
+    @classmethod
+    def restored(cls, values: dict[str, Any]) -> Self:
+        if "orientation" in values:  # recordings of version 0.1 keep the matrix
+            from scipy.spatial.transform import Rotation
+
+            values = dict(values)
+            values["rotation"] = Rotation.from_matrix(values.pop("orientation")).as_rotvec()
+        return cls(**values)
+
+    @property
+    def orientation(self) -> NDArray[np.float64]:
+        """(3, 3) rotation from the box's own axes to the world's, at time 0."""
+        return rotation_matrix(self.rotation)
+
+    @property
+    def has_exact_triangles(self) -> bool:
+        return not self.inside
+
+    def signed_distance(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        R = self.orientation
+        local = (points - np.asarray(self.center)) @ R
+        distances, parts = distances_from_corner(np.abs(local) - 0.5 * np.asarray(self.size))
+        return self._oriented(distances, (np.copysign(1.0, local) * parts) @ R.T)
+
+    def triangles(self) -> tuple[NDArray[np.float64], NDArray[np.integer]]:
+        surface = shapes.box(tuple(np.asarray(self.size, dtype=np.float64)), (1, 1, 1)).surface
+        return surface.vertices @ self.orientation.T + np.asarray(self.center), surface.triangles
+
+    def shapes(self) -> tuple[Shape, ...]:
+        center, half, axes = np.asarray(self.center), 0.5 * np.asarray(self.size), self.orientation.T
+        if not self.inside:
+            return (Shape(convex_contact(_signed_distance), np.vstack([center, axes]), tuple(half)),)
+        return tuple(
+            Shape(plane_contact, frame_of(center + side * half[i] * axes[i], -side * axes[i]))
+            for i in range(3)
+            for side in (-1.0, 1.0)
+        )
+
+    def probes(self, edge_length: float) -> tuple[NDArray[np.float64], float]:
+        """The corners of a solid box."""
+        return (np.zeros((0, 3)) if self.inside else self.triangles()[0]), 0.0

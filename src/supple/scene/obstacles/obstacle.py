@@ -1,0 +1,160 @@
+"""What every kind of obstacle supplies. A kind is one class in one file, and one line in `registry`.
+
+An obstacle is a convex solid, a room with a convex inside, or a mesh of triangles. Its shape is given where it is at
+time 0; `motion` carries it from there (see `supple.scene.motion`).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.mesh.surface import SurfaceMesh
+from supple.scene.motion import Motion, check_motion, rigid_pose
+from supple.scene.obstacles.parameters import Parameter
+from supple.scene.obstacles.shape import Shape
+from supple.scene.values import check_name, non_negative
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Obstacle(ABC):
+    """What all obstacles share. Fields that a kind adds are declared with `parameter`.
+
+    Parameters
+    ----------
+    friction : Coulomb coefficient between this obstacle and every body.
+    motion : None, Keyframes, or t -> displacement (3,) [m].
+    name : optional; stands in messages and exports. A scene names the unnamed ones by kind and number.
+    """
+
+    friction: float = 0.0
+    motion: Motion = None
+    name: str | None = None
+
+    file_kind: ClassVar[str]
+    """The value of `kind` in scene files."""
+    smooth: ClassVar[bool] = False
+    """Whether the surface is drawn without edges."""
+
+    def __post_init__(self) -> None:
+        if self.name is not None:
+            check_name(self.name, "obstacle")
+        object.__setattr__(self, "friction", non_negative(self.friction, f"{self.label}: friction"))
+        check_motion(self.motion, self.label)
+        for key, declared in self.parameters().items():
+            object.__setattr__(self, key, declared.checked(getattr(self, key), f"{self.label}: {key}"))
+
+    @classmethod
+    def parameters(cls) -> dict[str, Parameter]:
+        """The declared parameters, by name."""
+        return {f.name: f.metadata["parameter"] for f in fields(cls) if "parameter" in f.metadata}
+
+    @classmethod
+    def restored(cls, values: dict[str, Any]) -> Self:
+        """The obstacle of recorded values: those of `values()`, name and friction, and the surface if it has one."""
+        return cls(**values)
+
+    @property
+    def label(self) -> str:
+        """How messages call this obstacle."""
+        return f"obstacle {self.name!r}" if self.name else type(self).__name__
+
+    def values(self) -> dict[str, Any]:
+        """The parameters as plain numbers and lists, without surfaces; a recording keeps them."""
+        declared = {key: getattr(self, key) for key, one in self.parameters().items() if one.kind != "surface"}
+        return {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in declared.items()}
+
+    def pose(self, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Rotation (3, 3) and translation (3,) [m] from where it is at time 0 to where it is at `time` [s]."""
+        return rigid_pose(self.motion, time, self.label)
+
+    def carried(self, points: NDArray[np.float64], begin: float, end: float) -> NDArray[np.float64]:
+        """Where points (k, 3) that move with the obstacle from `begin` to `end` [s] arrive [m].
+
+        Divided by the time between, their displacement is the mean velocity of the obstacle at these points.
+        """
+        if self.motion is None:
+            return points
+        (R0, t0), (R1, t1) = self.pose(begin), self.pose(end)
+        return (points - t0) @ R0 @ R1.T + t1
+
+    @property
+    def is_room(self) -> bool:
+        """Whether it keeps bodies in."""
+        return bool(getattr(self, "inside", False))
+
+    @property
+    def plane(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """A point [m] and the unit normal (3,), (3,) of a half-space at time 0; None for what is bounded."""
+        return None
+
+    @property
+    def surface_mesh(self) -> SurfaceMesh | None:
+        """Triangles that are the obstacle itself, which stitches can hold on to; None where it is a formula."""
+        return None
+
+    @property
+    def has_exact_triangles(self) -> bool:
+        """Whether `triangles` is the surface itself, and not a polyhedron about it."""
+        return self.surface_mesh is not None
+
+    @abstractmethod
+    def signed_distance(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Distances (k,) [m] of points (k, 3) at time 0, below zero in the solid, and normals (k, 3) out of it.
+
+        The checker and the live page use it. It does not share code with `shapes`, which XPBD uses.
+        """
+
+    @abstractmethod
+    def triangles(self) -> tuple[NDArray[np.float64], NDArray[np.integer]]:
+        """Vertices (k, 3) [m] at time 0 and triangles (t, 3), facing outwards: the surface that Implicit and pages use.
+
+        A polyhedron about a round solid; one inside of a round room. So bodies never cross the true surface.
+        """
+
+    def drawn(self, center: NDArray[np.float64], reach: float) -> tuple[NDArray[np.float64], NDArray[np.integer]]:
+        """What is drawn: vertices and triangles. What is not bounded is cut at about `reach` [m] from `center` (3,)."""
+        return self.triangles()
+
+    def shapes(self) -> tuple[Shape, ...]:
+        """Shapes for XPBD; none for what has a `surface_mesh`."""
+        return ()
+
+    def probes(self, edge_length: float) -> tuple[NDArray[np.float64], float]:
+        """Points (k, 3) that XPBD keeps away from triangles of bodies, and by how much [m].
+
+        They hold bodies whose vertices are farther apart than this obstacle is wide.
+
+        Parameters
+        ----------
+        edge_length : of the bodies' surfaces, mean [m]
+        """
+        return np.zeros((0, 3)), 0.0
+
+    def _oriented(
+        self, distances: NDArray[np.float64], normals: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Distance and normal of the solid, or of the room with the same wall."""
+        return (-distances, -normals) if self.is_room else (distances, normals)
+
+
+def lengths_and_directions(
+    vectors: NDArray[np.float64], otherwise: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lengths (k,) and unit vectors (k, 3) of vectors (k, 3); `otherwise` (3,) for those without a length."""
+    lengths = np.linalg.norm(vectors, axis=1)
+    safe = np.where(lengths > 0.0, lengths, 1.0)[:, None]
+    return lengths, np.where(lengths[:, None] > 0.0, vectors / safe, otherwise)
+
+
+def distances_from_corner(beyond: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Signed distances (k,) of points beyond (k, m) from the solid where all coordinates are below 0, and normals."""
+    outside = np.maximum(beyond, 0.0)
+    distances, normals = lengths_and_directions(outside, np.zeros(beyond.shape[1]))
+    inside = distances == 0.0
+    normals[inside] = np.eye(beyond.shape[1])[beyond[inside].argmax(axis=1)]
+    return np.where(inside, beyond.max(axis=1), distances), normals

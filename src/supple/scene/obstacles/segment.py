@@ -1,0 +1,63 @@
+"""What a capsule and a cylinder share: the segment that is their axis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from supple.errors import SceneError
+from supple.scene.obstacles.obstacle import Obstacle, lengths_and_directions
+from supple.scene.obstacles.parameters import parameter
+from supple.scene.obstacles.shape import frame_of
+
+
+@dataclass(frozen=True, eq=False)
+class SegmentObstacle(Obstacle):
+    """What is round about a segment.
+
+    Parameters
+    ----------
+    start, end : (3,) the ends of the axis [m]; radius : [m]; inside : True where bodies live inside.
+    """
+
+    start: ArrayLike = field(default=(0.0, -0.5, 0.0), metadata=parameter("vector", "one end of the axis [m]"))
+    end: ArrayLike = field(default=(0.0, 0.5, 0.0), metadata=parameter("vector", "the other end of the axis [m]"))
+    radius: float = field(default=0.5, metadata=parameter("positive", "[m]"))
+    inside: bool = field(default=False, metadata=parameter("flag", "true where bodies live inside"))
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if np.linalg.norm(np.asarray(self.end) - np.asarray(self.start)) <= 1e-9 * self.radius:
+            raise SceneError(f"{self.label}: start and end are the same point; give an axis, or use a Sphere")
+
+    @property
+    def half_length(self) -> float:
+        """Of the axis [m]."""
+        return 0.5 * float(np.linalg.norm(np.asarray(self.end) - np.asarray(self.start)))
+
+    @property
+    def frame(self) -> NDArray[np.float64]:
+        """(4, 3) the middle of the axis [m], then three orthonormal axes; the first one leads from start to end."""
+        a, b = np.asarray(self.start), np.asarray(self.end)
+        return frame_of(0.5 * (a + b), (b - a) / np.linalg.norm(b - a))
+
+    def split(
+        self, points: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Heights (k,) over the middle of points (k, 3), their distances (k,) from the axis, and directions (k, 3)."""
+        middle, axis, aside, _ = self.frame
+        heights = (points - middle) @ axis
+        return heights, *lengths_and_directions(points - middle - heights[:, None] * axis, aside)
+
+    def placed(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points (k, 3), given in `frame`, in the world [m]."""
+        return self.frame[0] + points @ self.frame[1:]
+
+    def probes(self, edge_length: float) -> tuple[NDArray[np.float64], float]:
+        """Points of the axis, where the obstacle fits between vertices."""
+        if self.inside or self.radius >= 2.0 * edge_length:
+            return np.zeros((0, 3)), 0.0
+        count = 2 + int(2.0 * self.half_length / min(edge_length, self.radius))
+        return np.linspace(np.asarray(self.start), np.asarray(self.end), min(count, 1000)), self.radius

@@ -1,0 +1,60 @@
+"""A solid ball, or a bowl."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from supple.numerics.kernel_cache import njit
+from supple.numerics.mat3 import dot
+from supple.scene.obstacles.obstacle import Obstacle, lengths_and_directions
+from supple.scene.obstacles.parameters import parameter
+from supple.scene.obstacles.polyhedra import round_ball
+from supple.scene.obstacles.shape import Shape, concave_contact, convex_contact
+
+
+@njit
+def _signed_distance(parameters, s):
+    """Of the ball with radius parameters[0] about the origin, and the normal."""
+    r = math.sqrt(dot(s, s))
+    if r == 0.0:
+        return -parameters[0], (0.0, 1.0, 0.0)
+    return r - parameters[0], (s[0] / r, s[1] / r, s[2] / r)
+
+
+@dataclass(frozen=True, eq=False)
+class Sphere(Obstacle):
+    """A solid ball, or with `inside=True` a bowl that keeps bodies in.
+
+    Parameters
+    ----------
+    center : (3,) [m]; radius : [m]; inside : True where bodies live inside the sphere.
+    """
+
+    center: ArrayLike = field(default=(0.0, 0.0, 0.0), metadata=parameter("vector", "[m]"))
+    radius: float = field(default=1.0, metadata=parameter("positive", "[m]"))
+    inside: bool = field(default=False, metadata=parameter("flag", "true where bodies live inside"))
+
+    file_kind: ClassVar[str] = "sphere"
+    smooth: ClassVar[bool] = True
+
+    def signed_distance(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        r, normals = lengths_and_directions(points - np.asarray(self.center), np.array([0.0, 1.0, 0.0]))
+        return self._oriented(r - self.radius, normals)
+
+    def triangles(self) -> tuple[NDArray[np.float64], NDArray[np.integer]]:
+        points, triangles = round_ball(inscribed=self.inside)
+        return np.asarray(self.center) + self.radius * points, triangles
+
+    def shapes(self) -> tuple[Shape, ...]:
+        contact = (concave_contact if self.inside else convex_contact)(_signed_distance)
+        return (Shape(contact, np.vstack([np.asarray(self.center), np.eye(3)]), (self.radius,)),)
+
+    def probes(self, edge_length: float) -> tuple[NDArray[np.float64], float]:
+        """The center of a ball that fits between vertices."""
+        small = not self.inside and self.radius < 2.0 * edge_length
+        return np.asarray(self.center)[None][: int(small)], self.radius

@@ -1,0 +1,180 @@
+"""A kind of obstacle of a user's own: one class and one call make it work everywhere."""
+
+import math
+from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
+from typing import ClassVar
+
+import h5py
+import numpy as np
+import pytest
+from numba import njit
+
+import supple as sp
+from supple.output.drawing import obstacle_pictures, view_of
+from supple.scene.obstacles.obstacle import Obstacle
+from supple.scene.obstacles.parameters import parameter
+from supple.scene.obstacles.polyhedra import hull, round_ball
+from supple.scene.obstacles.registry import KINDS, register
+from supple.scene.obstacles.shape import Shape, convex_contact
+from supple.viewer.drawing.layers.obstacles import ObstacleView
+from supple.viewer.drawing.moments.from_recording import model_of_recording, moment_of_frame
+from supple.viewer.drawing.moments.from_snapshot import Translator
+from supple.viewer.engine.measurement.contact_points import contact_points
+from supple.viewer.engine.measurement.describe import describe
+from supple.viewer.engine.scene.live_scene import LiveScene
+from supple.viewer.engine.simulation_loop import SimulationLoop
+from supple.viewer.protocol.command_queue import CommandQueue
+from supple.viewer.protocol.live_source import LiveSource
+
+RUBBER = sp.StableNeoHookean(youngs=2e4, poisson=0.3, density=1000.0, damping=0.01)
+
+
+@njit
+def _distance(parameters, s):
+    r = parameters[1]
+    h = parameters[0] - r
+    x, y, z = s[0] - min(max(s[0], -h), h), s[1] - min(max(s[1], -h), h), s[2] - min(max(s[2], -h), h)
+    d = math.sqrt(x * x + y * y + z * z)
+    if d > 0.0:
+        return d - r, (x / d, y / d, z / d)
+    sign = math.copysign(1.0, s[1])
+    return abs(s[1]) - h - r, (0.0, sign, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class RoundedCube(Obstacle):
+    """A cube with round edges and corners."""
+
+    half: float = field(default=0.5, metadata=parameter("positive", "half the edge length, round parts included [m]"))
+    rounding: float = field(default=0.1, metadata=parameter("positive", "radius of the edges [m]"))
+
+    file_kind: ClassVar[str] = "rounded_cube"
+
+    def signed_distance(self, points):
+        h = self.half - self.rounding
+        off = points - np.clip(points, -h, h)
+        length = np.linalg.norm(off, axis=1)
+        up = np.copysign(1.0, points[:, 1])[:, None] * np.array([0.0, 1.0, 0.0])
+        normals = np.where(length[:, None] > 0.0, off / np.maximum(length, 1e-300)[:, None], up)
+        return np.where(length > 0.0, length, np.abs(points[:, 1]) - h) - self.rounding, normals
+
+    def triangles(self):
+        ball = self.rounding * round_ball(inscribed=False)[0]
+        h = self.half - self.rounding
+        corners = [[x, y, z] for x in (-h, h) for y in (-h, h) for z in (-h, h)]
+        return hull(np.concatenate([ball + corner for corner in np.array(corners)]))
+
+    def shapes(self):
+        frame = np.vstack([np.zeros(3), np.eye(3)])
+        return (Shape(convex_contact(_distance), frame, (self.half, self.rounding)),)
+
+
+@pytest.fixture(autouse=True)
+def registered():
+    register(RoundedCube)
+    yield
+    del KINDS["RoundedCube"]
+
+
+def falling_cube(**obstacle):
+    cube = sp.Body("cube", sp.shapes.box((0.2,) * 3, (2, 2, 2)), RUBBER, position=(0, 0.605, 0))
+    return sp.Scene([cube], [RoundedCube(friction=0.4, **obstacle)])
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    path = tmp_path_factory.mktemp("toy") / "toy.vtkhdf"
+    lift = sp.Keyframes([0, 1], [[0, 0, 0], [0, 0.1, 0]])
+    return path, list(
+        sp.simulate(falling_cube(motion=lift), sp.XPBD(substeps=10), 1 / 60, 20, sinks=[sp.Recorder(path)])
+    )
+
+
+@pytest.mark.parametrize("solver", [sp.XPBD(substeps=10), sp.Implicit()], ids=["xpbd", "implicit"])
+def test_a_cube_comes_to_rest_on_it(solver):
+    frames = list(sp.simulate(falling_cube(), solver, 1 / 60, 30))
+    assert {frame.report.status for frame in frames} == {"converged"}
+    lowest = [frame.positions["cube"][:, 1].min() for frame in frames]
+    assert min(lowest) > 0.5 - 1e-4
+    assert lowest[-1] == pytest.approx(0.5, abs=1e-3)
+    assert frames[-1].report.kinetic_energy < 1e-2
+
+
+def test_a_scripted_one_carries_the_cube(recorded):
+    _, frames = recorded
+    assert frames[-1].positions["cube"][:, 1].min() == pytest.approx(0.5 + 0.1 / 3, abs=2e-3)
+
+
+def test_a_recording_reads_it_back(recorded):
+    path, _ = recorded
+    with sp.read_recording(path) as recording:
+        (found,) = recording.obstacles
+        assert isinstance(found.obstacle, RoundedCube)
+        assert (found.obstacle.half, found.obstacle.rounding, found.obstacle.friction) == (0.5, 0.1, 0.4)
+        np.testing.assert_allclose(recording[20].poses[0, :, 3], [0, 0.1 / 3, 0], atol=1e-12)
+        (drawn,) = obstacle_pictures(recording, view_of(recording))
+        assert drawn.vertices[:, 0].max() == pytest.approx(0.5, abs=1e-3)
+    del KINDS["RoundedCube"]
+    with pytest.raises(sp.OutputError, match="'RoundedCube 1' is of an unknown kind, 'RoundedCube'; register"):
+        sp.read_recording(path)
+    register(RoundedCube)
+
+
+def test_the_checker_sees_who_is_inside_of_it(recorded, tmp_path):
+    path, _ = recorded
+    settings = sp.CheckSettings(only=["obstacles", "containment"])
+    report = sp.check_recording(path, settings)
+    assert report["containment"].verdict == "pass"
+    assert report["obstacles"].worst > -1e-4
+    copy = tmp_path / "copy.vtkhdf"
+    copy.write_bytes(path.read_bytes())
+    with h5py.File(copy, "r+") as file:
+        n = len(file["supple/rest_positions"])
+        x = file["VTKHDF/Points"][3 * n : 4 * n]
+        file["VTKHDF/Points"][3 * n : 4 * n] = x - [0.0, 0.05, 0.0]
+        file["VTKHDF/Points"][5 * n : 6 * n] = 20 * (x - x.mean(axis=0))
+    report = sp.check_recording(copy, settings)
+    assert report["obstacles"].first_failure == 3
+    assert report["containment"].where == "RoundedCube 1 in cube"
+
+
+@pytest.mark.parametrize("kind", ["obj", "glb", "html"])
+def test_exports_show_it(recorded, tmp_path, kind):
+    path, _ = recorded
+    output = tmp_path / ("toy" if kind == "obj" else f"toy.{kind}")
+    sp.export(path, to=kind, output=output)
+    files = sorted(output.iterdir()) if output.is_dir() else [output]
+    assert b"RoundedCube" in files[0].read_bytes() or kind == "html"
+    assert files[0].stat().st_size > 10_000
+
+
+class Stage:
+    """Takes what a page would be sent."""
+
+    def add_mesh_simple(self, name, vertices, triangles, **options):
+        self.name, self.vertices, self.options = name, vertices, options
+        return SimpleNamespace(**options)
+
+
+def test_pages_draw_it(recorded):
+    path, _ = recorded
+    with sp.read_recording(path) as recording:
+        model = model_of_recording(recording)
+        begins, ends = (moment_of_frame(model, recording[k]) for k in (0, 20))
+        stage = Stage()
+        view = ObstacleView(stage, begins)
+        assert stage.name == "/obstacles/0 RoundedCube 1"
+        assert np.abs(stage.vertices).max() == pytest.approx(0.5, abs=1e-3)
+        assert stage.options["flat_shading"]
+        (handle, _), *_ = view._handles.values()
+        view.update(ends)
+        np.testing.assert_allclose(handle.position, [0, 0.1 / 3, 0], atol=1e-12)
+
+
+def test_a_running_scene_draws_it():
+    live = LiveScene(LiveSource("toy", falling_cube(), sp.XPBD(substeps=4), 1 / 60))
+    loop = SimulationLoop(live, CommandQueue(), None)
+    moment = Translator().moment(replace(loop.snapshot(0.0), description=describe(live)))
+    assert moment.model.obstacles[0].obstacle.values() == live.system.obstacles[0].values()
+    assert len(contact_points(live.system, live.state.positions - [0, 0.005, 0], 0.0)) == 9

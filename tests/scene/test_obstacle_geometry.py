@@ -1,0 +1,164 @@
+"""Signed distance, normal and triangles of every kind of obstacle."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.numerics.geometry.triangle_tree import TriangleTree
+from supple.scene.obstacles.registry import KINDS
+from supple.scene.obstacles.shape import PARAMETERS
+
+SOLIDS = {
+    "HalfSpace": sp.HalfSpace(point=(0.1, 0.2, 0.3), normal=(1, 2, 0.5)),
+    "Box": sp.Box(center=(0.1, 0.2, 0), size=(1, 0.5, 2), rotation=(0.3, 0.1, 0.5)),
+    "Sphere": sp.Sphere(center=(0.2, 0, 0), radius=0.7),
+    "Capsule": sp.Capsule(start=(-0.5, 0, 0.1), end=(0.6, 0.3, 0), radius=0.3),
+    "Cylinder": sp.Cylinder(start=(-0.5, 0, 0.1), end=(0.6, 0.3, 0), radius=0.3),
+    "TriangleObstacle": sp.TriangleObstacle(sp.shapes.sphere_surface(radius=1.0, edge_length=0.3)),
+}
+ROOMS = {f"{name} room": replace(one, inside=True) for name, one in SOLIDS.items() if hasattr(one, "inside")}
+ALL = SOLIDS | ROOMS
+
+
+def points_about(count, seed=1):
+    return np.random.default_rng(seed).uniform(-1.5, 1.5, (count, 3))
+
+
+def sampled(points, triangles, spacing):
+    """Points on triangles, no farther apart than about `spacing`."""
+    a, b, c = points[triangles].transpose(1, 0, 2)
+    parts = []
+    for corner, u, v in zip(a, b - a, c - a, strict=True):
+        n = 1 + int(max(np.linalg.norm(u), np.linalg.norm(v), np.linalg.norm(u - v)) / spacing)
+        i, j = np.array([(i, j) for i in range(n + 1) for j in range(n + 1 - i)]).T
+        parts.append(corner + np.outer(i / n, u) + np.outer(j / n, v))
+    return np.concatenate(parts)
+
+
+def test_every_registered_kind_is_tested():
+    assert set(SOLIDS) <= set(KINDS)
+    assert {"HalfSpace", "Box", "Sphere", "Capsule", "Cylinder", "TriangleObstacle"} == set(SOLIDS)
+
+
+@pytest.mark.parametrize("name", [name for name in ALL if name != "HalfSpace"])
+def test_the_distance_is_that_of_the_triangles(name):
+    """By brute force: the polyhedron in place of a round surface is within 0.4 % of the radius."""
+    from scipy.spatial import cKDTree
+
+    obstacle = ALL[name]
+    points = points_about(400)
+    distances, _ = obstacle.signed_distance(points)
+    surface = sp.SurfaceMesh(*obstacle.triangles())
+    brute, _ = cKDTree(sampled(surface.vertices, surface.triangles, 0.02)).query(points)
+    np.testing.assert_allclose(np.abs(distances), brute, atol=0.012)
+    assert (distances > 0).any()
+    assert (distances < 0).any()
+    exact = TriangleTree.of(surface.vertices, surface.triangles).nearest(points)[1]
+    round_off = 1e-12 if obstacle.has_exact_triangles or name == "Box room" else 4e-3 * getattr(obstacle, "radius", 0.0)
+    np.testing.assert_allclose(np.abs(distances), exact, atol=round_off)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_the_normal_is_the_gradient_of_the_distance(name):
+    obstacle, points, h = ALL[name], points_about(1000), 1e-6
+    _, normals = obstacle.signed_distance(points)
+    sides = [[obstacle.signed_distance(points + sign * h * axis)[0] for sign in (1, -1)] for axis in np.eye(3)]
+    slopes = np.stack([(above - below) / (2 * h) for above, below in sides], axis=1)
+    smooth = np.abs(np.linalg.norm(slopes, axis=1) - 1.0) < 1e-6  # not across a ridge
+    assert smooth.mean() > 0.99
+    np.testing.assert_allclose(normals[smooth], slopes[smooth], atol=2e-8)
+
+
+@pytest.mark.parametrize("name", [name for name in ALL if name != "TriangleObstacle"])
+def test_the_element_function_of_xpbd_agrees(name):
+    obstacle, points = ALL[name], points_about(300)
+    wanted, normals = obstacle.signed_distance(points)
+    gaps, directions = [], []
+    for shape in obstacle.shapes():
+        local = (points - shape.frame[0]) @ shape.frame[1:].T
+        numbers = np.zeros(PARAMETERS)
+        numbers[: len(shape.parameters)] = shape.parameters
+        found = [shape.contact(numbers, tuple(s), tuple(s)) for s in local]
+        gaps.append([gap for gap, _, _ in found])
+        directions.append(np.array([n for _, _, n in found]) @ shape.frame[1:])
+    nearest = np.argmin(gaps, axis=0)
+    rows = np.arange(len(points))
+    # Beyond an edge of a room of six planes, each plane by itself is nearer than the room.
+    same = wanted > 0.0 if len(gaps) > 1 else np.ones(len(points), dtype=bool)
+    np.testing.assert_allclose(np.array(gaps)[nearest, rows][same], wanted[same], atol=1e-14)
+    np.testing.assert_allclose(np.array(directions)[nearest, rows][same], normals[same], atol=1e-13)
+
+
+@pytest.mark.parametrize("name", [name for name in ALL if name != "HalfSpace"])
+def test_triangles_are_closed_face_outwards_and_keep_bodies_on_the_true_side(name):
+    obstacle = ALL[name]
+    vertices, triangles = obstacle.triangles()
+    edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
+    surface = sp.SurfaceMesh(vertices, triangles)
+    assert surface.volume > 0.0
+    a, b, c = vertices[triangles].transpose(1, 0, 2)
+    assert np.linalg.norm(np.cross(b - a, c - a), axis=1).min() > 1e-7
+    distances, _ = obstacle.signed_distance(sampled(vertices, triangles, 0.05))
+    assert distances.min() > -1e-12
+    assert distances.max() < 0.005 * getattr(obstacle, "radius", 0.0) + 1e-12
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_a_fast_point_is_held_where_it_entered(inside):
+    """Through a thin cylinder in one substep, along its axis and across it, and at its rim."""
+    obstacle = sp.Cylinder(start=(0, -0.002, 0), end=(0, 0.002, 0), radius=0.5, inside=inside)
+    (shape,) = obstacle.shapes()
+    numbers = np.array([*shape.parameters, 0.0, 0.0])
+
+    def contact(before, now):
+        ends = (shape.frame[1:] @ (np.asarray(p) - shape.frame[0]) for p in (before, now))
+        gap, gap_before, normal = shape.contact(numbers, *map(tuple, ends))
+        return gap, gap_before, normal @ shape.frame[1:]
+
+    if inside:
+        gap, before, normal = contact((0, 0, 0.2), (0, -3, 0.2))
+        assert (gap, before) == pytest.approx((-2.998, 0.002))
+        np.testing.assert_allclose(normal, (0, 1, 0), atol=1e-12)
+        return
+    for start, end, normal in [
+        ((0.1, 1, 0.2), (0.1, -2, 0.2), (0, 1, 0)),
+        ((0.1, -1, 0.2), (0.1, 0.001, 0.2), (0, -1, 0)),
+        ((0.4999, 1, 0), (0.4999, 0.0015, 0), (0, 1, 0)),
+        ((2, 0.001, 0), (-2, 0.001, 0), (1, 0, 0)),
+    ]:
+        gap, before, found = contact(start, end)
+        assert gap < 0.0 < before
+        np.testing.assert_allclose(found, normal, atol=1e-9)
+    assert contact((2, 0.01, 0), (-2, 0.01, 0))[0] > 0.0
+
+
+BAD = [
+    (lambda: sp.Capsule(start=(0, 0)), r"Capsule: start has shape \(2,\)"),
+    (lambda: sp.Capsule(start=(0, 0, 0), end=(0, 0, 0)), "Capsule: start and end are the same point; .* use a Sphere"),
+    (lambda: sp.Capsule(radius=0.0), "Capsule: radius is 0; it must be above zero"),
+    (lambda: sp.Cylinder(radius=np.inf), "Cylinder: radius is inf; it must be finite"),
+    (lambda: sp.Cylinder(end=(0, np.nan, 0), name="pole"), "obstacle 'pole': end is .*must be finite"),
+    (lambda: sp.Cylinder(inside="yes"), "Cylinder: inside is 'yes'; give True or False"),
+    (lambda: sp.Box(size=(1, 0, 1)), r"Box: size is \[1.0, 0.0, 1.0\]; every edge must be above zero"),
+    (lambda: sp.TriangleObstacle(), "TriangleObstacle: surface is None; give a SurfaceMesh"),
+]
+
+
+@pytest.mark.parametrize(("make", "words"), BAD)
+def test_bad_parameters_are_refused_in_one_line(make, words):
+    with pytest.raises(sp.SceneError, match=words) as caught:
+        make()
+    assert "\n" not in str(caught.value)
+
+
+def test_points_are_carried_by_the_motion():
+    turning = sp.Keyframes(times=[0, 2], angles=[0, np.pi], axis=(0, 1, 0), pivot=(1, 0, 0))
+    capsule = sp.Capsule(motion=turning)
+    points = points_about(20)
+    at = [points @ R.T + t for R, t in map(capsule.pose, (0.5, 1.25))]
+    np.testing.assert_allclose(capsule.carried(at[0], 0.5, 1.25), at[1], atol=1e-14)
+    still = sp.Capsule()
+    assert still.carried(points, 0.0, 1.0) is points

@@ -1,0 +1,52 @@
+"""Kernels of obstacles that several processes have cached do not mix."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+PUSH = """
+import sys
+import numpy as np
+import supple as sp
+from supple.scene.obstacles.registry import KINDS
+from supple.xpbd.contact.obstacle_contacts import kernels_of
+
+for name in sys.argv[1:]:
+    obstacle = sp.Sphere(radius=0.5) if name == "Sphere" else KINDS[name]()
+    (shape,) = obstacle.shapes()
+    x = np.array([[0.45, 0.1, 0.0]])
+    numbers = np.zeros((1, 4))
+    numbers[0, : len(shape.parameters)] = shape.parameters
+    arrays = (numbers, np.zeros(1, dtype=np.bool_))
+    rules = (np.zeros(1, np.int32), np.ones((1, 1), np.bool_), np.zeros((1, 1)))
+    found = (np.array([0, 1]), np.zeros(1, np.int32))
+    frames = shape.frame[None]
+    kernels_of(shape.contact)[1](x, x.copy(), found, arrays, rules, frames, frames, 0, 1, 1.0, 1.0)
+    print(name, *np.round(x[0], 6) + 0.0)
+"""
+PUSHED = {
+    "Box": "Box 0.5 0.1 0.0",
+    "Sphere": "Sphere 0.488094 0.108465 0.0",
+    "Capsule": "Capsule 0.5 0.1 0.0",
+    "Cylinder": "Cylinder 0.5 0.1 0.0",
+}
+
+
+@pytest.fixture
+def push(tmp_path):
+    def push(*names):
+        environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+        command = [sys.executable, "-c", PUSH, *names]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=200, check=True)
+        return done.stdout.splitlines()
+
+    return push
+
+
+def test_kernels_that_different_processes_have_compiled_stay_apart(push):
+    for name in ("Sphere", "Box"):
+        assert push(name) == [PUSHED[name]]
+    assert push("Box", "Sphere") == [PUSHED["Box"], PUSHED["Sphere"]]
+    assert push("Sphere", "Box", "Capsule") == [PUSHED[name] for name in ("Sphere", "Box", "Capsule")]
