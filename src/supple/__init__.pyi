@@ -19,13 +19,13 @@ from .materials.regions import Regions as Regions
 from .materials.st_venant_kirchhoff import StVenantKirchhoff as StVenantKirchhoff
 from .materials.stable_neo_hookean import StableNeoHookean as StableNeoHookean
 from .mesh import shapes as shapes
-from .mesh.io.tetgen_files import read_tetgen as read_tetgen
-from .mesh.io.tetgen_files import write_tetgen as write_tetgen
 from .mesh.meshing.repair import repair_surface as repair_surface
 from .mesh.meshing.tetrahedralize import tetrahedralize as tetrahedralize
 from .mesh.skin import Embedding as Embedding
 from .mesh.surface import SurfaceMesh as SurfaceMesh
 from .mesh.surface_checks import SurfaceReport as SurfaceReport
+from .mesh.tetgen_files import read_tetgen as read_tetgen
+from .mesh.tetgen_files import write_tetgen as write_tetgen
 from .mesh.tetmesh import TetMesh as TetMesh
 from .numerics.cubic import smallest_positive_cubic_root as smallest_positive_cubic_root
 from .numerics.svd3 import rotation_variant_svd as rotation_variant_svd

@@ -13,7 +13,7 @@ from hypothesis.extra import numpy as hnp
 
 from supple.errors import MeshError
 from supple.mesh.io.tetgen_family import read_tetgen_family
-from supple.mesh.io.tetgen_files import read_tetgen, write_tetgen
+from supple.mesh.tetgen_files import read_tetgen, write_tetgen
 from supple.mesh.tetmesh import TetMesh
 
 # Two tets that share the face 1 2 3 (counted from 0).

@@ -64,9 +64,9 @@ def mesh(
 
     from supple.mesh.io.mesh_files import TET_EXTENSIONS
     from supple.mesh.io.tetgen_family import family_paths, is_tetgen_path
-    from supple.mesh.io.tetgen_files import write_tetgen
     from supple.mesh.meshing.tetrahedralize import tetrahedralize_reported
     from supple.mesh.surface import SurfaceMesh
+    from supple.mesh.tetgen_files import write_tetgen
     from supple.replacing import refuse_to_replace
 
     # Checked before the meshing, which can take minutes.

@@ -8,11 +8,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.output.check.checks.seams import with_seams
 from supple.output.check.elastic_energy import elastic_energy, stiffness_scale
 from supple.output.check.geometry.box_tree import build_tree, triangle_boxes
 from supple.output.check.geometry.orientation import volume_signs
 from supple.output.check.geometry.surface_pairs import meeting_pairs
+from supple.output.check.seams import with_seams
 from supple.output.check.stitch_energy import stitch_energy, stitch_scale
 from supple.output.check.surfaces import Surfaces, surfaces_of
 from supple.output.recording.reader import RecordedFrame, Recording
