@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from supple.implicit.energies.regularization import Regularization
 from supple.implicit.energies.stitch_damping import StitchViscosity
 from supple.implicit.energies.stitches import StitchEnergy
 from supple.implicit.newton.direction import Tools
+from supple.implicit.stepping.conservation import Conservation
 from supple.state import State
 from supple.system import System
 
@@ -39,6 +40,10 @@ class Workspace:
     stitches: StitchEnergy | None
     stitch_viscosity: StitchViscosity | None
     checked: NDArray[np.float64] | None = None
+    conservation: Conservation = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.conservation = Conservation.of(self.elasticity, self.stitches, self.tools.free_motion)
 
     @property
     def bodies_end(self) -> int:

@@ -1,4 +1,4 @@
-"""What the midpoint rule keeps of momentum and energy, restored after each step.
+"""Conservation of momentum and energy by the midpoint rule, completed after each step.
 
 The rule conserves linear and angular momentum exactly where its equations are solved exactly. Newton's method leaves a
 residual; the total impulse and moment of it are removed here from every free piece.
@@ -29,26 +29,27 @@ from supple.implicit.newton.free_motion import FreeMotion
 from supple.state import State
 from supple.system import System
 
-# Of a piece's elastic, stitch and relative kinetic energy: what the integrator may have made of it.
+# The energy that the integrator may add, as a share of a piece's elastic, stitch and relative kinetic energy.
 _ALLOWED = 0.01
-# Of the relative kinetic energy: what one step may take.
+# The largest share of the relative kinetic energy that one step removes.
 _MOST_TAKEN = 0.9
 
 
 @dataclass(frozen=True, eq=False)
 class EnergyMade:
-    """What the next step must know: made : (p,) energy that the steps before have made of each piece [J]."""
+    """The memory of the steps so far: made : (p,) energy that the integrator has added to each piece [J]."""
 
     made: NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Conservation:
     """The pieces of a system, joined by tets and stitches.
 
     Attributes
     ----------
     piece : (n,) number of each vertex's piece; free : see `FreeMotion`
+    latest : positions (n, 3) [m], and the energy (p,) that each piece stores there [J], which the next step needs again
     """
 
     system: System
@@ -56,6 +57,7 @@ class Conservation:
     stitches: StitchEnergy | None
     piece: NDArray[np.int32]
     free: FreeMotion
+    latest: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
 
     @classmethod
     def of(cls, elasticity: Elasticity, stitches: StitchEnergy | None, free: FreeMotion) -> Conservation:
@@ -63,7 +65,7 @@ class Conservation:
         return cls(system, elasticity, stitches, system.joined_components, free)
 
     def restore_momentum(self, before: State, end: State, residual: NDArray[np.float64]) -> None:
-        """Take from the velocities at the end, in place, what the residual (n, 3) [N] gave to every free piece."""
+        """Remove from the velocities at the end, in place, the momenta that the residual (n, 3) [N] added."""
         h = end.time - before.time
         for k in range(len(self.free.totals)):
             rows = np.flatnonzero(self.free.piece == k)
@@ -76,10 +78,13 @@ class Conservation:
             end.velocities[rows] -= _rigid(m, x - center, impulses.sum(axis=0), moment)
 
     def limit_energy(self, before: State, end: State) -> EnergyMade:
-        """Take from the velocities at the end, in place, the energy that steps made beyond what is allowed."""
+        """Remove from the velocities at the end, in place, the added energy beyond the allowed share."""
         v = end.velocities
+        if self.latest is None or not np.array_equal(self.latest[0], before.positions):
+            self.latest = before.positions, self._stored(before.positions)
         stored = self._stored(end.positions)
-        made = stored - self._stored(before.positions) - self._work(before.positions, end.positions)
+        made = stored - self.latest[1] - self._work(before.positions, end.positions)
+        self.latest = end.positions, stored
         if isinstance(before.memory, EnergyMade) and len(before.memory.made) == len(made):
             made += before.memory.made
         for k in np.flatnonzero(made > _ALLOWED * stored):
@@ -102,16 +107,16 @@ class Conservation:
         if self.stitches is not None:
             owner = self.piece[self.stitches.stitching.elements()[:, 0]]
             out += np.bincount(owner, weights=self.stitches.energies(x), minlength=count)
-        return out
+        return out.astype(np.float64)
 
     def _work(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(p,) what the forces in the middle of the way store [J]."""
+        """(p,) work against the elastic and stitch forces at the midpoint, along the displacement of the step [J]."""
         gradient = np.zeros_like(start)
         middle = 0.5 * (start + end)
         self.elasticity.add_gradient(middle, gradient)
         if self.stitches is not None:
             self.stitches.add_gradient(middle, gradient)
-        return np.bincount(self.piece, weights=np.einsum("ij,ij->i", gradient, end - start))
+        return np.bincount(self.piece, weights=np.einsum("ij,ij->i", gradient, end - start)).astype(np.float64)
 
 
 def _rigid(

@@ -20,7 +20,6 @@ from supple.implicit.newton.convergence import Convergence
 from supple.implicit.newton.minimize import Outcome, Problem, minimize
 from supple.implicit.newton.objective import Objective
 from supple.implicit.newton.trace import NewtonRow
-from supple.implicit.stepping.conservation import Conservation
 from supple.implicit.stepping.contact_step import ContactStep
 from supple.implicit.stepping.dirichlet import move_pins
 from supple.implicit.stepping.integrators import Integrator, Plan, Static
@@ -118,9 +117,8 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
         problem = replace(problem, objective=contact.with_contact(base, x))
     outcome = contact.verified(replace(outcome, rows=rows))
     after = State(end, x, plan.velocity(x), plan.memory)
-    conservation = Conservation.of(workspace.elasticity, workspace.stitches, tools.free_motion)
     residual = plan.place * outcome.end.gradient
-    return Substep(settings.integrator.finish(plan, state, after, residual, conservation), outcome, contact)
+    return Substep(settings.integrator.finish(plan, state, after, residual, workspace.conservation), outcome, contact)
 
 
 def _objective(

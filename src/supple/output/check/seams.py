@@ -36,7 +36,7 @@ def with_seams(recording: Recording, surfaces: Surfaces) -> Surfaces:
     for _ in range(2):
         found = meeting_pairs(x, triangles, owners, joined, surfaces.ignored, *tree, pairs)
         pairs = np.zeros((found, 2), dtype=np.int64) if len(pairs) < found else pairs
-    has_stitch = np.isin(triangles, stitched).any(axis=1)
+    has_stitch = np.asarray(np.isin(triangles, stitched).any(axis=1))
     pairs = np.sort(pairs[has_stitch[pairs].any(axis=1)], axis=1)
     keys = pairs[:, 0] * len(triangles) + pairs[:, 1]
     return replace(surfaces, ignored=np.union1d(surfaces.ignored, keys))
