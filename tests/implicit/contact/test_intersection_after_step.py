@@ -29,7 +29,7 @@ def model_of(stitched):
     seams = [sp.SoftVertexTriangleStitch("high", "low", max_distance=1e-6, youngs=1e5, poisson=0.3)] if stitched else []
     scene = sp.Scene(bodies, stitches=seams)
     system = build_system(scene)
-    model = contact_model(system, sp.Implicit().contact, elasticity_of(system).material.mu)
+    model = contact_model(system, sp.IPCContact(), elasticity_of(system).material.mu)
     return model, initial_state(scene).positions, system
 
 

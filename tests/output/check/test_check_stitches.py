@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import h5py
 import numpy as np
 import pytest
 
 import supple as sp
 from supple.implicit.stepping.integrators import Newmark
 
-from .conftest import FRAMES, JELLY, X, failures, recorded, verdicts
+from .conftest import JELLY, X, failures, recorded, verdicts
 
 CUBE = sp.shapes.box((0.1, 0.1, 0.1), (2, 2, 2))
 
@@ -53,7 +52,7 @@ def test_energy_of_stitches_to_an_obstacle_is_counted(tmp_path):
     report = sp.check_recording(path)
     assert report.ok
     assert str(report["energy"].verdict) == "pass"
-    assert report["records"].worst < 1e-9
+    assert 0.0 <= (report["records"].worst or 0.0) < 1e-9
 
 
 def test_bodies_that_meet_beside_their_seam(tmp_path, corrupted):
@@ -84,8 +83,8 @@ class Gaining(Newmark):
 @pytest.mark.parametrize("gap", [0.0, 0.05])
 def test_energy_that_an_integrator_makes(tmp_path, gap):
     path = recorded(tmp_path / "r.vtkhdf", stitched(gap), sp.Implicit(integrator=Gaining()))
-    with h5py.File(path) as file:
-        assert (file["supple/frames/stitch_energy"][:FRAMES] > 0.0).any()
+    with sp.read_recording(path) as recording:
+        assert (recording.series("stitch_energy") > 0.0).any()
     assert "energy" in failures(path)
 
 
