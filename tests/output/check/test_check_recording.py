@@ -73,7 +73,7 @@ def test_a_recording_without_physics_is_read_and_unknown_checks_are_skipped(free
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda header: header["physics"].update(untouching=[[0, 7]]), "not there"),
+        (lambda header: header["physics"].update(untouching=[[0, 7]]), "does not exist"),
         (lambda header: header["physics"].update(untouching=3), "not described"),
         (lambda header: header["physics"].pop("laws"), "not described"),
         (lambda header: header["physics"].update(compliances=[]), "another number of bodies"),
