@@ -13,13 +13,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple.implicit.details import ImplicitDetails
 from supple.output.recording.checked_hdf5 import CheckedFile
 from supple.output.recording.file import Series
 from supple.state import SolverDetails
-from supple.xpbd.details import XPBDDetails
 
-_KINDS = {kind.__name__: kind for kind in (SolverDetails, XPBDDetails, ImplicitDetails)}
+
+def _kinds() -> dict[str, type[SolverDetails]]:
+    # Imported here, so that the independent checker, which imports this module, does not import solvers.
+    from supple.implicit.details import ImplicitDetails
+    from supple.xpbd.details import XPBDDetails
+
+    return {kind.__name__: kind for kind in (SolverDetails, XPBDDetails, ImplicitDetails)}
 
 
 @dataclass(frozen=True)
@@ -71,7 +75,8 @@ class RecordedDetails:
     @classmethod
     def like(cls, details: SolverDetails) -> RecordedDetails:
         """For details with the names and shapes of these. Of a class from outside of Supple, the known base is kept."""
-        kind = next(base for base in type(details).__mro__ if _KINDS.get(base.__name__) is base)
+        known = _kinds().values()
+        kind = next(base for base in type(details).__mro__ if base in known)
         kept = [field.name for field in fields(kind) if field.compare]
         return cls(kind, tuple(_field_like(name, getattr(details, name)) for name in kept))
 
@@ -81,7 +86,7 @@ class RecordedDetails:
         if "details" not in header:
             return cls()
         try:
-            kind = _KINDS[header["details"]["kind"]]
+            kind = _kinds()[header["details"]["kind"]]
             known = {field.name for field in fields(kind) if field.compare}
             made = cls(kind, tuple(_field_of(described) for described in header["details"]["fields"]))
         except (KeyError, TypeError, ValueError):
