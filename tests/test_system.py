@@ -1,4 +1,4 @@
-"""A scene flattened: masses, components, pins, and the state at the start."""
+"""The arrays of a System: masses, components, pins; and the state at the start."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ def test_masses_of_each_body_sum_to_density_times_volume():
     assert masses["a"][1] == pytest.approx(1200.0 / 12)
 
 
-def test_indices_of_the_second_body_are_shifted_and_arrays_have_the_promised_types():
+def test_indices_of_the_second_body_are_shifted_and_arrays_have_the_documented_types():
     system = build_system(two_cubes())
     b = system.bodies[1]
     assert system.tets[b.tets].min() == 8

@@ -1,7 +1,7 @@
-"""A scene as flat arrays: what solvers see.
+"""A scene as flat arrays: the input of solvers.
 
-The bodies' vertices, tets, edges and surface triangles are concatenated; `BodyRange` says which part is whose. A System
-knows nothing of solvers, files or viewers.
+The bodies' vertices, tets, edges and surface triangles are concatenated; a `BodyRange` has the rows of one body. This
+file does not depend on solvers, files or viewers.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from supple.state import State
 
 @dataclass(frozen=True, eq=False)
 class BodyRange:
-    """Which rows of the System's arrays belong to one body."""
+    """The rows of the System's arrays that belong to one body."""
 
     body: Body
     vertices: slice
@@ -43,7 +43,7 @@ class BodyRange:
 
 @dataclass(frozen=True, eq=False)
 class PinRange:
-    """The vertices of one pin, and where they are when its motion is undone (at time 0)."""
+    """The vertices of one pin, and their positions at time 0, before its motion."""
 
     pin: Pin
     vertices: NDArray[np.int32]
@@ -58,7 +58,7 @@ class PinRange:
         return self.pin.motion
 
     def targets(self, time: float) -> NDArray[np.float64]:
-        """Where the pinned vertices (k, 3) must be at `time` [m]."""
+        """Required positions (k, 3) of the pinned vertices at `time` [m]."""
         return moved_points(self.pin.motion, self.anchors, time, self.pin.label)
 
 
@@ -76,14 +76,14 @@ class ForceRange:
 
 @dataclass(frozen=True, eq=False)
 class SoftTargetRange:
-    """The vertices of one soft target, and where their springs pull them to when its motion is undone (at time 0)."""
+    """The vertices of one soft target, and the targets of their springs at time 0, before its motion."""
 
     target: SoftTarget
     vertices: NDArray[np.int32]
     anchors: NDArray[np.float64]
 
     def targets(self, time: float) -> NDArray[np.float64]:
-        """Where the springs pull the vertices (k, 3) to at `time` [m]."""
+        """Targets (k, 3) of the springs at `time` [m]."""
         return moved_points(self.target.motion, self.anchors, time, self.target.label)
 
 
@@ -93,15 +93,15 @@ class System:
 
     Attributes
     ----------
-    rest_positions : (n, 3) [m] rest shapes, each in its body's own coordinates (not placed)
+    rest_positions : (n, 3) [m] rest shapes, each in its body's own coordinates, before placement
     masses : (n,) lumped, rho V / 4 to each node of a tet [kg]
     tets : (m, 4); rest_shape_inverse : (m, 3, 3) Dm^-1 [1/m]; rest_volumes : (m,) [m^3]
     edges : (e, 2); rest_lengths : (e,) [m]
     triangles : (t, 3) surfaces, counter-clockwise from outside
-    components : (n,) which connected piece of a mesh a vertex belongs to
+    components : (n,) the connected piece of a mesh that a vertex belongs to
     gravity : (3,) [m/s^2]
     stitching : tets and springs that join bodies to each other, and to obstacles
-    start_states : where a simulation began; after it, where it is continued. Vertices in the scene's order.
+    start_states : where a simulation began, then where it continues; vertices in the scene's order
     """
 
     scene: Scene
@@ -133,18 +133,18 @@ class System:
         return np.concatenate(parts).astype(np.int32) if parts else np.zeros(0, dtype=np.int32)
 
     def pin_targets(self, time: float) -> NDArray[np.float64]:
-        """(k, 3) where the pinned vertices must be at `time` [m]."""
+        """(k, 3) required positions of the pinned vertices at `time` [m]."""
         parts = [pin.targets(time) for pin in self.pins]
         return np.concatenate(parts) if parts else np.zeros((0, 3))
 
     @cached_property
     def elements(self) -> NDArray[np.int32]:
-        """(m + k, 4) the tets, then the stitches: everything that couples vertices; -1 for a node without a vertex."""
+        """(m + k, 4) the tets, then the stitches: all elements that couple vertices; -1 for a node without a vertex."""
         return np.concatenate([self.tets, self.stitching.elements()]) if len(self.stitching) else self.tets
 
     @cached_property
     def joined_components(self) -> NDArray[np.int32]:
-        """(n,) which piece a vertex belongs to, where what stitches join is one piece."""
+        """(n,) the piece that a vertex belongs to; stitched pieces count as one."""
         return self.stitching.joined_components(self.components)
 
     @cached_property
@@ -164,7 +164,7 @@ def build_system(scene: Scene, start: State | None = None) -> System:
 
     Parameters
     ----------
-    start : the state that the simulation begins from; pins hold its vertices where they are there.
+    start : the state that the simulation begins from; pins fix its vertices at their positions there.
     """
     ranges, rest, masses, tets, Dm_inv, volumes, edges, triangles = [], [], [], [], [], [], [], []
     n = m = e = t = 0
@@ -207,7 +207,7 @@ def build_system(scene: Scene, start: State | None = None) -> System:
 
 
 def _start_states(scene: Scene, start: State | None) -> tuple[State, ...]:
-    """A start at a later time continues what the scene has begun."""
+    """A start after time 0 continues a simulation that began with the scene's placement."""
     if start is not None and start.time == 0.0:
         return (start,)
     begun = initial_state(scene)
@@ -245,7 +245,7 @@ def _chosen_vertices(item: Force | SoftTarget, ranges: list[BodyRange]) -> NDArr
 
 
 def _soft_target_ranges(scene: Scene, ranges: list[BodyRange], start: State | None) -> tuple[SoftTargetRange, ...]:
-    """Soft targets pull to where their vertices are placed, or were given to be, at time 0."""
+    """Soft targets pull to the placement of their vertices at time 0, or to their given positions there."""
     targets = []
     for target in scene.soft_targets:
         part = next(r for r in ranges if r.name == target.body)
@@ -263,11 +263,11 @@ def initial_state(
     positions: Mapping[str, ArrayLike] | None = None,
     velocities: Mapping[str, ArrayLike] | None = None,
 ) -> State:
-    """The state at time 0: bodies placed, moving as the scene says; or with the given positions and velocities.
+    """The state at time 0: placement and velocities of the scene, or the given positions and velocities.
 
     Parameters
     ----------
-    positions, velocities : by body name, (n, 3) [m] and [m/s]; bodies not named start as the scene says.
+    positions, velocities : by body name, (n, 3) [m] and [m/s]; others start as in the scene.
 
     Raises
     ------

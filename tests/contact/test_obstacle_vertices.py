@@ -1,4 +1,4 @@
-"""Obstacles as vertices that move by script, and bodies that they push, lift, drag and carry."""
+"""Obstacles as scripted vertices, and bodies that they push, lift and drag."""
 
 import numpy as np
 import pytest
@@ -47,8 +47,8 @@ def test_the_icosphere_is_closed_round_and_outward(splits):
     assert plane_offsets(points, triangles).min() > 0.75
 
 
-def test_spheres_hold_the_true_ball():
-    """From outside no body enters the ball; from inside none leaves it; and it is nearly the ball."""
+def test_sphere_polyhedra_enclose_the_ball_or_lie_inside_the_room():
+    """No body crosses the true surface, and the polyhedron differs from it by less than 0.4 %."""
     for inside in (False, True):
         _, (part,) = ranges_of(sp.Sphere(center=(0.3, -1.0, 2.0), radius=0.7, inside=inside))
         first = part.vertices[0]
@@ -63,7 +63,7 @@ def test_spheres_hold_the_true_ball():
             assert farthest < 0.7 * (1 + 4e-3)
 
 
-def test_boxes_sheets_and_half_spaces_are_what_the_scene_says():
+def test_vertices_of_boxes_sheets_and_half_spaces():
     turned = sp.Box(center=(1, 2, 3), size=(0.2, 0.4, 0.6), rotation=(0.3, -0.2, 0.9))
     floor = sp.HalfSpace(point=(0, -5, 0), normal=(1, 2, 2))
     sheet = sp.TriangleObstacle(surface=SHEET)
@@ -78,14 +78,14 @@ def test_boxes_sheets_and_half_spaces_are_what_the_scene_says():
     assert len(plane.triangles) == 0
     assert np.array_equal(triangles.anchors, SHEET.vertices)
     assert np.array_equal(triangles.triangles - triangles.vertices[0], SHEET.triangles)
-    # They come after the bodies, pinned, one after the other.
+    # They follow the bodies' vertices, and are pinned.
     n = 8
     assert len(system.rest_positions) == n + 8 + 2 + 4
     assert np.array_equal(system.pinned_vertices, np.arange(n, n + 14))
     assert (system.masses > 0.0).all()
 
 
-def test_scripted_obstacles_are_where_the_script_says():
+def test_scripted_obstacles_follow_their_script():
     turning = sp.Keyframes(times=[0, 2], angles=[0, np.pi], axis=(0, 1, 0), pivot=(1, 0, 0))
     _, parts = ranges_of(sp.Box(motion=turning), sp.HalfSpace(motion=lambda t: (0, 0.5 * t, 0)))
     x = obstacle_positions(parts, 1.0)
@@ -94,26 +94,26 @@ def test_scripted_obstacles_are_where_the_script_says():
     assert np.allclose(x[8:], parts[1].anchors + np.array([0, 0.5, 0]), atol=1e-15)
 
 
-def test_without_contact_obstacles_are_refused():
+def test_obstacles_without_contact_raise_an_error():
     scene = sp.Scene([cube()], obstacles=[sp.HalfSpace(point=(0, -1, 0), name="floor")])
     with pytest.raises(sp.SolverError, match=r"'floor'.*contact=None"):
         sp.simulate(scene, sp.Implicit(contact=None), 0.01, 1)
 
 
-def test_a_box_that_is_moved_pushes_a_cube_before_it():
-    """Also where one step of the script is longer than the gap: nobody is jumped over."""
+def test_a_moving_box_pushes_a_cube():
+    """Also where one step of the script is longer than the gap."""
     ram = sp.Box(center=(-0.21, 0, 0), size=(0.2, 0.3, 0.3), motion=lambda t: (0.3 * t, 0, 0))
     scene = sp.Scene([cube()], obstacles=[ram], gravity=(0, 0, 0))
     frames = run(scene, 0.1, 8)
     for frame in frames:
         face = -0.11 + 0.3 * frame.time
         assert frame.positions["cube"][:, 0].min() > face
-    # Nothing else acts: it goes at least as fast as what pushes it.
+    # No other force acts: the cube is at least as fast as the box.
     assert frames[-1].velocities["cube"][:, 0].mean() > 0.3 * 0.99
     assert np.abs(frames[-1].positions["cube"][:, 1].mean()) < 1e-3
 
 
-def test_a_floor_that_rises_lifts_a_cube():
+def test_a_rising_floor_lifts_a_cube():
     lift = sp.HalfSpace(motion=lambda t: (0, 0.2 * t, 0))
     scene = sp.Scene([cube(position=(0, 0.1005, 0))], obstacles=[lift])
     frames = run(scene, 0.05, 20)
@@ -126,7 +126,7 @@ def test_a_floor_that_rises_lifts_a_cube():
 
 
 @pytest.mark.parametrize("kind", ["half-space", "box"])
-def test_a_conveyor_drags_a_cube_to_its_speed(kind):
+def test_a_conveyor_accelerates_a_cube_to_its_speed(kind):
     def motion(t):
         return (0.5 * t, 0, 0)
 
@@ -137,15 +137,15 @@ def test_a_conveyor_drags_a_cube_to_its_speed(kind):
     )
     scene = sp.Scene([cube(position=(0, 0.1002, 0))], obstacles=[belt])
     frames = run(scene, 0.01, 50)
-    # It slips for v / (mu g) = .127 s, at mu g, and is then carried.
+    # It slips for v / (mu g) = .127 s, at mu g, and then moves with the belt.
     early = frames[7]
     assert early.velocities["cube"][:, 0].mean() == pytest.approx(0.4 * 9.81 * early.time, rel=0.1)
-    carried = [frame.velocities["cube"][:, 0].mean() for frame in frames[40:]]
-    assert np.mean(carried) == pytest.approx(0.5, rel=1e-2)
-    assert max(frame.velocities["cube"][:, 0].mean() for frame in frames) < 0.5 * 1.1  # it shakes
+    moving = [frame.velocities["cube"][:, 0].mean() for frame in frames[40:]]
+    assert np.mean(moving) == pytest.approx(0.5, rel=1e-2)
+    assert max(frame.velocities["cube"][:, 0].mean() for frame in frames) < 0.5 * 1.1  # it oscillates
 
 
-def test_a_turntable_carries_a_cube():
+def test_a_turntable_rotates_a_cube():
     turning = sp.Keyframes(times=[0, 10], angles=[0, 10.0], axis=(0, 1, 0))
     table = sp.Box(center=(0, -0.05, 0), size=(1, 0.1, 1), friction=0.8, motion=turning)
     body = cube(position=(0.25, 0.1002, 0), velocity=(0, 0, -0.25), angular_velocity=(0, 1, 0))

@@ -1,4 +1,4 @@
-"""Rules for pairs of things: what they say, what the table makes of them, and which are refused."""
+"""Rules for pairs of bodies and obstacles: their effect on the table, and which rules raise an error."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def scene(*pairs):
     return sp.Scene(bodies, obstacles, contact_pairs=pairs)
 
 
-def test_without_rules_obstacles_decide_and_bodies_use_the_geometric_mean():
+def test_friction_without_rules():
     table = pair_table(scene())
     assert table.bodies == 3
     assert np.array_equal(table.collide, block(3, 5))
@@ -29,13 +29,13 @@ def test_without_rules_obstacles_decide_and_bodies_use_the_geometric_mean():
 
 
 def block(bodies, count):
-    """True but between obstacles."""
+    """True, except between two obstacles."""
     touch = np.ones((count, count), bool)
     touch[bodies:, bodies:] = False
     return touch
 
 
-def test_a_rule_acts_on_its_pair_both_ways_and_on_nothing_else():
+def test_a_rule_is_symmetric_and_changes_only_its_pair():
     plain, table = pair_table(scene()), pair_table(scene(sp.ContactPair("floor", "a2", friction=2.0)))
     assert table.friction[1, 3] == table.friction[3, 1] == 2.0
     changed = table.friction != plain.friction
@@ -43,30 +43,30 @@ def test_a_rule_acts_on_its_pair_both_ways_and_on_nothing_else():
     assert np.array_equal(table.collide, plain.collide)
 
 
-def test_groups_are_every_pair_and_the_same_body_twice_is_itself():
+def test_lists_of_names_give_every_pair():
     table = pair_table(scene(sp.ContactPair(["a1", "a2"], ["a1", "b", "Sphere 1"], collide=False)))
     off = {(0, 0), (0, 1), (0, 2), (0, 4), (1, 2), (1, 4)}
     off |= {(j, i) for i, j in off}
     assert {(int(i), int(j)) for i, j in np.argwhere(~table.collide & block(3, 5))} == off
 
 
-def test_stars_stand_for_letters():
+def test_wildcards_match_names():
     table = pair_table(scene(sp.ContactPair("a*", "floo?", friction=0.1), sp.ContactPair("b", "*", collide=False)))
     assert table.friction[:3, 3].tolist() == [0.1, 0.1, 0.3]
     assert not table.collide[2].any()
     assert table.collide[:2, :2].all()
 
 
-def test_the_same_rule_twice_is_no_contradiction():
+def test_repeating_a_rule_is_allowed():
     pairs = sp.ContactPair("a1", "floor", friction=0.5), sp.ContactPair("floor", ["a1", "a2"], friction=0.5)
     assert pair_table(scene(*pairs)).friction[:3, 3].tolist() == [0.5, 0.5, 0.3]
 
 
 BAD = [
-    (lambda: sp.ContactPair("a1", "b"), "contact pair of 'a1' and 'b': it says nothing; give friction=..., or"),
+    (lambda: sp.ContactPair("a1", "b"), "contact pair of 'a1' and 'b': it has no effect; give friction=..., or"),
     (lambda: sp.ContactPair("a1", "b", friction=-1), "friction is -1; it must be zero or more"),
     (lambda: sp.ContactPair("a1", "b", friction=np.nan), "friction is nan; it must be finite"),
-    (lambda: sp.ContactPair("a1", "b", friction=0.2, collide=False), "a pair that does not collide; take one of them"),
+    (lambda: sp.ContactPair("a1", "b", friction=0.2, collide=False), "a pair that does not collide; remove one of the"),
     (lambda: sp.ContactPair("a1", "b", collide=0), "collide is 0; give True or False"),
     (lambda: sp.ContactPair([], "b", collide=False), "first is empty; give a name or a list"),
     (lambda: sp.ContactPair("b", 7, collide=False), "second is 7; give a name or a list"),
@@ -81,17 +81,17 @@ BAD = [
     ),
     (
         lambda: scene(sp.ContactPair("a*", "b", collide=False), sp.ContactPair("b", "a2", friction=0.1)),
-        r"contact pair of 'b' and 'a2': contact pair 0 \(from 0\) says otherwise of 'b' and 'a2'; keep one",
+        r"contact pair of 'b' and 'a2': contact pair 0 \(from 0\) contradicts it for 'b' and 'a2'; keep one",
     ),
     (
         lambda: scene(sp.ContactPair("a1", "b", friction=0.2), sp.ContactPair("b", "a1", friction=0.1)),
-        "says otherwise of 'b' and 'a1'",
+        "contradicts it for 'b' and 'a1'",
     ),
 ]
 
 
-@pytest.mark.parametrize(("make", "said"), BAD, ids=[said[-40:] for _, said in BAD])
-def test_impossible_rules_are_refused_in_one_line(make, said):
-    with pytest.raises(sp.SceneError, match=said) as caught:
+@pytest.mark.parametrize(("make", "message"), BAD, ids=[message[-40:] for _, message in BAD])
+def test_impossible_rules_raise_a_one_line_error(make, message):
+    with pytest.raises(sp.SceneError, match=message) as caught:
         make()
     assert "\n" not in str(caught.value)

@@ -44,7 +44,7 @@ def test_every_registered_kind_is_tested():
 
 @pytest.mark.parametrize("name", [name for name in ALL if name != "HalfSpace"])
 def test_the_distance_is_that_of_the_triangles(name):
-    """By brute force: the polyhedron in place of a round surface is within 0.4 % of the radius."""
+    """By brute force. Polyhedra of round surfaces are within 0.4 % of the radius."""
     from scipy.spatial import cKDTree
 
     obstacle = ALL[name]
@@ -85,14 +85,14 @@ def test_the_element_function_of_xpbd_agrees(name):
         directions.append(np.array([n for _, _, n in found]) @ shape.frame[1:])
     nearest = np.argmin(gaps, axis=0)
     rows = np.arange(len(points))
-    # Beyond an edge of a room of six planes, each plane by itself is nearer than the room.
+    # Outside of a room of six planes, the distance from one plane can be smaller than that from the room.
     same = wanted > 0.0 if len(gaps) > 1 else np.ones(len(points), dtype=bool)
     np.testing.assert_allclose(np.array(gaps)[nearest, rows][same], wanted[same], atol=1e-14)
     np.testing.assert_allclose(np.array(directions)[nearest, rows][same], normals[same], atol=1e-13)
 
 
 @pytest.mark.parametrize("name", [name for name in ALL if name != "HalfSpace"])
-def test_triangles_are_closed_face_outwards_and_keep_bodies_on_the_true_side(name):
+def test_triangles_are_closed_face_outwards_and_do_not_cross_the_true_surface(name):
     obstacle = ALL[name]
     vertices, triangles = obstacle.triangles()
     edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
@@ -107,7 +107,7 @@ def test_triangles_are_closed_face_outwards_and_keep_bodies_on_the_true_side(nam
 
 
 @pytest.mark.parametrize("inside", [False, True])
-def test_a_fast_point_is_held_where_it_entered(inside):
+def test_a_fast_point_stays_on_the_side_where_it_entered(inside):
     """Through a thin cylinder in one substep, along its axis and across it, and at its rim."""
     obstacle = sp.Cylinder(start=(0, -0.002, 0), end=(0, 0.002, 0), radius=0.5, inside=inside)
     (shape,) = obstacle.shapes()
@@ -148,7 +148,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("make", "words"), BAD)
-def test_bad_parameters_are_refused_in_one_line(make, words):
+def test_bad_parameters_raise_a_one_line_error(make, words):
     with pytest.raises(sp.SceneError, match=words) as caught:
         make()
     assert "\n" not in str(caught.value)

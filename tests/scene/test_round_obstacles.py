@@ -11,7 +11,7 @@ SOLVERS = {"xpbd": sp.XPBD(substeps=10), "implicit": sp.Implicit()}
 
 
 def rails(kind, tilt=0.0, **obstacle):
-    """Two bars along z whose groove has its lowest line through the origin, tilted downwards along z."""
+    """Two parallel bars along z, tilted downwards along z."""
     along = np.array([0.0, -np.sin(tilt), np.cos(tilt)])
     sides = [np.array([x, 0.0, 0.0]) for x in (-0.52, 0.52)]
     return [kind(start=side - 2 * along, end=side + 2 * along, radius=0.5, **obstacle) for side in sides]
@@ -45,10 +45,10 @@ def test_a_ball_comes_to_rest(support, solver):
 
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("kind", [sp.Capsule, sp.Cylinder])
-def test_a_ball_slides_along_bars_as_fast_as_gravity_says(kind, solver):
+def test_a_ball_slides_along_bars_without_friction(kind, solver):
     tilt, steps = 0.2, 30
     normal, along = np.array([0, np.cos(tilt), np.sin(tilt)]), np.array([0, -np.sin(tilt), np.cos(tilt)])
-    # What lies on the tilted bars is lighter by cos(tilt); it starts where it rests.
+    # The ball starts near its rest position between the bars.
     body = sp.Body("ball", BALL, JELLY, position=normal * (HEIGHT + 5e-4))
     scene = sp.Scene([body], rails(kind, tilt))
     way = [frame.positions["ball"].mean(axis=0) for frame in sp.simulate(scene, SOLVERS[solver], 1 / 60, steps)]
@@ -104,8 +104,8 @@ def test_turning_rollers_carry_a_plate(solver):
     assert min(speeds[8:]) > 0.28
 
 
-def test_thin_bars_hold_a_coarse_body_in_xpbd():
-    """No vertex of the body comes near the bar: points of its axis keep the faces off."""
+def test_thin_bars_support_a_coarse_body_in_xpbd():
+    """No vertex of the body is near the bar: points of its axis support the faces."""
     soft = sp.EdgesAndVolume(edge_compliance=5e-5, volume_compliance=0.0, density=1000, damping=0.01)
     for kind in (sp.Capsule, sp.Cylinder):
         bar = kind(start=(-1, -0.03, 0.02), end=(1, -0.03, 0.02), radius=0.03)

@@ -1,4 +1,4 @@
-"""What a user types into a scene: every impossible value is refused by name."""
+"""Values of a scene: every impossible value raises an error that names it."""
 
 import numpy as np
 import pytest

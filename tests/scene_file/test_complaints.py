@@ -173,7 +173,7 @@ CASES = [
     (
         "dt: 1/60",
         "contact_pairs:\n  - {first: cube, second: cube, collide: false}\n  - {first: cube, second: cube, friction: 1}",
-        "15: contact_pairs[1]: contact pair of 'cube' and 'cube': contact pair 0 (from 0) says otherwise of",
+        "15: contact_pairs[1]: contact pair of 'cube' and 'cube': contact pair 0 (from 0) contradicts it for",
     ),
     (
         "dt: 1/60",

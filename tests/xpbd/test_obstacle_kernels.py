@@ -1,4 +1,4 @@
-"""Kernels of obstacles that several processes have cached do not mix."""
+"""Cached kernels of obstacles from several processes do not interfere."""
 
 import os
 import subprocess
@@ -45,7 +45,7 @@ def push(tmp_path):
     return push
 
 
-def test_kernels_that_different_processes_have_compiled_stay_apart(push):
+def test_cached_kernels_of_several_processes_do_not_interfere(push):
     for name in ("Sphere", "Box"):
         assert push(name) == [PUSHED[name]]
     assert push("Box", "Sphere") == [PUSHED["Box"], PUSHED["Sphere"]]

@@ -1,4 +1,4 @@
-"""Where scripted obstacles are at the two ends of a substep."""
+"""Poses of scripted obstacles at the beginning and the end of a substep."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from supple.scene.obstacles.obstacle import Obstacle
 
 
 class ObstaclePoses:
-    """Rotations (k, 3, 3) and translations (k, 3) [m] of k obstacles, at one time; each time is asked for once."""
+    """Rotations (k, 3, 3) and translations (k, 3) [m] of k obstacles, at one time. Each time is evaluated once."""
 
     def __init__(self, obstacles: Sequence[Obstacle]) -> None:
         self.obstacles = tuple(obstacles)

@@ -1,8 +1,8 @@
-"""Obstacles as vertices that move by script: pinned, without a body.
+"""Obstacles as scripted vertices: pinned, without a body.
 
-The implicit solver sees one array of positions: the bodies' vertices, and after them the corners of the obstacles. An
-obstacle's corners are carried to where they must be exactly as pins are, so that a body is pushed out of the way, or
-says what blocks it. A half-space is two points: a point of its plane, and the tip of its normal.
+The implicit solver has one array of positions: the bodies' vertices, and after them the vertices of the obstacles. An
+obstacle's vertices follow their script as pins do, so that a body is pushed out of the way, or a report names what
+blocks it. A half-space has two vertices: a point of its plane, and the tip of its normal.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class ObstacleRange:
         return self.obstacle.plane is not None
 
     def targets(self, time: float) -> NDArray[np.float64]:
-        """Where the vertices (k, 3) are at `time` [m]."""
+        """Positions (k, 3) of the vertices at `time` [m]."""
         if self.obstacle.motion is None:
             return self.anchors
         rotation, translation = self.obstacle.pose(time)
@@ -54,20 +54,20 @@ class ObstacleRange:
 
 
 def with_obstacles(system: System) -> tuple[System, tuple[ObstacleRange, ...]]:
-    """The system with the obstacles' vertices appended and pinned, and which ones they are."""
+    """The system with the obstacles' vertices appended and pinned, and their ranges."""
     diagonal = max(float(np.linalg.norm(np.ptp(system.rest_positions[p.vertices], axis=0))) for p in system.bodies)
     ranges: list[ObstacleRange] = []
     n = len(system.rest_positions)
     for index, obstacle in enumerate(system.obstacles):
         points, triangles = _surface(obstacle, diagonal)
         vertices = np.arange(n, n + len(points), dtype=np.int32)
-        corners = (triangles + n).astype(np.int32)
-        ranges.append(ObstacleRange(obstacle, index, vertices, np.ascontiguousarray(points), corners))
+        numbered = (triangles + n).astype(np.int32)
+        ranges.append(ObstacleRange(obstacle, index, vertices, np.ascontiguousarray(points), numbered))
         n += len(points)
     if not ranges:
         return system, ()
     added = np.concatenate([part.anchors for part in ranges])
-    # They are never free, but formulas that divide by masses see all vertices.
+    # They are never free, but some formulas divide by the masses of all vertices.
     light = np.full(len(added), 1e-6 * float(system.masses.min()))
     pieces = int(system.components.max()) + 1
     extended = replace(
@@ -82,7 +82,7 @@ def with_obstacles(system: System) -> tuple[System, tuple[ObstacleRange, ...]]:
 
 
 def obstacle_positions(ranges: tuple[ObstacleRange, ...], time: float) -> NDArray[np.float64]:
-    """(k, 3) of all obstacles' vertices at `time` [m]."""
+    """(k, 3) positions of all obstacles' vertices at `time` [m]."""
     return np.concatenate([part.targets(time) for part in ranges]) if ranges else np.zeros((0, 3))
 
 

@@ -1,4 +1,4 @@
-"""A soft body: a tetrahedral mesh, what it is made of, where it starts and how it moves there."""
+"""A soft body: a tetrahedral mesh, its material, its placement and its initial velocity."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class Body:
     ----------
     name : unique in its scene; frames and recordings are indexed by it.
     mesh : rest shape, in the body's own coordinates [m].
-    material : what it is made of.
-    position : (3,) where the mesh's origin is placed [m].
+    material : one material, or `Regions`.
+    position : (3,) of the mesh's origin [m].
     rotation : (3,) rotation vector that turns the mesh about its origin before it is placed [rad].
     velocity : (3,) initial velocity of the center of mass [m/s].
     angular_velocity : (3,) initial spin about the center of mass [rad/s].

@@ -1,4 +1,4 @@
-"""Which bodies and obstacles touch, and with how much friction: the one place where both solvers look it up."""
+"""Which bodies and obstacles touch, and with which friction coefficient. Both solvers use this file."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ class ContactPair:
     Parameters
     ----------
     first, second : name of a body or an obstacle, or a list of names: then the rule holds for every pair of one of the
-        first and one of the second. `*` and `?` stand for any letters and any one letter. A body paired with itself is
-        its contact with itself.
-    friction : Coulomb coefficient of these pairs, instead of what the bodies and obstacles say.
-    collide : False, and these pairs pass through each other.
+        first and one of the second. `*` matches any letters, `?` any one letter. A body paired with itself is its
+        contact with itself.
+    friction : Coulomb coefficient of these pairs, instead of those of the bodies and obstacles.
+    collide : if False, these pairs pass through each other.
 
     Raises
     ------
-    SceneError : where a value is of the wrong kind, or the rule says nothing.
+    SceneError : where a value is of the wrong kind, or the rule has no effect.
     """
 
     first: str | Sequence[str]
@@ -47,25 +47,25 @@ class ContactPair:
         if self.friction is not None:
             object.__setattr__(self, "friction", non_negative(self.friction, f"{self.label}: friction"))
             if not self.collide:
-                raise SceneError(f"{self.label}: friction of a pair that does not collide; take one of them out")
+                raise SceneError(f"{self.label}: friction of a pair that does not collide; remove one of the two")
         elif self.collide:
-            raise SceneError(f"{self.label}: it says nothing; give friction=..., or collide=False")
+            raise SceneError(f"{self.label}: it has no effect; give friction=..., or collide=False")
 
     @property
     def label(self) -> str:
-        """How messages call this rule."""
+        """The name of this rule in messages."""
         return f"contact pair of {_listed(self.first)} and {_listed(self.second)}"
 
 
 @dataclass(frozen=True, eq=False)
 class PairTable:
-    """What holds for each pair of p things: bodies in the scene's order, then obstacles in the scene's order.
+    """Contact of each pair of p bodies and obstacles: bodies in the scene's order, then obstacles in the scene's order.
 
     Attributes
     ----------
-    collide : (p, p) whether the two touch; the diagonal says whether a body touches itself
+    collide : (p, p) whether the two touch; on the diagonal: whether a body touches itself
     friction : (p, p) Coulomb coefficients
-    bodies : how many of the p are bodies
+    bodies : number of bodies among the p
 
     Both arrays are symmetric. Between two obstacles there is no contact: False and 0.
     """
@@ -101,7 +101,7 @@ class PairRules:
         self._rule: NDArray[np.int32] | None = None
 
     def add(self, pair: ContactPair) -> None:
-        """Take in one more rule.
+        """Add one rule.
 
         Raises
         ------
@@ -119,11 +119,11 @@ class PairRules:
         for rows, columns in ((first, second), (second, first)):
             block = np.ix_(rows, columns)
             for earlier in np.unique(self._rule[block]):
-                if earlier >= 0 and _says(self._pairs[earlier]) != _says(pair):
+                if earlier >= 0 and _effect(self._pairs[earlier]) != _effect(pair):
                     i, j = np.argwhere(self._rule[block] == earlier)[0]
                     a, b = self._names[rows[i]], self._names[columns[j]]
                     raise SceneError(
-                        f"{pair.label}: contact pair {earlier} (from 0) says otherwise of {a!r} and {b!r}; keep one"
+                        f"{pair.label}: contact pair {earlier} (from 0) contradicts it for {a!r} and {b!r}; keep one"
                     )
         for rows, columns in ((first, second), (second, first)):
             self._rule[np.ix_(rows, columns)] = len(self._pairs)
@@ -134,29 +134,29 @@ class PairRules:
         if self._rule is None:
             return
         for number, pair in enumerate(self._pairs):
-            meant = self._rule == number
+            entries = self._rule == number
             if pair.friction is None:
-                table.collide[meant] = False
+                table.collide[entries] = False
             else:
-                table.friction[meant] = pair.friction
+                table.friction[entries] = pair.friction
 
     def _found(self, pair: ContactPair, key: str) -> list[int]:
-        """Numbers of the things that one side of a rule names, ascending."""
+        """Numbers of the bodies and obstacles that one side of a rule names, ascending."""
         numbers: set[int] = set()
         for name in getattr(pair, key):
             found = [i for i, known in enumerate(self._names) if _matches(name, known)]
             if not found:
-                mend = suggestion(name, self._names)
-                raise SceneError(f"{pair.label}: {key}: there is no body or obstacle {name!r}; {mend}")
+                remedy = suggestion(name, self._names)
+                raise SceneError(f"{pair.label}: {key}: there is no body or obstacle {name!r}; {remedy}")
             numbers.update(found)
         return sorted(numbers)
 
 
 def pair_table(scene: HasContactPairs) -> PairTable:
-    """Which of a scene's things touch, and with how much friction.
+    """Which bodies and obstacles of a scene touch, and with which friction coefficient.
 
-    Without a rule everything touches; an obstacle's coefficient holds for all bodies, and two bodies, or a body and
-    itself, use the geometric mean of theirs.
+    Without a rule everything touches. An obstacle's coefficient holds for all bodies. Two bodies, or a body and itself,
+    use the geometric mean of their coefficients.
     """
     bodies, count = len(scene.bodies), len(scene.bodies) + len(scene.obstacles)
     own = np.array([body.friction for body in scene.bodies], dtype=np.float64)
@@ -175,7 +175,7 @@ def pair_table(scene: HasContactPairs) -> PairTable:
     return table
 
 
-def _says(pair: ContactPair) -> tuple[float | None, bool]:
+def _effect(pair: ContactPair) -> tuple[float | None, bool]:
     return pair.friction, pair.collide
 
 
@@ -194,7 +194,7 @@ def _names(value: object, key: str) -> tuple[str, ...]:
 
 
 def _matches(pattern: str, name: str) -> bool:
-    """Whether a name is meant. Names hold neither `*` nor `?`, but may hold `[`, which is no pattern here."""
+    """Whether a name matches. Names contain no `*` and no `?`; they may contain `[`, which is not a pattern here."""
     if "*" in pattern or "?" in pattern:
         return fnmatchcase(name, pattern.replace("[", "[[]"))
     return pattern == name

@@ -1,4 +1,4 @@
-"""Forces on vertices, and springs that pull vertices to where they should be."""
+"""Forces on vertices, and springs that pull vertices to target positions."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from supple.scene.values import check_name, positive
 
 @dataclass(frozen=True, eq=False)
 class Force:
-    """A dead load: a force that keeps its direction however the body deforms.
+    """A dead load: a force whose direction does not follow the deformation.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ class Force:
     vertices : indices into the body's mesh, or an `InBox`.
     force : [N]; (3,) is the total, shared equally by the vertices; (k, 3) is one force for each of them; or a function
         of time [s] that returns either.
-    name : stands in messages.
+    name : appears in messages.
 
     Raises
     ------
@@ -46,7 +46,7 @@ class Force:
 
     @property
     def label(self) -> str:
-        """How messages call this force."""
+        """The name of this force in messages."""
         return f"force {self.name!r} on body {self.body!r}" if self.name else f"force on body {self.body!r}"
 
     def select(self, placed: NDArray[np.float64]) -> NDArray[np.int32]:
@@ -54,11 +54,11 @@ class Force:
         return selected_vertices(self.vertices, placed, self.label)
 
     def per_vertex(self, time: float, count: int) -> NDArray[np.float64]:
-        """The force (count, 3) on each of the `count` chosen vertices at `time` [N].
+        """The force (count, 3) on each of the `count` selected vertices at `time` [N].
 
         Raises
         ------
-        SceneError : where there are forces for another number of vertices, or the function of time returns nonsense.
+        SceneError : where the number of forces is not that of vertices, or the function of time returns a wrong value.
         """
         given = self._checked(self.force(time), f"force({time:g})") if callable(self.force) else np.asarray(self.force)
         if given.ndim == 1:
@@ -81,7 +81,7 @@ class Force:
 
 @dataclass(frozen=True, eq=False)
 class SoftTarget:
-    """Springs of rest length zero from vertices to where they start, or to where `motion` carries that place.
+    """Springs of rest length zero from vertices to their positions at the start, or to where `motion` moves these.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class SoftTarget:
     vertices : indices into the body's mesh, or an `InBox`.
     stiffness : of each vertex's spring [N/m].
     motion : None, `Keyframes`, or t -> displacement [m], (3,) for all or (k, 3) for each vertex.
-    name : stands in messages.
+    name : appears in messages.
     """
 
     body: str
@@ -108,7 +108,7 @@ class SoftTarget:
 
     @property
     def label(self) -> str:
-        """How messages call this soft target."""
+        """The name of this soft target in messages."""
         return f"soft target {self.name!r} of body {self.body!r}" if self.name else f"soft target of body {self.body!r}"
 
     def select(self, placed: NDArray[np.float64]) -> NDArray[np.int32]:

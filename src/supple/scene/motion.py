@@ -1,6 +1,6 @@
-"""How something scripted moves: nothing, keyframes, or a function of time.
+"""Scripted motion: none, keyframes, or a function of time.
 
-A motion is a displacement of points from where they are at time 0. Keyframes may turn as well; a function of time
+A motion displaces points from their positions at time 0. Keyframes can also rotate them; a function of time
 returns a displacement, one for all points (3,) or one for each (k, 3).
 """
 
@@ -25,7 +25,7 @@ class Keyframes:
     times : (k,) strictly increasing [s]
     displacements : (k, 3) [m], or None for no translation
     angles : (k,) [rad], or None for no rotation
-    axis, pivot : (3,) the line that the angles turn about, through `pivot` [m] along `axis`
+    axis, pivot : (3,) axis of the rotation: through `pivot` [m] along `axis`
 
     Raises
     ------
@@ -99,12 +99,12 @@ def check_motion(motion: object, owner: str) -> None:
 def displacement_at(
     motion: Callable[[float], ArrayLike], time: float, owner: str, count: int | None
 ) -> NDArray[np.float64]:
-    """What a scripted function returns at `time`, checked: (3,), or (count, 3) where `count` is given."""
-    said = motion(time)
+    """The checked value of a function of time: (3,), or (count, 3) where `count` is given."""
+    returned = motion(time)
     try:
-        value = np.asarray(said, dtype=np.float64)
+        value = np.asarray(returned, dtype=np.float64)
     except (TypeError, ValueError):
-        raise SceneError(f"{owner}: motion({time:g}) is {said!r}; it must be an array of numbers") from None
+        raise SceneError(f"{owner}: motion({time:g}) is {returned!r}; it must be an array of numbers") from None
     if value.shape != (3,) and (count is None or value.shape != (count, 3)):
         want = "(3,)" if count is None else f"(3,) or ({count}, 3)"
         raise SceneError(f"{owner}: motion({time:g}) has shape {value.shape}; it must have shape {want}")

@@ -1,4 +1,4 @@
-"""Vertices that are held, or moved along a script."""
+"""Vertices that are fixed, or moved by a script."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ __all__ = ["InBox", "Pin"]
 
 @dataclass(frozen=True, eq=False)
 class Pin:
-    """Holds vertices of one body where they start, or carries them along `motion` from there.
+    """Fixes vertices of one body at their start, or moves them along `motion` from there.
 
     Parameters
     ----------
     body : name of the body.
     vertices : indices into the body's mesh, or an `InBox`.
     motion : None, `Keyframes`, or t -> displacement [m], (3,) for all or (k, 3) for each vertex.
-    name : stands in messages and in the reaction forces of a report.
+    name : appears in messages and in the reaction forces of a report.
     """
 
     body: str
@@ -40,7 +40,7 @@ class Pin:
 
     @property
     def label(self) -> str:
-        """How messages call this pin."""
+        """The name of this pin in messages."""
         return f"pin {self.name!r} of body {self.body!r}" if self.name else f"pin of body {self.body!r}"
 
     def select(self, placed: NDArray[np.float64]) -> NDArray[np.int32]:

@@ -39,10 +39,10 @@ class Scene:
     ----------
     bodies : at least one.
     obstacles : rigid things that bodies collide with. No two bodies or obstacles have the same name.
-    pins : vertices held or scripted.
+    pins : fixed or scripted vertices.
     gravity : (3,) acceleration [m/s^2].
     forces : loads on vertices; soft_targets : springs to places.
-    stitches : what joins bodies to each other, and to triangle obstacles.
+    stitches : joints of bodies with each other, and with triangle obstacles.
     contact_pairs : friction of some pairs of bodies and obstacles, and which of them pass through each other.
 
     Raises
@@ -74,23 +74,23 @@ class Scene:
         object.__setattr__(self, "gravity", finite_vector(self.gravity, "scene: gravity"))
         known = [body.name for body in self.bodies]
         object.__setattr__(self, "obstacles", _all_named(self.obstacles, known))
-        owners: dict[str | None, str] = {}
+        named: dict[str | None, str] = {}
         for thing, name in [("body", name) for name in known] + [("obstacle", item.name) for item in self.obstacles]:
-            if name in owners:
-                things = f"{owners[name]} {name!r} and {thing} {name!r}"
+            if name in named:
+                things = f"{named[name]} {name!r} and {thing} {name!r}"
                 raise SceneError(f"scene: {things} have the same name; give each body and obstacle a name of its own")
-            owners[name] = thing
-        held: dict[str, np.ndarray] = {}
+            named[name] = thing
+        pinned: dict[str, np.ndarray] = {}
         for pin in self.pins:
             if pin.body not in known:
                 raise SceneError(f"{pin.label}: there is no such body; the scene has {', '.join(map(repr, known))}")
             body = self.body(pin.body)
             chosen = pin.select(body.place(body.mesh.vertices))
-            taken = held.setdefault(pin.body, np.zeros(len(body.mesh.vertices), dtype=bool))
-            if taken[chosen].any():
-                vertex = chosen[taken[chosen]][0]
+            is_pinned = pinned.setdefault(pin.body, np.zeros(len(body.mesh.vertices), dtype=bool))
+            if is_pinned[chosen].any():
+                vertex = chosen[is_pinned[chosen]][0]
                 raise SceneError(f"{pin.label}: vertex {vertex} is held by another pin already; hold it once")
-            taken[chosen] = True
+            is_pinned[chosen] = True
         for item in (*self.forces, *self.soft_targets):
             if item.body not in known:
                 raise SceneError(f"{item.label}: there is no such body; the scene has {', '.join(map(repr, known))}")
@@ -105,7 +105,7 @@ class Scene:
 
     @cached_property
     def stitching(self) -> Stitching:
-        """All stitches with their pairs found, where the scene places everything at time 0.
+        """All stitches with their pairs, found where the scene places everything at time 0.
 
         Raises
         ------

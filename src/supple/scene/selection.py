@@ -1,4 +1,4 @@
-"""Which vertices of a body are meant: indices into its mesh, or a box in the world."""
+"""Selections of a body's vertices: indices into its mesh, or a box in the world."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ Selection = ArrayLike | InBox
 
 
 def checked_selection(vertices: Selection, label: str) -> NDArray[np.int32] | InBox:
-    """The selection of `label`, as far as it can be checked without its body.
+    """The selection, checked as far as possible without its body. `label` begins the messages.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What to say of a name that nothing has."""
+"""A suggestion in place of an unknown name."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 
 def suggestion(name: str, known: Sequence[str]) -> str:
-    """The known name that was probably meant, or what there is."""
+    """The known name most similar to `name`, or a list of known names."""
     near = difflib.get_close_matches(name, known, n=1, cutoff=0.6)
     if near:
         return f"did you mean {near[0]!r}?"
-    shown = ", ".join(map(repr, known[:12]))
-    return f"there are {shown}{', ...' if len(known) > 12 else ''}"
+    listed = ", ".join(map(repr, known[:12]))
+    return f"there are {listed}{', ...' if len(known) > 12 else ''}"

@@ -1,4 +1,4 @@
-"""Checks of the values that a user types into a scene; each failure is one line that names the thing and the mend."""
+"""Checks of a scene's values. Each error is one line with the name, the value and the remedy."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from supple.errors import SceneError
 
 
 def check_name(name: object, kind: str) -> None:
-    """Raise unless `name` is a non-empty text that can stand in a file name and an HDF5 path."""
+    """Raise unless `name` is a non-empty text that is valid in a file name and an HDF5 path."""
     if not isinstance(name, str) or not name.strip():
         raise SceneError(f"{kind}: name is {name!r}; give a non-empty text")
     if len(name) > 100 or any(c in name for c in '/\\:*?"<>|\0') or not name.isprintable() or name in (".", ".."):

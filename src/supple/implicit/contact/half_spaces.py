@@ -1,4 +1,4 @@
-"""Half-spaces: exact planes, one contact for each vertex near one.
+"""Contact with half-spaces: exact planes, one contact for each vertex near a plane.
 
 A plane is two of the solver's vertices, a point c and the tip c + L n of its normal (see `kinematic`). The distance of
 a vertex x is d = (x - c) . n, and its derivatives by c and the tip couple bodies to a plane that moves.
@@ -16,7 +16,7 @@ from supple.contact.collision_mesh.contact_surface import ContactSurface
 from supple.contact.obstacle_vertices import ObstacleRange
 from supple.implicit.energies.potential import ContactPotential, HessianBlocks
 
-# A step leaves at least this share of every distance: conservative, as the bound for triangles is.
+# A step keeps at least this share of every distance; the bound for triangles is conservative in the same way.
 _KEEP = 0.1
 
 
@@ -26,7 +26,7 @@ class Planes:
 
     Attributes
     ----------
-    vertices : (k,) ; areas : (k,) [m^2]; owner : (k,) which body; obstacle : (k,) which obstacle, of the scene's
+    vertices : (k,); areas : (k,) [m^2]; owner, obstacle : (k,) numbers of the body and of the scene's obstacle
     base, tip : (k,) the plane's two points, as vertices
     ranges : by obstacle
     dhat : [m]
@@ -78,7 +78,7 @@ class Planes:
         return np.einsum("ij,ij->i", x[self.vertices] - x[self.base], normals), normals
 
     def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> float:
-        """How far along `direction` (n, 3), at most 1, every vertex keeps a tenth of its distance.
+        """Largest step along `direction` (n, 3), at most 1, that keeps a tenth of every vertex's distance.
 
         The distance times the length of the normal is a quadratic in the step.
         """
@@ -149,7 +149,7 @@ class PlaneBarrier(ContactPotential):
         np.add.at(out, p.tip[near], size * by_tip)
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
-        """Of the bodies' vertices exactly; their coupling with the planes without the turn of the normal."""
+        """Exact for the bodies' vertices; the coupling with the planes omits the rotation of the normal."""
         p = self.planes
         d, normals = p.distances(x)
         near = (d < p.dhat) & (d > 0.0)
@@ -182,7 +182,7 @@ class PlaneFriction(ContactPotential):
     ----------
     vertices : (k,); base : (k,) a point of each one's plane, as a vertex
     forces : (k,) mu lambda [N]; normals : (k, 3)
-    start : (k, 3) where the vertices would be, relative to `base`, if they stuck to their planes over the step [m]
+    start : (k, 3) positions relative to `base`, if the vertices stuck to their planes during the step [m]
     reach : eps_v h [m], the displacement below which friction is static
     """
 
@@ -205,7 +205,7 @@ class PlaneFriction(ContactPotential):
         np.add.at(out, self.base, -force)
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
-        """Positive semi-definite as it is."""
+        """Positive semi-definite without projection."""
         u, y = self._slip(x)
         e = self.reach
         across = self._over_slip(y)
@@ -253,12 +253,12 @@ def plane_friction(
     if len(near) == 0:
         return None
     forces = mu[near] * barrier.stiffness * p.areas[near] * np.abs(barrier_terms(d[near], p.dhat)[1])
-    carried = start[p.vertices[near]].copy()
+    sticking = start[p.vertices[near]].copy()
     for index, part in p.ranges.items():
         rows = p.obstacle[near] == index
         if rows.any():
-            carried[rows] = part.obstacle.carried(carried[rows], *times) - part.targets(times[1])[0]
-    return PlaneFriction(p.vertices[near], p.base[near], forces, normals[near], carried, reach)
+            sticking[rows] = part.obstacle.carried(sticking[rows], *times) - part.targets(times[1])[0]
+    return PlaneFriction(p.vertices[near], p.base[near], forces, normals[near], sticking, reach)
 
 
 def _block_matrix(

@@ -25,7 +25,7 @@ class Clearance:
     Attributes
     ----------
     smallest : [m]; row : of the vertex or triangle it belongs to; by_vertex : which of the two
-    entered : whether the body is in the obstacle, beyond what rounding explains
+    entered : whether the body is in the obstacle by more than rounding errors
     """
 
     smallest: float
@@ -41,10 +41,10 @@ def clearance(
     vertices: NDArray[np.int64],
     triangles: NDArray[np.int64],
 ) -> Clearance:
-    """How a surface, its `vertices` and `triangles` being rows of x, keeps away from an obstacle at a pose (3, 4).
+    """The clearance of a surface from an obstacle at a pose (3, 4). `vertices` and `triangles` are rows of x.
 
-    A half-space that stands still is decided exactly, by the point and the normal that the recording has. Of a room,
-    vertices decide; of a solid, whole triangles, to some 1e-6 of their size where they lie along its surface.
+    A static half-space is decided exactly, from its recorded point and normal. For a room vertices decide. For a solid
+    whole triangles decide, up to about 1e-6 of their size where they lie along its surface.
     """
     thing, R, t = obstacle.obstacle, pose[:, :3], pose[:, 3]
     points = x[vertices]
@@ -75,11 +75,11 @@ def smallest_on_triangles(
     signed_distance: Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]],
     corners: NDArray[np.float64],
 ) -> tuple[float, int]:
-    """The smallest distance from a convex solid of triangles with these corners (t, 3, 3), and whose row it is.
+    """The smallest distance of triangles with these corners (t, 3, 3) from a convex solid, and its triangle's row.
 
-    The distance from a convex solid is convex, so on a triangle it is nowhere below the plane that touches its graph at
-    the middle. Triangles that this bound does not rule out are divided in four, which brings the bound four times
-    nearer, until round-off or too many of them end it.
+    The distance from a convex solid is convex, so on a triangle it is nowhere below its linear approximation at the
+    middle. A triangle that can still contain the minimum is divided in four, which divides the error of this bound by
+    four. The search ends at round-off, or where too many triangles are left.
     """
     rows = np.arange(len(corners))
     best, row = np.inf, -1

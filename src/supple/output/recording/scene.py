@@ -1,4 +1,4 @@
-"""What a recording keeps of its scene, once for all frames: bodies, skins and obstacles, and the arrays behind them."""
+"""The part of a recording that no frame changes: bodies, skins, obstacles and their arrays."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class RecordedObstacle:
 
 
 def write_scene(file: h5py.File, first: Frame, facts: dict[str, Any], scene_text: str | None) -> None:
-    """Write everything that is the same in all frames; `facts` are added to the header."""
+    """Write the part that no frame changes; `facts` are added to the header."""
     system = first.system
     n, m = len(system.rest_positions), len(system.tets)
     _write_grid(file.require_group("VTKHDF"), first, n, m)
@@ -158,7 +158,7 @@ def _describe_obstacle(obstacle: Obstacle) -> dict[str, Any]:
 
 
 def read_header(file: CheckedFile) -> dict[str, Any]:
-    """The header of a recording; the file is checked to be a recording of a known version.
+    """The header of a recording, after a check that the file is a recording of a known version.
 
     Raises
     ------
@@ -167,12 +167,12 @@ def read_header(file: CheckedFile) -> dict[str, Any]:
     version = file.attribute("supple", "format_version")
     if version is None:
         kind = file.attribute("VTKHDF", "Type")
-        content = (
+        other = (
             f"a VTKHDF {kind.decode()} of another program"
             if isinstance(kind, bytes)
             else "an HDF5 file of another kind"
         )
-        raise file.other(content)
+        raise file.other(other)
     if not isinstance(version, (int, np.integer)) or version < 1:
         raise file.broken(f"its format version is {version!r}")
     if version > FORMAT_VERSION:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -47,7 +48,11 @@ class Capsule(SegmentObstacle):
         return self._oriented(r - self.radius, normals)
 
     def triangles(self) -> tuple[NDArray[np.float64], NDArray[np.integer]]:
-        """The convex hull of the polyhedra of both ends."""
+        return self._hull
+
+    @cached_property
+    def _hull(self) -> tuple[NDArray[np.float64], NDArray[np.integer]]:
+        """Of the polyhedra of both ends."""
         ball = self.radius * round_ball(inscribed=self.inside)[0]
         ends = [ball + np.array([x, 0.0, 0.0]) for x in (-self.half_length, self.half_length)]
         points, triangles = hull(np.concatenate(ends))

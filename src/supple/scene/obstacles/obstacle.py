@@ -1,7 +1,7 @@
-"""What every kind of obstacle supplies. A kind is one class in one file, and one line in `registry`.
+"""The interface of obstacles. A kind is one class in one file, and one line in `registry`.
 
 An obstacle is a convex solid, a room with a convex inside, or a mesh of triangles. Its shape is given where it is at
-time 0; `motion` carries it from there (see `supple.scene.motion`).
+time 0; `motion` moves it from there (see `supple.scene.motion`).
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from supple.scene.values import check_name, non_negative
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Obstacle(ABC):
-    """What all obstacles share. Fields that a kind adds are declared with `parameter`.
+    """Base of all obstacles. A kind declares its own fields with `parameter`.
 
     Parameters
     ----------
     friction : Coulomb coefficient between this obstacle and every body.
     motion : None, Keyframes, or t -> displacement (3,) [m].
-    name : optional; stands in messages and exports. A scene names the unnamed ones by kind and number.
+    name : optional; appears in messages and exports. A scene names unnamed obstacles by kind and number.
     """
 
     friction: float = 0.0
@@ -60,7 +60,7 @@ class Obstacle(ABC):
 
     @property
     def label(self) -> str:
-        """How messages call this obstacle."""
+        """The name of this obstacle in messages."""
         return f"obstacle {self.name!r}" if self.name else type(self).__name__
 
     def values(self) -> dict[str, Any]:
@@ -94,7 +94,7 @@ class Obstacle(ABC):
 
     @property
     def surface_mesh(self) -> SurfaceMesh | None:
-        """Triangles that are the obstacle itself, which stitches can hold on to; None where it is a formula."""
+        """The triangles of an obstacle that consists of triangles, which can be stitched to; None for others."""
         return None
 
     @property
@@ -117,17 +117,17 @@ class Obstacle(ABC):
         """
 
     def drawn(self, center: NDArray[np.float64], reach: float) -> tuple[NDArray[np.float64], NDArray[np.integer]]:
-        """What is drawn: vertices and triangles. What is not bounded is cut at about `reach` [m] from `center` (3,)."""
+        """Vertices and triangles to draw; an unbounded surface is cut at about `reach` [m] from `center` (3,)."""
         return self.triangles()
 
     def shapes(self) -> tuple[Shape, ...]:
-        """Shapes for XPBD; none for what has a `surface_mesh`."""
+        """Shapes for XPBD; none for an obstacle with a `surface_mesh`."""
         return ()
 
     def probes(self, edge_length: float) -> tuple[NDArray[np.float64], float]:
         """Points (k, 3) that XPBD keeps away from triangles of bodies, and by how much [m].
 
-        They hold bodies whose vertices are farther apart than this obstacle is wide.
+        They support bodies whose vertices are farther apart than the obstacle is wide.
 
         Parameters
         ----------

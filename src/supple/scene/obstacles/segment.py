@@ -1,4 +1,4 @@
-"""What a capsule and a cylinder share: the segment that is their axis."""
+"""Common part of capsules and cylinders: the segment that is their axis."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from supple.scene.obstacles.shape import frame_of
 
 @dataclass(frozen=True, eq=False)
 class SegmentObstacle(Obstacle):
-    """What is round about a segment.
+    """A body of revolution about a segment.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class SegmentObstacle(Obstacle):
         return self.frame[0] + points @ self.frame[1:]
 
     def probes(self, edge_length: float) -> tuple[NDArray[np.float64], float]:
-        """Points of the axis, where the obstacle fits between vertices."""
+        """Points of the axis, where the obstacle is thin enough to fit between vertices."""
         if self.inside or self.radius >= 2.0 * edge_length:
             return np.zeros((0, 3)), 0.0
         count = 2 + int(2.0 * self.half_length / min(edge_length, self.radius))

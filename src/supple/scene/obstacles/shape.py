@@ -1,7 +1,7 @@
 """Contact of one point with one simple shape, as an element function that kernels call.
 
 A point moves on a straight line from s0 to s1 during a substep, in the coordinates of the shape's own frame. A kind of
-obstacle supplies `signed_distance(parameters, s) -> (distance, normal)`; this file makes the contact of it.
+obstacle supplies `signed_distance(parameters, s) -> (distance, normal)`; this file builds the contact from it.
 """
 
 from __future__ import annotations

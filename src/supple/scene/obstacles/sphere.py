@@ -55,6 +55,6 @@ class Sphere(Obstacle):
         return (Shape(contact, np.vstack([np.asarray(self.center), np.eye(3)]), (self.radius,)),)
 
     def probes(self, edge_length: float) -> tuple[NDArray[np.float64], float]:
-        """The center of a ball that fits between vertices."""
+        """The center of a ball that is small enough to fit between vertices."""
         small = not self.inside and self.radius < 2.0 * edge_length
         return np.asarray(self.center)[None][: int(small)], self.radius

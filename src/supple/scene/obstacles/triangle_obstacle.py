@@ -34,7 +34,7 @@ class TriangleObstacle(Obstacle):
         return self.surface
 
     def signed_distance(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """A closed mesh is taken as facing outwards; the distance from a sheet is above zero on both sides."""
+        """A closed mesh must face outwards; the distance from an open sheet is above zero on both sides."""
         surface = self.surface_mesh
         rows, distances = self._tree.nearest(points)
         corners = surface.vertices[surface.triangles[rows]]

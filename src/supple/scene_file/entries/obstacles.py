@@ -28,9 +28,9 @@ _CLASSES = {one.file_kind: one for one in KINDS.values()}
 
 class _ObstacleModel(Model):
     kind: str
-    name: Name | None = Field(default=None, description="stands in messages and exports")
+    name: Name | None = Field(default=None, description="appears in messages and exports")
     friction: NonNegative = Field(default=0.0, description="Coulomb coefficient against every body")
-    motion: KeyframesModel | None = Field(default=None, description="scripted motion; it stands still without it")
+    motion: KeyframesModel | None = Field(default=None, description="scripted motion; static without it")
 
     def build(self, meshes: MeshStore) -> Obstacle:
         with at("motion"):

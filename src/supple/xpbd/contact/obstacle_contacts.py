@@ -1,10 +1,10 @@
 """Vertices against obstacles of simple shape, static or scripted, with friction.
 
-Every vertex of a body is tested, also inner ones. A correction is along the shape's normal only, to the last bit: a
-floor cannot turn what stands on it about the vertical.
+Every vertex of a body is tested, inner vertices too. A correction is along the shape's normal only, to the last bit:
+a floor does not rotate a body about the vertical.
 
-How a point meets a shape is the shape's own element function. The two kernels of this file are compiled once for each
-such function, which is inlined: a new kind of obstacle costs the others nothing.
+Each shape supplies its contact as an element function. The two kernels of this file are compiled once for each such
+function, which is inlined: a new kind of obstacle does not slow down the others.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def _find_candidates(x, reach, masses_inverse, shapes, rules, frames, starts, ve
     All vertices, where the shape moves. Vertices whose body does not collide with the shape are left out. `shapes` and
     `rules`: see `_project_shapes`.
 
-    Writes `starts` (k + 1,) and as many of `vertices`, from `count` on, as fit. Returns how many there are by now.
+    Writes `starts` (k + 1,) and as many of `vertices`, from `count` on, as fit. Returns their number so far.
     """
     parameters, moving = shapes
     owner, collide, _ = rules
@@ -115,7 +115,7 @@ def _project_shapes(x, x_prev, candidates, shapes, rules, frames, frames_before,
             contacts += 1
             n = _turned(frames, k, normal)
             impulse, shift = split_overlap(gap, gap_before, limit)
-            carried = p  # where the point of the obstacle that is now at p was at the beginning
+            carried = p  # position, at the beginning, of the obstacle's point that is now at p
             if moving[k]:
                 d = _turned(frames_before, k, s)
                 carried = (
@@ -166,7 +166,7 @@ class ObstacleContacts:
         )
         self._starts = np.zeros(len(shapes.contacts) + 1, dtype=np.int64)
         self._vertices = np.zeros(1024, dtype=np.int32)
-        # Neighbours with the same element function are done in one call.
+        # Consecutive shapes with the same element function need one call.
         self._groups = []
         first = 0
         for function, group in groupby(shapes.contacts):
@@ -178,7 +178,7 @@ class ObstacleContacts:
         return len(self.shapes.contacts) > 0
 
     def gather(self, x: NDArray[np.float64], reach: NDArray[np.float64], time: float) -> None:
-        """List the vertices (of n) that may touch something before they have moved by `reach` (n,) [m]."""
+        """List the vertices (of n) that may touch a shape before they have moved by `reach` (n,) [m]."""
         frames = self.shapes.placed(self.poses, time)
         described = (self._arrays, self._rules, frames, self._starts)
         while True:

@@ -80,8 +80,8 @@ def place_for(
 
 
 def unused_name(scene: Scene, stem: str) -> str:
-    """`stem` with the first number that gives an unused name."""
-    used = {body.name for body in scene.bodies}
+    """`stem` with the first number that gives a name which no body and no obstacle has."""
+    used = {thing.name for thing in (*scene.bodies, *scene.obstacles)}
     return next(f"{stem} {k}" for k in itertools.count(1) if f"{stem} {k}" not in used)
 
 
