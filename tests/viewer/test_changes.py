@@ -10,7 +10,7 @@ from supple.errors import CommandError, SolverError, SuppleError
 from supple.viewer.engine.measurement.describe import describe, measures
 from supple.viewer.engine.scene.changes import change, without_body
 from supple.viewer.engine.scene.live_scene import LiveScene
-from supple.viewer.engine.scene.new_bodies import free_name
+from supple.viewer.engine.scene.new_bodies import unused_name
 from supple.viewer.protocol import limits
 from supple.viewer.protocol.live_source import LiveSource
 from supple.viewer.protocol.messages import (
@@ -326,4 +326,4 @@ def test_after_a_reset_added_bodies_do_not_overlap_others(live):
 def test_free_names_differ_from_those_of_bodies_and_obstacles(live):
     scene = live.setup.scene
     named = dataclasses.replace(scene, obstacles=[sp.Sphere(name="cube 1", center=(0, -9, 0))])
-    assert (free_name(scene, "cube"), free_name(named, "cube")) == ("cube 1", "cube 2")
+    assert (unused_name(scene, "cube"), unused_name(named, "cube")) == ("cube 1", "cube 2")

@@ -115,7 +115,7 @@ def view_of(recording: Recording) -> View:
 
 @dataclass(frozen=True, eq=False)
 class ObstaclePicture:
-    """An obstacle's triangles in its place at time 0; `RecordedFrame.poses[number]` moves them to a frame."""
+    """An obstacle's triangles at time 0; `RecordedFrame.poses[number]` moves them."""
 
     number: int
     name: str
@@ -131,27 +131,27 @@ class ObstaclePicture:
 
 
 class HasObstacles(Protocol):
-    """Something with obstacles: a recording, or a scene on a live page."""
+    """An object with obstacles: a recording, or the scene of a live page."""
 
     @property
     def obstacles(self) -> Sequence[RecordedObstacle]:
-        """In their places at time 0."""
+        """The obstacles at time 0."""
         ...
 
 
 def obstacle_pictures(source: HasObstacles, view: View) -> list[ObstaclePicture]:
-    """One for each obstacle. A half-space is a square around the bodies.
+    """One for each obstacle. A half-space is drawn as a square about the bodies.
 
-    Obstacles that would hide the bodies are transparent: rooms, and half-spaces that are not floors.
+    Obstacles that would hide the bodies are transparent: rooms, and half-spaces that are not a floor.
     """
     made = []
-    for number, obstacle in enumerate(source.obstacles):
-        thing = obstacle.obstacle
-        vertices, triangles = thing.drawn(view.center, 2.5 * view.radius)
-        is_wall = thing.plane is not None and float(thing.plane[1] @ view.up) < 0.5
-        opacity = WALL_OPACITY if is_wall else ROOM_OPACITY if thing.is_room else 1.0
+    for number, recorded in enumerate(source.obstacles):
+        obstacle = recorded.obstacle
+        vertices, triangles = obstacle.drawn(view.center, 2.5 * view.radius)
+        is_wall = obstacle.plane is not None and float(obstacle.plane[1] @ view.up) < 0.5
+        opacity = WALL_OPACITY if is_wall else ROOM_OPACITY if obstacle.is_room else 1.0
         triangles = triangles.astype(np.int32)
-        made.append(ObstaclePicture(number, obstacle.name, vertices, triangles, opacity, thing.smooth))
+        made.append(ObstaclePicture(number, recorded.name, vertices, triangles, opacity, obstacle.smooth))
     return made
 
 

@@ -54,7 +54,7 @@ def _contact_model(system: System, settings: IPCContact, shear_moduli: NDArray[n
     for start in system.start_states:
         x = np.concatenate([start.positions, obstacle_positions(obstacles, start.time)])
         gaps.append(min(collisions.smallest_distance(x), _gap(planes, x)))
-    scales = scales_of(settings, system, shear_moduli, max(gaps))
+    scales = scales_of(settings, system, shear_moduli, max(gaps, default=np.inf))
     return ContactModel(
         system=extended,
         obstacles=obstacles,

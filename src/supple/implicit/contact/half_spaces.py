@@ -86,19 +86,19 @@ class Planes:
             return 1.0
         r, dr = x[self.vertices] - x[self.base], direction[self.vertices] - direction[self.base]
         m, dm = x[self.tip] - x[self.base], direction[self.tip] - direction[self.base]
-        now = np.einsum("ij,ij->i", r, m)
+        heights = np.einsum("ij,ij->i", r, m)
         b = np.einsum("ij,ij->i", r, dm) + np.einsum("ij,ij->i", dr, m)
         a = np.einsum("ij,ij->i", dr, dm)
-        c = (1.0 - _KEEP) * now
+        c = (1.0 - _KEEP) * heights
         if not (np.isfinite(a).all() and np.isfinite(b).all()):
             return 0.0
-        if (now <= 0.0).any():
+        if (heights <= 0.0).any():
             return 0.0
         # Smallest positive root of a t^2 + b t + c with c > 0, without cancellation.
         root = np.full(len(c), np.inf)
-        under = b * b - 4.0 * a * c
-        real = under >= 0.0
-        q = -0.5 * (b[real] + np.where(b[real] >= 0.0, 1.0, -1.0) * np.sqrt(under[real]))
+        discriminant = b * b - 4.0 * a * c
+        real = discriminant >= 0.0
+        q = -0.5 * (b[real] + np.where(b[real] >= 0.0, 1.0, -1.0) * np.sqrt(discriminant[real]))
         with np.errstate(divide="ignore", invalid="ignore"):
             roots = np.stack([q / a[real], c[real] / q])
         roots[~(roots > 0.0)] = np.inf

@@ -46,10 +46,10 @@ def clearance(
     A static half-space is decided exactly, from its recorded point and normal. For a room vertices decide. For a solid
     whole triangles decide, up to about 1e-6 of their size where they lie along its surface.
     """
-    thing, R, t = obstacle.obstacle, pose[:, :3], pose[:, 3]
+    shape, R, t = obstacle.obstacle, pose[:, :3], pose[:, 3]
     points = x[vertices]
-    if thing.plane is not None:
-        given, normal = thing.plane
+    if shape.plane is not None:
+        given, normal = shape.plane
         point = moved(given[None], pose)[0]
         turned = moved(normal[None], np.column_stack([R, np.zeros(3)]))[0]
         values = (points - point) @ turned
@@ -62,12 +62,12 @@ def clearance(
         else:
             entered = bool(values[worst] < -_rounding(points, point))
         return Clearance(float(values[worst]), int(vertices[worst]), True, entered)
-    tolerance = _rounding(points, t) + _rounding(thing.triangles()[0])
-    if thing.is_room:  # the distance from its wall is concave: smallest at a vertex
-        values, _ = thing.signed_distance(moved_back(points, pose))
+    tolerance = _rounding(points, t) + _rounding(shape.triangles()[0])
+    if shape.is_room:  # the distance from its wall is concave: smallest at a vertex
+        values, _ = shape.signed_distance(moved_back(points, pose))
         worst = int(np.argmin(values))
         return Clearance(float(values[worst]), int(vertices[worst]), True, bool(values[worst] < -tolerance))
-    smallest, row = smallest_on_triangles(thing.signed_distance, moved_back(x, pose)[triangles])
+    smallest, row = smallest_on_triangles(shape.signed_distance, moved_back(x, pose)[triangles])
     return Clearance(smallest, row, False, smallest < -tolerance)
 
 

@@ -113,11 +113,11 @@ class Containment(FrameCheck):
     def _solids_in_bodies(self, at: Snapshot) -> Iterator[str]:
         surfaces = self.scene.surfaces
         for j, obstacle in enumerate(self.scene.recording.obstacles):
-            thing = obstacle.obstacle
-            if is_mesh(obstacle) or thing.is_room or thing.plane is not None:
+            shape = obstacle.obstacle
+            if is_mesh(obstacle) or shape.is_room or shape.plane is not None:
                 continue
             # Of a convex solid, the mean of points about it is inside.
-            center = moved(thing.triangles()[0].mean(axis=0)[None], at.poses[j])[0]
+            center = moved(shape.triangles()[0].mean(axis=0)[None], at.poses[j])[0]
             for solid in surfaces.pieces:
                 allowed = solid.owner < surfaces.bodies and surfaces.allowed[solid.owner, surfaces.bodies + j]
                 if allowed and solid.closed and is_inside(at.points, center, surfaces.triangles, solid.triangles):

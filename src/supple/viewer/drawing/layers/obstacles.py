@@ -1,4 +1,4 @@
-"""Obstacles, moving as they are scripted."""
+"""The obstacles, at their scripted poses."""
 
 from __future__ import annotations
 
