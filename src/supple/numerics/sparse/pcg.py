@@ -79,96 +79,77 @@ def conjugate_gradients(
     return CGResult(int(iterations), bool(converged), bool(indefinite), float(first), float(last))
 
 
-@njit(cache=True, error_model="numpy")
-def _product_group(g, group_start, row_start, columns, data, p, Ap, sums):
-    """Ap <- A p in the rows of a group, and its share of p . Ap."""
-    total = 0.0
-    for i in range(group_start[g], group_start[g + 1]):
-        a = b = c = 0.0
-        for q in range(row_start[i], row_start[i + 1]):
-            j = columns[q]
-            x, y, z = p[j, 0], p[j, 1], p[j, 2]
-            a += data[q, 0, 0] * x + data[q, 0, 1] * y + data[q, 0, 2] * z
-            b += data[q, 1, 0] * x + data[q, 1, 1] * y + data[q, 1, 2] * z
-            c += data[q, 2, 0] * x + data[q, 2, 1] * y + data[q, 2, 2] * z
-        Ap[i, 0], Ap[i, 1], Ap[i, 2] = a, b, c
-        total += p[i, 0] * a + p[i, 1] * b + p[i, 2] * c
-    sums[g] = total
-
-
-@njit(cache=True, error_model="numpy")
-def _smooth_group(
-    g, alpha, group_start, columns, diagonal, inner, data, inverse, fields, p, Ap, x, r, z, restricted, sums
-):
-    """x += alpha p, r -= alpha Ap, z <- S^-1 r, restricted <- Z^T r in the rows of a group, and its share of r . z."""
-    low, high = group_start[g], group_start[g + 1]
-    for i in range(low, high):
-        for k in range(3):
-            x[i, k] += alpha * p[i, k]
-            r[i, k] -= alpha * Ap[i, k]
-    for k in range(12):
-        restricted[12 * g + k] = 0.0
-    for i in range(low, high):
-        a, b, c = r[i, 0], r[i, 1], r[i, 2]
-        for m in range(4):
-            w = fields[i, m]
-            restricted[12 * g + 3 * m] += w * a
-            restricted[12 * g + 3 * m + 1] += w * b
-            restricted[12 * g + 3 * m + 2] += w * c
-        for q in range(inner[i, 0], diagonal[i]):
-            j = columns[q]
-            u, v, w = z[j, 0], z[j, 1], z[j, 2]
-            a -= data[q, 0, 0] * u + data[q, 0, 1] * v + data[q, 0, 2] * w
-            b -= data[q, 1, 0] * u + data[q, 1, 1] * v + data[q, 1, 2] * w
-            c -= data[q, 2, 0] * u + data[q, 2, 1] * v + data[q, 2, 2] * w
-        z[i, 0] = inverse[i, 0, 0] * a + inverse[i, 0, 1] * b + inverse[i, 0, 2] * c
-        z[i, 1] = inverse[i, 1, 0] * a + inverse[i, 1, 1] * b + inverse[i, 1, 2] * c
-        z[i, 2] = inverse[i, 2, 0] * a + inverse[i, 2, 1] * b + inverse[i, 2, 2] * c
-    total = 0.0
-    for i in range(high - 1, low - 1, -1):
-        a = b = c = 0.0
-        for q in range(diagonal[i] + 1, inner[i, 1]):
-            j = columns[q]
-            u, v, w = z[j, 0], z[j, 1], z[j, 2]
-            a += data[q, 0, 0] * u + data[q, 0, 1] * v + data[q, 0, 2] * w
-            b += data[q, 1, 0] * u + data[q, 1, 1] * v + data[q, 1, 2] * w
-            c += data[q, 2, 0] * u + data[q, 2, 1] * v + data[q, 2, 2] * w
-        z[i, 0] -= inverse[i, 0, 0] * a + inverse[i, 0, 1] * b + inverse[i, 0, 2] * c
-        z[i, 1] -= inverse[i, 1, 0] * a + inverse[i, 1, 1] * b + inverse[i, 1, 2] * c
-        z[i, 2] -= inverse[i, 2, 0] * a + inverse[i, 2, 1] * b + inverse[i, 2, 2] * c
-        total += r[i, 0] * z[i, 0] + r[i, 1] * z[i, 1] + r[i, 2] * z[i, 2]
-    sums[g] = total
-
-
-@njit(cache=True, error_model="numpy")
-def _direction_group(g, beta, group_start, fields, coefficients, z, p):
-    """p <- z + Z coefficients + beta p in the rows of a group."""
-    for i in range(group_start[g], group_start[g + 1]):
-        for k in range(3):
-            value = z[i, k]
-            for m in range(4):
-                value += fields[i, m] * coefficients[12 * g + 3 * m + k]
-            p[i, k] = value + beta * p[i, k]
-
-
 @njit(cache=True, parallel=True, error_model="numpy")
 def _product(group_start, row_start, columns, data, p, Ap, sums):
+    """Ap <- A p, and each group's share of p . Ap."""
     for g in prange(len(group_start) - 1):
-        _product_group(g, group_start, row_start, columns, data, p, Ap, sums)
+        total = 0.0
+        for i in range(group_start[g], group_start[g + 1]):
+            a = b = c = 0.0
+            for q in range(row_start[i], row_start[i + 1]):
+                j = columns[q]
+                x, y, z = p[j, 0], p[j, 1], p[j, 2]
+                a += data[q, 0, 0] * x + data[q, 0, 1] * y + data[q, 0, 2] * z
+                b += data[q, 1, 0] * x + data[q, 1, 1] * y + data[q, 1, 2] * z
+                c += data[q, 2, 0] * x + data[q, 2, 1] * y + data[q, 2, 2] * z
+            Ap[i, 0], Ap[i, 1], Ap[i, 2] = a, b, c
+            total += p[i, 0] * a + p[i, 1] * b + p[i, 2] * c
+        sums[g] = total
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def _smooth(alpha, group_start, columns, diagonal, inner, data, inverse, fields, p, Ap, x, r, z, restricted, sums):
+    """x += alpha p, r -= alpha Ap, z <- S^-1 r, restricted <- Z^T r, and each group's share of r . z."""
     for g in prange(len(group_start) - 1):
-        _smooth_group(
-            g, alpha, group_start, columns, diagonal, inner, data, inverse, fields, p, Ap, x, r, z, restricted, sums
-        )
+        low, high = group_start[g], group_start[g + 1]
+        for i in range(low, high):
+            for k in range(3):
+                x[i, k] += alpha * p[i, k]
+                r[i, k] -= alpha * Ap[i, k]
+        for k in range(12):
+            restricted[12 * g + k] = 0.0
+        for i in range(low, high):
+            a, b, c = r[i, 0], r[i, 1], r[i, 2]
+            for m in range(4):
+                w = fields[i, m]
+                restricted[12 * g + 3 * m] += w * a
+                restricted[12 * g + 3 * m + 1] += w * b
+                restricted[12 * g + 3 * m + 2] += w * c
+            for q in range(inner[i, 0], diagonal[i]):
+                j = columns[q]
+                u, v, w = z[j, 0], z[j, 1], z[j, 2]
+                a -= data[q, 0, 0] * u + data[q, 0, 1] * v + data[q, 0, 2] * w
+                b -= data[q, 1, 0] * u + data[q, 1, 1] * v + data[q, 1, 2] * w
+                c -= data[q, 2, 0] * u + data[q, 2, 1] * v + data[q, 2, 2] * w
+            z[i, 0] = inverse[i, 0, 0] * a + inverse[i, 0, 1] * b + inverse[i, 0, 2] * c
+            z[i, 1] = inverse[i, 1, 0] * a + inverse[i, 1, 1] * b + inverse[i, 1, 2] * c
+            z[i, 2] = inverse[i, 2, 0] * a + inverse[i, 2, 1] * b + inverse[i, 2, 2] * c
+        total = 0.0
+        for i in range(high - 1, low - 1, -1):
+            a = b = c = 0.0
+            for q in range(diagonal[i] + 1, inner[i, 1]):
+                j = columns[q]
+                u, v, w = z[j, 0], z[j, 1], z[j, 2]
+                a += data[q, 0, 0] * u + data[q, 0, 1] * v + data[q, 0, 2] * w
+                b += data[q, 1, 0] * u + data[q, 1, 1] * v + data[q, 1, 2] * w
+                c += data[q, 2, 0] * u + data[q, 2, 1] * v + data[q, 2, 2] * w
+            z[i, 0] -= inverse[i, 0, 0] * a + inverse[i, 0, 1] * b + inverse[i, 0, 2] * c
+            z[i, 1] -= inverse[i, 1, 0] * a + inverse[i, 1, 1] * b + inverse[i, 1, 2] * c
+            z[i, 2] -= inverse[i, 2, 0] * a + inverse[i, 2, 1] * b + inverse[i, 2, 2] * c
+            total += r[i, 0] * z[i, 0] + r[i, 1] * z[i, 1] + r[i, 2] * z[i, 2]
+        sums[g] = total
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def _direction(beta, group_start, fields, coefficients, z, p):
+    """p <- z + Z coefficients + beta p."""
     for g in prange(len(group_start) - 1):
-        _direction_group(g, beta, group_start, fields, coefficients, z, p)
+        for i in range(group_start[g], group_start[g + 1]):
+            for k in range(3):
+                value = z[i, k]
+                for m in range(4):
+                    value += fields[i, m] * coefficients[12 * g + 3 * m + k]
+                p[i, k] = value + beta * p[i, k]
 
 
 @njit(cache=True, error_model="numpy")
