@@ -1,4 +1,4 @@
-"""Implicit time integration against what mechanics says: free fall, momenta, energies, orders of convergence."""
+"""Implicit time integration against mechanics: free fall, momenta, energies, orders of convergence."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def squeezed(body):
     return {"cube": x}
 
 
-def test_free_fall_is_that_of_the_discrete_equation():
+def test_free_fall_solves_the_discrete_equation():
     body = cube(position=(0, 10, 0))
     h, g = 1 / 60, 9.81
     for frame in run(sp.Scene([body]), Implicit(), h, 30):
@@ -47,7 +47,7 @@ def test_second_order_free_fall(integrator):
 
 
 @pytest.mark.parametrize("integrator", DYNAMIC)
-def test_linear_momentum_is_kept(integrator):
+def test_linear_momentum_is_conserved(integrator):
     body = cube(velocity=(1.0, -2.0, 0.5), angular_velocity=(0, 3, 1))
     scene = sp.Scene([body], gravity=(0, 0, 0))
     frames = run(scene, Implicit(integrator=integrator), 1 / 60, 20, initial_positions=squeezed(body))
@@ -91,7 +91,7 @@ def energy(frame):
     return r.kinetic_energy + r.elastic_energy + r.potential_energy
 
 
-def test_trapezoidal_keeps_the_energy_and_backward_euler_only_loses_it():
+def test_trapezoidal_conserves_the_energy_and_backward_euler_only_loses_it():
     body = cube(angular_velocity=(0, 2, 1), youngs=2e4)
     scene = sp.Scene([body], gravity=(0, 0, 0))
     period = 2 * 0.2 / np.sqrt(2e4 / 1000.0)  # of a wave through the cube and back
@@ -119,12 +119,12 @@ def test_orders_of_convergence(integrator, order):
     assert np.log2(errors[0] / errors[2]) / 2 > order - 0.25
 
 
-def test_damping_calms_vibration_and_leaves_spin_alone():
+def test_damping_reduces_vibration_and_not_spin():
     body = cube(angular_velocity=(0, 5, 0), damping=0.02, youngs=2e5)
     undamped = cube(angular_velocity=(0, 5, 0), youngs=2e5)
     scenes = [sp.Scene([b], gravity=(0, 0, 0)) for b in (body, undamped)]
     damped, free = (run(s, Implicit(integrator="newmark"), 1 / 240, 120)[-1].report for s in scenes)
-    # The stretch that the spin causes sets in suddenly: without damping it rings.
+    # The stretch that the spin causes begins suddenly: without damping it oscillates.
     assert damped.angular_momentum[1] == pytest.approx(free.angular_momentum[1], rel=2e-3)
     start = squeezed(body)
     rung = [run(s, Implicit(integrator="newmark"), 1 / 240, 120, initial_positions=start)[-1].report for s in scenes]
@@ -145,7 +145,7 @@ def test_damped_newmark_and_bdf2_agree_with_a_fine_reference():
         assert coarse / fine > 3.2
 
 
-def test_halving_the_default_tolerance_hardly_moves_the_result():
+def test_half_the_default_tolerance_gives_the_same_result():
     body = cube(youngs=2e4, divisions=(3, 3, 3))
     scene = sp.Scene([body], pins=[sp.Pin("cube", sp.InBox((-1, 0.0999, -1), (1, 0.2, 1)))])
     usual, tight = (run(scene, Implicit(tolerance=t), 1 / 60, 30)[-1].positions["cube"] for t in (1e-3, 5e-4))

@@ -151,7 +151,7 @@ def test_uniaxial_stretch_with_free_sides(material, stretch, stress, lateral):
     body = sp.Body("cube", mesh, material(youngs=1e5, poisson=0.4))
     left, right = np.flatnonzero(X[:, 0] == X[:, 0].min()), np.flatnonzero(X[:, 0] == X[:, 0].max())
 
-    # Ends slide freely: the exact lateral contraction is prescribed there, and found inside.
+    # The exact lateral contraction is prescribed at the ends, and computed inside.
     def moved(chosen, along):
         target = X[chosen] * np.array([1.0, lateral, lateral])
         target[:, 0] += along
@@ -190,7 +190,7 @@ def test_torque_of_a_slightly_twisted_bar():
     assert np.abs(torque[1:]).max() < 0.01 * torque[0]
 
 
-def test_a_hanging_body_weighs_on_its_pin_and_a_soft_target_stretches():
+def test_a_pin_and_soft_targets_carry_the_weight_of_a_hanging_body():
     mesh = sp.shapes.box((0.1, 0.1, 0.1), (2, 2, 2))
     body = sp.Body("weight", mesh, sp.StableNeoHookean(youngs=1e6, poisson=0.3, density=1000))
     top = np.flatnonzero(mesh.vertices[:, 1] == mesh.vertices[:, 1].max())
@@ -203,7 +203,7 @@ def test_a_hanging_body_weighs_on_its_pin_and_a_soft_target_stretches():
     assert sag == pytest.approx(-weight / (200.0 * len(top)), rel=1e-6)
 
 
-def test_the_direct_solver_and_cg_find_the_same_equilibrium():
+def test_the_direct_solver_and_cg_have_the_same_equilibrium():
     mesh = sp.shapes.box((0.4, 0.1, 0.1), (8, 2, 2))
     left = np.flatnonzero(mesh.vertices[:, 0] == mesh.vertices[:, 0].min())
     body = sp.Body("beam", mesh, sp.StableNeoHookean(youngs=1e5, poisson=0.45))
@@ -218,8 +218,8 @@ def test_the_direct_solver_and_cg_find_the_same_equilibrium():
     assert by["direct"].report.details.cg_iterations == 0
 
 
-def test_a_body_on_one_nail_finds_its_hanging_place():
-    # Nothing but gravity keeps it from turning about the nail: the Hessian at the start is singular.
+def test_a_body_pinned_at_one_vertex_turns_until_it_hangs():
+    # Only gravity acts against a turn about the pin: the Hessian at the start is singular.
     mesh = sp.shapes.box((0.1, 0.1, 0.1), (2, 2, 2))
     body = sp.Body("weight", mesh, sp.StableNeoHookean(youngs=1e6, poisson=0.3))
     corner = int(np.argmax(mesh.vertices.sum(axis=1)))
@@ -231,13 +231,13 @@ def test_a_body_on_one_nail_finds_its_hanging_place():
     assert np.abs(below[[0, 2]]).max() < 1e-5
 
 
-def test_static_refuses_what_nothing_holds():
+def test_static_is_an_error_for_free_bodies():
     body = sp.Body("loose", sp.shapes.box(), sp.StableNeoHookean(youngs=1e4, poisson=0.3))
     with pytest.raises(sp.SolverError, match=r"body 'loose': nothing holds it"):
         sp.simulate(sp.Scene([body]), STATIC, 1.0, 1)
 
 
-def test_every_material_stands_under_its_weight():
+def test_every_material_carries_its_weight():
     from supple.materials.registry import ELASTIC_MATERIALS
 
     mesh = sp.shapes.box((0.1, 0.2, 0.1), (2, 4, 2))

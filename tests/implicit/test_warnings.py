@@ -1,11 +1,11 @@
-"""What the implicit solver cannot do, it says."""
+"""Errors for scenes that the implicit solver does not support."""
 
 import pytest
 
 import supple as sp
 
 
-def test_obstacles_without_contact_are_refused() -> None:
+def test_obstacles_without_contact_are_an_error() -> None:
     mesh = sp.shapes.box(size=(0.1, 0.1, 0.1), divisions=(1, 1, 1))
     body = sp.Body("one", mesh, sp.StableNeoHookean(youngs=1e5, poisson=0.3))
     scene = sp.Scene([body], obstacles=[sp.HalfSpace(name="floor")])

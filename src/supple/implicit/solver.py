@@ -42,7 +42,7 @@ _LINEAR_SOLVERS = ("auto", "pcg", "direct")
 
 @dataclass(frozen=True)
 class Implicit(Solver):
-    """Implicit integration by projected Newton with a step filter: no tetrahedron that starts un-inverted ever inverts.
+    """Implicit integration by projected Newton with a step filter: in a body without inverted tets none ever inverts.
 
     Parameters
     ----------
@@ -54,8 +54,8 @@ class Implicit(Solver):
         contact's [-].
     max_iterations : of Newton in one (sub)step.
     linear_solver : "pcg", "direct", or "auto": CG, and a factorization where CG stalls.
-    max_substeps : a step that fails is halved until it would take more substeps than this. Steps in which scripts turn
-        far are first divided into straight pieces (1024 at most), each of which may take so many. 1: never divided.
+    max_substeps : largest number of substeps: a step that fails is halved. Steps in which scripts turn far are first
+        divided into straight pieces (1024 at most), each of which may take this number. 1: never divided.
     path_tolerance : how far a script may go off the straight line within a piece, as a share of the (smallest) body's
         diagonal [-].
     volume_kept : share of its volume that a tet keeps at least in one Newton iteration, above 0 and below 1 [-].
@@ -106,12 +106,12 @@ class Implicit(Solver):
             )
 
     def prepare(self, system: System) -> Workspace:
-        """Patterns, groups and scratch memory for a system.
+        """Compute the patterns, groups and memory for a system.
 
         Raises
         ------
-        SolverError : for what this solver cannot work with: materials of XPBD, obstacles without contact,
-            unheld bodies where static.
+        SolverError : for what this solver does not support: materials of XPBD, obstacles without contact, and free
+            bodies with the static integrator.
         """
         elasticity = elasticity_of(system)
         contact = None
@@ -183,7 +183,7 @@ class Implicit(Solver):
 
     @one_contact_thread()
     def step(self, system: System, state: State, dt: float, workspace: Workspace) -> tuple[State, StepReport]:
-        """Advance by dt, in as many substeps as it takes; see `Solver.step`.
+        """Advance by dt in one or more substeps; see `Solver.step`.
 
         Raises
         ------

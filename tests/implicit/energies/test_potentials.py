@@ -29,7 +29,7 @@ def system_of(material_type, poisson=0.3, **extra):
 
 
 def near_inverted(seed, squeeze):
-    """Positions with random shear and noise, flattened until the tets are nearly without volume, but none inverted."""
+    """Positions with random shear and noise, flattened until the tets have almost no volume; none is inverted."""
     rng = np.random.default_rng(seed)
     A = np.eye(3) + 0.25 * rng.uniform(-1, 1, (3, 3))
     U, _, V = np.linalg.svd(A)
@@ -105,7 +105,7 @@ def test_gradients_and_hessians_have_slope_two(material, seed, squeeze):
 
 
 @pytest.mark.parametrize("material", ELASTIC_MATERIALS, ids=lambda m: m.__name__)
-def test_the_model_at_once_is_the_same_as_its_parts(material):
+def test_the_model_is_the_sum_of_its_parts(material):
     system = system_of(material, damping=0.01)
     x = near_inverted(7, 0.6)
     objective = Objective(list(potentials(system, x, 7).values()))
@@ -172,14 +172,14 @@ def test_the_inversion_barrier_has_slope_two(seed, squeeze):
     )
 
 
-def test_the_inversion_barrier_is_felt_only_near_inversion():
+def test_the_inversion_barrier_acts_only_near_inversion():
     system = system_of(sp.StableNeoHookean)
     barrier = inversion_barrier(elasticity_of(system), np.ones(len(system.tets), dtype=bool), ONSET)
     assert barrier is not None
-    for J, felt in ((1.0, False), (1.01 * ONSET, False), (0.9 * ONSET, True)):
+    for J, active in ((1.0, False), (1.01 * ONSET, False), (0.9 * ONSET, True)):
         x = MESH.vertices * np.array([1.0, J, 1.0])
-        assert (barrier.value(x) > 0.0) is felt
-        assert gradient_of(barrier, x).any() == felt
+        assert (barrier.value(x) > 0.0) is active
+        assert gradient_of(barrier, x).any() == active
     assert barrier.value(MESH.vertices * np.array([1.0, -1.0, 1.0])) == np.inf
     rubber = build_system(sp.Scene([sp.Body("block", MESH, NeoHookean(youngs=1e4, poisson=0.3))]))
     assert inversion_barrier(elasticity_of(rubber), np.ones(len(MESH.tets), dtype=bool), ONSET) is None
@@ -191,7 +191,7 @@ def rotation(angle, axis):
     return Rotation.from_rotvec(angle * np.asarray(axis) / np.linalg.norm(axis)).as_matrix()
 
 
-def test_damping_does_not_feel_rigid_motion_of_any_size():
+def test_rigid_motion_of_any_size_is_not_damped():
     system = system_of(sp.StableNeoHookean, damping=0.05)
     x = near_inverted(3, 0.7)
     viscosity = viscosity_of(elasticity_of(system))
@@ -235,7 +235,7 @@ def test_undamped_bodies_have_no_viscosity():
     assert viscosity_of(elasticity_of(system_of(sp.StableNeoHookean))) is None
 
 
-def test_a_material_of_xpbd_is_refused_by_name():
+def test_a_material_of_xpbd_is_an_error_that_names_the_body():
     scene = sp.Scene([sp.Body("jelly", MESH, sp.EdgesAndVolume())])
     with pytest.raises(sp.SolverError, match=r"body 'jelly': EdgesAndVolume"):
         elasticity_of(build_system(scene))

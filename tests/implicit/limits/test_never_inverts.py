@@ -1,4 +1,4 @@
-"""Large deformations, scripted pins, recovery and refusal: what the step filter promises."""
+"""Large deformations, scripted pins, recovery, and states that are an error: the guarantees of the step filter."""
 
 import re
 
@@ -55,7 +55,7 @@ def test_a_bar_twisted_by_four_turns(divisions):
         assert pinned_exactly(frame)
 
 
-def test_a_jump_of_the_pins_is_made_in_one_frame():
+def test_a_jump_of_the_pins_takes_one_frame():
     body, left, right = bar(rubber())
     jump = sp.Keyframes(times=[0, 0.01], displacements=[[0, 0, 0], [-0.6, 0.3, 0]])
     scene = sp.Scene([body], pins=[sp.Pin("bar", left), sp.Pin("bar", right, jump)], gravity=(0, 0, 0))
@@ -72,7 +72,7 @@ def test_a_static_bar_is_pressed_in_few_steps():
         assert np.abs(frame.velocities["bar"]).max() == 0.0
 
 
-def test_pins_that_cannot_reach_their_place_are_blocked_by_name():
+def test_pins_that_cannot_reach_their_targets_are_reported_by_name():
     body, left, right = bar(rubber(), (4, 1, 1))
     through = sp.Keyframes(times=[0, 0.2], displacements=[[0, 0, 0], [-2.0, 0, 0]])
     scene = sp.Scene(
@@ -88,7 +88,7 @@ def test_pins_that_cannot_reach_their_place_are_blocked_by_name():
     assert all(frame.report.status == "converged" for frame in frames[:-1])
 
 
-def test_a_pin_that_turns_a_tet_inside_out_is_blocked():
+def test_a_pin_that_inverts_a_tet_is_blocked():
     # All four vertices of a tet are scripted: no free vertex can help.
     body, _, _ = bar(rubber(), (2, 1, 1))
     tet = body.mesh.tets[0]
@@ -103,7 +103,7 @@ def test_a_pin_that_turns_a_tet_inside_out_is_blocked():
 
 @pytest.mark.parametrize("integrator", ["backward_euler", "newmark"])
 def test_a_body_too_soft_for_its_weight_is_crushed_without_inverting(integrator):
-    # Stable Neo-Hookean has its energy's minimum beyond inversion here: the barrier holds it before.
+    # Here the minimum of the stable Neo-Hookean energy is inverted: the barrier makes one before inversion.
     mesh = sp.shapes.box((1, 1, 1), (2, 3, 2))
     top = np.flatnonzero(mesh.vertices[:, 1] == mesh.vertices[:, 1].max())
     foot = np.flatnonzero(mesh.vertices[:, 1] == mesh.vertices[:, 1].min())
@@ -149,7 +149,7 @@ def test_stable_neo_hookean_recovers_from_a_plane():
     assert shape_error(last.positions["cube"], mesh.vertices) < 1e-2
 
 
-def test_neo_hookean_refuses_inverted_tets_and_lists_them():
+def test_inverted_neo_hookean_tets_are_an_error_that_lists_them():
     mesh = sp.shapes.box((1, 1, 1), (1, 1, 1))
     body = sp.Body("cube", mesh, rubber())
     x = mesh.vertices.copy()
@@ -180,7 +180,7 @@ def test_a_body_that_has_recovered_is_guarded_from_then_on():
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
         ({"integrator": "euler"}, "there is no integrator 'euler'"),
         ({"tolerance": 0.0}, "tolerance is 0.0"),
@@ -195,12 +195,12 @@ def test_a_body_that_has_recovered_is_guarded_from_then_on():
         ({"barrier_onset": "low"}, "barrier_onset is 'low'"),
     ],
 )
-def test_impossible_parameters_are_refused(change, said):
-    with pytest.raises(sp.SolverError, match=re.escape(said)):
+def test_invalid_parameters_are_errors(change, message):
+    with pytest.raises(sp.SolverError, match=re.escape(message)):
         Implicit(**change)
 
 
-def test_an_iteration_limit_is_named_and_the_run_goes_on():
+def test_an_iteration_limit_is_reported_and_the_run_continues():
     body, left, right = bar(rubber())
     pull = sp.Keyframes(times=[0, 0.05], displacements=[[0, 0, 0], [0.5, 0.2, 0]])
     scene = sp.Scene([body], pins=[sp.Pin("bar", left), sp.Pin("bar", right, pull)])

@@ -68,7 +68,7 @@ def directions(rng, kind, x):
         normal /= np.linalg.norm(normal, axis=2, keepdims=True)
         p -= (1.0 - 10.0 ** rng.uniform(-9, -3, size=(n, 1, 1))) * (p @ normal.swapaxes(1, 2)) * normal
     elif kind == "biaxial":
-        # The tet is pulled along two axes and pressed along the third.
+        # The tet is stretched along two axes and compressed along the third.
         axes = np.linalg.qr(rng.normal(size=(n, 3, 3)))[0]
         p = np.einsum("eij,j,ekj,enk->eni", axes, [1.0, 1.0, -1.0], axes, x)
     return p * size
@@ -78,7 +78,7 @@ def directions(rng, kind, x):
 @pytest.mark.parametrize(
     ("scale", "thinness"), [(1.0, 0.7), (1e-9, 0.7), (1e3, 0.7), (1.0, 1e-4), (1e-9, 1e-8), (1e3, 1e-12)]
 )
-def test_step_is_never_beyond_the_true_one_and_hardly_short_of_it(kind, scale, thinness):
+def test_step_is_at_most_the_true_one_and_close_to_it(kind, scale, thinness):
     rng = np.random.default_rng(7)
     n = 120
     x = random_tets(rng, n, thinness) * scale
@@ -116,7 +116,7 @@ def exact_volumes_ratio(x, y, tets):
 
 
 def test_published_failures_as_tets():
-    """Directions whose scaled cubic has the coefficients on which the published closed form misses or oversteps."""
+    """Directions for whose scaled cubic the published closed form misses a root or returns one too large."""
     for a, b, c, truth in ((2e-6, 2000.0, -200.0, 0.0041742430504), (1e-5, 500.0, -300.0, 0.0026786250536)):
         # Stretches 1 + u t, 1 + v t, 1 + w t of the unit tet: the product's coefficients are the cubic's.
         roots = np.roots([1.0, -c, b, -a])
@@ -128,7 +128,7 @@ def test_published_failures_as_tets():
         assert step == pytest.approx(truth, rel=1e-6)
 
 
-def test_nothing_limits():
+def test_steps_without_a_limit_are_whole():
     tets = [[0, 1, 2, 3]]
     assert largest_noninverting_step(REGULAR, np.zeros((4, 3)), tets) == 1.0
     assert largest_noninverting_step(REGULAR, np.ones((4, 3)), tets) == 1.0
@@ -143,7 +143,7 @@ def test_linear_root_and_keep():
     assert largest_noninverting_step(x, p, [[0, 1, 2, 3]], keep=0.5) == pytest.approx(0.25, rel=1e-12)
 
 
-def test_refuses_inverted_tets_by_name_unless_ignored():
+def test_inverted_tets_are_an_error_that_names_them_unless_ignored():
     x = np.vstack([REGULAR, REGULAR])
     p = np.zeros_like(x)
     p[3, 2] = -2.0

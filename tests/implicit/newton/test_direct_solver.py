@@ -1,4 +1,4 @@
-"""The direct path: the factorizations solve, and a step by either of them is the step by conjugate gradients."""
+"""Direct solvers: each factorization solves, and its steps are those by conjugate gradients."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def test_pardiso_and_superlu_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     np.testing.assert_allclose(with_pardiso, _step("direct"), atol=1e-9)
 
 
-def test_pardiso_answers_as_superlu_on_one_system(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pardiso_solves_one_system(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("pypardiso")
     pattern = build_pattern(np.array([[0, 1, 2, 3]], dtype=np.int32), 4)
     root = np.random.default_rng(3).normal(size=(12, 12))

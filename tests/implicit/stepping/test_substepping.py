@@ -1,4 +1,4 @@
-"""How steps are divided: where scripts turn, and where substeps fail."""
+"""The substeps of a step: where scripts turn, and where substeps fail."""
 
 import numpy as np
 import pytest
@@ -61,7 +61,7 @@ def test_each_piece_may_be_halved_as_often():
     assert step.halve()
 
 
-def test_a_script_that_jumps_is_followed_all_the_same():
+def test_a_script_that_jumps_takes_few_pieces():
     mesh = sp.shapes.box((1, 1, 1), (1, 1, 1))
     scene = sp.Scene(
         [sp.Body("cube", mesh, sp.NeoHookean(youngs=1e5, poisson=0.4))],
@@ -96,7 +96,7 @@ def test_a_bar_twisted_into_itself_converges_with_the_defaults(dt: float):
     assert frame.report.iterations < 500
 
 
-def test_a_limit_that_is_reached_is_named():
+def test_the_message_names_the_limit_that_is_reached():
     solver = sp.Implicit(max_iterations=2, max_substeps=2)
     frame = next(iter(sp.simulate(turning_bar(0.3), solver, 1.0, 1)))
     assert frame.report.status == "iteration_limit"

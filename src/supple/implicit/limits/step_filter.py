@@ -1,4 +1,4 @@
-"""How far nodes may move in one step before a tetrahedron loses its volume.
+"""The largest step over which no tet loses more than a share of its volume.
 
 Along positions x + t p, six times the volume of a tet is a cubic in t. With edges x21, x31, x41, and p21, p31, p41:
 
@@ -8,8 +8,8 @@ Along positions x + t p, six times the volume of a tet is a cubic in t. With edg
     a0 = (x21 x x31) . x41 = 6 V
 
 Divided by a0, and with 1 - keep in place of the constant 1, its smallest positive root is where the volume first falls
-to `keep` of what it was. All coefficients are lowered by what rounding can have added to them, so that the step found
-is never beyond the true one.
+to the share `keep`. All coefficients are lowered by the largest possible round-off, so that the computed step is never
+longer than the true one.
 
 Source: Li, Jiang, Luo, "Physics-Based Simulation", equations 23.3.1 and 23.3.2, whose closed form of the root is
 replaced (see `numerics.cubic`).
@@ -28,16 +28,16 @@ from supple.numerics.geometry import double_double as dd
 from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import cross, det, dot, load_mat, mat_mul, row, subtract
 
-# How much of a step a solver lets the volume of one tet lose by default: down to one fifth.
+# The default share of its volume that a tet keeps in one step.
 KEEP = 0.2
 
-# Rounding units (2^-53) that the coefficients and the evaluation of their cubic can lose, with room to spare.
+# A bound, with a margin, on the round-off of the coefficients and of the evaluation of their cubic.
 _ROUND_OFF = 32.0 * 2.0**-53
 
-# Where rounding may move the volume by more than this share of it, coefficients are computed with twice the precision.
+# Where round-off may exceed this share of the volume, coefficients are computed with twice the precision.
 _UNSURE = 1e-9
 
-# Tets are handled in runs of fixed length, whatever the number of threads.
+# Tets are processed in runs of this length, independent of the number of threads, so that the bits are.
 _RUN = 256
 
 
@@ -83,13 +83,13 @@ def _tet_step(x, p, tets, e, keep):
     e1 = _ROUND_OFF * (_size_of_triple(x1, p2, x3) + _size_of_triple(p1, x2, x3) + _size_of_triple(x1, x2, p3))
     e0 = _ROUND_OFF * _size_of_triple(x1, x2, x3)
     lost = 1.0 - keep
-    # Divided by a0 and lowered by what rounding may have added: below the true cubic for all t >= 0.
+    # Divided by a0 and lowered by the largest round-off: below the true cubic for all t >= 0.
     if a0 > e0:
         a, b, c, d = (a3 - e3) / a0, (a2 - e2) / a0, (a1 - e1) / a0, lost * (1.0 - e0 / a0)
         if positive_on_unit_interval(a, b, c, d):
             return 1.0
     if not e3 + e2 + e1 + e0 < _UNSURE * a0:
-        # A sliver, or a direction far longer than the tet: rounding would decide. Rare, so precision may cost time.
+        # A sliver, or a direction far longer than the tet: rounding would decide. This is rare, and precision is slow.
         a3, a2, a1, a0 = _precise_coefficients(x, p, tets, e)
         if not a0 > 0.0:
             return 0.0
@@ -130,7 +130,7 @@ def noninverting_step(x, direction, tets, guarded, keep):
     Parameters
     ----------
     x, direction : (n, 3) positions and their change over a full step [m]
-    tets : (m, 4) int32; guarded : (m,) bool, False for tets that are not looked at
+    tets : (m, 4) int32; guarded : (m,) bool, False for tets that are ignored
     keep : in (0, 1)
 
     Returns
@@ -165,7 +165,7 @@ def noninverting_step(x, direction, tets, guarded, keep):
 def min_det(x, tets, Dm_inv, guarded):
     """The smallest J = det(Ds Dm^-1) over guarded tets, and the first tet that has it; not-a-number comes first.
 
-    The check after a step: a step is taken only where this is above zero. (inf, -1) where no tet is guarded.
+    The check after a step, which is taken only where this is positive. (inf, -1) where no tet is guarded.
     """
     m = len(tets)
     runs = (m + _RUN - 1) // _RUN
@@ -201,7 +201,7 @@ def min_det(x, tets, Dm_inv, guarded):
 
 @njit(cache=True, error_model="numpy")
 def volume_signs(x, tets):
-    """Six times the volumes, precise enough that slivers have the right sign."""
+    """(m,) six times the volumes, precise enough that slivers have the right sign."""
     out = np.empty(len(tets))
     for e in range(len(tets)):
         u, v, w = _precise_edge(x, tets, e, 1), _precise_edge(x, tets, e, 2), _precise_edge(x, tets, e, 3)
@@ -224,7 +224,7 @@ def largest_noninverting_step(
     direction : (n, 3) change of the positions over a full step [m]
     tets : (m, 4) indices, positive volume at `vertices`
     keep : the share of its present volume that a tet may fall to, above 0 and below 1
-    ignore : tets that are not looked at, such as those that are inverted at the start
+    ignore : tets without a limit, such as those that are inverted at the start
 
     Returns
     -------
