@@ -90,11 +90,10 @@ class Implicit(Solver):
             ("volume_kept", 1.0, "a share above 0 and below 1"),
             ("barrier_onset", np.nextafter(1.0, 2.0), "a number above 0 and at most 1"),
         ):
-            value = getattr(self, key)
+            value: Any = getattr(self, key)
             if value is None and key == "tolerance":
                 continue
-            number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
-            if not (number and 0.0 < value < limit):
+            if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not 0.0 < value < limit:
                 raise SolverError(f"Implicit: {key} is {value!r}; give {wanted}")
         for key in ("max_iterations", "max_substeps"):
             value = getattr(self, key)

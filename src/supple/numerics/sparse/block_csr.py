@@ -95,9 +95,9 @@ def build_pattern(elements: NDArray[np.int32], rows: int) -> BlockPattern:
     elements : (m, 4) row of each node; negative where the node has no row (it is held).
     rows : number of block rows n.
     """
-    elements = np.asarray(elements, dtype=np.int64)
+    nodes = np.asarray(elements, dtype=np.int64)
     # Entry 16 e + 4 a + c couples row i, of node a, with row j, of node c.
-    i, j = np.repeat(elements, 4, axis=1).ravel(), np.tile(elements, (1, 4)).ravel()
+    i, j = np.repeat(nodes, 4, axis=1).ravel(), np.tile(nodes, (1, 4)).ravel()
     entries = np.flatnonzero((i >= 0) & (j >= 0))
     i, j = i[entries], j[entries]
     both, block = np.unique(np.concatenate([np.arange(rows) * (rows + 1), i * rows + j]), return_inverse=True)
