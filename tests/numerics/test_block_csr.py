@@ -1,4 +1,4 @@
-"""Block CSR: the assembled matrix is the sum of the element matrices, whatever the elements."""
+"""Block CSR: the assembled matrix is the sum of the element matrices, for all elements."""
 
 import numpy as np
 import pytest

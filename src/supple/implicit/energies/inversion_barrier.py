@@ -6,7 +6,7 @@ converge to. With y = J / J0 and the onset J0,
 
     B = V kappa b(y),    b(y) = -(y - 1)^2 ln y for y < 1, else 0,    kappa = J0 (mu + lam),
 
-the minimum exists again. b has two continuous derivatives. A tet with J >= J0 does not feel it.
+the minimum exists again. b has two continuous derivatives. It is zero for a tet with J >= J0.
 
 Source of b: Li et al., "Incremental Potential Contact" (2020), equation 6, with the volume in place of the distance.
 """

@@ -31,7 +31,7 @@ class HessianBlocks:
     vertices : (n, 3, 3) one matrix for each vertex with itself [N/m]
     tet_count : m
     couplings : (3 n, 3 n) matrices between vertices that no element joins, in blocks of 3 x 3 [N/m]
-    blank : whether nothing has been added to `elements`, whatever the memory holds
+    blank : whether nothing has been added to `elements`; the memory may then hold an earlier sum
     """
 
     memory: NDArray[np.float64]
@@ -122,7 +122,7 @@ class Potential(ABC):
 
 
 class ContactPotential(Potential):
-    """A term of contact: so stiff that the length of a Newton step says little about the forces left over."""
+    """A term of contact: so stiff that a short Newton step can leave large forces."""
 
     label = "contact"
     projection = Projection.RELEASED_LAST

@@ -1,4 +1,4 @@
-"""When a minimization has converged, and how fast it does."""
+"""The conditions under which a minimization has converged."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Convergence:
     ----------
     step : largest component of a Newton direction at the minimum [m]
     force : where surfaces touch, the norm of the forces left over, relative to that of contact's forces: contact is so
-        stiff that a short way changes its forces a lot
+        stiff that a short step can change large forces
     """
 
     step: float

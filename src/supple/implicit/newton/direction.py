@@ -1,7 +1,7 @@
 """Newton directions: an inexact solution of H p = -g, with a Hessian that is positive definite.
 
-The tolerance of the linear solver follows the decrease of the gradient (Eisenstat, Walker). Whether a Hessian that is
-not fully projected is positive definite is found out by every linear solver; where it is not, more terms are projected.
+The tolerance of the linear solver follows the decrease of the gradient (Eisenstat, Walker). A Hessian that is not fully
+projected may be indefinite: every linear solver detects this, and more terms are then projected.
 
 Source: Eisenstat, Walker, "Choosing the Forcing Terms in an Inexact Newton Method" (1996), choice 2.
 """
@@ -32,7 +32,7 @@ _LAST = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class Tools:
-    """What is kept from step to step: the linear solver, and the memory for Hessians."""
+    """The data that is kept from step to step: linear solver, memory for Hessians, pinned vertices, free pieces."""
 
     linear_solver: LinearSolver
     hessian: HessianBlocks
@@ -49,7 +49,7 @@ class Direction:
     ----------
     vector : (n, 3) [m], zero where pinned; length : its largest component [m]
     slope : of the energy along it [J]; force : largest component of the gradient on free vertices [N]
-    linear : how the system was solved; tolerance : that was asked for
+    linear : how the system was solved; tolerance : of the linear solver
     projected : the terms whose Hessians were projected; touching : whether contact is part of the Hessian
     """
 
@@ -97,7 +97,8 @@ class DirectionFinder:
         if vector is None or not np.isfinite(vector).all():
             return None
         touching = bool(tools.hessian.couplings)
-        if touching and self.forcing > _LAST and float(np.abs(vector).max(initial=0.0)) <= self.short:
+        loose = report.method == "pcg" and self.forcing > _LAST
+        if touching and loose and float(np.abs(vector).max(initial=0.0)) <= self.short:
             # Contact is stiff: the error of a loose solution is small in length, and large in force.
             with tools.clock.of("linear_solve"):
                 better, more = tools.linear_solver.solve(-gradient, _LAST, self._convex)

@@ -1,4 +1,4 @@
-"""How far to go along a Newton direction: as far as filters allow, backtracking to a decrease of the energy.
+"""The step along a Newton direction: at most what filters allow, halved until the energy decreases enough.
 
 Source: Nocedal, Wright, "Numerical Optimization" (2006), section 3.1 (Armijo's condition).
 """
@@ -31,7 +31,7 @@ _LONGEST = 16.0
 
 
 class Filter(Protocol):
-    """Bounds the states that may be visited."""
+    """A bound on states."""
 
     def allows(self, x: NDArray[np.float64]) -> bool:
         """Whether a state x (n, 3) is admissible, in rounded numbers."""
@@ -79,7 +79,7 @@ def search(
     step = largest
     for cuts in range(_MOST_CUTS):
         moved = start.positions + step * direction
-        # Nearly always the first try is good, and then nothing is left to do.
+        # The first try is nearly always good, and its model is then the one at the end.
         model = objective.model(moved, hessian, projected) if cuts == 0 else None
         energy, size = (model.energy, model.size) if model is not None else objective.value_and_size(moved)
         enough = energy <= start.energy + _SUFFICIENT * step * slope + _ROUND_OFF * max(size, start.size)

@@ -31,7 +31,7 @@ _LINEAR_RATE = 0.2
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What is minimized, and when it is done.
+    """The function to minimize, and the conditions at its minimum.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """Where a minimization ended, and how; `rows` describe every iteration."""
+    """The end of a minimization, and its status; `rows` describe every iteration."""
 
     status: Status
     end: Model
@@ -76,7 +76,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
             return Outcome(Status.NOT_FINITE, here, "the linear system of a Newton step could not be solved", rows)
         last = convergence.is_short(found.length)
         rate = found.length / last_length if last_length > 0.0 else 0.0
-        # True Hessians need no extension, and bodies that recover from a tangle find their way in small steps.
+        # True Hessians need no extension, and bodies with inverted tets recover in small steps.
         if (last and not found.touching) or found.projected is not ProjectedTerms.ALL or not limits.guard.complete:
             extension.factor = 1.0
         vector = extension.factor * found.vector

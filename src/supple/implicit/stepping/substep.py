@@ -41,7 +41,7 @@ _FRICTION_SHARE = 1e-2
 
 @dataclass(frozen=True)
 class StepSettings:
-    """How a step is taken; see `Implicit`."""
+    """The settings of a step; see `Implicit`."""
 
     integrator: Integrator
     tolerance: float | None
