@@ -48,7 +48,8 @@ class _Measurement(ContactMeasurement):
             for k in range(1, len(PLACES) + 1)
         ]
         details = self.last.report.details
-        friction = details.friction_forces["mat"] if isinstance(details, ImplicitDetails) else np.zeros(3)
+        assert isinstance(details, ImplicitDetails)
+        friction = details.friction_forces.get("mat", np.zeros(3))
         carried = (sum(forces) + float(friction[1])) / weight
         before, after = mechanical_energy(self.first), mechanical_energy(self.last)
         return [
