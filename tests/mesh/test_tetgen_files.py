@@ -150,9 +150,9 @@ def test_unused_vertices_are_dropped_and_negative_tets_turned(tmp_path: Path, ca
 
 # (files to write, what the message must contain); None removes a file.
 MALFORMED = {
-    "empty node": ({"node": ""}, "two.1.node: is empty"),
-    "only comments": ({"node": "# nothing\n\n"}, "two.1.node: is empty"),
-    "empty ele": ({"ele": ""}, "two.1.ele: is empty"),
+    "empty node": ({"node": ""}, "two.1.node: it is empty"),
+    "only comments": ({"node": "# nothing\n\n"}, "two.1.node: it is empty"),
+    "empty ele": ({"ele": ""}, "two.1.ele: it is empty"),
     "no ele": ({"ele": None}, "two.1.ele: there is no such file"),
     "no node": ({"node": None}, "two.1.node: there is no such file"),
     "two dimensions": ({"node": "3 2 0 0\n1 0 0\n2 1 0\n3 0 1\n"}, "two.1.node:1: dimension 2"),

@@ -8,7 +8,7 @@ from supple.errors import MeshError
 
 
 def file_contents(path: Path) -> bytes:
-    """All bytes of a regular file.
+    """All bytes of a regular file that is not blank.
 
     Raises
     ------
@@ -19,7 +19,7 @@ def file_contents(path: Path) -> bytes:
             raise MeshError(f"{path}: it is a folder; give the path of a mesh file")
         if path.exists() and not path.is_file():
             raise MeshError(f"{path}: it is not a regular file")
-        return path.read_bytes()
+        data = path.read_bytes()
     except FileNotFoundError:
         raise MeshError(f"{path}: there is no such file") from None
     except MemoryError:
@@ -27,3 +27,6 @@ def file_contents(path: Path) -> bytes:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else error
         raise MeshError(f"{path}: it cannot be read: {reason}") from None
+    if not data.strip():
+        raise MeshError(f"{path}: it is empty")
+    return data

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -20,7 +20,6 @@ from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.scene.selection import InBox
-from supple.scene.stitches.stitch import Stitch
 from supple.scene.stitches.stitching import StitchError
 from supple.scene_file.complaints import scene_error, suggestion
 from supple.scene_file.document import OutputModel, SceneFileModel
@@ -33,6 +32,8 @@ from supple.solver import Solver
 logger = logging.getLogger(__name__)
 
 Selecting = TypeVar("Selecting", Pin, Force, SoftTarget)
+Described = TypeVar("Described")
+Built = TypeVar("Built")
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,23 +120,11 @@ def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
             if obstacle.name in bodies:
                 raise SceneError(f"a body has the name {obstacle.name!r}; give each thing a different name")
             obstacles.append(obstacle)
-    pins: list[Pin] = []
     held: dict[str, set[int]] = {}
-    for i, described in enumerate(model.pins):
-        with at("pins", i):
-            pins.append(_free(_fits(described.build(), bodies), bodies, held))
-    forces: list[Force] = []
-    for i, described in enumerate(model.forces):
-        with at("forces", i):
-            forces.append(_fits(described.build(), bodies))
-    targets: list[SoftTarget] = []
-    for i, described in enumerate(model.soft_targets):
-        with at("soft_targets", i):
-            targets.append(_fits(described.build(), bodies))
-    stitches: list[Stitch] = []
-    for i, described in enumerate(model.stitches):
-        with at("stitches", i):
-            stitches.append(described.build())
+    pins = _each("pins", model.pins, lambda pin: _free(_fits(pin.build(), bodies), bodies, held))
+    forces = _each("forces", model.forces, lambda force: _fits(force.build(), bodies))
+    targets = _each("soft_targets", model.soft_targets, lambda target: _fits(target.build(), bodies))
+    stitches = _each("stitches", model.stitches, lambda stitch: stitch.build())
     with at("solver"):
         solver = model.solver.build()
     with at():
@@ -148,6 +137,15 @@ def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
         except StitchError as error:
             raise LocatedError(("stitches", error.number), str(error)) from None
     return Run(scene, solver, model.dt, model.steps, starts, model.output)
+
+
+def _each(key: str, models: Sequence[Described], build: Callable[[Described], Built]) -> list[Built]:
+    """What `build` makes of each entry of a list in the file; errors get the place of their entry."""
+    built = []
+    for i, model in enumerate(models):
+        with at(key, i):
+            built.append(build(model))
+    return built
 
 
 def _fits(item: Selecting, bodies: dict[str, Body]) -> Selecting:

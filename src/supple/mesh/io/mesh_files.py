@@ -65,7 +65,7 @@ def read_surface(path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.int6
     if extension not in SURFACE_READERS:
         hint = "; a tet mesh is loaded with TetMesh.load" if extension in TET_EXTENSIONS else ""
         raise _unknown_extension(path, tuple(SURFACE_READERS), hint)
-    data = _contents(path)
+    data = file_contents(path)
     try:
         soup = SURFACE_READERS[extension](data)
         if len(soup.points) == 0:
@@ -101,8 +101,7 @@ def write_surface(path: str | Path, vertices: NDArray[np.float64], triangles: ND
     writer = SURFACE_WRITERS.get(path.suffix.lower())
     if writer is None:
         raise _unknown_extension(path, tuple(SURFACE_WRITERS), "")
-    data = writer(vertices, triangles)
-    _write_whole(path, lambda temporary: temporary.write_bytes(data))
+    _write_whole(path, lambda temporary: temporary.write_bytes(writer(vertices, triangles)))
 
 
 def read_tets(path: str | Path) -> TetFile:
@@ -118,7 +117,7 @@ def read_tets(path: str | Path) -> TetFile:
     if extension not in TET_EXTENSIONS:
         hint = "; a surface is loaded with SurfaceMesh.load" if extension in SURFACE_READERS else ""
         raise _unknown_extension(path, TET_EXTENSIONS, hint)
-    data = _contents(path)
+    data = file_contents(path)
     try:
         soup = TET_READERS[extension](data)
         return TetFile(soup.points, tets_of(soup), path)
@@ -137,13 +136,6 @@ def write_tets(path: str | Path, vertices: NDArray[np.float64], tets: NDArray[np
         _write_whole(path, lambda temporary: temporary.write_bytes(data))
     else:
         raise _unknown_extension(path, TET_EXTENSIONS, "")
-
-
-def _contents(path: Path) -> bytes:
-    data = file_contents(path)
-    if not data.strip():
-        raise MeshError(f"{path}: it is empty")
-    return data
 
 
 def _write_whole(path: Path, write: Callable[[Path], object]) -> None:

@@ -85,7 +85,7 @@ def read_header(path: Path, text: bytes, names: tuple[str, ...], defaults: tuple
     """
     number, line = next(_filled_lines(text), (0, b""))
     if not number:
-        raise MeshError(f"{path}: is empty; its first line must give {', '.join(names)}")
+        raise MeshError(f"{path}: it is empty; its first line must give {', '.join(names)}")
     words = line.decode("ascii").split()
     if len(words) > len(names) or not all(_WHOLE_NUMBER.fullmatch(w) and len(w) <= 18 for w in words):
         raise MeshError(f"{path}:{number}: the header {_short(line)} is not whole numbers for {', '.join(names)}")

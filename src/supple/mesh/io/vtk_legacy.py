@@ -199,31 +199,19 @@ def _skip_field(cursor: _Cursor, words: list[str]) -> None:
 
 def written_surface(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> bytes:
     """PolyData as binary legacy VTK 3.0, which all readers support."""
-    cells = np.column_stack([np.full(len(triangles), 3), triangles]).astype(">i4")
-    return b"".join(
-        [
-            b"# vtk DataFile Version 3.0\nwritten by supple\nBINARY\nDATASET POLYDATA\n",
-            f"POINTS {len(vertices)} double\n".encode(),
-            vertices.astype(">f8").tobytes(),
-            f"\nPOLYGONS {len(triangles)} {cells.size}\n".encode(),
-            cells.tobytes() + b"\n",
-        ]
-    )
+    return _written("POLYDATA", vertices, "POLYGONS", triangles)
 
 
 def written_cells(vertices: NDArray[np.float64], cells: NDArray[np.int32]) -> bytes:
     """Triangles or tets as an UnstructuredGrid in binary legacy VTK 3.0."""
     m, width = cells.shape
+    types = np.full(m, TETRA if width == 4 else TRIANGLE, dtype=">i4").tobytes()
+    return _written("UNSTRUCTURED_GRID", vertices, "CELLS", cells) + f"CELL_TYPES {m}\n".encode() + types + b"\n"
+
+
+def _written(dataset: str, vertices: NDArray[np.float64], section: str, cells: NDArray[np.int32]) -> bytes:
+    m, width = cells.shape
+    head = f"# vtk DataFile Version 3.0\nwritten by supple\nBINARY\nDATASET {dataset}\nPOINTS {len(vertices)} double\n"
     packed = np.column_stack([np.full(m, width), cells]).astype(">i4")
-    cell_type = TETRA if width == 4 else TRIANGLE
-    return b"".join(
-        [
-            b"# vtk DataFile Version 3.0\nwritten by supple\nBINARY\nDATASET UNSTRUCTURED_GRID\n",
-            f"POINTS {len(vertices)} double\n".encode(),
-            vertices.astype(">f8").tobytes(),
-            f"\nCELLS {m} {packed.size}\n".encode(),
-            packed.tobytes(),
-            f"\nCELL_TYPES {m}\n".encode(),
-            np.full(m, cell_type, dtype=">i4").tobytes() + b"\n",
-        ]
-    )
+    points = vertices.astype(">f8").tobytes()
+    return head.encode() + points + f"\n{section} {m} {packed.size}\n".encode() + packed.tobytes() + b"\n"

@@ -207,7 +207,9 @@ def _meshfix_components(surface: SurfaceMesh, steps: list[str], allow_lost: bool
         if fixed is None or loss == 1.0:
             steps.append(f"dropped {what}")
         else:
-            steps.append(_change(f"MeshFix repaired component {k} of {count}", piece, fixed))
+            sizes = f"{len(piece.triangles)} -> {len(fixed.triangles)} triangles"
+            areas = f"area {piece.area:.6g} -> {fixed.area:.6g} m^2"
+            steps.append(f"MeshFix repaired component {k} of {count}: {sizes}, {areas}")
             kept.append(fixed)
     if not kept:
         raise MeshingError("repair could not fix the surface: no component remains")
@@ -222,10 +224,3 @@ def _own_faults(piece: SurfaceMesh) -> list[str]:
     """Faults of a component alone, without its facing: alone, a cavity cannot be recognized."""
     report = piece.check()
     return report.problems[: len(report.problems) - bool(len(report.wrong_facing_components))]
-
-
-def _change(what: str, before: SurfaceMesh, after: SurfaceMesh) -> str:
-    return (
-        f"{what}: {len(before.triangles)} -> {len(after.triangles)} triangles, "
-        f"area {before.area:.6g} -> {after.area:.6g} m^2"
-    )

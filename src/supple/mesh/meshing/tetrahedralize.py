@@ -83,18 +83,7 @@ def tetrahedralize(
     MeshingError : for a surface that cannot be meshed (what is wrong, where, and the remedy), a mesher that failed or
         reached a limit, a result that does not meet the demands, or a parameter out of its range.
     """
-    return tetrahedralize_reported(
-        surface,
-        max_volume=max_volume,
-        quality=quality,
-        min_dihedral=min_dihedral,
-        keep_surface=keep_surface,
-        mesher=mesher,
-        repair=repair,
-        envelope=envelope,
-        time_limit=time_limit,
-        memory_limit=memory_limit,
-    )[0]
+    return tetrahedralize_reported(**locals())[0]  # all parameters, and nothing else yet
 
 
 def tetrahedralize_reported(

@@ -11,6 +11,8 @@ import numpy as np
 
 from supple.numerics.kernel_cache import njit
 
+from supple.numerics.geometry.double_double import product_error, sum_error
+
 # (7 + 56 u) u with u = 2^-53: bound of the rounding error, relative to the sum of the products' magnitudes.
 _ERROR = (7.0 + 56.0 * 2.0**-53) * 2.0**-53
 # 6 permutations x 8 choices of a difference's two parts x 4 parts of a product of three.
@@ -20,23 +22,13 @@ _PARTS = 192
 @njit
 def _two_sum(a, b):
     s = a + b
-    t = s - a
-    return s, (a - (s - t)) + (b - t)
-
-
-@njit
-def _halves(a):
-    c = 134217729.0 * a
-    high = c - (c - a)
-    return high, a - high
+    return s, sum_error(a, b, s)
 
 
 @njit
 def _two_product(a, b):
     p = a * b
-    ah, al = _halves(a)
-    bh, bl = _halves(b)
-    return p, al * bl - (((p - ah * bh) - al * bh) - ah * bl)
+    return p, product_error(a, b, p)
 
 
 @njit
