@@ -58,7 +58,7 @@ def test_repair_is_reported(ball: Path, capsys: pytest.CaptureFixture[str]) -> N
         (["missing.stl", "-o", "b.node"], "missing.stl: "),
         (["ball.stl", "-o", "b.step"], "b.step: the extension must be one of .node"),
         (["ball.stl", "-o", "no/where/b.msh"], "there is no folder"),
-        (["ball.stl", "-o", "taken.1.node"], "taken.1.face: is a folder"),
+        (["ball.stl", "-o", "used.1.node"], "used.1.face: is a folder"),
         (["ball.stl", "-o", "b.node", "--quality", "0.9"], "ball.stl: quality must be"),
         (["ball.stl", "-o", "b.node", "--max-volume", "-1"], "max_volume must be"),
         (["ball.stl", "-o", "b.node", "--memory-limit", "0"], "memory limit must be"),
@@ -70,9 +70,9 @@ def test_repair_is_reported(ball: Path, capsys: pytest.CaptureFixture[str]) -> N
 )
 def test_errors_are_one_line_and_leave_no_file(ball: Path, monkeypatch, capsys, arguments, message) -> None:
     monkeypatch.chdir(ball.parent)
-    Path("taken.1.face").mkdir()
+    Path("used.1.face").mkdir()
     assert main(["mesh", *arguments]) == 2
     output = capsys.readouterr().err
     assert message in output
     assert output.count("\n") == 1
-    assert {p.name for p in ball.parent.iterdir()} == {"ball.stl", "taken.1.face"}
+    assert {p.name for p in ball.parent.iterdir()} == {"ball.stl", "used.1.face"}

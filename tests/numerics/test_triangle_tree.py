@@ -35,10 +35,10 @@ def test_agrees_with_a_search_through_all_triangles(count, collapse):
     assert np.array_equal(near >= 0, distances.min(axis=1) <= limit * (1 + 1e-9))
     assert np.isinf(how_near[near < 0]).all()
     of_query, rows, lengths = tree.all_within(queries, limit)
-    wanted = np.nonzero(distances <= limit * (1 + 1e-12))
-    assert np.array_equal(of_query, wanted[0])
-    assert np.array_equal(rows, wanted[1])
-    assert np.allclose(lengths, distances[wanted])
+    expected = np.nonzero(distances <= limit * (1 + 1e-12))
+    assert np.array_equal(of_query, expected[0])
+    assert np.array_equal(rows, expected[1])
+    assert np.allclose(lengths, distances[expected])
 
 
 def test_an_edge_as_a_triangle_has_the_distance_of_an_edge():

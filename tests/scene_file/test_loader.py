@@ -304,8 +304,8 @@ def test_pairs_are_found_once_by_the_names_in_the_scene(load, tmp_path, monkeypa
     from supple.scene.stitches.stitch import Stitch
     from supple.system import build_system
 
-    looked, find = [], Stitch.find
-    monkeypatch.setattr(Stitch, "find", lambda self, *sides: (looked.append(self.name), find(self, *sides))[1])
+    searched, find = [], Stitch.find
+    monkeypatch.setattr(Stitch, "find", lambda self, *sides: (searched.append(self.name), find(self, *sides))[1])
     sp.shapes.box_surface((4, 1, 4), (1, 1, 1)).save(tmp_path / "roof.obj")
     soft = "kind: soft_vertex_triangle, first: high, max_distance: 0.3, youngs: 1e5, poisson: 0.3"
     nameless = STITCHED.replace("name: roof, ", "")
@@ -313,7 +313,7 @@ def test_pairs_are_found_once_by_the_names_in_the_scene(load, tmp_path, monkeypa
         nameless + f"  - {{name: a, {soft}, second: low}}\n  - {{name: b, {soft}, second: TriangleObstacle 1}}\n"
     )
     assert len(build_system(run.scene).stitching) == 8
-    assert looked == ["a", "b"]
+    assert searched == ["a", "b"]
 
 
 @pytest.mark.parametrize(

@@ -62,7 +62,7 @@ class SurfaceMesh:
 
         Raises
         ------
-        MeshError : where the file is missing, malformed, of another kind, or holds no surface; the text starts with
+        MeshError : where the file is missing, malformed, of another kind, or has no surface; the text starts with
             the path.
         """
         return cls(*read_surface(path))

@@ -56,10 +56,10 @@ class TetMesh:
     def __init__(self, vertices: ArrayLike, tets: ArrayLike) -> None:
         points = vertex_array(vertices, "TetMesh")
         given = index_array(tets, 4, len(points), "TetMesh", "tet")
-        _refuse_repeated_corners(given)
+        _check_repeated_corners(given)
         positive, turned = _positive_winding(points, given)
-        _refuse_unused(points, positive)
-        _refuse_duplicates(positive, len(points))
+        _check_unused(points, positive)
+        _check_duplicates(positive, len(points))
         object.__setattr__(self, "vertices", points)
         object.__setattr__(self, "tets", frozen(positive))
         object.__setattr__(self, "turned", turned)
@@ -88,18 +88,16 @@ class TetMesh:
 
         Raises
         ------
-        MeshError : where the file is missing, malformed, of another kind, or holds no usable tets; the text starts
+        MeshError : where the file is missing, malformed, of another kind, or has no usable tets; the text starts
             with the path.
         """
-        file = read_tets(path)
+        points, tets, source = read_tets(path)
         try:
-            mesh = cls.dropping_unused(file.points, file.tets)
+            mesh = cls.dropping_unused(points, tets)
         except MeshError as error:
-            raise MeshError(f"{file.path}: {str(error).removeprefix('TetMesh: ')} (counted from 0)") from None
+            raise MeshError(f"{source}: {str(error).removeprefix('TetMesh: ')} (counted from 0)") from None
         if mesh.turned:
-            logger.info(
-                "%s: %d of %d tets had negative winding and were turned", file.path, mesh.turned, len(mesh.tets)
-            )
+            logger.info("%s: %d of %d tets had negative winding and were turned", source, mesh.turned, len(mesh.tets))
         return mesh
 
     def save(self, path: str | Path) -> None:
@@ -211,7 +209,7 @@ def _positive_winding(vertices: NDArray[np.float64], tets: NDArray[np.int32]) ->
     return positive, int(np.count_nonzero(negative))
 
 
-def _refuse_repeated_corners(tets: NDArray[np.int32]) -> None:
+def _check_repeated_corners(tets: NDArray[np.int32]) -> None:
     repeated = np.zeros(len(tets), dtype=bool)
     for i, j in TET_EDGES:
         repeated |= tets[:, i] == tets[:, j]
@@ -220,7 +218,7 @@ def _refuse_repeated_corners(tets: NDArray[np.int32]) -> None:
         raise MeshError(f"TetMesh: tet {t} is {tets[t].tolist()}, with a vertex twice; remove it")
 
 
-def _refuse_unused(vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> None:
+def _check_unused(vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> None:
     used = np.zeros(len(vertices), dtype=bool)
     used[tets] = True
     if not used.all():
@@ -232,7 +230,7 @@ def _refuse_unused(vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> No
         )
 
 
-def _refuse_duplicates(tets: NDArray[np.int32], n_vertices: int) -> None:
+def _check_duplicates(tets: NDArray[np.int32], n_vertices: int) -> None:
     corners = np.sort(tets, axis=1).astype(np.int64)
     first, second = corners[:, 0] * n_vertices + corners[:, 1], corners[:, 2] * n_vertices + corners[:, 3]
     # Equal tets have equal sums of keys. The slower exact comparison is needed only where two sums agree.

@@ -95,11 +95,11 @@ def tets_of(soup: CellSoup) -> NDArray[np.int64]:
     others = np.unique(soup.types[(soup.types != TETRA) & (soup.types > QUAD)])
     if len(others):
         name = CELL_NAMES.get(int(others[0]), f"type {others[0]}")
-        raise FormatError(f"it holds {name} cells; only linear tetrahedra can be used: convert or remesh it")
+        raise FormatError(f"it has {name} cells; only linear tetrahedra can be used: convert or remesh it")
     cells = np.flatnonzero(soup.types == TETRA)
     if len(cells) == 0:
         raise FormatError(
-            "it holds no tetrahedra; a surface is loaded with SurfaceMesh.load and meshed with tetrahedralize"
+            "it has no tetrahedra; a surface is loaded with SurfaceMesh.load and meshed with tetrahedralize"
         )
     starts, sizes = soup.offsets[cells], soup.offsets[cells + 1] - soup.offsets[cells]
     if (sizes != 4).any():

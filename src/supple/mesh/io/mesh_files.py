@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,14 +49,6 @@ TET_EXTENSIONS = (*SUFFIXES, *TET_READERS)
 MERGE_TOLERANCE = 2e-7
 
 
-class TetFile(NamedTuple):
-    """Vertices (n, 3) and tets (m, 4) as read from a file, and the file that lists the tets."""
-
-    points: NDArray[np.float64]
-    tets: NDArray[np.integer]
-    path: Path
-
-
 def read_surface(path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Vertices (n, 3) and triangles (m, 3) of a surface file; see `SurfaceMesh.load`."""
     path = Path(path)
@@ -69,7 +60,7 @@ def read_surface(path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.int6
     try:
         soup = SURFACE_READERS[extension](data)
         if len(soup.points) == 0:
-            raise FormatError("it holds no vertices")
+            raise FormatError("it has no vertices")
         points = vertex_array(soup.points, str(path))
         triangles = triangles_of(soup)
     except FormatError as error:
@@ -80,7 +71,7 @@ def read_surface(path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.int6
     a, b, c = triangles.T
     collapsed = (a == b) | (b == c) | (c == a)
     if collapsed.all():
-        raise MeshError(f"{path}: all {len(triangles)} triangles are degenerate; it holds no surface")
+        raise MeshError(f"{path}: all {len(triangles)} triangles are degenerate; it has no surface")
     if len(keep) < len(points):
         logger.info("%s: %d vertices at the place of others were merged", path, len(points) - len(keep))
     if collapsed.any():
@@ -104,8 +95,8 @@ def write_surface(path: str | Path, vertices: NDArray[np.float64], triangles: ND
     _write_whole(path, lambda temporary: temporary.write_bytes(writer(vertices, triangles)))
 
 
-def read_tets(path: str | Path) -> TetFile:
-    """Vertices and tets of a file, unchecked beyond the format; see `TetMesh.load`."""
+def read_tets(path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.integer], Path]:
+    """Vertices (n, 3), tets (m, 4), and the file that lists the tets; see `TetMesh.load`."""
     path = Path(path)
     extension = path.suffix.lower()
     if is_tetgen_path(path):
@@ -113,14 +104,14 @@ def read_tets(path: str | Path) -> TetFile:
         ele = family_paths(path)[".ele"]
         if family.order == 2:
             logger.warning("%s: ten-node tets: only their four corners are used", ele)
-        return TetFile(family.points, family.tets, ele)
+        return family.points, family.tets, ele
     if extension not in TET_EXTENSIONS:
         hint = "; a surface is loaded with SurfaceMesh.load" if extension in SURFACE_READERS else ""
         raise _unknown_extension(path, TET_EXTENSIONS, hint)
     data = file_contents(path)
     try:
         soup = TET_READERS[extension](data)
-        return TetFile(soup.points, tets_of(soup), path)
+        return soup.points, tets_of(soup), path
     except FormatError as error:
         raise _located(path, error) from None
 

@@ -40,7 +40,7 @@ class _Section:
         self.name, self.form, self.data = name, form, data
         found = re.search(rb"^\$" + name.encode() + rb"[ \t]*\r?\n", data, re.MULTILINE)
         if found is None:
-            raise FormatError(f"it has no section ${name}: it is truncated, or holds no mesh")
+            raise FormatError(f"it has no section ${name}: it is truncated, or has no mesh")
         self.at = found.end()
         self.values = np.empty(0)
         if form.is_text:
@@ -144,7 +144,7 @@ def read(data: bytes) -> CellSoup:
     tags, points = (_nodes_2 if form.version == "2" else _nodes_4)(_Section(data, "Nodes", form))
     blocks = (_elements_2 if form.version == "2" else _elements_4)(_Section(data, "Elements", form))
     if len(tags) == 0:
-        raise FormatError("it holds no nodes")
+        raise FormatError("it has no nodes")
     order = np.argsort(tags, kind="stable")
     ordered = tags[order]
     if (ordered[1:] == ordered[:-1]).any():
@@ -158,7 +158,7 @@ def read(data: bytes) -> CellSoup:
             raise FormatError(f"an element names node {nodes[unknown][0]}, which does not exist")
         soups.append(CellSoup.of_rows(points[:0], order[place], ELEMENTS[kind][1]))
     if not soups:
-        raise FormatError("it holds no elements")
+        raise FormatError("it has no elements")
     return joined(soups)._replace(points=points)
 
 

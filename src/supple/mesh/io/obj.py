@@ -21,7 +21,7 @@ def read(data: bytes) -> CellSoup:
         elif words[0] == "f":
             polygons.append(_face(words[1:], len(points), line))
     if not points:
-        raise FormatError("it holds no vertices (lines 'v x y z'); is it an OBJ file?")
+        raise FormatError("it has no vertices (lines 'v x y z'); is it an OBJ file?")
     soup = CellSoup.of_polygons(np.array(points, dtype=np.float64), polygons)
     outside = soup.connectivity >= len(points)
     if outside.any():

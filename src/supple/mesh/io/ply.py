@@ -55,7 +55,7 @@ def read(data: bytes) -> CellSoup:
         elif points is None or faces is None:
             body.lists(element)
     if points is None or faces is None:
-        raise FormatError("it has no 'vertex' element with x, y, z, or no 'face' element: it holds no surface")
+        raise FormatError("it has no 'vertex' element with x, y, z, or no 'face' element: it has no surface")
     return CellSoup.of_sizes(points, *faces)
 
 
@@ -139,11 +139,11 @@ class _Binary:
         return np.column_stack([table[f"c{k}"].astype(np.float64) for k in columns])
 
     def lists(self, element: Element) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        wanted = _which_list(element)
-        fast = self._equal_lists(element, wanted)
-        return self._any_lists(element, wanted) if fast is None else fast
+        column = _which_list(element)
+        fast = self._equal_lists(element, column)
+        return self._any_lists(element, column) if fast is None else fast
 
-    def _equal_lists(self, element: Element, wanted: int) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
+    def _equal_lists(self, element: Element, column: int) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
         """All rows at once, where each list is as long as in the first row; None where lengths differ."""
         columns, at = [], self.at
         lengths = {}
@@ -167,10 +167,10 @@ class _Binary:
         if any((table[f"n{k}"] != length).any() for k, length in lengths.items()):
             return None
         self.at += dtype.itemsize * element.count
-        flat = table[f"c{wanted}"].astype(np.int64).ravel() if wanted >= 0 else np.empty(0, dtype=np.int64)
-        return np.full(element.count, lengths.get(wanted, 0), dtype=np.int64), flat
+        flat = table[f"c{column}"].astype(np.int64).ravel() if column >= 0 else np.empty(0, dtype=np.int64)
+        return np.full(element.count, lengths.get(column, 0), dtype=np.int64), flat
 
-    def _any_lists(self, element: Element, wanted: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def _any_lists(self, element: Element, column: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         sizes, pieces = [], []
         kinds = [
             (np.dtype(self.order + p.kind), None if p.length is None else np.dtype(self.order + p.length))
@@ -189,7 +189,7 @@ class _Binary:
                 except ValueError:
                     raise FormatError(f"row {row} of '{element.name}' goes beyond the end of the file") from None
                 self.at += size * kind.itemsize
-                if k == wanted:
+                if k == column:
                     sizes.append(size)
                     pieces.append(values)
         flat = np.concatenate(pieces).astype(np.int64) if pieces else np.empty(0, dtype=np.int64)
@@ -219,7 +219,7 @@ class _Text:
         return np.array(table, dtype=np.float64).reshape(-1, width)[:, columns]
 
     def lists(self, element: Element) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        wanted = _which_list(element)
+        column = _which_list(element)
         sizes: list[int] = []
         flat: list[int] = []
         for line, words in self._rows(element):
@@ -231,7 +231,7 @@ class _Text:
                     at += 1
                 if size < 0 or at + size > len(words):
                     raise FormatError(f"'{shortened(words)}' is too short for '{p.name}'", line)
-                if k == wanted:
+                if k == column:
                     sizes.append(size)
                     flat += [integer(word, line, "face index") for word in words[at : at + size]]
                 at += size

@@ -31,10 +31,10 @@ def triangles_of(soup: CellSoup) -> NDArray[np.int64]:
     if len(solid):
         name = CELL_NAMES.get(int(solid[0]), f"type {solid[0]}")
         hint = "; load it with TetMesh.load, whose .surface is the boundary" if name == "tetrahedron" else ""
-        raise FormatError(f"it holds {name} cells, which are not a surface{hint}")
+        raise FormatError(f"it has {name} cells, which are not a surface{hint}")
     cells = np.flatnonzero(np.isin(soup.types, SURFACE_TYPES))
     if len(cells) == 0:
-        raise FormatError("it holds no triangles or polygons")
+        raise FormatError("it has no triangles or polygons")
     types, starts = soup.types[cells], soup.offsets[cells]
     sizes = soup.offsets[cells + 1] - starts
     if (sizes < 3).any():

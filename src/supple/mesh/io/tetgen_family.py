@@ -184,7 +184,7 @@ def _read_tets(path: Path, n_points: int, base: int) -> tuple[NDArray[np.int32],
     _check_numbering(table, base, "tet")
     corners = _corners(table, nodes, n_points, base)[:, :4]
     ordered = np.sort(corners, axis=1)
-    table.refuse((ordered[:, 1:] == ordered[:, :-1]).any(axis=1), "the tet has the same vertex twice")
+    table.raise_where((ordered[:, 1:] == ordered[:, :-1]).any(axis=1), "the tet has the same vertex twice")
     return np.ascontiguousarray(corners), np.ascontiguousarray(table.rows[:, 1 + nodes :]), 1 if nodes == 4 else 2
 
 
@@ -209,11 +209,11 @@ def _read_simplices(
     keys = facet_keys(_as_triangles(np.concatenate([corners, of_tets])), n_points)
     own, known = keys[:count], np.sort(keys[count:])
     found = known[np.minimum(np.searchsorted(known, own), len(known) - 1)] == own
-    table.refuse(~found, f"the {what} belongs to no tet")
+    table.raise_where(~found, f"the {what} belongs to no tet")
     order = np.argsort(own, kind="stable")
     again = np.zeros(count, dtype=bool)
     again[order[1:]] = own[order][1:] == own[order][:-1]
-    table.refuse(again, f"the {what} is given a second time")
+    table.raise_where(again, f"the {what} is given a second time")
     return corners, _markers(table, slice(1 + on_line, 2 + on_line)) if n_markers else None
 
 
@@ -248,7 +248,7 @@ def _corners(table: Table, width: int, n_points: int, base: int) -> NDArray[np.i
     corners = table.whole_numbers(slice(1, 1 + width), "vertex")
     for column in corners.T:
         bad = (column < base) | (column >= n_points + base)
-        table.refuse(bad, f"vertex {{}} does not exist: they run from {base} to {n_points + base - 1}", column)
+        table.raise_where(bad, f"vertex {{}} does not exist: they run from {base} to {n_points + base - 1}", column)
     return (corners - base).astype(np.int32)
 
 

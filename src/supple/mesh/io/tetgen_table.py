@@ -49,7 +49,7 @@ class Table:
                 return MeshError(f"{self.path}:{line}: {reason}")
         return MeshError(f"{self.path}: {reason}")
 
-    def refuse(self, bad: NDArray[np.bool_] | np.bool_, reason: str, column: NDArray[np.float64] | None = None) -> None:
+    def raise_where(self, bad: NDArray[np.bool_] | np.bool_, reason: str, column: NDArray | None = None) -> None:
         """Raise for the first row marked in `bad`; `{}` in the reason becomes that row's value in `column`."""
         if bad.any():
             row = int(np.flatnonzero(bad)[0])
@@ -59,8 +59,8 @@ class Table:
         """Columns (n, k) that must hold integers of 32 bits."""
         block = self.rows[:, columns]
         for column in block.T:
-            self.refuse(column != np.rint(column), f"{what} {{}} is not a whole number", column)
-            self.refuse(np.abs(column) > 2**31 - 1, f"{what} {{}} does not fit into 32 bits", column)
+            self.raise_where(column != np.rint(column), f"{what} {{}} is not a whole number", column)
+            self.raise_where(np.abs(column) > 2**31 - 1, f"{what} {{}} does not fit into 32 bits", column)
         return block.astype(np.int64)
 
 
@@ -101,22 +101,22 @@ def read_rows(path: Path, text: bytes, header_line: int, columns: Columns) -> Ta
     held = text.count(b"\n", start) + 1
     if columns.count > held:
         # The file is incomplete: report the line without parsing the numbers.
-        _refuse_bad_lines(path, text, header_line, columns)
+        _raise_for_bad_line(path, text, header_line, columns)
     try:
         body = text[start:]
         rows = np.loadtxt(io.BytesIO(body), ndmin=2) if body.strip() else np.empty((0, columns.width))
     except (ValueError, OverflowError):
-        _refuse_bad_lines(path, text, header_line, columns)
+        _raise_for_bad_line(path, text, header_line, columns)
         raise MeshError(f"{path}: cannot be read as a table of numbers") from None
     width = rows.shape[1]
     if len(rows) != columns.count or not columns.width <= width <= columns.width + columns.extra:
-        _refuse_bad_lines(path, text, header_line, columns)
+        _raise_for_bad_line(path, text, header_line, columns)
     table = Table(path, rows, text, header_line)
-    table.refuse(~np.isfinite(rows).all(axis=1), "holds a number that is not finite")
+    table.raise_where(~np.isfinite(rows).all(axis=1), "holds a number that is not finite")
     return table
 
 
-def _refuse_bad_lines(path: Path, text: bytes, header_line: int, columns: Columns) -> None:
+def _raise_for_bad_line(path: Path, text: bytes, header_line: int, columns: Columns) -> None:
     """Raise for the first line that does not fit the header. Slow, so it is only called when something is wrong."""
     width = None
     rows, last = 0, header_line

@@ -114,9 +114,9 @@ def _soup(
     points: NDArray[np.float64], blocks: list[tuple[int, NDArray[np.int64], NDArray[np.int64]]], types: NDArray | None
 ) -> CellSoup:
     if len(points) == 0:
-        raise FormatError("it holds no points")
+        raise FormatError("it has no points")
     if not blocks:
-        raise FormatError("it holds no cells")
+        raise FormatError("it has no cells")
     sizes = np.concatenate([np.diff(offsets) for _, offsets, _ in blocks])
     offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
     flat = np.concatenate([flat for _, _, flat in blocks]).astype(np.int64)

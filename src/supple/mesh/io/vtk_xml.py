@@ -55,7 +55,7 @@ def read(data: bytes) -> CellSoup:
     pieces = [_piece(piece, encoding) for piece in root.iter("Piece")]
     pieces = [piece for piece in pieces if len(piece.points)]
     if not pieces:
-        raise FormatError("it holds no points")
+        raise FormatError("it has no points")
     return joined(pieces)
 
 

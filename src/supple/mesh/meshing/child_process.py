@@ -56,7 +56,7 @@ class MesherResult:
 
 
 class MesherFailure(MeshingError):
-    """The child returned no mesh; `kind` is "time", "memory", "crash" or "refused"."""
+    """The child returned no mesh; `kind` is "time", "memory", "crash" or "failed"."""
 
     def __init__(self, kind: str, text: str) -> None:
         super().__init__(text)
@@ -159,7 +159,7 @@ def _failure(mesher: str, code: int, error: str, last: str, limits: Limits, star
             "memory", f"{mesher} ran out of memory{limit}; ask for less (a larger max_volume) or raise memory_limit"
         )
     if error:
-        return MesherFailure("refused", f"{mesher} failed: {error.rstrip('.')}")
+        return MesherFailure("failed", f"{mesher} failed: {error.rstrip('.')}")
     how = f"exit code {code}" if code >= 0 else _signal_name(-code)
     return MesherFailure("crash", f"{mesher} crashed ({how})" + (f", its last output: {last}" if last else ""))
 

@@ -50,7 +50,7 @@ def mesh_with_ftetwild(
     try:
         result = run_mesher("ftetwild", unit, options, limits)
     except MesherFailure as failure:
-        if failure.kind in ("crash", "refused"):
+        if failure.kind in ("crash", "failed"):
             raise MesherFailure(failure.kind, f"{failure}; fix the surface in a modelling program") from None
         raise
     if len(result.elements) == 0:

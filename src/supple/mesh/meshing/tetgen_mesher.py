@@ -59,7 +59,7 @@ def _inside(surface: SurfaceMesh, vertices: NDArray[np.float64], result: MesherR
 
 
 def _with_remedy(failure: MesherFailure) -> MesherFailure:
-    if failure.kind not in ("crash", "refused"):
+    if failure.kind not in ("crash", "failed"):
         return failure
     return MesherFailure(
         failure.kind,

@@ -132,7 +132,7 @@ def tetrahedralize_reported(
         }
         result = mesh_with_tetgen(surface, options, limits)
     else:
-        _refuse_tetgen_options(quality, min_dihedral, keep_surface)
+        _check_ftetwild_options(quality, min_dihedral, keep_surface)
         result = mesh_with_ftetwild(surface, max_volume, envelope, limits)
     try:
         mesh = TetMesh.dropping_unused(result.vertices, result.elements)
@@ -206,7 +206,7 @@ def _choose(mesher: Mesher, report: SurfaceReport, repaired: bool) -> Literal["t
     raise MeshingError(f"TetGen cannot mesh this surface: {still}{faults}; {' or '.join(remedies)}")
 
 
-def _refuse_tetgen_options(quality: float | None, min_dihedral: float | None, keep_surface: bool) -> None:
+def _check_ftetwild_options(quality: float | None, min_dihedral: float | None, keep_surface: bool) -> None:
     """Raise for options that fTetWild does not have; warn of the one that it does not use."""
     for name, given in (("keep_surface", keep_surface), ("min_dihedral", min_dihedral is not None)):
         if given:

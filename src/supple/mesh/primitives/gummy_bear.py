@@ -117,9 +117,9 @@ def _marching_cubes(resolution: int) -> tuple[NDArray[np.float64], NDArray[np.in
 
 
 def _spread(points: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Move each vertex along the skin towards its neighbours' middle, and back onto the skin, a few times.
+    """Move each vertex along the surface towards the middle of its neighbours, then back onto the surface; repeat.
 
-    Marching cubes leaves slivers wherever the skin passes close to a grid point; meshers and solvers dislike them.
+    This removes the slivers of marching cubes where the surface passes close to a grid point.
     """
     edges = unique_edges(triangles, len(points))
     both = np.concatenate([edges, edges[:, ::-1]])

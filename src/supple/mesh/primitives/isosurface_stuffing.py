@@ -1,8 +1,8 @@
 """Filling the inside of a smooth surface with well-shaped tets.
 
 Isosurface stuffing (Labelle & Shewchuk 2007, "Isosurface Stuffing: Fast Tetrahedral Meshes with Good Dihedral
-Angles"): a body-centred cubic lattice is cut by the surface; lattice points that a cut comes too close to are
-moved onto the surface first, so that the pieces left are never thin. With the distances of the paper's table
+Angles"): the surface cuts a body-centred cubic lattice. Before that, lattice points too close to a cut are moved onto
+the surface, so that no piece is thin. With the distances of the paper's table
 (the safe choice of its section 3) dihedral angles stay between 10.7 and 164.8 degrees.
 """
 
@@ -17,10 +17,10 @@ from supple.errors import MeshError
 from supple.mesh.primitives.sizes import not_too_many
 from supple.mesh.tetmesh import TetMesh
 
-# A function of points (k, 3) that is negative inside, zero on the surface, and about a distance near it.
+# A function of points (k, 3) that is negative inside, zero on the surface, and approximately a distance near it.
 Implicit = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
-# Closer than this fraction of an edge to its end, a cut moves the end onto the surface: long and short edges.
+# A cut closer than this fraction of the edge to an end moves this end onto the surface; for long and short edges.
 SNAP_LONG, SNAP_SHORT = 0.24999, 0.41189
 # Mean edge of the lattice over its spacing: 4 short edges, sqrt(3)/2 long, for 3 long ones.
 MEAN_EDGE = (4.0 * np.sqrt(0.75) + 3.0) / 7.0
@@ -36,7 +36,7 @@ def stuff(
 
     Parameters
     ----------
-    owner : who asks, for error texts
+    owner : name of the shape, for error messages
     inside : function of points (k, 3) -> (k,), negative inside
     bounds : lowest and highest corner of a box around the region [m]; a lattice point lies in its middle
     edge_length : mean edge [m]
@@ -52,10 +52,10 @@ def stuff(
     not_too_many(owner, elements, "make edge_length longer")
     points, tets = _lattice(low, high, spacing)
     values = inside(points)
-    # Only tets that reach inside matter.
+    # Only tets with a corner inside are needed.
     tets = tets[(values[tets] < 0.0).any(axis=1)]
     if len(tets) == 0:
-        raise MeshError(f"{owner}: edge_length = {edge_length:g} m is too long: nothing is left of it; make it shorter")
+        raise MeshError(f"{owner}: edge_length = {edge_length:g} m is too long: no tet is left; make it shorter")
     edges, of_tet, is_long = _edges(tets, len(points))
     cuts, fractions = _cuts(inside, points, values, edges)
     values = values.copy()
@@ -72,7 +72,7 @@ def stuff(
 def _lattice(
     low: NDArray[np.float64], high: NDArray[np.float64], spacing: float
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Points and tets of a body-centred cubic lattice that covers a box with a layer to spare."""
+    """Points and tets of a body-centred cubic lattice that covers a box and at least one layer around it."""
     half = np.ceil(0.5 * (high - low) / spacing).astype(np.int64) + 1
     n = 2 * half + 1
     grid = np.stack(np.meshgrid(*(np.arange(k) for k in n), indexing="ij"), axis=-1).reshape(-1, 3)
@@ -81,7 +81,7 @@ def _lattice(
     strides = np.array([n[1] * n[2], n[2], 1])
     tets = []
     for axis in range(3):
-        # Around the edge from a corner along `axis` lie four centres, each pair of neighbours along another axis.
+        # Four centres surround the edge from a corner along `axis`; each two neighbours differ along another axis.
         u, v = (axis + 1) % 3, (axis + 2) % 3
         keep = (grid[:, axis] < n[axis] - 1) & (grid[:, u] > 0) & (grid[:, v] > 0)
         start = np.flatnonzero(keep)
@@ -138,9 +138,9 @@ def _snap(
     cuts: NDArray[np.float64],
     fractions: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Move lattice points that cuts come too close to onto the nearest of them; changes `values` to 0 there.
+    """Move lattice points that are too close to cuts onto the nearest cut, and set `values` to 0 there.
 
-    Returns the points, and the edges whose cuts are left.
+    Returns the points, and the edges that are still cut.
     """
     points = points.copy()
     cut = np.flatnonzero(~np.isnan(fractions))
@@ -164,7 +164,7 @@ def _snap(
 def _pieces(
     tets: NDArray[np.int64], signs: NDArray[np.float64], cut_of: NDArray[np.int64], points: NDArray[np.float64]
 ) -> NDArray[np.int64]:
-    """What is left of each lattice tet inside the surface (figure 3 of the paper), as tets of any winding."""
+    """The part of each lattice tet inside the surface (figure 3 of the paper), as tets of any winding."""
     sign = signs[tets]
     n_inside, n_outside = (sign < 0).sum(axis=1), (sign > 0).sum(axis=1)
     # Corners sorted: inside, on the surface, outside.
@@ -194,7 +194,7 @@ def _pieces(
     top = [q, cut(1, 2, some), cut(1, 3, some)]
     by_2 = _first_leads(order[some, 0], order[some, 1], order[some, 2], p, q)
     by_3 = _first_leads(order[some, 0], order[some, 1], order[some, 3], p, q)
-    # The quad on the surface is free: take its shorter diagonal, unless that would close a cycle.
+    # The quad on the surface has no neighbour: use its shorter diagonal, unless that would close a cycle.
     one_way = np.linalg.norm(points[bottom[1]] - points[top[2]], axis=1)
     other_way = np.linalg.norm(points[bottom[2]] - points[top[1]], axis=1)
     free = np.where(by_2 != by_3, by_3, one_way <= other_way)
@@ -216,7 +216,7 @@ def _first_leads(
 ) -> NDArray[np.bool_]:
     """Whether the quad on facet (p, q, n), n outside, is cut from p to the cut on q n, not from q to that on p n.
 
-    Both tets at the facet must decide alike: the corner whose edge to n is long leads; else the lower point.
+    Both tets at the facet must decide equally: the corner with the long edge to n leads, otherwise the lower point.
     """
     p_long, q_long = PARTNER[p] == n, PARTNER[q] == n
     return np.where(p_long | q_long, p_long, p_row < q_row)
@@ -227,7 +227,7 @@ def _prisms(
 ) -> list[NDArray[np.int64]]:
     """Three tets for each prism. leads[k]: the quad of columns k and k + 1 is cut from bottom k to top k + 1."""
     a, b = np.column_stack(bottom), np.column_stack(top)
-    # A column comes before those that its bottom's diagonals go to; the places are 0, 1, 2 unless in a cycle.
+    # A column precedes those to which the diagonals from its bottom lead. The places are 0, 1, 2, except in a cycle.
     place = np.column_stack([~leads[0] * 1 + leads[2], leads[0] * 1 + ~leads[1], leads[1] * 1 + ~leads[2]])
     order = np.argsort(place, axis=1, kind="stable")
     rows = np.arange(len(a))
