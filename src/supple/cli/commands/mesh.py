@@ -50,7 +50,7 @@ def mesh(
     mesher
         "auto" uses TetGen for a clean surface, and fTetWild (an extra) for any other.
     repair
-        First repair a surface that is not clean, and print what the repair changed.
+        Repair a surface that is not clean first, and list the changes. Where that fails, fTetWild meshes it as it is.
     envelope
         How far fTetWild may move the surface, as a fraction of the bounding box's diagonal.
     time_limit

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import struct
+from array import array
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,20 +49,20 @@ def _read_binary(data: bytes) -> CellSoup:
 
 
 def _read_text(data: bytes) -> CellSoup:
-    corners: list[list[float]] = []
+    corners = array("d")
     line = 0
     for line, words in meaningful_lines(decoded(data)):
         keyword = words[0].lower()
         if keyword == "vertex":
-            corners.append(numbers(words[1:], 3, line, "vertex"))
+            corners.extend(numbers(words[1:], 3, line, "vertex"))
         elif keyword == "endloop":
-            if len(corners) == 0 or len(corners) % 3:
+            if len(corners) == 0 or len(corners) % 9:
                 raise FormatError("the loop that ends here does not have three vertices", line)
         elif keyword not in ("solid", "facet", "outer", "endfacet", "endsolid", "end"):
             raise FormatError(f"'{shortened(words)}' does not belong in an STL file", line)
-    if len(corners) % 3:
+    if len(corners) % 9:
         raise FormatError("the file ends inside a triangle: it is truncated", line)
-    return _soup(np.array(corners, dtype=np.float64).reshape(-1, 3))
+    return _soup(np.array(corners).reshape(-1, 3))
 
 
 def written(vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> bytes:

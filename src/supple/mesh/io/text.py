@@ -27,8 +27,12 @@ def decoded(data: bytes) -> str:
 
 def meaningful_lines(text: str) -> Iterator[tuple[int, list[str]]]:
     """Number (1-based) and words of each line that is neither blank nor a comment after `#`."""
-    for number, line in enumerate(text.split("\n"), start=1):
-        words = line.split("#", 1)[0].split()
+    number, start = 0, 0
+    while start <= len(text):  # not text.split("\n"): a list of all lines takes several times the memory of the file
+        end = text.find("\n", start)
+        end = len(text) if end < 0 else end
+        words = text[start:end].split("#", 1)[0].split()
+        number, start = number + 1, end + 1
         if words:
             yield number, words
 
