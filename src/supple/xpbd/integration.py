@@ -113,7 +113,7 @@ def to_world(points, origins, world):
 
 
 @njit(cache=True)
-def take_changes(points, velocities, h, origins, previous, world, world_previous):
+def apply_changes(points, velocities, h, origins, previous, world, world_previous):
     """Apply what contacts changed since `to_world`; what they did not change keeps every bit.
 
     Positions at the end and at the beginning of the substep may both have changed; the velocity gets the difference.

@@ -30,11 +30,11 @@ from supple.xpbd.details import XPBDDetails
 from supple.xpbd.external_forces import ExternalForces
 from supple.xpbd.integration import (
     accelerate,
+    apply_changes,
     first_lost,
     hold,
     origins_of_components,
     predict,
-    take_changes,
     to_world,
     update_velocities,
 )
@@ -226,7 +226,7 @@ def _collide(ws: XPBDWorkspace, time: float, h: float) -> bool:
         return False
     to_world(ws.previous, ws.origins, ws.world_previous)
     ws.collisions.project(ws.world, ws.world_previous, time, h)
-    take_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
+    apply_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
     return True
 
 

@@ -18,7 +18,7 @@ def reach_from_velocities(velocities, dt, least, out):
 
 
 @njit(cache=True)
-def outran(x, x_gathered, reach):
+def any_beyond_reach(x, x_gathered, reach):
     """Whether some vertex is farther than its reach (n,) from where it was."""
     for i in range(len(x)):
         a, b, c = x[i, 0] - x_gathered[i, 0], x[i, 1] - x_gathered[i, 1], x[i, 2] - x_gathered[i, 2]
@@ -48,13 +48,13 @@ def mean_motions(motions, pieces, all_share, out):
 
 
 @njit(cache=True)
-def search_radii(motions, come, excursions, pieces, drifts, scales, far, near):
+def search_radii(motions, moved, excursions, pieces, drifts, scales, far, near):
     """How far points may move, from their velocities: the arguments `far` and `near` of `spatial_hash.find_pairs`.
 
     Parameters
     ----------
     motions : (n, 3) expected motion: velocity times the time ahead [m]
-    come : (n, 3) motion since the beginning of the substep [m]
+    moved : (n, 3) motion since the beginning of the substep [m]
     excursions : (n,) largest motion of a point in a substep before contact stopped it [m]
     pieces : (n,)
     drifts : (p + 1, 3) common motion of each piece; in the last row the common motion of all points [m]
@@ -69,7 +69,7 @@ def search_radii(motions, come, excursions, pieces, drifts, scales, far, near):
         for j in range(3):
             absolute += (motions[i, j] - drifts[-1, j]) ** 2
             relative += (motions[i, j] - drifts[k, j]) ** 2
-            path += come[i, j] ** 2
+            path += moved[i, j] ** 2
         path = math.sqrt(path)
         strain = min(2.0 * most, excursions[i])
         a = strain + min(most, least + 1.2 * math.sqrt(absolute))
@@ -79,7 +79,7 @@ def search_radii(motions, come, excursions, pieces, drifts, scales, far, near):
 
 
 @njit(cache=True)
-def outran_pieces(x, x_prev, x_gathered, far, near, pieces, all_share, drifts, excursions):
+def any_beyond_radii(x, x_prev, x_gathered, far, near, pieces, all_share, drifts, excursions):
     """Whether some point has moved farther than `search_radii` allowed, absolutely or relative to its piece.
 
     Parameters

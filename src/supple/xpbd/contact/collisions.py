@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.obstacle_poses import ObstaclePoses
-from supple.contact.search.reach import outran, reach_from_velocities
+from supple.contact.search.reach import any_beyond_reach, reach_from_velocities
 from supple.contact.search.surfaces import build_surfaces
 from supple.scene.contact_pairs import pair_table
 from supple.system import System
@@ -108,7 +108,7 @@ class Collisions:
         if self.surfaces is not None:
             self._count(self.surfaces.project(x, x_prev, (time - h, time), limit))
         if self.obstacles:
-            if outran(x, self._gathered, self._reach):
+            if any_beyond_reach(x, self._gathered, self._reach):
                 self._gather_obstacles(x, (x - x_prev) / h, time)
             self._count(self.obstacles.project(x, x_prev, (time - h, time), limit, NEAR * self.edge_length))
         return self.contacts

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from supple.contact.obstacle_poses import ObstaclePoses
 from supple.contact.search.excluded_pairs import excluded_pairs
 from supple.contact.search.point_inside import bounds_of_pieces, depths_inside
-from supple.contact.search.reach import mean_motions, outran_pieces, search_radii
+from supple.contact.search.reach import any_beyond_radii, mean_motions, search_radii
 from supple.contact.search.spatial_hash import PairFinder
 from supple.contact.search.stitch_masks import stitched_points
 from supple.contact.search.surfaces import ContactSurfaces
@@ -81,7 +81,7 @@ class SurfaceCollisions:
         s.place_obstacles(self.poses, times[1], self._x)
         s.place_obstacles(self.poses, times[0], self._before)
         allowed = (self._far, self._near, s.point_piece, self._all_share, self._drifts)
-        if outran_pieces(self._x, self._before, self._gathered, *allowed, self._excursions):
+        if any_beyond_radii(self._x, self._before, self._gathered, *allowed, self._excursions):
             self._gather((self._x - self._before) * (self._dt / (times[1] - times[0])))
         lists = (finder.n_active, finder.active, finder.starts, finder.triangles)
         scales = (limit, NEAR * self.edge_length)
