@@ -15,6 +15,7 @@ TESTS = Path(__file__).parent
 # Packages that are imported under another name than they are installed with.
 IMPORT_NAMES = {
     "imageio-ffmpeg": "imageio_ffmpeg",
+    "lazy-loader": "lazy_loader",
     "mapbox-earcut": "mapbox_earcut",
     "pillow": "PIL",
     "pydantic-core": "pydantic_core",

@@ -18,14 +18,12 @@ LAYERS = (
     ("viewer",),
     ("output", "scene_file"),
     ("simulate",),
-    ("diagnostics",),
     ("xpbd", "implicit"),
-    ("solver",),
     ("contact",),
     ("system",),
     ("scene",),
     ("mesh", "materials"),
-    ("numerics", "state", "contact_points", "replacing", "errors"),
+    ("numerics", "files", "state", "errors"),
 )
 LEVEL = {part: -k for k, layer in enumerate(LAYERS) for part in layer}
 LOWEST = LAYERS[-1]

@@ -1,6 +1,5 @@
 """The public names of Supple and their modules: for type checkers, and for the lazy import of `__init__.py`."""
 
-from .contact_points import ContactPoints as ContactPoints
 from .errors import CommandError as CommandError
 from .errors import MeshError as MeshError
 from .errors import MeshingError as MeshingError
@@ -63,6 +62,7 @@ from .simulate import Frame as Frame
 from .simulate import NullSink as NullSink
 from .simulate import Report as Report
 from .simulate import simulate as simulate
+from .state import ContactPoints as ContactPoints
 from .state import State as State
 from .state import Status as Status
 from .xpbd.contact.settings import XPBDContact as XPBDContact

@@ -13,16 +13,41 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple.contact_points import ContactPoints
-from supple.diagnostics import Diagnostics, deformation_gradients, determinants, measure
 from supple.errors import SceneError, SolverError
+from supple.materials.edges_and_volume import EdgesAndVolume
+from supple.materials.material import Elastic
+from supple.numerics.deformation import deformation_gradients, determinants
 from supple.scene.scene import Scene
-from supple.solver import Solver
-from supple.state import SolverDetails, State, Status, StepReport
-from supple.system import System, build_system, initial_state
+from supple.scene.stitches.measures import largest_stitch_stretch, stitch_energy
+from supple.state import ContactPoints, SolverDetails, State, Status, StepReport
+from supple.system import BodyRange, Solver, System, build_system, initial_state
 
 # Beyond these, dt^2 and 1 / dt^2 leave what float64 can hold.
 _DT_RANGE = (1e-30, 1e30)
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnostics:
+    """Measured on one state.
+
+    Attributes
+    ----------
+    min_det_F : smallest J over all tets [-]
+    kinetic_energy, elastic_energy : [J], elastic from the rest state
+    potential_energy : of gravity [J], zero where all mass is at the origin
+    stitch_energy : of all stitches, from their rest state [J]
+    largest_stitch_stretch : see `supple.scene.stitches.measures`; None without stitches
+    linear_momentum : (3,) [kg m/s]; angular_momentum : (3,) about the center of mass [kg m^2/s]
+    """
+
+    min_det_F: float
+    kinetic_energy: float
+    elastic_energy: float
+    potential_energy: float
+    stitch_energy: float
+    largest_stitch_stretch: float | None
+    linear_momentum: NDArray[np.float64]
+    angular_momentum: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,3 +247,43 @@ def _report(system: System, state: State, step: StepReport, seconds: float) -> R
         min_distance=step.min_distance,
         details=step.details,
     )
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def measure(system: System, state: State) -> Diagnostics:
+    """Measure a state. Where its numbers are too large for double precision, the results are not finite."""
+    m, x, v = system.masses, state.positions, state.velocities
+    center = m @ x / m.sum()
+    momentum = m @ v
+    F = deformation_gradients(x, system.tets, system.rest_shape_inverse)
+    J = determinants(F)
+    stitching = system.stitching
+    points = stitching.points(x, state.time)
+    return Diagnostics(
+        min_det_F=float(J.min()),
+        kinetic_energy=0.5 * float(m @ np.einsum("ij,ij->i", v, v)),
+        elastic_energy=sum(_elastic_energy(system, part, x, F[part.tets], J[part.tets]) for part in system.bodies),
+        potential_energy=-float((m @ x) @ system.gravity),
+        stitch_energy=stitch_energy(stitching, points) if len(stitching) else 0.0,
+        largest_stitch_stretch=largest_stitch_stretch(stitching, points) if len(stitching) else None,
+        linear_momentum=momentum,
+        angular_momentum=m @ np.cross(x - center, v - momentum / m.sum()),
+    )
+
+
+def _elastic_energy(system: System, part: BodyRange, x: NDArray, F: NDArray, J: NDArray) -> float:
+    material = part.body.material
+    volumes = system.rest_volumes[part.tets]
+    if isinstance(material, EdgesAndVolume):
+        energy = 0.0
+        if material.edge_compliance > 0.0:
+            ends = system.edges[part.edges]
+            C = np.linalg.norm(x[ends[:, 0]] - x[ends[:, 1]], axis=1) - system.rest_lengths[part.edges]
+            energy += 0.5 * float(C @ C) / material.edge_compliance
+        if material.volume_compliance > 0.0:
+            C = (J - 1.0) * volumes
+            energy += 0.5 * float(C @ C) / material.volume_compliance
+        return energy
+    if isinstance(material, Elastic):
+        return float(material.energy_density(F) @ volumes)
+    return 0.0

@@ -1,4 +1,4 @@
-"""The state of all vertices at one time, and the report of a step."""
+"""The state of all vertices at one time, and the report of a step with its contacts."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from supple.contact_points import ContactPoints
 
 
 class Status(StrEnum):
@@ -26,6 +24,39 @@ class Status(StrEnum):
     def can_go_on(self) -> bool:
         """Whether the next step may start from the state that came with this status."""
         return self in (Status.CONVERGED, Status.ITERATION_LIMIT)
+
+
+@dataclass(frozen=True, eq=False)
+class ContactPoints:
+    """All contacts of one frame.
+
+    Attributes
+    ----------
+    points : (k, 3) midpoints between the two nearest points [m]
+    normals : (k, 3) unit vectors from the second to the first
+    forces : (k, 3) on the first, along the normal [N]; the force on the second is opposite
+    distances : (k,) [m]
+    first, second : (k,) the two bodies or obstacles: indices into `names`
+    names : of all bodies, and after them of all obstacles
+    """
+
+    points: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    forces: NDArray[np.float64]
+    distances: NDArray[np.float64]
+    first: NDArray[np.int32]
+    second: NDArray[np.int32]
+    names: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def force_between(self, on: str, by: str) -> NDArray[np.float64]:
+        """(3,) the total normal force on one body or obstacle by another [N]."""
+        a, b = self.names.index(on), self.names.index(by)
+        forward = self.forces[(self.first == a) & (self.second == b)].sum(axis=0)
+        backward = self.forces[(self.first == b) & (self.second == a)].sum(axis=0)
+        return np.asarray(forward - backward)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""A scene as flat arrays: the input of solvers.
+"""A scene as flat arrays, the input of solvers, and the interface of solvers.
 
 The bodies' vertices, tets, edges and surface triangles are concatenated; a `BodyRange` has the rows of one body. This
 file does not depend on solvers, files or viewers.
@@ -6,9 +6,11 @@ file does not depend on solvers, files or viewers.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,7 +25,7 @@ from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.scene.stitches.stitching import Stitching, no_stitching
-from supple.state import State
+from supple.state import SolverDetails, State, StepReport
 
 
 @dataclass(frozen=True, eq=False)
@@ -311,3 +313,35 @@ def _rigid_velocity(body: Body, placed: NDArray[np.float64]) -> NDArray[np.float
     masses = _lumped_masses(body)
     center = masses @ placed / masses.sum()
     return np.asarray(body.velocity) + np.cross(np.asarray(body.angular_velocity), placed - center)
+
+
+class Solver(ABC):
+    """An immutable description of a method and its parameters; what changes is in the State and the workspace."""
+
+    @abstractmethod
+    def prepare(self, system: System) -> Any:
+        """What is computed once for a system: colorings, sparsity patterns, work arrays.
+
+        Raises
+        ------
+        SolverError : where this solver cannot work with something in the scene; the text names it.
+        """
+
+    def check(self, system: System, state: State, workspace: Any) -> None:
+        """Raise where this solver cannot start from `state`. `simulate` calls it before anything is written.
+
+        Solvers that start from any state do not override this method.
+
+        Raises
+        ------
+        SceneError, SolverError : the text names what is wrong with the state.
+        """
+        return
+
+    def initial_details(self, system: System, workspace: Any) -> SolverDetails:
+        """The details of the start, before any step: of the type and with the names that all steps have."""
+        return SolverDetails()
+
+    @abstractmethod
+    def step(self, system: System, state: State, dt: float, workspace: Any) -> tuple[State, StepReport]:
+        """Advance `state` by `dt` [s]. Where that is impossible, return the last good state and the reason."""

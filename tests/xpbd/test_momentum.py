@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.diagnostics import measure
+from supple.simulate import measure
 from supple.system import build_system, initial_state
 from supple.xpbd.solver import XPBD
 

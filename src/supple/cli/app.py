@@ -13,9 +13,9 @@ from cyclopts import App
 from cyclopts.exceptions import CycloptsError
 
 from supple import __version__
-from supple.cli.complain import print_error
 from supple.cli.console import ShellConsole
 from supple.cli.exit_codes import ExitCode
+from supple.cli.print_error import print_error
 from supple.errors import SuppleError
 
 app = App(

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from supple.cli.complain import print_error
 from supple.cli.exit_codes import ExitCode
+from supple.cli.print_error import print_error
 from supple.errors import OutputError
 from supple.scene.scene import Scene
 from supple.simulate import Frame, Sink, simulate
-from supple.solver import Solver
+from supple.system import Solver
 
 logger = logging.getLogger(__name__)
 

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from supple.errors import SolverError
+from supple.files.replacing import parent_folder, whole_file
 from supple.implicit.details import ImplicitDetails
 from supple.implicit.newton.trace import NewtonRow, trace_csv
 from supple.implicit.solver import Implicit
-from supple.replacing import parent_folder, whole_file
 from supple.simulate import Frame
-from supple.solver import Solver
+from supple.system import Solver
 
 
 class NewtonTrace:

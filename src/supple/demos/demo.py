@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from supple.errors import SolverError
 from supple.scene.scene import Scene
 from supple.simulate import Frame
-from supple.solver import Solver
+from supple.system import Solver
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -29,11 +30,10 @@ from supple.implicit.stepping.integrators import Integrator, Static, integrator_
 from supple.implicit.stepping.reactions import reaction_forces
 from supple.implicit.stepping.substep import StepSettings, Substep, take_substep
 from supple.implicit.stepping.substepping import Substepping
+from supple.implicit.stepping.workspace import Workspace
 from supple.implicit.timings import PARTS
-from supple.implicit.workspace import Workspace
-from supple.solver import Solver
 from supple.state import State, Status, StepReport
-from supple.system import System
+from supple.system import Solver, System
 
 logger = logging.getLogger(__name__)
 

@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError
 from supple.materials.kinds import STRETCH_ENERGIES
 from supple.materials.per_tet import TetMaterial
-from supple.materials.stretches import UNKNOWN_ONE, UNKNOWN_SIX, UNKNOWN_THREE, dispatch
+from supple.materials.stretch_energies.stretches import UNKNOWN_ONE, UNKNOWN_SIX, UNKNOWN_THREE, dispatch
 from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed, store_mat, symmetric_eigen
 from supple.numerics.svd3 import svd3 as decompose

@@ -15,7 +15,7 @@ from supple.materials.stretch_energies import (
     st_venant_kirchhoff,
     stable_neo_hookean,
 )
-from supple.materials.stretches import StretchFunctions
+from supple.materials.stretch_energies.stretches import StretchFunctions
 
 STRETCH_ENERGIES: tuple[StretchFunctions, ...] = (
     stable_neo_hookean.FUNCTIONS,

@@ -14,7 +14,7 @@ from supple.materials.isotropic import batch_energy_densities, batch_first_piola
 from supple.materials.kinds import STRETCH_ENERGIES
 from supple.materials.lame import lame_from_engineering
 from supple.materials.per_tet import TetMaterial, one_per_tet
-from supple.materials.stretches import StretchFunctions
+from supple.materials.stretch_energies.stretches import StretchFunctions
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

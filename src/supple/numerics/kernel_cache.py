@@ -35,7 +35,7 @@ def njit(function: FunctionType | None = None, *, cache: bool = False, **options
         return partial(njit, cache=cache, **options)
     compiled: Any = numba.njit(**options)(function)
     if cache and isinstance(compiled, Dispatcher):  # a plain function where NUMBA_DISABLE_JIT is set
-        compiled._cache = KernelCache(function)
+        compiled._cache = KernelCache(function)  # pyright: ignore[reportAttributeAccessIssue]
     return compiled
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.files.replacing import whole_file
 from supple.output.drawing import (
     OBSTACLE_COLOR,
     STITCH_COLOR,
@@ -24,7 +25,6 @@ from supple.output.drawing import (
 )
 from supple.output.recording.reader import Recording
 from supple.output.viser_server import temporary_server
-from supple.replacing import whole_file
 
 # Bytes of moving vertices before compression, which at least halves them; pages of longer recordings have fewer frames.
 _MOST_BYTES = 36_000_000

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import OutputError
+from supple.files.replacing import whole_file
 from supple.output.drawing import BODY_COLORS, opened
 from supple.output.recording.reader import Recording
-from supple.replacing import whole_file
 
 _KINDS = ("png", "pdf", "svg")
 _LEGEND: dict[str, Any] = {  # above the axes

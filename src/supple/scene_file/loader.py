@@ -21,13 +21,13 @@ from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.scene.selection import InBox
 from supple.scene.stitches.stitching import StitchError
-from supple.scene_file.complaints import scene_error, suggestion
 from supple.scene_file.document import OutputModel, SceneFileModel
 from supple.scene_file.entries.contact_pairs import built_pairs
 from supple.scene_file.entries.mesh_sources import MeshStore
 from supple.scene_file.located import LocatedError, at
+from supple.scene_file.validation_errors import scene_error, suggestion
 from supple.scene_file.yaml_reader import Key, read_yaml
-from supple.solver import Solver
+from supple.system import Solver
 
 logger = logging.getLogger(__name__)
 

@@ -17,9 +17,8 @@ from supple.errors import SolverError
 from supple.numerics.interruption import interruption_point
 from supple.numerics.thread_tuning import ThreadTuner
 from supple.numerics.threads import numba_threads
-from supple.solver import Solver
 from supple.state import State, Status, StepReport
-from supple.system import System
+from supple.system import Solver, System
 from supple.xpbd.constraints.registry import ConstraintSet, build_constraint_sets
 from supple.xpbd.constraints.stitch_anchors import StitchAnchors
 from supple.xpbd.constraints.stitches import stitch_constraints

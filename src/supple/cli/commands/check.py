@@ -53,9 +53,9 @@ def check(
     quiet
         Print only failed checks.
     """
+    from supple.files.replacing import refuse_to_replace
     from supple.output.check.checker import check_recording
     from supple.output.check.settings import CheckSettings
-    from supple.replacing import refuse_to_replace
 
     given = {
         "every": every,

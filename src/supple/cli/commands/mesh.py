@@ -62,12 +62,12 @@ def mesh(
     """
     from rich.console import Console
 
+    from supple.files.replacing import refuse_to_replace
     from supple.mesh.io.mesh_files import TET_EXTENSIONS
     from supple.mesh.io.tetgen_family import family_paths, is_tetgen_path
     from supple.mesh.meshing.tetrahedralize import tetrahedralize_reported
     from supple.mesh.surface import SurfaceMesh
     from supple.mesh.tetgen_files import write_tetgen
-    from supple.replacing import refuse_to_replace
 
     # Checked before the meshing, which can take minutes.
     if output.suffix.lower() not in TET_EXTENSIONS:

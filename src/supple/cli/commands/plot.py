@@ -23,8 +23,8 @@ def plot(
     output
         Picture to write (.png, .pdf or .svg); without it, plot.png beside the recording.
     """
+    from supple.files.replacing import refuse_to_replace
     from supple.output.plots import plot_recording
-    from supple.replacing import refuse_to_replace
 
     picture = recording.with_name("plot.png") if output is None else output
     refuse_to_replace(recording, picture)

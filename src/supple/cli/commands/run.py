@@ -57,7 +57,7 @@ def run(
     from supple.scene_file.loader import load_run
 
     if trace is not None:
-        from supple.replacing import refuse_to_replace
+        from supple.files.replacing import refuse_to_replace
 
         refuse_to_replace(scene, trace)
     described = load_run(scene)

@@ -19,7 +19,7 @@ def schema(*, output: Annotated[Path | None, Parameter(name=["--output", "-o"])]
     """
     import json
 
-    from supple.replacing import whole_file
+    from supple.files.replacing import whole_file
     from supple.scene_file.document import json_schema
 
     text = json.dumps(json_schema(), indent=2) + "\n"

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact_points import ContactPoints
 from supple.implicit.contact.half_spaces import barrier_terms
 from supple.implicit.contact.model import Barriers, ContactModel
 from supple.implicit.contact.threads import one_contact_thread
+from supple.state import ContactPoints
 
 
 @one_contact_thread()

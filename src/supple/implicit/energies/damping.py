@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from supple.implicit.energies.elasticity import SERIAL_TETS, Elasticity, gather_gradients
 from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
 from supple.materials.isotropic import rest_lame_parameters
-from supple.materials.stretches import green_strain
+from supple.materials.stretch_energies.stretches import green_strain
 from supple.materials.tet_energies import deformation_gradient, edge_matrix, put_gradient
 from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed, transpose

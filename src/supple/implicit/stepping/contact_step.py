@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact_points import ContactPoints
 from supple.implicit.contact.friction import Friction
 from supple.implicit.contact.half_spaces import PlaneFriction
 from supple.implicit.contact.model import Barriers, ContactModel
@@ -16,7 +15,7 @@ from supple.implicit.contact.points import contact_points, forces_on_owners
 from supple.implicit.details import ImplicitDetails
 from supple.implicit.newton.minimize import Outcome
 from supple.implicit.newton.objective import Objective
-from supple.state import Status
+from supple.state import ContactPoints, Status
 
 FindContacts = Callable[[], ContactPoints] | None
 

@@ -24,7 +24,7 @@ from supple.implicit.stepping.contact_step import ContactStep
 from supple.implicit.stepping.dirichlet import move_pins
 from supple.implicit.stepping.integrators import Integrator, Plan, Static
 from supple.implicit.stepping.midpoint import acting_at
-from supple.implicit.workspace import Workspace
+from supple.implicit.stepping.workspace import Workspace
 from supple.state import State, Status
 from supple.system import System
 

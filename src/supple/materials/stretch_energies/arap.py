@@ -6,7 +6,7 @@ chapter 5.
 
 from __future__ import annotations
 
-from supple.materials.stretches import StretchFunctions, distance_from_rotations, rotation_quotients
+from supple.materials.stretch_energies.stretches import StretchFunctions, distance_from_rotations, rotation_quotients
 from supple.numerics.kernel_cache import njit
 
 

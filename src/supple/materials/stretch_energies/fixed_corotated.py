@@ -5,7 +5,12 @@ Source: Stomakhin, Howes, Schroeder, Teran, "Energetically Consistent Invertible
 
 from __future__ import annotations
 
-from supple.materials.stretches import StretchFunctions, distance_from_rotations, rotation_quotients, volume_change
+from supple.materials.stretch_energies.stretches import (
+    StretchFunctions,
+    distance_from_rotations,
+    rotation_quotients,
+    volume_change,
+)
 from supple.numerics.kernel_cache import njit
 
 

@@ -5,7 +5,7 @@ Source: Bonet, Wood, "Nonlinear Continuum Mechanics for Finite Element Analysis"
 
 from __future__ import annotations
 
-from supple.materials.stretches import StretchFunctions, green_strain
+from supple.materials.stretch_energies.stretches import StretchFunctions, green_strain
 from supple.numerics.kernel_cache import njit
 
 

@@ -5,7 +5,7 @@ Source: Smith, de Goes, Kim, "Stable Neo-Hookean Flesh Simulation" (2018), witho
 
 from __future__ import annotations
 
-from supple.materials.stretches import StretchFunctions, shape_and_volume, volume_change
+from supple.materials.stretch_energies.stretches import StretchFunctions, shape_and_volume, volume_change
 from supple.numerics.kernel_cache import njit
 
 

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshError
+from supple.files.replacing import whole_files
 from supple.mesh.checked_arrays import vertex_array
-from supple.mesh.file_contents import file_contents
 from supple.mesh.io import msh, obj, off, ply, stl, vtk_legacy, vtk_xml
 from supple.mesh.io.cells import CellSoup, FormatError, tets_of
+from supple.mesh.io.file_contents import file_contents
 from supple.mesh.io.polygons import triangles_of
 from supple.mesh.io.tetgen_family import SUFFIXES, family_paths, is_tetgen_path, read_tetgen_family
 from supple.mesh.merge import merge_map
-from supple.replacing import whole_files
 
 logger = logging.getLogger(__name__)
 

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from supple.numerics.kernel_cache import njit
-
 from supple.numerics.geometry.double_double import product_error, sum_error
+from supple.numerics.kernel_cache import njit
 
 # (7 + 56 u) u with u = 2^-53: bound of the rounding error, relative to the sum of the products' magnitudes.
 _ERROR = (7.0 + 56.0 * 2.0**-53) * 2.0**-53

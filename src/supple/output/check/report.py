@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
 
-from supple.replacing import whole_file
+from supple.files.replacing import whole_file
 
 
 class Verdict(StrEnum):

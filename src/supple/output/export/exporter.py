@@ -8,10 +8,10 @@ from importlib import import_module
 from pathlib import Path
 
 from supple.errors import OutputError
+from supple.files.replacing import refuse_to_replace
 from supple.output.drawing import opened
 from supple.output.recording.reader import Recording
 from supple.output.recording.recorder import SUFFIXES as RECORDING_SUFFIXES
-from supple.replacing import refuse_to_replace
 
 Writer = Callable[[Recording, Path], None]
 

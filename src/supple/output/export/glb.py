@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.files.replacing import whole_file
 from supple.output.drawing import (
     OBSTACLE_COLOR,
     ObstaclePicture,
@@ -24,7 +25,6 @@ from supple.output.drawing import (
     view_of,
 )
 from supple.output.recording.reader import RecordedFrame, Recording
-from supple.replacing import whole_file
 
 logger = logging.getLogger(__name__)
 

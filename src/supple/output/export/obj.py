@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from supple.files.replacing import whole_folder
 from supple.output.drawing import obstacle_pictures, pictures, view_of
 from supple.output.recording.reader import Recording
-from supple.replacing import whole_folder
 
 
 def write_obj_folder(recording: Recording, output: Path) -> None:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from supple.files.replacing import whole_file, whole_folder
 from supple.output.recording.reader import RecordedFrame, Recording
-from supple.replacing import whole_file, whole_folder
 
 
 def write_pvd(recording: Recording, output: Path) -> None:

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from supple.errors import OutputError
+from supple.files.replacing import whole_file
 from supple.output.drawing import OBSTACLE_COLOR, obstacle_pictures, pictures, view_of
 from supple.output.recording.reader import Recording
-from supple.replacing import whole_file
 
 
 def write_usd(recording: Recording, output: Path) -> None:

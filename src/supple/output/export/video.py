@@ -8,8 +8,8 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from supple.errors import OutputError
+from supple.files.replacing import whole_file
 from supple.output.recording.reader import Recording
-from supple.replacing import whole_file
 
 _NEEDED = {"gif": ("pyvista", "PIL"), "mp4": ("pyvista", "imageio_ffmpeg")}
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from supple.errors import OutputError
+from supple.files.replacing import whole_file
 from supple.output.recording.file import rewrite
 from supple.output.recording.reader import Recording
 from supple.output.recording.recorder import frame_layout
-from supple.replacing import whole_file
 
 
 def write_vtkhdf(recording: Recording, output: Path) -> None:

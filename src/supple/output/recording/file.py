@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from supple.errors import OutputError
-from supple.replacing import put_in_place, temporary_name
+from supple.files.replacing import put_in_place, temporary_name
 
 WRITTEN = "supple/frames_written"
 STEP_TIMES, _TIMES = "VTKHDF/Steps/Values", "supple/frames/time"

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import OutputError
+from supple.files.replacing import output_error, parent_folder, put_in_place, remove_abandoned, temporary_name
 from supple.output.recording.details import RecordedDetails
 from supple.output.recording.file import STEP_TIMES, Layout, RecordingFile, Series, create, rewrite
 from supple.output.recording.scene import write_scene
-from supple.replacing import output_error, parent_folder, put_in_place, remove_abandoned, temporary_name
 from supple.simulate import Frame
 from supple.state import Status
 

@@ -7,9 +7,9 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from supple.errors import SolverError
-from supple.scene_file.complaints import suggestion
 from supple.scene_file.model import Model, Positive
-from supple.solver import Solver
+from supple.scene_file.validation_errors import suggestion
+from supple.system import Solver
 
 Iterations = Annotated[int, Field(ge=1, le=100_000)]
 Share = Annotated[float, Field(gt=0, lt=1)]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.scene.scene import Scene
-from supple.solver import Solver
+from supple.system import Solver
 
 
 @dataclass(frozen=True, eq=False)

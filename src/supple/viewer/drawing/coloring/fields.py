@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.diagnostics import determinants
 from supple.materials.material import Elastic
+from supple.numerics.deformation import determinants
 from supple.viewer.drawing.moments.model import Moment
 
 

@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.diagnostics import deformation_gradients
 from supple.materials.material import Material
+from supple.numerics.deformation import deformation_gradients
 from supple.output.drawing import BODY_COLORS, View
 from supple.output.recording.scene import RecordedObstacle
 from supple.output.recording.skinned_surface import SkinnedSurface

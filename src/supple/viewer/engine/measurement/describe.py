@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.diagnostics import measure
 from supple.scene.obstacles.obstacle import Obstacle
+from supple.simulate import measure
 from supple.state import State
 from supple.system import BodyRange, System
 from supple.viewer.engine.scene.live_scene import LiveScene

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.diagnostics import deformation_gradients, determinants
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.material import Elastic
+from supple.numerics.deformation import deformation_gradients, determinants
 from supple.system import System
 
 QUANTITIES = ("J", "von_mises", "energy")

@@ -15,9 +15,8 @@ from supple.scene.forces import SoftTarget
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.simulate import first_frame
-from supple.solver import Solver
 from supple.state import State, Status, StepReport
-from supple.system import System, initial_state
+from supple.system import Solver, System, initial_state
 from supple.viewer.engine.scene.grab_spring import GrabSpring
 from supple.viewer.engine.scene.new_bodies import moved_apart
 from supple.viewer.engine.scene.pusher import Pusher

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple import replacing
 from supple.errors import OutputError
-from supple.replacing import put_in_place, remove_abandoned, temporary_name, whole_file, whole_files, whole_folder
+from supple.files import replacing
+from supple.files.replacing import put_in_place, remove_abandoned, temporary_name, whole_file, whole_files, whole_folder
 
 posix = pytest.mark.skipif(os.name != "posix", reason="needs POSIX to know whether a process exists")
 
@@ -24,7 +24,7 @@ import os, sys
 from pathlib import Path
 import numpy as np
 import supple as sp
-from supple.replacing import temporary_name, whole_file, whole_folder
+from supple.files.replacing import temporary_name, whole_file, whole_folder
 
 folder = Path(sys.argv[1])
 with whole_file(folder / "plot.png") as fresh, whole_folder(folder / "a_obj") as inside:

@@ -1,0 +1,1 @@
+"""Reading and writing files: whole files or none, and groups of files."""

@@ -1,0 +1,36 @@
+"""Deformation gradients of tetrahedra and their determinants."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from supple.numerics.kernel_cache import njit
+
+
+@njit(cache=True)
+def deformation_gradients(x, tets, Dm_inv):
+    """F = Ds Dm^-1 of every tet: positions (n, 3), tets (m, 4), Dm_inv (m, 3, 3) -> (m, 3, 3)."""
+    F = np.empty((len(tets), 3, 3))
+    for e in range(len(tets)):
+        a = tets[e, 0]
+        for i in range(3):
+            d0 = x[tets[e, 1], i] - x[a, i]
+            d1 = x[tets[e, 2], i] - x[a, i]
+            d2 = x[tets[e, 3], i] - x[a, i]
+            for j in range(3):
+                F[e, i, j] = d0 * Dm_inv[e, 0, j] + d1 * Dm_inv[e, 1, j] + d2 * Dm_inv[e, 2, j]
+    return F
+
+
+@njit(cache=True)
+def determinants(F):
+    """det of every matrix: (m, 3, 3) -> (m,)."""
+    J = np.empty(len(F))
+    for e in range(len(F)):
+        f = F[e]
+        J[e] = (
+            f[0, 0] * (f[1, 1] * f[2, 2] - f[1, 2] * f[2, 1])
+            - f[0, 1] * (f[1, 0] * f[2, 2] - f[1, 2] * f[2, 0])
+            + f[0, 2] * (f[1, 0] * f[2, 1] - f[1, 1] * f[2, 0])
+        )
+    return J
