@@ -321,7 +321,7 @@ def test_a_failed_write_leaves_the_old_family(tmp_path: Path, monkeypatch: pytes
         real(source, target)
 
     monkeypatch.setattr(os, "replace", fail_on_the_last)
-    with pytest.raises(MeshError, match=r"a\.1\.face: it cannot be written: No space left"):
+    with pytest.raises(MeshError, match=r"a\.1\.face: cannot be written: No space left"):
         write_tetgen(new, tmp_path / "a.1.node")
     assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == before
     monkeypatch.undo()

@@ -2,6 +2,7 @@
 
 import importlib
 import os
+import pickle
 import pkgutil
 import shutil
 import subprocess
@@ -55,6 +56,18 @@ def test_a_kernel_is_compiled_again_when_a_function_of_another_file_changes(copi
     assert run().endswith(" 1"), "unchanged, it is loaded"
     replace_in(package / "numerics" / "mat3.py", "        array[e, 0, 0],", "        2.0 * array[e, 0, 0],")
     assert run() == "[6.0, 2.0, 1.0] 0"
+    assert run().endswith(" 1")
+
+
+@pytest.mark.parametrize("content", [b"cmoved.module\nkernel\n.", b"", b"\x80\x05"])
+def test_a_cache_that_cannot_be_read_is_made_anew(copied_package, content):
+    package, run = copied_package
+    run()
+    indices = list((package / "numerics" / "__pycache__").glob("svd3.*.nbi"))
+    assert indices
+    for index in indices:
+        index.write_bytes(pickle.dumps(numba.__version__) + content)
+    assert run() == "[3.0, 2.0, 1.0] 0"
     assert run().endswith(" 1")
 
 

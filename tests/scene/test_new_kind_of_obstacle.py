@@ -19,7 +19,7 @@ from supple.scene.obstacles.registry import KINDS, register
 from supple.scene.obstacles.shape import Shape, convex_contact
 from supple.viewer.drawing.layers.obstacles import ObstacleView
 from supple.viewer.drawing.moments.from_recording import model_of_recording, moment_of_frame
-from supple.viewer.drawing.moments.from_snapshot import Translator
+from supple.viewer.drawing.moments.from_snapshot import MomentBuilder
 from supple.viewer.engine.measurement.contact_points import contact_points
 from supple.viewer.engine.measurement.describe import describe
 from supple.viewer.engine.scene.live_scene import LiveScene
@@ -175,6 +175,6 @@ def test_pages_draw_it(recorded):
 def test_a_running_scene_draws_it():
     live = LiveScene(LiveSource("rounded", falling_cube(), sp.XPBD(substeps=4), 1 / 60))
     loop = SimulationLoop(live, CommandQueue(), None)
-    moment = Translator().moment(replace(loop.snapshot(0.0), description=describe(live)))
+    moment = MomentBuilder().moment(replace(loop.snapshot(0.0), description=describe(live)))
     assert moment.model.obstacles[0].obstacle.values() == live.system.obstacles[0].values()
     assert len(contact_points(live.system, live.state.positions - [0, 0.005, 0], 0.0)) == 9

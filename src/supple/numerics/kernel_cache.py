@@ -49,7 +49,11 @@ class KernelCache(FunctionCache):
     def load_overload(self, sig, target_context):
         # A kernel may call what is defined below it, so the stamp waits for the first call. Numba loads, then saves.
         self._cache_file._source_stamp = self._stamp
-        return super().load_overload(sig, target_context)
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:  # the files name a module that has moved since, or are damaged: unpickling may raise anything
+            self.flush()
+            return None
 
     @cached_property
     def _stamp(self) -> tuple[Any, bytes]:

@@ -44,7 +44,7 @@ def test_dhat_is_not_too_small_where_a_simulation_is_continued_farther_away(as_f
 def test_a_run_that_is_continued_at_rest_keeps_its_dhat():
     one = scene(1e-4)
     frames = list(sp.simulate(one, sp.Implicit(), 1 / 60, 6))
-    used = frames[-1].report.details["dhat"]
+    used = frames[-1].report.details.dhat
     assert used == pytest.approx(1e-4, rel=1e-6)
     assert frames[-1].report.min_distance < used
     for start in (frames[-1], frames[-1].state):

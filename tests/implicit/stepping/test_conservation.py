@@ -47,6 +47,6 @@ def test_the_reaction_of_a_pin_is_what_changes_the_momentum_of_a_step():
     for frame in sp.simulate(scene, sp.Implicit(integrator="newmark", tolerance=1e-7), 1 / 240, 10):
         gained = 240 * (frame.report.linear_momentum - before)
         weight = frame.system.masses.sum() * np.array([0, -9.81, 0])
-        (reaction,) = frame.report.details["reaction_forces"].values()
+        (reaction,) = frame.report.details.reaction_forces.values()
         assert np.abs(reaction + weight - gained).max() < 1e-6 * np.abs(weight).max()
         before = frame.report.linear_momentum

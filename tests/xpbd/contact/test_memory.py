@@ -77,7 +77,7 @@ def same_bits(one, other):
 def test_a_run_that_continues_from_a_frame_has_the_same_bits(name):
     scene, _ = SCENES[name]
     whole = run(name, 2 * STEPS)
-    assert sum(frame.report.details["contacts"] for frame in whole) > 0
+    assert sum(frame.report.details.contacts for frame in whole) > 0
     for middle in (*whole[:3], whole[STEPS - 1]):
         steps = 2 * STEPS - middle.index
         again = list(sp.simulate(scene, SOLVER, DT, steps, start=middle))
