@@ -280,7 +280,7 @@ def test_a_python_that_cannot_start_is_reported(monkeypatch: pytest.MonkeyPatch)
 def test_an_interrupt_ends_the_child(tmp_path: Path) -> None:
     """Ctrl-C in a program that meshes: no child and no temporary files remain."""
     program = (
-        "import sys; from supple.mesh import mesher_worker\n"
+        "import sys; from supple.mesh.meshing import mesher_worker\n"
         "from supple.mesh.primitives.surfaces import sphere_surface\n"
         "from supple.mesh.meshing.tetrahedralize import tetrahedralize\n"
         f"mesher_worker.__file__ = {str(tmp_path / 'worker.py')!r}\n"

@@ -156,6 +156,7 @@ class Implicit(Solver):
             damped,
         )
 
+    @one_contact_thread()
     def check(self, system: System, state: State, workspace: Workspace) -> None:
         """Raise where a step cannot start from `state`; see `Solver.check`.
 
