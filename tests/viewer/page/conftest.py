@@ -308,7 +308,14 @@ class Screen:
         return 0.5 * camera.image_width + float(x), 0.5 * camera.image_height - float(y)
 
     def press(self, name: str) -> None:
-        self.tab.get_by_role("button", name=name, exact=True).click()
+        """Click a button where it has come to rest: on a busy machine, a folder that opens moves it under the mouse."""
+        button = self.tab.get_by_role("button", name=name, exact=True)
+        button.scroll_into_view_if_needed()
+        places = [button.bounding_box()]
+        while len(places) < 4 or places[-1] != places[-4]:
+            self.tab.wait_for_timeout(100)
+            places.append(button.bounding_box())
+        button.click()
 
     def show_tab(self, name: str) -> None:
         self.tab.get_by_role("tab", name=name).click()
