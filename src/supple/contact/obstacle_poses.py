@@ -17,22 +17,20 @@ class ObstaclePoses:
         self.obstacles = tuple(obstacles)
         self.moving = np.array([obstacle.motion is not None for obstacle in self.obstacles], dtype=np.bool_)
         self._recent: dict[float, tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
-        self._static = self._evaluate(0.0, everything=True)
 
     def at(self, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Rotations and translations at `time` [s]; read only."""
         if not self.moving.any():
-            return self._static
+            time = 0.0
         if time not in self._recent:
             if len(self._recent) >= 4:
                 self._recent.pop(next(iter(self._recent)))
-            self._recent[time] = self._evaluate(time, everything=False)
+            self._recent[time] = self._evaluate(time)
         return self._recent[time]
 
-    def _evaluate(self, time: float, everything: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _evaluate(self, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         R = np.tile(np.eye(3), (len(self.obstacles), 1, 1))
         t = np.zeros((len(self.obstacles), 3))
-        for k, obstacle in enumerate(self.obstacles):
-            if self.moving[k] and not everything:
-                R[k], t[k] = obstacle.pose(time)
+        for k in np.flatnonzero(self.moving):
+            R[k], t[k] = self.obstacles[k].pose(time)
         return R, t

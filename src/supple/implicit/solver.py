@@ -11,6 +11,7 @@ import numpy as np
 from supple.errors import SolverError
 from supple.implicit.contact.build import contact_model
 from supple.implicit.contact.points import forces_on_owners
+from supple.implicit.contact.scales import smallest_diagonal
 from supple.implicit.contact.settings import IPCContact
 from supple.implicit.contact.threads import one_contact_thread
 from supple.implicit.details import ImplicitDetails
@@ -138,9 +139,6 @@ class Implicit(Solver):
             system.pinned_vertices,
             free_motion,
         )
-        diagonal = min(
-            float(np.linalg.norm(np.ptp(system.rest_positions[part.vertices], axis=0))) for part in system.bodies
-        )
         stitches = StitchEnergy.of(system.stitching, 0.0) if len(system.stitching) else None
         viscosity = viscosity_of(elasticity)
         damped = StitchViscosity.of(system.stitching)
@@ -150,7 +148,7 @@ class Implicit(Solver):
             elasticity,
             viscosity,
             tools,
-            diagonal,
+            smallest_diagonal(system),
             regularization_of(elasticity),
             stitches,
             damped,

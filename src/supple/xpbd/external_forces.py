@@ -9,37 +9,35 @@ from supple.numerics.kernel_cache import njit
 from supple.system import System
 
 
-class ExternalForces:
-    """The forces and soft targets of a system.
+def add_forces(
+    system: System, points: NDArray[np.float64], velocities: NDArray[np.float64], time: float, h: float
+) -> None:
+    """Add the forces at `time` to a prediction: v += h w f, x += h^2 w f.
 
-    `points` (n, 4) are positions about `origins` (n, 3) [m] with inverse masses [1/kg], `velocities` (n, 3) [m/s].
+    Parameters
+    ----------
+    points : (n, 4) positions about the components' origins [m], and inverse masses [1/kg]; velocities : (n, 3) [m/s]
     """
+    for force in system.forces:
+        _push(points, velocities, force.vertices, np.ascontiguousarray(force.per_vertex(time)), h)
 
-    def __init__(self, system: System) -> None:
-        self.forces = system.forces
-        self.targets = system.soft_targets
 
-    def push(self, points: NDArray[np.float64], velocities: NDArray[np.float64], time: float, h: float) -> None:
-        """Add the forces at `time` to a prediction: v += h w f, x += h^2 w f."""
-        for force in self.forces:
-            _push(points, velocities, force.vertices, np.ascontiguousarray(force.per_vertex(time)), h)
+def pull_to_targets(
+    system: System,
+    points: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+    origins: NDArray[np.float64],
+    time: float,
+    h: float,
+) -> None:
+    """Project the springs to soft targets: C = x - target with compliance 1 / k, all three components at once.
 
-    def pull(
-        self,
-        points: NDArray[np.float64],
-        velocities: NDArray[np.float64],
-        origins: NDArray[np.float64],
-        time: float,
-        h: float,
-    ) -> None:
-        """Project the springs: C = x - target with compliance 1 / k, all three components at once.
-
-        Dlam = -C / (w + 1 / (k h^2)), as for any XPBD constraint. These forces are external, so they act after the
-        momentum restore.
-        """
-        for target in self.targets:
-            places = np.ascontiguousarray(target.targets(time))
-            _pull(points, velocities, origins, target.vertices, places, target.target.stiffness, h)
+    Dlam = -C / (w + 1 / (k h^2)), as for any XPBD constraint. These forces are external, so they act after the momentum
+    restore. `points` and `velocities` as in `add_forces`, origins (n, 3) [m].
+    """
+    for target in system.soft_targets:
+        places = np.ascontiguousarray(target.targets(time))
+        _pull(points, velocities, origins, target.vertices, places, target.target.stiffness, h)
 
 
 @njit(cache=True)

@@ -26,7 +26,7 @@ from supple.xpbd.contact.collisions import Collisions
 from supple.xpbd.contact.memory import ContactMemory
 from supple.xpbd.contact.settings import XPBDContact
 from supple.xpbd.details import XPBDDetails
-from supple.xpbd.external_forces import ExternalForces
+from supple.xpbd.external_forces import add_forces, pull_to_targets
 from supple.xpbd.integration import (
     accelerate,
     apply_changes,
@@ -63,7 +63,6 @@ class XPBDWorkspace:
     layout: Layout
     sets: list[ConstraintSet]
     momentum: MomentumRestore | None
-    external: ExternalForces
     collisions: Collisions
     pace: ThreadTuner
     anchors: StitchAnchors
@@ -141,7 +140,6 @@ class XPBD(Solver):
             layout=layout,
             sets=sets,
             momentum=MomentumRestore(inner) if self.momentum_restore else None,
-            external=ExternalForces(inner),
             collisions=Collisions(inner, self.contact),
             pace=ThreadTuner(choice=parallel and self.threads is None, parallel=parallel),
             anchors=StitchAnchors(inner),
@@ -163,7 +161,7 @@ class XPBD(Solver):
                 parallel = ws.pace.choose()
                 end = state.time + (k + 1) * h
                 _begin_substep(ws, targets[k], end, h, parallel)
-                ws.external.push(ws.points, ws.velocities, end, h)
+                add_forces(ws.system, ws.points, ws.velocities, end, h)
                 for constraints in ws.sets:
                     constraints.project(ws.extended, h, parallel)
                 if ws.momentum is not None:
@@ -171,7 +169,7 @@ class XPBD(Solver):
                 else:
                     update_velocities(ws.points, ws.previous, ws.velocities, h)
                 ws.pace.note(parallel, perf_counter() - started)
-                ws.external.pull(ws.points, ws.velocities, ws.origins, end, h)
+                pull_to_targets(ws.system, ws.points, ws.velocities, ws.origins, end, h)
                 if ws.collisions and not _collide(ws, end, h):
                     break
         lost = first_lost(ws.points, ws.velocities)

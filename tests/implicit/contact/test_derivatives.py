@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.contact.obstacle_vertices import obstacle_positions
 from supple.implicit.contact.build import contact_model
 from supple.implicit.contact.half_spaces import PlaneBarrier, barrier_terms, plane_friction
 from supple.implicit.energies.potential import HessianBlocks
@@ -56,7 +57,7 @@ def model_of(bodies, size, obstacles=(), friction=0.3):
     scene = sp.Scene(made, obstacles=list(obstacles))
     contact = sp.IPCContact(dhat=5 * GAP * size, stiffness=1e4, friction_velocity=SLOW * size)
     model = contact_model(build_system(scene), contact, np.full(len(made), 1e4))
-    x = np.concatenate([initial_state(scene).positions, model.obstacle_positions(0.0)])
+    x = np.concatenate([initial_state(scene).positions, obstacle_positions(model.obstacles, 0.0)])
     return model, x
 
 

@@ -44,7 +44,7 @@ def moved(x, system, body, by):
 @pytest.mark.parametrize("status", [Status.CONVERGED, Status.ITERATION_LIMIT])
 def test_a_step_that_ends_with_an_intersection_fails(stitched, status):
     model, x, system = model_of(stitched)
-    step = ContactStep.of(model, x, (0.0, 0.01), 1.0)
+    step = ContactStep(model, x, (0.0, 0.01), 1.0)
 
     def verified(end):
         return step.verified(Outcome(status, Model(end, 0.0, 0.0, np.zeros_like(end))))
@@ -65,5 +65,5 @@ def test_a_seam_may_touch_and_cross_but_what_is_stitched_may_not_cross_elsewhere
 def test_a_step_without_contact_is_not_tested():
     _, x, _ = model_of(False)
     outcome = Outcome(Status.ITERATION_LIMIT, Model(x, 0.0, 0.0, np.zeros_like(x)))
-    step = ContactStep.of(None, x, (0.0, 0.01), 1.0)
+    step = ContactStep(None, x, (0.0, 0.01), 1.0)
     assert replace(step).verified(outcome) is outcome

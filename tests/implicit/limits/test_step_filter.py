@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from supple.errors import SolverError
-from supple.implicit.limits.step_filter import largest_noninverting_step, min_det, noninverting_step
+from supple.implicit.limits.step_filter import keeps_volume, largest_noninverting_step, noninverting_step
 
 REGULAR = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 0.8, 0.0], [0.4, 0.3, 0.9]])
 
@@ -185,17 +185,15 @@ def test_kernel_names_the_limiting_tet_and_skips_unguarded():
     assert step == largest_noninverting_step(x, p, tets, ignore=[800])
 
 
-def test_min_det_finds_the_worst_tet_and_not_a_number():
+def test_volumes_are_kept_where_every_guarded_tet_has_a_positive_one():
     n = 600
     x = np.tile(REGULAR, (n, 1))
     tets = np.arange(4 * n, dtype=np.int32).reshape(-1, 4)
     Dm_inv = np.linalg.inv((x[tets[:, 1:]] - x[tets[:, :1]]).swapaxes(1, 2)).copy()
     guarded = np.ones(n, dtype=np.bool_)
-    x[4 * 300 + 3, 2] *= -0.5
-    J, tet = min_det(x, tets, Dm_inv, guarded)
-    assert (J, tet) == (pytest.approx(-0.5), 300)
-    x[4 * 500, 0] = np.nan
-    J, tet = min_det(x, tets, Dm_inv, guarded)
-    assert np.isnan(J)
-    assert tet == 500
-    assert min_det(x, tets, Dm_inv, np.zeros(n, dtype=np.bool_)) == (np.inf, -1)
+    assert keeps_volume(x, tets, Dm_inv, guarded)
+    for tet, height in ((300, -0.5), (400, 0.0), (500, np.nan)):
+        bad = x.copy()
+        bad[4 * tet + 3, 2] *= height
+        assert not keeps_volume(bad, tets, Dm_inv, guarded)
+        assert keeps_volume(bad, tets, Dm_inv, np.arange(n) != tet)

@@ -65,7 +65,9 @@ class ContactSurface:
         size = 3 * len(self.vertices)
         if len(self.middles):
             hessian = self.weights.T @ hessian @ self.weights
-        blocks = bsr_matrix(csr_of_symmetric(hessian), blocksize=(3, 3), shape=(size, size))
+        # The columns of a symmetric matrix, read as its rows.
+        by_rows = csr_matrix((hessian.data, hessian.indices, hessian.indptr), shape=hessian.shape)
+        blocks = bsr_matrix(by_rows, blocksize=(3, 3), shape=(size, size))
         counts = np.zeros(n, dtype=np.int32)
         counts[self.vertices] = np.diff(blocks.indptr)
         start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
@@ -79,11 +81,6 @@ class ContactSurface:
         columns = np.concatenate([np.arange(s), self.middles.ravel()])
         values = np.concatenate([np.ones(s), np.full(2 * k, 0.5)])
         return csc_matrix(kron(coo_matrix((values, (rows, columns)), shape=(s + k, s)), identity(3)))
-
-
-def csr_of_symmetric(matrix: csc_matrix) -> csr_matrix:
-    """A symmetric matrix by rows: its columns, read as rows."""
-    return csr_matrix((matrix.data, matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
 def contact_surface(

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from supple.numerics.geometry.closest_point import closest_on_triangle, combine
 from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import dot, row, subtract
@@ -79,11 +77,3 @@ def depths_inside(shapes, closed, allowed, boxes, out):
                     nearest = min(nearest, dot(d, d))
                 out[p] = max(out[p], math.sqrt(nearest))
         begin = end
-
-
-def bounds_of_pieces(points, point_piece, count):
-    """Lowest and highest coordinates (count, 3) of the points of each piece."""
-    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
-    np.minimum.at(low, point_piece, points)
-    np.maximum.at(high, point_piece, points)
-    return low, high

@@ -10,14 +10,6 @@ from supple.numerics.kernel_cache import njit
 
 
 @njit(cache=True)
-def reach_from_velocities(velocities, dt, least, out):
-    """out (n,) [m]: how far each vertex may move within dt [s], at least `least`."""
-    for i in range(len(velocities)):
-        a, b, c = velocities[i, 0], velocities[i, 1], velocities[i, 2]
-        out[i] = least + 1.2 * dt * math.sqrt(a * a + b * b + c * c)
-
-
-@njit(cache=True)
 def any_beyond_reach(x, x_gathered, reach):
     """Whether some vertex is farther than its reach (n,) from where it was."""
     for i in range(len(x)):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,6 +73,15 @@ class _Piece:
     gap: float | None = None
 
 
+class _Part(NamedTuple):
+    """The surfaces of all bodies or of one obstacle: (k, 3) points, their pieces (k,), and triangles (t, 3) of them."""
+
+    pieces: list[_Piece]
+    points: NDArray[np.float64]
+    point_piece: NDArray[np.int32]
+    triangles: NDArray[np.int32]
+
+
 def build_surfaces(
     system: System,
     table: PairTable,
@@ -89,31 +98,28 @@ def build_surfaces(
     body_collision, self_collision : whether bodies touch each other, and themselves
     thickness : the gap that surfaces keep [m]; edge_length : mean edge length of the bodies' surfaces [m]
     """
-    obstacles = _obstacle_parts(system.obstacles, len(system.bodies), edge_length)
-    pieces, rows, body_piece, triangles = _body_parts(system)
-    points, owners, point_piece = [np.zeros((0, 3))], [np.zeros(0, np.int32)], [body_piece]
-    triangle_parts, piece_parts = [triangles], [body_piece[triangles[:, 0]]]
-    count = len(rows)
-    for k, part in obstacles:
-        offset = len(pieces)
-        pieces += part["pieces"]
-        points.append(part["points"])
-        owners.append(np.full(len(part["points"]), k, np.int32))
-        point_piece.append(part["point_piece"] + offset)
-        triangle_parts.append(part["triangles"] + count)
-        piece_parts.append(part["triangle_piece"] + offset)
-        count += len(part["points"])
-    fixed = np.concatenate(points)
+    rows, bodies = _body_part(system)
+    fixed = [_obstacle_part(table.bodies + k, each, edge_length) for k, each in enumerate(system.obstacles)]
+    pieces: list[_Piece] = []
+    point_piece, triangles, count = [], [], 0
+    for part in (bodies, *fixed):
+        point_piece.append(part.point_piece + len(pieces))
+        triangles.append(part.triangles + count)
+        pieces += part.pieces
+        count += len(part.points)
+    piece_of = np.concatenate(point_piece).astype(np.int32)
+    all_triangles = np.ascontiguousarray(np.concatenate(triangles), dtype=np.int32)
+    fixed_points = np.concatenate([np.zeros((0, 3)), *(part.points for part in fixed)])
     allowed, gaps, friction = _rules(pieces, table, body_collision, self_collision, thickness)
     return ContactSurfaces(
         rows=rows,
-        fixed_points=fixed,
-        fixed_owners=np.concatenate(owners),
-        inverse_masses=np.concatenate([system.inverse_masses[rows], np.zeros(len(fixed))]),
-        point_piece=np.concatenate(point_piece).astype(np.int32),
-        triangles=np.ascontiguousarray(np.concatenate(triangle_parts), dtype=np.int32),
-        triangle_piece=np.concatenate(piece_parts).astype(np.int32),
-        body_triangles=len(triangles),
+        fixed_points=fixed_points,
+        fixed_owners=np.repeat(np.arange(len(fixed), dtype=np.int32), [len(part.points) for part in fixed]),
+        inverse_masses=np.concatenate([system.inverse_masses[rows], np.zeros(len(fixed_points))]),
+        point_piece=piece_of,
+        triangles=all_triangles,
+        triangle_piece=piece_of[all_triangles[:, 0]],
+        body_triangles=len(bodies.triangles),
         closed=np.array([piece.closed for piece in pieces], dtype=np.bool_),
         allowed=allowed,
         gaps=gaps,
@@ -121,50 +127,28 @@ def build_surfaces(
     )
 
 
-def _body_parts(
-    system: System,
-) -> tuple[list[_Piece], NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
+def _body_part(system: System) -> tuple[NDArray[np.int32], _Part]:
+    """The vertices that are points of the bodies' surfaces, and these surfaces."""
     rows = np.unique(system.triangles).astype(np.int32)
     index = np.full(len(system.masses), -1, dtype=np.int32)
     index[rows] = np.arange(len(rows), dtype=np.int32)
-    labels, piece = np.unique(system.components[rows], return_inverse=True)
-    owner = np.zeros(len(system.masses), dtype=np.int64)
-    for k, part in enumerate(system.bodies):
-        owner[part.vertices] = k
-    pieces = []
-    for label in labels:
-        vertex = int(np.argmax(system.components == label))
-        pieces.append(_Piece(int(owner[vertex])))
+    _, first, piece = np.unique(system.components[rows], return_index=True, return_inverse=True)
+    ends = [part.vertices.stop for part in system.bodies]
+    pieces = [_Piece(int(owner)) for owner in np.searchsorted(ends, rows[first], side="right")]
     triangles = index[system.triangles]
     order = np.argsort(piece[triangles[:, 0]], kind="stable")
-    return pieces, rows, piece.astype(np.int32), triangles[order]
+    return rows, _Part(pieces, system.rest_positions[rows], piece.astype(np.int32), triangles[order])
 
 
-def _obstacle_parts(obstacles: Sequence[Obstacle], bodies: int, edge_length: float) -> list[tuple[int, dict[str, Any]]]:
-    parts = []
-    for number, obstacle in enumerate(obstacles):
-        owner = bodies + number
-        if obstacle.surface_mesh is not None:
-            parts.append((number, _triangle_part(owner, obstacle.surface_mesh)))
-            continue
-        points, gap = obstacle.probes(edge_length)
-        if len(points):
-            parts.append((number, _points_part(_Piece(owner, gap=gap), points)))
-    return parts
+def _obstacle_part(owner: int, obstacle: Obstacle, edge_length: float) -> _Part:
+    if obstacle.surface_mesh is not None:
+        return _triangle_part(owner, obstacle.surface_mesh)
+    points, gap = obstacle.probes(edge_length)
+    pieces = [_Piece(owner, gap=gap)] if len(points) else []
+    return _Part(pieces, points, np.zeros(len(points), dtype=np.int32), np.zeros((0, 3), dtype=np.int32))
 
 
-def _points_part(piece: _Piece, points: NDArray[np.float64]) -> dict[str, Any]:
-    none = np.zeros(0, dtype=np.int32)
-    return {
-        "pieces": [piece],
-        "points": points,
-        "point_piece": np.zeros(len(points), dtype=np.int32),
-        "triangles": none.reshape(0, 3),
-        "triangle_piece": none,
-    }
-
-
-def _triangle_part(owner: int, mesh: SurfaceMesh) -> dict[str, Any]:
+def _triangle_part(owner: int, mesh: SurfaceMesh) -> _Part:
     surface = mesh.compact()
     triangles = surface.triangles
     count, labels = connected_components(triangles, len(surface.vertices))
@@ -174,13 +158,8 @@ def _triangle_part(owner: int, mesh: SurfaceMesh) -> dict[str, Any]:
     inward = closed[labels].all() and surface.volume < 0.0
     point_piece = np.zeros(len(surface.vertices), dtype=np.int32)
     point_piece[triangles] = labels[:, None]
-    return {
-        "pieces": [_Piece(owner, closed=bool(c)) for c in closed],
-        "points": surface.vertices,
-        "point_piece": point_piece,
-        "triangles": triangles[:, ::-1] if inward else triangles,
-        "triangle_piece": labels,
-    }
+    pieces = [_Piece(owner, closed=bool(c)) for c in closed]
+    return _Part(pieces, surface.vertices, point_piece, triangles[:, ::-1] if inward else triangles)
 
 
 def _is_closed(triangles: NDArray[np.int32]) -> bool:

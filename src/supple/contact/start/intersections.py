@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.contact.search.spatial_hash import boxes_of_pieces
 from supple.contact.start.surfaces import StartSurfaces, winding_number
 from supple.numerics.geometry.triangle_crossings import CROSSING, crossing_triangles
 from supple.scene.contact_pairs import PairTable
@@ -136,13 +137,10 @@ def _nested(s: StartSurfaces, table: PairTable, met: set[tuple[int, int]]) -> li
 
 def _boxes(s: StartSurfaces) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Corners (p, 3) of the things' bounding boxes; planes have none."""
-    low = np.full((len(s.solid), 3), np.inf)
-    high = -low
-    for k in range(3):
-        x = s.points[s.triangles, k]
-        np.minimum.at(low[:, k], s.owner, x.min(axis=1))
-        np.maximum.at(high[:, k], s.owner, x.max(axis=1))
-    return low, high
+    boxes = np.empty((len(s.solid), 3)), np.empty((len(s.solid), 3))
+    corners = s.points[s.triangles].reshape(-1, 3)
+    boxes_of_pieces(corners, np.repeat(s.owner, 3), np.zeros((len(corners), 1)), *boxes)
+    return boxes
 
 
 def _behind_planes(s: StartSurfaces, table: PairTable) -> list[Intersection]:

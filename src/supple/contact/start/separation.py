@@ -88,13 +88,11 @@ def separate(
             if moved & {item.first, item.second}:
                 continue
             move = mover.separating_move(surfaces, item)
-            if move is None:
+            if move is None or np.linalg.norm(total[move[0]] + move[1]) > mover.limits[move[0]]:
                 raise SceneError(f"{mover.description(item)}; {mover.remedy(item)}")
             body, shift = move
             together = np.flatnonzero(mover.group == mover.group[body])
             total[together] += shift
-            if np.linalg.norm(total[body]) > mover.limits[body]:
-                raise SceneError(f"{mover.description(item)}; {mover.remedy(item)}")
             for one in together.tolist():
                 surfaces = shifted(system, surfaces, one, shift)
             moved.update(together.tolist())

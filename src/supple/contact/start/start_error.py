@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,20 +13,13 @@ from supple.scene.contact_pairs import PairTable
 from supple.system import System
 
 
-def raise_if_intersecting(
-    system: System,
-    positions: NDArray[np.float64],
-    time: float,
-    table: PairTable,
-    stitched: Collection[tuple[int, int]] = (),
-) -> None:
-    """Raise where surfaces are not apart at the start.
+def raise_if_intersecting(system: System, positions: NDArray[np.float64], time: float, table: PairTable) -> None:
+    """Raise where surfaces are not apart at the start. Things that are stitched to each other are named last.
 
     Parameters
     ----------
     positions : (n, 3) of the system's vertices [m]; time : [s], where scripted obstacles are
     table : which things collide
-    stitched : ascending pairs of things that are stitched to each other; named only where no other pair intersects
 
     Raises
     ------
@@ -38,7 +29,9 @@ def raise_if_intersecting(
     found = intersections_of(surfaces, table)
     if not found:
         return
-    found = [item for item in found if (item.first, item.second) not in stitched] or found
+    names = [str(thing.name) for thing in (*system.bodies, *system.obstacles)]
+    stitched = [{names.index(stitch.first), names.index(stitch.second)} for stitch in system.scene.stitches]
+    found = [item for item in found if {item.first, item.second} not in stitched] or found
     mover = Mover(system, table, default_gap(system))
     worst = next((item for item in found if item.kind != "touches"), found[0])
     move = mover.separating_move(surfaces, worst)

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from supple.contact.obstacle_vertices import with_obstacles
+from supple.mesh.topology import connected_components
 from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.system import System
@@ -81,10 +80,8 @@ def _is_closed(triangles: NDArray[np.integer]) -> bool:
 
 
 def _pieces(triangles: NDArray[np.int32], owner: NDArray[np.int32], n: int) -> NDArray[np.int64]:
-    first = triangles[:, [0, 0]].ravel()
-    graph = coo_matrix((np.ones(len(first), dtype=np.int8), (first, triangles[:, 1:].ravel())), shape=(n, n))
-    labels = connected_components(graph, directed=False)[1]
-    _, rows = np.unique(labels[triangles[:, 0]], return_index=True)
+    labels = connected_components(triangles, n).labels
+    _, rows = np.unique(labels, return_index=True)
     rows = np.sort(rows)
     return np.column_stack([owner[rows], triangles[rows, 0]]).astype(np.int64)
 

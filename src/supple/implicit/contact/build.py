@@ -53,7 +53,8 @@ def _contact_model(system: System, settings: IPCContact, shear_moduli: NDArray[n
     gaps = []
     for start in system.start_states:
         x = np.concatenate([start.positions, obstacle_positions(obstacles, start.time)])
-        gaps.append(min(collisions.smallest_distance(x), _gap(planes, x)))
+        heights = planes.distances(x)[0]  # vertices behind a plane are an error that is found later
+        gaps.append(min(collisions.smallest_distance(x), float(heights[heights > 0.0].min(initial=np.inf))))
     scales = scales_of(settings, system, shear_moduli, max(gaps, default=np.inf))
     return ContactModel(
         system=extended,
@@ -65,9 +66,3 @@ def _contact_model(system: System, settings: IPCContact, shear_moduli: NDArray[n
         scales=scales,
         friction_iterations=settings.friction_iterations,
     )
-
-
-def _gap(planes: Planes, x: NDArray[np.float64]) -> float:
-    """The smallest distance of a vertex in front of a plane [m]; those behind one are an error that is found later."""
-    distances, _ = planes.distances(x)
-    return float(distances[distances > 0.0].min(initial=np.inf))

@@ -9,14 +9,15 @@ Source: Li et al., "Incremental Potential Contact" (2020), section 5.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.contact.barrier import Barrier
-from supple.implicit.energies.potential import ContactPotential, HessianBlocks
+from supple.implicit.contact.barrier import Barrier, LibraryPotential
 
 
-class Friction(ContactPotential):
+class Friction(LibraryPotential):
     """Of the contacts that a barrier has at one state.
 
     Parameters
@@ -40,7 +41,7 @@ class Friction(ContactPotential):
 
         self.surface = barrier.collisions.surface
         self.start = self.surface.points(start)
-        self.h = h
+        self.unit = h
         self.potential = ipctk.FrictionPotential(slow)
         self.contacts = ipctk.TangentialCollisions()
         found = barrier.collisions.at(lagged)
@@ -54,23 +55,5 @@ class Friction(ContactPotential):
             points = barrier.collisions.points(lagged)
             self.contacts.build(self.surface.mesh, points, found, barrier.potential, owner, owner, blend)
 
-    def value(self, x: NDArray[np.float64]) -> float:
-        if self.contacts.empty():
-            return 0.0
-        return self.h * float(self.potential(self.contacts, self.surface.mesh, self._velocities(x)))
-
-    def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-        if not self.contacts.empty():
-            gradient = self.potential.gradient(self.contacts, self.surface.mesh, self._velocities(x))
-            self.surface.add_gradient(gradient, out)
-
-    def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
-        if not self.contacts.empty():
-            import ipctk
-
-            method = ipctk.PSDProjectionMethod.CLAMP if project else ipctk.PSDProjectionMethod.NONE
-            hessian = self.potential.hessian(self.contacts, self.surface.mesh, self._velocities(x), method)
-            out.couplings.append(self.surface.blocks(hessian / self.h, len(x)))
-
-    def _velocities(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asfortranarray((self.surface.points(x) - self.start) / self.h)
+    def library_arguments(self, x: NDArray[np.float64]) -> tuple[Any, Any, NDArray[np.float64]]:
+        return self.contacts, self.surface.mesh, np.asfortranarray((self.surface.points(x) - self.start) / self.unit)

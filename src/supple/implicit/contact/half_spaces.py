@@ -141,10 +141,9 @@ class PlaneBarrier(ContactPotential):
         p = self.planes
         d, normals = p.distances(x)
         near = (d < p.dhat) & (d > 0.0)
-        force = (self.stiffness * p.areas[near] * barrier_terms(d[near], p.dhat)[1])[:, None] * normals[near]
-        np.add.at(out, p.vertices[near], force)
-        by_base, by_tip = self._by_plane(x, near, d[near], normals[near])
         size = (self.stiffness * p.areas[near] * barrier_terms(d[near], p.dhat)[1])[:, None]
+        np.add.at(out, p.vertices[near], size * normals[near])
+        by_base, by_tip = self._by_plane(x, near, d[near], normals[near])
         np.add.at(out, p.base[near], size * by_base)
         np.add.at(out, p.tip[near], size * by_tip)
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from supple.contact.collision_mesh.collisions import Collisions
 from supple.contact.collision_mesh.contact_surface import ContactSurface
-from supple.contact.obstacle_vertices import ObstacleRange, obstacle_positions
+from supple.contact.obstacle_vertices import ObstacleRange
 from supple.contact.start.start_error import raise_if_intersecting
 from supple.errors import SolverError
 from supple.implicit.contact.barrier import Barrier
@@ -79,11 +79,8 @@ class ContactModel:
         if not between.contacts.empty():
             terms.append(between)
         bodies = self.surface.body_count
-        with_planes = (
-            plane_friction(barriers.planes, lagged, start, times, self.coefficients[:bodies, bodies:], slow * h)
-            if len(self.planes.vertices)
-            else None
-        )
+        on_planes = self.coefficients[:bodies, bodies:]
+        with_planes = plane_friction(barriers.planes, lagged, start, times, on_planes, slow * h)
         if with_planes is not None:
             terms.append(with_planes)
         return terms
@@ -115,7 +112,7 @@ class ContactModel:
         apart = self.allows(x) and not self.collisions.intersect(x) and self.smallest_distance(x) > 0.0
         if len(stitching) and apart:
             return
-        raise_if_intersecting(self.system, x, time, self.table, stitched=self._stitched_things())
+        raise_if_intersecting(self.system, x, time, self.table)
         if not apart:
             raise SolverError("the scene starts with surfaces that touch; move them apart, or give contact=None")
 
@@ -141,19 +138,6 @@ class ContactModel:
                 names = self._names([self.planes.owner[k], self.surface.body_count + self.planes.obstacle[k]])
         return names
 
-    def _stitched_things(self) -> set[tuple[int, int]]:
-        """Ascending pairs of things that stitches join: bodies in the scene's order, then obstacles."""
-        names = self.surface.names
-        return {
-            (min(pair), max(pair))
-            for stitch in self.system.scene.stitches
-            for pair in [(names.index(stitch.first), names.index(stitch.second))]
-        }
-
     def _names(self, owners: list[int]) -> str:
         kinds = [f"{'body' if k < self.surface.body_count else 'obstacle'} {self.surface.names[k]!r}" for k in owners]
         return kinds[0] + " and itself" if len(kinds) == 1 else " and ".join(kinds)
-
-    def obstacle_positions(self, time: float) -> NDArray[np.float64]:
-        """(k, 3) of all obstacles' vertices at `time` [m]."""
-        return obstacle_positions(self.obstacles, time)

@@ -44,8 +44,7 @@ def scales_of(settings: IPCContact, system: System, shear_moduli: NDArray[np.flo
     ----------
     shear_moduli : (m,) of the tets [Pa]; gap : smallest distance at the start [m], or infinity
     """
-    diagonals = [float(np.linalg.norm(np.ptp(system.rest_positions[p.vertices], axis=0))) for p in system.bodies]
-    smallest = min(diagonals)
+    smallest = smallest_diagonal(system)
     moduli = [3.0 * float(np.mean(shear_moduli[p.tets])) for p in system.bodies]
     dhat = settings.dhat
     if dhat is None:
@@ -56,11 +55,15 @@ def scales_of(settings: IPCContact, system: System, shear_moduli: NDArray[np.flo
     return Scales(dhat, stiffness, _SLOW_SHARE * smallest if slow is None else slow, adaptive)
 
 
+def smallest_diagonal(system: System) -> float:
+    """The diagonal of the smallest body's bounding box at rest [m]."""
+    return min(float(np.linalg.norm(np.ptp(system.rest_positions[part.vertices], axis=0))) for part in system.bodies)
+
+
 def largest_dhat(system: System) -> float:
     """The default of dhat where no surfaces are near each other at the start [m]."""
-    diagonals = [float(np.linalg.norm(np.ptp(system.rest_positions[p.vertices], axis=0))) for p in system.bodies]
     a, b, c = system.rest_positions[system.triangles].transpose(1, 0, 2)
     edges = np.concatenate(
         [np.linalg.norm(b - a, axis=1), np.linalg.norm(c - b, axis=1), np.linalg.norm(a - c, axis=1)]
     )
-    return min(_DHAT_SHARE * min(diagonals), _EDGE_SHARE * float(np.percentile(edges, _SHORT_EDGES)))
+    return min(_DHAT_SHARE * smallest_diagonal(system), _EDGE_SHARE * float(np.percentile(edges, _SHORT_EDGES)))

@@ -13,7 +13,6 @@ which is often used, takes the chord of a rotation for a compression, and damps 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +25,6 @@ from supple.materials.tet_energies import deformation_gradient, edge_matrix, put
 from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed, transpose
 from supple.numerics.threads import threads_for
-from supple.system import System
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,24 +49,18 @@ class Viscosity:
     lam: NDArray[np.float64]
 
     def strains(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(m, 6), see `green_strains`."""
-        return green_strains(self.elasticity.system, x)
+        """(m, 6) Green strain of every tet at positions x."""
+        return self._of_tets(x, x, False)
 
     def strain_rates(self, x: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(m, 6), see `green_strain_rates`."""
-        return green_strain_rates(self.elasticity.system, x, v)
+        """(m, 6) rate of the Green strain of every tet at positions x moving with v [1/s]."""
+        return self._of_tets(x, v, True)
 
-
-class Strained(Protocol):
-    """An element type whose strain is damped; strains are arrays of any shape."""
-
-    def strains(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """At positions x (n, 3) [m]."""
-        ...
-
-    def strain_rates(self, x: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
-        """At positions x moving with v [m/s]."""
-        ...
+    def _of_tets(self, x: NDArray[np.float64], v: NDArray[np.float64], rates: bool) -> NDArray[np.float64]:
+        system = self.elasticity.system
+        out = np.empty((len(system.tets), 6))
+        _strains(x, v, system.tets, system.rest_shape_inverse, rates, out)
+        return out
 
 
 def viscosity_of(elasticity: Elasticity) -> Viscosity | None:
@@ -78,20 +70,6 @@ def viscosity_of(elasticity: Elasticity) -> Viscosity | None:
         return None
     mu, lam = rest_lame_parameters(elasticity.material)
     return Viscosity(elasticity, tau * mu, tau * lam)
-
-
-def green_strains(system: System, x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(m, 6) Green strain of every tet at positions x."""
-    out = np.empty((len(system.tets), 6))
-    _strains(x, x, system.tets, system.rest_shape_inverse, False, out)
-    return out
-
-
-def green_strain_rates(system: System, x: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(m, 6) rate of the Green strain of every tet at positions x moving with v [1/s]."""
-    out = np.empty((len(system.tets), 6))
-    _strains(x, v, system.tets, system.rest_shape_inverse, True, out)
-    return out
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,27 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.energies.damping import Damping, StrainRate, Viscosity, green_strain_rates, green_strains
+from supple.implicit.energies.damping import Damping, StrainRate, Viscosity
 from supple.implicit.energies.elasticity import Elasticity
 from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
 from supple.implicit.energies.stitch_springs import spring_energies, spring_gradients, spring_hessians
 from supple.numerics.sparse.block_csr import incidences
 from supple.scene.stitches.elements import Springs
 from supple.scene.stitches.stitching import Stitching
-
-
-@dataclass(frozen=True, eq=False)
-class _Tets:
-    """Stitch tets under the names of a system's tets."""
-
-    tets: NDArray[np.int32]
-    rest_shape_inverse: NDArray[np.float64]
-    rest_volumes: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,9 +36,12 @@ class StitchViscosity:
         tets, springs = stitching.tets, stitching.springs
         if not tets.damping.any() and not springs.damping.any():
             return None
-        elements = _Tets(tets.vertices, tets.rest_shape_inverse, tets.rest_volumes)
+        # Stitch tets under the names of a system's tets.
+        elements: Any = SimpleNamespace(
+            tets=tets.vertices, rest_shape_inverse=tets.rest_shape_inverse, rest_volumes=tets.rest_volumes
+        )
         gathering = incidences(tets.vertices, stitching.body_vertices)
-        elasticity = Elasticity(cast(Any, elements), cast(Any, None), *gathering)
+        elasticity = Elasticity(elements, cast(Any, None), *gathering)
         # The Lamé parameters of small strains; the viscous bulk modulus is not below zero.
         mu, lam = tets.mu, np.maximum(tets.lam - tets.mu, -2.0 / 3.0 * tets.mu)
         viscosity = Viscosity(elasticity, tets.damping * mu, tets.damping * lam)
@@ -55,14 +50,14 @@ class StitchViscosity:
     def strains(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Green strains of the tets, and lengths of the springs, one after the other (6 k + s,)."""
         lengths = np.linalg.norm(self.springs.extensions(x), axis=1)
-        return np.concatenate([green_strains(self.tets.elasticity.system, x).ravel(), lengths])
+        return np.concatenate([self.tets.strains(x).ravel(), lengths])
 
     def strain_rates(self, x: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
         """Their rates at positions x moving with v [1/s], [m/s]."""
         d = self.springs.extensions(x)
         lengths = np.linalg.norm(d, axis=1)
         along = np.einsum("ki,ki->k", d, self.springs.extensions(v)) / np.where(lengths > 0.0, lengths, 1.0)
-        return np.concatenate([green_strain_rates(self.tets.elasticity.system, x, v).ravel(), along])
+        return np.concatenate([self.tets.strain_rates(x, v).ravel(), along])
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from supple.errors import SolverError
 from supple.implicit.energies.elasticity import SERIAL_TETS
-from supple.implicit.limits.step_filter import KEEP, min_det, noninverting_step, volume_signs
+from supple.implicit.limits.step_filter import KEEP, keeps_volume, noninverting_step, volume_signs
 from supple.materials.kinds import needs_positive_volume
 from supple.materials.per_tet import TetMaterial
 from supple.numerics.threads import threads_for
@@ -50,8 +50,7 @@ class InversionGuard:
     def allows(self, x: NDArray[np.float64]) -> bool:
         """Whether every guarded tet has a positive volume at x."""
         with threads_for(len(self.system.tets), SERIAL_TETS):
-            smallest, _ = min_det(x, self.system.tets, self.system.rest_shape_inverse, self.guarded)
-        return bool(smallest > 0.0)
+            return bool(keeps_volume(x, self.system.tets, self.system.rest_shape_inverse, self.guarded))
 
     def widen(self, x: NDArray[np.float64]) -> None:
         """From now on, also guard the bodies that have no flat or inverted tet at x."""

@@ -23,10 +23,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SolverError
+from supple.materials.tet_energies import deformation_gradient
 from supple.numerics.cubic import last_positive_before_root, positive_on_unit_interval
 from supple.numerics.geometry import double_double as dd
 from supple.numerics.kernel_cache import njit, prange
-from supple.numerics.mat3 import cross, det, dot, load_mat, mat_mul, row, subtract
+from supple.numerics.mat3 import cross, det, dot, row, subtract
 
 # The default share of its volume that a tet keeps in one step.
 KEEP = 0.2
@@ -162,41 +163,13 @@ def noninverting_step(x, direction, tets, guarded, keep):
 
 
 @njit(parallel=True, cache=True, error_model="numpy")
-def min_det(x, tets, Dm_inv, guarded):
-    """The smallest J = det(Ds Dm^-1) over guarded tets, and the first tet that has it; not-a-number comes first.
-
-    The check after a step, which is taken only where this is positive. (inf, -1) where no tet is guarded.
-    """
-    m = len(tets)
-    runs = (m + _RUN - 1) // _RUN
-    lowest = np.full(runs, np.inf)
-    where = np.full(runs, -1, dtype=np.int64)
-    for r in prange(runs):
-        smallest = np.inf
-        which = -1
-        for e in range(r * _RUN, min(m, (r + 1) * _RUN)):
-            if guarded[e]:
-                o = row(x, tets[e, 0])
-                u = subtract(row(x, tets[e, 1]), o)
-                v = subtract(row(x, tets[e, 2]), o)
-                w = subtract(row(x, tets[e, 3]), o)
-                Ds = (u[0], v[0], w[0], u[1], v[1], w[1], u[2], v[2], w[2])
-                J = det(mat_mul(Ds, load_mat(Dm_inv, e)))
-                if np.isnan(J) or smallest > J:
-                    smallest = J
-                    which = e
-                    if np.isnan(J):
-                        break
-        lowest[r] = smallest
-        where[r] = which
-    J, tet = np.inf, -1
-    for r in range(runs):
-        if lowest[r] < J or np.isnan(lowest[r]):
-            J = lowest[r]
-            tet = where[r]
-            if np.isnan(J):
-                break
-    return J, tet
+def keeps_volume(x, tets, Dm_inv, guarded):
+    """Whether J = det(Ds Dm^-1) > 0 in every guarded tet, in rounded numbers: a step is taken only where this holds."""
+    bad = 0
+    for e in prange(len(tets)):
+        if guarded[e] and not det(deformation_gradient(x, tets, Dm_inv, e)) > 0.0:
+            bad += 1
+    return bad == 0
 
 
 @njit(cache=True, error_model="numpy")

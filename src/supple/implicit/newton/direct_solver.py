@@ -21,19 +21,16 @@ _NEGATIVE_EIGENVALUES = 23
 
 
 @cache
-def _pardiso() -> Any | None:
-    """The pypardiso module, or None where it is not installed."""
+def _pardiso() -> tuple[Any, type[Exception]] | None:
+    """The solver of pypardiso and its error, or None where it is not installed.
+
+    One instance is for all calls: the library does not support several at once.
+    """
     try:
         import pypardiso  # pyright: ignore[reportMissingImports]
     except ImportError:
         return None
-    return pypardiso
-
-
-@cache
-def _symmetric_solver(pardiso: Any) -> Any:
-    """One instance for all calls: the library does not support several at once."""
-    return pardiso.PyPardisoSolver(mtype=_SYMMETRIC)
+    return pypardiso.PyPardisoSolver(mtype=_SYMMETRIC), pypardiso.pardiso_wrapper.PyPardisoError
 
 
 def solve_directly(
@@ -49,7 +46,7 @@ def solve_directly(
     """
     matrix, pardiso = pattern.to_scipy(data), _pardiso()
     if pardiso is not None:
-        x, definite = _by_pardiso(pardiso, matrix, b.ravel())
+        x, definite = _by_pardiso(*pardiso, matrix, b.ravel())
     else:
         x, definite = _by_superlu(matrix, b.ravel(), require_definite)
     if x is None or not np.isfinite(x).all() or (require_definite and not definite):
@@ -57,12 +54,13 @@ def solve_directly(
     return np.ascontiguousarray(x.reshape(-1, 3))
 
 
-def _by_pardiso(pardiso: Any, matrix: bsr_matrix, b: NDArray[np.float64]) -> tuple[NDArray[np.float64] | None, bool]:
+def _by_pardiso(
+    solver: Any, failure: type[Exception], matrix: bsr_matrix, b: NDArray[np.float64]
+) -> tuple[NDArray[np.float64] | None, bool]:
     """The solution, and whether there is no negative eigenvalue."""
-    solver = _symmetric_solver(pardiso)
     try:
         x = solver.solve(triu(matrix, format="csr"), b)
-    except pardiso.pardiso_wrapper.PyPardisoError as error:
+    except failure as error:
         logger.debug("direct solve: %s", error)
         return None, False
     return x, solver.get_iparm(_NEGATIVE_EIGENVALUES) == 0

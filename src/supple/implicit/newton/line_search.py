@@ -6,12 +6,12 @@ Source: Nocedal, Wright, "Numerical Optimization" (2006), section 3.1 (Armijo's 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.implicit.energies.potential import HessianBlocks
+from supple.implicit.limits.step_limits import StepLimits
 from supple.implicit.newton.hessian_projection import ProjectedTerms
 from supple.implicit.newton.objective import Model, Objective
 
@@ -28,14 +28,6 @@ _ROUND_OFF = 1e-13
 # iterations with it, and 425 without.
 _CRAWL = 0.7
 _LONGEST = 16.0
-
-
-class Filter(Protocol):
-    """A bound on states."""
-
-    def allows(self, x: NDArray[np.float64]) -> bool:
-        """Whether a state x (n, 3) is admissible, in rounded numbers."""
-        ...
 
 
 @dataclass(eq=False)
@@ -58,7 +50,7 @@ def search(
     direction: NDArray[np.float64],
     slope: float,
     largest: float,
-    states: Filter,
+    limits: StepLimits,
     hessian: HessianBlocks | None,
     projected: ProjectedTerms,
 ) -> tuple[Model, float, int]:
@@ -67,7 +59,7 @@ def search(
     Parameters
     ----------
     start : the objective where the search begins; slope : gradient . direction
-    largest : first length to try; states : which ends are admissible
+    largest : first length to try; limits : which ends are admissible
     hessian, projected : where the Hessian at the end goes, if it is wanted, and which terms are projected in it
 
     Returns
@@ -83,7 +75,7 @@ def search(
         model = objective.model(moved, hessian, projected) if cuts == 0 else None
         energy, size = (model.energy, model.size) if model is not None else objective.value_and_size(moved)
         enough = energy <= start.energy + _SUFFICIENT * step * slope + _ROUND_OFF * max(size, start.size)
-        if enough and states.allows(moved):
+        if enough and limits.allows(moved):
             return model or objective.model(moved, hessian, projected), step, cuts
         step *= _SHRINK
     if hessian is not None:

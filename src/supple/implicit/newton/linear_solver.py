@@ -14,7 +14,7 @@ from scipy.sparse import bsr_matrix
 
 from supple.implicit.energies.potential import HessianBlocks
 from supple.implicit.newton.direct_solver import solve_directly
-from supple.numerics.sparse.block_csr import SERIAL_BLOCKS, BlockPattern, BlockRows, build_pattern
+from supple.numerics.sparse.block_csr import SERIAL_BLOCKS, BlockPattern, build_pattern
 from supple.numerics.sparse.block_sum import JointPattern, join
 from supple.numerics.sparse.pcg import conjugate_gradients
 from supple.numerics.sparse.preconditioner import RowOrder, TwoLevel, order_rows, two_level
@@ -102,14 +102,11 @@ class LinearSolver:
         began = perf_counter()
         self.parallel = self.pace.choose()
         with one_thread(not self.parallel):
-            self._assemble(hessian)
+            self.pattern.assemble(hessian.elements, hessian.vertices[self.order.vertices], self.elements)
+            self._add_couplings(hessian.couplings)
+            if self.kind != "direct":
+                self.preconditioner.update(self.matrix, coarse=self.age < 0)
         self.spent = perf_counter() - began
-
-    def _assemble(self, hessian: HessianBlocks) -> None:
-        self.pattern.assemble(hessian.elements, hessian.vertices[self.order.vertices], self.elements)
-        self._add_couplings(hessian.couplings)
-        if self.kind != "direct":
-            self.preconditioner.update(self.matrix, coarse=self.age < 0)
 
     def _add_couplings(self, couplings: list[bsr_matrix]) -> None:
         """Add couplings of vertices that no element joins; the joint pattern is rebuilt where theirs has changed."""
@@ -132,11 +129,6 @@ class LinearSolver:
             if not np.array_equal(before, self.preconditioner.first):
                 self.age = -1
         self.matrix = self.joint.add(self.elements, extra.data)
-
-    @property
-    def rows(self) -> BlockRows:
-        """The present pattern of the matrix."""
-        return self.preconditioner.pattern
 
     def solve(
         self, force: NDArray[np.float64], tolerance: float, convex: bool = True
@@ -190,7 +182,7 @@ class LinearSolver:
             if self.kind == "pcg":
                 return None, LinearReport("pcg", iterations, first_norm)
             logger.debug("CG stalled after %d iterations; factorizing", iterations)
-        solution = solve_directly(self.rows, self.matrix, b, require_definite=not convex)
+        solution = solve_directly(self.preconditioner.pattern, self.matrix, b, require_definite=not convex)
         if solution is None:
             return None, LinearReport("direct", iterations, first_norm)
         p[self.order.vertices] = solution

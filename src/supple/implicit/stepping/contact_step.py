@@ -49,7 +49,7 @@ class ContactStep:
     start: NDArray[np.float64]
     times: tuple[float, float]
     weight: float
-    stiffness: float = 0.0
+    stiffness: float = field(init=False)
     stiffness_increases: int = 0
     nearest: float = 0.0
     friction_updates: int = 0
@@ -57,11 +57,8 @@ class ContactStep:
     frictions: list[Friction | PlaneFriction] | None = None
     normal_gradient: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
 
-    @classmethod
-    def of(
-        cls, model: ContactModel | None, start: NDArray[np.float64], times: tuple[float, float], weight: float
-    ) -> ContactStep:
-        return cls(model, start, times, weight, model.scales.stiffness * weight if model is not None else 0.0)
+    def __post_init__(self) -> None:
+        self.stiffness = self.model.scales.stiffness * self.weight if self.model is not None else 0.0
 
     def with_contact(self, objective: Objective, x: NDArray[np.float64]) -> Objective:
         """The objective with barriers, and with friction whose normal forces are those at x (n, 3)."""
@@ -125,11 +122,7 @@ class ContactStep:
         model, barriers = self.model, self.barriers
         if model is None or barriers is None:
             return details, None, None
-        normal, tangential = np.zeros_like(x), np.zeros_like(x)
-        for term in barriers.terms:
-            term.add_gradient(x, normal)
-        for term in self.frictions or ():
-            term.add_gradient(x, tangential)
+        normal, tangential = (Objective(terms).gradient(x) for terms in (barriers.terms, self.frictions or ()))
         details = replace(
             details,
             contacts=model.count(x),

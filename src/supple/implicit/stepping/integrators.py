@@ -19,10 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SolverError
-from supple.implicit.energies.damping import Strained, StrainRate
+from supple.implicit.energies.damping import StrainRate, Viscosity
+from supple.implicit.energies.stitch_damping import StitchViscosity
 from supple.implicit.stepping.conservation import Conservation
 from supple.state import State
 from supple.system import System
+
+Damped = Viscosity | StitchViscosity
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +46,7 @@ class Plan:
     scale: float | None
     predicted: NDArray[np.float64]
     velocity: Callable[[NDArray[np.float64]], NDArray[np.float64]]
-    strain_rate: Callable[[Strained], StrainRate]
+    strain_rate: Callable[[Damped], StrainRate]
     memory: History | None = None
     place: float = 1.0
 
@@ -124,7 +127,7 @@ class BDF2(Integrator):
         old_x = one * x - two * past.positions
         old_v = one * v - two * past.velocities
 
-        def strain_rate(damped: Strained) -> StrainRate:
+        def strain_rate(damped: Damped) -> StrainRate:
             return StrainRate(1.0 / b, one * damped.strains(x) - two * damped.strains(past.positions))
 
         return Plan(
@@ -159,7 +162,7 @@ class Newmark(Integrator):
             at_end[pinned] = (end[pinned] - x[pinned]) / h
             return at_end
 
-        def strain_rate(damped: Strained) -> StrainRate:
+        def strain_rate(damped: Damped) -> StrainRate:
             # The difference quotient over half a step belongs to its middle. The last terms move the rate to its end.
             strains = damped.strains(x)
             curvature = damped.strains(half) - strains - 0.5 * h * damped.strain_rates(x, v)

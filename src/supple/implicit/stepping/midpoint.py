@@ -57,8 +57,3 @@ class ActingWithin(Potential):
 
     def _within(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         return self.start + self.place * (x - self.start)
-
-
-def acting_at(place: float, term: Potential, start: NDArray[np.float64]) -> Potential:
-    """The term, as it enters the objective of a step whose forces act at this place; see `ActingWithin`."""
-    return term if place == 1.0 else ActingWithin(term, start, place)

@@ -23,7 +23,7 @@ from supple.implicit.newton.trace import NewtonRow
 from supple.implicit.stepping.contact_step import ContactStep
 from supple.implicit.stepping.dirichlet import move_pins
 from supple.implicit.stepping.integrators import Integrator, Plan, Static
-from supple.implicit.stepping.midpoint import acting_at
+from supple.implicit.stepping.midpoint import ActingWithin
 from supple.implicit.stepping.workspace import Workspace
 from supple.state import State, Status
 from supple.system import System
@@ -90,7 +90,7 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     barrier = inversion_barrier(workspace.elasticity, guard.guarded, settings.barrier_onset)
     if barrier is not None:
         base = replace(base, terms=[*base.terms, barrier])
-    contact = ContactStep.of(workspace.contact, state.positions, (state.time, end), plan.contact_weight)
+    contact = ContactStep(workspace.contact, state.positions, (state.time, end), plan.contact_weight)
     problem = Problem(
         contact.with_contact(base, state.positions),
         plan.scale,
@@ -137,7 +137,8 @@ def _objective(
     if plan.scale is not None and workspace.stitch_viscosity is not None:
         rate = plan.strain_rate(workspace.stitch_viscosity)
         terms.append(StitchDamping.of(workspace.stitch_viscosity, rate))
-    terms = [acting_at(plan.place, term, x) for term in terms]
+    if plan.place != 1.0:
+        terms = [ActingWithin(term, x, plan.place) for term in terms]
     terms.append(workspace.regularization if plan.scale is None else Inertia(system.masses, plan.predicted, plan.scale))
     return Objective(terms, workspace.tools.clock)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.contact.obstacle_vertices import obstacle_positions
 from supple.implicit.contact.model import ContactModel
 from supple.implicit.energies.damping import Viscosity
 from supple.implicit.energies.elasticity import Elasticity
@@ -54,7 +55,7 @@ class Workspace:
         """The state with the obstacles' vertices after the bodies'."""
         if self.contact is None or not self.contact.obstacles:
             return state
-        there = self.contact.obstacle_positions(state.time)
+        there = obstacle_positions(self.contact.obstacles, state.time)
         return replace(
             state,
             positions=np.concatenate([state.positions, there]),

@@ -115,25 +115,13 @@ def build_pattern(elements: NDArray[np.int32], rows: int) -> BlockPattern:
     )
 
 
-@njit(cache=True, error_model="numpy")
-def incidences(elements, rows):
-    """For every row, the (element, node) pairs, coded 4 element + node, that name it."""
-    start = np.zeros(rows + 1, dtype=np.int32)
-    for e in range(len(elements)):
-        for a in range(4):
-            if elements[e, a] >= 0:
-                start[elements[e, a] + 1] += 1
-    for i in range(rows):
-        start[i + 1] += start[i]
-    fill = start[:rows].copy()
-    incidence = np.empty(start[rows], dtype=np.int32)
-    for e in range(len(elements)):
-        for a in range(4):
-            i = elements[e, a]
-            if i >= 0:
-                incidence[fill[i]] = 4 * e + a
-                fill[i] += 1
-    return start, incidence
+def incidences(elements: NDArray[np.int32], rows: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Starts (rows + 1,) and, for every row, the (element, node) pairs, coded 4 element + node, that name it."""
+    nodes = elements.ravel()
+    used = np.flatnonzero(nodes >= 0)
+    incidence = used[np.argsort(nodes[used], kind="stable")]
+    start = np.concatenate([[0], np.cumsum(np.bincount(nodes[used], minlength=rows))])
+    return start.astype(np.int32), incidence.astype(np.int32)
 
 
 @njit(cache=True, error_model="numpy")

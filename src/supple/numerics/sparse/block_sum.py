@@ -30,10 +30,10 @@ class JointPattern:
     of_base: NDArray[np.int32]
     of_extra: NDArray[np.int32]
 
-    def add(self, base: NDArray[np.float64], extra: NDArray[np.float64], weight: float = 1.0) -> NDArray[np.float64]:
-        """The blocks (b, 3, 3) of base + weight extra."""
+    def add(self, base: NDArray[np.float64], extra: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The blocks (b, 3, 3) of base + extra."""
         data = np.zeros((self.rows.blocks, 3, 3))
-        _add(base, self.of_base, extra, self.of_extra, weight, data)
+        _add(base, self.of_base, extra, self.of_extra, data)
         return data
 
 
@@ -105,7 +105,7 @@ def _join(row_start, columns, extra_start, extra_columns, row_of):
 
 
 @njit(cache=True, error_model="numpy")
-def _add(base, of_base, extra, of_extra, weight, data):
+def _add(base, of_base, extra, of_extra, data):
     for q in range(len(of_base)):
         for r in range(3):
             for c in range(3):
@@ -115,4 +115,4 @@ def _add(base, of_base, extra, of_extra, weight, data):
         if p >= 0:
             for r in range(3):
                 for c in range(3):
-                    data[p, r, c] += weight * extra[q, r, c]
+                    data[p, r, c] += extra[q, r, c]

@@ -31,14 +31,13 @@ class CGResult:
     ----------
     iterations : products with the matrix; converged : whether the tolerance was met
     indefinite : whether a direction of no positive curvature was met, which ends the search
-    first_norm, last_norm : of the residual, sqrt(r . M^-1 r)
+    first_norm : of the residual at the start, sqrt(r . M^-1 r)
     """
 
     iterations: int
     converged: bool
     indefinite: bool
     first_norm: float
-    last_norm: float
 
 
 def conjugate_gradients(
@@ -60,7 +59,7 @@ def conjugate_gradients(
     """
     p = preconditioner.pattern
     with threads_for(p.blocks, _SERIAL_BLOCKS):
-        iterations, converged, indefinite, first, last = _solve(
+        iterations, converged, indefinite, first = _solve(
             p.row_start,
             p.columns,
             p.diagonal,
@@ -76,7 +75,7 @@ def conjugate_gradients(
             tolerance,
             max_iterations,
         )
-    return CGResult(int(iterations), bool(converged), bool(indefinite), float(first), float(last))
+    return CGResult(int(iterations), bool(converged), bool(indefinite), float(first))
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
@@ -198,7 +197,7 @@ def _solve(
         if iteration == 0:
             first_norm = norm
         if norm <= tolerance * first_norm:
-            return iteration, rz >= 0.0, not rz >= 0.0, first_norm, norm
+            return iteration, rz >= 0.0, not rz >= 0.0, first_norm
         if iteration == max_iterations or not rz < np.inf:
             break
         beta = rz / old if iteration > 0 else 0.0
@@ -209,6 +208,6 @@ def _solve(
         for g in range(groups):
             curvature += sums[g]
         if not curvature > 0.0:
-            return iteration, False, True, first_norm, norm
+            return iteration, False, True, first_norm
         alpha = rz / curvature
-    return iteration, False, False, first_norm, norm
+    return iteration, False, False, first_norm

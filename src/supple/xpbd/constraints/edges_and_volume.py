@@ -21,13 +21,24 @@ from numpy.typing import NDArray
 from supple.errors import SolverError
 from supple.numerics.kernel_cache import njit, prange
 from supple.system import BodyRange, System
-from supple.xpbd.sweeps.compilation import FLAGS, serial_and_parallel
+from supple.xpbd.sweeps.compilation import FLAGS, SerialAndParallel, serial_and_parallel
 from supple.xpbd.sweeps.ordering import Layout
-from supple.xpbd.sweeps.segments import Segments, gather, sort_into_segments
+from supple.xpbd.sweeps.segments import gather, sort_into_segments
 
 
 class _Constraints:
-    """One constraint on each edge or on each tet (`which`) of some bodies, with the compliance of this name."""
+    """One constraint on each edge or on each tet (`which`) of some bodies, with the compliance of this name.
+
+    Attributes
+    ----------
+    rest : (m,) of each constraint; unit : factor of the compliance
+    sweep, damping_sweep : the kernels
+    """
+
+    rest: NDArray[np.float64]
+    unit: float
+    sweep: SerialAndParallel
+    damping_sweep: SerialAndParallel
 
     def __init__(self, system: System, parts: list[BodyRange], layout: Layout, which: str, compliance: str) -> None:
         vertices: NDArray[np.int32] = getattr(system, which)
@@ -41,6 +52,19 @@ class _Constraints:
         self.count = self.work = len(rows)
         self.damped = bool(self.table[:, 1].any())
 
+    def project(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:
+        """See `ConstraintSet.project`."""
+        self.sweep[parallel](points, self.vertices, self.rest, *self._scaled(h))
+
+    def damp(self, points: NDArray[np.float64], previous: NDArray[np.float64], h: float, parallel: bool) -> None:
+        """See `ConstraintSet.damp`."""
+        self.damping_sweep[parallel](points, previous, self.vertices, *self._scaled(h))
+
+    def _scaled(self, h: float) -> tuple[NDArray, NDArray, NDArray]:
+        """The arguments of the kernels: chunk pointers, bounds, and (alpha / h^2, tau / h) of each segment."""
+        constants = self.table[self.segments.kinds] * np.array([self.unit / h**2, 1.0 / h])
+        return self.segments.chunk_pointers, self.segments.bounds, np.ascontiguousarray(constants)
+
 
 class EdgeConstraints(_Constraints):
     """The edges of all bodies made of `EdgesAndVolume`."""
@@ -48,14 +72,7 @@ class EdgeConstraints(_Constraints):
     def __init__(self, system: System, parts: list[BodyRange], layout: Layout) -> None:
         super().__init__(system, parts, layout, "edges", "edge_compliance")
         self.rest = np.ascontiguousarray(system.rest_lengths[self.rows])
-
-    def project(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:
-        """See `ConstraintSet.project`."""
-        _sweep_edges[parallel](points, self.vertices, self.rest, *_scaled(self.segments, self.table, h, 1.0))
-
-    def damp(self, points: NDArray[np.float64], previous: NDArray[np.float64], h: float, parallel: bool) -> None:
-        """See `ConstraintSet.damp`."""
-        _damp_edges[parallel](points, previous, self.vertices, *_scaled(self.segments, self.table, h, 1.0))
+        self.unit, self.sweep, self.damping_sweep = 1.0, _sweep_edges, _damp_edges
 
 
 class VolumeConstraints(_Constraints):
@@ -64,15 +81,8 @@ class VolumeConstraints(_Constraints):
     def __init__(self, system: System, parts: list[BodyRange], layout: Layout) -> None:
         super().__init__(system, parts, layout, "tets", "volume_compliance")
         self.rest = np.ascontiguousarray(6.0 * system.rest_volumes[self.rows])
-
-    def project(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:
-        """See `ConstraintSet.project`."""
         # The energy C^2 / (2 alpha) of C = V - V0 is that of 6 C with 36 alpha.
-        _sweep_volumes[parallel](points, self.vertices, self.rest, *_scaled(self.segments, self.table, h, 36.0))
-
-    def damp(self, points: NDArray[np.float64], previous: NDArray[np.float64], h: float, parallel: bool) -> None:
-        """See `ConstraintSet.damp`."""
-        _damp_volumes[parallel](points, previous, self.vertices, *_scaled(self.segments, self.table, h, 36.0))
+        self.unit, self.sweep, self.damping_sweep = 36.0, _sweep_volumes, _damp_volumes
 
 
 def _constants(part: BodyRange, compliance: str) -> NDArray[np.float64]:
@@ -83,12 +93,6 @@ def _constants(part: BodyRange, compliance: str) -> NDArray[np.float64]:
             f"XPBD: body {part.name!r}: EdgesAndVolume needs one damping for the whole body; give a number"
         )
     return np.array([getattr(material, compliance), material.damping], dtype=np.float64)
-
-
-def _scaled(segments: Segments, table: NDArray, h: float, unit: float) -> tuple[NDArray, NDArray, NDArray]:
-    """The arguments of the kernels: chunk pointers, bounds, and (alpha / h^2, tau / h) of each segment."""
-    constants = table[segments.kinds] * np.array([unit / h**2, 1.0 / h])
-    return segments.chunk_pointers, segments.bounds, np.ascontiguousarray(constants)
 
 
 @njit(cache=True, fastmath=FLAGS)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.obstacle_poses import ObstaclePoses
-from supple.contact.search.reach import any_beyond_reach, reach_from_velocities
+from supple.contact.search.reach import any_beyond_reach
 from supple.contact.search.surfaces import build_surfaces
 from supple.scene.contact_pairs import pair_table
 from supple.system import System
@@ -119,7 +119,8 @@ class Collisions:
 
     def _gather_obstacles(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float) -> None:
         falling = 0.5 * math.hypot(*self.system.gravity) * self._dt**2
-        reach_from_velocities(v, self._dt, LEAST_REACH * self.edge_length + falling, self._reach)
+        least = LEAST_REACH * self.edge_length + falling
+        self._reach = least + 1.2 * self._dt * np.sqrt(np.einsum("ij,ij->i", v, v))
         self._gathered[:] = x
         self.obstacles.gather(x, self._reach, time)
 

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from supple.contact.obstacle_poses import ObstaclePoses
 from supple.contact.search.excluded_pairs import excluded_pairs
-from supple.contact.search.point_inside import bounds_of_pieces, depths_inside
+from supple.contact.search.point_inside import depths_inside
 from supple.contact.search.reach import any_beyond_radii, mean_motions, search_radii
-from supple.contact.search.spatial_hash import PairFinder
+from supple.contact.search.spatial_hash import PairFinder, boxes_of_pieces
 from supple.contact.search.stitch_masks import stitched_points
 from supple.contact.search.surfaces import ContactSurfaces
 from supple.system import System
@@ -140,7 +140,8 @@ class SurfaceCollisions:
     def _find_overlaps(self) -> None:
         """Set how deep each point is inside other pieces, from positions alone."""
         s = self.surfaces
-        boxes = bounds_of_pieces(self._x, s.point_piece, len(s.closed))
+        boxes = np.empty((len(s.closed), 3)), np.empty((len(s.closed), 3))
+        boxes_of_pieces(self._x, s.point_piece, np.zeros((len(self._x), 1)), *boxes)
         for kind, part in enumerate((slice(0, s.body_triangles), slice(s.body_triangles, None))):
             shapes = (self._x, s.point_piece, s.triangles[part], s.triangle_piece[part])
             depths_inside(shapes, s.closed, s.allowed, boxes, self._depth[kind])
