@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.mesh.io.cells import CellSoup, FormatError, joined
+from supple.mesh.io.cells import Block, CellSoup, FormatError
 from supple.mesh.io.text import without_mark
 
 # Gmsh's element types: nodes, and VTK's number for the same cell.
@@ -150,16 +150,17 @@ def read(data: bytes) -> CellSoup:
     if (ordered[1:] == ordered[:-1]).any():
         tag = ordered[:-1][ordered[1:] == ordered[:-1]][0]
         raise FormatError(f"node {tag} is given twice")
-    soups = []
+    cells: list[Block] = []
     for kind, nodes in blocks:
         place = np.minimum(np.searchsorted(ordered, nodes), len(ordered) - 1)
         unknown = ordered[place] != nodes
         if unknown.any():
             raise FormatError(f"an element names node {nodes[unknown][0]}, which does not exist")
-        soups.append(CellSoup.of_rows(points[:0], order[place], ELEMENTS[kind][1]))
-    if not soups:
+        size, cell_type = ELEMENTS[kind]
+        cells.append((cell_type, np.full(len(nodes), size), order[place].ravel()))
+    if not cells:
         raise FormatError("it has no elements")
-    return joined(soups)._replace(points=points)
+    return CellSoup.of_blocks(points, cells)
 
 
 def _form(data: bytes) -> _Form:

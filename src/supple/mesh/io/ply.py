@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.mesh.io.cells import CellSoup, FormatError
+from supple.mesh.io.cells import POLYGON, CellSoup, FormatError
 from supple.mesh.io.text import integer, numbers, shortened, without_mark
 
 SCALARS = {
@@ -56,7 +56,7 @@ def read(data: bytes) -> CellSoup:
             body.lists(element)
     if points is None or faces is None:
         raise FormatError("it has no 'vertex' element with x, y, z, or no 'face' element: it has no surface")
-    return CellSoup.of_sizes(points, *faces)
+    return CellSoup.of_blocks(points, [(POLYGON, *faces)])
 
 
 def _header(data: bytes) -> tuple[str, list[Element], int, int]:
