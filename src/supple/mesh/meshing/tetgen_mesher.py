@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from supple.mesh.meshing.child_process import Limits, MesherFailure, MesherResult, run_mesher
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.surface_checks import winding_number
+from supple.mesh.topology import without_unused
 
 
 def mesh_with_tetgen(surface: SurfaceMesh, options: dict[str, Any], limits: Limits) -> MesherResult:
@@ -36,9 +37,8 @@ def mesh_with_tetgen(surface: SurfaceMesh, options: dict[str, Any], limits: Limi
     inside = _inside(surface, vertices, result)
     if inside.all():
         return replace(result, vertices=vertices)
-    used, elements = np.unique(result.elements[inside], return_inverse=True)
-    elements = elements.reshape(-1, 4).astype(np.int32)
-    return replace(result, vertices=vertices[used], elements=elements, labels=result.labels[inside])
+    vertices, elements = without_unused(vertices, result.elements[inside])
+    return replace(result, vertices=vertices, elements=elements, labels=result.labels[inside])
 
 
 def _inside(surface: SurfaceMesh, vertices: NDArray[np.float64], result: MesherResult) -> NDArray[np.bool_]:
