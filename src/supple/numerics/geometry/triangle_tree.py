@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.numerics.geometry.closest_point import closest_on_triangle, combine
+from supple.numerics.geometry.closest_point import area_normal, closest_on_triangle, combine
 from supple.numerics.kernel_cache import njit, prange
-from supple.numerics.mat3 import cross, dot, row, subtract
+from supple.numerics.mat3 import dot, row, subtract
 
 _LEAF = 4
 _DEPTH = 64  # of a balanced tree; more than any memory can hold
@@ -140,8 +140,13 @@ def _square_to_box(p, boxes, node):
 
 
 @njit(error_model="numpy")
+def _corners(points, triangles, t):
+    return row(points, triangles[t, 0]), row(points, triangles[t, 1]), row(points, triangles[t, 2])
+
+
+@njit(error_model="numpy")
 def _square_to_triangle(p, points, triangles, t):
-    a, b, c = row(points, triangles[t, 0]), row(points, triangles[t, 1]), row(points, triangles[t, 2])
+    a, b, c = _corners(points, triangles, t)
     off = subtract(p, combine(closest_on_triangle(p, a, b, c), a, b, c))
     return dot(off, off)
 
@@ -167,8 +172,7 @@ def closest_places(
 @njit(cache=True, error_model="numpy")
 def _closest_places(queries, points, triangles, out):
     for k in range(len(queries)):
-        a, b, c = triangles[k, 0], triangles[k, 1], triangles[k, 2]
-        out[k] = closest_on_triangle(row(queries, k), row(points, a), row(points, b), row(points, c))
+        out[k] = closest_on_triangle(row(queries, k), *_corners(points, triangles, k))
 
 
 @njit(cache=True, error_model="numpy")
@@ -181,18 +185,12 @@ def _pair_distances(queries, points, triangles, out):
 def _square_height(p, points, triangles, t, normal):
     """Square of the distance from the triangle's plane, and the cosine between its normal and another one; 0, 0 for a
     triangle without area."""
-    a, b, c = row(points, triangles[t, 0]), row(points, triangles[t, 1]), row(points, triangles[t, 2])
-    n = cross(subtract(b, a), subtract(c, a))
+    a, b, c = _corners(points, triangles, t)
+    n = area_normal(a, b, c)
     area = dot(n, n)
     if area == 0.0:
         return 0.0, 0.0
     return dot(n, subtract(p, a)) ** 2 / area, dot(n, normal) / np.sqrt(area)
-
-
-@njit(error_model="numpy")
-def _largest(boxes):
-    """The largest coordinate [m]."""
-    return np.abs(boxes[0]).max()
 
 
 @njit(error_model="numpy")
@@ -219,7 +217,7 @@ def _comes_first(p, normal, points, triangles, t, best, largest):
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def _nearest(queries, normals, within, points, triangles, order, bounds, boxes, found, squares):
-    largest = _largest(boxes)
+    largest = np.abs(boxes[0]).max()  # coordinate [m]
     for q in prange(len(queries)):
         p, normal = row(queries, q), row(normals, q)
         stack = np.empty(_DEPTH, dtype=np.int64)
@@ -256,7 +254,7 @@ def _nearest(queries, normals, within, points, triangles, order, bounds, boxes, 
 @njit(cache=True, parallel=True, error_model="numpy")
 def _all_within(queries, within, points, triangles, order, bounds, boxes, counts, starts, found, squares):
     """With an empty `found`, only count."""
-    largest = _largest(boxes)
+    largest = np.abs(boxes[0]).max()  # coordinate [m]
     for q in prange(len(queries)):
         p = row(queries, q)
         limit = within * within + _slack(within * within, p, largest)
