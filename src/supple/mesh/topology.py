@@ -32,16 +32,12 @@ def edge_keys(simplices: NDArray[np.int32], n_vertices: int) -> NDArray[np.int64
 
 def unique_edges(simplices: NDArray[np.int32], n_vertices: int) -> NDArray[np.int32]:
     """Edges (e, 2) int32 of triangles or tets, each once, lower vertex first, in lexicographic order."""
-    keys = _sorted_once(edge_keys(simplices, n_vertices).ravel())
-    return np.ascontiguousarray(np.column_stack(np.divmod(keys, n_vertices)).astype(np.int32))
-
-
-def _sorted_once(keys: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The result of `np.unique`, in a quarter of its time for millions of keys."""
-    ordered = np.sort(keys)
+    # In a quarter of the time of `np.unique` for millions of keys.
+    ordered = np.sort(edge_keys(simplices, n_vertices), axis=None)
     first = np.ones(len(ordered), dtype=bool)
     np.not_equal(ordered[1:], ordered[:-1], out=first[1:])
-    return ordered[first]
+    keys = ordered[first]
+    return np.ascontiguousarray(np.column_stack(np.divmod(keys, n_vertices)).astype(np.int32))
 
 
 def facet_keys(triangles: NDArray[np.int32], n_vertices: int) -> NDArray[np.int64]:

@@ -42,7 +42,7 @@ class _Section:
         if found is None:
             raise FormatError(f"it has no section ${name}: it is truncated, or has no mesh")
         self.at = found.end()
-        self.values = np.empty(0)
+        self.values, self.line = np.empty(0), None
         if form.is_text:
             self.line = data.count(b"\n", 0, found.end()) + 1
             end = data.find(b"$End" + name.encode(), found.end())
@@ -64,11 +64,8 @@ class _Section:
             raise FormatError(f"${self.name} holds something that is not a number", self.line) from None
 
     def _short(self, count: int) -> FormatError:
-        line = self.line if self.form.is_text else None
-        return FormatError(
-            f"${self.name} does not hold the {count} numbers that its counts announce: it is truncated or damaged",
-            line,
-        )
+        announced = f"the {count} numbers that its counts announce"
+        return FormatError(f"${self.name} does not hold {announced}: it is truncated or damaged", self.line)
 
     def _taken(self, count: int) -> NDArray[np.float64]:
         if count < 0 or count > len(self.values) - self.at:
@@ -141,8 +138,10 @@ def read(data: bytes) -> CellSoup:
     """Points and cells of a .msh file; physical groups and data are ignored."""
     data = without_mark(data)
     form = _form(data)
-    tags, points = (_nodes_2 if form.version == "2" else _nodes_4)(_Section(data, "Nodes", form))
-    blocks = (_elements_2 if form.version == "2" else _elements_4)(_Section(data, "Elements", form))
+    first = _Section(data, "Nodes", form)
+    is_2 = form.version == "2"
+    tags, points = first.tagged(first.first_count(), 3) if is_2 else _nodes_4(first)
+    blocks = (_elements_2 if is_2 else _elements_4)(_Section(data, "Elements", form))
     if len(tags) == 0:
         raise FormatError("it has no nodes")
     order = np.argsort(tags, kind="stable")
@@ -186,10 +185,6 @@ def _nodes_of(kind: int) -> int:
     if kind not in ELEMENTS:
         raise FormatError(f"it holds elements of type {kind}; only linear tetrahedra can be used: convert or remesh it")
     return ELEMENTS[kind][0]
-
-
-def _nodes_2(section: _Section) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    return section.tagged(section.first_count(), 3)
 
 
 def _nodes_4(section: _Section) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

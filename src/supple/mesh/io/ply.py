@@ -33,11 +33,6 @@ class Element(NamedTuple):
     count: int
     properties: list[Property]
 
-    @property
-    def smallest_row(self) -> int:
-        """Smallest size of a binary row [bytes]."""
-        return sum(np.dtype(p.length or p.kind).itemsize for p in self.properties)
-
 
 def read(data: bytes) -> CellSoup:
     """Polygons of a PLY file; other elements and columns are ignored."""
@@ -128,7 +123,8 @@ class _Binary:
 
     def expect(self, element: Element) -> None:
         left = len(self.data) - self.at
-        if element.count * element.smallest_row > left:
+        smallest_row = sum(np.dtype(p.length or p.kind).itemsize for p in element.properties)
+        if element.count * smallest_row > left:
             raise _truncated(element, f"{left} bytes")
 
     def points(self, element: Element) -> NDArray[np.float64]:

@@ -6,10 +6,10 @@ line. The number of the first vertex, 0 or 1, is the start of all numbering. `#`
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
 from itertools import chain
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,7 @@ from supple.mesh.topology import TET_EDGES, TET_FACETS, edge_keys, facet_keys, h
 SUFFIXES = (".node", ".ele", ".edge", ".face")
 
 
-@dataclass(frozen=True, eq=False)
-class TetgenFamily:
+class TetgenFamily(NamedTuple):
     """The contents of a family of TetGen files, before anything is dropped or turned. Indices start at 0.
 
     Attributes
@@ -56,7 +55,7 @@ def read_tetgen_family(path: str | Path) -> TetgenFamily:
     MeshError : `file:line: reason`, or the name of the file that is missing.
     """
     path = Path(path)
-    node, ele, edge, face = (_member(path, suffix) for suffix in SUFFIXES)
+    node, ele, edge, face = family_paths(path).values()
     _require(node, path)
     _require(ele, path)
     points, point_attributes, point_markers, base = _read_nodes(node)
@@ -81,35 +80,25 @@ def write_tetgen_family(
     if base_index not in (0, 1):
         raise MeshError(f"{path}: base_index must be 0 or 1, not {base_index!r}")
     paths = family_paths(path)
-    with whole_files(*paths.values(), error=MeshError) as fresh:
-        for suffix, pieces in _family_text(vertices, tets, edges, triangles, base_index).items():
-            with fresh[paths[suffix]].open("w", encoding="ascii", newline="\n") as file:
-                file.writelines(pieces)
-    return paths
-
-
-def _family_text(
-    vertices: NDArray[np.float64],
-    tets: NDArray[np.int32],
-    edges: NDArray[np.int32],
-    triangles: NDArray[np.int32],
-    base: int,
-) -> dict[str, Iterable[str]]:
     n = len(vertices)
     on_boundary = np.zeros(n, dtype=np.int64)
     on_boundary[triangles] = 1
     keys = edges[:, 0].astype(np.int64) * n + edges[:, 1]
     edge_marker = np.isin(keys, edge_keys(triangles, n)).astype(np.int64)
     face_marker = np.ones(len(triangles), dtype=np.int64)
-    numbers = [np.arange(base, base + len(a)) for a in (vertices, tets, edges, triangles)]
-    return {
-        ".node": chain([f"{n} 3 0 1\n"], _lines("%d %r %r %r %d\n", numbers[0], vertices, on_boundary)),
-        ".ele": chain([f"{len(tets)} 4 0\n"], _lines("%d %d %d %d %d\n", numbers[1], tets + base)),
-        ".edge": chain([f"{len(edges)} 1\n"], _lines("%d %d %d %d\n", numbers[2], edges + base, edge_marker)),
-        ".face": chain(
-            [f"{len(triangles)} 1\n"], _lines("%d %d %d %d %d\n", numbers[3], triangles + base, face_marker)
-        ),
-    }
+    contents = (
+        ("3 0 1", "%d %r %r %r %d\n", (vertices, on_boundary)),
+        ("4 0", "%d %d %d %d %d\n", (tets + base_index,)),
+        ("1", "%d %d %d %d\n", (edges + base_index, edge_marker)),
+        ("1", "%d %d %d %d %d\n", (triangles + base_index, face_marker)),
+    )
+    with whole_files(*paths.values(), error=MeshError) as fresh:
+        for member, (header, pattern, blocks) in zip(paths.values(), contents, strict=True):
+            count = len(blocks[0])
+            with fresh[member].open("w", encoding="ascii", newline="\n") as file:
+                file.write(f"{count} {header}\n")
+                file.writelines(_lines(pattern, np.arange(base_index, base_index + count), *blocks))
+    return paths
 
 
 def _lines(pattern: str, *blocks: NDArray) -> Iterator[str]:
@@ -127,13 +116,9 @@ def is_tetgen_path(path: str | Path) -> bool:
 
 def family_paths(path: str | Path) -> dict[str, Path]:
     """The four files {suffix: path} of the family that a name belongs to."""
-    return {suffix: _member(Path(path), suffix) for suffix in SUFFIXES}
-
-
-def _member(path: Path, suffix: str) -> Path:
     # "bear.1" without one of the suffixes is the family's own name; with_suffix would remove its ".1".
-    stem = path.with_suffix("") if is_tetgen_path(path) else path
-    return stem.with_name(stem.name + suffix)
+    stem = Path(path).with_suffix("") if is_tetgen_path(path) else Path(path)
+    return {suffix: stem.with_name(stem.name + suffix) for suffix in SUFFIXES}
 
 
 def _require(member: Path, given: Path) -> None:

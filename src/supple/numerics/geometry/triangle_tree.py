@@ -155,9 +155,9 @@ def pair_distances(
     queries: NDArray[np.float64], points: NDArray[np.float64], triangles: NDArray[np.int32]
 ) -> NDArray[np.float64]:
     """Distances (k,) [m] from the queries (k, 3) to the triangles (k, 3) of the same rows, indices of points (n, 3)."""
-    out = np.empty(len(queries))
-    _pair_distances(np.ascontiguousarray(queries), np.ascontiguousarray(points), np.ascontiguousarray(triangles), out)
-    return out
+    weights = closest_places(queries, points, triangles)
+    off = queries - sum(weights[:, k, None] * points[triangles[:, k]] for k in range(3))
+    return np.sqrt((off * off).sum(axis=1))
 
 
 def closest_places(
@@ -173,12 +173,6 @@ def closest_places(
 def _closest_places(queries, points, triangles, out):
     for k in range(len(queries)):
         out[k] = closest_on_triangle(row(queries, k), *_corners(points, triangles, k))
-
-
-@njit(cache=True, error_model="numpy")
-def _pair_distances(queries, points, triangles, out):
-    for k in range(len(queries)):
-        out[k] = np.sqrt(_square_to_triangle(row(queries, k), points, triangles, k))
 
 
 @njit(error_model="numpy")
