@@ -35,6 +35,13 @@ class _Cursor:
         self.at, self.line = end + 1, self.line + 1
         return line.decode("latin-1").strip()
 
+    def next_words(self) -> list[str]:
+        """The words of the next line that is not blank; none at the end."""
+        words: list[str] = []
+        while not words and (line := self.next_line()) is not None:
+            words = line.split()
+        return words
+
     def array(self, count: int, kind: str, what: str) -> NDArray:
         """`count` numbers; text may spread over lines, binary is big-endian."""
         if count < 0 or count > len(self.data):
@@ -79,10 +86,7 @@ def _body(cursor: _Cursor) -> CellSoup:
     points = np.empty((0, 3))
     types: NDArray | None = None
     blocks: list[Block] = []
-    while (line := cursor.next_line()) is not None:
-        words = line.split()
-        if not words:
-            continue
+    while words := cursor.next_words():
         section = words[0].upper()
         if section == "DATASET":
             if len(words) < 2 or words[1].upper() not in ("POLYDATA", "UNSTRUCTURED_GRID"):
@@ -131,9 +135,7 @@ def _cells(cursor: _Cursor, words: list[str]) -> tuple[NDArray[np.int64], NDArra
     following = (cursor.next_line() or "").split()
     if following and following[0].upper() == "OFFSETS":
         offsets = cursor.array(n, _kind(following, cursor), what).astype(np.int64)
-        following = (cursor.next_line() or "").split()
-        while not following and cursor.at < len(cursor.data):
-            following = (cursor.next_line() or "").split()
+        following = cursor.next_words()
         if not following or following[0].upper() != "CONNECTIVITY":
             raise FormatError(f"CONNECTIVITY is missing in {what}", cursor.line)
         flat = cursor.array(size, _kind(following, cursor), what).astype(np.int64)
@@ -174,10 +176,7 @@ def _skip_field(cursor: _Cursor, words: list[str]) -> None:
     """Field data before the geometry (time values and the like)."""
     count = integer(words[2] if len(words) > 2 else "", cursor.line, "number of field arrays")
     for _ in range(count):
-        line = cursor.next_line()
-        while line == "":
-            line = cursor.next_line()
-        head = (line or "").split()
+        head = cursor.next_words()
         kind = SCALARS.get(head[3].lower()) if len(head) == 4 else None
         if kind is None:
             raise FormatError(f"field array '{shortened(head)}' cannot be read", cursor.line)

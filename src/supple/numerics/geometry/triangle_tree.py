@@ -7,7 +7,7 @@ Source: Ericson, "Real-Time Collision Detection" (2005), section 6.2.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +26,7 @@ TIE, ROUND_OFF = 1e-12, 1e-14
 SAME_FACING = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
-class TriangleTree:
+class TriangleTree(NamedTuple):
     """A balanced tree. Node i has the children 2 i + 1 and 2 i + 2; the last level are the leaves.
 
     Attributes
@@ -74,7 +73,7 @@ class TriangleTree:
         squares = np.full(len(queries), np.inf)
         queries = np.ascontiguousarray(queries, dtype=np.float64)
         own = np.zeros_like(queries) if normals is None else np.ascontiguousarray(normals, dtype=np.float64)
-        _nearest(queries, own, within, *self._arrays(), found, squares)
+        _nearest(queries, own, within, *self, found, squares)
         return found, np.sqrt(squares)
 
     def all_within(self, queries: NDArray[np.float64], within: float) -> tuple[NDArray, NDArray, NDArray]:
@@ -87,16 +86,13 @@ class TriangleTree:
         queries = np.ascontiguousarray(queries, dtype=np.float64)
         counts = np.zeros(len(queries), dtype=np.int64)
         nothing = np.zeros(0, dtype=np.int64)
-        _all_within(queries, within, *self._arrays(), counts, nothing, nothing, np.zeros(0))
+        _all_within(queries, within, *self, counts, nothing, nothing, np.zeros(0))
         starts = np.concatenate([[0], np.cumsum(counts)])
         found, squares = np.empty(starts[-1], dtype=np.int64), np.empty(starts[-1])
-        _all_within(queries, within, *self._arrays(), counts, starts, found, squares)
+        _all_within(queries, within, *self, counts, starts, found, squares)
         of_query = np.repeat(np.arange(len(queries)), counts)
         order = np.lexsort((found, of_query))
         return of_query[order], found[order], np.sqrt(squares[order])
-
-    def _arrays(self) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
-        return self.points, self.triangles, self.order, self.bounds, self.boxes
 
 
 @njit(cache=True, error_model="numpy")
