@@ -21,7 +21,7 @@ class Components(NamedTuple):
     labels: NDArray[np.int32]
 
 
-def edge_keys(simplices: NDArray[np.int32], n_vertices: int) -> NDArray[np.int64]:
+def edge_keys(simplices: NDArray[np.integer], n_vertices: int) -> NDArray[np.int64]:
     """One 64-bit key, lower vertex * n + higher vertex, for each edge of each simplex: (m, edges per simplex)."""
     width = simplices.shape[1]
     pairs = TET_EDGES if width == 4 else np.array([[0, 1], [1, 2], [2, 0]])

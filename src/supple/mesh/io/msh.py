@@ -42,26 +42,27 @@ class _Section:
         if found is None:
             raise FormatError(f"it has no section ${name}: it is truncated, or has no mesh")
         self.at = found.end()
-        self.values, self.line = np.empty(0), None
+        self.values = np.empty(0)
+        line = data.count(b"\n", 0, found.end()) + 1
+        self.line = line if form.is_text else None
         if form.is_text:
-            self.line = data.count(b"\n", 0, found.end()) + 1
             end = data.find(b"$End" + name.encode(), found.end())
             if end < 0:
                 raise FormatError(f"it has no $End{name}: it is truncated")
-            self.values = self._parsed(data[found.end() : end])
+            self.values = self._parsed(data[found.end() : end], line)
             self.at = 0
 
-    def _parsed(self, text: bytes) -> NDArray[np.float64]:
+    def _parsed(self, text: bytes, first: int) -> NDArray[np.float64]:
         words = text.split()
         try:
             return np.array(words, dtype=np.float64)
         except ValueError:
-            for k, line in enumerate(text.split(b"\n")):
+            for number, line in enumerate(text.split(b"\n"), start=first):
                 try:
                     np.array(line.split(), dtype=np.float64)
                 except ValueError:
-                    raise FormatError(f"${self.name} holds something that is not a number", self.line + k) from None
-            raise FormatError(f"${self.name} holds something that is not a number", self.line) from None
+                    raise FormatError(f"${self.name} holds something that is not a number", number) from None
+            raise FormatError(f"${self.name} holds something that is not a number", first) from None
 
     def _short(self, count: int) -> FormatError:
         announced = f"the {count} numbers that its counts announce"
