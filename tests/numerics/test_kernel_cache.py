@@ -54,7 +54,7 @@ def test_a_kernel_is_compiled_again_when_a_function_of_another_file_changes(copi
     package, run = copied_package
     assert run() == "[3.0, 2.0, 1.0] 0"
     assert run().endswith(" 1"), "unchanged, it is loaded"
-    replace_in(package / "numerics" / "mat3.py", "        array[e, 0, 0],", "        2.0 * array[e, 0, 0],")
+    replace_in(package / "numerics" / "mat3.py", "(array[e, i, 0],", "(2.0 * array[e, i, 0],")
     assert run() == "[6.0, 2.0, 1.0] 0"
     assert run().endswith(" 1")
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.mesh.topology import graph_components
+
 
 def merge_map(points: NDArray[np.float64], tolerance: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Which points to keep, and for each point the row among the kept ones that replaces it.
@@ -20,13 +22,7 @@ def merge_map(points: NDArray[np.float64], tolerance: float) -> tuple[NDArray[np
     close = KDTree(points[keep]).query_pairs(tolerance, output_type="ndarray")
     if len(close) == 0:
         return keep, index
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    n = len(keep)
-    graph = coo_array((np.ones(len(close), dtype=np.int8), (close[:, 0], close[:, 1])), shape=(n, n))
-    _, group = connected_components(graph.tocsr(), directed=False)
-    first, second_index = _first_of_each(group)
+    first, second_index = _first_of_each(graph_components(len(keep), *close.T))
     return keep[first], second_index[index]
 
 

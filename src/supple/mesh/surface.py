@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import MeshError
 from supple.mesh.checked_arrays import frozen, index_array, vertex_array
 from supple.mesh.io.mesh_files import read_surface, write_surface
-from supple.mesh.topology import Components, connected_components, unique_edges
+from supple.mesh.topology import Components, connected_components, is_used, unique_edges, without_unused
 
 if TYPE_CHECKING:
     from supple.mesh.surface_checks import SurfaceReport
@@ -106,9 +106,7 @@ class SurfaceMesh:
     @cached_property
     def used_vertices(self) -> NDArray[np.int32]:
         """Rows of `vertices` that some triangle uses, sorted."""
-        used = np.zeros(len(self.vertices), dtype=bool)
-        used[self.triangles] = True
-        return frozen(np.flatnonzero(used).astype(np.int32))
+        return frozen(np.flatnonzero(is_used(self.triangles, len(self.vertices))).astype(np.int32))
 
     @cached_property
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -119,8 +117,7 @@ class SurfaceMesh:
     @cached_property
     def components(self) -> Components:
         """The number of connected pieces, and the piece of each triangle (m,)."""
-        count, labels = connected_components(self.triangles, len(self.vertices))
-        return Components(count, frozen(labels))
+        return connected_components(self.triangles, len(self.vertices))
 
     def check(self) -> SurfaceReport:
         """Find all faults that prevent a mesher or a contact solver from using this surface."""
@@ -130,9 +127,7 @@ class SurfaceMesh:
 
     def compact(self) -> SurfaceMesh:
         """The same surface without the vertices that no triangle uses."""
-        rows = np.full(len(self.vertices), -1, dtype=np.int32)
-        rows[self.used_vertices] = np.arange(len(self.used_vertices), dtype=np.int32)
-        return SurfaceMesh(self.vertices[self.used_vertices], rows[self.triangles])
+        return SurfaceMesh(*without_unused(self.vertices, self.triangles))
 
     def flipped(self) -> SurfaceMesh:
         """The same surface turned inside out."""

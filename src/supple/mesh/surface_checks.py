@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,63 +99,43 @@ class SurfaceReport:
     @cached_property
     def problems(self) -> list[str]:
         """One line for each kind of fault: its name, how many there are, and where the first one is."""
+        surface, vertices = self.surface, self.surface.vertices
+
+        def edge(row: NDArray[np.int32]) -> tuple[str, NDArray[np.float64]]:
+            return f"between vertices {row[0]} and {row[1]}", vertices[row].mean(axis=0)
+
+        def vertex(row: int) -> tuple[str, NDArray[np.float64]]:
+            return f"vertex {row}", vertices[row]
+
+        def triangle(row: int) -> tuple[str, NDArray[np.float64]]:
+            return f"triangle {row}", vertices[surface.triangles[row]].mean(axis=0)
+
+        def pair(row: NDArray[np.int32]) -> tuple[str, NDArray[np.float64]]:
+            return f"triangles {row[0]} and {row[1]}", triangle(row[0])[1]
+
+        def component(row: int) -> tuple[str, NDArray[np.float64]]:
+            return f"component {row}", triangle(int(np.argmax(surface.components.labels == row)))[1]
+
+        crossing = self.intersecting_triangles
+        more = "or more " if len(crossing) >= MAX_INTERSECTIONS else ""
+        count, facing = self.component_count, "the wrong way (bodies face outward, cavities inward)"
         found = [
-            self._edges(self.open_edges, "open boundary edge", "the surface has a hole there"),
-            self._edges(self.non_manifold_edges, "non-manifold edge", "three or more triangles share it"),
-            self._edges(self.inconsistent_edges, "inconsistent edge", "its triangles face opposite sides"),
-            self._triangles(self.duplicate_triangles, "duplicate triangle", "pair"),
-            self._triangles(self.degenerate_triangles, "degenerate triangle", "without area"),
-            self._triangles(self.folded_triangles, "folded triangle", "pair that lies on each other"),
-            self._triangles(self.intersecting_triangles, "intersecting triangle", "pair"),
-            self._unused(),
-            self._facing(),
+            _line(self.open_edges, edge, "open boundary edge{s}", ", the surface has a hole there"),
+            _line(self.non_manifold_edges, edge, "non-manifold edge{s}", ", three or more triangles share it"),
+            _line(self.inconsistent_edges, edge, "inconsistent edge{s}", ", its triangles face opposite sides"),
+            _line(self.duplicate_triangles, pair, "duplicate triangle pair{s}"),
+            _line(self.degenerate_triangles, triangle, "degenerate triangle{s} without area"),
+            _line(self.folded_triangles, pair, "folded triangle pair{s} that {lie} on each other"),
+            _line(crossing, pair, f"{more}intersecting triangle pair{{s}}"),
+            _line(self.unused_vertices, vertex, "{vertices} in no triangle"),
+            _line(self.wrong_facing_components, component, f"component{{s}} of {count} {{face}} {facing}"),
         ]
-        return [line for line in found if line is not None]
+        return [line for line in found if line]
 
     def __str__(self) -> str:
         pieces = "1 component" if self.component_count == 1 else f"{self.component_count} components"
         lines = self.problems or ["nothing wrong: watertight, oriented outward, no self-intersection"]
         return "\n".join([f"{self.surface!r}, {pieces}", *lines])
-
-    def _edges(self, edges: NDArray[np.int32], name: str, why: str) -> str | None:
-        if len(edges) == 0:
-            return None
-        a, b = self.surface.vertices[edges[0]]
-        ends, middle = f"{edges[0, 0]} and {edges[0, 1]}", place(0.5 * (a + b))
-        return f"{_count(len(edges), name)}: {_first(edges)}between vertices {ends} at {middle}, {why}"
-
-    def _triangles(self, rows: NDArray[np.int32], name: str, kind: str) -> str | None:
-        if len(rows) == 0:
-            return None
-        vertices, triangles = self.surface.vertices, self.surface.triangles
-        where = place(vertices[triangles[np.ravel(rows[0])[0]]].mean(axis=0))
-        if rows.ndim == 1:
-            return f"{_count(len(rows), name)} {kind}: {_first(rows)}triangle {rows[0]} at {where}"
-        many = rows is self.intersecting_triangles and len(rows) >= MAX_INTERSECTIONS
-        count = f"{len(rows)} or more {name} {kind}s" if many else f"{_count(len(rows), f'{name} {kind}')}"
-        if kind != "pair" and len(rows) > 1:
-            count = f"{len(rows)} {name} pairs that lie on each other"
-        return f"{count}: {_first(rows)}triangles {rows[0, 0]} and {rows[0, 1]} at {where}"
-
-    def _unused(self) -> str | None:
-        rows = self.unused_vertices
-        if len(rows) == 0:
-            return None
-        where = place(self.surface.vertices[rows[0]])
-        name = "vertex" if len(rows) == 1 else "vertices"
-        return f"{len(rows)} {name} in no triangle: {_first(rows)}vertex {rows[0]} at {where}"
-
-    def _facing(self) -> str | None:
-        rows = self.wrong_facing_components
-        if len(rows) == 0:
-            return None
-        triangle = int(np.flatnonzero(self.surface.components.labels == rows[0])[0])
-        where = place(self.surface.vertices[self.surface.triangles[triangle]].mean(axis=0))
-        verb = "faces" if len(rows) == 1 else "face"
-        return (
-            f"{_count(len(rows), 'component')} of {self.component_count} {verb} the wrong way (bodies face outward, "
-            f"cavities inward): {_first(rows)}component {rows[0]} at {where}"
-        )
 
 
 def check_surface(surface: CheckedSurface) -> SurfaceReport:
@@ -198,12 +179,16 @@ def check_surface(surface: CheckedSurface) -> SurfaceReport:
     )
 
 
-def _count(n: int, name: str) -> str:
-    return f"1 {name}" if n == 1 else f"{n} {name}s"
-
-
-def _first(rows: NDArray[np.int32]) -> str:
-    return "" if len(rows) == 1 else "the first is "
+def _line(rows: NDArray[np.int32], first: Callable[[Any], tuple[str, NDArray]], name: str, why: str = "") -> str:
+    """One kind of fault: how many, and the name and place that `first` gives for the first one; "" without faults."""
+    if len(rows) == 0:
+        return ""
+    if len(rows) == 1:
+        words, begin = {"s": "", "lie": "lies", "face": "faces", "vertices": "vertex"}, ""
+    else:
+        words, begin = {"s": "s", "lie": "lie", "face": "face", "vertices": "vertices"}, "the first is "
+    what, where = first(rows[0])
+    return f"{len(rows)} {name.format(**words)}: {begin}{what} at {place(where)}{why}"
 
 
 def _duplicate_triangles(surface: CheckedSurface) -> NDArray[np.int32]:

@@ -16,7 +16,17 @@ from supple.mesh.io.mesh_files import read_tets, write_tets
 from supple.mesh.io.tetgen_family import is_tetgen_path, write_tetgen_family
 from supple.mesh.quality import min_dihedrals, radius_ratios
 from supple.mesh.surface import SurfaceMesh, linear_map
-from supple.mesh.topology import TET_EDGES, TET_FACETS, Components, connected_components, facet_keys, unique_edges
+from supple.mesh.topology import (
+    TET_EDGES,
+    TET_FACETS,
+    Components,
+    connected_components,
+    facet_keys,
+    has_vertex_twice,
+    is_used,
+    unique_edges,
+    without_unused,
+)
 
 logger = logging.getLogger(__name__)
 
@@ -73,12 +83,10 @@ class TetMesh:
         """A `TetMesh` of the vertices that some tet uses, in their order; the log gives the number of the others."""
         points = vertex_array(vertices, "TetMesh")
         given = index_array(tets, 4, len(points), "TetMesh", "tet")
-        used = np.zeros(len(points), dtype=bool)
-        used[given] = True
-        if used.all():
-            return cls(points, given)
-        logger.warning("dropped %d of %d vertices that belong to no tet", np.count_nonzero(~used), len(points))
-        return cls(points[used], (np.cumsum(used) - 1)[given])
+        kept, renumbered = without_unused(points, given)
+        if len(kept) < len(points):
+            logger.warning("dropped %d of %d vertices that belong to no tet", len(points) - len(kept), len(points))
+        return cls(kept, renumbered)
 
     @classmethod
     def load(cls, path: str | Path) -> TetMesh:
@@ -153,8 +161,7 @@ class TetMesh:
     @cached_property
     def components(self) -> Components:
         """How many connected pieces there are, and which one each tet (m,) belongs to."""
-        count, labels = connected_components(self.tets, len(self.vertices))
-        return Components(count, frozen(labels))
+        return connected_components(self.tets, len(self.vertices))
 
     @cached_property
     def min_dihedrals(self) -> NDArray[np.float64]:
@@ -210,19 +217,15 @@ def _positive_winding(vertices: NDArray[np.float64], tets: NDArray[np.int32]) ->
 
 
 def _check_repeated_corners(tets: NDArray[np.int32]) -> None:
-    repeated = np.zeros(len(tets), dtype=bool)
-    for i, j in TET_EDGES:
-        repeated |= tets[:, i] == tets[:, j]
+    repeated = has_vertex_twice(tets)
     if repeated.any():
         t = int(np.flatnonzero(repeated)[0])
         raise MeshError(f"TetMesh: tet {t} is {tets[t].tolist()}, with a vertex twice; remove it")
 
 
 def _check_unused(vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> None:
-    used = np.zeros(len(vertices), dtype=bool)
-    used[tets] = True
-    if not used.all():
-        rows = np.flatnonzero(~used)
+    rows = np.flatnonzero(~is_used(tets, len(vertices)))
+    if len(rows):
         more = f" (and {len(rows) - 1} more)" if len(rows) > 1 else ""
         raise MeshError(
             f"TetMesh: vertex {rows[0]} at {place(vertices[rows[0]])}{more} belongs to no tet; "

@@ -33,28 +33,11 @@ def breadth_first_order(constraints: list[NDArray[np.int32]], n_vertices: int) -
     levels : (n_vertices,) int32, the level of each vertex, growing by one from piece to piece.
     """
     pairs = [rows[:, [i, j]] for rows in constraints for i in range(rows.shape[1]) for j in range(i)]
-    joined = np.ascontiguousarray(np.concatenate(pairs), dtype=np.int32) if pairs else np.zeros((0, 2), dtype=np.int32)
-    pointers, neighbours = _adjacency(joined, n_vertices)
-    return _breadth_first(pointers, neighbours)
-
-
-@njit(cache=True)
-def _adjacency(pairs, n_vertices):
-    pointers = np.zeros(n_vertices + 1, np.int64)
-    for k in range(len(pairs)):
-        pointers[pairs[k, 0] + 1] += 1
-        pointers[pairs[k, 1] + 1] += 1
-    for i in range(n_vertices):
-        pointers[i + 1] += pointers[i]
-    fill = pointers[:-1].copy()
-    neighbours = np.empty(2 * len(pairs), np.int32)
-    for k in range(len(pairs)):
-        i, j = pairs[k, 0], pairs[k, 1]
-        neighbours[fill[i]] = j
-        fill[i] += 1
-        neighbours[fill[j]] = i
-        fill[j] += 1
-    return pointers, neighbours
+    joined = np.concatenate([np.zeros((0, 2), dtype=np.int32), *pairs])
+    # The neighbours of each vertex in the order of the pairs.
+    by_vertex = np.argsort(joined.ravel(), kind="stable")
+    pointers = np.concatenate([[0], np.cumsum(np.bincount(joined.ravel(), minlength=n_vertices))])
+    return _breadth_first(pointers, joined[:, ::-1].ravel()[by_vertex])
 
 
 @njit(cache=True)

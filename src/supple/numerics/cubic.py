@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SolverError
-from supple.numerics.geometry.double_double import product_error, sum_error
+from supple.numerics.geometry.double_double import two_product, two_sum
 from supple.numerics.kernel_cache import njit
 
 # Bounds on the rounding error of Horner's rule and of its compensated form, relative to the sum of the terms' sizes.
@@ -36,10 +36,9 @@ def _is_positive(a, b, c, d, t):
     error = 0.0
     for k in range(3):
         coefficient = b if k == 0 else (c if k == 1 else d)
-        product = value * t
-        total = product + coefficient
-        error = error * t + (product_error(value, t, product) + sum_error(product, coefficient, total))
-        value = total
+        product, product_error = two_product(value, t)
+        value, sum_error = two_sum(product, coefficient)
+        error = error * t + (product_error + sum_error)
     return value + error > _COMPENSATED_ROUND_OFF * size
 
 

@@ -64,17 +64,12 @@ def mat_mul_transposed(A, B):
 @njit(error_model="numpy")
 def load_mat(array, e):
     """Matrix e of an (m, 3, 3) array."""
-    return (
-        array[e, 0, 0],
-        array[e, 0, 1],
-        array[e, 0, 2],
-        array[e, 1, 0],
-        array[e, 1, 1],
-        array[e, 1, 2],
-        array[e, 2, 0],
-        array[e, 2, 1],
-        array[e, 2, 2],
-    )
+    return _row(array, e, 0) + _row(array, e, 1) + _row(array, e, 2)
+
+
+@njit(error_model="numpy")
+def _row(array, e, i):
+    return (array[e, i, 0], array[e, i, 1], array[e, i, 2])
 
 
 @njit(error_model="numpy")

@@ -26,6 +26,9 @@ class FormatError(Exception):
         self.line = line
 
 
+Block = tuple[int | NDArray, NDArray[np.int64], NDArray[np.int64]]
+
+
 class CellSoup(NamedTuple):
     """Points (n, 3), and for each cell k its VTK type and its points connectivity[offsets[k] : offsets[k + 1]]."""
 
@@ -39,52 +42,31 @@ class CellSoup(NamedTuple):
         """Soup of polygons, given as lists of point indices."""
         sizes = np.fromiter((len(p) for p in polygons), dtype=np.int64, count=len(polygons))
         flat = np.fromiter((i for p in polygons for i in p), dtype=np.int64, count=int(sizes.sum()))
-        return cls.of_sizes(points, sizes, flat)
-
-    @classmethod
-    def of_sizes(cls, points: NDArray[np.float64], sizes: NDArray[np.int64], flat: NDArray[np.int64]) -> CellSoup:
-        """Soup of polygons, given as the size of each, and the point indices of all in one array."""
-        offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
-        return cls(points, np.full(len(sizes), POLYGON, dtype=np.uint8), offsets, flat.astype(np.int64))
+        return cls.of_blocks(points, [(POLYGON, sizes, flat)])
 
     @classmethod
     def of_rows(cls, points: NDArray[np.float64], rows: NDArray[np.int64], cell_type: int) -> CellSoup:
         """Soup of cells of one type (m, corners)."""
-        m, width = rows.shape
-        offsets = np.arange(m + 1, dtype=np.int64) * width
-        return cls(points, np.full(m, cell_type, dtype=np.uint8), offsets, rows.ravel().astype(np.int64))
+        return cls.of_blocks(points, [(cell_type, np.full(len(rows), rows.shape[1]), rows.ravel())])
 
-
-def joined(soups: Sequence[CellSoup]) -> CellSoup:
-    """Several soups as one."""
-    if len(soups) == 1:
-        return soups[0]
-    shifts = np.cumsum([0] + [len(s.points) for s in soups])
-    starts = np.cumsum([0] + [len(s.connectivity) for s in soups])
-    return CellSoup(
-        np.concatenate([s.points for s in soups]),
-        np.concatenate([s.types for s in soups]),
-        np.concatenate([[0], *(s.offsets[1:] + start for s, start in zip(soups, starts[:-1], strict=True))]).astype(
-            np.int64
-        ),
-        np.concatenate([s.connectivity + shift for s, shift in zip(soups, shifts[:-1], strict=True)]),
-    )
+    @classmethod
+    def of_blocks(cls, points: NDArray[np.float64], blocks: Sequence[Block]) -> CellSoup:
+        """Soup of blocks of cells: the type of all or of each, the size of each, and the point indices of all."""
+        nothing = np.empty(0, dtype=np.int64)
+        sizes = np.concatenate([nothing, *(sizes for _, sizes, _ in blocks)])
+        types = np.concatenate([nothing, *(np.broadcast_to(types, sizes.shape) for types, sizes, _ in blocks)])
+        flat = np.concatenate([nothing, *(flat for _, _, flat in blocks)])
+        offsets = np.concatenate([[0], np.cumsum(sizes)])
+        return cls(points, types.astype(np.uint8), offsets.astype(np.int64), flat.astype(np.int64))
 
 
 def checked(soup: CellSoup) -> CellSoup:
-    """The same soup, or a `FormatError` where offsets or indices point outside."""
-    offsets, flat = soup.offsets, soup.connectivity
-    if (
-        len(offsets) != len(soup.types) + 1
-        or offsets[0] != 0
-        or offsets[-1] > len(flat)
-        or (np.diff(offsets) < 0).any()
-    ):
-        raise FormatError("its cell offsets contradict its cells; the file is damaged")
+    """The same soup, or a `FormatError` where an index points outside."""
+    flat = soup.connectivity
     outside = (flat < 0) | (flat >= len(soup.points))
     if outside.any():
         k = int(np.flatnonzero(outside)[0])
-        cell = int(np.searchsorted(offsets, k, side="right")) - 1
+        cell = int(np.searchsorted(soup.offsets, k, side="right")) - 1
         raise FormatError(f"cell {cell} names point {flat[k]}, but points run from 0 to {len(soup.points) - 1}")
     return soup
 

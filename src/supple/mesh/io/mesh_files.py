@@ -18,6 +18,7 @@ from supple.mesh.io.file_contents import file_contents
 from supple.mesh.io.polygons import triangles_of
 from supple.mesh.io.tetgen_family import SUFFIXES, family_paths, is_tetgen_path, read_tetgen_family
 from supple.mesh.merge import merge_map
+from supple.mesh.topology import has_vertex_twice, without_unused
 
 logger = logging.getLogger(__name__)
 
@@ -68,21 +69,17 @@ def read_surface(path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.int6
     low, high = points.min(axis=0), points.max(axis=0)
     keep, index = merge_map(points, MERGE_TOLERANCE * float(np.linalg.norm(high - low)))
     triangles = index[triangles]
-    a, b, c = triangles.T
-    collapsed = (a == b) | (b == c) | (c == a)
+    collapsed = has_vertex_twice(triangles)
     if collapsed.all():
         raise MeshError(f"{path}: all {len(triangles)} triangles are degenerate; it has no surface")
     if len(keep) < len(points):
         logger.info("%s: %d vertices at the place of others were merged", path, len(points) - len(keep))
     if collapsed.any():
         logger.warning("%s: %d triangles that have a vertex twice were dropped", path, np.count_nonzero(collapsed))
-    points, triangles = points[keep], triangles[~collapsed]
-    used = np.zeros(len(points), dtype=bool)
-    used[triangles] = True
-    if not used.all():
-        unused = np.count_nonzero(~used)
+    points, triangles = without_unused(points[keep], triangles[~collapsed])
+    if len(points) < len(keep):
+        unused = len(keep) - len(points)
         logger.warning("%s: %d vertices that belong to no triangle were dropped", path, unused)
-        points, triangles = points[used], (np.cumsum(used) - 1)[triangles]
     return points, triangles
 
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.mesh.io.cells import CellSoup, FormatError, joined
+from supple.mesh.io.cells import Block, CellSoup, FormatError
 from supple.mesh.io.text import without_mark
 
 # Gmsh's element types: nodes, and VTK's number for the same cell.
@@ -43,32 +43,30 @@ class _Section:
             raise FormatError(f"it has no section ${name}: it is truncated, or has no mesh")
         self.at = found.end()
         self.values = np.empty(0)
+        line = data.count(b"\n", 0, found.end()) + 1
+        self.line = line if form.is_text else None
         if form.is_text:
-            self.line = data.count(b"\n", 0, found.end()) + 1
             end = data.find(b"$End" + name.encode(), found.end())
             if end < 0:
                 raise FormatError(f"it has no $End{name}: it is truncated")
-            self.values = self._parsed(data[found.end() : end])
+            self.values = self._parsed(data[found.end() : end], line)
             self.at = 0
 
-    def _parsed(self, text: bytes) -> NDArray[np.float64]:
+    def _parsed(self, text: bytes, first: int) -> NDArray[np.float64]:
         words = text.split()
         try:
             return np.array(words, dtype=np.float64)
         except ValueError:
-            for k, line in enumerate(text.split(b"\n")):
+            for number, line in enumerate(text.split(b"\n"), start=first):
                 try:
                     np.array(line.split(), dtype=np.float64)
                 except ValueError:
-                    raise FormatError(f"${self.name} holds something that is not a number", self.line + k) from None
-            raise FormatError(f"${self.name} holds something that is not a number", self.line) from None
+                    raise FormatError(f"${self.name} holds something that is not a number", number) from None
+            raise FormatError(f"${self.name} holds something that is not a number", first) from None
 
     def _short(self, count: int) -> FormatError:
-        line = self.line if self.form.is_text else None
-        return FormatError(
-            f"${self.name} does not hold the {count} numbers that its counts announce: it is truncated or damaged",
-            line,
-        )
+        announced = f"the {count} numbers that its counts announce"
+        return FormatError(f"${self.name} does not hold {announced}: it is truncated or damaged", self.line)
 
     def _taken(self, count: int) -> NDArray[np.float64]:
         if count < 0 or count > len(self.values) - self.at:
@@ -141,8 +139,10 @@ def read(data: bytes) -> CellSoup:
     """Points and cells of a .msh file; physical groups and data are ignored."""
     data = without_mark(data)
     form = _form(data)
-    tags, points = (_nodes_2 if form.version == "2" else _nodes_4)(_Section(data, "Nodes", form))
-    blocks = (_elements_2 if form.version == "2" else _elements_4)(_Section(data, "Elements", form))
+    first = _Section(data, "Nodes", form)
+    is_2 = form.version == "2"
+    tags, points = first.tagged(first.first_count(), 3) if is_2 else _nodes_4(first)
+    blocks = (_elements_2 if is_2 else _elements_4)(_Section(data, "Elements", form))
     if len(tags) == 0:
         raise FormatError("it has no nodes")
     order = np.argsort(tags, kind="stable")
@@ -150,16 +150,17 @@ def read(data: bytes) -> CellSoup:
     if (ordered[1:] == ordered[:-1]).any():
         tag = ordered[:-1][ordered[1:] == ordered[:-1]][0]
         raise FormatError(f"node {tag} is given twice")
-    soups = []
+    cells: list[Block] = []
     for kind, nodes in blocks:
         place = np.minimum(np.searchsorted(ordered, nodes), len(ordered) - 1)
         unknown = ordered[place] != nodes
         if unknown.any():
             raise FormatError(f"an element names node {nodes[unknown][0]}, which does not exist")
-        soups.append(CellSoup.of_rows(points[:0], order[place], ELEMENTS[kind][1]))
-    if not soups:
+        size, cell_type = ELEMENTS[kind]
+        cells.append((cell_type, np.full(len(nodes), size), order[place].ravel()))
+    if not cells:
         raise FormatError("it has no elements")
-    return joined(soups)._replace(points=points)
+    return CellSoup.of_blocks(points, cells)
 
 
 def _form(data: bytes) -> _Form:
@@ -185,10 +186,6 @@ def _nodes_of(kind: int) -> int:
     if kind not in ELEMENTS:
         raise FormatError(f"it holds elements of type {kind}; only linear tetrahedra can be used: convert or remesh it")
     return ELEMENTS[kind][0]
-
-
-def _nodes_2(section: _Section) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    return section.tagged(section.first_count(), 3)
 
 
 def _nodes_4(section: _Section) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

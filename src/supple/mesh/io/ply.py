@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.mesh.io.cells import CellSoup, FormatError
+from supple.mesh.io.cells import POLYGON, CellSoup, FormatError
 from supple.mesh.io.text import integer, numbers, shortened, without_mark
 
 SCALARS = {
@@ -33,11 +33,6 @@ class Element(NamedTuple):
     count: int
     properties: list[Property]
 
-    @property
-    def smallest_row(self) -> int:
-        """Smallest size of a binary row [bytes]."""
-        return sum(np.dtype(p.length or p.kind).itemsize for p in self.properties)
-
 
 def read(data: bytes) -> CellSoup:
     """Polygons of a PLY file; other elements and columns are ignored."""
@@ -56,7 +51,7 @@ def read(data: bytes) -> CellSoup:
             body.lists(element)
     if points is None or faces is None:
         raise FormatError("it has no 'vertex' element with x, y, z, or no 'face' element: it has no surface")
-    return CellSoup.of_sizes(points, *faces)
+    return CellSoup.of_blocks(points, [(POLYGON, *faces)])
 
 
 def _header(data: bytes) -> tuple[str, list[Element], int, int]:
@@ -128,7 +123,8 @@ class _Binary:
 
     def expect(self, element: Element) -> None:
         left = len(self.data) - self.at
-        if element.count * element.smallest_row > left:
+        smallest_row = sum(np.dtype(p.length or p.kind).itemsize for p in element.properties)
+        if element.count * smallest_row > left:
             raise _truncated(element, f"{left} bytes")
 
     def points(self, element: Element) -> NDArray[np.float64]:

@@ -6,24 +6,23 @@ line. The number of the first vertex, 0 or 1, is the start of all numbering. `#`
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
 from itertools import chain
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshError
 from supple.files.replacing import whole_files
-from supple.mesh.io.tetgen_table import Columns, Table, read_header, read_rows, read_text
-from supple.mesh.topology import TET_EDGES, TET_FACETS, edge_keys, facet_keys
+from supple.mesh.io.tetgen_table import Header, Table, read_header, read_rows
+from supple.mesh.topology import TET_EDGES, TET_FACETS, edge_keys, facet_keys, has_vertex_twice
 
 SUFFIXES = (".node", ".ele", ".edge", ".face")
 
 
-@dataclass(frozen=True, eq=False)
-class TetgenFamily:
+class TetgenFamily(NamedTuple):
     """The contents of a family of TetGen files, before anything is dropped or turned. Indices start at 0.
 
     Attributes
@@ -56,7 +55,7 @@ def read_tetgen_family(path: str | Path) -> TetgenFamily:
     MeshError : `file:line: reason`, or the name of the file that is missing.
     """
     path = Path(path)
-    node, ele, edge, face = (_member(path, suffix) for suffix in SUFFIXES)
+    node, ele, edge, face = family_paths(path).values()
     _require(node, path)
     _require(ele, path)
     points, point_attributes, point_markers, base = _read_nodes(node)
@@ -81,35 +80,25 @@ def write_tetgen_family(
     if base_index not in (0, 1):
         raise MeshError(f"{path}: base_index must be 0 or 1, not {base_index!r}")
     paths = family_paths(path)
-    with whole_files(*paths.values(), error=MeshError) as fresh:
-        for suffix, pieces in _family_text(vertices, tets, edges, triangles, base_index).items():
-            with fresh[paths[suffix]].open("w", encoding="ascii", newline="\n") as file:
-                file.writelines(pieces)
-    return paths
-
-
-def _family_text(
-    vertices: NDArray[np.float64],
-    tets: NDArray[np.int32],
-    edges: NDArray[np.int32],
-    triangles: NDArray[np.int32],
-    base: int,
-) -> dict[str, Iterable[str]]:
     n = len(vertices)
     on_boundary = np.zeros(n, dtype=np.int64)
     on_boundary[triangles] = 1
     keys = edges[:, 0].astype(np.int64) * n + edges[:, 1]
     edge_marker = np.isin(keys, edge_keys(triangles, n)).astype(np.int64)
     face_marker = np.ones(len(triangles), dtype=np.int64)
-    numbers = [np.arange(base, base + len(a)) for a in (vertices, tets, edges, triangles)]
-    return {
-        ".node": chain([f"{n} 3 0 1\n"], _lines("%d %r %r %r %d\n", numbers[0], vertices, on_boundary)),
-        ".ele": chain([f"{len(tets)} 4 0\n"], _lines("%d %d %d %d %d\n", numbers[1], tets + base)),
-        ".edge": chain([f"{len(edges)} 1\n"], _lines("%d %d %d %d\n", numbers[2], edges + base, edge_marker)),
-        ".face": chain(
-            [f"{len(triangles)} 1\n"], _lines("%d %d %d %d %d\n", numbers[3], triangles + base, face_marker)
-        ),
-    }
+    contents = (
+        ("3 0 1", "%d %r %r %r %d\n", (vertices, on_boundary)),
+        ("4 0", "%d %d %d %d %d\n", (tets + base_index,)),
+        ("1", "%d %d %d %d\n", (edges + base_index, edge_marker)),
+        ("1", "%d %d %d %d %d\n", (triangles + base_index, face_marker)),
+    )
+    with whole_files(*paths.values(), error=MeshError) as fresh:
+        for member, (header, pattern, blocks) in zip(paths.values(), contents, strict=True):
+            count = len(blocks[0])
+            with fresh[member].open("w", encoding="ascii", newline="\n") as file:
+                file.write(f"{count} {header}\n")
+                file.writelines(_lines(pattern, np.arange(base_index, base_index + count), *blocks))
+    return paths
 
 
 def _lines(pattern: str, *blocks: NDArray) -> Iterator[str]:
@@ -127,13 +116,9 @@ def is_tetgen_path(path: str | Path) -> bool:
 
 def family_paths(path: str | Path) -> dict[str, Path]:
     """The four files {suffix: path} of the family that a name belongs to."""
-    return {suffix: _member(Path(path), suffix) for suffix in SUFFIXES}
-
-
-def _member(path: Path, suffix: str) -> Path:
     # "bear.1" without one of the suffixes is the family's own name; with_suffix would remove its ".1".
-    stem = path.with_suffix("") if is_tetgen_path(path) else path
-    return stem.with_name(stem.name + suffix)
+    stem = Path(path).with_suffix("") if is_tetgen_path(path) else Path(path)
+    return {suffix: stem.with_name(stem.name + suffix) for suffix in SUFFIXES}
 
 
 def _require(member: Path, given: Path) -> None:
@@ -151,16 +136,15 @@ def _require(member: Path, given: Path) -> None:
 def _read_nodes(
     path: Path,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32] | None, int]:
-    text = read_text(path)
     names = ("number of vertices", "dimension", "attributes", "boundary markers (0 or 1)")
-    (count, dimension, n_attributes, n_markers), line = read_header(path, text, names, (3, 0, 0))
+    header = read_header(path, names, (3, 0, 0))
+    count, dimension, n_attributes, n_markers = header.values
     if dimension != 3:
-        raise MeshError(f"{path}:{line}: dimension {dimension}; only meshes of dimension 3 can be read")
-    _check_header(path, line, n_attributes, n_markers)
+        raise header.error(f"dimension {dimension}; only meshes of dimension 3 can be read")
+    further = _further_columns(header, n_attributes, n_markers)
     if count == 0:
-        raise MeshError(f"{path}:{line}: the header announces no vertices")
-    meaning = "index x y z" + _columns_text(n_attributes, n_markers)
-    table = read_rows(path, text, line, Columns(count, 4 + n_attributes + n_markers, meaning))
+        raise header.error("the header announces no vertices")
+    table = read_rows(header, 4 + n_attributes + n_markers, f"index x y z{further}")
     base = table.rows[0, 0]
     if base not in (0.0, 1.0):
         raise table.error(0, f"the first vertex has the number {base:.17g}; numbering must start at 0 or 1")
@@ -171,20 +155,17 @@ def _read_nodes(
 
 
 def _read_tets(path: Path, n_points: int, base: int) -> tuple[NDArray[np.int32], NDArray[np.float64], int]:
-    text = read_text(path)
-    names = ("number of tets", "nodes per tet", "attributes")
-    (count, nodes, n_attributes), line = read_header(path, text, names, (4, 0))
+    header = read_header(path, ("number of tets", "nodes per tet", "attributes"), (4, 0))
+    count, nodes, n_attributes = header.values
     if nodes not in (4, 10):
-        raise MeshError(f"{path}:{line}: {nodes} nodes per tet; only 4 and 10 can be read")
-    _check_header(path, line, n_attributes, 0)
+        raise header.error(f"{nodes} nodes per tet; only 4 and 10 can be read")
+    further = _further_columns(header, n_attributes, 0)
     if count == 0:
-        raise MeshError(f"{path}:{line}: the header announces no tets")
-    meaning = f"index and {nodes} vertices" + _columns_text(n_attributes, 0)
-    table = read_rows(path, text, line, Columns(count, 1 + nodes + n_attributes, meaning))
+        raise header.error("the header announces no tets")
+    table = read_rows(header, 1 + nodes + n_attributes, f"index and {nodes} vertices{further}")
     _check_numbering(table, base, "tet")
     corners = _corners(table, nodes, n_points, base)[:, :4]
-    ordered = np.sort(corners, axis=1)
-    table.raise_where((ordered[:, 1:] == ordered[:, :-1]).any(axis=1), "the tet has the same vertex twice")
+    table.raise_where(has_vertex_twice(corners), "the tet has the same vertex twice")
     return np.ascontiguousarray(corners), np.ascontiguousarray(table.rows[:, 1 + nodes :]), 1 if nodes == 4 else 2
 
 
@@ -195,18 +176,19 @@ def _read_simplices(
     if not (path.exists() or path.is_symlink()):
         return None, None
     width, on_line = nodes
-    text = read_text(path)
-    (count, n_markers), line = read_header(path, text, (f"number of {what}s", "boundary markers (0 or 1)"), (0,))
-    _check_header(path, line, 0, n_markers)
-    meaning = f"index and {on_line} vertices" + _columns_text(0, n_markers)
-    table = read_rows(path, text, line, Columns(count, 1 + on_line + n_markers, meaning, extra=width - 1))
+    header = read_header(path, (f"number of {what}s", "boundary markers (0 or 1)"), (0,))
+    count, n_markers = header.values
+    meaning = f"index and {on_line} vertices" + _further_columns(header, 0, n_markers)
+    table = read_rows(header, 1 + on_line + n_markers, meaning, extra=width - 1)
     if count == 0:
         return np.empty((0, width), np.int32), np.empty(0, np.int32) if n_markers else None
     _check_numbering(table, base, what)
     corners = np.ascontiguousarray(_corners(table, on_line, n_points, base)[:, :width])
     of_tets = tets[:, TET_EDGES if width == 2 else TET_FACETS].reshape(-1, width)
     # Only keys of one call can be compared, so both go into one call.
-    keys = facet_keys(_as_triangles(np.concatenate([corners, of_tets])), n_points)
+    every = np.concatenate([corners, of_tets])
+    # An edge (a, b), a < b, as (a, b, b), so that one key function serves both.
+    keys = facet_keys(every if width == 3 else np.sort(every, axis=1)[:, [0, 1, 1]], n_points)
     own, known = keys[:count], np.sort(keys[count:])
     found = known[np.minimum(np.searchsorted(known, own), len(known) - 1)] == own
     table.raise_where(~found, f"the {what} belongs to no tet")
@@ -217,31 +199,21 @@ def _read_simplices(
     return corners, _markers(table, slice(1 + on_line, 2 + on_line)) if n_markers else None
 
 
-def _as_triangles(simplices: NDArray[np.int32]) -> NDArray[np.int32]:
-    # An edge (a, b), a < b, as (a, b, b), so that one key function serves both.
-    return simplices if simplices.shape[1] == 3 else np.sort(simplices, axis=1)[:, [0, 1, 1]]
-
-
-def _check_header(path: Path, line: int, n_attributes: int, n_markers: int) -> None:
+def _further_columns(header: Header, n_attributes: int, n_markers: int) -> str:
+    """What follows the vertices of a row, as text; `MeshError` where the header announces what cannot be."""
     if n_markers not in (0, 1):
-        raise MeshError(f"{path}:{line}: the header's boundary markers must be 0 or 1, not {n_markers}")
+        raise header.error(f"the header's boundary markers must be 0 or 1, not {n_markers}")
     if not 0 <= n_attributes < 10**6:
-        raise MeshError(f"{path}:{line}: {n_attributes} attributes")
-
-
-def _columns_text(n_attributes: int, n_markers: int) -> str:
+        raise header.error(f"{n_attributes} attributes")
     return (f", {n_attributes} attributes" if n_attributes else "") + (", a marker" if n_markers else "")
 
 
 def _check_numbering(table: Table, base: int, what: str) -> None:
     given = table.rows[:, 0]
     wrong = given != np.arange(base, base + len(given))
-    if wrong.any():
-        row = int(np.flatnonzero(wrong)[0])
-        raise table.error(
-            row,
-            f"{what} number {given[row]:.17g} where {base + row} must come; numbers run on from {base}, as in .node",
-        )
+    row = int(wrong.argmax())
+    reason = f"{what} number {{}} where {base + row} must come; numbers run on from {base}, as in .node"
+    table.raise_where(wrong, reason, given)
 
 
 def _corners(table: Table, width: int, n_points: int, base: int) -> NDArray[np.int32]:

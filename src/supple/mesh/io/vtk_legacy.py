@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.mesh.io.cells import POLYGON, TETRA, TRIANGLE, TRIANGLE_STRIP, CellSoup, FormatError
+from supple.mesh.io.cells import POLYGON, TETRA, TRIANGLE, TRIANGLE_STRIP, Block, CellSoup, FormatError
 from supple.mesh.io.text import integer, shortened, without_mark
 
 SCALARS = {
@@ -34,6 +34,13 @@ class _Cursor:
         line = self.data[self.at : end]
         self.at, self.line = end + 1, self.line + 1
         return line.decode("latin-1").strip()
+
+    def next_words(self) -> list[str]:
+        """The words of the next line that is not blank; none at the end."""
+        words: list[str] = []
+        while not words and (line := self.next_line()) is not None:
+            words = line.split()
+        return words
 
     def array(self, count: int, kind: str, what: str) -> NDArray:
         """`count` numbers; text may spread over lines, binary is big-endian."""
@@ -78,11 +85,8 @@ def read(data: bytes) -> CellSoup:
 def _body(cursor: _Cursor) -> CellSoup:
     points = np.empty((0, 3))
     types: NDArray | None = None
-    blocks: list[tuple[int, NDArray[np.int64], NDArray[np.int64]]] = []
-    while (line := cursor.next_line()) is not None:
-        words = line.split()
-        if not words:
-            continue
+    blocks: list[Block] = []
+    while words := cursor.next_words():
         section = words[0].upper()
         if section == "DATASET":
             if len(words) < 2 or words[1].upper() not in ("POLYDATA", "UNSTRUCTURED_GRID"):
@@ -107,30 +111,22 @@ def _body(cursor: _Cursor) -> CellSoup:
             _skip_field(cursor, words)
         else:
             raise FormatError(f"'{shortened(words)}' is an unknown section", cursor.line)
-    return _soup(points, blocks, types)
-
-
-def _soup(
-    points: NDArray[np.float64], blocks: list[tuple[int, NDArray[np.int64], NDArray[np.int64]]], types: NDArray | None
-) -> CellSoup:
     if len(points) == 0:
         raise FormatError("it has no points")
     if not blocks:
         raise FormatError("it has no cells")
-    sizes = np.concatenate([np.diff(offsets) for _, offsets, _ in blocks])
-    offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
-    flat = np.concatenate([flat for _, _, flat in blocks]).astype(np.int64)
+    soup = CellSoup.of_blocks(points, blocks)
     if types is None:
-        types = np.concatenate([np.full(len(offsets) - 1, kind) for kind, offsets, _ in blocks])
-    if len(types) != len(sizes):
-        raise FormatError(f"it has {len(sizes)} cells, but {len(types)} cell types")
+        types = soup.types
+    if len(types) != len(soup.types):
+        raise FormatError(f"it has {len(soup.types)} cells, but {len(types)} cell types")
     if not types.all():
         raise FormatError("its cells have no CELL_TYPES")
-    return CellSoup(points, types.astype(np.uint8), offsets, flat)
+    return soup._replace(types=types.astype(np.uint8))
 
 
 def _cells(cursor: _Cursor, words: list[str]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Offsets and connectivity of a block of cells, in either of the two layouts."""
+    """Sizes and points of a block of cells, in either of the two layouts."""
     what = f"the section {words[0].upper()}"
     if len(words) < 3:
         raise FormatError(f"'{shortened(words)}' has fewer than two counts", cursor.line)
@@ -139,23 +135,18 @@ def _cells(cursor: _Cursor, words: list[str]) -> tuple[NDArray[np.int64], NDArra
     following = (cursor.next_line() or "").split()
     if following and following[0].upper() == "OFFSETS":
         offsets = cursor.array(n, _kind(following, cursor), what).astype(np.int64)
-        following = (cursor.next_line() or "").split()
-        while not following and cursor.at < len(cursor.data):
-            following = (cursor.next_line() or "").split()
+        following = cursor.next_words()
         if not following or following[0].upper() != "CONNECTIVITY":
             raise FormatError(f"CONNECTIVITY is missing in {what}", cursor.line)
         flat = cursor.array(size, _kind(following, cursor), what).astype(np.int64)
         if n == 0:
-            return np.zeros(1, dtype=np.int64), flat[:0]
+            return offsets, flat[:0]
         if offsets[0] != 0 or offsets[-1] != len(flat) or (np.diff(offsets) < 0).any():
             raise FormatError(f"the offsets of {what} contradict its size")
-        return offsets, flat
+        return np.diff(offsets), flat
     cursor.at, cursor.line = before, line_before
-    return _counted_cells(cursor.array(size, "i4", what).astype(np.int64), n, what)
-
-
-def _counted_cells(packed: NDArray[np.int64], n: int, what: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Cells written one after the other, each as its size and its points."""
+    # Cells one after the other, each as its size and its points.
+    packed = cursor.array(size, "i4", what).astype(np.int64)
     if n > len(packed) or n < 0:
         raise FormatError(f"{what} announces {n} cells in {len(packed)} numbers")
     sizes = np.empty(n, dtype=np.int64)
@@ -170,9 +161,8 @@ def _counted_cells(packed: NDArray[np.int64], n: int, what: str) -> tuple[NDArra
             at += int(packed[at]) + 1
         if at != len(packed):
             raise FormatError(f"the cells of {what} do not fill its {len(packed)} numbers")
-    offsets = np.concatenate([[0], np.cumsum(sizes)])
-    heads = offsets[:-1] + np.arange(n)
-    return offsets, np.delete(packed, heads)
+    heads = np.cumsum(sizes + 1) - sizes - 1
+    return sizes, np.delete(packed, heads)
 
 
 def _kind(words: list[str], cursor: _Cursor) -> str:
@@ -186,10 +176,7 @@ def _skip_field(cursor: _Cursor, words: list[str]) -> None:
     """Field data before the geometry (time values and the like)."""
     count = integer(words[2] if len(words) > 2 else "", cursor.line, "number of field arrays")
     for _ in range(count):
-        line = cursor.next_line()
-        while line == "":
-            line = cursor.next_line()
-        head = (line or "").split()
+        head = cursor.next_words()
         kind = SCALARS.get(head[3].lower()) if len(head) == 4 else None
         if kind is None:
             raise FormatError(f"field array '{shortened(head)}' cannot be read", cursor.line)

@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.mesh.io.cells import POLYGON, TETRA, TRIANGLE, TRIANGLE_STRIP, CellSoup, FormatError, joined
+from supple.mesh.io.cells import POLYGON, TETRA, TRIANGLE, TRIANGLE_STRIP, Block, CellSoup, FormatError
 from supple.mesh.io.text import shortened
 
 SCALARS = {
@@ -24,6 +24,7 @@ SCALARS = {
     "UInt64": "u8", "Float32": "f4", "Float64": "f8",
 }  # fmt: skip
 POLYDATA_TAGS = {"Verts": 2, "Lines": 4, "Strips": TRIANGLE_STRIP, "Polys": POLYGON}
+CELL_ARRAYS = ("connectivity", "offsets", "types")
 # Largest size of a decompressed block [bytes]; writers use 32 KiB.
 MAX_BLOCK = 2**30
 
@@ -53,10 +54,17 @@ def read(data: bytes) -> CellSoup:
         raise FormatError(f"its compressor {shortened([compressor])} is not supported; save it with ZLib or none")
     encoding = _Encoding(order, np.dtype(order + header), compressor, appended, appended_is_text)
     pieces = [_piece(piece, encoding) for piece in root.iter("Piece")]
-    pieces = [piece for piece in pieces if len(piece.points)]
-    if not pieces:
+    points = np.concatenate([np.empty((0, 3)), *(points for points, _ in pieces)])
+    if len(points) == 0:
         raise FormatError("it has no points")
-    return joined(pieces)
+    starts = np.cumsum([0] + [len(points) for points, _ in pieces])
+    blocks = [
+        (types, sizes, flat + start)
+        for (own, cells), start in zip(pieces, starts[:-1], strict=True)
+        for types, sizes, flat in cells
+        if len(own)
+    ]
+    return CellSoup.of_blocks(points, blocks)
 
 
 def _parsed(data: bytes) -> tuple[ElementTree.Element, bytes, bool]:
@@ -79,47 +87,32 @@ def _parsed(data: bytes) -> tuple[ElementTree.Element, bytes, bool]:
         ) from None
 
 
-def _piece(piece: ElementTree.Element, encoding: _Encoding) -> CellSoup:
+def _piece(piece: ElementTree.Element, encoding: _Encoding) -> tuple[NDArray[np.float64], list[Block]]:
     array = piece.find("Points/DataArray")
     points = np.empty((0, 3)) if array is None else _values(array, encoding).astype(np.float64)
-    if points.size % 3 or points.size != 3 * _count(piece, "NumberOfPoints"):
+    try:
+        count = int(piece.get("NumberOfPoints", ""))
+    except ValueError:
+        raise FormatError("its Piece has no valid NumberOfPoints") from None
+    if points.size != 3 * count:
         raise FormatError(f"it announces {piece.get('NumberOfPoints')} points and holds {points.size} coordinates")
-    points = points.reshape(-1, 3)
-    blocks = []
+    blocks: list[Block] = []
     for tag, cell_type in (*POLYDATA_TAGS.items(), ("Cells", 0)):
         block = piece.find(tag)
         if block is None or not len(block):
             continue
-        arrays = {a.get("Name", ""): _values(a, encoding) for a in block.findall("DataArray") if _is_wanted(a)}
-        if "connectivity" not in arrays or "offsets" not in arrays or (tag == "Cells" and "types" not in arrays):
+        arrays = {
+            a.get("Name", ""): _values(a, encoding) for a in block.findall("DataArray") if a.get("Name") in CELL_ARRAYS
+        }
+        if not arrays.keys() >= {*CELL_ARRAYS[: 3 if tag == "Cells" else 2]}:
             raise FormatError(f"its {tag} lack 'connectivity', 'offsets' or 'types'")
         flat, ends = arrays["connectivity"].astype(np.int64), arrays["offsets"].astype(np.int64)
         types = arrays["types"] if tag == "Cells" else np.full(len(ends), cell_type)
-        offsets = np.concatenate([[0], ends]).astype(np.int64)
-        if len(types) != len(ends) or (np.diff(offsets) < 0).any() or offsets[-1] != len(flat):
+        sizes = np.diff(ends, prepend=0)
+        if len(types) != len(ends) or (sizes < 0).any() or sizes.sum() != len(flat):
             raise FormatError(f"the offsets of its {tag} contradict their connectivity: it is damaged")
-        blocks.append((types.astype(np.uint8), offsets, flat))
-    if not blocks:
-        return CellSoup.of_polygons(points, [])
-    shifts = np.cumsum([0] + [len(flat) for _, _, flat in blocks])
-    starts = [offsets[1:] + shift for (_, offsets, _), shift in zip(blocks, shifts[:-1], strict=True)]
-    return CellSoup(
-        points,
-        np.concatenate([types for types, _, _ in blocks]),
-        np.concatenate([[0], *starts]).astype(np.int64),
-        np.concatenate([flat for _, _, flat in blocks]),
-    )
-
-
-def _is_wanted(array: ElementTree.Element) -> bool:
-    return array.get("Name") in ("connectivity", "offsets", "types")
-
-
-def _count(piece: ElementTree.Element, name: str) -> int:
-    try:
-        return int(piece.get(name, ""))
-    except ValueError:
-        raise FormatError(f"its Piece has no valid {name}") from None
+        blocks.append((types.astype(np.uint8), sizes, flat))
+    return points.reshape(-1, 3), blocks
 
 
 def _values(array: ElementTree.Element, encoding: _Encoding) -> NDArray:

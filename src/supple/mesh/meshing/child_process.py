@@ -63,8 +63,12 @@ class MesherFailure(MeshingError):
         self.kind = kind
 
 
-def run_mesher(mesher: str, surface: SurfaceMesh, options: dict[str, Any], limits: Limits) -> MesherResult:
+def run_mesher(
+    mesher: str, surface: SurfaceMesh, options: dict[str, Any], limits: Limits, remedy: str = ""
+) -> MesherResult:
     """Run "tetgen", "ftetwild" (elements are tets) or "meshfix" (triangles) on a surface, in a child process.
+
+    `remedy` ends the message where the mesher failed or crashed.
 
     Raises
     ------
@@ -90,7 +94,7 @@ def run_mesher(mesher: str, surface: SurfaceMesh, options: dict[str, Any], limit
             with np.load(folder / "mesh.npz") as mesh:
                 return MesherResult(mesh["vertices"], mesh["elements"], mesh["labels"], float(answer["seconds"]))
         starved = limits.memory is not None and peak > STARVED * limits.memory
-        raise _failure(mesher, code, answer.get("error", ""), _last_line(folder), limits, starved)
+        raise _failure(mesher, code, answer.get("error", ""), _last_line(folder), limits, starved, remedy)
 
 
 def _run_child(mesher: str, folder: Path, limits: Limits) -> tuple[int, int]:
@@ -150,7 +154,9 @@ def _address_space(pid: int) -> int:
     return pages * mmap.PAGESIZE
 
 
-def _failure(mesher: str, code: int, error: str, last: str, limits: Limits, starved: bool) -> MesherFailure:
+def _failure(
+    mesher: str, code: int, error: str, last: str, limits: Limits, starved: bool, remedy: str
+) -> MesherFailure:
     report = (error or last).lower()
     # A program may crash without any message when it gets no memory.
     if any(sign in report for sign in OUT_OF_MEMORY) or (starved and not error):
@@ -159,9 +165,10 @@ def _failure(mesher: str, code: int, error: str, last: str, limits: Limits, star
             "memory", f"{mesher} ran out of memory{limit}; ask for less (a larger max_volume) or raise memory_limit"
         )
     if error:
-        return MesherFailure("failed", f"{mesher} failed: {error.rstrip('.')}")
+        return MesherFailure("failed", f"{mesher} failed: {error.rstrip('.')}{remedy}")
     how = f"exit code {code}" if code >= 0 else _signal_name(-code)
-    return MesherFailure("crash", f"{mesher} crashed ({how})" + (f", its last output: {last}" if last else ""))
+    output = f", its last output: {last}" if last else ""
+    return MesherFailure("crash", f"{mesher} crashed ({how}){output}{remedy}")
 
 
 def _signal_name(number: int) -> str:
@@ -173,11 +180,7 @@ def _signal_name(number: int) -> str:
 
 def _last_line(folder: Path) -> str:
     """The last line that the child wrote, shortened."""
-    try:
-        with (folder / "output.txt").open("rb") as file:
-            file.seek(max(0, file.seek(0, os.SEEK_END) - 4096))
-            lines = file.read().decode("utf-8", "replace").split("\n")
-    except OSError:
-        return ""
-    filled = [line.strip() for line in lines if line.strip()]
-    return filled[-1][:200] if filled else ""
+    with (folder / "output.txt").open("rb") as file:
+        file.seek(max(0, file.seek(0, os.SEEK_END) - 4096))
+        text = file.read().decode("utf-8", "replace")
+    return text.strip().rpartition("\n")[2].strip()[:200]

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from supple.errors import MeshingError
-from supple.mesh.meshing.child_process import Limits, MesherFailure, MesherResult, run_mesher
+from supple.mesh.meshing.child_process import Limits, MesherResult, run_mesher
 from supple.mesh.surface import SurfaceMesh
 
 logger = logging.getLogger(__name__)
@@ -47,12 +47,7 @@ def mesh_with_ftetwild(
         "threads": threads,
     }
     unit = SurfaceMesh((surface.vertices - middle) / size, surface.triangles)
-    try:
-        result = run_mesher("ftetwild", unit, options, limits)
-    except MesherFailure as failure:
-        if failure.kind in ("crash", "failed"):
-            raise MesherFailure(failure.kind, f"{failure}; fix the surface in a modelling program") from None
-        raise
+    result = run_mesher("ftetwild", unit, options, limits, "; fix the surface in a modelling program")
     if len(result.elements) == 0:
         raise MeshingError("fTetWild found nothing that the surface encloses; close its holes, or give another surface")
     result = replace(result, vertices=result.vertices * size + middle)

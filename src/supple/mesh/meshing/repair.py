@@ -14,7 +14,7 @@ from supple.mesh.merge import merge_map
 from supple.mesh.meshing.child_process import Limits, run_mesher
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.surface_checks import SurfaceReport
-from supple.mesh.topology import facet_keys
+from supple.mesh.topology import edge_keys, facet_keys, graph_components, has_vertex_twice
 
 logger = logging.getLogger(__name__)
 
@@ -110,7 +110,7 @@ def _drop_useless(surface: SurfaceMesh, steps: list[str]) -> SurfaceMesh:
         steps.append(f"merged {len(surface.vertices) - len(keep)} vertices with others at the same place")
         surface = SurfaceMesh(surface.vertices[keep], index[surface.triangles])
     triangles = surface.triangles
-    collapsed = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
+    collapsed = has_vertex_twice(triangles)
     _, first = np.unique(facet_keys(triangles, len(surface.vertices)), return_index=True)
     repeats = np.ones(len(triangles), dtype=bool)
     repeats[first] = False
@@ -152,11 +152,7 @@ def _disagreeing(triangles: NDArray[np.int32], n_vertices: int) -> NDArray[np.bo
 
     The nodes of a graph are (triangle, side 0 or 1). Two nodes are connected where neighbours with these sides agree.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    starts, ends = triangles.ravel().astype(np.int64), np.roll(triangles, -1, axis=1).ravel().astype(np.int64)
-    keys = np.minimum(starts, ends) * n_vertices + np.maximum(starts, ends)
+    starts, keys = triangles.ravel(), edge_keys(triangles, n_vertices).ravel()
     order = np.argsort(keys, kind="stable")
     same = np.flatnonzero(keys[order][1:] == keys[order][:-1])
     a, b = order[same], order[same + 1]
@@ -166,8 +162,7 @@ def _disagreeing(triangles: NDArray[np.int32], n_vertices: int) -> NDArray[np.bo
     ta, tb = a // 3, b // 3
     rows = np.concatenate([ta, ta + m])
     columns = np.concatenate([np.where(agree, tb, tb + m), np.where(agree, tb + m, tb)])
-    graph = coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(2 * m, 2 * m))
-    _, labels = connected_components(graph.tocsr(), directed=False)
+    labels = graph_components(2 * m, rows, columns)
     if (labels[:m] == labels[m:]).any():
         return None
     # Each piece appears twice in the graph, as it is and turned; the lower label is one of the two.

@@ -9,9 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.mesh.meshing.child_process import Limits, MesherFailure, MesherResult, run_mesher
+from supple.mesh.meshing.child_process import Limits, MesherResult, run_mesher
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.surface_checks import winding_number
+from supple.mesh.topology import without_unused
+
+REMEDY = (
+    "; the surface is most likely damaged or has details near round-off: fix it (repair=True) or use "
+    'mesher="ftetwild" (pip install "supple[dirty]")'
+)
 
 
 def mesh_with_tetgen(surface: SurfaceMesh, options: dict[str, Any], limits: Limits) -> MesherResult:
@@ -28,17 +34,13 @@ def mesh_with_tetgen(surface: SurfaceMesh, options: dict[str, Any], limits: Limi
     scale = 2.0 ** -math.frexp(float((high - low).max()) or 1.0)[1]
     volume = options["max_volume"]
     scaled = options | {"max_volume": None if volume is None else volume * scale**3}
-    try:
-        result = run_mesher("tetgen", SurfaceMesh(surface.vertices * scale, surface.triangles), scaled, limits)
-    except MesherFailure as failure:
-        raise _with_remedy(failure) from None
+    result = run_mesher("tetgen", SurfaceMesh(surface.vertices * scale, surface.triangles), scaled, limits, REMEDY)
     vertices = result.vertices / scale
     inside = _inside(surface, vertices, result)
     if inside.all():
         return replace(result, vertices=vertices)
-    used, elements = np.unique(result.elements[inside], return_inverse=True)
-    elements = elements.reshape(-1, 4).astype(np.int32)
-    return replace(result, vertices=vertices[used], elements=elements, labels=result.labels[inside])
+    vertices, elements = without_unused(vertices, result.elements[inside])
+    return replace(result, vertices=vertices, elements=elements, labels=result.labels[inside])
 
 
 def _inside(surface: SurfaceMesh, vertices: NDArray[np.float64], result: MesherResult) -> NDArray[np.bool_]:
@@ -56,13 +58,3 @@ def _inside(surface: SurfaceMesh, vertices: NDArray[np.float64], result: MesherR
         if winding_number(triangles, middle) < 0.5:
             inside[members] = False
     return inside
-
-
-def _with_remedy(failure: MesherFailure) -> MesherFailure:
-    if failure.kind not in ("crash", "failed"):
-        return failure
-    return MesherFailure(
-        failure.kind,
-        f"{failure}; the surface is most likely damaged or has details near round-off: fix it (repair=True) or use "
-        'mesher="ftetwild" (pip install "supple[dirty]")',
-    )

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from supple.errors import MeshError
 from supple.mesh.primitives.sizes import not_too_many
 from supple.mesh.tetmesh import TetMesh
+from supple.mesh.topology import TET_EDGES, edge_keys, without_unused
 
 # A function of points (k, 3) that is negative inside, zero on the surface, and approximately a distance near it.
 Implicit = Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -64,9 +65,7 @@ def stuff(
     cut_row[cut_is_left] = len(points) + np.arange(len(cut_is_left))
     all_points = np.concatenate([points, cuts[cut_is_left]])
     pieces = _pieces(tets, np.sign(values), cut_row[of_tet], all_points)
-    used = np.zeros(len(all_points), dtype=bool)
-    used[pieces] = True
-    return TetMesh(all_points[used], (np.cumsum(used) - 1)[pieces])
+    return TetMesh(*without_unused(all_points, pieces))
 
 
 def _lattice(
@@ -94,15 +93,10 @@ def _lattice(
 
 def _edges(tets: NDArray[np.int64], n_points: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
     """Unique edges (e, 2); the edge between corners i and j of each tet (m, 4, 4); which edges are long."""
-    pairs = [(i, j) for i in range(4) for j in range(i + 1, 4)]
-    keys = np.stack(
-        [np.minimum(tets[:, i], tets[:, j]) * n_points + np.maximum(tets[:, i], tets[:, j]) for i, j in pairs]
-    )
-    unique, inverse = np.unique(keys, return_inverse=True)
-    inverse = inverse.reshape(keys.shape)
+    unique, inverse = np.unique(edge_keys(tets, n_points), return_inverse=True)
     of_tet = np.zeros((len(tets), 4, 4), dtype=np.int64)
     is_long = np.zeros(len(unique), dtype=bool)
-    for row, (i, j) in zip(inverse, pairs, strict=True):
+    for row, (i, j) in zip(inverse.reshape(len(tets), 6).T, TET_EDGES, strict=True):
         of_tet[:, i, j] = of_tet[:, j, i] = row
         is_long[row] = PARTNER[i] == j
     return np.column_stack(np.divmod(unique, n_points)), of_tet, is_long

@@ -29,18 +29,29 @@ def product_error(x, y, product):
 
 
 @njit(error_model="numpy")
+def two_sum(x, y):
+    """x + y of two floats, exactly."""
+    total = x + y
+    return total, sum_error(x, y, total)
+
+
+@njit(error_model="numpy")
+def two_product(x, y):
+    """x y of two floats, exactly."""
+    product = x * y
+    return product, product_error(x, y, product)
+
+
+@njit(error_model="numpy")
 def difference(x, y):
     """x - y of two floats, exactly."""
-    total = x - y
-    return (total, sum_error(x, -y, total))
+    return two_sum(x, -y)
 
 
 @njit(error_model="numpy")
 def add(a, b):
-    high = a[0] + b[0]
-    low = sum_error(a[0], b[0], high)
-    tail = a[1] + b[1]
-    tail_low = sum_error(a[1], b[1], tail)
+    high, low = two_sum(a[0], b[0])
+    tail, tail_low = two_sum(a[1], b[1])
     low += tail
     total = high + low
     low = (low - (total - high)) + tail_low
@@ -55,8 +66,8 @@ def subtract(a, b):
 
 @njit(error_model="numpy")
 def multiply(a, b):
-    product = a[0] * b[0]
-    low = product_error(a[0], b[0], product) + (a[0] * b[1] + a[1] * b[0])
+    product, error = two_product(a[0], b[0])
+    low = error + (a[0] * b[1] + a[1] * b[0])
     total = product + low
     return (total, low - (total - product))
 

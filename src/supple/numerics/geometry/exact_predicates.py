@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from supple.numerics.geometry.double_double import product_error, sum_error
+from supple.numerics.geometry.double_double import two_product, two_sum
 from supple.numerics.kernel_cache import njit
 
 # (7 + 56 u) u with u = 2^-53: bound of the rounding error, relative to the sum of the products' magnitudes.
@@ -19,23 +19,11 @@ _PARTS = 192
 
 
 @njit
-def _two_sum(a, b):
-    s = a + b
-    return s, sum_error(a, b, s)
-
-
-@njit
-def _two_product(a, b):
-    p = a * b
-    return p, product_error(a, b, p)
-
-
-@njit
 def _add(parts, n, value):
     """Add a number to a sum of n numbers that do not overlap, exactly; returns the new n."""
     kept = 0
     for i in range(n):
-        value, low = _two_sum(value, parts[i])
+        value, low = two_sum(value, parts[i])
         if low != 0.0:
             parts[kept] = low
             kept += 1
@@ -51,7 +39,7 @@ def _exact_sign(a, b, c, d):
     high, low = np.empty((3, 3)), np.empty((3, 3))
     for j in range(3):
         for i, p in enumerate((b, c, d)):
-            high[i, j], low[i, j] = _two_sum(p[j], -a[j])
+            high[i, j], low[i, j] = two_sum(p[j], -a[j])
     parts = np.empty(_PARTS)
     n = 0
     for k in range(3):
@@ -60,12 +48,12 @@ def _exact_sign(a, b, c, d):
             first, second, third = k, (k + turn) % 3, (k + 2 * turn) % 3
             for u in (high[0, first], low[0, first]):
                 for v in (high[1, second], low[1, second]):
-                    p, q = _two_product(sign * u, v)
+                    p, q = two_product(sign * u, v)
                     for w in (high[2, third], low[2, third]):
                         if w != 0.0:
-                            s, t = _two_product(p, w)
+                            s, t = two_product(p, w)
                             n = _add(parts, _add(parts, n, t), s)
-                            s, t = _two_product(q, w)
+                            s, t = two_product(q, w)
                             n = _add(parts, _add(parts, n, t), s)
     if n == 0:
         return 0

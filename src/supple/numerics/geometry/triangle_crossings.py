@@ -85,13 +85,17 @@ def edge_and_triangle(p, q, a, b, c, at_p, at_q):
 
 
 @njit
+def _is_corner(i, triangle):
+    return i == triangle[0] or i == triangle[1] or i == triangle[2]
+
+
+@njit
 def _sides(x, one, other, out):
     """Write the side of the plane of `other` on which each corner of `one` is; returns whether all sides are equal."""
     a, b, c = row(x, other[0]), row(x, other[1]), row(x, other[2])
     for k in range(3):
         i = one[k]
-        shared = i == other[0] or i == other[1] or i == other[2]
-        out[k] = 0 if shared else side_of_plane(a, b, c, row(x, i))
+        out[k] = 0 if _is_corner(i, other) else side_of_plane(a, b, c, row(x, i))
     return (out[0] > 0 and out[1] > 0 and out[2] > 0) or (out[0] < 0 and out[1] < 0 and out[2] < 0)
 
 
@@ -105,9 +109,8 @@ def _clearly_apart(x, first, second):
     origin = row(x, first[0])
     shared = False
     for k in range(3):
-        i = first[k]
-        if i == second[0] or i == second[1] or i == second[2]:
-            origin, shared = row(x, i), True
+        if _is_corner(first[k], second):
+            origin, shared = row(x, first[k]), True
     dx = dy = dz = 0.0
     for k in range(3):
         u, v = row(x, first[k]), row(x, second[k])
@@ -134,12 +137,9 @@ def triangles_meet(x, first, second, sides):
     """
     shared = 0
     for k in range(3):
-        i = first[k]
-        if i == second[0] or i == second[1] or i == second[2]:
-            shared += 1
-    if shared > 1:  # every edge of one has a vertex of the other
-        return APART
-    if _clearly_apart(x, first, second):
+        shared += _is_corner(first[k], second)
+    # Where they share an edge, every edge of one has a vertex of the other.
+    if shared > 1 or _clearly_apart(x, first, second):
         return APART
     if _sides(x, first, second, sides[0]) or _sides(x, second, first, sides[1]):
         return APART
@@ -149,7 +149,7 @@ def triangles_meet(x, first, second, sides):
         for k in range(3):
             n = (k + 1) % 3
             i, j = one[k], one[n]
-            if i == other[0] or i == other[1] or i == other[2] or j == other[0] or j == other[1] or j == other[2]:
+            if _is_corner(i, other) or _is_corner(j, other):
                 continue
             a, b, c = row(x, other[0]), row(x, other[1]), row(x, other[2])
             found = edge_and_triangle(row(x, i), row(x, j), a, b, c, sides[turn, k], sides[turn, n])

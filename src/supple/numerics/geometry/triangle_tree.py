@@ -7,14 +7,14 @@ Source: Ericson, "Real-Time Collision Detection" (2005), section 6.2.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.numerics.geometry.closest_point import closest_on_triangle, combine
+from supple.numerics.geometry.closest_point import area_normal, closest_on_triangle, combine
 from supple.numerics.kernel_cache import njit, prange
-from supple.numerics.mat3 import cross, dot, row, subtract
+from supple.numerics.mat3 import dot, row, subtract
 
 _LEAF = 4
 _DEPTH = 64  # of a balanced tree; more than any memory can hold
@@ -26,8 +26,7 @@ TIE, ROUND_OFF = 1e-12, 1e-14
 SAME_FACING = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
-class TriangleTree:
+class TriangleTree(NamedTuple):
     """A balanced tree. Node i has the children 2 i + 1 and 2 i + 2; the last level are the leaves.
 
     Attributes
@@ -74,7 +73,7 @@ class TriangleTree:
         squares = np.full(len(queries), np.inf)
         queries = np.ascontiguousarray(queries, dtype=np.float64)
         own = np.zeros_like(queries) if normals is None else np.ascontiguousarray(normals, dtype=np.float64)
-        _nearest(queries, own, within, *self._arrays(), found, squares)
+        _nearest(queries, own, within, *self, found, squares)
         return found, np.sqrt(squares)
 
     def all_within(self, queries: NDArray[np.float64], within: float) -> tuple[NDArray, NDArray, NDArray]:
@@ -87,16 +86,13 @@ class TriangleTree:
         queries = np.ascontiguousarray(queries, dtype=np.float64)
         counts = np.zeros(len(queries), dtype=np.int64)
         nothing = np.zeros(0, dtype=np.int64)
-        _all_within(queries, within, *self._arrays(), counts, nothing, nothing, np.zeros(0))
+        _all_within(queries, within, *self, counts, nothing, nothing, np.zeros(0))
         starts = np.concatenate([[0], np.cumsum(counts)])
         found, squares = np.empty(starts[-1], dtype=np.int64), np.empty(starts[-1])
-        _all_within(queries, within, *self._arrays(), counts, starts, found, squares)
+        _all_within(queries, within, *self, counts, starts, found, squares)
         of_query = np.repeat(np.arange(len(queries)), counts)
         order = np.lexsort((found, of_query))
         return of_query[order], found[order], np.sqrt(squares[order])
-
-    def _arrays(self) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
-        return self.points, self.triangles, self.order, self.bounds, self.boxes
 
 
 @njit(cache=True, error_model="numpy")
@@ -140,8 +136,13 @@ def _square_to_box(p, boxes, node):
 
 
 @njit(error_model="numpy")
+def _corners(points, triangles, t):
+    return row(points, triangles[t, 0]), row(points, triangles[t, 1]), row(points, triangles[t, 2])
+
+
+@njit(error_model="numpy")
 def _square_to_triangle(p, points, triangles, t):
-    a, b, c = row(points, triangles[t, 0]), row(points, triangles[t, 1]), row(points, triangles[t, 2])
+    a, b, c = _corners(points, triangles, t)
     off = subtract(p, combine(closest_on_triangle(p, a, b, c), a, b, c))
     return dot(off, off)
 
@@ -150,9 +151,9 @@ def pair_distances(
     queries: NDArray[np.float64], points: NDArray[np.float64], triangles: NDArray[np.int32]
 ) -> NDArray[np.float64]:
     """Distances (k,) [m] from the queries (k, 3) to the triangles (k, 3) of the same rows, indices of points (n, 3)."""
-    out = np.empty(len(queries))
-    _pair_distances(np.ascontiguousarray(queries), np.ascontiguousarray(points), np.ascontiguousarray(triangles), out)
-    return out
+    weights = closest_places(queries, points, triangles)
+    off = queries - sum(weights[:, k, None] * points[triangles[:, k]] for k in range(3))
+    return np.sqrt((off * off).sum(axis=1))
 
 
 def closest_places(
@@ -167,32 +168,19 @@ def closest_places(
 @njit(cache=True, error_model="numpy")
 def _closest_places(queries, points, triangles, out):
     for k in range(len(queries)):
-        a, b, c = triangles[k, 0], triangles[k, 1], triangles[k, 2]
-        out[k] = closest_on_triangle(row(queries, k), row(points, a), row(points, b), row(points, c))
-
-
-@njit(cache=True, error_model="numpy")
-def _pair_distances(queries, points, triangles, out):
-    for k in range(len(queries)):
-        out[k] = np.sqrt(_square_to_triangle(row(queries, k), points, triangles, k))
+        out[k] = closest_on_triangle(row(queries, k), *_corners(points, triangles, k))
 
 
 @njit(error_model="numpy")
 def _square_height(p, points, triangles, t, normal):
     """Square of the distance from the triangle's plane, and the cosine between its normal and another one; 0, 0 for a
     triangle without area."""
-    a, b, c = row(points, triangles[t, 0]), row(points, triangles[t, 1]), row(points, triangles[t, 2])
-    n = cross(subtract(b, a), subtract(c, a))
+    a, b, c = _corners(points, triangles, t)
+    n = area_normal(a, b, c)
     area = dot(n, n)
     if area == 0.0:
         return 0.0, 0.0
     return dot(n, subtract(p, a)) ** 2 / area, dot(n, normal) / np.sqrt(area)
-
-
-@njit(error_model="numpy")
-def _largest(boxes):
-    """The largest coordinate [m]."""
-    return np.abs(boxes[0]).max()
 
 
 @njit(error_model="numpy")
@@ -219,7 +207,7 @@ def _comes_first(p, normal, points, triangles, t, best, largest):
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def _nearest(queries, normals, within, points, triangles, order, bounds, boxes, found, squares):
-    largest = _largest(boxes)
+    largest = np.abs(boxes[0]).max()  # coordinate [m]
     for q in prange(len(queries)):
         p, normal = row(queries, q), row(normals, q)
         stack = np.empty(_DEPTH, dtype=np.int64)
@@ -256,7 +244,7 @@ def _nearest(queries, normals, within, points, triangles, order, bounds, boxes, 
 @njit(cache=True, parallel=True, error_model="numpy")
 def _all_within(queries, within, points, triangles, order, bounds, boxes, counts, starts, found, squares):
     """With an empty `found`, only count."""
-    largest = _largest(boxes)
+    largest = np.abs(boxes[0]).max()  # coordinate [m]
     for q in prange(len(queries)):
         p = row(queries, q)
         limit = within * within + _slack(within * within, p, largest)
