@@ -71,7 +71,7 @@ def check_recording(
             at = Snapshot.of(scene, recording[number])
             seen += at.finite
             for check in checks.values():
-                if at.finite or check.sees_all:
+                if check.why_not is None and (at.finite or check.sees_all):
                     check.see(at)
             if progress is not None:
                 progress(done + 1, len(numbers))

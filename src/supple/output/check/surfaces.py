@@ -10,7 +10,6 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from supple.output.recording.reader import Recording
-from supple.output.recording.scene import RecordedObstacle
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +36,6 @@ class Surfaces:
     ----------
     names : of bodies and obstacles, the owners; bodies : how many owners are bodies
     triangles : (t, 3) those of bodies first; owners : (t,); first_triangle : (p,) the first one of each owner
-    vertex_owners : (n,) of the bodies' vertices; first_vertex : (p,) the first vertex of each body
     allowed : (p, p) which owners' surfaces must stay apart; ignored : sorted keys of pairs of triangles that may meet
     stitched : (k, 4) points of each stitch, some of them twice where it has fewer
     fixed : (obstacle, its points at time 0, its first row) of obstacles made of triangles; points : number of all rows
@@ -49,8 +47,6 @@ class Surfaces:
     triangles: NDArray[np.int64]
     owners: NDArray[np.int64]
     first_triangle: NDArray[np.int64]
-    vertex_owners: NDArray[np.int64]
-    first_vertex: NDArray[np.int64]
     allowed: NDArray[np.bool_]
     ignored: NDArray[np.int64]
     stitched: NDArray[np.int64]
@@ -72,11 +68,6 @@ class Surfaces:
         kind = "" if owner < self.bodies else "obstacle "
         return f"triangle {row - int(self.first_triangle[owner])} of {kind}{self.names[owner]}"
 
-    def name_vertex(self, row: int) -> str:
-        """A body's vertex as messages call it."""
-        owner = int(self.vertex_owners[row])
-        return f"vertex {row - int(self.first_vertex[owner])} of {self.names[owner]}"
-
 
 def moved(points: NDArray[np.float64], pose: NDArray[np.float64]) -> NDArray[np.float64]:
     """Points (k, 3) of time 0 under a pose (3, 4); the same bits where the pose is the identity."""
@@ -92,25 +83,17 @@ def moved_back(points: NDArray[np.float64], pose: NDArray[np.float64]) -> NDArra
     return points if np.array_equal(R, np.eye(3)) and not t.any() else (points - t) @ R
 
 
-def is_mesh(obstacle: RecordedObstacle) -> bool:
-    """Whether an obstacle is checked as triangles; others are checked by their formula."""
-    return obstacle.obstacle.has_exact_triangles
-
-
 def surfaces_of(recording: Recording) -> Surfaces:
     """Collect the surfaces of a recording."""
     n, nb = len(recording.rest_positions), len(recording.bodies)
     names = tuple(body.name for body in recording.bodies) + tuple(o.name for o in recording.obstacles)
-    vertex_owners = np.zeros(n, dtype=np.int64)
-    first_vertex = np.zeros(nb, dtype=np.int64)
     triangles, owners = [], []
     for i, body in enumerate(recording.bodies):
-        vertex_owners[body.vertices], first_vertex[i] = i, body.vertices.start
         triangles.append(body.triangles.astype(np.int64) + body.vertices.start)
         owners.append(np.full(len(body.triangles), i))
     fixed, row = [], n
     for j, obstacle in enumerate(recording.obstacles):
-        if is_mesh(obstacle):
+        if obstacle.obstacle.has_exact_triangles:  # others are checked by their formula
             points, faces = obstacle.obstacle.triangles()
             fixed.append((j, points, row))
             triangles.append(faces.astype(np.int64) + row)
@@ -127,8 +110,6 @@ def surfaces_of(recording: Recording) -> Surfaces:
         triangles=all_triangles,
         owners=owner,
         first_triangle=first,
-        vertex_owners=vertex_owners,
-        first_vertex=first_vertex,
         allowed=_allowed(recording, nb, len(names)),
         ignored=_ignored_keys(stitched, all_triangles),
         stitched=stitched,

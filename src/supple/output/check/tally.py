@@ -3,22 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
 
 from supple.output.check.report import CheckResult, Verdict
+from supple.output.check.snapshot import Snapshot
+from supple.output.recording.reader import RecordedFrame
 
 # Units of numbers that count errors.
 COUNTED = ("numbers", "pairs", "pieces")
-
-
-class InTime(Protocol):
-    """A frame: its number and time [s]."""
-
-    @property
-    def number(self) -> int: ...
-
-    @property
-    def time(self) -> float: ...
 
 
 class Tally:
@@ -39,7 +30,9 @@ class Tally:
         self.first_failure: int | None = None
         self._last_failure: int | None = None
 
-    def see(self, at: InTime | None, value: float, failed: bool, where: str | Callable[[], str] = "") -> None:
+    def see(
+        self, at: Snapshot | RecordedFrame | None, value: float, failed: bool, where: str | Callable[[], str] = ""
+    ) -> None:
         """Add a number of a frame, or of no frame (None). A frame may come several times in succession.
 
         Failures count as worse than other numbers.
