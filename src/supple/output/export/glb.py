@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from supple.files.replacing import whole_file
 from supple.output.drawing import (
-    OBSTACLE_COLOR,
     ObstaclePicture,
     Picture,
     evenly,
@@ -42,7 +41,7 @@ def write_glb(recording: Recording, output: Path) -> None:
     glb = _Glb(frames)
     for picture in pictures(recording):
         glb.add_body(picture)
-    for obstacle in obstacle_pictures(recording, view_of(recording)):
+    for obstacle in obstacle_pictures(recording.obstacles, view_of(recording)):
         glb.add_obstacle(obstacle)
     with whole_file(output) as fresh:
         fresh.write_bytes(glb.to_bytes())
@@ -87,13 +86,13 @@ class _Glb:
         # Triangles share no corners, so that edges stay sharp.
         x = obstacle.vertices[obstacle.triangles.ravel()]
         triangles = np.arange(len(x), dtype=np.int32).reshape(-1, 3)
-        material = self._material(OBSTACLE_COLOR, obstacle.opacity)
+        material = self._material(obstacle.color, obstacle.opacity)
         node = self._mesh_node(obstacle.name, x, vertex_normals(x, triangles), triangles, material, [])
         poses = np.stack([frame.poses[obstacle.number] for frame in self.frames])
         rotations = _quaternions(poses[:, :, :3])
         made = self.document.nodes[node]
         made.translation, made.rotation = poses[0, :, 3].tolist(), rotations[0].tolist()
-        if len(poses) > 1 and np.any(poses != poses[0]):
+        if obstacle.moves(self.frames):
             self._animate(node, "translation", self._vectors(poses[:, :, 3]))
             self._animate(node, "rotation", self._accessor(rotations, "VEC4"))
 
@@ -119,7 +118,7 @@ class _Glb:
         kinds, document = self.kinds, self.document
         primitive = kinds.Primitive(
             attributes=kinds.Attributes(POSITION=self._vectors(x, bounds=True), NORMAL=self._vectors(normals)),
-            indices=self._indices(triangles),
+            indices=self._append(triangles.astype("<u4").reshape(-1, 1), _UNSIGNED, "SCALAR", {}, _INDICES),
             material=material,
             targets=targets or None,
         )
@@ -149,10 +148,6 @@ class _Glb:
 
     def _vectors(self, values: NDArray, *, bounds: bool = False) -> int:
         return self._accessor(values, "VEC3", bounds=bounds, target=_VERTICES)
-
-    def _indices(self, triangles: NDArray) -> int:
-        data = np.ascontiguousarray(triangles, dtype="<u4").reshape(-1, 1)
-        return self._append(data, _UNSIGNED, "SCALAR", {}, _INDICES)
 
     def _accessor(self, values: NDArray, kind: str, *, bounds: bool = False, target: int | None = None) -> int:
         data = np.ascontiguousarray(np.nan_to_num(values), dtype="<f4")
