@@ -13,29 +13,21 @@ from supple.output.check.elastic_energy import elastic_energy
 from supple.output.check.geometry.box_tree import build_tree, triangle_boxes
 from supple.output.check.geometry.orientation import volume_signs
 from supple.output.check.geometry.surface_pairs import meeting_pairs
-from supple.output.check.seams import with_seams
+from supple.output.check.seams import seam_keys
 from supple.output.check.stitch_energy import stitch_energy
-from supple.output.check.surfaces import Surfaces, surfaces_of
+from supple.output.check.surfaces import Surfaces
 from supple.output.recording.reader import RecordedFrame, Recording
 
 _MOST_PAIRS = 1000
 
 
-@dataclass(frozen=True, eq=False)
 class Scene:
-    """The data that all frames share.
+    """The data that all frames of a recording share. Seams are among the surfaces' ignored pairs."""
 
-    Attributes
-    ----------
-    recording : the file; surfaces : see `Surfaces`
-    """
-
-    recording: Recording
-    surfaces: Surfaces
-
-    @classmethod
-    def of(cls, recording: Recording) -> Scene:
-        return cls(recording, with_seams(recording, surfaces_of(recording)))
+    def __init__(self, recording: Recording) -> None:
+        self.recording = recording
+        self.surfaces = Surfaces(recording)
+        self.surfaces.ignored = np.union1d(self.surfaces.ignored, seam_keys(recording, self.surfaces))
 
     @cached_property
     def rest_inverse(self) -> NDArray[np.float64]:

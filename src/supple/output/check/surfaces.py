@@ -28,9 +28,8 @@ class Piece:
     vertex: int
 
 
-@dataclass(frozen=True, eq=False)
 class Surfaces:
-    """All surfaces, and which of them must stay apart.
+    """All surfaces of a recording, and which of them must stay apart.
 
     Attributes
     ----------
@@ -42,17 +41,29 @@ class Surfaces:
     pieces : see `Piece`
     """
 
-    names: tuple[str, ...]
-    bodies: int
-    triangles: NDArray[np.int64]
-    owners: NDArray[np.int64]
-    first_triangle: NDArray[np.int64]
-    allowed: NDArray[np.bool_]
-    ignored: NDArray[np.int64]
-    stitched: NDArray[np.int64]
-    fixed: tuple[tuple[int, NDArray[np.float64], int], ...]
-    points: int
-    pieces: tuple[Piece, ...]
+    def __init__(self, recording: Recording) -> None:
+        self.bodies = len(recording.bodies)
+        self.names = tuple(thing.name for thing in (*recording.bodies, *recording.obstacles))
+        triangles = [body.triangles.astype(np.int64) + body.vertices.start for body in recording.bodies]
+        counts = [len(body.triangles) for body in recording.bodies]
+        self.fixed: list[tuple[int, NDArray[np.float64], int]] = []
+        row = len(recording.rest_positions)
+        for j, obstacle in enumerate(recording.obstacles):
+            points, faces = np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
+            if obstacle.obstacle.has_exact_triangles:  # others are checked by their formula
+                points, faces = obstacle.obstacle.triangles()
+                self.fixed.append((j, points, row))
+            triangles.append(faces.astype(np.int64) + row)
+            counts.append(len(faces))
+            row += len(points)
+        self.points = row
+        self.triangles = np.ascontiguousarray(np.concatenate(triangles).reshape(-1, 3))
+        self.owners = np.repeat(np.arange(len(counts)), counts)
+        self.first_triangle = np.cumsum(counts) - counts
+        self.allowed = _allowed(recording, self.bodies, len(self.names))
+        self.stitched = _stitched_points(recording, {obstacle: row for obstacle, _, row in self.fixed})
+        self.ignored = _ignored_keys(self.stitched, self.triangles)
+        self.pieces = _pieces(recording, self.triangles, self.owners, row)
 
     def place(self, positions: NDArray[np.float64], poses: NDArray[np.float64]) -> NDArray[np.float64]:
         """All points (n + obstacles' + 2, 3) of a frame; the last two rows are room for a ray."""
@@ -81,42 +92,6 @@ def moved_back(points: NDArray[np.float64], pose: NDArray[np.float64]) -> NDArra
     """The inverse of `moved`: points (k, 3) under a pose (3, 4), where they were at time 0."""
     R, t = pose[:, :3], pose[:, 3]
     return points if np.array_equal(R, np.eye(3)) and not t.any() else (points - t) @ R
-
-
-def surfaces_of(recording: Recording) -> Surfaces:
-    """Collect the surfaces of a recording."""
-    n, nb = len(recording.rest_positions), len(recording.bodies)
-    names = tuple(body.name for body in recording.bodies) + tuple(o.name for o in recording.obstacles)
-    triangles, owners = [], []
-    for i, body in enumerate(recording.bodies):
-        triangles.append(body.triangles.astype(np.int64) + body.vertices.start)
-        owners.append(np.full(len(body.triangles), i))
-    fixed, row = [], n
-    for j, obstacle in enumerate(recording.obstacles):
-        if obstacle.obstacle.has_exact_triangles:  # others are checked by their formula
-            points, faces = obstacle.obstacle.triangles()
-            fixed.append((j, points, row))
-            triangles.append(faces.astype(np.int64) + row)
-            owners.append(np.full(len(faces), nb + j))
-            row += len(points)
-    owner = np.concatenate(owners).astype(np.int64)
-    all_triangles = np.ascontiguousarray(np.concatenate(triangles).reshape(-1, 3))
-    # Owners are in order, so the first triangle of each is where it would be inserted.
-    first = np.searchsorted(owner, np.arange(len(names)))
-    stitched = _stitched_points(recording, {obstacle: row for obstacle, _, row in fixed})
-    return Surfaces(
-        names=names,
-        bodies=nb,
-        triangles=all_triangles,
-        owners=owner,
-        first_triangle=first,
-        allowed=_allowed(recording, nb, len(names)),
-        ignored=_ignored_keys(stitched, all_triangles),
-        stitched=stitched,
-        fixed=tuple(fixed),
-        points=row,
-        pieces=_pieces(recording, all_triangles, owner, row),
-    )
 
 
 def _allowed(recording: Recording, bodies: int, owners: int) -> NDArray[np.bool_]:

@@ -29,6 +29,7 @@ class Tally:
         self.failed_frames = 0
         self.first_failure: int | None = None
         self._last_failure: int | None = None
+        self._rank: tuple[bool, float] | None = None
 
     def see(
         self, at: Snapshot | RecordedFrame | None, value: float, failed: bool, where: str | Callable[[], str] = ""
@@ -37,19 +38,15 @@ class Tally:
 
         Failures count as worse than other numbers.
         """
-        worse = self.worst is None or (value < self.worst if self._lowest else value > self.worst)
-        if failed and self.failed_frames == 0:
-            worse = True
         number = None if at is None else at.number
         if failed and not (self.failed_frames and number == self._last_failure):
             self.failed_frames += 1
             self._last_failure = number
             if self.first_failure is None:
                 self.first_failure = number
-        if self.failed_frames and not failed:
-            worse = False
-        if worse:
-            self.worst = float(value)
+        rank = failed, -value if self._lowest else value
+        if self._rank is None or rank > self._rank:
+            self._rank, self.worst = rank, float(value)
             self.frame, self.time = (None, None) if at is None else (at.number, at.time)
             self.where = where() if callable(where) else where
 

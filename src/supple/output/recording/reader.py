@@ -82,6 +82,7 @@ class RecordedFrame:
         """
         values = {name: float(self.recording.series(name)[self.number]) for name in REPORT_NUMBERS}
         vectors = {name: self.recording.series(name)[self.number] for name in REPORT_VECTORS}
+        message = self._rows(_MESSAGE).tobytes() if _MESSAGE in self.recording._file else b""
         distance, stretch = values.pop("min_distance"), values.pop("largest_stitch_stretch")
         return Report(
             **values,
@@ -90,7 +91,7 @@ class RecordedFrame:
             iterations=int(self.recording._values("supple/frames/iterations")[self.number]),
             min_distance=None if np.isnan(distance) else distance,
             largest_stitch_stretch=None if np.isnan(stretch) else stretch,
-            message=self.recording._message(self.number),
+            message=message.rstrip(b"\0").decode(errors="replace"),
             details=self.recording.details.of_frame(self.number, self.recording._values),
         )
 
@@ -232,11 +233,6 @@ class Recording(Sequence[RecordedFrame]):
     def _frame_rows(self, path: str, number: int) -> NDArray[Any]:
         block = self._file.rows(self._series[path], number, number + 1, f"frame {number}")
         return block[0] if path == "supple/frames/poses" else block
-
-    def _message(self, number: int) -> str:
-        if _MESSAGE not in self._file:
-            return ""
-        return self._frame_rows(_MESSAGE, number).tobytes().rstrip(b"\0").decode(errors="replace")
 
 
 def read_recording(path: str | Path) -> Recording:
