@@ -61,7 +61,7 @@ class Surfaces:
         self.owners = np.repeat(np.arange(len(counts)), counts)
         self.first_triangle = np.cumsum(counts) - counts
         self.allowed = _allowed(recording, self.bodies, len(self.names))
-        self.stitched = _stitched_points(recording, {obstacle: row for obstacle, _, row in self.fixed})
+        self.stitched = self._stitched_points(recording)
         self.ignored = _ignored_keys(self.stitched, self.triangles)
         self.pieces = _pieces(recording, self.triangles, self.owners, row)
 
@@ -72,6 +72,16 @@ class Surfaces:
         for obstacle, points, row in self.fixed:
             x[row : row + len(points)] = moved(points, poses[obstacle])
         return x
+
+    def _stitched_points(self, recording: Recording) -> NDArray[np.int64]:
+        """The nodes of the stitches, of which anchors are the obstacles' points at the same place."""
+        stitches = recording.stitches
+        number = list(range(len(recording.rest_positions)))
+        placed = {obstacle: (points, row) for obstacle, points, row in self.fixed}
+        for owner, anchor in zip(stitches.anchor_owners.tolist(), stitches.anchors, strict=True):
+            points, row = placed.get(owner, (anchor[None], 0))
+            number.append(row + int(np.argmin(np.linalg.norm(points - anchor, axis=1))))
+        return np.array(number, dtype=np.int64)[stitches.nodes]
 
     def name_triangle(self, row: int) -> str:
         """A triangle as messages call it: the row of its own body's surface."""
@@ -98,17 +108,9 @@ def _allowed(recording: Recording, bodies: int, owners: int) -> NDArray[np.bool_
     """(p, p) which owners must stay apart: all but two obstacles, and pairs that the scene excludes."""
     is_body = np.arange(owners) < bodies
     allowed = is_body[:, None] | is_body[None, :]
-    for i, j in recording.untouching.pairs:
+    for i, j in recording.untouching:
         allowed[i, j] = allowed[j, i] = False
     return allowed
-
-
-def _stitched_points(recording: Recording, first_rows: dict[int, int]) -> NDArray[np.int64]:
-    """(k, 4) the points of each stitch; obstacles' points begin at these rows."""
-    untouching = recording.untouching
-    anchors = [first_rows.get(int(i), 0) + int(k) for i, k in untouching.anchors]
-    number = np.concatenate([np.arange(len(recording.rest_positions)), anchors]).astype(np.int64)
-    return number[untouching.stitched]
 
 
 def _ignored_keys(stitched: NDArray[np.int64], triangles: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -110,7 +110,7 @@ class Recording(Sequence[RecordedFrame]):
     gravity : (3,) [m/s^2]; dt : time from frame to frame [s]
     physics : the bodies' laws and what acts on them, or None where an older version wrote the recording
     details : which fields of the solver's details are kept
-    untouching : pairs that may touch or pass through each other
+    untouching : pairs that may pass through each other: numbers of bodies, then obstacles
     scene_text : the scene file's text, or None; solver : its description, or None; supple_version : of the writer
     """
 
@@ -142,7 +142,7 @@ class Recording(Sequence[RecordedFrame]):
         self.bodies: tuple[RecordedBody, ...] = read_bodies(file, header, n, m, self.triangles)
         self.obstacles: tuple[RecordedObstacle, ...] = read_obstacles(file, header)
         self.physics: RecordedPhysics | None = read_physics(file, header, m)
-        self.untouching = read_untouching(file, header, n, [len(obstacle.vertices) for obstacle in self.obstacles])
+        self.untouching = read_untouching(file, header)
         self.stitches: RecordedStitches = read_stitches(file, n, len(self.obstacles))
         self.dt = float(header["dt"])
         self.solver: str | None = header.get("solver")
