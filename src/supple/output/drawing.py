@@ -5,8 +5,8 @@ Pages, videos and exports use it, so that all show the same.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
@@ -163,14 +163,9 @@ def vertex_normals(x: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDAr
     return np.where(length > 0.0, normals / np.where(length > 0.0, length, 1.0), [0.0, 1.0, 0.0])
 
 
-@contextmanager
-def opened(recording: Recording | str | Path) -> Iterator[Recording]:
+def opened(recording: Recording | str | Path) -> AbstractContextManager[Recording]:
     """The recording itself if it is open, otherwise one that is opened for this block."""
-    if isinstance(recording, Recording):
-        yield recording
-    else:
-        with read_recording(recording) as made:
-            yield made
+    return nullcontext(recording) if isinstance(recording, Recording) else read_recording(recording)
 
 
 def evenly(recording: Recording, most: int) -> list[RecordedFrame]:

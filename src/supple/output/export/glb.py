@@ -7,6 +7,7 @@ metres, as in Supple.
 from __future__ import annotations
 
 import logging
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -66,7 +67,6 @@ class _Glb:
         times = np.array([frame.time for frame in frames])
         self.times = self._accessor((times - times[0])[:, None], "SCALAR", bounds=True)
         self.animation = pygltflib.Animation(name="recording", channels=[], samplers=[])
-        self.weights: int | None = None
 
     def add_body(self, picture: Picture) -> None:
         """Add a mesh whose base shape is frame 0, and whose k-th morph target gives frame k."""
@@ -79,7 +79,7 @@ class _Glb:
             targets.append({"POSITION": self._vectors(x - x0, bounds=True), "NORMAL": self._vectors(n - n0)})
         node = self._mesh_node(picture.name, x0, n0, picture.triangles, self._material(picture.color, 1.0), targets)
         if targets:
-            self._animate(node, "weights", self._weights())
+            self._animate(node, "weights", self._weights)
 
     def add_obstacle(self, obstacle: ObstaclePicture) -> None:
         """Add a rigid mesh; its poses are animated where it moves."""
@@ -105,12 +105,11 @@ class _Glb:
         self.document.set_binary_blob(bytes(self.blob))
         return b"".join(self.document.save_to_bytes())
 
+    @cached_property
     def _weights(self) -> int:
         """Target k has weight 1 in frame k and 0 in all others; the first frame is the mesh itself."""
-        if self.weights is None:
-            k = len(self.frames)
-            self.weights = self._accessor(np.eye(k, k - 1, -1).reshape(-1, 1), "SCALAR")
-        return self.weights
+        k = len(self.frames)
+        return self._accessor(np.eye(k, k - 1, -1).reshape(-1, 1), "SCALAR")
 
     def _mesh_node(
         self, name: str, x: NDArray, normals: NDArray, triangles: NDArray, material: int, targets: list[dict[str, int]]
