@@ -238,15 +238,9 @@ def _steps(
 
 
 def _report(system: System, state: State, step: StepReport, seconds: float) -> Report:
-    return Report(
-        **vars(measure(system, state)),
-        status=step.status,
-        iterations=step.iterations,
-        wall_seconds=seconds,
-        message=step.message,
-        min_distance=step.min_distance,
-        details=step.details,
-    )
+    values = vars(measure(system, state)) | vars(step)
+    del values["contacts"]  # made when they are asked for: `Frame.contacts`
+    return Report(**values, wall_seconds=seconds)
 
 
 @np.errstate(over="ignore", invalid="ignore")

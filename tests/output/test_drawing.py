@@ -25,7 +25,7 @@ def test_bodies_are_drawn_by_their_skin_or_boundary(recording):
 
 
 def test_obstacles_are_closed_and_face_outward(recording):
-    drawn = {picture.name.split()[0]: picture for picture in obstacle_pictures(recording, view_of(recording))}
+    drawn = {picture.name.split()[0]: picture for picture in obstacle_pictures(recording.obstacles, view_of(recording))}
     volumes = {name: SurfaceMesh(p.vertices, p.triangles).volume for name, p in drawn.items()}
     assert volumes["Box"] == pytest.approx(0.25)
     assert volumes["Sphere"] == pytest.approx(4.0 / 3.0 * np.pi * 0.027, rel=0.03)
@@ -38,7 +38,7 @@ def test_obstacles_are_closed_and_face_outward(recording):
 
 def test_moving_obstacles_follow_their_pose(recording):
     view = view_of(recording)
-    box = next(p for p in obstacle_pictures(recording, view) if p.name.startswith("Box"))
+    box = next(p for p in obstacle_pictures(recording.obstacles, view) if p.name.startswith("Box"))
     np.testing.assert_allclose(box.at(recording[24]) - box.at(recording[0]), np.tile([0, 0, 0.8], (8, 1)), atol=1e-12)
 
 
@@ -79,5 +79,5 @@ def test_obstacles_that_would_hide_the_bodies_are_transparent(tmp_path, tools):
     path = tmp_path / "walls.vtkhdf"
     list(simulate(scene, tools.Prescribed(), 1 / 30, 1, sinks=[Recorder(path)]))
     with read_recording(path) as recording:
-        drawn = obstacle_pictures(recording, view_of(recording))
+        drawn = obstacle_pictures(recording.obstacles, view_of(recording))
     assert {p.name for p in drawn if p.opacity < 1.0} == {"wall", "lid", "room"}

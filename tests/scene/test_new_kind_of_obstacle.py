@@ -113,7 +113,7 @@ def test_a_recording_restores_it(recorded):
         assert isinstance(found.obstacle, RoundedCube)
         assert (found.obstacle.half, found.obstacle.rounding, found.obstacle.friction) == (0.5, 0.1, 0.4)
         np.testing.assert_allclose(recording[20].poses[0, :, 3], [0, 0.1 / 3, 0], atol=1e-12)
-        (drawn,) = obstacle_pictures(recording, view_of(recording))
+        (drawn,) = obstacle_pictures(recording.obstacles, view_of(recording))
         assert drawn.vertices[:, 0].max() == pytest.approx(0.5, abs=1e-3)
     del KINDS["RoundedCube"]
     with pytest.raises(sp.OutputError, match="'RoundedCube 1' is of an unknown kind, 'RoundedCube'; register"):

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from rich.console import Console
+from rich.markup import escape
 
 
 class ShellConsole(Console):
@@ -15,3 +18,15 @@ class ShellConsole(Console):
 def shell_console() -> Console:
     """The console for the output of commands: numbers are not colored, and long lines are not wrapped."""
     return ShellConsole(highlight=False, soft_wrap=True)
+
+
+def print_table(rows: Iterable[tuple[str, str]], title: str = "") -> None:
+    """Print names and values in two columns. Nothing is parsed as markup: a file may be called [bold]."""
+    from rich.table import Table
+
+    table = Table(title=escape(title) or None, title_justify="left", show_header=False, box=None, pad_edge=False)
+    table.add_column(style="bold")
+    table.add_column(overflow="fold")
+    for name, value in rows:
+        table.add_row(escape(name), escape(value))
+    ShellConsole().print(table)

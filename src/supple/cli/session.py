@@ -37,6 +37,11 @@ class Products:
     compress: bool = False
     scene_text: str | None = None
 
+    def files(self, *, wanted: bool = True) -> dict[str, Path]:
+        """The page and the plot, by name: those that are written, or those that are not."""
+        every = {"page": (self.page, "index.html"), "plot": (self.plot, "plot.png")}
+        return {name: self.folder / file for name, (is_wanted, file) in every.items() if is_wanted is wanted}
+
 
 @dataclass
 class Outcome:
@@ -73,7 +78,7 @@ def run_session(
     from supple.output.recording.recorder import Recorder
 
     recording = products.folder / "recording.vtkhdf"
-    for path in _product_paths(products):
+    for path in products.files().values():
         if path.is_dir():  # reported before the simulation
             raise OutputError(
                 f"{path}: this is a folder, and a file of that name must be written; choose another --output"
@@ -109,29 +114,20 @@ def run_session(
     return outcome
 
 
-def _product_paths(products: Products) -> list[Path]:
-    """The files that are written beside the recording."""
-    wanted = {"index.html": products.page, "plot.png": products.plot}
-    return [products.folder / name for name, is_wanted in wanted.items() if is_wanted]
-
-
 def _warn_of_older_files(products: Products) -> None:
     """Warn of files beside the new recording that show an earlier one."""
-    for wanted, name in ((products.page, "index.html"), (products.plot, "plot.png")):
-        path = products.folder / name
-        if not wanted and path.exists():
+    for path in products.files(wanted=False).values():
+        if path.exists():
             logger.warning("%s shows an earlier run", path)
 
 
 def _write_products(recording: Path, products: Products) -> None:
-    if products.page:
-        from supple.output.page import write_page
+    from supple.output.page import write_page
+    from supple.output.plots import plot_recording
 
-        write_page(recording, products.folder / "index.html")
-    if products.plot:
-        from supple.output.plots import plot_recording
-
-        plot_recording(recording, products.folder / "plot.png")
+    writers = {"page": write_page, "plot": plot_recording}
+    for name, path in products.files().items():
+        writers[name](recording, path)
 
 
 def _print_summary(outcome: Outcome, recording: Path, products: Products) -> None:
@@ -147,8 +143,5 @@ def _print_summary(outcome: Outcome, recording: Path, products: Products) -> Non
             f"{outcome.frames} frames to t = {outcome.last.time:.6g} s ({report.status}); "
             f"smallest J {outcome.worst_J:.4g}; energy {energy:.6g} J"
         )
-    console.print(f"recording  {escape(str(recording))}")
-    if products.page:
-        console.print(f"page       {escape(str(products.folder / 'index.html'))}")
-    if products.plot:
-        console.print(f"plot       {escape(str(products.folder / 'plot.png'))}")
+    for name, path in {"recording": recording, **products.files()}.items():
+        console.print(f"{name:<9}  {escape(str(path))}")

@@ -222,8 +222,6 @@ def _machine() -> str:
 def _is_gone(process: int) -> bool:
     try:
         os.kill(process, 0)  # POSIX: signal 0 only asks whether the process exists
-    except ProcessLookupError:
-        return True
-    except (OSError, OverflowError):
-        return False
+    except (OSError, OverflowError) as error:
+        return isinstance(error, ProcessLookupError)
     return False

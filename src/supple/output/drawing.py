@@ -5,11 +5,11 @@ Pages, videos and exports use it, so that all show the same.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,6 +123,12 @@ class ObstaclePicture:
     triangles: NDArray[np.int32]
     opacity: float
     smooth: bool
+    color: ClassVar[tuple[int, int, int]] = OBSTACLE_COLOR
+
+    def moves(self, frames: Iterable[RecordedFrame]) -> bool:
+        """Whether its pose changes in these frames."""
+        poses = np.stack([frame.poses[self.number] for frame in frames])
+        return bool(np.any(poses != poses[0]))
 
     def at(self, frame: RecordedFrame) -> NDArray[np.float64]:
         """(k, 3) [m] in a frame."""
@@ -130,22 +136,13 @@ class ObstaclePicture:
         return self.vertices @ pose[:, :3].T + pose[:, 3]
 
 
-class HasObstacles(Protocol):
-    """An object with obstacles: a recording, or the scene of a live page."""
-
-    @property
-    def obstacles(self) -> Sequence[RecordedObstacle]:
-        """The obstacles at time 0."""
-        ...
-
-
-def obstacle_pictures(source: HasObstacles, view: View) -> list[ObstaclePicture]:
+def obstacle_pictures(obstacles: Sequence[RecordedObstacle], view: View) -> list[ObstaclePicture]:
     """One for each obstacle. A half-space is drawn as a square about the bodies.
 
     Obstacles that would hide the bodies are transparent: rooms, and half-spaces that are not a floor.
     """
     made = []
-    for number, recorded in enumerate(source.obstacles):
+    for number, recorded in enumerate(obstacles):
         obstacle = recorded.obstacle
         vertices, triangles = obstacle.drawn(view.center, 2.5 * view.radius)
         is_wall = obstacle.plane is not None and float(obstacle.plane[1] @ view.up) < 0.5
@@ -166,14 +163,9 @@ def vertex_normals(x: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDAr
     return np.where(length > 0.0, normals / np.where(length > 0.0, length, 1.0), [0.0, 1.0, 0.0])
 
 
-@contextmanager
-def opened(recording: Recording | str | Path) -> Iterator[Recording]:
+def opened(recording: Recording | str | Path) -> AbstractContextManager[Recording]:
     """The recording itself if it is open, otherwise one that is opened for this block."""
-    if isinstance(recording, Recording):
-        yield recording
-    else:
-        with read_recording(recording) as made:
-            yield made
+    return nullcontext(recording) if isinstance(recording, Recording) else read_recording(recording)
 
 
 def evenly(recording: Recording, most: int) -> list[RecordedFrame]:

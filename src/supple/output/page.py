@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from supple.files.replacing import whole_file
 from supple.output.drawing import (
-    OBSTACLE_COLOR,
     STITCH_COLOR,
     View,
     evenly,
@@ -41,14 +40,10 @@ def write_page(recording: Recording | str | Path, output: str | Path) -> Path:
     """
     output = Path(output)
     with opened(recording) as source, whole_file(output) as fresh:
-        fresh.write_text(_page(source), encoding="utf-8")
+        with temporary_server() as server:
+            page = _serialize(server, source)
+        fresh.write_text(titled(page, ", ".join(body.name for body in source.bodies)), encoding="utf-8")
     return output
-
-
-def _page(recording: Recording) -> str:
-    with temporary_server() as server:
-        text = _serialize(server, recording)
-    return titled(text, ", ".join(body.name for body in recording.bodies))
 
 
 def titled(page: str, title: str) -> str:
@@ -94,25 +89,21 @@ def _set_stage(server: Any, view: View) -> None:
     eye, up = view.eye(_ANGLE), view.up
     server.scene.set_up_direction(tuple(up))
     camera = server.initial_camera
-    camera.position, camera.look_at, camera.up, camera.fov = (
-        tuple(eye),
-        tuple(view.center),
-        tuple(up),
-        np.radians(_ANGLE),
-    )
+    camera.position, camera.look_at, camera.up = tuple(eye), tuple(view.center), tuple(up)
+    camera.fov = np.radians(_ANGLE)
     camera.near, camera.far = view.radius * 1e-2, view.radius * 1e3
 
 
 def _add_obstacles(server: Any, recording: Recording, view: View) -> dict[int, tuple[Any, NDArray[np.float64]]]:
     """Draw the obstacles; returns their handles and poses by number."""
     handles = {}
-    for obstacle in obstacle_pictures(recording, view):
+    for obstacle in obstacle_pictures(recording.obstacles, view):
         pose = recording[0].poses[obstacle.number]
         handle = server.scene.add_mesh_simple(
             f"/obstacles/{obstacle.number} {obstacle.name}",
             obstacle.vertices.astype(np.float32),
             obstacle.triangles,
-            color=OBSTACLE_COLOR,
+            color=obstacle.color,
             opacity=obstacle.opacity if obstacle.opacity < 1.0 else None,
             flat_shading=not obstacle.smooth,
             side="double",

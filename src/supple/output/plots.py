@@ -22,7 +22,6 @@ _LEGEND: dict[str, Any] = {  # above the axes
     "frameon": False,
     "fontsize": "small",
 }
-_ENERGIES = ("kinetic", "elastic", "potential")
 STITCH_LINE = "#c77700"
 _AXES = (("x", "#d1495b"), ("y", "#3a7d44"), ("z", "#30638e"))
 
@@ -61,7 +60,7 @@ def plot_recording(recording: Recording | str | Path, output: str | Path) -> Pat
 def _draw(recording: Recording, axes) -> None:
     t = recording.times
     energy, volume, linear, angular, worst, wall = axes.flat
-    names = ("kinetic", "elastic", "potential", "stitch") if len(recording.stitches) else _ENERGIES
+    names = ("kinetic", "elastic", "potential", "stitch")[: 4 if len(recording.stitches) else 3]
     parts = {name: recording.series(f"{name}_energy") for name in names}
     for name, values in parts.items():
         energy.plot(t, values, label=name)

@@ -27,12 +27,9 @@ class ProgressBar:
     def __init__(self, console: Console | None = None) -> None:
         self._console = console
         self._bar: Progress | None = None
-        self._start = 0.0
-        self._frames = 0
-        self._steps = 0
-        self._solver_seconds = 0.0
-        self._displayed_ms: float | None = None
-        self._status = ""
+        self._start, self._steps, self._status = 0.0, 0, ""
+        self._seconds: list[float] = []  # of each step, in the solver
+        self._displayed_ms = 0.0
 
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         from rich.console import Console
@@ -40,14 +37,8 @@ class ProgressBar:
 
         if self._console is None:
             self._console = Console(stderr=True)
-        self._start = time.perf_counter()
-        self._frames, self._steps, self._solver_seconds, self._displayed_ms, self._status = (
-            0,
-            steps,
-            0.0,
-            None,
-            "starting",
-        )
+        self._start, self._steps, self._status = time.perf_counter(), steps, "starting"
+        self._seconds.clear()
         if self._console.is_terminal:
             columns = (
                 BarColumn(),
@@ -62,21 +53,22 @@ class ProgressBar:
 
     def write(self, frame: Frame) -> None:
         report = frame.report
-        self._frames += 1
-        self._solver_seconds += report.wall_seconds
-        self._status = str(report.status)
         ms = 1e3 * report.wall_seconds
-        before = self._displayed_ms
-        self._displayed_ms = ms if before is None else before + _SMOOTHING * (ms - before)
+        self._displayed_ms += (_SMOOTHING if self._seconds else 1.0) * (ms - self._displayed_ms)
+        self._seconds.append(report.wall_seconds)
+        self._status = str(report.status)
         if self._bar is not None:
-            self._bar.update(self._task, completed=self._frames, ms=f"{self._displayed_ms:.1f}", status=self._status)
+            self._bar.update(
+                self._task, completed=len(self._seconds), ms=f"{self._displayed_ms:.1f}", status=self._status
+            )
 
     def end(self) -> None:
         if self._bar is not None:
             self._bar.stop()
             self._bar = None
         elif self._console is not None:
-            each = f", {1e3 * self._solver_seconds / self._frames:.1f} ms each in the solver" if self._frames else ""
+            frames = len(self._seconds)
+            each = f", {1e3 * sum(self._seconds) / frames:.1f} ms each in the solver" if frames else ""
             seconds = time.perf_counter() - self._start
-            done = f"{self._frames} of {self._steps} frames in {seconds:.1f} s{each}; {self._status}"
+            done = f"{frames} of {self._steps} frames in {seconds:.1f} s{each}; {self._status}"
             self._console.print(done, soft_wrap=True, highlight=False, markup=False)

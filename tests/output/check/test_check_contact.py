@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.output.check.surfaces import Surfaces
 
 from .conftest import JELLY, X, failures, octahedron, recorded, set_header
 
@@ -101,8 +102,9 @@ def test_vertices_that_may_touch_a_triangle_are_left_out(free, corrupted):
         x[vertex] = x[triangles[facing[0]]].mean(axis=0) - [1e-6, 0, 0]
         file[X][2 * n : 3 * n] = x
         if exempt:
-            del file["supple/physics/stitched"]
-            file["supple/physics/stitched"] = np.array([[vertex, *triangles[facing[0]]]])
+            stitches = file.create_group("supple/stitches")
+            stitches["nodes"], stitches["weights"] = np.array([[vertex, *triangles[facing[0]]]]), np.full((1, 3), 1 / 3)
+            stitches["anchors"], stitches["anchor_owners"] = np.zeros((0, 3)), np.zeros(0, dtype=int)
 
     assert failures(corrupted(free, lambda file, n: touch(file, n, False)), only=["intersection"]) == {
         "intersection": 2
@@ -213,15 +215,19 @@ def test_excluded_and_stitched_pairs_are_recorded(tmp_path):
     with sp.read_recording(recorded(path, scene, sp.XPBD(substeps=2))) as recording:
         untouching = recording.untouching
         n = len(recording.rest_positions)
-        assert {(0, 1), (0, 2), (1, 2), (2, 2)} <= set(untouching.pairs)
-        assert not {(0, 0), (1, 1), (0, 3), (3, 4)} & set(untouching.pairs)
+        assert {(0, 1), (0, 2), (1, 2), (2, 2)} <= set(untouching)
+        assert not {(0, 0), (1, 1), (0, 3), (3, 4)} & set(untouching)
         a = scene.bodies[0].mesh.surface.triangles[3]
-        assert [row.tolist() for row in np.sort(untouching.stitched)] == [
+        assert [row.tolist() for row in np.sort(recording.stitches.nodes)] == [
             [*sorted(a), 2 * n // 3],
             [n // 3 + 1, n, n, n],
         ]
-        assert untouching.stitched[:, 0].tolist() == [2 * n // 3, n // 3 + 1]
-        np.testing.assert_array_equal(untouching.anchors, [[1, 4]])
+        assert recording.stitches.nodes[:, 0].tolist() == [2 * n // 3, n // 3 + 1]
+        np.testing.assert_array_equal(recording.stitches.anchor_owners, [1])
+        np.testing.assert_array_equal(recording.stitches.anchors, recording.obstacles[1].vertices[[4]])
+        surfaces = Surfaces(recording)
+        at = surfaces.place(recording[0].state.positions, recording[0].poses)
+        np.testing.assert_array_equal(at[surfaces.stitched[1, 1]], recording.obstacles[1].vertices[4])
         assert recording.physics.stitches == 2
     # a and b overlap, and may.
     assert failures(path, only=CONTACT) == {}

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from supple.cli.console import print_table
+
 if TYPE_CHECKING:
     import numpy as np
 
@@ -27,7 +29,7 @@ def info(file: Path | None = None, /) -> None:
         A scene (.yaml), a surface, a tet mesh or a recording (.vtkhdf).
     """
     if file is None:
-        _print_table("Supple", _platform())
+        print_table(_platform(), "Supple")
         return
     suffix = file.suffix.lower()
     if suffix in SCENE_FILES:
@@ -36,20 +38,6 @@ def info(file: Path | None = None, /) -> None:
         _recording(file)
     else:
         _mesh(file, suffix)
-
-
-def _print_table(title: str, rows: list[tuple[str, str]]) -> None:
-    from rich.markup import escape
-    from rich.table import Table
-
-    from supple.cli.console import ShellConsole
-
-    table = Table(title=escape(title), title_justify="left", show_header=False, box=None, pad_edge=False)
-    table.add_column(style="bold")
-    table.add_column(overflow="fold")
-    for name, value in rows:
-        table.add_row(escape(name), escape(value))
-    ShellConsole().print(table)
 
 
 def _platform() -> list[tuple[str, str]]:
@@ -120,31 +108,20 @@ def _mesh(file: Path, suffix: str) -> None:
     known = (*SCENE_FILES, *RECORDINGS[:1], *dict.fromkeys((*SURFACE_READERS, *TET_EXTENSIONS)))
     if suffix not in known:
         raise MeshError(f"{file}: unknown extension {suffix or '(none)'}; known are {', '.join(known)}")
-    if suffix in TET_EXTENSIONS:
+    mesh: TetMesh | SurfaceMesh
+    if suffix not in TET_EXTENSIONS:
+        mesh = SurfaceMesh.load(file)
+    else:
         try:
             mesh = TetMesh.load(file)
         except MeshError as error:
-            surface = _surface_of_same_kind(file, suffix in SURFACE_READERS)
-            if surface is None:
+            if suffix not in SURFACE_READERS:
+                raise
+            try:  # a file of this format may hold a surface
+                mesh = SurfaceMesh.load(file)
+            except MeshError:
                 raise error from None
-            _print_table(str(file), _surface_rows(surface))
-        else:
-            _print_table(str(file), _tet_rows(mesh))
-        return
-    _print_table(str(file), _surface_rows(SurfaceMesh.load(file)))
-
-
-def _surface_of_same_kind(file: Path, may_hold_one: bool) -> SurfaceMesh | None:
-    """The surface in a file whose format may hold tets or triangles, or None."""
-    from supple.errors import MeshError
-    from supple.mesh.surface import SurfaceMesh
-
-    if not may_hold_one:
-        return None
-    try:
-        return SurfaceMesh.load(file)
-    except MeshError:
-        return None
+    print_table(_tet_rows(mesh) if isinstance(mesh, TetMesh) else _surface_rows(mesh), str(file))
 
 
 def _scene(file: Path) -> None:
@@ -169,7 +146,7 @@ def _scene(file: Path) -> None:
         text = f"{type(part.body.material).__name__}, {len(mesh.tets)} tets, {mesh.volume:.6g} m^3, {mass:.6g} kg"
         rows.append((f"body {part.name}", text))
     rows += _stitch_rows(system.stitching)
-    _print_table(str(file), rows)
+    print_table(rows, str(file))
 
 
 def _stitch_rows(stitching: Stitching) -> list[tuple[str, str]]:
@@ -208,7 +185,7 @@ def _recording(file: Path) -> None:
         ]
         bad = [k for k, status in enumerate(recording.statuses) if not status.can_go_on]
         rows.append(("problems", _recording_problems(float(J.min()), bad)))
-    _print_table(str(file), rows)
+    print_table(rows, str(file))
 
 
 def _recording_problems(smallest_J: float, stopped: list[int]) -> str:

@@ -112,9 +112,7 @@ def _bytes(gibibytes: float) -> int:
 
 
 def _summarize(tets: TetMesh, report: MeshingReport, files: list[Path]) -> None:
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
+    from supple.cli.console import print_table
 
     rows = {
         "mesher": f"{report.mesher}, {report.seconds:.2f} s",
@@ -128,10 +126,4 @@ def _summarize(tets: TetMesh, report: MeshingReport, files: list[Path]) -> None:
     }
     if report.repair is not None:
         rows["repair"] = str(report.repair)
-    table = Table(show_header=False, box=None, pad_edge=False)
-    table.add_column(style="bold")
-    table.add_column(overflow="fold")
-    for name, value in rows.items():
-        # Text is not parsed as markup: a file may be called [bold].
-        table.add_row(name, Text(value))
-    Console().print(table)
+    print_table(rows.items())

@@ -17,7 +17,7 @@ from supple.output.check.report import CheckReport, CheckResult
 from supple.output.check.settings import CheckSettings
 from supple.output.check.snapshot import Scene, Snapshot
 from supple.output.check.tally import skipped
-from supple.output.recording.reader import Recording, read_recording
+from supple.output.recording.reader import read_recording
 
 CHECKS: tuple[type[FrameCheck], ...] = (
     Finite,
@@ -61,17 +61,17 @@ def check_recording(
     """
     settings = settings or CheckSettings()
     with read_recording(path) as recording, np.errstate(all="ignore"):
-        scene = Scene.of(recording)
+        scene = Scene(recording)
         sound = all(np.isfinite(getattr(recording, name)).all() for name in CONSTANTS)
         chosen = [check for check in CHECKS if check.name in settings.chosen]
         checks = {check.name: check(scene, settings) for check in chosen if sound or check.sees_all}
-        numbers = _frames_to_check(recording, settings.every)
+        numbers = sorted({*range(0, len(recording), settings.every), len(recording) - 1})
         seen = 0
         for done, number in enumerate(numbers):
             at = Snapshot.of(scene, recording[number])
             seen += at.finite
             for check in checks.values():
-                if at.finite or check.sees_all:
+                if check.why_not is None and (at.finite or check.sees_all):
                     check.see(at)
             if progress is not None:
                 progress(done + 1, len(numbers))
@@ -85,8 +85,3 @@ def _result(name: str, check: FrameCheck | None, seen: int) -> CheckResult:
     if check.needs_frames and seen == 0:
         return skipped(name, "no frame has finite positions and velocities")
     return check.result()
-
-
-def _frames_to_check(recording: Recording, every: int) -> list[int]:
-    """Every k-th frame, and the last one."""
-    return sorted({*range(0, len(recording), every), len(recording) - 1})

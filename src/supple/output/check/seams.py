@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
+from numpy.typing import NDArray
 
 from supple.output.check.geometry.box_tree import build_tree, triangle_boxes
 from supple.output.check.geometry.surface_pairs import meeting_pairs
@@ -12,13 +11,13 @@ from supple.output.check.surfaces import Surfaces
 from supple.output.recording.reader import Recording
 
 
-def with_seams(recording: Recording, surfaces: Surfaces) -> Surfaces:
-    """The surfaces, with the pairs of triangles ignored that meet in the first frame, belong to two things that are
-    stitched to each other, and have a stitched corner."""
+def seam_keys(recording: Recording, surfaces: Surfaces) -> NDArray[np.int64]:
+    """Keys, as in `Surfaces.ignored`, of the pairs of triangles that meet in the first frame, belong to two things that
+    are stitched to each other, and have a stitched corner."""
     stitched = surfaces.stitched
     frame = recording[0]
     if not len(stitched) or not np.isfinite(frame.state.positions).all() or not np.isfinite(frame.poses).all():
-        return surfaces
+        return np.zeros(0, dtype=np.int64)
     x, triangles, owners = surfaces.place(frame.state.positions, frame.poses), surfaces.triangles, surfaces.owners
     thing = np.full(len(x), -1)
     thing[triangles] = owners[:, None]
@@ -38,5 +37,4 @@ def with_seams(recording: Recording, surfaces: Surfaces) -> Surfaces:
         pairs = np.zeros((found, 2), dtype=np.int64) if len(pairs) < found else pairs
     has_stitch = np.asarray(np.isin(triangles, stitched).any(axis=1))
     pairs = np.sort(pairs[has_stitch[pairs].any(axis=1)], axis=1)
-    keys = pairs[:, 0] * len(triangles) + pairs[:, 1]
-    return replace(surfaces, ignored=np.union1d(surfaces.ignored, keys))
+    return pairs[:, 0] * len(triangles) + pairs[:, 1]

@@ -4,37 +4,30 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.output.check.elastic_energy import elastic_energy, stiffness_scale
+from supple.output.check.elastic_energy import elastic_energy
 from supple.output.check.geometry.box_tree import build_tree, triangle_boxes
 from supple.output.check.geometry.orientation import volume_signs
 from supple.output.check.geometry.surface_pairs import meeting_pairs
-from supple.output.check.seams import with_seams
-from supple.output.check.stitch_energy import stitch_energy, stitch_scale
-from supple.output.check.surfaces import Surfaces, surfaces_of
+from supple.output.check.seams import seam_keys
+from supple.output.check.stitch_energy import stitch_energy
+from supple.output.check.surfaces import Surfaces
 from supple.output.recording.reader import RecordedFrame, Recording
 
 _MOST_PAIRS = 1000
 
 
-@dataclass(frozen=True, eq=False)
 class Scene:
-    """The data that all frames share.
+    """The data that all frames of a recording share. Seams are among the surfaces' ignored pairs."""
 
-    Attributes
-    ----------
-    recording : the file; surfaces : see `Surfaces`
-    """
-
-    recording: Recording
-    surfaces: Surfaces
-
-    @classmethod
-    def of(cls, recording: Recording) -> Scene:
-        return cls(recording, with_seams(recording, surfaces_of(recording)))
+    def __init__(self, recording: Recording) -> None:
+        self.recording = recording
+        self.surfaces = Surfaces(recording)
+        self.surfaces.ignored = np.union1d(self.surfaces.ignored, seam_keys(recording, self.surfaces))
 
     @cached_property
     def rest_inverse(self) -> NDArray[np.float64]:
@@ -47,22 +40,13 @@ class Scene:
         rest = self.recording.rest_positions
         return max(float(np.ptp(rest[body.vertices], axis=0).max()) for body in self.recording.bodies)
 
-    @cached_property
-    def stiffness_scale(self) -> float:
-        """An energy [J] that round-off of the elastic energy is measured by."""
-        return stiffness_scale(self.recording)
-
-    @cached_property
-    def stitch_scale(self) -> float:
-        """An energy [J] that round-off of the stitch energy is measured by."""
-        return stitch_scale(self.recording)
-
-    def name_tet(self, row: int) -> str:
-        """A tet as messages call it: its number within its body."""
+    def name(self, kind: Literal["vertex", "tet"], row: int) -> str:
+        """A vertex or tet as messages call it: its number within its body."""
         for body in self.recording.bodies:
-            if body.tets.start <= row < body.tets.stop:
-                return f"tet {row - body.tets.start} of {body.name}"
-        return f"tet {row}"
+            rows = body.vertices if kind == "vertex" else body.tets
+            if rows.start <= row < rows.stop:
+                return f"{kind} {row - rows.start} of {body.name}"
+        return f"{kind} {row}"
 
 
 @dataclass(frozen=True, eq=False)

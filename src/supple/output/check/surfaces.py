@@ -10,7 +10,6 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from supple.output.recording.reader import Recording
-from supple.output.recording.scene import RecordedObstacle
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,34 +28,42 @@ class Piece:
     vertex: int
 
 
-@dataclass(frozen=True, eq=False)
 class Surfaces:
-    """All surfaces, and which of them must stay apart.
+    """All surfaces of a recording, and which of them must stay apart.
 
     Attributes
     ----------
     names : of bodies and obstacles, the owners; bodies : how many owners are bodies
     triangles : (t, 3) those of bodies first; owners : (t,); first_triangle : (p,) the first one of each owner
-    vertex_owners : (n,) of the bodies' vertices; first_vertex : (p,) the first vertex of each body
     allowed : (p, p) which owners' surfaces must stay apart; ignored : sorted keys of pairs of triangles that may meet
     stitched : (k, 4) points of each stitch, some of them twice where it has fewer
     fixed : (obstacle, its points at time 0, its first row) of obstacles made of triangles; points : number of all rows
     pieces : see `Piece`
     """
 
-    names: tuple[str, ...]
-    bodies: int
-    triangles: NDArray[np.int64]
-    owners: NDArray[np.int64]
-    first_triangle: NDArray[np.int64]
-    vertex_owners: NDArray[np.int64]
-    first_vertex: NDArray[np.int64]
-    allowed: NDArray[np.bool_]
-    ignored: NDArray[np.int64]
-    stitched: NDArray[np.int64]
-    fixed: tuple[tuple[int, NDArray[np.float64], int], ...]
-    points: int
-    pieces: tuple[Piece, ...]
+    def __init__(self, recording: Recording) -> None:
+        self.bodies = len(recording.bodies)
+        self.names = tuple(thing.name for thing in (*recording.bodies, *recording.obstacles))
+        triangles = [body.triangles.astype(np.int64) + body.vertices.start for body in recording.bodies]
+        counts = [len(body.triangles) for body in recording.bodies]
+        self.fixed: list[tuple[int, NDArray[np.float64], int]] = []
+        row = len(recording.rest_positions)
+        for j, obstacle in enumerate(recording.obstacles):
+            points, faces = np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
+            if obstacle.obstacle.has_exact_triangles:  # others are checked by their formula
+                points, faces = obstacle.obstacle.triangles()
+                self.fixed.append((j, points, row))
+            triangles.append(faces.astype(np.int64) + row)
+            counts.append(len(faces))
+            row += len(points)
+        self.points = row
+        self.triangles = np.ascontiguousarray(np.concatenate(triangles).reshape(-1, 3))
+        self.owners = np.repeat(np.arange(len(counts)), counts)
+        self.first_triangle = np.cumsum(counts) - counts
+        self.allowed = _allowed(recording, self.bodies, len(self.names))
+        self.stitched = self._stitched_points(recording)
+        self.ignored = _ignored_keys(self.stitched, self.triangles)
+        self.pieces = _pieces(recording, self.triangles, self.owners, row)
 
     def place(self, positions: NDArray[np.float64], poses: NDArray[np.float64]) -> NDArray[np.float64]:
         """All points (n + obstacles' + 2, 3) of a frame; the last two rows are room for a ray."""
@@ -66,16 +73,21 @@ class Surfaces:
             x[row : row + len(points)] = moved(points, poses[obstacle])
         return x
 
+    def _stitched_points(self, recording: Recording) -> NDArray[np.int64]:
+        """The nodes of the stitches, of which anchors are the obstacles' points at the same place."""
+        stitches = recording.stitches
+        number = list(range(len(recording.rest_positions)))
+        placed = {obstacle: (points, row) for obstacle, points, row in self.fixed}
+        for owner, anchor in zip(stitches.anchor_owners.tolist(), stitches.anchors, strict=True):
+            points, row = placed.get(owner, (anchor[None], 0))
+            number.append(row + int(np.argmin(np.linalg.norm(points - anchor, axis=1))))
+        return np.array(number, dtype=np.int64)[stitches.nodes]
+
     def name_triangle(self, row: int) -> str:
         """A triangle as messages call it: the row of its own body's surface."""
         owner = int(self.owners[row])
         kind = "" if owner < self.bodies else "obstacle "
         return f"triangle {row - int(self.first_triangle[owner])} of {kind}{self.names[owner]}"
-
-    def name_vertex(self, row: int) -> str:
-        """A body's vertex as messages call it."""
-        owner = int(self.vertex_owners[row])
-        return f"vertex {row - int(self.first_vertex[owner])} of {self.names[owner]}"
 
 
 def moved(points: NDArray[np.float64], pose: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -92,67 +104,13 @@ def moved_back(points: NDArray[np.float64], pose: NDArray[np.float64]) -> NDArra
     return points if np.array_equal(R, np.eye(3)) and not t.any() else (points - t) @ R
 
 
-def is_mesh(obstacle: RecordedObstacle) -> bool:
-    """Whether an obstacle is checked as triangles; others are checked by their formula."""
-    return obstacle.obstacle.has_exact_triangles
-
-
-def surfaces_of(recording: Recording) -> Surfaces:
-    """Collect the surfaces of a recording."""
-    n, nb = len(recording.rest_positions), len(recording.bodies)
-    names = tuple(body.name for body in recording.bodies) + tuple(o.name for o in recording.obstacles)
-    vertex_owners = np.zeros(n, dtype=np.int64)
-    first_vertex = np.zeros(nb, dtype=np.int64)
-    triangles, owners = [], []
-    for i, body in enumerate(recording.bodies):
-        vertex_owners[body.vertices], first_vertex[i] = i, body.vertices.start
-        triangles.append(body.triangles.astype(np.int64) + body.vertices.start)
-        owners.append(np.full(len(body.triangles), i))
-    fixed, row = [], n
-    for j, obstacle in enumerate(recording.obstacles):
-        if is_mesh(obstacle):
-            points, faces = obstacle.obstacle.triangles()
-            fixed.append((j, points, row))
-            triangles.append(faces.astype(np.int64) + row)
-            owners.append(np.full(len(faces), nb + j))
-            row += len(points)
-    owner = np.concatenate(owners).astype(np.int64)
-    all_triangles = np.ascontiguousarray(np.concatenate(triangles).reshape(-1, 3))
-    # Owners are in order, so the first triangle of each is where it would be inserted.
-    first = np.searchsorted(owner, np.arange(len(names)))
-    stitched = _stitched_points(recording, {obstacle: row for obstacle, _, row in fixed})
-    return Surfaces(
-        names=names,
-        bodies=nb,
-        triangles=all_triangles,
-        owners=owner,
-        first_triangle=first,
-        vertex_owners=vertex_owners,
-        first_vertex=first_vertex,
-        allowed=_allowed(recording, nb, len(names)),
-        ignored=_ignored_keys(stitched, all_triangles),
-        stitched=stitched,
-        fixed=tuple(fixed),
-        points=row,
-        pieces=_pieces(recording, all_triangles, owner, row),
-    )
-
-
 def _allowed(recording: Recording, bodies: int, owners: int) -> NDArray[np.bool_]:
     """(p, p) which owners must stay apart: all but two obstacles, and pairs that the scene excludes."""
     is_body = np.arange(owners) < bodies
     allowed = is_body[:, None] | is_body[None, :]
-    for i, j in recording.untouching.pairs:
+    for i, j in recording.untouching:
         allowed[i, j] = allowed[j, i] = False
     return allowed
-
-
-def _stitched_points(recording: Recording, first_rows: dict[int, int]) -> NDArray[np.int64]:
-    """(k, 4) the points of each stitch; obstacles' points begin at these rows."""
-    untouching = recording.untouching
-    anchors = [first_rows.get(int(i), 0) + int(k) for i, k in untouching.anchors]
-    number = np.concatenate([np.arange(len(recording.rest_positions)), anchors]).astype(np.int64)
-    return number[untouching.stitched]
 
 
 def _ignored_keys(stitched: NDArray[np.int64], triangles: NDArray[np.int64]) -> NDArray[np.int64]:

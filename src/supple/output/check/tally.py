@@ -3,22 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
 
 from supple.output.check.report import CheckResult, Verdict
+from supple.output.check.snapshot import Snapshot
+from supple.output.recording.reader import RecordedFrame
 
 # Units of numbers that count errors.
 COUNTED = ("numbers", "pairs", "pieces")
-
-
-class InTime(Protocol):
-    """A frame: its number and time [s]."""
-
-    @property
-    def number(self) -> int: ...
-
-    @property
-    def time(self) -> float: ...
 
 
 class Tally:
@@ -38,25 +29,24 @@ class Tally:
         self.failed_frames = 0
         self.first_failure: int | None = None
         self._last_failure: int | None = None
+        self._rank: tuple[bool, float] | None = None
 
-    def see(self, at: InTime | None, value: float, failed: bool, where: str | Callable[[], str] = "") -> None:
+    def see(
+        self, at: Snapshot | RecordedFrame | None, value: float, failed: bool, where: str | Callable[[], str] = ""
+    ) -> None:
         """Add a number of a frame, or of no frame (None). A frame may come several times in succession.
 
         Failures count as worse than other numbers.
         """
-        worse = self.worst is None or (value < self.worst if self._lowest else value > self.worst)
-        if failed and self.failed_frames == 0:
-            worse = True
         number = None if at is None else at.number
         if failed and not (self.failed_frames and number == self._last_failure):
             self.failed_frames += 1
             self._last_failure = number
             if self.first_failure is None:
                 self.first_failure = number
-        if self.failed_frames and not failed:
-            worse = False
-        if worse:
-            self.worst = float(value)
+        rank = failed, -value if self._lowest else value
+        if self._rank is None or rank > self._rank:
+            self._rank, self.worst = rank, float(value)
             self.frame, self.time = (None, None) if at is None else (at.number, at.time)
             self.where = where() if callable(where) else where
 

@@ -41,8 +41,8 @@ FORMATS = {
     "vtu": Format("export.pvd:write_last_vtu", (".vtu",)),  # the last frame as a VTK unstructured grid
     "vtkhdf": Format("export.vtkhdf:write_vtkhdf", RECORDING_SUFFIXES),  # a recording again, compressed and repaired
     "usd": Format("export.usd:write_usd", (".usdc", ".usda", ".usd")),  # with time samples (extra: usd)
-    "gif": Format("export.video:write_gif", (".gif",)),  # (extra: video)
-    "mp4": Format("export.video:write_mp4", (".mp4",)),  # (extra: video)
+    "gif": Format("export.video:write_video", (".gif",)),  # (extra: video)
+    "mp4": Format("export.video:write_video", (".mp4",)),  # (extra: video)
     "html": Format("page:write_page", (".html", ".htm")),  # plays the recording in a browser
 }
 

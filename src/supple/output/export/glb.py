@@ -7,6 +7,7 @@ metres, as in Supple.
 from __future__ import annotations
 
 import logging
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,6 @@ from numpy.typing import NDArray
 
 from supple.files.replacing import whole_file
 from supple.output.drawing import (
-    OBSTACLE_COLOR,
     ObstaclePicture,
     Picture,
     evenly,
@@ -42,7 +42,7 @@ def write_glb(recording: Recording, output: Path) -> None:
     glb = _Glb(frames)
     for picture in pictures(recording):
         glb.add_body(picture)
-    for obstacle in obstacle_pictures(recording, view_of(recording)):
+    for obstacle in obstacle_pictures(recording.obstacles, view_of(recording)):
         glb.add_obstacle(obstacle)
     with whole_file(output) as fresh:
         fresh.write_bytes(glb.to_bytes())
@@ -67,7 +67,6 @@ class _Glb:
         times = np.array([frame.time for frame in frames])
         self.times = self._accessor((times - times[0])[:, None], "SCALAR", bounds=True)
         self.animation = pygltflib.Animation(name="recording", channels=[], samplers=[])
-        self.weights: int | None = None
 
     def add_body(self, picture: Picture) -> None:
         """Add a mesh whose base shape is frame 0, and whose k-th morph target gives frame k."""
@@ -80,20 +79,20 @@ class _Glb:
             targets.append({"POSITION": self._vectors(x - x0, bounds=True), "NORMAL": self._vectors(n - n0)})
         node = self._mesh_node(picture.name, x0, n0, picture.triangles, self._material(picture.color, 1.0), targets)
         if targets:
-            self._animate(node, "weights", self._weights())
+            self._animate(node, "weights", self._weights)
 
     def add_obstacle(self, obstacle: ObstaclePicture) -> None:
         """Add a rigid mesh; its poses are animated where it moves."""
         # Triangles share no corners, so that edges stay sharp.
         x = obstacle.vertices[obstacle.triangles.ravel()]
         triangles = np.arange(len(x), dtype=np.int32).reshape(-1, 3)
-        material = self._material(OBSTACLE_COLOR, obstacle.opacity)
+        material = self._material(obstacle.color, obstacle.opacity)
         node = self._mesh_node(obstacle.name, x, vertex_normals(x, triangles), triangles, material, [])
         poses = np.stack([frame.poses[obstacle.number] for frame in self.frames])
         rotations = _quaternions(poses[:, :, :3])
         made = self.document.nodes[node]
         made.translation, made.rotation = poses[0, :, 3].tolist(), rotations[0].tolist()
-        if len(poses) > 1 and np.any(poses != poses[0]):
+        if obstacle.moves(self.frames):
             self._animate(node, "translation", self._vectors(poses[:, :, 3]))
             self._animate(node, "rotation", self._accessor(rotations, "VEC4"))
 
@@ -106,12 +105,11 @@ class _Glb:
         self.document.set_binary_blob(bytes(self.blob))
         return b"".join(self.document.save_to_bytes())
 
+    @cached_property
     def _weights(self) -> int:
         """Target k has weight 1 in frame k and 0 in all others; the first frame is the mesh itself."""
-        if self.weights is None:
-            k = len(self.frames)
-            self.weights = self._accessor(np.eye(k, k - 1, -1).reshape(-1, 1), "SCALAR")
-        return self.weights
+        k = len(self.frames)
+        return self._accessor(np.eye(k, k - 1, -1).reshape(-1, 1), "SCALAR")
 
     def _mesh_node(
         self, name: str, x: NDArray, normals: NDArray, triangles: NDArray, material: int, targets: list[dict[str, int]]
@@ -119,7 +117,7 @@ class _Glb:
         kinds, document = self.kinds, self.document
         primitive = kinds.Primitive(
             attributes=kinds.Attributes(POSITION=self._vectors(x, bounds=True), NORMAL=self._vectors(normals)),
-            indices=self._indices(triangles),
+            indices=self._append(triangles.astype("<u4").reshape(-1, 1), _UNSIGNED, "SCALAR", {}, _INDICES),
             material=material,
             targets=targets or None,
         )
@@ -149,10 +147,6 @@ class _Glb:
 
     def _vectors(self, values: NDArray, *, bounds: bool = False) -> int:
         return self._accessor(values, "VEC3", bounds=bounds, target=_VERTICES)
-
-    def _indices(self, triangles: NDArray) -> int:
-        data = np.ascontiguousarray(triangles, dtype="<u4").reshape(-1, 1)
-        return self._append(data, _UNSIGNED, "SCALAR", {}, _INDICES)
 
     def _accessor(self, values: NDArray, kind: str, *, bounds: bool = False, target: int | None = None) -> int:
         data = np.ascontiguousarray(np.nan_to_num(values), dtype="<f4")

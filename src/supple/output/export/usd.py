@@ -14,7 +14,7 @@ import numpy as np
 
 from supple.errors import OutputError
 from supple.files.replacing import whole_file
-from supple.output.drawing import OBSTACLE_COLOR, obstacle_pictures, pictures, view_of
+from supple.output.drawing import ObstaclePicture, obstacle_pictures, pictures, view_of
 from supple.output.recording.reader import Recording
 
 
@@ -38,20 +38,16 @@ def write_usd(recording: Recording, output: Path) -> None:
         stage.SetStartTimeCode(0)
         stage.SetEndTimeCode(len(recording) - 1)
         stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, "/recording").GetPrim())
-        bodies = UsdGeom.Scope.Define(stage, "/recording/bodies").GetPath()
-        for i, picture in enumerate(pictures(recording)):
-            mesh = _define(stage, f"{bodies}/{_identifier(picture.name, i)}", picture.name, picture)
-            for k, frame in enumerate(recording):
-                _set_points(mesh, picture.at(frame), k)
-        rigid = UsdGeom.Scope.Define(stage, "/recording/obstacles").GetPath()
-        for i, obstacle in enumerate(obstacle_pictures(recording, view_of(recording))):
-            mesh = _define(stage, f"{rigid}/{_identifier(obstacle.name, i)}", obstacle.name, obstacle)
-            poses = np.stack([frame.poses[obstacle.number] for frame in recording])
-            if np.any(poses != poses[0]):
+        obstacles = obstacle_pictures(recording.obstacles, view_of(recording))
+        for group, drawn in (("bodies", pictures(recording)), ("obstacles", obstacles)):
+            folder = UsdGeom.Scope.Define(stage, f"/recording/{group}").GetPath()
+            for i, picture in enumerate(drawn):
+                mesh = _define(stage, f"{folder}/{_identifier(picture.name, i)}", picture)
+                if isinstance(picture, ObstaclePicture) and not picture.moves(recording):
+                    _set_points(mesh, picture.at(recording[0]), None)
+                    continue
                 for k, frame in enumerate(recording):
-                    _set_points(mesh, obstacle.at(frame), k)
-            else:
-                _set_points(mesh, obstacle.at(recording[0]), None)
+                    _set_points(mesh, picture.at(frame), k)
         try:
             stage.GetRootLayer().Save()
         except Tf.ErrorException as error:
@@ -60,16 +56,16 @@ def write_usd(recording: Recording, output: Path) -> None:
             raise OSError(errno.EIO, reason[1] if reason else "USD could not write it") from None
 
 
-def _define(stage, path: str, name: str, picture):
+def _define(stage, path: str, picture):
     from pxr import Gf, UsdGeom, Vt
 
     mesh = UsdGeom.Mesh.Define(stage, path)
-    mesh.GetPrim().SetDisplayName(name)
+    mesh.GetPrim().SetDisplayName(picture.name)
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     triangles = picture.triangles
     mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(triangles), 3, dtype=np.int32)))
     mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(triangles.ravel(), dtype=np.int32)))
-    color = np.array(getattr(picture, "color", OBSTACLE_COLOR)) / 255.0
+    color = np.array(picture.color) / 255.0
     mesh.CreateDisplayColorAttr([Gf.Vec3f(*(float(c) for c in color**2.2))])
     return mesh
 

@@ -14,22 +14,17 @@ from supple.output.recording.reader import Recording
 _NEEDED = {"gif": ("pyvista", "PIL"), "mp4": ("pyvista", "imageio_ffmpeg")}
 
 
-def write_gif(recording: Recording, output: Path) -> None:
-    """Write an animated GIF, of about 20 frames per second."""
-    _write(recording, output, "gif")
+def write_video(recording: Recording, output: Path) -> None:
+    """Write a video that plays at the speed of the simulation, of the format that the suffix names.
 
-
-def write_mp4(recording: Recording, output: Path) -> None:
-    """Write an H.264 video, of at most 60 frames per second, that plays at the speed of the simulation."""
-    _write(recording, output, "mp4")
-
-
-def _write(recording: Recording, output: Path, kind: str) -> None:
+    A .gif has about 20 frames per second, a .mp4 (H.264) at most 60.
+    """
+    kind = output.suffix[1:].lower()
     missing = [name for name in _NEEDED[kind] if find_spec(name) is None]
     if missing:
         raise OutputError(f"export to {kind} needs {missing[0]}, which is not installed; pip install 'supple[video]'")
     with whole_file(output) as fresh:
-        command = [sys.executable, "-m", "supple.output.export.video_worker", str(recording.path), str(fresh), kind]
+        command = [sys.executable, "-m", "supple.output.export.video_worker", str(recording.path), str(fresh)]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode != 0 or not fresh.exists():
             raise OutputError(f"{output}: {_reason(done)}")

@@ -1,4 +1,4 @@
-"""The child process that draws a video: `python -m supple.output.export.video_worker RECORDING OUTPUT gif|mp4`."""
+"""The child process that draws a .gif or .mp4: `python -m supple.output.export.video_worker RECORDING OUTPUT`."""
 
 from __future__ import annotations
 
@@ -12,14 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SuppleError
-from supple.output.drawing import (
-    OBSTACLE_COLOR,
-    evenly,
-    obstacle_pictures,
-    pictures,
-    vertex_normals,
-    view_of,
-)
+from supple.output.drawing import evenly, obstacle_pictures, pictures, vertex_normals, view_of
 from supple.output.recording.reader import RecordedFrame, Recording, read_recording
 
 _ANGLE = 30.0  # of the camera, upwards [degrees]
@@ -42,9 +35,9 @@ def draw(recording: Recording, frames: list[RecordedFrame], size: tuple[int, int
         actor = plotter.add_mesh(mesh, color=color, specular=0.4, specular_power=25, ambient=0.15)
         actor.prop.interpolation = "phong"  # uses the normals that are set for each frame below
         moving.append((mesh, picture, True))
-    for obstacle in obstacle_pictures(recording, view):
+    for obstacle in obstacle_pictures(recording.obstacles, view):
         mesh = _polydata(pyvista, obstacle.at(frames[0]), obstacle.triangles)
-        plotter.add_mesh(mesh, color=[c / 255.0 for c in OBSTACLE_COLOR], opacity=obstacle.opacity, ambient=0.3)
+        plotter.add_mesh(mesh, color=[c / 255.0 for c in obstacle.color], opacity=obstacle.opacity, ambient=0.3)
         moving.append((mesh, obstacle, False))
     camera = plotter.camera
     camera.position, camera.focal_point, camera.up = tuple(view.eye(_ANGLE)), tuple(view.center), tuple(view.up)
@@ -69,8 +62,9 @@ def _polydata(pyvista: Any, x: NDArray[np.float64], triangles: NDArray[np.int32]
     return pyvista.PolyData(x.astype(np.float32), faces)
 
 
-def write(source: Path, output: Path, kind: str) -> None:
-    """Draw a recording to a file."""
+def write(source: Path, output: Path) -> None:
+    """Draw a recording to a file, .gif or .mp4."""
+    kind = output.suffix[1:].lower()
     with read_recording(source) as recording:
         duration = max(float(recording.times[-1] - recording.times[0]), recording.dt)
         count = min(_MOST_FRAMES[kind], max(2, round(duration * _RATES[kind]) + 1))
@@ -123,9 +117,9 @@ def _fail(reason: str) -> int:
 
 
 def main(arguments: list[str]) -> int:
-    source, output, kind = arguments
+    source, output = arguments
     try:
-        write(Path(source), Path(output), kind)
+        write(Path(source), Path(output))
     except SuppleError as error:
         return _fail(str(error))
     except OSError as error:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import OutputError
+from supple.output.recording.file import Series
 
 # An HDF5 header can claim more data than the file contains. gzip compresses at most 1032 to one, so that a claim beyond
 # this factor is wrong.
@@ -105,7 +106,8 @@ class CheckedFile:
         got = dataset.shape or ()
         if len(got) != len(shape) or any(want not in (None, have) for want, have in zip(shape, got, strict=True)):
             raise self.broken(f"{path} has shape {got}, not {tuple('any' if s is None else s for s in shape)}")
-        return self._load(dataset, path, kind, ())
+        self._check_data(dataset, path, kind, dataset.size * dataset.dtype.itemsize)
+        return self._load(dataset, path, ())
 
     def indices(self, path: str, columns: int, count: int) -> NDArray[np.int32]:
         """(k, columns) int32 below `count`."""
@@ -116,33 +118,32 @@ class CheckedFile:
             )
         return np.ascontiguousarray(values, dtype=np.int32)
 
-    def check_series(self, path: str, frames: int, rows: int, row_shape: tuple[int, ...], kind: str) -> h5py.Dataset:
-        """A dataset with `rows` rows for each of `frames` frames, at least."""
-        dataset = self.dataset(path)
-        got = dataset.shape or ()
-        if got[1:] != row_shape or not got[:1] >= (frames * rows,):
-            raise self.broken(f"{path} has shape {got}; {frames} frames need {(frames * rows, *row_shape)}")
-        if dataset.dtype.kind != kind:
-            raise self.broken(f"{path} holds {dataset.dtype}")
-        one = rows * int(np.prod(row_shape, dtype=np.int64)) * dataset.dtype.itemsize
-        if one > _MOST_EXPANSION * self._bytes:
-            raise self.broken(f"{path} claims more data than the file can contain")
+    def check_series(self, series: Series, frames: int) -> h5py.Dataset:
+        """The dataset of a series, which has the rows of at least so many frames."""
+        dataset = self.dataset(series.path)
+        got, needed = dataset.shape or (), series.shape(frames)
+        if got[1:] != needed[1:] or not got[:1] >= needed[:1]:
+            raise self.broken(f"{series.path} has shape {got}; {frames} frames need {needed}")
+        self._check_data(dataset, series.path, np.dtype(series.dtype).kind, series.frame_bytes)
         return dataset
 
-    def first_rows(self, path: str, frames: int, row_shape: tuple[int, ...], kind: str) -> NDArray[Any]:
-        """The rows of all frames of a series with one row per frame."""
-        dataset = self.check_series(path, frames, 1, row_shape, kind)
-        return self._load(dataset, path, kind, slice(0, frames), frames * int(np.prod(row_shape, dtype=np.int64)))
+    def rows(self, series: Series, begin: int, end: int, what: str) -> NDArray[Any]:
+        """The rows of the frames from `begin` to `end`; an error calls them `what`."""
+        dataset = self.check_series(series, end)
+        self._check_data(dataset, series.path, dataset.dtype.kind, (end - begin) * series.frame_bytes)
+        return self._load(dataset, what, slice(begin * series.rows, end * series.rows))
 
     def close(self) -> None:
         self._file.close()
 
-    def _load(self, dataset: h5py.Dataset, path: str, kind: str, rows: Any, size: int | None = None) -> NDArray[Any]:
+    def _check_data(self, dataset: h5py.Dataset, path: str, kind: str, size: int) -> None:
         if dataset.dtype.kind != kind:
             raise self.broken(f"{path} holds {dataset.dtype}")
-        if (dataset.size if size is None else size) * dataset.dtype.itemsize > _MOST_EXPANSION * self._bytes:
+        if size > _MOST_EXPANSION * self._bytes:
             raise self.broken(f"{path} claims more data than the file can contain")
+
+    def _load(self, dataset: h5py.Dataset, what: str, rows: Any) -> NDArray[Any]:
         try:
             return np.asarray(dataset[rows])
         except (OSError, RuntimeError, ValueError) as error:
-            raise self.broken(f"{path} cannot be read ({' '.join(str(error).split())})") from None
+            raise self.broken(f"{what} cannot be read ({' '.join(str(error).split())})") from None

@@ -99,9 +99,9 @@ class RecordedDetails:
         """The description, as JSON can hold it."""
         return {"kind": self.kind.__name__, "fields": [vars(field) for field in self.fields]}
 
-    def of_frame(self, number: int, series: Callable[[Series], NDArray[Any]]) -> SolverDetails:
-        """The details of one frame; `series` returns all frames' rows of a series."""
-        return self.kind(**{field.name: field.loaded(series(field.series)[number]) for field in self.fields})
+    def of_frame(self, number: int, series: Callable[[str], NDArray[Any]]) -> SolverDetails:
+        """The details of one frame; `series` returns all frames' rows of the series at a path."""
+        return self.kind(**{field.name: field.loaded(series(field.series.path)[number]) for field in self.fields})
 
 
 def _field_like(name: str, value: Any) -> RecordedField:

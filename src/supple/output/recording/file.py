@@ -81,22 +81,21 @@ class RecordingFile:
     def __init__(self, path: Path, layout: Layout, capacity: int, written: int = 0) -> None:
         self.path, self.layout, self.capacity, self.written = path, layout, capacity, written
         with h5py.File(path, "r") as file:
-            self._places = {s.path: _place(file, s) for s in layout.series}
+            self._series = {s.path: (s, _place(file, s)) for s in layout.series}
             self._counter = _dataset(file, WRITTEN).id.get_offset()
             header = h5py.h5o.get_info(file["VTKHDF/Steps"].id).addr
             lengths = {h5py.h5o.get_info(item.id).addr for item in _step_datasets(file)}
-            self._series = {s.path: s for s in layout.series}
         self._file: BinaryIO = open(path, "r+b", buffering=0)  # noqa: SIM115
         self._steps = _place_of_mark(self._file, header)
         self._lengths = sorted(_place_of_length(self._file, address, capacity) for address in lengths)
 
     def put(self, path: str, values: ArrayLike) -> None:
         """Write the next frame's rows of one series; readers see them after `commit`."""
-        series = self._series[path]
+        series, place = self._series[path]
         data = np.ascontiguousarray(values, dtype=series.dtype)
         if data.nbytes != series.frame_bytes:
             raise ValueError(f"{path}: a frame has {series.frame_bytes} bytes, not {data.nbytes}")
-        self._write(self._places[path] + self.written * series.frame_bytes, data.tobytes())
+        self._write(place + self.written * series.frame_bytes, data.tobytes())
 
     def commit(self) -> None:
         """Add the frame that was put to the count of frames."""

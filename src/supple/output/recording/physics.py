@@ -63,7 +63,6 @@ def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
             kind[part.tets], mu[part.tets], lam[part.tets] = rows.kind, rows.mu, rows.lam
     group = own.create_group("physics")
     group["kind"], group["mu"], group["lam"] = kind, mu, lam
-    group["stitched"], group["anchors"] = _stitched(system), _anchors(system)
     return {
         "laws": [law.__name__ for law in ELASTIC_MATERIALS],
         "compliances": compliances,
@@ -81,41 +80,6 @@ def _untouching(system: System) -> list[list[int]]:
     obstacle = np.arange(len(collide)) >= len(system.bodies)
     passing = np.argwhere(np.triu(~collide & ~(obstacle[:, None] & obstacle[None, :])))
     return passing.tolist()
-
-
-def _stitched(system: System) -> NDArray[np.int64]:
-    """(k, 4) the vertices of each stitch, the last one twice where it has fewer; anchors come after the bodies'."""
-    stitching = system.stitching
-    springs = stitching.springs.vertices
-    return np.concatenate([stitching.tets.vertices, springs[:, [0, 1, 2, 2]]]).astype(np.int64)
-
-
-def _anchors(system: System) -> NDArray[np.int64]:
-    """(a, 2) obstacle, and row of its recorded vertices, of each anchor."""
-    anchors = system.stitching.anchors
-    out = np.zeros((len(anchors), 2), dtype=np.int64)
-    for k, (owner, point) in enumerate(zip(anchors.owner, anchors.points, strict=True)):
-        surface = anchors.obstacles[owner].surface_mesh
-        assert surface is not None  # others cannot be stitched to
-        out[k] = owner, np.flatnonzero((surface.compact().vertices == point).all(axis=1))[0]
-    return out
-
-
-@dataclass(frozen=True, eq=False)
-class Untouching:
-    """Pairs that may touch or pass through each other.
-
-    Attributes
-    ----------
-    pairs : numbers of bodies, then obstacles
-    stitched : (k, 4) vertices of stitches: the first may touch the triangles that have all of the others. Numbers from
-        n on, where n is the number of all bodies' vertices, are anchors
-    anchors : (a, 2) obstacle, and row of its vertices
-    """
-
-    pairs: tuple[tuple[int, int], ...]
-    stitched: NDArray[np.int64]
-    anchors: NDArray[np.int64]
 
 
 def read_physics(file: CheckedFile, header: dict[str, Any], m: int) -> RecordedPhysics | None:
@@ -147,29 +111,20 @@ def read_physics(file: CheckedFile, header: dict[str, Any], m: int) -> RecordedP
     return RecordedPhysics(kind, mu, lam, compliances, *counts)
 
 
-def read_untouching(
-    file: CheckedFile, header: dict[str, Any], vertices: int, obstacle_vertices: list[int]
-) -> Untouching:
-    """The pairs that may touch; `vertices` is the number of all bodies', `obstacle_vertices` those of each obstacle.
+def read_untouching(file: CheckedFile, header: dict[str, Any]) -> tuple[tuple[int, int], ...]:
+    """The pairs that may pass through each other: numbers of bodies, then obstacles.
 
     Raises
     ------
-    OutputError : where a body, obstacle or vertex does not exist.
+    OutputError : where a body or obstacle does not exist.
     """
-    physics = header.get("physics")
-    if physics is None:
-        return Untouching((), np.zeros((0, 4), dtype=np.int64), np.zeros((0, 2), dtype=np.int64))
+    if header.get("physics") is None:
+        return ()
     try:
-        pairs = tuple((int(i), int(j)) for i, j in physics["untouching"])
+        pairs = tuple((int(i), int(j)) for i, j in header["physics"]["untouching"])
     except (KeyError, TypeError, ValueError):
         raise file.broken("the pairs that may touch are not described as they should be") from None
-    stitched = file.array(f"{_GROUP}/stitched", "i", (None, 4)).astype(np.int64)
-    anchors = file.array(f"{_GROUP}/anchors", "i", (None, 2)).astype(np.int64)
-    owners = len(header["bodies"]) + len(obstacle_vertices)
-    numbers = np.array(pairs, dtype=np.int64).reshape(-1, 2)
-    wrong = ((numbers < 0) | (numbers >= owners)).any()
-    wrong |= ((stitched < 0) | (stitched >= vertices + len(anchors))).any()
-    wrong |= any(not (0 <= i < len(obstacle_vertices) and 0 <= k < obstacle_vertices[i]) for i, k in anchors.tolist())
-    if wrong:
-        raise file.broken("what may touch names a body, obstacle or vertex that does not exist")
-    return Untouching(pairs, stitched, anchors)
+    owners = len(header["bodies"]) + len(header["obstacles"])
+    if not all(0 <= number < owners for pair in pairs for number in pair):
+        raise file.broken("what may touch names a body or obstacle that does not exist")
+    return pairs

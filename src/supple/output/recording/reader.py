@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from supple.errors import OutputError
 from supple.output.recording.checked_hdf5 import CheckedFile
 from supple.output.recording.details import RecordedDetails
-from supple.output.recording.file import WRITTEN, Series
+from supple.output.recording.file import WRITTEN
 from supple.output.recording.physics import RecordedPhysics, read_physics, read_untouching
-from supple.output.recording.recorder import MESSAGE_BYTES, REPORT_NUMBERS, REPORT_VECTORS
+from supple.output.recording.recorder import REPORT_NUMBERS, REPORT_VECTORS, frame_layout
 from supple.output.recording.scene import RecordedBody, RecordedObstacle, read_bodies, read_header, read_obstacles
 from supple.output.recording.stitches import RecordedStitches, read_stitches
 from supple.simulate import Report
@@ -25,6 +25,7 @@ from supple.state import State, Status
 # Recordings of earlier versions do not have these, but their values are known.
 _OF_EARLIER = {"stitch_energy": 0.0, "largest_stitch_stretch": np.nan}
 _MESSAGE = "supple/frames/message"
+_READ_BY_FRAME = ("VTKHDF/Points", "VTKHDF/PointData/velocities", "VTKHDF/CellData/det_F", "supple/frames/poses")
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +41,7 @@ class RecordedFrame:
     @property
     def index(self) -> int:
         """Number of steps since the start."""
-        return int(self.recording._values("supple/frames/index", (), "i")[self.number])
+        return int(self.recording._values("supple/frames/index")[self.number])
 
     @property
     def time(self) -> float:
@@ -81,16 +82,17 @@ class RecordedFrame:
         """
         values = {name: float(self.recording.series(name)[self.number]) for name in REPORT_NUMBERS}
         vectors = {name: self.recording.series(name)[self.number] for name in REPORT_VECTORS}
+        message = self._rows(_MESSAGE).tobytes() if _MESSAGE in self.recording._file else b""
         distance, stretch = values.pop("min_distance"), values.pop("largest_stitch_stretch")
         return Report(
             **values,
             **vectors,
             status=self.recording.statuses[self.number],
-            iterations=int(self.recording._values("supple/frames/iterations", (), "i")[self.number]),
+            iterations=int(self.recording._values("supple/frames/iterations")[self.number]),
             min_distance=None if np.isnan(distance) else distance,
             largest_stitch_stretch=None if np.isnan(stretch) else stretch,
-            message=self.recording._message(self.number),
-            details=self.recording.details.of_frame(self.number, self.recording._details_series),
+            message=message.rstrip(b"\0").decode(errors="replace"),
+            details=self.recording.details.of_frame(self.number, self.recording._values),
         )
 
     def _rows(self, path: str) -> NDArray[Any]:
@@ -108,7 +110,7 @@ class Recording(Sequence[RecordedFrame]):
     gravity : (3,) [m/s^2]; dt : time from frame to frame [s]
     physics : the bodies' laws and what acts on them, or None where an older version wrote the recording
     details : which fields of the solver's details are kept
-    untouching : pairs that may touch or pass through each other
+    untouching : pairs that may pass through each other: numbers of bodies, then obstacles
     scene_text : the scene file's text, or None; solver : its description, or None; supple_version : of the writer
     """
 
@@ -140,7 +142,7 @@ class Recording(Sequence[RecordedFrame]):
         self.bodies: tuple[RecordedBody, ...] = read_bodies(file, header, n, m, self.triangles)
         self.obstacles: tuple[RecordedObstacle, ...] = read_obstacles(file, header)
         self.physics: RecordedPhysics | None = read_physics(file, header, m)
-        self.untouching = read_untouching(file, header, n, [len(obstacle.vertices) for obstacle in self.obstacles])
+        self.untouching = read_untouching(file, header)
         self.stitches: RecordedStitches = read_stitches(file, n, len(self.obstacles))
         self.dt = float(header["dt"])
         self.solver: str | None = header.get("solver")
@@ -149,19 +151,13 @@ class Recording(Sequence[RecordedFrame]):
         self._count = int(file.array(WRITTEN, "i", ()))
         if self._count < 1:
             raise file.broken(f"its number of frames is {self._count}")
-        for path, rows, shape, kind in (
-            ("VTKHDF/Points", n, (3,), "f"),
-            ("VTKHDF/PointData/velocities", n, (3,), "f"),
-            ("VTKHDF/CellData/det_F", m, (), "f"),
-            ("supple/frames/poses", 1, (len(self.obstacles), 3, 4), "f"),
-            (_MESSAGE, 1, (MESSAGE_BYTES,), "u"),
-        ):
-            if path != _MESSAGE or path in file:
-                file.check_series(path, self._count, rows, shape, kind)
-        self.times: NDArray[np.float64] = file.first_rows("supple/frames/time", self._count, (), "f")
+        self._series = {series.path: series for series in frame_layout(n, m, len(self.obstacles), self.details).series}
+        for path in (*_READ_BY_FRAME, *([_MESSAGE] if _MESSAGE in file else [])):
+            file.check_series(self._series[path], self._count)
+        self.times: NDArray[np.float64] = self._values("supple/frames/time")
         if not np.isfinite(self.times).all():
             raise file.broken("a frame's time is not finite")
-        codes = self._values("supple/frames/status", (), "u")
+        codes = self._values("supple/frames/status")
         names = header["statuses"]
         if codes.max() >= len(names) or not set(names) <= {str(status) for status in Status}:
             raise file.newer("a frame has a status that this version does not know")
@@ -210,16 +206,13 @@ class Recording(Sequence[RecordedFrame]):
 
     def series(self, name: str) -> NDArray[np.float64]:
         """A number (frames,) or vector (frames, 3) of the reports over time, such as "kinetic_energy"."""
-        if name in REPORT_VECTORS:
-            return self._values(f"supple/frames/{name}", (3,))
-        if name in REPORT_NUMBERS:
-            path = f"supple/frames/{name}"
-            if name in _OF_EARLIER and path not in self._file:
-                return np.full(self._count, _OF_EARLIER[name])
-            return self._values(path)
-        raise OutputError(
-            f"{self.path}: there is no series {name!r}; take one of {', '.join(REPORT_NUMBERS + REPORT_VECTORS)}"
-        )
+        known = REPORT_NUMBERS + REPORT_VECTORS
+        if name not in known:
+            raise OutputError(f"{self.path}: there is no series {name!r}; take one of {', '.join(known)}")
+        path = f"supple/frames/{name}"
+        if name in _OF_EARLIER and path not in self._file:
+            return np.full(self._count, _OF_EARLIER[name])
+        return self._values(path)
 
     def close(self) -> None:
         """Close the file; frames that were not read before can then not be read."""
@@ -231,34 +224,15 @@ class Recording(Sequence[RecordedFrame]):
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _values(self, path: str, shape: tuple[int, ...] = (), kind: str = "f") -> NDArray[Any]:
+    def _values(self, path: str) -> NDArray[Any]:
         """All frames' rows of a series; read once."""
         if path not in self._read_series:
-            self._read_series[path] = self._file.first_rows(path, self._count, shape, kind)
+            self._read_series[path] = self._file.rows(self._series[path], 0, self._count, path)
         return self._read_series[path]
 
     def _frame_rows(self, path: str, number: int) -> NDArray[Any]:
-        dataset = self._file.dataset(path)
-        rows = len(self.tets) if path == "VTKHDF/CellData/det_F" else 1
-        if path in ("VTKHDF/Points", "VTKHDF/PointData/velocities"):
-            rows = len(self.rest_positions)
-        try:
-            block = dataset[number * rows : (number + 1) * rows]
-        except (OSError, RuntimeError) as error:
-            raise self._file.broken(f"frame {number} cannot be read ({_reason(error)})") from None
+        block = self._file.rows(self._series[path], number, number + 1, f"frame {number}")
         return block[0] if path == "supple/frames/poses" else block
-
-    def _details_series(self, series: Series) -> NDArray[Any]:
-        return self._values(series.path, series.row_shape, np.dtype(series.dtype).kind)
-
-    def _message(self, number: int) -> str:
-        if _MESSAGE not in self._file:
-            return ""
-        return self._frame_rows(_MESSAGE, number).tobytes().rstrip(b"\0").decode(errors="replace")
-
-
-def _reason(error: Exception) -> str:
-    return " ".join(str(error).split())
 
 
 def read_recording(path: str | Path) -> Recording:

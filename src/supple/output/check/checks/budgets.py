@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.output.check.frame_check import FrameCheck, Moment
+from supple.output.check.frame_check import FrameCheck
 from supple.output.check.report import CheckResult
-from supple.output.check.settings import CheckSettings
-from supple.output.check.snapshot import Scene, Snapshot
-from supple.output.check.tally import Tally, skipped
+from supple.output.check.snapshot import Snapshot
 from supple.output.recording.reader import Recording
 
 _UNKNOWN = "the recording does not contain what acts on its bodies: an older version wrote it"
@@ -35,17 +33,15 @@ class Momentum(FrameCheck):
     """P(t) - P(0) = M g t, where no other force acts."""
 
     name = "momentum"
+    good = "changes by gravity alone, within {worst}"
+    bad = "changes by {worst} of itself without a force"
 
-    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
-        super().__init__(scene, settings)
-        self._tally = Tally(self.name)
-        self._why_not = external_action(scene.recording)
+    def begin(self) -> None:
+        self.why_not = external_action(self.scene.recording)
         self._start: tuple[float, NDArray[np.float64]] | None = None
         self._scale = 0.0
 
     def see(self, at: Snapshot) -> None:
-        if self._why_not is not None:
-            return
         recording = self.scene.recording
         m, v, g = recording.masses, at.velocities, recording.gravity
         P = m @ v
@@ -56,14 +52,7 @@ class Momentum(FrameCheck):
         pushed = total * float(np.linalg.norm(g)) * t
         self._scale = max(self._scale, float(m @ np.linalg.norm(v, axis=1)) + pushed + floor)
         change = float(np.linalg.norm(P - self._start[1] - total * g * t)) / self._scale
-        self._tally.see(at, change, not change <= self.settings.max_momentum_change)
-
-    def result(self) -> CheckResult:
-        if self._why_not is not None:
-            return skipped(self.name, self._why_not)
-        return self._tally.result(
-            "changes by gravity alone, within {worst}", "changes by {worst} of itself without a force"
-        )
+        self.tally.see(at, change, not change <= self.settings.max_momentum_change)
 
 
 class Spin(FrameCheck):
@@ -76,21 +65,19 @@ class Spin(FrameCheck):
     """
 
     name = "spin"
+    bad = "angular momentum changes by {worst} of what turns, without a torque"
 
-    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
-        super().__init__(scene, settings)
-        self._tally = Tally(self.name)
-        recording = scene.recording
-        self._why_not = external_action(recording)
+    def begin(self) -> None:
+        recording = self.scene.recording
+        self.why_not = external_action(recording)
         self._implicit = (recording.solver or "").startswith("Implicit")
-        if self._why_not is None and self._implicit and settings.every > 1:
-            self._why_not = "the error of an implicit integrator is known from one frame to the next only"
+        self.good = "constant within {worst}" + (", beyond the error of the integrator" if self._implicit else "")
+        if self.why_not is None and self._implicit and self.settings.every > 1:
+            self.why_not = "the error of an implicit integrator is known from one frame to the next only"
         self._last: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
         self._drift, self._scale = 0.0, 0.0
 
     def see(self, at: Snapshot) -> None:
-        if self._why_not is not None:
-            return
         recording = self.scene.recording
         m, x = recording.masses, at.positions
         total = float(m.sum())
@@ -107,47 +94,39 @@ class Spin(FrameCheck):
             # Changes beyond the allowed ones add up over the steps.
             self._drift += max(0.0, change)
             share = self._drift / self._scale
-            self._tally.see(at, share, not share <= self.settings.max_momentum_change)
+            self.tally.see(at, share, not share <= self.settings.max_momentum_change)
         self._last = L, v
-
-    def result(self) -> CheckResult:
-        if self._why_not is not None:
-            return skipped(self.name, self._why_not)
-        good = "constant within {worst}" + (", beyond the error of the integrator" if self._implicit else "")
-        return self._tally.result(good, "angular momentum changes by {worst} of what turns, without a torque")
 
 
 class Energy(FrameCheck):
     """The sum of kinetic, elastic, stitch and potential energy does not grow where nothing does work."""
 
     name = "energy"
+    good = "never above the start by more than {worst} of what is moved"
+    bad = "grows by {worst}"
 
-    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
-        super().__init__(scene, settings)
-        recording = scene.recording
+    def begin(self) -> None:
+        recording = self.scene.recording
         physics = recording.physics
-        self._why_not = None
         if physics is None:
-            self._why_not = _UNKNOWN
+            self.why_not = _UNKNOWN
         elif physics.forces or physics.soft_targets:
-            self._why_not = "forces or soft targets do work"
+            self.why_not = "forces or soft targets do work"
         elif physics.scripted_pins:
-            self._why_not = "scripted pins do work"
+            self.why_not = "scripted pins do work"
         elif physics.stitches and recording.stitches.laws is None:
-            self._why_not = "the recording does not contain the laws of its stitches: an older version wrote it"
+            self.why_not = "the recording does not contain the laws of its stitches: an older version wrote it"
         self._first: Snapshot | None = None
-        self._rows: list[tuple[Moment, float, float]] = []
+        self._rows: list[tuple[int, float, float]] = []
 
     def see(self, at: Snapshot) -> None:
-        if self._why_not is not None:
-            return
         recording = self.scene.recording
         self._first = self._first or at
         held = recording.pinned_vertices
         if not np.array_equal(at.positions[held], self._first.positions[held]):
-            self._why_not = "pinned vertices move, which does work"
+            self.why_not = "pinned vertices move, which does work"
         elif not np.array_equal(at.poses, self._first.poses):
-            self._why_not = "obstacles move, which does work"
+            self.why_not = "obstacles move, which does work"
         else:
             m, v = recording.masses, at.velocities
             elastic = at.elastic_energy
@@ -155,20 +134,16 @@ class Energy(FrameCheck):
                 elastic = float(recording.series("elastic_energy")[at.number])
             moved = 0.5 * float(m @ np.einsum("ij,ij->i", v, v)) + elastic + (at.stitch_energy or 0.0)
             fallen = at.positions - self._first.positions
-            self._rows.append((Moment(at.number, at.time), moved, -float((m @ fallen) @ recording.gravity)))
+            self._rows.append((at.number, moved, -float((m @ fallen) @ recording.gravity)))
 
     def result(self) -> CheckResult:
-        if self._why_not is not None:
-            return skipped(self.name, self._why_not)
-        if not self._rows:
-            return skipped(self.name, "there is no frame")
+        if self.why_not is not None:
+            return super().result()
         recording = self.scene.recording
-        stored = np.array([row[1] for row in self._rows])
-        height = np.array([row[2] for row in self._rows])
+        _, stored, height = np.array(self._rows).T
         weight = float(recording.masses.sum() * np.linalg.norm(recording.gravity))
         scale = float(stored.max() + np.ptp(height)) + _FLOOR * weight * self.scene.size + 1e-300
         gains = (stored + height - stored[0] - height[0]) / scale
-        tally = Tally(self.name)
-        for (moment, _, _), gain in zip(self._rows, gains, strict=True):
-            tally.see(moment, float(gain), not gain <= self.settings.max_energy_gain)
-        return tally.result("never above the start by more than {worst} of what is moved", "grows by {worst}")
+        for (number, _, _), gain in zip(self._rows, gains, strict=True):
+            self.tally.see(recording[number], float(gain), not gain <= self.settings.max_energy_gain)
+        return super().result()

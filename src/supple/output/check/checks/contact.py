@@ -12,36 +12,30 @@ from supple.output.check.geometry.containment import is_inside
 from supple.output.check.geometry.surface_pairs import closest_pair
 from supple.output.check.geometry.triangle_distance import triangles_apart
 from supple.output.check.report import CheckResult
-from supple.output.check.settings import CheckSettings
 from supple.output.check.snapshot import Scene, Snapshot
-from supple.output.check.surfaces import is_mesh, moved
-from supple.output.check.tally import Tally, skipped
+from supple.output.check.surfaces import moved
 
 
 class Intersection(FrameCheck):
     """Bodies with each other, with themselves, and with obstacles made of triangles."""
 
     name = "intersection"
-
-    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
-        super().__init__(scene, settings)
-        self._tally = Tally(self.name, "pairs")
+    unit = "pairs"
+    good = "no triangles meet"
+    bad = "triangles meet: {worst}"
 
     def see(self, at: Snapshot) -> None:
         count, pairs = at.meeting
         name = self.scene.surfaces.name_triangle
         where = f"{name(int(pairs[0, 0]))} and {name(int(pairs[0, 1]))}" if count else ""
-        self._tally.see(at, count, count > 0, where)
-
-    def result(self) -> CheckResult:
-        return self._tally.result("no triangles meet", "triangles meet: {worst}")
+        self.tally.see(at, count, count > 0, where)
 
 
 def clearances(scene: Scene, at: Snapshot) -> Iterator[tuple[str, Clearance]]:
     """The clearance of each body from each obstacle that is a formula: where, and how far."""
     surfaces = scene.surfaces
     for j, obstacle in enumerate(scene.recording.obstacles):
-        if is_mesh(obstacle):
+        if obstacle.obstacle.has_exact_triangles:
             continue
         for i in range(surfaces.bodies):
             if not surfaces.allowed[i, surfaces.bodies + j]:
@@ -51,7 +45,7 @@ def clearances(scene: Scene, at: Snapshot) -> Iterator[tuple[str, Clearance]]:
             if len(triangles) == 0:
                 continue
             found = clearance(obstacle, at.poses[j], at.points, np.unique(triangles), triangles)
-            part = surfaces.name_vertex(found.row) if found.by_vertex else surfaces.name_triangle(int(rows[found.row]))
+            part = scene.name("vertex", found.row) if found.by_vertex else surfaces.name_triangle(int(rows[found.row]))
             yield f"{part} and {obstacle.name}", found
 
 
@@ -59,35 +53,33 @@ class Obstacles(FrameCheck):
     """Bodies and the obstacles that are formulas."""
 
     name = "obstacles"
+    unit = "m"
+    lowest = True
+    good = "closest {worst}"
+    bad = "a body is in an obstacle, at {worst}"
 
-    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
-        super().__init__(scene, settings)
-        self._tally = Tally(self.name, "m", lowest=True)
+    def begin(self) -> None:
+        if all(recorded.obstacle.has_exact_triangles for recorded in self.scene.recording.obstacles):
+            self.why_not = "the scene has no half-space, round solid or room"
 
     def see(self, at: Snapshot) -> None:
         found = list(clearances(self.scene, at))
         if found:
             where, worst = min(found, key=lambda item: (not item[1].entered, item[1].smallest))
-            self._tally.see(at, worst.smallest, worst.entered, where)
-
-    def result(self) -> CheckResult:
-        if all(is_mesh(obstacle) for obstacle in self.scene.recording.obstacles):
-            return skipped(self.name, "the scene has no half-space, round solid or room")
-        return self._tally.result("closest {worst}", "a body is in an obstacle, at {worst}")
+            self.tally.see(at, worst.smallest, worst.entered, where)
 
 
 class Containment(FrameCheck):
     """Pieces of bodies and obstacles that are completely inside others, where no triangles meet."""
 
     name = "containment"
-
-    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
-        super().__init__(scene, settings)
-        self._tally = Tally(self.name, "pieces")
+    unit = "pieces"
+    good = "nothing is inside another thing"
+    bad = "contained: {worst}"
 
     def see(self, at: Snapshot) -> None:
         found = [*self._contained(at), *self._solids_in_bodies(at)]
-        self._tally.see(at, len(found), bool(found), found[0] if found else "")
+        self.tally.see(at, len(found), bool(found), found[0] if found else "")
 
     def _contained(self, at: Snapshot) -> Iterator[str]:
         surfaces, x = self.scene.surfaces, at.points
@@ -114,7 +106,7 @@ class Containment(FrameCheck):
         surfaces = self.scene.surfaces
         for j, obstacle in enumerate(self.scene.recording.obstacles):
             shape = obstacle.obstacle
-            if is_mesh(obstacle) or shape.is_room or shape.plane is not None:
+            if shape.has_exact_triangles or shape.is_room or shape.plane is not None:
                 continue
             # Of a convex solid, the mean of points about it is inside.
             center = moved(shape.triangles()[0].mean(axis=0)[None], at.poses[j])[0]
@@ -123,18 +115,17 @@ class Containment(FrameCheck):
                 if allowed and solid.closed and is_inside(at.points, center, surfaces.triangles, solid.triangles):
                     yield f"{obstacle.name} in {surfaces.names[solid.owner]}"
 
-    def result(self) -> CheckResult:
-        return self._tally.result("nothing is inside another thing", "contained: {worst}")
-
 
 class Distance(FrameCheck):
     """The smallest distance between triangles without a common corner, and from obstacles that are formulas."""
 
     name = "distance"
+    unit = "m"
+    lowest = True
+    good = "smallest {worst}"
+    bad = "surfaces touch or meet: {worst}"
 
-    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
-        super().__init__(scene, settings)
-        self._tally = Tally(self.name, "m", lowest=True)
+    def begin(self) -> None:
         self._last: tuple[int, int] | None = None
 
     def see(self, at: Snapshot) -> None:
@@ -143,7 +134,7 @@ class Distance(FrameCheck):
         count, pairs = at.meeting
         if count:
             a, b = int(pairs[0, 0]), int(pairs[0, 1])
-            self._tally.see(at, 0.0, True, f"{name(a)} and {name(b)} meet")
+            self.tally.see(at, 0.0, True, f"{name(a)} and {name(b)} meet")
             return
         best = np.inf
         if self._last is not None:
@@ -155,11 +146,11 @@ class Distance(FrameCheck):
         )
         if a >= 0:
             self._last = a, b
-            self._tally.see(at, float(np.sqrt(squared)), squared <= 0.0, lambda: f"{name(a)} and {name(b)}")
+            self.tally.see(at, float(np.sqrt(squared)), squared <= 0.0, lambda: f"{name(a)} and {name(b)}")
         for where, found in clearances(self.scene, at):
-            self._tally.see(at, found.smallest, found.smallest <= 0.0, where)
+            self.tally.see(at, found.smallest, found.smallest <= 0.0, where)
 
     def result(self) -> CheckResult:
-        if self._tally.worst is None:
-            return skipped(self.name, "there are no two surfaces")
-        return self._tally.result("smallest {worst}", "surfaces touch or meet: {worst}")
+        if self.tally.worst is None:
+            self.why_not = "there are no two surfaces"
+        return super().result()

@@ -7,11 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.output.check.frame_check import FrameCheck, Moment
-from supple.output.check.report import CheckResult
-from supple.output.check.settings import CheckSettings
-from supple.output.check.snapshot import Scene, Snapshot
-from supple.output.check.tally import Tally
+from supple.output.check.frame_check import FrameCheck
+from supple.output.check.snapshot import Snapshot
 from supple.output.recording.recorder import REPORT_NUMBERS, REPORT_VECTORS
 from supple.state import Status
 
@@ -33,36 +30,33 @@ class Finite(FrameCheck):
     name = "finite"
     sees_all = True
     needs_frames = False
+    unit = "numbers"
+    good = "all numbers are finite"
+    bad = "not finite: {worst}"
 
-    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
-        super().__init__(scene, settings)
-        self._tally = Tally(self.name, "numbers")
-        recording = scene.recording
+    def begin(self) -> None:
+        recording = self.scene.recording
         for what in CONSTANTS:
             count = _bad_count(getattr(recording, what))
             if count:
-                self._tally.see(None, count, True, what.replace("_", " "))
+                self.tally.see(None, count, True, what.replace("_", " "))
         names = [name for name in (*REPORT_NUMBERS, *REPORT_VECTORS) if name not in _MAY_BE_UNKNOWN]
         self._series = {name: recording.series(name) for name in names}
 
     def see(self, at: Snapshot) -> None:
         found = [(count, where) for count, where in self._bad(at) if count]
-        self._tally.see(at, sum(count for count, _ in found), bool(found), found[0][1] if found else "")
+        self.tally.see(at, sum(count for count, _ in found), bool(found), found[0][1] if found else "")
 
     def _bad(self, at: Snapshot) -> Iterator[tuple[int, str]]:
-        surfaces = self.scene.surfaces
         for what, values in (("position", at.positions), ("velocity", at.velocities)):
             count = _bad_count(values)
             row = int(np.argmin(np.isfinite(values).all(axis=1)))
-            yield count, f"{what} of {surfaces.name_vertex(row)}" if count else ""
+            yield count, f"{what} of {self.scene.name('vertex', row)}" if count else ""
         count = _bad_count(at.det_F)
-        yield count, f"det F of {self.scene.name_tet(int(np.argmin(np.isfinite(at.det_F))))}" if count else ""
+        yield count, f"det F of {self.scene.name('tet', int(np.argmin(np.isfinite(at.det_F))))}" if count else ""
         yield _bad_count(at.poses), "pose of an obstacle"
         for name, series in self._series.items():
             yield _bad_count(series[at.number]), f"recorded {name}"
-
-    def result(self) -> CheckResult:
-        return self._tally.result("all numbers are finite", "not finite: {worst}")
 
 
 def _bad_count(values: NDArray[np.float64]) -> int:
@@ -74,25 +68,25 @@ class Sequence(FrameCheck):
 
     name = "sequence"
     needs_frames = False
+    good = "frames follow each other"
+    bad = "frames do not follow each other"
 
-    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
-        super().__init__(scene, settings)
-        self._tally = Tally(self.name)
+    def begin(self) -> None:
         self._last: Snapshot | None = None
-        recording = scene.recording
+        recording = self.scene.recording
         # XPBD may push a body out of another one and stop it within the same frame.
         self._implicit = (recording.solver or "").startswith("Implicit")
         indices = np.array([frame.index for frame in recording])
         for k in range(1, len(recording)):
-            at = Moment(k, float(recording.times[k]))
+            at = recording[k]
             step = at.time - float(recording.times[k - 1])
             rounding = 4.0 * np.finfo(np.float64).eps * abs(at.time)
             if not step > 0.0:
-                self._tally.see(at, step, True, f"time {at.time:.9g} s does not come after the one before")
+                self.tally.see(at, step, True, f"time {at.time:.9g} s does not come after the one before")
             elif indices[k] - indices[k - 1] != 1:
-                self._tally.see(at, step, True, f"number {indices[k]} does not follow {indices[k - 1]}")
+                self.tally.see(at, step, True, f"number {indices[k]} does not follow {indices[k - 1]}")
             elif abs(step - recording.dt) > _SAME_TIME * recording.dt + rounding:
-                self._tally.see(at, step, True, f"a step of {step:.9g} s, not of {recording.dt:.9g} s")
+                self.tally.see(at, step, True, f"a step of {step:.9g} s, not of {recording.dt:.9g} s")
 
     def see(self, at: Snapshot) -> None:
         before, self._last = self._last, at
@@ -106,7 +100,7 @@ class Sequence(FrameCheck):
             return
         slowest = min(float(np.abs(frame.velocities).max(initial=0.0)) for frame in (before, at))
         if slowest * recording.dt > _MOVING * self.scene.size and recording.statuses[at.number].can_go_on:
-            self._tally.see(at, slowest, True, f"repeats frame {before.number} although it moves")
+            self.tally.see(at, slowest, True, f"repeats frame {before.number} although it moves")
 
     def _follow(self, before: Snapshot, at: Snapshot) -> None:
         """Whether the displacements of bodies agree with their velocities before and after the step."""
@@ -126,10 +120,7 @@ class Sequence(FrameCheck):
             rounding = _MOVING * self.scene.size / abs(step)
             if max(speeds) > 0.0 and off > _LARGEST_DEVIATION * (max(speeds) + fall) + rounding:
                 where = f"{body.name} is {off * abs(step):.3g} m from where its velocities lead"
-                self._tally.see(at, off, True, where)
-
-    def result(self) -> CheckResult:
-        return self._tally.result("frames follow each other", "frames do not follow each other")
+                self.tally.see(at, off, True, where)
 
 
 class Converged(FrameCheck):
@@ -137,17 +128,11 @@ class Converged(FrameCheck):
 
     name = "status"
     needs_frames = False
+    good = "every step converged"
+    bad = "a step did not converge"
 
-    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
-        super().__init__(scene, settings)
-        self._tally = Tally(self.name)
-        recording = scene.recording
-        for k, status in enumerate(recording.statuses):
+    def begin(self) -> None:
+        recording = self.scene.recording
+        for frame, status in zip(recording, recording.statuses, strict=True):
             if status is not Status.CONVERGED:
-                self._tally.see(Moment(k, float(recording.times[k])), 1.0, True, str(status))
-
-    def see(self, at: Snapshot) -> None:
-        """Nothing depends on frames."""
-
-    def result(self) -> CheckResult:
-        return self._tally.result("every step converged", "a step did not converge")
+                self.tally.see(frame, 1.0, True, str(status))

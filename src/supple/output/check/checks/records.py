@@ -6,11 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from supple.output.check.elastic_energy import stiffness_scale
 from supple.output.check.frame_check import FrameCheck
-from supple.output.check.report import CheckResult
-from supple.output.check.settings import CheckSettings
-from supple.output.check.snapshot import Scene, Snapshot, edge_vectors
-from supple.output.check.tally import Tally
+from supple.output.check.snapshot import Snapshot, edge_vectors
+from supple.output.check.stitch_energy import stitch_scale
 
 # Allowed difference, as a share of the natural size of each quantity; both sides are computed in double precision.
 _SAME = 1e-9
@@ -21,17 +20,20 @@ class Records(FrameCheck):
     """Determinants tet by tet, the smallest of them, energies and momenta."""
 
     name = "records"
+    good = "agree within {worst}"
+    bad = "differ by {worst} from what the positions give"
 
-    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
-        super().__init__(scene, settings)
-        self._tally = Tally(self.name)
-        self._inverse_sizes = np.linalg.norm(scene.rest_inverse, axis=(1, 2))
+    def begin(self) -> None:
+        self._inverse_sizes = np.linalg.norm(self.scene.rest_inverse, axis=(1, 2))
+        self._stiffness_scale = stiffness_scale(self.scene.recording)
+        self._stitch_scale = stitch_scale(self.scene.recording)
 
     def see(self, at: Snapshot) -> None:
         # Another check finds numbers that are not finite.
         differences = [(value, where) for value, where in self._differences(at) if np.isfinite(value)]
         value, where = max(differences, default=(0.0, ""))
-        self._tally.see(at, value, value > _SAME, where)
+        failed = value > _SAME
+        self.tally.see(at, value, failed, where if failed else "")
 
     def _differences(self, at: Snapshot) -> Iterator[tuple[float, str]]:
         recording, k = self.scene.recording, at.number
@@ -41,7 +43,7 @@ class Records(FrameCheck):
         apart = np.abs(at.det_F - at.J) / sizes
         apart[~np.isfinite(apart)] = 0.0
         row = int(np.argmax(apart))
-        yield float(apart[row]), f"det F of {self.scene.name_tet(row)}"
+        yield float(apart[row]), f"det F of {self.scene.name('tet', row)}"
         recorded = recording.series("min_det_F")[k]
         yield abs(recorded - at.J.min()) / sizes[int(np.argmin(at.J))], "smallest det F"
         kinetic = 0.5 * float(m @ np.einsum("ij,ij->i", v, v))
@@ -52,8 +54,8 @@ class Records(FrameCheck):
         recorded = recording.series("potential_energy")[k]
         yield abs(recorded - potential) / (heights + _NOTHING), "potential energy"
         for name, energy, scale in (
-            ("elastic energy", at.elastic_energy, self.scene.stiffness_scale),
-            ("stitch energy", at.stitch_energy, self.scene.stitch_scale),
+            ("elastic energy", at.elastic_energy, self._stiffness_scale),
+            ("stitch energy", at.stitch_energy, self._stitch_scale),
         ):
             if energy is not None:
                 recorded = recording.series(name.replace(" ", "_"))[k]
@@ -67,8 +69,3 @@ class Records(FrameCheck):
         recorded = recording.series("angular_momentum")[k]
         turning = float(m @ (np.linalg.norm(r, axis=1) * speeds))
         yield float(np.linalg.norm(recorded - spin)) / (turning + _NOTHING), "angular momentum"
-
-    def result(self) -> CheckResult:
-        if self._tally.failed_frames == 0:
-            self._tally.where = ""
-        return self._tally.result("agree within {worst}", "differ by {worst} from what the positions give")

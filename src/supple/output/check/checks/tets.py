@@ -8,10 +8,7 @@ from supple.materials.registry import ELASTIC_MATERIALS
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.output.check.frame_check import FrameCheck
 from supple.output.check.geometry.orientation import volume_signs
-from supple.output.check.report import CheckResult
-from supple.output.check.settings import CheckSettings
-from supple.output.check.snapshot import Scene, Snapshot, edge_vectors
-from supple.output.check.tally import Tally
+from supple.output.check.snapshot import Snapshot, edge_vectors
 
 NEARLY_INCOMPRESSIBLE = 0.45
 GENEROUS_VOLUME_CHANGE = 0.5
@@ -23,65 +20,57 @@ class RestShape(FrameCheck):
 
     name = "rest shape"
     needs_frames = False
+    unit = "m^3"
+    lowest = True
+    good = "smallest tet at rest {worst}"
+    bad = "not a rest shape: {worst}"
 
-    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
-        super().__init__(scene, settings)
-        self._tally = Tally(self.name, "m^3", lowest=True)
-        recording = scene.recording
+    def begin(self) -> None:
+        recording = self.scene.recording
         D = edge_vectors(recording.rest_positions, recording.tets)
         volumes = np.einsum("ij,ij->i", D[:, :, 0], np.cross(D[:, :, 1], D[:, :, 2])) / 6.0
         bad = np.flatnonzero(volume_signs(recording.rest_positions, recording.tets) <= 0)
         row = int(bad[0]) if len(bad) else int(np.argmin(volumes))
-        self._tally.see(None, volumes[row], len(bad) > 0, scene.name_tet(row))
+        self.tally.see(None, volumes[row], len(bad) > 0, self.scene.name("tet", row))
         sizes = np.abs(D).max(axis=(1, 2)) ** 3
         wrong = np.flatnonzero(~(np.abs(recording.rest_volumes - volumes) <= _SAME_VOLUME * sizes))
         if len(wrong):
             row = int(wrong[0])
-            text = f"{scene.name_tet(row)} has a recorded volume of {recording.rest_volumes[row]:.6g} m^3"
-            self._tally.see(None, volumes[row], True, text)
+            text = f"{self.scene.name('tet', row)} has a recorded volume of {recording.rest_volumes[row]:.6g} m^3"
+            self.tally.see(None, volumes[row], True, text)
         light = np.flatnonzero(~(recording.masses > 0.0))
         if len(light):
             row = int(light[0])
-            text = f"{scene.surfaces.name_vertex(row)} has a mass of {recording.masses[row]:.6g} kg"
-            self._tally.see(None, volumes.min(), True, text)
-
-    def see(self, at: Snapshot) -> None:
-        """Nothing depends on frames."""
-
-    def result(self) -> CheckResult:
-        return self._tally.result("smallest tet at rest {worst}", "not a rest shape: {worst}")
+            text = f"{self.scene.name('vertex', row)} has a mass of {recording.masses[row]:.6g} kg"
+            self.tally.see(None, volumes.min(), True, text)
 
 
 class Inversion(FrameCheck):
     """The exact sign of every tet's determinant; the smallest det F is reported."""
 
     name = "inversion"
-
-    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
-        super().__init__(scene, settings)
-        self._tally = Tally(self.name, lowest=True)
+    lowest = True
+    good = "smallest det F {worst}"
+    bad = "inverted or flat, det F {worst}"
 
     def see(self, at: Snapshot) -> None:
         bad = np.flatnonzero(at.signs <= 0)
         J = np.where(np.isfinite(at.J), at.J, np.inf)
         row = int(bad[np.argmin(J[bad])]) if len(bad) else int(np.argmin(J))
-        self._tally.see(at, float(J[row]), len(bad) > 0, lambda: self.scene.name_tet(row))
-
-    def result(self) -> CheckResult:
-        return self._tally.result("smallest det F {worst}", "inverted or flat, det F {worst}")
+        self.tally.see(at, float(J[row]), len(bad) > 0, lambda: self.scene.name("tet", row))
 
 
 class Volume(FrameCheck):
     """The change of each body's volume from that at rest."""
 
     name = "volume"
+    good = "largest change {worst} of a body's volume"
+    bad = "changes by {worst} of a body's volume"
 
-    def __init__(self, scene: Scene, settings: CheckSettings) -> None:
-        super().__init__(scene, settings)
-        self._tally = Tally(self.name)
-        bodies = scene.recording.bodies
+    def begin(self) -> None:
+        bodies = self.scene.recording.bodies
         self._limits = [self._limit(k) for k in range(len(bodies))]
-        self._rest = [float(scene.recording.rest_volumes[body.tets].sum()) for body in bodies]
+        self._rest = [float(self.scene.recording.rest_volumes[body.tets].sum()) for body in bodies]
 
     def _limit(self, number: int) -> float:
         if self.settings.max_volume_change is not None:
@@ -104,7 +93,4 @@ class Volume(FrameCheck):
         for k, body in enumerate(self.scene.recording.bodies):
             volume = float(self.scene.recording.rest_volumes[body.tets] @ at.J[body.tets])
             change = abs(volume / self._rest[k] - 1.0)
-            self._tally.see(at, change, not change <= self._limits[k], body.name)
-
-    def result(self) -> CheckResult:
-        return self._tally.result("largest change {worst} of a body's volume", "changes by {worst} of a body's volume")
+            self.tally.see(at, change, not change <= self._limits[k], body.name)

@@ -18,7 +18,7 @@ class ObstacleView(Layer):
     def __init__(self, scene: Any, moment: Moment) -> None:
         model = moment.model
         self._handles = {}
-        for picture in obstacle_pictures(model, model.view):
+        for picture in obstacle_pictures(model.obstacles, model.view):
             pose = moment.poses[picture.number]
             handle = scene.add_mesh_simple(
                 f"/obstacles/{picture.number} {picture.name}",
