@@ -23,9 +23,9 @@ def round_ball(inscribed: bool) -> tuple[NDArray[np.float64], NDArray[np.integer
     return directions * (1.0 if inscribed else 1.0 / float(nearest.min())), triangles
 
 
-def prism(inscribed: bool) -> tuple[NDArray[np.float64], NDArray[np.integer]]:
+def prism(inscribed: bool, sides: int = CYLINDER_SIDES) -> tuple[NDArray[np.float64], NDArray[np.integer]]:
     """A prism about the x axis from -1 to 1, in the cylinder of radius 1 or about it; its ends are fans."""
-    n = CYLINDER_SIDES
+    n = sides
     angles = np.arange(n) * (2.0 * np.pi / n)
     radius = 1.0 if inscribed else 1.0 / np.cos(np.pi / n)
     ring = radius * np.column_stack([np.cos(angles), np.sin(angles)])
