@@ -12,8 +12,9 @@ from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
 from supple.scene.body import Body
 from supple.scene.forces import Force
-from supple.scene.pins import InBox, Pin
+from supple.scene.pins import Pin
 from supple.scene.scene import Scene
+from supple.scene.selection import InBox
 from supple.scene.stitches.vertex_triangle import SoftVertexTriangleStitch
 from supple.simulate import simulate
 from supple.xpbd.solver import XPBD

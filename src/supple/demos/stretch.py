@@ -13,8 +13,9 @@ from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
 from supple.scene.body import Body
 from supple.scene.motion import Keyframes
-from supple.scene.pins import InBox, Pin
+from supple.scene.pins import Pin
 from supple.scene.scene import Scene
+from supple.scene.selection import InBox
 from supple.simulate import Frame
 from supple.xpbd.solver import XPBD
 

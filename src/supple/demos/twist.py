@@ -13,8 +13,9 @@ from supple.materials.neo_hookean import NeoHookean
 from supple.mesh import shapes
 from supple.scene.body import Body
 from supple.scene.motion import Keyframes
-from supple.scene.pins import InBox, Pin
+from supple.scene.pins import Pin
 from supple.scene.scene import Scene
+from supple.scene.selection import InBox
 from supple.simulate import Frame
 
 LENGTH, SIDE, YOUNGS, POISSON = 1.0, 0.2, 1e5, 0.45

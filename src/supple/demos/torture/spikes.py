@@ -12,8 +12,9 @@ from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh.tetmesh import TetMesh
 from supple.scene.body import Body
 from supple.scene.obstacles.half_space import HalfSpace
-from supple.scene.pins import InBox, Pin
+from supple.scene.pins import Pin
 from supple.scene.scene import Scene
+from supple.scene.selection import InBox
 from supple.simulate import Frame
 
 GAP = 2e-3

@@ -48,8 +48,8 @@ class Side:
         return np.where(counts > 0, sums, np.inf) / np.maximum(counts, 1)
 
 
-def side_of(thing: Body | Obstacle) -> Side:
-    """A body as the scene places it, or a triangle obstacle at time 0.
+def side_of(thing: Body | Obstacle, stitch: str) -> Side:
+    """A body as the scene places it, or a triangle obstacle at time 0; `stitch` begins the message.
 
     Raises
     ------
@@ -59,7 +59,9 @@ def side_of(thing: Body | Obstacle) -> Side:
         return _side(f"body {thing.name!r}", thing.mesh.surface, thing.place(thing.mesh.vertices))
     surface = thing.surface_mesh
     if surface is None:
-        raise SceneError(f"{thing.label} is a {type(thing).__name__}; stitches join bodies and TriangleObstacles")
+        raise SceneError(
+            f"{stitch}: {thing.label} is a {type(thing).__name__}; stitches join bodies and TriangleObstacles"
+        )
     R, t = thing.pose(0.0)
     return _side(thing.label, surface, surface.vertices @ R.T + t)
 

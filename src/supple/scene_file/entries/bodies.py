@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from supple.scene.body import Body
+from supple.scene.located import at
 from supple.scene_file.entries.materials import MaterialModel
 from supple.scene_file.entries.mesh_sources import MeshFileModel, MeshStore, SurfaceModel
 from supple.scene_file.entries.regions import RegionModel, with_regions
 from supple.scene_file.entries.shapes import ShapeModel
-from supple.scene_file.located import at
 from supple.scene_file.model import Count, Model, Name, NonNegative, Positive, Vector
 
 MAX_COPIES = 10_000

@@ -10,9 +10,9 @@ from pydantic import BaseModel, Field, model_validator
 from supple.errors import MeshError
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
+from supple.scene.located import at
 from supple.scene.rotation import rotation_matrix
 from supple.scene_file.entries.shapes import ShapeModel, SurfaceShapeModel
-from supple.scene_file.located import at
 from supple.scene_file.model import FilePath, Model, Positive, Vector
 
 SURFACE_FILES = (".stl", ".obj", ".ply", ".off", ".vtp")

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
 from pydantic import Field, create_model
 
+from supple.scene.located import at
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.obstacles.registry import KINDS
 from supple.scene_file.entries.mesh_sources import MeshStore, SurfaceModel
 from supple.scene_file.entries.motions import KeyframesModel
-from supple.scene_file.located import at
 from supple.scene_file.model import Model, Name, NonNegative, Positive, Vector
 
 Extents = Annotated[list[Positive], Field(min_length=3, max_length=3)]

@@ -12,9 +12,9 @@ from supple.errors import SceneError
 from supple.materials.material import Elastic, Material
 from supple.materials.regions import Regions
 from supple.mesh.tetmesh import TetMesh
+from supple.scene.located import at
 from supple.scene.selection import InBox
 from supple.scene_file.entries.materials import ElasticMaterialModel
-from supple.scene_file.located import at
 from supple.scene_file.model import Model, Vector
 
 TetIndex = Annotated[int, Field(ge=0, lt=2**31)]

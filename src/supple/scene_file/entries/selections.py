@@ -7,10 +7,10 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from supple.scene.forces import Force, SoftTarget
+from supple.scene.located import at
 from supple.scene.pins import Pin
 from supple.scene.selection import InBox, Selection
 from supple.scene_file.entries.motions import KeyframesModel
-from supple.scene_file.located import at
 from supple.scene_file.model import Model, Name, Positive, Vector
 
 VertexIndex = Annotated[int, Field(ge=0, lt=2**31)]
