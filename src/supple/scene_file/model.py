@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
@@ -23,6 +23,9 @@ class Model(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
+    alternatives: ClassVar[tuple[str, str, str] | None] = None
+    """Two keys of which exactly one must be given, and the message otherwise."""
+
     @model_validator(mode="before")
     @classmethod
     def _reject_unknown_keys(cls, data: Any) -> Any:
@@ -33,3 +36,11 @@ class Model(BaseModel):
                     context = {"key": key, "known": list(cls.model_fields)}
                     raise PydanticCustomError(UNKNOWN_KEY, "unknown key {key}", context)
         return data
+
+    @model_validator(mode="after")
+    def _one_of_the_alternatives(self) -> Self:
+        if self.alternatives is not None:
+            first, second, message = self.alternatives
+            if (getattr(self, first) is None) == (getattr(self, second) is None):
+                raise ValueError(message)
+        return self

@@ -74,6 +74,8 @@ class BuiltBody:
 class BodyModel(Model):
     """One soft body. Give `mesh` (a file) or `shape`."""
 
+    alternatives = ("mesh", "shape", "a body needs either `mesh` or `shape`; give one of them")
+
     name: Name = Field(description="unique in the scene")
     mesh: MeshFileModel | None = Field(default=None, description="of tetrahedra, or a surface to fill with them")
     shape: ShapeModel | None = Field(default=None, description="instead of `mesh`: a ready-made shape")
@@ -96,12 +98,6 @@ class BodyModel(Model):
     )
     copies: CopiesModel | None = Field(default=None, description="copies of the body")
     initial: InitialModel | None = Field(default=None, description="a deformed start")
-
-    @model_validator(mode="after")
-    def _one_mesh(self) -> BodyModel:
-        if (self.mesh is None) == (self.shape is None):
-            raise ValueError("a body needs either `mesh` or `shape`; give one of them")
-        return self
 
     def build(self, meshes: MeshStore) -> list[BuiltBody]:
         """The body, or all its copies."""
