@@ -25,6 +25,7 @@ from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.scene.stitches.stitching import Stitching, no_stitching
+from supple.scene.values import float_array
 from supple.state import SolverDetails, State, StepReport
 
 
@@ -281,10 +282,7 @@ def initial_state(
 
 
 def _given(value: ArrayLike, count: int, what: str) -> NDArray[np.float64]:
-    try:
-        array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise SceneError(f"{what} is not an array of numbers") from None
+    array = float_array(value, what)
     if array.shape != (count, 3):
         raise SceneError(f"{what} has shape {array.shape}; the body's mesh needs ({count}, 3)")
     if not np.isfinite(array).all():

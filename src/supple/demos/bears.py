@@ -87,6 +87,5 @@ BEARS = Demo(
     scene=scene,
     solvers={"xpbd": lambda: XPBD(substeps=40)},
     measurement=_Measurement,
-    dt=1 / 60,
     steps=180,
 )

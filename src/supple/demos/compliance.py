@@ -68,6 +68,5 @@ COMPLIANCE = Demo(
     scene=scene,
     solvers={"xpbd": lambda: XPBD(substeps=40)},
     measurement=_Measurement,
-    dt=1 / 60,
     steps=300,
 )

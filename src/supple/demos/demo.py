@@ -100,8 +100,8 @@ class Demo:
     scene: Callable[[], Scene]
     solvers: Mapping[str, Callable[[], Solver]]
     measurement: Callable[[], Measurement]
-    dt: float
     steps: int
+    dt: float = 1 / 60
     variants: Mapping[str, Demo] = field(default_factory=dict)
 
     @property

@@ -99,6 +99,5 @@ QUILT = Demo(
     scene=scene,
     solvers={"xpbd": lambda: XPBD(substeps=80), "implicit": Implicit},
     measurement=_Measurement,
-    dt=1 / 60,
     steps=240,
 )

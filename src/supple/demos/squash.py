@@ -143,7 +143,6 @@ _IMPLICIT = Demo(
     scene=pinned_scene,
     solvers={"implicit": Implicit},
     measurement=_PinnedMeasurement,
-    dt=1 / 60,
     steps=210,
 )
 
@@ -158,7 +157,6 @@ SQUASH = Demo(
     scene=scene,
     solvers={"xpbd": lambda: XPBD(substeps=40)},
     measurement=_Measurement,
-    dt=1 / 60,
     steps=240,
     variants={"implicit": _IMPLICIT},
 )

@@ -125,6 +125,5 @@ STITCH = Demo(
     scene=scene,
     solvers={"xpbd": lambda: XPBD(substeps=60), "implicit": lambda: Implicit(integrator="bdf2")},
     measurement=_Measurement,
-    dt=1 / 60,
     steps=60,
 )

@@ -76,6 +76,5 @@ STRETCH = Demo(
     scene=scene,
     solvers={"xpbd": lambda: XPBD(substeps=20), "implicit": Implicit},
     measurement=_Measurement,
-    dt=1 / 60,
     steps=300,
 )

@@ -81,6 +81,5 @@ TWIST = Demo(
     scene=scene,
     solvers={"implicit": Implicit},
     measurement=_Measurement,
-    dt=1 / 60,
     steps=240,
 )

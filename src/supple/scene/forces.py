@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError
 from supple.scene.motion import Motion, check_motion
 from supple.scene.selection import OnVertices, Selection
-from supple.scene.values import positive
+from supple.scene.values import float_array, positive
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,10 +60,7 @@ class Force(OnVertices):
         return given
 
     def _checked(self, value: ArrayLike, what: str) -> NDArray[np.float64]:
-        try:
-            array = np.array(value, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise SceneError(f"{self.label}: {what} is not an array of numbers") from None
+        array = float_array(value, f"{self.label}: {what}")
         if array.shape != (3,) and (array.ndim != 2 or array.shape[1] != 3):
             raise SceneError(f"{self.label}: {what} has shape {array.shape}; give (3,) in total or (k, 3) per vertex")
         if not np.isfinite(array).all():

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +24,6 @@ from supple.scene_file.yaml_reader import Key, read_yaml
 from supple.system import Solver
 
 logger = logging.getLogger(__name__)
-
-Described = TypeVar("Described")
-Built = TypeVar("Built")
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,27 +101,24 @@ def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
                 bodies[built.body.name] = built.body
                 if built.initial_positions is not None:
                     starts[built.body.name] = built.initial_positions
-    obstacles = _each("obstacles", model.obstacles, lambda obstacle: obstacle.build(meshes))
-    pins = _each("pins", model.pins, lambda pin: pin.build())
-    forces = _each("forces", model.forces, lambda force: force.build())
-    targets = _each("soft_targets", model.soft_targets, lambda target: target.build())
-    stitches = _each("stitches", model.stitches, lambda stitch: stitch.build())
-    pairs = _each("contact_pairs", model.contact_pairs, lambda pair: pair.build())
+    obstacles = _each("obstacles", model.obstacles, meshes)
+    lists = ("pins", "forces", "soft_targets", "stitches", "contact_pairs")
+    parts = {key: _each(key, getattr(model, key)) for key in lists}
     with at("solver"):
         solver = model.solver.build()
     with at():
-        scene = Scene(list(bodies.values()), obstacles, pins, model.gravity, forces, targets, stitches, pairs)
+        scene = Scene(list(bodies.values()), obstacles, gravity=model.gravity, **parts)
         # The pairs are found here, where an error's place in the file is known; the scene caches them.
         logger.debug("%d stitched pairs", len(scene.stitching))
     return Run(scene, solver, model.dt, model.steps, starts, model.output)
 
 
-def _each(key: str, models: Sequence[Described], build: Callable[[Described], Built]) -> list[Built]:
-    """What `build` makes of each entry of a list in the file; errors get the place of their entry."""
+def _each(key: str, models: Sequence[Any], *arguments: MeshStore) -> list[Any]:
+    """What each entry of a list in the file builds; errors get the place of their entry."""
     built = []
     for i, model in enumerate(models):
         with at(key, i):
-            built.append(build(model))
+            built.append(model.build(*arguments))
     return built
 
 

@@ -56,7 +56,7 @@ def torture(
 
     def demo(size: Size) -> Demo:
         made, solvers = partial(scene, *size.arguments), {"implicit": solver}
-        return Demo(f"torture-{name}", summary, explanation, made, solvers, measurement, size.dt, size.steps)
+        return Demo(f"torture-{name}", summary, explanation, made, solvers, measurement, size.steps, size.dt)
 
     return Torture(demo(small), demo(full), demo(large) if large is not None else None)
 
