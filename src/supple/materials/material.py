@@ -120,9 +120,8 @@ class Elastic(Material):
         ------
         SceneError : where the energy is not among those that the kernels are compiled for.
         """
-        for kind, energy in enumerate(STRETCH_ENERGIES):
-            if energy is cls.stretch_functions:
-                return kind
+        if cls.stretch_functions in STRETCH_ENERGIES:
+            return STRETCH_ENERGIES.index(cls.stretch_functions)
         raise SceneError(
             f"{cls.__name__}: its energy is not registered; add it to STRETCH_ENERGIES of supple.materials.kinds"
         )

@@ -118,7 +118,8 @@ def pair_table(scene: HasContactPairs) -> PairTable:
                 )
             before = rule[np.ix_(first, second)]
             for earlier in np.unique(before[before >= 0]):
-                if _effect(scene.contact_pairs[earlier]) != _effect(pair):
+                other = scene.contact_pairs[earlier]
+                if (other.friction, other.collide) != (pair.friction, pair.collide):
                     i, j = np.argwhere(before == earlier)[0]
                     a, b = names[first[i]], names[second[j]]
                     raise SceneError(
@@ -142,10 +143,6 @@ def _found(pair: ContactPair, key: str, names: list[str]) -> list[int]:
             raise SceneError(f"{pair.label}: {key}: there is no body or obstacle {name!r}; {suggestion(name, names)}")
         numbers.update(found)
     return sorted(numbers)
-
-
-def _effect(pair: ContactPair) -> tuple[float | None, bool]:
-    return pair.friction, pair.collide
 
 
 def _names(value: object, key: str) -> tuple[str, ...]:

@@ -15,6 +15,8 @@ NonNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
 Name = Annotated[str, Field(min_length=1, max_length=100)]
+Extents = Annotated[list[Positive], Field(min_length=3, max_length=3)]
+Index = Annotated[int, Field(ge=0, lt=2**31)]
 FilePath = Annotated[str, Field(min_length=1, max_length=1000)]
 
 

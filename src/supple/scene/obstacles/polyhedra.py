@@ -38,9 +38,9 @@ def prism(inscribed: bool, sides: int = CYLINDER_SIDES) -> tuple[NDArray[np.floa
     points = np.concatenate([*ends, [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]])
     i = np.arange(n)
     j = (i + 1) % n
-    sides = [np.column_stack([i, j, j + n]), np.column_stack([i, j + n, i + n])]
+    walls = [np.column_stack([i, j, j + n]), np.column_stack([i, j + n, i + n])]
     caps = [np.column_stack([np.full(n, 2 * n), j, i]), np.column_stack([np.full(n, 2 * n + 1), i + n, j + n])]
-    return points, np.concatenate([*sides, *caps])
+    return points, np.concatenate([*walls, *caps])
 
 
 def hull(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.integer]]:

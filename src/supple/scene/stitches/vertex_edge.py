@@ -23,11 +23,9 @@ class VertexEdgeStitch(SpringStitch):
     partner = "edges"
 
     def partners(self, second: Side) -> NDArray[np.int32]:
-        """See `Stitch`."""
         return second.edges[:, [0, 1, 1]]
 
     def join(self, first: Side, second: Side, pairs: Pairs) -> Springs:
-        """See `Stitch`."""
         ends = second.edges[pairs.rows]
         a, b = second.points[ends].transpose(1, 0, 2)
         along, off = b - a, first.points[pairs.vertices] - a

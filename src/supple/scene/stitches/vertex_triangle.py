@@ -115,7 +115,6 @@ class SoftVertexTriangleStitch(Stitch):
         return 0.5 * mu * (Ic - 3.0) - mu * grown + 0.5 * lam * grown * grown + (mu / lam) ** 2
 
     def partners(self, second: Side) -> NDArray[np.int32]:
-        """See `Stitch`."""
         return second.triangles
 
     def join(self, first: Side, second: Side, pairs: Pairs) -> StitchTets:

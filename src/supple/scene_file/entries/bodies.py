@@ -16,7 +16,7 @@ from supple.scene_file.entries.materials import MaterialModel
 from supple.scene_file.entries.mesh_sources import MeshFileModel, MeshStore, SurfaceModel
 from supple.scene_file.entries.regions import RegionModel, with_regions
 from supple.scene_file.entries.shapes import ShapeModel
-from supple.scene_file.model import Count, Model, Name, NonNegative, Positive, Vector
+from supple.scene_file.model import Count, Extents, Model, Name, NonNegative, Vector
 
 MAX_COPIES = 10_000
 
@@ -58,7 +58,7 @@ class CopiesModel(Model):
 class InitialModel(Model):
     """A deformed start of a body."""
 
-    scale: Annotated[list[Positive], Field(min_length=3, max_length=3)] = Field(
+    scale: Extents = Field(
         description="along the world's x, y and z about the center of volume; [1, 0.5, 1] squeezes to half the height"
     )
 

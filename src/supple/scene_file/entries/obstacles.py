@@ -12,9 +12,8 @@ from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.obstacles.registry import KINDS
 from supple.scene_file.entries.mesh_sources import MeshStore, SurfaceModel
 from supple.scene_file.entries.motions import KeyframesModel, built_motion
-from supple.scene_file.model import Model, Name, NonNegative, Positive, Vector
+from supple.scene_file.model import Extents, Model, Name, NonNegative, Positive, Vector
 
-Extents = Annotated[list[Positive], Field(min_length=3, max_length=3)]
 _TYPES: dict[str, Any] = {
     "vector": Vector,
     "direction": Vector,

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
@@ -16,9 +14,7 @@ from supple.scene.located import at
 from supple.scene.selection import InBox
 from supple.scene_file.entries.materials import ElasticMaterialModel
 from supple.scene_file.entries.selections import InBoxModel
-from supple.scene_file.model import Model
-
-TetIndex = Annotated[int, Field(ge=0, lt=2**31)]
+from supple.scene_file.model import Index, Model
 
 
 class BoxOfMeshModel(InBoxModel):
@@ -33,7 +29,7 @@ class RegionModel(Model):
 
     material: ElasticMaterialModel
     box: BoxOfMeshModel | None = Field(default=None, description="all tets whose center is inside")
-    tets: list[TetIndex] | None = Field(
+    tets: list[Index] | None = Field(
         default=None, min_length=1, description="instead of `box`: tet numbers of the mesh, from 0"
     )
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 from pydantic import Field
 
 from supple.scene.forces import Force, SoftTarget
@@ -11,9 +9,7 @@ from supple.scene.located import at
 from supple.scene.pins import Pin
 from supple.scene.selection import InBox, Selection
 from supple.scene_file.entries.motions import KeyframesModel, built_motion
-from supple.scene_file.model import Model, Name, Positive, Vector
-
-VertexIndex = Annotated[int, Field(ge=0, lt=2**31)]
+from supple.scene_file.model import Index, Model, Name, Positive, Vector
 
 
 class InBoxModel(Model):
@@ -27,7 +23,7 @@ class _SelectionModel(Model):
     alternatives = ("vertices", "box", "give the vertices by either `vertices` or `box`")
 
     body: Name = Field(description="name of the body")
-    vertices: list[VertexIndex] | None = Field(default=None, min_length=1, description="vertex numbers, from 0")
+    vertices: list[Index] | None = Field(default=None, min_length=1, description="vertex numbers, from 0")
     box: InBoxModel | None = Field(default=None, description="instead of `vertices`: all vertices inside")
     name: Name | None = Field(default=None, description="used in messages and reports")
 

@@ -9,9 +9,8 @@ from pydantic import Field
 from supple.mesh import shapes
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
-from supple.scene_file.model import Count, Model, Positive
+from supple.scene_file.model import Count, Extents, Model, Positive
 
-Sizes = Annotated[list[Positive], Field(min_length=3, max_length=3)]
 Divisions = Annotated[list[Count], Field(min_length=3, max_length=3)]
 
 
@@ -19,7 +18,7 @@ class BoxShapeModel(Model):
     """A box, centred at the origin, divided into a grid."""
 
     kind: Literal["box"]
-    size: Sizes = Field(default=[1.0, 1.0, 1.0], description="full edge lengths [m]")
+    size: Extents = Field(default=[1.0, 1.0, 1.0], description="full edge lengths [m]")
     divisions: Divisions = Field(default=[4, 4, 4], description="cells along x, y and z")
 
     def build(self) -> TetMesh:

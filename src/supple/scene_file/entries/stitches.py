@@ -8,9 +8,8 @@ from pydantic import Field
 
 from supple.scene.stitches.registry import STITCHES
 from supple.scene.stitches.stitch import Stitch
-from supple.scene_file.model import Model, Name, NonNegative, Positive
+from supple.scene_file.model import Index, Model, Name, NonNegative, Positive
 
-Index = Annotated[int, Field(ge=0, lt=2**31)]
 PairList = Annotated[list[Annotated[list[Index], Field(min_length=2, max_length=2)]], Field(min_length=1)]
 PerPair = Positive | Annotated[list[Positive], Field(min_length=1)]
 Lengths = NonNegative | Annotated[list[NonNegative], Field(min_length=1)]
