@@ -134,7 +134,7 @@ class OneFrame(Measurement):
 
 
 def demo_of(scene, solver: Solver) -> Demo:
-    return Demo("made up", "for a test", "A test.", scene, {"xpbd": lambda: solver}, OneFrame, 1 / 60, 1)
+    return Demo("made up", "for a test", "A test.", scene, {"xpbd": lambda: solver}, OneFrame, steps=1)
 
 
 def test_a_claim_that_does_not_hold_is_reported_and_exits_1(monkeypatch, capfd, tmp_path):
