@@ -25,6 +25,7 @@ from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.scene.stitches.stitching import Stitching, no_stitching
+from supple.scene.values import float_array
 from supple.state import SolverDetails, State, StepReport
 
 
@@ -190,7 +191,7 @@ def build_system(scene: Scene, start: State | None = None) -> System:
     return System(
         scene=scene,
         bodies=tuple(ranges),
-        pins=_pin_ranges(scene, ranges, start),
+        pins=tuple(PinRange(pin, *_anchored(pin, ranges, start)) for pin in scene.pins),
         rest_positions=np.ascontiguousarray(rest_positions),
         masses=np.concatenate(masses),
         tets=np.ascontiguousarray(np.concatenate(tets), dtype=np.int32),
@@ -201,8 +202,8 @@ def build_system(scene: Scene, start: State | None = None) -> System:
         triangles=np.ascontiguousarray(np.concatenate(triangles), dtype=np.int32),
         components=connected_components(graph, directed=False)[1].astype(np.int32),
         gravity=np.asarray(scene.gravity, dtype=np.float64),
-        forces=tuple(ForceRange(force, _chosen_vertices(force, ranges)) for force in scene.forces),
-        soft_targets=_soft_target_ranges(scene, ranges, start),
+        forces=tuple(ForceRange(force, _anchored(force, ranges, start)[0]) for force in scene.forces),
+        soft_targets=tuple(SoftTargetRange(item, *_anchored(item, ranges, start)) for item in scene.soft_targets),
         stitching=scene.stitching,
         start_states=_start_states(scene, start),
     )
@@ -224,40 +225,24 @@ def _lumped_masses(body: Body) -> NDArray[np.float64]:
     return masses.astype(np.float64, copy=False)
 
 
-def _pin_ranges(scene: Scene, ranges: list[BodyRange], start: State | None) -> tuple[PinRange, ...]:
-    pins = []
-    for pin in scene.pins:
-        part = next(r for r in ranges if r.name == pin.body)
-        placed = part.body.place(part.body.mesh.vertices)
-        local = pin.select(placed)
-        vertices = (local + part.vertices.start).astype(np.int32)
-        if start is None:
-            anchors = placed[local]
-        elif start.time == 0.0:
-            anchors = start.positions[vertices]
-        else:
-            anchors = points_at_origin(pin.motion, start.positions[vertices], start.time, pin.label)
-        pins.append(PinRange(pin, vertices, np.ascontiguousarray(anchors)))
-    return tuple(pins)
+def _anchored(
+    item: Pin | Force | SoftTarget, ranges: list[BodyRange], start: State | None
+) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """The selected vertices (k,) and their anchors (k, 3): where they are at time 0, before any motion.
 
-
-def _chosen_vertices(item: Force | SoftTarget, ranges: list[BodyRange]) -> NDArray[np.int32]:
+    A start at time 0 moves anchors. One at a later time moves those of pins, which hold their vertices where they are
+    then; soft targets still pull to the placement.
+    """
     part = next(r for r in ranges if r.name == item.body)
-    return (item.select(part.body.place(part.body.mesh.vertices)) + part.vertices.start).astype(np.int32)
-
-
-def _soft_target_ranges(scene: Scene, ranges: list[BodyRange], start: State | None) -> tuple[SoftTargetRange, ...]:
-    """Soft targets pull to the placement of their vertices at time 0, or to their given positions there."""
-    targets = []
-    for target in scene.soft_targets:
-        part = next(r for r in ranges if r.name == target.body)
-        vertices = _chosen_vertices(target, ranges)
-        if start is not None and start.time == 0.0:
-            anchors = start.positions[vertices]
-        else:
-            anchors = part.body.place(part.body.mesh.vertices)[vertices - part.vertices.start]
-        targets.append(SoftTargetRange(target, vertices, np.ascontiguousarray(anchors)))
-    return tuple(targets)
+    placed = part.body.place(part.body.mesh.vertices)
+    local = item.select(placed)
+    vertices = (local + part.vertices.start).astype(np.int32)
+    anchors = placed[local]
+    if start is not None and start.time == 0.0:
+        anchors = start.positions[vertices]
+    elif start is not None and isinstance(item, Pin):
+        anchors = points_at_origin(item.motion, start.positions[vertices], start.time, item.label)
+    return vertices, np.ascontiguousarray(anchors)
 
 
 def initial_state(
@@ -297,10 +282,7 @@ def initial_state(
 
 
 def _given(value: ArrayLike, count: int, what: str) -> NDArray[np.float64]:
-    try:
-        array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise SceneError(f"{what} is not an array of numbers") from None
+    array = float_array(value, what)
     if array.shape != (count, 3):
         raise SceneError(f"{what} has shape {array.shape}; the body's mesh needs ({count}, 3)")
     if not np.isfinite(array).all():

@@ -5,7 +5,7 @@ import pytest
 
 import supple as sp
 from supple.contact.obstacle_vertices import obstacle_positions, with_obstacles
-from supple.scene.obstacles.polyhedra import icosphere
+from supple.scene.obstacles.polyhedra import SPHERE_SPLITS, round_ball
 from supple.scene.rotation import rotation_matrix
 from supple.system import build_system
 
@@ -36,11 +36,10 @@ def plane_offsets(points, triangles):
     return np.einsum("ij,ij->i", a, normals) / np.linalg.norm(normals, axis=1)
 
 
-@pytest.mark.parametrize("splits", [1, 4, 12])
-def test_the_icosphere_is_closed_round_and_outward(splits):
-    points, triangles = icosphere(splits)
-    assert len(points) == 10 * splits**2 + 2
-    assert len(triangles) == 20 * splits**2
+def test_the_polyhedron_in_the_ball_is_closed_round_and_outward():
+    points, triangles = round_ball(inscribed=True)
+    assert len(points) == 10 * SPHERE_SPLITS**2 + 2
+    assert len(triangles) == 20 * SPHERE_SPLITS**2
     assert np.allclose(np.linalg.norm(points, axis=1), 1.0, rtol=1e-14)
     edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
     assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()

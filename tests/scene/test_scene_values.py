@@ -157,10 +157,10 @@ BAD_SCENES = [
         "obstacle 'floor' and obstacle 'floor' have the same name",
     ),
     ({"obstacles": [sp.HalfSpace(name="cube")]}, "body 'cube' and obstacle 'cube' have the same name; give each body"),
-    ({"pins": [sp.Pin("ball", [0])]}, "there is no such body; the scene has 'cube'"),
+    ({"pins": [sp.Pin("ball", [0])]}, "there is no body 'ball'; there are 'cube'"),
     ({"pins": [sp.Pin("cube", [8])]}, "vertex 8 does not exist; the body has 8"),
     ({"pins": [sp.Pin("cube", sp.InBox((5, 5, 5), (6, 6, 6)))]}, "its box holds no vertex; the body reaches from"),
-    ({"pins": [sp.Pin("cube", [0, 1]), sp.Pin("cube", [1, 2])]}, "vertex 1 is held by another pin already"),
+    ({"pins": [sp.Pin("cube", [0, 1]), sp.Pin("cube", [1, 2])]}, "vertex 1 is already held by another pin"),
     ({"gravity": (0, -9.81)}, "gravity has shape"),
     ({"gravity": (0, np.nan, 0)}, "gravity is"),
 ]

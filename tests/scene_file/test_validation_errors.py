@@ -124,10 +124,14 @@ CASES = [
     (
         "{kind: half_space}",
         "{kind: half_space, name: x}\n  - {kind: sphere, name: x}",
-        "11: obstacles[1].name: another obstacle has the name 'x'",
+        "11: obstacles[1].name: obstacle 'x' and obstacle 'x' have the same name; give each",
     ),
-    ("{kind: half_space}", "{kind: half_space, name: cube}", "10: obstacles[0].name: a body has the name 'cube'; give"),
-    ("body: cube", "body: cub", "12: pins[0].body: there is no body 'cub'; did you mean `cube`?"),
+    (
+        "{kind: half_space}",
+        "{kind: half_space, name: cube}",
+        "10: obstacles[0].name: body 'cube' and obstacle 'cube' have the same name; give",
+    ),
+    ("body: cube", "body: cub", "12: pins[0].body: pin of body 'cub': there is no body 'cub'; did you mean 'cube'?"),
     ("vertices: [0]", "vertices: [8]", "12: pins[0].vertices: pin of body 'cube': vertex 8 does not exist"),
     ("vertices: [0]", "vertices: [-1]", "12: pins[0].vertices[0]: is -1; it must be at least 0"),
     ("vertices: [0]", "vertices: [0, 0]", "12: pins[0].vertices: pin of body 'cube': vertices names a vertex twice"),
@@ -157,7 +161,7 @@ CASES = [
     (
         "dt: 1/60",
         "soft_targets: [{body: ball, vertices: [0], stiffness: 1}]",
-        "13: soft_targets[0].body: there is no body 'ball'; known here: cube",
+        "13: soft_targets[0].body: soft target of body 'ball': there is no body 'ball'; there are 'cube'",
     ),
     (
         "dt: 1/60",

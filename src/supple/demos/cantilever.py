@@ -10,8 +10,9 @@ from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
 from supple.scene.body import Body
 from supple.scene.forces import Force
-from supple.scene.pins import InBox, Pin
+from supple.scene.pins import Pin
 from supple.scene.scene import Scene
+from supple.scene.selection import InBox
 
 LENGTH, SIDE, YOUNGS, POISSON, LOAD = 1.0, 0.1, 1e6, 0.3, 0.01
 MESHES = {"coarse": (32, 5, 1), "medium": (64, 10, 2), "fine": (128, 20, 4)}

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from supple.demos.demo import Claim, Demo, Measurement
+from supple.demos.motion_measures import height
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.mesh import shapes
 from supple.scene.body import Body
@@ -32,18 +35,12 @@ def scene() -> Scene:
 
 
 class _Measurement(Measurement):
-    def begin(self, first: Frame, dt: float, steps: int) -> None:
-        self.heights: dict[str, list[float]] = {name: [] for name in KINDS}
-        self.last = first
-
-    def write(self, frame: Frame) -> None:
-        for name, heights in self.heights.items():
-            heights.append(float(np.ptp(frame.positions[name][:, 1])) / (2 * RADIUS))
-        self.last = frame
+    def values(self, frame: Frame) -> dict[str, Any]:
+        return {name: height(frame, name) / (2 * RADIUS) for name in KINDS}
 
     def claims(self) -> list[Claim]:
-        lowest = {name: min(heights) for name, heights in self.heights.items()}
-        soft = self.heights["soft"]
+        lowest = {name: min(self.series[name]) for name in KINDS}
+        soft = self.series["soft"]
         rebound = max(soft[int(np.argmin(soft)) :])
         speed = float(np.linalg.norm(self.last.velocities["stiff"], axis=1).max())
         return [
@@ -71,6 +68,5 @@ COMPLIANCE = Demo(
     scene=scene,
     solvers={"xpbd": lambda: XPBD(substeps=40)},
     measurement=_Measurement,
-    dt=1 / 60,
     steps=300,
 )

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from supple.errors import SolverError
 from supple.scene.scene import Scene
 from supple.simulate import Frame
+from supple.state import Status
 from supple.system import Solver
 
 
@@ -32,18 +35,43 @@ class Measurement(ABC):
     Attributes
     ----------
     first, last : the frame at the start, and the latest one
+    dt : time from frame to frame [s]; steps : how many frames the run should have
+    statuses : how many steps ended how; iterations : of all steps
+    series : by name, the `values` of every frame after the start
     """
-
-    first: Frame
-    last: Frame
 
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         """Called with the frame at the start."""
         self.first = self.last = first
+        self.dt, self.steps = dt, steps
+        self.statuses: Counter[Status] = Counter()
+        self.iterations = 0
+        self.series: defaultdict[str, list[Any]] = defaultdict(list)
 
     def write(self, frame: Frame) -> None:
         """Called with every frame."""
         self.last = frame
+        self.statuses[frame.report.status] += 1
+        self.iterations += frame.report.iterations
+        for name, value in self.values(frame).items():
+            self.series[name].append(value)
+
+    def values(self, frame: Frame) -> dict[str, Any]:
+        """What the claims need of every frame, by name."""
+        return {"min_J": frame.report.min_det_F}
+
+    @property
+    def endings(self) -> str:
+        """How many steps ended how, for a claim."""
+        return ", ".join(f"{count} {status}" for status, count in self.statuses.items())
+
+    @property
+    def every_step_converged(self) -> bool:
+        return set(self.statuses) == {Status.CONVERGED}
+
+    def no_tet_inverts(self) -> Claim:
+        min_J = min(self.series["min_J"])
+        return Claim("no tetrahedron inverts", f"smallest J {min_J:.3g}", min_J > 0.0)
 
     def end(self) -> None:  # noqa: B027 - most demos have nothing to do here
         """Called when the run is over."""
@@ -72,8 +100,8 @@ class Demo:
     scene: Callable[[], Scene]
     solvers: Mapping[str, Callable[[], Solver]]
     measurement: Callable[[], Measurement]
-    dt: float
     steps: int
+    dt: float = 1 / 60
     variants: Mapping[str, Demo] = field(default_factory=dict)
 
     @property

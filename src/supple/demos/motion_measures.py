@@ -1,8 +1,9 @@
-"""Measures that several demos share: volumes and spins of bodies."""
+"""Measures that several demos share."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from supple.simulate import Frame
 from supple.system import BodyRange
@@ -28,3 +29,20 @@ def spin_about(frame: Frame, name: str, axis: int) -> float:
     L = m @ np.cross(r, v - m @ v / m.sum())
     across = np.delete(r, axis, axis=1)
     return float(L[axis] / (m @ np.einsum("ij,ij->i", across, across)))
+
+
+def pin_error(frame: Frame) -> float:
+    """The largest distance of a pinned vertex from where its motion puts it, along one axis [m]."""
+    off = frame.state.positions[frame.system.pinned_vertices] - frame.system.pin_targets(frame.time)
+    return float(np.abs(off).max())
+
+
+def height(frame: Frame, name: str) -> float:
+    """The vertical extent of a body [m]."""
+    return float(np.ptp(frame.positions[name][:, 1]))
+
+
+def stitch_lengths(frame: Frame) -> NDArray[np.float64]:
+    """(k,) distances from stitched vertices to the centers of the triangles that they are stitched to [m]."""
+    x, nodes = frame.state.positions, frame.system.stitching.tets.vertices
+    return np.linalg.norm(x[nodes[:, 0]] - x[nodes[:, 1:]].mean(axis=1), axis=1)

@@ -19,19 +19,15 @@ Sources: Stomakhin et al., "Energetically Consistent Invertible Elasticity" (201
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from supple.errors import SceneError
 from supple.materials.kinds import STRETCH_ENERGIES
 from supple.materials.per_tet import TetMaterial
 from supple.materials.stretch_energies.stretches import UNKNOWN_ONE, UNKNOWN_SIX, UNKNOWN_THREE, dispatch
 from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed, store_mat, symmetric_eigen
 from supple.numerics.svd3 import svd3 as decompose
-from supple.numerics.threads import threads_for
 
 density = dispatch("density", [energy.density for energy in STRETCH_ENERGIES], UNKNOWN_ONE)
 gradient = dispatch("gradient", [energy.gradient for energy in STRETCH_ENERGIES], UNKNOWN_THREE)
@@ -142,19 +138,22 @@ def _rest_moduli(kind, mu, lam, rest_mu, rest_lam):
 
 
 @njit(parallel=True, cache=True, error_model="numpy")
-def _densities(F, kind, mu, lam, out):
+def densities(F, kind, mu, lam, out):
+    """Energy densities (m,) of F (m, 3, 3), into `out`."""
     for e in prange(len(F)):
         out[e] = energy_density(load_mat(F, e), kind[e], mu[e], lam[e])
 
 
 @njit(cache=True, error_model="numpy")
-def _piolas(F, kind, mu, lam, out):
+def piolas(F, kind, mu, lam, out):
+    """Stresses (m, 3, 3) of F (m, 3, 3), into `out`."""
     for e in range(len(F)):
         store_mat(first_piola(load_mat(F, e), kind[e], mu[e], lam[e]), out, e)
 
 
 @njit(cache=True, error_model="numpy")
-def _hessians(F, kind, mu, lam, project, out):
+def hessians(F, kind, mu, lam, project, out):
+    """Hessians (m, 9, 9) of F (m, 3, 3), into `out`."""
     for e in range(len(F)):
         U, s, V = decompose(load_mat(F, e))
         A, alpha, beta = principal_hessian(s, kind[e], mu[e], lam[e], project)
@@ -173,38 +172,3 @@ def rest_lame_parameters(material: TetMaterial) -> tuple[NDArray[np.float64], ND
     mu, lam = np.empty_like(material.mu), np.empty_like(material.lam)
     _rest_moduli(material.kind, material.mu, material.lam, mu, lam)
     return mu, lam
-
-
-def _flat(F: ArrayLike) -> tuple[NDArray[np.float64], tuple[int, ...]]:
-    F = np.asarray(F, dtype=np.float64)
-    if F.shape[-2:] != (3, 3):
-        raise SceneError(f"F has shape {F.shape}; its last two axes must be (3, 3)")
-    return np.ascontiguousarray(F.reshape(-1, 3, 3)), F.shape[:-2]
-
-
-def batch_energy_densities(F: ArrayLike, per_tet: Callable[[int], TetMaterial]) -> NDArray[np.float64]:
-    """See `Elastic.energy_density`; `per_tet(n)` returns the parameters for n gradients."""
-    flat, shape = _flat(F)
-    tet = per_tet(len(flat))
-    out = np.empty(len(flat))
-    with threads_for(len(flat), 5_000):
-        _densities(flat, tet.kind, tet.mu, tet.lam, out)
-    return out.reshape(shape)
-
-
-def batch_first_piolas(F: ArrayLike, per_tet: Callable[[int], TetMaterial]) -> NDArray[np.float64]:
-    """See `Elastic.first_piola` and `batch_energy_densities`."""
-    flat, shape = _flat(F)
-    tet = per_tet(len(flat))
-    out = np.empty_like(flat)
-    _piolas(flat, tet.kind, tet.mu, tet.lam, out)
-    return out.reshape(*shape, 3, 3)
-
-
-def batch_hessians(F: ArrayLike, per_tet: Callable[[int], TetMaterial], project: bool) -> NDArray[np.float64]:
-    """See `Elastic.hessian` and `batch_energy_densities`."""
-    flat, shape = _flat(F)
-    tet = per_tet(len(flat))
-    out = np.empty((len(flat), 9, 9))
-    _hessians(flat, tet.kind, tet.mu, tet.lam, bool(project), out)
-    return out.reshape(*shape, 9, 9)

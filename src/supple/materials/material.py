@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -10,11 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.materials.isotropic import batch_energy_densities, batch_first_piolas, batch_hessians
+from supple.materials.isotropic import densities, hessians, piolas
 from supple.materials.kinds import STRETCH_ENERGIES
 from supple.materials.lame import lame_from_engineering
 from supple.materials.per_tet import TetMaterial, one_per_tet
 from supple.materials.stretch_energies.stretches import StretchFunctions
+from supple.numerics.threads import threads_for
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -118,9 +120,8 @@ class Elastic(Material):
         ------
         SceneError : where the energy is not among those that the kernels are compiled for.
         """
-        for kind, energy in enumerate(STRETCH_ENERGIES):
-            if energy is cls.stretch_functions:
-                return kind
+        if cls.stretch_functions in STRETCH_ENERGIES:
+            return STRETCH_ENERGIES.index(cls.stretch_functions)
         raise SceneError(
             f"{cls.__name__}: its energy is not registered; add it to STRETCH_ENERGIES of supple.materials.kinds"
         )
@@ -146,7 +147,7 @@ class Elastic(Material):
         -------
         (...) energy densities [Pa].
         """
-        return batch_energy_densities(F, self.per_tet)
+        return self._evaluated(densities, F, ())
 
     def first_piola(self, F: ArrayLike) -> NDArray[np.float64]:
         """First Piola-Kirchhoff stress P = d psi / d F.
@@ -159,7 +160,7 @@ class Elastic(Material):
         -------
         (..., 3, 3) stresses [Pa].
         """
-        return batch_first_piolas(F, self.per_tet)
+        return self._evaluated(piolas, F, (3, 3))
 
     def hessian(self, F: ArrayLike, project: bool = False) -> NDArray[np.float64]:
         """Second derivative of the energy density, H[3 i + j, 3 k + l] = d^2 psi / (dF_ij dF_kl).
@@ -173,4 +174,17 @@ class Elastic(Material):
         -------
         (..., 9, 9) symmetric [Pa].
         """
-        return batch_hessians(F, self.per_tet, project)
+        return self._evaluated(hessians, F, (9, 9), bool(project))
+
+    def _evaluated(
+        self, kernel: Callable[..., None], F: ArrayLike, shape: tuple[int, ...], *options: bool
+    ) -> NDArray[np.float64]:
+        """What a kernel computes of every F, an array of that shape each."""
+        F = np.asarray(F, dtype=np.float64)
+        if F.shape[-2:] != (3, 3):
+            raise SceneError(f"F has shape {F.shape}; its last two axes must be (3, 3)")
+        flat = np.ascontiguousarray(F.reshape(-1, 3, 3))
+        tet, out = self.per_tet(len(flat)), np.empty((len(flat), *shape))
+        with threads_for(len(flat), 5_000):
+            kernel(flat, tet.kind, tet.mu, tet.lam, *options, out)
+        return out.reshape(F.shape[:-2] + shape)

@@ -56,9 +56,8 @@ class Regions(Elastic):
         object.__setattr__(self, "materials", materials)
         object.__setattr__(self, "index", index.astype(np.int32))
         for name in ("youngs", "poisson", "density", "damping"):
-            object.__setattr__(
-                self, name, self._values_per_tet([getattr(material, name) for material in materials], name)
-            )
+            values = [getattr(material, name) for material in materials]
+            object.__setattr__(self, name, self._values_per_tet(values, name))
         super().__post_init__()
 
     def _values_per_tet(self, values: Sequence[ArrayLike], name: str) -> NDArray[np.float64]:
@@ -77,10 +76,8 @@ class Regions(Elastic):
 
     def lame_parameters(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(n_tets,) mu and lam [Pa] of the energy density of each tet's material."""
-        pairs = [material.lame_parameters() for material in self.materials]
-        return self._values_per_tet([mu for mu, _ in pairs], "mu"), self._values_per_tet(
-            [lam for _, lam in pairs], "lam"
-        )
+        mus, lams = zip(*(material.lame_parameters() for material in self.materials), strict=True)
+        return self._values_per_tet(mus, "mu"), self._values_per_tet(lams, "lam")
 
     def per_tet(self, n_tets: int) -> TetMaterial:
         index = np.asarray(self.index)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from supple.errors import SceneError
 from supple.scene.body import Body
+from supple.scene.located import at
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.suggestion import suggestion
 from supple.scene.values import non_negative
@@ -86,79 +87,18 @@ class HasContactPairs(Protocol):
     def contact_pairs(self) -> Sequence[ContactPair]: ...
 
 
-class PairRules:
-    """The contact pairs of a scene, added one by one; each must name existing things and contradict no earlier one.
-
-    Parameters
-    ----------
-    scene : its bodies and obstacles; its contact pairs are not read.
-    """
-
-    def __init__(self, scene: HasContactPairs) -> None:
-        self._bodies = len(scene.bodies)
-        self._names = [body.name for body in scene.bodies] + [str(obstacle.name) for obstacle in scene.obstacles]
-        self._pairs: list[ContactPair] = []
-        self._rule: NDArray[np.int32] | None = None
-
-    def add(self, pair: ContactPair) -> None:
-        """Add one rule.
-
-        Raises
-        ------
-        SceneError : where a name is unknown, two obstacles are paired, or an earlier rule contradicts this one.
-        """
-        first, second = self._found(pair, "first"), self._found(pair, "second")
-        if first[-1] >= self._bodies and second[-1] >= self._bodies:
-            a, b = self._names[first[-1]], self._names[second[-1]]
-            raise SceneError(
-                f"{pair.label}: {a!r} and {b!r} are both obstacles, which never touch each other; name a body in "
-                "`first` or in `second`, and no obstacle there"
-            )
-        if self._rule is None:
-            self._rule = np.full((len(self._names), len(self._names)), -1, dtype=np.int32)
-        for rows, columns in ((first, second), (second, first)):
-            block = np.ix_(rows, columns)
-            for earlier in np.unique(self._rule[block]):
-                if earlier >= 0 and _effect(self._pairs[earlier]) != _effect(pair):
-                    i, j = np.argwhere(self._rule[block] == earlier)[0]
-                    a, b = self._names[rows[i]], self._names[columns[j]]
-                    raise SceneError(
-                        f"{pair.label}: contact pair {earlier} (from 0) contradicts it for {a!r} and {b!r}; keep one"
-                    )
-        for rows, columns in ((first, second), (second, first)):
-            self._rule[np.ix_(rows, columns)] = len(self._pairs)
-        self._pairs.append(pair)
-
-    def apply(self, table: PairTable) -> None:
-        """Write the rules into a table of this scene, in place."""
-        if self._rule is None:
-            return
-        for number, pair in enumerate(self._pairs):
-            entries = self._rule == number
-            if pair.friction is None:
-                table.collide[entries] = False
-            else:
-                table.friction[entries] = pair.friction
-
-    def _found(self, pair: ContactPair, key: str) -> list[int]:
-        """Numbers of the bodies and obstacles that one side of a rule names, ascending."""
-        numbers: set[int] = set()
-        for name in getattr(pair, key):
-            found = [i for i, known in enumerate(self._names) if _matches(name, known)]
-            if not found:
-                remedy = suggestion(name, self._names)
-                raise SceneError(f"{pair.label}: {key}: there is no body or obstacle {name!r}; {remedy}")
-            numbers.update(found)
-        return sorted(numbers)
-
-
 def pair_table(scene: HasContactPairs) -> PairTable:
     """Which bodies and obstacles of a scene touch, and with which friction coefficient.
 
     Without a rule everything touches. An obstacle's coefficient holds for all bodies. Two bodies, or a body and itself,
     use the geometric mean of their coefficients.
+
+    Raises
+    ------
+    SceneError : where a rule names an unknown thing, pairs two obstacles, or contradicts an earlier one.
     """
-    bodies, count = len(scene.bodies), len(scene.bodies) + len(scene.obstacles)
+    names = [body.name for body in scene.bodies] + [str(obstacle.name) for obstacle in scene.obstacles]
+    bodies, count = len(scene.bodies), len(names)
     own = np.array([body.friction for body in scene.bodies], dtype=np.float64)
     theirs = np.array([obstacle.friction for obstacle in scene.obstacles], dtype=np.float64)
     collide = np.ones((count, count), dtype=np.bool_)
@@ -167,16 +107,42 @@ def pair_table(scene: HasContactPairs) -> PairTable:
     friction[:bodies, :bodies] = np.sqrt(np.outer(own, own))
     friction[:bodies, bodies:] = theirs
     friction[bodies:, :bodies] = theirs[:, None]
-    table = PairTable(collide, friction, bodies)
-    rules = PairRules(scene)
-    for pair in scene.contact_pairs:
-        rules.add(pair)
-    rules.apply(table)
-    return table
+    rule = np.full((count, count) if scene.contact_pairs else 0, -1, dtype=np.int32)
+    for number, pair in enumerate(scene.contact_pairs):
+        with at("contact_pairs", number):
+            first, second = _found(pair, "first", names), _found(pair, "second", names)
+            if first[-1] >= bodies and second[-1] >= bodies:
+                raise SceneError(
+                    f"{pair.label}: {names[first[-1]]!r} and {names[second[-1]]!r} are both obstacles, which never "
+                    "touch each other; name a body in `first` or in `second`, and no obstacle there"
+                )
+            before = rule[np.ix_(first, second)]
+            for earlier in np.unique(before[before >= 0]):
+                other = scene.contact_pairs[earlier]
+                if (other.friction, other.collide) != (pair.friction, pair.collide):
+                    i, j = np.argwhere(before == earlier)[0]
+                    a, b = names[first[i]], names[second[j]]
+                    raise SceneError(
+                        f"{pair.label}: contact pair {earlier} (from 0) contradicts it for {a!r} and {b!r}; keep one"
+                    )
+        for block in (np.ix_(first, second), np.ix_(second, first)):
+            rule[block] = number
+            if pair.friction is None:
+                collide[block] = False
+            else:
+                friction[block] = pair.friction
+    return PairTable(collide, friction, bodies)
 
 
-def _effect(pair: ContactPair) -> tuple[float | None, bool]:
-    return pair.friction, pair.collide
+def _found(pair: ContactPair, key: str, names: list[str]) -> list[int]:
+    """Numbers of the bodies and obstacles that one side of a rule names, ascending."""
+    numbers: set[int] = set()
+    for name in getattr(pair, key):
+        found = [i for i, known in enumerate(names) if _matches(name, known)]
+        if not found:
+            raise SceneError(f"{pair.label}: {key}: there is no body or obstacle {name!r}; {suggestion(name, names)}")
+        numbers.update(found)
+    return sorted(numbers)
 
 
 def _names(value: object, key: str) -> tuple[str, ...]:

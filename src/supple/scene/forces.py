@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.scene.motion import Motion, check_motion
-from supple.scene.selection import Selection, checked_selection, selected_vertices
-from supple.scene.values import check_name, positive
+from supple.scene.selection import OnVertices, Selection
+from supple.scene.values import float_array, positive
 
 
 @dataclass(frozen=True, eq=False)
-class Force:
+class Force(OnVertices):
     """A dead load: a force whose direction does not follow the deformation.
 
     Parameters
@@ -31,27 +32,18 @@ class Force:
     SceneError : where the force is not finite or has another shape.
     """
 
+    kind: ClassVar[str] = "force"
+    joint: ClassVar[str] = "on"
+
     body: str
     vertices: Selection
     force: ArrayLike | Callable[[float], ArrayLike]
     name: str | None = None
 
     def __post_init__(self) -> None:
-        check_name(self.body, "force: body")
-        if self.name is not None:
-            check_name(self.name, "force")
-        object.__setattr__(self, "vertices", checked_selection(self.vertices, self.label))
+        super().__post_init__()
         if not callable(self.force):
             object.__setattr__(self, "force", self._checked(self.force, "force"))
-
-    @property
-    def label(self) -> str:
-        """The name of this force in messages."""
-        return f"force {self.name!r} on body {self.body!r}" if self.name else f"force on body {self.body!r}"
-
-    def select(self, placed: NDArray[np.float64]) -> NDArray[np.int32]:
-        """Vertex indices (k,) of the body, given its vertices placed in the world (n, 3)."""
-        return selected_vertices(self.vertices, placed, self.label)
 
     def per_vertex(self, time: float, count: int) -> NDArray[np.float64]:
         """The force (count, 3) on each of the `count` selected vertices at `time` [N].
@@ -68,10 +60,7 @@ class Force:
         return given
 
     def _checked(self, value: ArrayLike, what: str) -> NDArray[np.float64]:
-        try:
-            array = np.array(value, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise SceneError(f"{self.label}: {what} is not an array of numbers") from None
+        array = float_array(value, f"{self.label}: {what}")
         if array.shape != (3,) and (array.ndim != 2 or array.shape[1] != 3):
             raise SceneError(f"{self.label}: {what} has shape {array.shape}; give (3,) in total or (k, 3) per vertex")
         if not np.isfinite(array).all():
@@ -80,7 +69,7 @@ class Force:
 
 
 @dataclass(frozen=True, eq=False)
-class SoftTarget:
+class SoftTarget(OnVertices):
     """Springs of rest length zero from vertices to their positions at the start, or to where `motion` moves these.
 
     Parameters
@@ -92,6 +81,8 @@ class SoftTarget:
     name : appears in messages.
     """
 
+    kind: ClassVar[str] = "soft target"
+
     body: str
     vertices: Selection
     stiffness: float
@@ -99,18 +90,6 @@ class SoftTarget:
     name: str | None = None
 
     def __post_init__(self) -> None:
-        check_name(self.body, "soft target: body")
-        if self.name is not None:
-            check_name(self.name, "soft target")
+        super().__post_init__()
         check_motion(self.motion, self.label)
-        object.__setattr__(self, "vertices", checked_selection(self.vertices, self.label))
         object.__setattr__(self, "stiffness", positive(self.stiffness, f"{self.label}: stiffness"))
-
-    @property
-    def label(self) -> str:
-        """The name of this soft target in messages."""
-        return f"soft target {self.name!r} of body {self.body!r}" if self.name else f"soft target of body {self.body!r}"
-
-    def select(self, placed: NDArray[np.float64]) -> NDArray[np.int32]:
-        """Vertex indices (k,) of the body, given its vertices placed in the world (n, 3)."""
-        return selected_vertices(self.vertices, placed, self.label)

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.scene.rotation import rotation_matrix
+from supple.scene.values import float_array
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,28 +49,21 @@ class Keyframes:
             raise SceneError(f"Keyframes: times[{at}] = {times[at]:g} s does not come after {times[at - 1]:g} s")
         if self.displacements is None and self.angles is None:
             raise SceneError("Keyframes: give displacements, angles, or both")
+        displacements = np.zeros((k, 3)) if self.displacements is None else self.displacements
+        angles = np.zeros(k) if self.angles is None else self.angles
         object.__setattr__(self, "times", times)
-        zeros = np.zeros((k, 3))
-        displacements = angles = None
-        if self.displacements is not None:
-            displacements = self._array("displacements", self.displacements, (k, 3))
-        if self.angles is not None:
-            angles = self._array("angles", self.angles, (k,))
+        object.__setattr__(self, "displacements", self._array("displacements", displacements, (k, 3)))
+        object.__setattr__(self, "angles", self._array("angles", angles, (k,)))
         axis = self._array("axis", self.axis, (3,))
         length = np.linalg.norm(axis)
         if length == 0.0:
             raise SceneError("Keyframes: axis has no length; give a direction such as [0, 0, 1]")
-        object.__setattr__(self, "displacements", zeros if displacements is None else displacements)
-        object.__setattr__(self, "angles", zeros[:, 0] if angles is None else angles)
         object.__setattr__(self, "axis", axis / length)
         object.__setattr__(self, "pivot", self._array("pivot", self.pivot, (3,)))
 
     @staticmethod
     def _array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
-        try:
-            array = np.array(value, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise SceneError(f"Keyframes: {name} is not an array of numbers") from None
+        array = float_array(value, f"Keyframes: {name}")
         if array.ndim != len(shape) or any(want not in (-1, got) for want, got in zip(shape, array.shape, strict=True)):
             want = tuple("k" if s == -1 else s for s in shape)
             raise SceneError(f"Keyframes: {name} has shape {array.shape}; it must have shape {want}, one per keyframe")
@@ -100,11 +94,7 @@ def displacement_at(
     motion: Callable[[float], ArrayLike], time: float, owner: str, count: int | None
 ) -> NDArray[np.float64]:
     """The checked value of a function of time: (3,), or (count, 3) where `count` is given."""
-    returned = motion(time)
-    try:
-        value = np.asarray(returned, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise SceneError(f"{owner}: motion({time:g}) is {returned!r}; it must be an array of numbers") from None
+    value = float_array(motion(time), f"{owner}: motion({time:g})", "it must be an array of numbers")
     if value.shape != (3,) and (count is None or value.shape != (count, 3)):
         want = "(3,)" if count is None else f"(3,) or ({count}, 3)"
         raise SceneError(f"{owner}: motion({time:g}) has shape {value.shape}; it must have shape {want}")

@@ -8,16 +8,19 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.scene.body import Body
-from supple.scene.contact_pairs import ContactPair, PairRules
+from supple.scene.contact_pairs import ContactPair, pair_table
 from supple.scene.forces import Force, SoftTarget
+from supple.scene.located import at
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.pins import Pin
+from supple.scene.selection import InBox
 from supple.scene.stitches.stitch import Stitch
 from supple.scene.stitches.stitching import Stitching, check_names, stitch_together
+from supple.scene.suggestion import suggestion
 from supple.scene.values import finite_vector
 
 _PARTS = (
@@ -72,36 +75,39 @@ class Scene:
         if not self.bodies:
             raise SceneError("scene: there is no body; give at least one")
         object.__setattr__(self, "gravity", finite_vector(self.gravity, "scene: gravity"))
-        known = [body.name for body in self.bodies]
-        object.__setattr__(self, "obstacles", _all_named(self.obstacles, known))
+        object.__setattr__(self, "obstacles", _all_named(self.obstacles, [body.name for body in self.bodies]))
         named: dict[str | None, str] = {}
-        for thing, name in [("body", name) for name in known] + [("obstacle", item.name) for item in self.obstacles]:
-            if name in named:
-                things = f"{named[name]} {name!r} and {thing} {name!r}"
-                raise SceneError(f"scene: {things} have the same name; give each body and obstacle a name of its own")
-            named[name] = thing
-        pinned: dict[str, np.ndarray] = {}
-        for pin in self.pins:
-            if pin.body not in known:
-                raise SceneError(f"{pin.label}: there is no such body; the scene has {', '.join(map(repr, known))}")
-            body = self.body(pin.body)
-            chosen = pin.select(body.place(body.mesh.vertices))
-            is_pinned = pinned.setdefault(pin.body, np.zeros(len(body.mesh.vertices), dtype=bool))
-            if is_pinned[chosen].any():
-                vertex = chosen[is_pinned[chosen]][0]
-                raise SceneError(f"{pin.label}: vertex {vertex} is held by another pin already; hold it once")
-            is_pinned[chosen] = True
-        for item in (*self.forces, *self.soft_targets):
-            if item.body not in known:
-                raise SceneError(f"{item.label}: there is no such body; the scene has {', '.join(map(repr, known))}")
-            body = self.body(item.body)
+        for key, thing, items in (("bodies", "body", self.bodies), ("obstacles", "obstacle", self.obstacles)):
+            for i, item in enumerate(items):
+                with at(key, i, "name"):
+                    if item.name in named:
+                        things = f"{named[item.name]} {item.name!r} and {thing} {item.name!r}"
+                        raise SceneError(f"{things} have the same name; give each body and obstacle a name of its own")
+                named[item.name] = thing
+        pinned = {body.name: np.zeros(len(body.mesh.vertices), dtype=bool) for body in self.bodies}
+        for key in ("pins", "forces", "soft_targets"):
+            for i, item in enumerate(getattr(self, key)):
+                with at(key, i):
+                    self._check_selection(item, pinned)
+        if self.contact_pairs:
+            pair_table(self)
+        check_names(self.stitches, list(pinned), [str(obstacle.name) for obstacle in self.obstacles])
+
+    def _check_selection(self, item: Pin | Force | SoftTarget, pinned: dict[str, NDArray[np.bool_]]) -> None:
+        """Raise where body or vertices do not exist, or a pin selects vertices that are `pinned`, then mark these."""
+        if item.body not in pinned:
+            with at("body"):
+                raise SceneError(f"{item.label}: there is no body {item.body!r}; {suggestion(item.body, list(pinned))}")
+        body, held = self.body(item.body), pinned[item.body]
+        with at("box" if isinstance(item.vertices, InBox) else "vertices"):
             chosen = item.select(body.place(body.mesh.vertices))
-            if isinstance(item, Force) and not callable(item.force):
-                item.per_vertex(0.0, len(chosen))
-        rules = PairRules(self)
-        for pair in self.contact_pairs:
-            rules.add(pair)
-        check_names(self.stitches, known, [str(obstacle.name) for obstacle in self.obstacles])
+            if isinstance(item, Pin):
+                if held[chosen].any():
+                    vertex = chosen[held[chosen]][0]
+                    raise SceneError(f"{item.label}: vertex {vertex} is already held by another pin; hold it once")
+                held[chosen] = True
+        if isinstance(item, Force) and not callable(item.force):
+            item.per_vertex(0.0, len(chosen))
 
     @cached_property
     def stitching(self) -> Stitching:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.scene.values import finite_vector
+from supple.scene.values import check_name, finite_vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,45 +40,59 @@ class InBox:
 Selection = ArrayLike | InBox
 
 
-def checked_selection(vertices: Selection, label: str) -> NDArray[np.int32] | InBox:
-    """The selection, checked as far as possible without its body. `label` begins the messages.
+class OnVertices:
+    """The base class of what acts on vertices of one body: the selection, and the name in messages."""
 
-    Raises
-    ------
-    SceneError : where indices are not whole numbers of zero or more, or name a vertex twice.
-    """
-    if isinstance(vertices, InBox):
-        return vertices
-    try:
-        indices = np.atleast_1d(np.asarray(vertices))
-    except (TypeError, ValueError):
-        raise SceneError(f"{label}: vertices is {vertices!r}; give indices or an InBox") from None
-    if indices.ndim != 1 or indices.size == 0 or not np.issubdtype(indices.dtype, np.integer):
-        raise SceneError(f"{label}: vertices must be a non-empty list of whole numbers, or an InBox")
-    unique = np.unique(indices)
-    if len(unique) != len(indices):
-        raise SceneError(f"{label}: vertices names a vertex twice; name each once")
-    if indices.min() < 0:
-        raise SceneError(f"{label}: vertices holds {indices.min()}, which is negative; indices begin at 0")
-    if indices.max() > np.iinfo(np.int32).max:
-        raise SceneError(f"{label}: vertices holds {indices.max()}, which is more than any mesh has")
-    return indices.astype(np.int32)
+    kind: ClassVar[str]
+    joint: ClassVar[str] = "of"
 
+    body: str
+    vertices: Selection
+    name: str | None
 
-def selected_vertices(vertices: Selection, placed: NDArray[np.float64], label: str) -> NDArray[np.int32]:
-    """Vertex indices (k,) of a body, given its vertices placed in the world (n, 3).
+    def __post_init__(self) -> None:
+        check_name(self.body, f"{self.kind}: body")
+        if self.name is not None:
+            check_name(self.name, self.kind)
+        object.__setattr__(self, "vertices", self._checked_selection())
 
-    Raises
-    ------
-    SceneError : where an index is out of range, or the box holds no vertex.
-    """
-    if isinstance(vertices, InBox):
-        indices = vertices.select(placed)
-        if len(indices) == 0:
-            low, high = placed.min(axis=0).round(6).tolist(), placed.max(axis=0).round(6).tolist()
-            raise SceneError(f"{label}: its box holds no vertex; the body reaches from {low} to {high}")
+    @property
+    def label(self) -> str:
+        """The name of this object in messages."""
+        return f"{self.kind}{f' {self.name!r}' if self.name else ''} {self.joint} body {self.body!r}"
+
+    def select(self, placed: NDArray[np.float64]) -> NDArray[np.int32]:
+        """Vertex indices (k,) of the body, given its vertices placed in the world (n, 3).
+
+        Raises
+        ------
+        SceneError : where an index is out of range, or the box holds no vertex.
+        """
+        if isinstance(self.vertices, InBox):
+            indices = self.vertices.select(placed)
+            if len(indices) == 0:
+                low, high = placed.min(axis=0).round(6).tolist(), placed.max(axis=0).round(6).tolist()
+                raise SceneError(f"{self.label}: its box holds no vertex; the body reaches from {low} to {high}")
+            return indices
+        indices = np.asarray(self.vertices, dtype=np.int32)
+        if indices.max() >= len(placed):
+            raise SceneError(f"{self.label}: vertex {indices.max()} does not exist; the body has {len(placed)}")
         return indices
-    indices = np.asarray(vertices, dtype=np.int32)
-    if indices.max() >= len(placed):
-        raise SceneError(f"{label}: vertex {indices.max()} does not exist; the body has {len(placed)}")
-    return indices
+
+    def _checked_selection(self) -> NDArray[np.int32] | InBox:
+        """The selection, checked as far as possible without its body."""
+        if isinstance(self.vertices, InBox):
+            return self.vertices
+        try:
+            indices = np.atleast_1d(np.asarray(self.vertices))
+        except (TypeError, ValueError):
+            raise SceneError(f"{self.label}: vertices is {self.vertices!r}; give indices or an InBox") from None
+        if indices.ndim != 1 or indices.size == 0 or not np.issubdtype(indices.dtype, np.integer):
+            raise SceneError(f"{self.label}: vertices must be a non-empty list of whole numbers, or an InBox")
+        if len(np.unique(indices)) != len(indices):
+            raise SceneError(f"{self.label}: vertices names a vertex twice; name each once")
+        if indices.min() < 0:
+            raise SceneError(f"{self.label}: vertices holds {indices.min()}, which is negative; indices begin at 0")
+        if indices.max() > np.iinfo(np.int32).max:
+            raise SceneError(f"{self.label}: vertices holds {indices.max()}, which is more than any mesh has")
+        return indices.astype(np.int32)

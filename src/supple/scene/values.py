@@ -16,12 +16,18 @@ def check_name(name: object, kind: str) -> None:
         raise SceneError(f"{kind} {name[:100]!r}: a name is at most 100 letters, digits, spaces, '-', '_' and '.'")
 
 
+def float_array(value: object, what: str, remedy: str | None = None) -> NDArray[np.float64]:
+    """A new float64 array of `value`; raise where it does not consist of numbers."""
+    try:
+        return np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        problem = "is not an array of numbers" if remedy is None else f"is {value!r}; {remedy}"
+        raise SceneError(f"{what} {problem}") from None
+
+
 def finite_vector(value: object, what: str, *, nonzero: bool = False) -> NDArray[np.float64]:
     """`value` as a read-only (3,) float64 array; raise where it is not three finite numbers."""
-    try:
-        vector = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise SceneError(f"{what} is {value!r}; give three numbers") from None
+    vector = float_array(value, what, "give three numbers")
     if vector.shape != (3,):
         raise SceneError(f"{what} has shape {vector.shape}; give three numbers")
     if not np.isfinite(vector).all():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 from pathlib import Path
 
 from supple.errors import SceneError
@@ -21,7 +22,7 @@ class ConfinedMeshStore(MeshStore):
         path = self.folder / file
         self._require_inside(path, file)
         # A TetGen mesh consists of several files of one stem; the scene gives one of them.
-        for sibling in path.parent.glob(f"{_literal(path.stem)}.*") if path.parent.is_dir() else ():
+        for sibling in path.parent.glob(f"{glob.escape(path.stem)}.*") if path.parent.is_dir() else ():
             self._require_inside(sibling, file)
         return path
 
@@ -37,7 +38,3 @@ class ConfinedMeshStore(MeshStore):
             raise SceneError(f"{printable(file)} is outside the scene file's folder; a live page reads no files there")
         if exists and not regular:
             raise SceneError(f"{printable(file)} is not a regular file of at most {LARGEST_FILE // 2**20} MiB")
-
-
-def _literal(stem: str) -> str:
-    return "".join(f"[{c}]" if c in "*?[" else c for c in stem)

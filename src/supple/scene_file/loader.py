@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,25 +15,15 @@ from pydantic import ValidationError
 
 from supple.errors import SceneError
 from supple.scene.body import Body
-from supple.scene.forces import Force, SoftTarget
-from supple.scene.obstacles.obstacle import Obstacle
-from supple.scene.pins import Pin
+from supple.scene.located import LocatedError, at
 from supple.scene.scene import Scene
-from supple.scene.selection import InBox
-from supple.scene.stitches.stitching import StitchError
 from supple.scene_file.document import OutputModel, SceneFileModel
-from supple.scene_file.entries.contact_pairs import built_pairs
 from supple.scene_file.entries.mesh_sources import MeshStore
-from supple.scene_file.located import LocatedError, at
-from supple.scene_file.validation_errors import scene_error, suggestion
+from supple.scene_file.validation_errors import scene_error
 from supple.scene_file.yaml_reader import Key, read_yaml
 from supple.system import Solver
 
 logger = logging.getLogger(__name__)
-
-Selecting = TypeVar("Selecting", Pin, Force, SoftTarget)
-Described = TypeVar("Described")
-Built = TypeVar("Built")
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,64 +101,25 @@ def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
                 bodies[built.body.name] = built.body
                 if built.initial_positions is not None:
                     starts[built.body.name] = built.initial_positions
-    obstacles: list[Obstacle] = []
-    for i, described in enumerate(model.obstacles):
-        with at("obstacles", i):
-            obstacle = described.build(meshes)
-            if obstacle.name is not None and any(obstacle.name == other.name for other in obstacles):
-                raise SceneError(f"another obstacle has the name {obstacle.name!r}; give each a different name")
-            if obstacle.name in bodies:
-                raise SceneError(f"a body has the name {obstacle.name!r}; give each thing a different name")
-            obstacles.append(obstacle)
-    held: dict[str, set[int]] = {}
-    pins = _each("pins", model.pins, lambda pin: _free(_fits(pin.build(), bodies), bodies, held))
-    forces = _each("forces", model.forces, lambda force: _fits(force.build(), bodies))
-    targets = _each("soft_targets", model.soft_targets, lambda target: _fits(target.build(), bodies))
-    stitches = _each("stitches", model.stitches, lambda stitch: stitch.build())
+    obstacles = _each("obstacles", model.obstacles, meshes)
+    lists = ("pins", "forces", "soft_targets", "stitches", "contact_pairs")
+    parts = {key: _each(key, getattr(model, key)) for key in lists}
     with at("solver"):
         solver = model.solver.build()
     with at():
-        try:
-            scene = Scene(list(bodies.values()), obstacles, pins, model.gravity, forces, targets, stitches)
-            if model.contact_pairs:
-                scene = replace(scene, contact_pairs=built_pairs(model.contact_pairs, scene))
-            # The pairs are found here, where an error's place in the file is known; the scene caches them.
-            logger.debug("%d stitched pairs", len(scene.stitching))
-        except StitchError as error:
-            raise LocatedError(("stitches", error.number), str(error)) from None
+        scene = Scene(list(bodies.values()), obstacles, gravity=model.gravity, **parts)
+        # The pairs are found here, where an error's place in the file is known; the scene caches them.
+        logger.debug("%d stitched pairs", len(scene.stitching))
     return Run(scene, solver, model.dt, model.steps, starts, model.output)
 
 
-def _each(key: str, models: Sequence[Described], build: Callable[[Described], Built]) -> list[Built]:
-    """What `build` makes of each entry of a list in the file; errors get the place of their entry."""
+def _each(key: str, models: Sequence[Any], *arguments: MeshStore) -> list[Any]:
+    """What each entry of a list in the file builds; errors get the place of their entry."""
     built = []
     for i, model in enumerate(models):
         with at(key, i):
-            built.append(build(model))
+            built.append(model.build(*arguments))
     return built
-
-
-def _fits(item: Selecting, bodies: dict[str, Body]) -> Selecting:
-    """The item, after a check that its body and vertices exist; here its place in the file is known."""
-    if item.body not in bodies:
-        with at("body"):
-            raise SceneError(f"there is no body {item.body!r}; {suggestion(item.body, bodies)}")
-    body = bodies[item.body]
-    with at("box" if isinstance(item.vertices, InBox) else "vertices"):
-        item.select(body.place(body.mesh.vertices))
-    return item
-
-
-def _free(pin: Pin, bodies: dict[str, Body], held: dict[str, set[int]]) -> Pin:
-    """The pin, after a check that no other pin holds its vertices."""
-    body = bodies[pin.body]
-    chosen = set(pin.select(body.place(body.mesh.vertices)).tolist())
-    twice = chosen & held.setdefault(pin.body, set())
-    if twice:
-        with at("box" if isinstance(pin.vertices, InBox) else "vertices"):
-            raise SceneError(f"{pin.label}: vertex {min(twice)} is already held by another pin; hold it once")
-    held[pin.body] |= chosen
-    return pin
 
 
 def _keys_of_message(data: Any, keys: tuple[Key, ...], message: str) -> tuple[Key, ...]:

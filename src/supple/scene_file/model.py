@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
@@ -15,6 +15,8 @@ NonNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
 Name = Annotated[str, Field(min_length=1, max_length=100)]
+Extents = Annotated[list[Positive], Field(min_length=3, max_length=3)]
+Index = Annotated[int, Field(ge=0, lt=2**31)]
 FilePath = Annotated[str, Field(min_length=1, max_length=1000)]
 
 
@@ -22,6 +24,9 @@ class Model(BaseModel):
     """Base of all parts of a scene file."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+    alternatives: ClassVar[tuple[str, str, str] | None] = None
+    """Two keys of which exactly one must be given, and the message otherwise."""
 
     @model_validator(mode="before")
     @classmethod
@@ -33,3 +38,11 @@ class Model(BaseModel):
                     context = {"key": key, "known": list(cls.model_fields)}
                     raise PydanticCustomError(UNKNOWN_KEY, "unknown key {key}", context)
         return data
+
+    @model_validator(mode="after")
+    def _one_of_the_alternatives(self) -> Self:
+        if self.alternatives is not None:
+            first, second, message = self.alternatives
+            if (getattr(self, first) is None) == (getattr(self, second) is None):
+                raise ValueError(message)
+        return self

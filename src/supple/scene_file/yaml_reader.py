@@ -15,6 +15,7 @@ from typing import Any
 import yaml
 
 from supple.errors import SceneError
+from supple.scene.located import Key
 
 MAX_BYTES = 8 * 1024 * 1024
 MAX_VALUES = 1_000_000
@@ -27,8 +28,6 @@ _INT = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
 _BOOL = re.compile(r"true|True|TRUE|false|False|FALSE")
 _NULL = re.compile(r"~|null|Null|NULL|")
 _PREFIX = "tag:yaml.org,2002:"
-
-Key = str | int
 
 
 class _Loader(yaml.SafeLoader):

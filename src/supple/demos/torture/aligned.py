@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 
-from supple.demos.demo import Claim, Demo
-from supple.demos.torture.watch import ContactMeasurement, Torture, center, mass, mechanical_energy
-from supple.implicit.solver import Implicit
+from supple.demos.demo import Claim
+from supple.demos.torture.watch import ContactMeasurement, Size, center, mass, mechanical_energy, torture
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
 from supple.scene.body import Body
@@ -52,20 +49,15 @@ class _Measurement(ContactMeasurement):
         ]
 
 
-def _demo(cells: int, steps: int) -> Demo:
-    return Demo(
-        name="torture-aligned",
-        summary="eight aligned cubes collide and bounce off",
-        explanation=(
-            "Two by two by two soft cubes (E = 100 kPa), exactly aligned, collide in the middle at 0.5 m/s along each "
-            "axis: vertices meet vertices, edges meet parallel edges, faces meet faces, all at the same time."
-        ),
-        scene=partial(scene, cells),
-        solvers={"implicit": Implicit},
-        measurement=_Measurement,
-        dt=1 / 200,
-        steps=steps,
-    )
-
-
-ALIGNED = Torture(small=_demo(2, 24), full=_demo(4, 40))
+ALIGNED = torture(
+    name="aligned",
+    summary="eight aligned cubes collide and bounce off",
+    explanation=(
+        "Two by two by two soft cubes (E = 100 kPa), exactly aligned, collide in the middle at 0.5 m/s along each "
+        "axis: vertices meet vertices, edges meet parallel edges, faces meet faces, all at the same time."
+    ),
+    scene=scene,
+    measurement=_Measurement,
+    small=Size((2,), 1 / 200, 24),
+    full=Size((4,), 1 / 200, 40),
+)

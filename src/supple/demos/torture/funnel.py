@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 
-from supple.demos.demo import Claim, Demo
+from supple.demos.demo import Claim
 from supple.demos.motion_measures import volume
-from supple.demos.torture.watch import ContactMeasurement, Torture
-from supple.implicit.solver import Implicit
+from supple.demos.torture.watch import ContactMeasurement, Size, torture
 from supple.materials.neo_hookean import NeoHookean
 from supple.mesh import shapes
 from supple.mesh.surface import SurfaceMesh
@@ -77,22 +74,16 @@ class _Measurement(ContactMeasurement):
         ]
 
 
-def _demo(edge_length: float, neck: float, dt: float, steps: int | None = None) -> Demo:
-    return Demo(
-        name="torture-funnel",
-        summary="a gummy bear is pulled through a funnel that is narrower than the bear",
-        explanation=(
-            "A pin at the lower end of a gummy bear (E = 30 kPa), 10 cm tall and 5 cm wide, pulls it through a funnel, "
-            "an open sheet of triangles with a neck of 36 mm."
-        ),
-        scene=partial(scene, edge_length, neck),
-        solvers={"implicit": Implicit},
-        measurement=_Measurement,
-        dt=dt,
-        steps=round(SECONDS / dt) if steps is None else steps,
-    )
-
-
-FUNNEL = Torture(
-    small=_demo(0.014, 0.022, 1 / 10), full=_demo(0.011, 0.018, 1 / 25), large=_demo(0.0042, 0.018, 1 / 25, 12)
+FUNNEL = torture(
+    name="funnel",
+    summary="a gummy bear is pulled through a funnel that is narrower than the bear",
+    explanation=(
+        "A pin at the lower end of a gummy bear (E = 30 kPa), 10 cm tall and 5 cm wide, pulls it through a funnel, "
+        "an open sheet of triangles with a neck of 36 mm."
+    ),
+    scene=scene,
+    measurement=_Measurement,
+    small=Size((0.014, 0.022), 1 / 10, round(10 * SECONDS)),
+    full=Size((0.011, 0.018), 1 / 25, round(25 * SECONDS)),
+    large=Size((0.0042, 0.018), 1 / 25, 12),
 )

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from functools import partial
-
-from supple.demos.demo import Claim, Demo
-from supple.demos.torture.watch import ContactMeasurement, Torture, mass
-from supple.implicit.solver import Implicit
+from supple.demos.demo import Claim
+from supple.demos.torture.watch import ContactMeasurement, Size, mass, push, torture
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
 from supple.scene.body import Body
@@ -36,10 +33,9 @@ def scene(cells: int) -> Scene:
 
 class _Measurement(ContactMeasurement):
     def own_claims(self) -> list[Claim]:
-        contacts = self.last.contacts
         heavy, light = GRAVITY * mass(self.last, "heavy"), GRAVITY * mass(self.last, "light")
-        on_light = contacts.force_between("heavy", "light")[1] / heavy if contacts is not None else 0.0
-        on_floor = contacts.force_between("light", "floor")[1] / (heavy + light) if contacts is not None else 0.0
+        on_light = push(self.last, "heavy", "light") / heavy
+        on_floor = push(self.last, "light", "floor") / (heavy + light)
         lowest = float(self.last.positions["heavy"][:, 1].min()) / SIDE
         return [
             Claim(
@@ -55,20 +51,15 @@ class _Measurement(ContactMeasurement):
         ]
 
 
-def _demo(cells: int, steps: int) -> Demo:
-    return Demo(
-        name="torture-heavy",
-        summary="ten tonnes on a cube of one gram",
-        explanation=(
-            "A cube of 1 m and 10,000 kg/m^3 falls by a millimetre on a cube of 10 cm and 1 kg/m^3 (both E = 2 GPa): "
-            "ten million times the mass."
-        ),
-        scene=partial(scene, cells),
-        solvers={"implicit": Implicit},
-        measurement=_Measurement,
-        dt=1 / 100,
-        steps=steps,
-    )
-
-
-HEAVY = Torture(small=_demo(2, 30), full=_demo(4, 60))
+HEAVY = torture(
+    name="heavy",
+    summary="ten tonnes on a cube of one gram",
+    explanation=(
+        "A cube of 1 m and 10,000 kg/m^3 falls by a millimetre on a cube of 10 cm and 1 kg/m^3 (both E = 2 GPa): "
+        "ten million times the mass."
+    ),
+    scene=scene,
+    measurement=_Measurement,
+    small=Size((2,), 1 / 100, 30),
+    full=Size((4,), 1 / 100, 60),
+)

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 
-from supple.demos.demo import Claim, Demo
-from supple.demos.torture.watch import ContactMeasurement, Torture, mass, mechanical_energy
+from supple.demos.demo import Claim
+from supple.demos.torture.watch import ContactMeasurement, Size, mass, mechanical_energy, push, torture
 from supple.implicit.details import ImplicitDetails
-from supple.implicit.solver import Implicit
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
 from supple.mesh.surface import SurfaceMesh
@@ -42,11 +39,8 @@ def scene(cells: int) -> Scene:
 
 class _Measurement(ContactMeasurement):
     def own_claims(self) -> list[Claim]:
-        contacts, weight = self.last.contacts, GRAVITY * mass(self.last, "mat")
-        forces = [
-            contacts.force_between("mat", f"knife{k}")[1] if contacts is not None else 0.0
-            for k in range(1, len(PLACES) + 1)
-        ]
+        weight = GRAVITY * mass(self.last, "mat")
+        forces = [push(self.last, "mat", f"knife{k}") for k in range(1, len(PLACES) + 1)]
         details = self.last.report.details
         assert isinstance(details, ImplicitDetails)
         friction = details.friction_forces.get("mat", np.zeros(3))
@@ -62,20 +56,16 @@ class _Measurement(ContactMeasurement):
         ]
 
 
-def _demo(cells: int, steps: int) -> Demo:
-    return Demo(
-        name="torture-knives",
-        summary="a soft mat falls on three blades without thickness",
-        explanation=(
-            "A mat (E = 30 kPa) of 60 x 30 x 3 cm falls by 5 cm on three upright sheets of two triangles each, which "
-            "have no thickness, and hangs over their edges."
-        ),
-        scene=partial(scene, cells),
-        solvers={"implicit": Implicit},
-        measurement=_Measurement,
-        dt=1 / 100,
-        steps=steps,
-    )
-
-
-KNIVES = Torture(small=_demo(1, 60), full=_demo(2, 100), large=_demo(4, 20))
+KNIVES = torture(
+    name="knives",
+    summary="a soft mat falls on three blades without thickness",
+    explanation=(
+        "A mat (E = 30 kPa) of 60 x 30 x 3 cm falls by 5 cm on three upright sheets of two triangles each, which "
+        "have no thickness, and hangs over their edges."
+    ),
+    scene=scene,
+    measurement=_Measurement,
+    small=Size((1,), 1 / 100, 60),
+    full=Size((2,), 1 / 100, 100),
+    large=Size((4,), 1 / 100, 20),
+)

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 
-from supple.demos.demo import Claim, Demo
+from supple.demos.demo import Claim
 from supple.demos.motion_measures import volume
-from supple.demos.torture.watch import ContactMeasurement, Torture
-from supple.implicit.solver import Implicit
+from supple.demos.torture.watch import ContactMeasurement, Size, torture
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh import shapes
 from supple.mesh.surface import SurfaceMesh
 from supple.scene.body import Body
 from supple.scene.motion import Keyframes
+from supple.scene.obstacles.polyhedra import prism
 from supple.scene.obstacles.triangle_obstacle import TriangleObstacle
 from supple.scene.scene import Scene
-from supple.simulate import Frame
 
 RADIUS = 0.1  # of the ball [m]
 ROLLER, GAP = 0.15, 0.1  # radius of the rollers, and the distance of their surfaces [m]
@@ -26,23 +23,8 @@ SPIN = 2 * np.pi  # [rad/s]
 
 def roller(x: float) -> SurfaceMesh:
     """A closed cylinder along z at x, of 48 sides."""
-    angles = 2 * np.pi * np.arange(48) / 48
-    ring = np.column_stack([x + ROLLER * np.cos(angles), ROLLER * np.sin(angles)])
-    n = len(ring)
-    points = np.concatenate(
-        [np.column_stack([ring, np.full(n, z)]) for z in (-0.2, 0.2)] + [np.array([[x, 0, -0.2], [x, 0, 0.2]])]
-    )
-    k = np.arange(n)
-    after = (k + 1) % n
-    triangles = np.concatenate(
-        [
-            np.column_stack([k, after, after + n]),
-            np.column_stack([k, after + n, k + n]),
-            np.column_stack([after, k, np.full(n, 2 * n)]),
-            np.column_stack([k + n, after + n, np.full(n, 2 * n + 1)]),
-        ]
-    )
-    return SurfaceMesh(points, triangles)
+    points, triangles = prism(inscribed=True, sides=48)
+    return SurfaceMesh(np.array([x, 0.0, 0.0]) + points[:, [1, 2, 0]] * [ROLLER, ROLLER, 0.2], triangles)
 
 
 def scene(edge_length: float) -> Scene:
@@ -64,14 +46,6 @@ def scene(edge_length: float) -> Scene:
 
 
 class _Measurement(ContactMeasurement):
-    def begin(self, first: Frame, dt: float, steps: int) -> None:
-        super().begin(first, dt, steps)
-        self.narrowest = np.inf
-
-    def write(self, frame: Frame) -> None:
-        super().write(frame)
-        self.narrowest = min(self.narrowest, float(np.ptp(frame.positions["ball"][:, 0])))
-
     def own_claims(self) -> list[Claim]:
         highest = float(self.last.positions["ball"][:, 1].max())
         ratio = volume(self.last, "ball") / volume(self.first, "ball")
@@ -85,20 +59,15 @@ class _Measurement(ContactMeasurement):
         ]
 
 
-def _demo(edge_length: float, dt: float, seconds: float) -> Demo:
-    return Demo(
-        name="torture-rollers",
-        summary="two turning rollers pull a ball through a gap of half its width",
-        explanation=(
-            "A soft ball (E = 50 kPa) of 20 cm lies on two rollers that turn towards each other, one turn a second, "
-            "10 cm apart. Friction alone (mu = 1) pulls it through."
-        ),
-        scene=partial(scene, edge_length),
-        solvers={"implicit": Implicit},
-        measurement=_Measurement,
-        dt=dt,
-        steps=round(seconds / dt),
-    )
-
-
-ROLLERS = Torture(small=_demo(0.05, 1 / 50, 0.5), full=_demo(0.033, 1 / 100, 0.5))
+ROLLERS = torture(
+    name="rollers",
+    summary="two turning rollers pull a ball through a gap of half its width",
+    explanation=(
+        "A soft ball (E = 50 kPa) of 20 cm lies on two rollers that turn towards each other, one turn a second, "
+        "10 cm apart. Friction alone (mu = 1) pulls it through."
+    ),
+    scene=scene,
+    measurement=_Measurement,
+    small=Size((0.05,), 1 / 50, 25),
+    full=Size((0.033,), 1 / 100, 50),
+)

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 from scipy.optimize import brentq
 
-from supple.demos.demo import Claim, Demo
-from supple.demos.torture.watch import ContactMeasurement, Torture, center
+from supple.demos.demo import Claim
+from supple.demos.torture.watch import ContactMeasurement, Size, center, torture
 from supple.implicit.contact.settings import IPCContact
 from supple.implicit.solver import Implicit
 from supple.materials.stable_neo_hookean import StableNeoHookean
@@ -81,24 +79,16 @@ class _Measurement(ContactMeasurement):
         ]
 
 
-def _solver() -> Implicit:
-    return Implicit(contact=IPCContact(dhat=DHAT, stiffness=STIFFNESS, friction_velocity=SLOW))
-
-
-def _demo(cells: int, dt: float) -> Demo:
-    return Demo(
-        name="torture-slope",
-        summary="a block sticks to a slope at mu = 0.5, and slides at 0.49 as far as Coulomb's law predicts",
-        explanation=(
-            "Two stiff blocks (E = 1 GPa) on a slope of 26.565 degrees, whose tangent is 0.5. One has the friction "
-            "coefficient 0.5, the other 0.49."
-        ),
-        scene=partial(scene, cells),
-        solvers={"implicit": _solver},
-        measurement=_Measurement,
-        dt=dt,
-        steps=round(SECONDS / dt),
-    )
-
-
-SLOPE = Torture(small=_demo(1, 1 / 40), full=_demo(2, 1 / 100))
+SLOPE = torture(
+    name="slope",
+    summary="a block sticks to a slope at mu = 0.5, and slides at 0.49 as far as Coulomb's law predicts",
+    explanation=(
+        "Two stiff blocks (E = 1 GPa) on a slope of 26.565 degrees, whose tangent is 0.5. One has the friction "
+        "coefficient 0.5, the other 0.49."
+    ),
+    scene=scene,
+    solver=lambda: Implicit(contact=IPCContact(dhat=DHAT, stiffness=STIFFNESS, friction_velocity=SLOW)),
+    measurement=_Measurement,
+    small=Size((1,), 1 / 40, round(40 * SECONDS)),
+    full=Size((2,), 1 / 100, round(100 * SECONDS)),
+)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 
-from supple.demos.demo import Claim, Demo
-from supple.demos.torture.watch import ContactMeasurement, Torture, center
+from supple.demos.demo import Claim
+from supple.demos.torture.watch import ContactMeasurement, Size, center, torture
 from supple.implicit.contact.settings import IPCContact
 from supple.implicit.solver import Implicit
 from supple.materials.stable_neo_hookean import StableNeoHookean
@@ -66,7 +64,7 @@ def scene(names: tuple[str, ...]) -> Scene:
 
 class _Measurement(ContactMeasurement):
     def own_claims(self) -> list[Claim]:
-        n = self.frames
+        n = self.statuses.total()
         fall = GRAVITY * self.dt**2 * n * (n + 1) / 2  # backward Euler in free fall
         behind = {
             name: 1 - float((center(self.first, name) - center(self.last, name))[1]) / fall
@@ -88,22 +86,16 @@ class _Measurement(ContactMeasurement):
         ]
 
 
-def _demo(names: tuple[str, ...], dt: float, steps: int) -> Demo:
-    return Demo(
-        name="torture-slots",
-        summary="tets and a cube fall through a slot that leaves one micrometre on either side",
-        explanation=(
-            "Two single tetrahedra and a cube, 10 cm wide, fall through a slot that leaves them one micrometre on "
-            "either side: they neither touch its walls nor get stuck."
-        ),
-        scene=partial(scene, names),
-        solvers={"implicit": lambda: Implicit(contact=IPCContact(dhat=CLEARANCE / 2))},
-        measurement=_Measurement,
-        dt=dt,
-        steps=steps,
-    )
-
-
-SLOTS = Torture(
-    small=_demo(("tet", "leaning tet"), 1 / 50, 15), full=_demo(("tet", "cube", "leaning tet"), 1 / 100, 30)
+SLOTS = torture(
+    name="slots",
+    summary="tets and a cube fall through a slot that leaves one micrometre on either side",
+    explanation=(
+        "Two single tetrahedra and a cube, 10 cm wide, fall through a slot that leaves them one micrometre on "
+        "either side: they neither touch its walls nor get stuck."
+    ),
+    scene=scene,
+    solver=lambda: Implicit(contact=IPCContact(dhat=CLEARANCE / 2)),
+    measurement=_Measurement,
+    small=Size((("tet", "leaning tet"),), 1 / 50, 15),
+    full=Size((("tet", "cube", "leaning tet"),), 1 / 100, 30),
 )

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from supple.demos.demo import Claim, Demo
-from supple.demos.torture.watch import ContactMeasurement, Torture, mechanical_energy
-from supple.implicit.solver import Implicit
+from supple.demos.demo import Claim
+from supple.demos.torture.watch import ContactMeasurement, Size, mechanical_energy, push, torture
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.mesh.tetmesh import TetMesh
 from supple.scene.body import Body
 from supple.scene.obstacles.half_space import HalfSpace
-from supple.scene.pins import InBox, Pin
+from supple.scene.pins import Pin
 from supple.scene.scene import Scene
+from supple.scene.selection import InBox
 from supple.simulate import Frame
 
 GAP = 2e-3
@@ -59,51 +61,39 @@ def scene() -> Scene:
 
 
 class _Measurement(ContactMeasurement):
-    def begin(self, first: Frame, dt: float, steps: int) -> None:
-        super().begin(first, dt, steps)
-        self.most = self.start = mechanical_energy(first)
-        self.caught = dict.fromkeys(PAIRS, 0.0)
-
-    def write(self, frame: Frame) -> None:
-        super().write(frame)
-        self.most = max(self.most, mechanical_energy(frame))
-        contacts = frame.contacts
-        assert contacts is not None
-        for name in PAIRS:
-            push = float(contacts.force_between(f"{name} above", f"{name} below")[1])
-            self.caught[name] = max(self.caught[name], push)
+    def values(self, frame: Frame) -> dict[str, Any]:
+        pushes = {name: push(frame, f"{name} above", f"{name} below") for name in PAIRS}
+        return {**super().values(frame), **pushes, "energy": mechanical_energy(frame)}
 
     def own_claims(self) -> list[Claim]:
+        start = mechanical_energy(self.first)
+        most = max(start, *self.series["energy"])
+        caught = {name: max(0.0, *self.series[name]) for name in PAIRS}
         lowest = float(self.last.state.positions[:, 1].min())
         return [
             Claim(
                 "each pair touches, and nothing sinks below the floor",
-                ", ".join(f"{name} {force:.3g} N" for name, force in self.caught.items())
+                ", ".join(f"{name} {force:.3g} N" for name, force in caught.items())
                 + f"; lowest vertex {1e3 * lowest:.3g} mm above the floor",
-                min(self.caught.values()) > 0.0 and lowest > 0.0,
+                min(caught.values()) > 0.0 and lowest > 0.0,
             ),
             Claim(
                 "at no time is there more energy than at the start",
-                f"{self.start:.5g} J at the start, at most {self.most:.5g} J",
-                self.most <= self.start * (1 + 1e-9),
+                f"{start:.5g} J at the start, at most {most:.5g} J",
+                most <= start * (1 + 1e-9),
             ),
         ]
 
 
-def _demo(dt: float, steps: int) -> Demo:
-    return Demo(
-        name="torture-spikes",
-        summary="spike on spike, point on point, edge on edge, with friction 1",
-        explanation=(
-            "Pyramids and roofs fall upside down on equal ones, tip exactly on tip, ridge along ridge and ridge across "
-            "ridge, with a friction coefficient of 1. They balance, or topple and slide to the floor."
-        ),
-        scene=scene,
-        solvers={"implicit": Implicit},
-        measurement=_Measurement,
-        dt=dt,
-        steps=steps,
-    )
-
-
-SPIKES = Torture(small=_demo(1 / 50, 40), full=_demo(1 / 100, 200))
+SPIKES = torture(
+    name="spikes",
+    summary="spike on spike, point on point, edge on edge, with friction 1",
+    explanation=(
+        "Pyramids and roofs fall upside down on equal ones, tip exactly on tip, ridge along ridge and ridge across "
+        "ridge, with a friction coefficient of 1. They balance, or topple and slide to the floor."
+    ),
+    scene=scene,
+    measurement=_Measurement,
+    small=Size((), 1 / 50, 40),
+    full=Size((), 1 / 100, 200),
+)

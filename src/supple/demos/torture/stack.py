@@ -6,13 +6,13 @@ above each other repel each other, and in coarse meshes no other force is large 
 
 from __future__ import annotations
 
-from functools import partial
+from typing import Any
 
 import numpy as np
 
-from supple.demos.demo import Claim, Demo
+from supple.demos.demo import Claim
 from supple.demos.torture.meshes import mirrored_box
-from supple.demos.torture.watch import ContactMeasurement, Torture, center, mass
+from supple.demos.torture.watch import ContactMeasurement, Size, center, mass, push, torture
 from supple.implicit.solver import Implicit
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.scene.body import Body
@@ -45,30 +45,21 @@ def scene(cells: int, scale: float = 1.0) -> Scene:
 
 
 class _Measurement(ContactMeasurement):
-    def begin(self, first: Frame, dt: float, steps: int) -> None:
-        super().begin(first, dt, steps)
-        self.names = [part.name for part in first.system.bodies]
-        self.settled: Frame | None = None
-
-    def write(self, frame: Frame) -> None:
-        super().write(frame)
-        if self.settled is None and frame.time >= SETTLED - 1e-9:
-            self.settled = frame
+    def values(self, frame: Frame) -> dict[str, Any]:
+        centers = np.array([center(frame, name) for name in frame.positions])
+        return {**super().values(frame), "centers": (frame.time, centers)}
 
     def own_claims(self) -> list[Claim]:
-        contacts = self.last.contacts
-        errors = []
-        for k, name in enumerate(self.names):
-            below = self.names[k - 1] if k else "floor"
-            weight = GRAVITY * sum(mass(self.last, above) for above in self.names[k:])
-            pushed = contacts.force_between(name, below)[1] if contacts is not None else 0.0
-            errors.append(pushed / weight - 1.0)
+        names, errors = list(self.first.positions), []
+        for k, name in enumerate(names):
+            weight = GRAVITY * sum(mass(self.last, above) for above in names[k:])
+            errors.append(push(self.last, name, names[k - 1] if k else "floor") / weight - 1.0)
         worst = max(errors, key=abs)
+        settled = [(time, centers) for time, centers in self.series["centers"] if time >= SETTLED - 1e-9]
         drift = np.inf
-        if self.settled is not None and self.last.time > self.settled.time:
-            ways = [center(self.last, name) - center(self.settled, name) for name in self.names]
-            furthest = max(float(np.hypot(way[0], way[2])) for way in ways)
-            drift = furthest / SIDE / (self.last.time - self.settled.time)
+        if len(settled) > 1:
+            (begin, start), (end, now) = settled[0], settled[-1]
+            drift = float(np.linalg.norm((now - start)[:, [0, 2]], axis=1).max()) / SIDE / (end - begin)
         return [
             Claim(
                 "at the end every cube, and the floor, carries the weight above it within 2 %",
@@ -83,20 +74,17 @@ class _Measurement(ContactMeasurement):
         ]
 
 
-def _demo(cells: int, steps: int) -> Demo:
-    return Demo(
-        name="torture-stack",
-        summary="five cubes without friction fall on each other, rest, and do not creep",
-        explanation=(
-            "Five cubes (E = 10 MPa), one per cent of their size apart, fall on each other and on a floor, without any "
-            "friction. The load on each of them is compared with the weight above it."
-        ),
-        scene=partial(scene, cells),
-        solvers={"implicit": lambda: Implicit(tolerance=TOLERANCE)},
-        measurement=_Measurement,
-        dt=1 / 50,
-        steps=steps,
-    )
-
-
-STACK = Torture(small=_demo(2, 50), full=_demo(4, 75), large=_demo(8, 8))
+STACK = torture(
+    name="stack",
+    summary="five cubes without friction fall on each other, rest, and do not creep",
+    explanation=(
+        "Five cubes (E = 10 MPa), one per cent of their size apart, fall on each other and on a floor, without any "
+        "friction. The load on each of them is compared with the weight above it."
+    ),
+    scene=scene,
+    solver=lambda: Implicit(tolerance=TOLERANCE),
+    measurement=_Measurement,
+    small=Size((2,), 1 / 50, 50),
+    full=Size((4,), 1 / 50, 75),
+    large=Size((8,), 1 / 50, 8),
+)

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from supple.demos.demo import Claim, Demo, Measurement
+from supple.demos.motion_measures import body_range
+from supple.implicit.solver import Implicit
+from supple.scene.scene import Scene
 from supple.simulate import Frame
 from supple.state import Status
 
@@ -26,55 +33,67 @@ class Torture:
     large: Demo | None = None
 
 
-class ContactMeasurement(Measurement):
-    """Claims that every step converges, no tet inverts and no surfaces touch, and what the scene itself claims.
+class Size(NamedTuple):
+    """The arguments of a scene's function, the time from frame to frame [s], and the number of frames."""
 
-    Attributes
-    ----------
-    min_J, nearest : smallest det F and distance [m] of all frames
-    """
+    arguments: tuple[Any, ...]
+    dt: float
+    steps: int
+
+
+def torture(
+    name: str,
+    summary: str,
+    explanation: str,
+    scene: Callable[..., Scene],
+    measurement: Callable[[], Measurement],
+    small: Size,
+    full: Size,
+    large: Size | None = None,
+    solver: Callable[[], Implicit] = Implicit,
+) -> Torture:
+    """The same demo in all sizes; the parameters are those of `Demo` and `Torture`."""
+
+    def demo(size: Size) -> Demo:
+        made, solvers = partial(scene, *size.arguments), {"implicit": solver}
+        return Demo(f"torture-{name}", summary, explanation, made, solvers, measurement, size.steps, size.dt)
+
+    return Torture(demo(small), demo(full), demo(large) if large is not None else None)
+
+
+class ContactMeasurement(Measurement):
+    """Claims that every step converges, no tet inverts and no surfaces touch, and what the scene itself claims."""
 
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         super().begin(first, dt, steps)
-        self.dt, self.steps, self.frames = dt, steps, 0
-        self.min_J = self.nearest = np.inf
-        self.statuses: dict[Status, int] = {}
-        self.iterations = 0
         self.problem = ""
 
     def write(self, frame: Frame) -> None:
         super().write(frame)
-        self.frames += 1
         report = frame.report
-        self.statuses[report.status] = self.statuses.get(report.status, 0) + 1
-        self.iterations += report.iterations
-        self.min_J = min(self.min_J, report.min_det_F)
         if report.min_distance is not None:
-            self.nearest = min(self.nearest, report.min_distance)
+            self.series["distance"].append(report.min_distance)
         if report.status is not Status.CONVERGED:
             self.problem = f"; at {frame.time:.4g} s: {report.message}"
 
     def claims(self) -> list[Claim]:
-        gap = (
-            f"smallest distance {1e3 * self.nearest:.3g} mm"
-            if np.isfinite(self.nearest)
-            else "no surfaces came near each other"
-        )
-        ends = ", ".join(f"{count} {status}" for status, count in self.statuses.items())
+        nearest = min(self.series["distance"], default=np.inf)
+        near = f"smallest distance {1e3 * nearest:.3g} mm" if nearest < np.inf else "no surfaces came near each other"
+        frames = self.statuses.total()
         return [
             Claim(
                 f"all {self.steps} steps converge",
-                f"{ends}, {self.iterations / max(self.frames, 1):.1f} iterations each{self.problem}",
-                self.frames == self.steps and set(self.statuses) == {Status.CONVERGED},
+                f"{self.endings}, {self.iterations / frames:.1f} iterations each{self.problem}",
+                frames == self.steps and self.every_step_converged,
             ),
-            Claim("no tetrahedron inverts", f"smallest det F {self.min_J:.3g}", self.min_J > 0.0),
-            Claim("no surfaces touch", gap, self.nearest > 0.0),
+            self.no_tet_inverts(),
+            Claim("no surfaces touch", near, nearest > 0.0),
             *self.own_claims(),
         ]
 
+    @abstractmethod
     def own_claims(self) -> list[Claim]:
         """The claims of this scene only."""
-        return []
 
 
 def mechanical_energy(frame: Frame) -> float:
@@ -85,12 +104,16 @@ def mechanical_energy(frame: Frame) -> float:
 
 def center(frame: Frame, name: str) -> np.ndarray:
     """(3,) the center of mass of a body [m]."""
-    part = next(part for part in frame.system.bodies if part.name == name)
-    m = frame.system.masses[part.vertices]
+    m = frame.system.masses[body_range(frame, name).vertices]
     return m @ frame.positions[name] / m.sum()
 
 
 def mass(frame: Frame, name: str) -> float:
     """The mass of a body [kg]."""
-    part = next(part for part in frame.system.bodies if part.name == name)
-    return float(frame.system.masses[part.vertices].sum())
+    return float(frame.system.masses[body_range(frame, name).vertices].sum())
+
+
+def push(frame: Frame, on: str, by: str) -> float:
+    """The upward normal force on one body or obstacle by another [N]."""
+    contacts = frame.contacts
+    return float(contacts.force_between(on, by)[1]) if contacts is not None else 0.0

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+
+from supple.mesh.primitives.surfaces import sphere_surface
 
 # An icosahedron's faces split into this many along each edge: faces stay within 0.4 % of the radius.
 SPHERE_SPLITS = 12
@@ -16,16 +19,18 @@ CYLINDER_SIDES = 64
 @cache
 def round_ball(inscribed: bool) -> tuple[NDArray[np.float64], NDArray[np.integer]]:
     """A polyhedron inside of the unit ball, with its vertices on the sphere, or else one that has the ball inside."""
-    directions, triangles = icosphere(SPHERE_SPLITS)
+    # An edge of the icosahedron spans the angle arctan 2. A bit more than its share gives this number of splits.
+    surface = sphere_surface(1.0, (1.0 + 1e-9) * math.atan(2.0) / SPHERE_SPLITS)
+    directions, triangles = surface.vertices, surface.triangles
     corners = directions[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     nearest = np.abs(np.einsum("ij,ij->i", corners[:, 0], normals)) / np.linalg.norm(normals, axis=1)
     return directions * (1.0 if inscribed else 1.0 / float(nearest.min())), triangles
 
 
-def prism(inscribed: bool) -> tuple[NDArray[np.float64], NDArray[np.integer]]:
+def prism(inscribed: bool, sides: int = CYLINDER_SIDES) -> tuple[NDArray[np.float64], NDArray[np.integer]]:
     """A prism about the x axis from -1 to 1, in the cylinder of radius 1 or about it; its ends are fans."""
-    n = CYLINDER_SIDES
+    n = sides
     angles = np.arange(n) * (2.0 * np.pi / n)
     radius = 1.0 if inscribed else 1.0 / np.cos(np.pi / n)
     ring = radius * np.column_stack([np.cos(angles), np.sin(angles)])
@@ -33,9 +38,9 @@ def prism(inscribed: bool) -> tuple[NDArray[np.float64], NDArray[np.integer]]:
     points = np.concatenate([*ends, [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]])
     i = np.arange(n)
     j = (i + 1) % n
-    sides = [np.column_stack([i, j, j + n]), np.column_stack([i, j + n, i + n])]
+    walls = [np.column_stack([i, j, j + n]), np.column_stack([i, j + n, i + n])]
     caps = [np.column_stack([np.full(n, 2 * n), j, i]), np.column_stack([np.full(n, 2 * n + 1), i + n, j + n])]
-    return points, np.concatenate([*sides, *caps])
+    return points, np.concatenate([*walls, *caps])
 
 
 def hull(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.integer]]:
@@ -49,24 +54,3 @@ def hull(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.i
     triangles[inward] = triangles[inward][:, [0, 2, 1]]
     used, compact = np.unique(triangles, return_inverse=True)
     return points[used], compact.reshape(-1, 3)
-
-
-def icosphere(splits: int) -> tuple[NDArray[np.float64], NDArray[np.integer]]:
-    """An icosahedron with every edge split into `splits`, projected on the unit sphere: points and triangles."""
-    g = (1.0 + 5.0**0.5) / 2.0
-    corners = np.array([[-1, g, 0], [1, g, 0], [-1, -g, 0], [1, -g, 0]], dtype=np.float64)
-    corners = np.concatenate([corners, np.roll(corners, 1, axis=1), np.roll(corners, 2, axis=1)])
-    corners, faces = hull(corners)
-    i, j = np.array([(i, j) for i in range(splits + 1) for j in range(splits + 1 - i)]).T
-    number = np.full((splits + 1, splits + 1), -1)
-    number[i, j] = np.arange(len(i))
-    up = [(i, j) for i in range(splits) for j in range(splits - i)]
-    down = [(i, j) for i, j in up if i + j < splits - 1]
-    cells = [[number[i, j], number[i + 1, j], number[i, j + 1]] for i, j in up]
-    cells += [[number[i + 1, j], number[i + 1, j + 1], number[i, j + 1]] for i, j in down]
-    a, b, c = corners[faces].transpose(1, 0, 2)[:, :, None]
-    points = (a + (b - a) * (i[:, None] / splits) + (c - a) * (j[:, None] / splits)).reshape(-1, 3)
-    triangles = (np.array(cells) + len(i) * np.arange(len(faces))[:, None, None]).reshape(-1, 3)
-    points /= np.linalg.norm(points, axis=1)[:, None]
-    _, first, merged = np.unique(np.round(points, 9), axis=0, return_index=True, return_inverse=True)
-    return points[first], merged.reshape(-1)[triangles]

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
-from supple.mesh.surface import SurfaceMesh
 from supple.scene.body import Body
 from supple.scene.obstacles.obstacle import Obstacle
 
@@ -48,21 +47,19 @@ class Side:
         return np.where(counts > 0, sums, np.inf) / np.maximum(counts, 1)
 
 
-def side_of(thing: Body | Obstacle) -> Side:
-    """A body as the scene places it, or a triangle obstacle at time 0.
+def side_of(thing: Body | Obstacle, stitch: str) -> Side:
+    """A body as the scene places it, or a triangle obstacle at time 0; `stitch` begins the message.
 
     Raises
     ------
     SceneError : for other obstacles.
     """
     if isinstance(thing, Body):
-        return _side(f"body {thing.name!r}", thing.mesh.surface, thing.place(thing.mesh.vertices))
-    surface = thing.surface_mesh
-    if surface is None:
-        raise SceneError(f"{thing.label} is a {type(thing).__name__}; stitches join bodies and TriangleObstacles")
-    R, t = thing.pose(0.0)
-    return _side(thing.label, surface, surface.vertices @ R.T + t)
-
-
-def _side(label: str, surface: SurfaceMesh, points: NDArray[np.float64]) -> Side:
+        label, surface, points = f"body {thing.name!r}", thing.mesh.surface, thing.place(thing.mesh.vertices)
+    elif thing.surface_mesh is not None:
+        R, t = thing.pose(0.0)
+        label, surface, points = thing.label, thing.surface_mesh, thing.surface_mesh.vertices @ R.T + t
+    else:
+        kind = type(thing).__name__
+        raise SceneError(f"{stitch}: {thing.label} is a {kind}; stitches join bodies and TriangleObstacles")
     return Side(label, points, surface.triangles, surface.edges, surface.used_vertices)

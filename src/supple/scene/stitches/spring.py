@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.scene.stitches.elements import Pairs, Springs
-from supple.scene.stitches.side import Side
 from supple.scene.stitches.stitch import Stitch
 
 
@@ -45,11 +44,3 @@ class SpringStitch(Stitch):
             rest_lengths=self.per_pair(lengths, count, "rest_length"),
             damping=np.full(count, self.damping),
         )
-
-
-def places_on_edges(first: Side, second: Side, pairs: Pairs, ends: NDArray[np.int32]) -> NDArray[np.float64]:
-    """(k,) the place on the edge, from 0 to 1, of the point nearest to each vertex."""
-    a, b = second.points[ends].transpose(1, 0, 2)
-    along, off = b - a, first.points[pairs.vertices] - a
-    squares = np.einsum("ij,ij->i", along, along)
-    return np.clip(np.einsum("ij,ij->i", along, off) / np.where(squares > 0.0, squares, 1.0), 0.0, 1.0)

@@ -13,7 +13,7 @@ from supple.errors import SceneError
 from supple.numerics.geometry.triangle_tree import TriangleTree, pair_distances
 from supple.scene.stitches.elements import Pairs, Springs, StitchTets
 from supple.scene.stitches.side import Side
-from supple.scene.values import check_name, non_negative, positive
+from supple.scene.values import check_name, float_array, non_negative, positive
 
 PAIRINGS = ("closest", "all")
 
@@ -158,10 +158,7 @@ class Stitch(ABC):
 
     def checked_numbers(self, value: object, what: str, unit: str, *, zero: bool = False) -> NDArray[np.float64]:
         """A number, or a list of them, finite and above zero (or zero, too)."""
-        try:
-            values = np.array(value, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise SceneError(f"{self.label}: {what} is {value!r}; give a number, or one for each pair") from None
+        values = float_array(value, f"{self.label}: {what}", "give a number, or one for each pair")
         bad = ~np.isfinite(values) | (values < 0.0) | ((values == 0.0) & (not zero))
         if values.ndim > 1 or values.size == 0:
             raise SceneError(f"{self.label}: {what} has shape {values.shape}; give a number, or one for each pair")

@@ -16,19 +16,12 @@ from scipy.sparse.csgraph import connected_components
 
 from supple.errors import SceneError
 from supple.scene.body import Body
+from supple.scene.located import at
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.stitches.elements import Pairs, Springs, StitchTets
 from supple.scene.stitches.side import Side, side_of
 from supple.scene.stitches.stitch import Stitch
 from supple.scene.suggestion import suggestion
-
-
-class StitchError(SceneError):
-    """One stitch of a scene is wrong: the one with that `number`."""
-
-    def __init__(self, number: int, message: str) -> None:
-        super().__init__(message)
-        self.number = number
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +153,7 @@ def stitch_together(bodies: Sequence[Body], obstacles: Sequence[Obstacle], stitc
 
     Raises
     ------
-    StitchError : where a thing cannot be stitched to, a pair does not exist, or none is within reach.
+    SceneError : where a thing cannot be stitched to, a pair does not exist, or none is within reach.
     """
     starts = np.concatenate([[0], np.cumsum([len(body.mesh.vertices) for body in bodies])])
     n = int(starts[-1])
@@ -174,18 +167,13 @@ def stitch_together(bodies: Sequence[Body], obstacles: Sequence[Obstacle], stitc
     ranges: list[StitchRange] = []
     tets, springs = [StitchTets.none()], [Springs.none()]
     for number, stitch in enumerate(stitches):
-        for name in (stitch.first, stitch.second):
-            if name not in sides:
-                try:
-                    sides[name] = side_of(things[name])
-                except SceneError as error:
-                    raise StitchError(number, f"{stitch.label}: {error}") from None
-        first, second = sides[stitch.first], sides[stitch.second]
-        try:
+        with at("stitches", number):
+            for name in (stitch.first, stitch.second):
+                if name not in sides:
+                    sides[name] = side_of(things[name], stitch.label)
+            first, second = sides[stitch.first], sides[stitch.second]
             pairs = stitch.find(first, second)
             part = stitch.join(first, second, pairs)
-        except SceneError as error:
-            raise StitchError(number, str(error)) from None
         if stitch.second in first_of:
             numbering = first_of[stitch.second] + np.arange(len(second.points))
         else:
@@ -215,7 +203,7 @@ def check_names(stitches: Sequence[Stitch], bodies: Sequence[str], obstacles: Se
 
     Raises
     ------
-    StitchError : names the known ones.
+    SceneError : names the known ones.
     """
     for number, stitch in enumerate(stitches):
         for name, what, known in (
@@ -223,5 +211,5 @@ def check_names(stitches: Sequence[Stitch], bodies: Sequence[str], obstacles: Se
             (stitch.second, "body or obstacle", [*bodies, *obstacles]),
         ):
             if name not in known:
-                remedy = suggestion(name, known)
-                raise StitchError(number, f"{stitch.label}: there is no {what} {name!r}; {remedy}")
+                with at("stitches", number):
+                    raise SceneError(f"{stitch.label}: there is no {what} {name!r}; {suggestion(name, known)}")

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from supple.scene.stitches.elements import Pairs, Springs
 from supple.scene.stitches.side import Side
-from supple.scene.stitches.spring import SpringStitch, places_on_edges
+from supple.scene.stitches.spring import SpringStitch
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,10 +23,12 @@ class VertexEdgeStitch(SpringStitch):
     partner = "edges"
 
     def partners(self, second: Side) -> NDArray[np.int32]:
-        """See `Stitch`."""
         return second.edges[:, [0, 1, 1]]
 
     def join(self, first: Side, second: Side, pairs: Pairs) -> Springs:
-        """See `Stitch`."""
         ends = second.edges[pairs.rows]
-        return self.springs(pairs, ends, places_on_edges(first, second, pairs, ends))
+        a, b = second.points[ends].transpose(1, 0, 2)
+        along, off = b - a, first.points[pairs.vertices] - a
+        squares = np.einsum("ij,ij->i", along, along)
+        places = np.clip(np.einsum("ij,ij->i", along, off) / np.where(squares > 0.0, squares, 1.0), 0.0, 1.0)
+        return self.springs(pairs, ends, places)

@@ -15,6 +15,7 @@ from supple.materials.lame import lame_from_engineering
 from supple.scene.stitches.elements import Pairs, StitchTets
 from supple.scene.stitches.side import Side
 from supple.scene.stitches.stitch import Stitch
+from supple.scene.values import float_array
 
 # The default rest distance, as a share of the mean edge at a pair. Two half bars, joined by stitches as stiff as they
 # are, then bend 0.3 % further than one bar (docs/stitches.md).
@@ -105,10 +106,7 @@ class SoftVertexTriangleStitch(Stitch):
         -------
         (...) [Pa]
         """
-        try:
-            F = np.asarray(F, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise SceneError("F is not an array of numbers; its last two axes must be (3, 3)") from None
+        F = float_array(F, "F", "its last two axes must be (3, 3)")
         if F.shape[-2:] != (3, 3):
             raise SceneError(f"F has shape {F.shape}; its last two axes must be (3, 3)")
         mu, lam = np.asarray(self.mu), np.asarray(self.lam)
@@ -117,7 +115,6 @@ class SoftVertexTriangleStitch(Stitch):
         return 0.5 * mu * (Ic - 3.0) - mu * grown + 0.5 * lam * grown * grown + (mu / lam) ** 2
 
     def partners(self, second: Side) -> NDArray[np.int32]:
-        """See `Stitch`."""
         return second.triangles
 
     def join(self, first: Side, second: Side, pairs: Pairs) -> StitchTets:

@@ -19,7 +19,6 @@ class VertexVertexStitch(SpringStitch):
     partner = "vertices"
 
     def partners(self, second: Side) -> NDArray[np.int32]:
-        """See `Stitch`."""
         return np.repeat(np.arange(len(second.points), dtype=np.int32)[:, None], 3, axis=1)
 
     def surface_partners(self, second: Side) -> NDArray[np.int32]:
@@ -27,5 +26,4 @@ class VertexVertexStitch(SpringStitch):
         return second.surface_vertices
 
     def join(self, first: Side, second: Side, pairs: Pairs) -> Springs:
-        """See `Stitch`."""
         return self.springs(pairs, np.repeat(pairs.rows[:, None], 2, axis=1), np.zeros(len(pairs.rows)))

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from supple.scene.body import Body
+from supple.scene.located import at
 from supple.scene_file.entries.materials import MaterialModel
 from supple.scene_file.entries.mesh_sources import MeshFileModel, MeshStore, SurfaceModel
 from supple.scene_file.entries.regions import RegionModel, with_regions
 from supple.scene_file.entries.shapes import ShapeModel
-from supple.scene_file.located import at
-from supple.scene_file.model import Count, Model, Name, NonNegative, Positive, Vector
+from supple.scene_file.model import Count, Extents, Model, Name, NonNegative, Vector
 
 MAX_COPIES = 10_000
 
@@ -58,7 +58,7 @@ class CopiesModel(Model):
 class InitialModel(Model):
     """A deformed start of a body."""
 
-    scale: Annotated[list[Positive], Field(min_length=3, max_length=3)] = Field(
+    scale: Extents = Field(
         description="along the world's x, y and z about the center of volume; [1, 0.5, 1] squeezes to half the height"
     )
 
@@ -73,6 +73,8 @@ class BuiltBody:
 
 class BodyModel(Model):
     """One soft body. Give `mesh` (a file) or `shape`."""
+
+    alternatives = ("mesh", "shape", "a body needs either `mesh` or `shape`; give one of them")
 
     name: Name = Field(description="unique in the scene")
     mesh: MeshFileModel | None = Field(default=None, description="of tetrahedra, or a surface to fill with them")
@@ -96,12 +98,6 @@ class BodyModel(Model):
     )
     copies: CopiesModel | None = Field(default=None, description="copies of the body")
     initial: InitialModel | None = Field(default=None, description="a deformed start")
-
-    @model_validator(mode="after")
-    def _one_mesh(self) -> BodyModel:
-        if (self.mesh is None) == (self.shape is None):
-            raise ValueError("a body needs either `mesh` or `shape`; give one of them")
-        return self
 
     def build(self, meshes: MeshStore) -> list[BuiltBody]:
         """The body, or all its copies."""

@@ -6,9 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
-from supple.scene.contact_pairs import ContactPair, PairRules
-from supple.scene.scene import Scene
-from supple.scene_file.located import at
+from supple.scene.contact_pairs import ContactPair
 from supple.scene_file.model import Model, Name, NonNegative
 
 _NAME = {"type": "string", "minLength": 1, "maxLength": 100}
@@ -50,13 +48,3 @@ class ContactPairModel(Model):
 
     def build(self) -> ContactPair:
         return ContactPair(self.first, self.second, self.friction, self.collide)
-
-
-def built_pairs(described: list[ContactPairModel], scene: Scene) -> list[ContactPair]:
-    """The contact pairs, each checked against the scene; here their places in the file are known."""
-    rules, pairs = PairRules(scene), []
-    for i, model in enumerate(described):
-        with at("contact_pairs", i):
-            pairs.append(model.build())
-            rules.add(pairs[-1])
-    return pairs

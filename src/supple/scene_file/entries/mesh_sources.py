@@ -5,14 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, Field, model_validator
+from pydantic import BaseModel, Field
 
 from supple.errors import MeshError
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
+from supple.scene.located import at
 from supple.scene.rotation import rotation_matrix
 from supple.scene_file.entries.shapes import ShapeModel, SurfaceShapeModel
-from supple.scene_file.located import at
 from supple.scene_file.model import FilePath, Model, Positive, Vector
 
 SURFACE_FILES = (".stl", ".obj", ".ply", ".off", ".vtp")
@@ -52,17 +52,13 @@ class MeshFileModel(Model):
 class SurfaceModel(Model):
     """A triangle surface: of a file or of a shape, scaled, then rotated, then moved."""
 
+    alternatives = ("file", "shape", "a surface needs either `file` or `shape`; give one of them")
+
     file: FilePath | None = Field(default=None, description="relative to the scene file")
     shape: SurfaceShapeModel | None = Field(default=None, description="instead of `file`")
     scale: Positive = Field(default=1.0, description="of all coordinates")
     rotation: Vector = Field(default=[0.0, 0.0, 0.0], description="rotation vector about the origin [rad]")
     position: Vector = Field(default=[0.0, 0.0, 0.0], description="[m]")
-
-    @model_validator(mode="after")
-    def _one_source(self) -> SurfaceModel:
-        if (self.file is None) == (self.shape is None):
-            raise ValueError("a surface needs either `file` or `shape`; give one of them")
-        return self
 
 
 class MeshStore:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from supple.scene.located import at
 from supple.scene.motion import Keyframes
 from supple.scene_file.model import Model, Number, Vector
 
@@ -17,5 +18,8 @@ class KeyframesModel(Model):
     axis: Vector = Field(default=[0.0, 0.0, 1.0], description="axis of the angles")
     pivot: Vector = Field(default=[0.0, 0.0, 0.0], description="a point on that axis [m]")
 
-    def build(self) -> Keyframes:
-        return Keyframes(self.times, self.displacements, self.angles, self.axis, self.pivot)
+
+def built_motion(described: KeyframesModel | None) -> Keyframes | None:
+    """The keyframes of the entry's key `motion`, if it has one."""
+    with at("motion"):
+        return Keyframes(**described.model_dump()) if described is not None else None

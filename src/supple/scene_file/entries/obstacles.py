@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
 from pydantic import Field, create_model
 
+from supple.scene.located import at
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.obstacles.registry import KINDS
 from supple.scene_file.entries.mesh_sources import MeshStore, SurfaceModel
-from supple.scene_file.entries.motions import KeyframesModel
-from supple.scene_file.located import at
-from supple.scene_file.model import Model, Name, NonNegative, Positive, Vector
+from supple.scene_file.entries.motions import KeyframesModel, built_motion
+from supple.scene_file.model import Extents, Model, Name, NonNegative, Positive, Vector
 
-Extents = Annotated[list[Positive], Field(min_length=3, max_length=3)]
 _TYPES: dict[str, Any] = {
     "vector": Vector,
     "direction": Vector,
@@ -33,14 +32,12 @@ class _ObstacleModel(Model):
     motion: KeyframesModel | None = Field(default=None, description="scripted motion; static without it")
 
     def build(self, meshes: MeshStore) -> Obstacle:
-        with at("motion"):
-            motion = self.motion.build() if self.motion else None
         values = {key: getattr(self, key) for key in _CLASSES[self.kind].parameters()}
         for key, value in values.items():
             if isinstance(value, SurfaceModel):
                 with at(key):
                     values[key] = meshes.surface(value)
-        return _CLASSES[self.kind](name=self.name, friction=self.friction, motion=motion, **values)
+        return _CLASSES[self.kind](name=self.name, friction=self.friction, motion=built_motion(self.motion), **values)
 
 
 def _model_of(obstacle: type[Obstacle]) -> type[_ObstacleModel]:

@@ -2,46 +2,36 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from supple.errors import SceneError
 from supple.materials.material import Elastic, Material
 from supple.materials.regions import Regions
 from supple.mesh.tetmesh import TetMesh
+from supple.scene.located import at
 from supple.scene.selection import InBox
 from supple.scene_file.entries.materials import ElasticMaterialModel
-from supple.scene_file.located import at
-from supple.scene_file.model import Model, Vector
-
-TetIndex = Annotated[int, Field(ge=0, lt=2**31)]
+from supple.scene_file.entries.selections import InBoxModel
+from supple.scene_file.model import Index, Model
 
 
-class BoxOfMeshModel(Model):
+class BoxOfMeshModel(InBoxModel):
     """The tets whose center is inside an axis-aligned box, in the coordinates of the mesh: before `position`,
     `rotation` and `copies`."""
-
-    low: Vector = Field(description="corner with the lowest coordinates [m]")
-    high: Vector = Field(description="corner with the highest coordinates [m]")
 
 
 class RegionModel(Model):
     """Tets of a body with another elastic material than the body's."""
 
+    alternatives = ("box", "tets", "give the tets of a region by either `box` or `tets`")
+
     material: ElasticMaterialModel
     box: BoxOfMeshModel | None = Field(default=None, description="all tets whose center is inside")
-    tets: list[TetIndex] | None = Field(
+    tets: list[Index] | None = Field(
         default=None, min_length=1, description="instead of `box`: tet numbers of the mesh, from 0"
     )
-
-    @model_validator(mode="after")
-    def _one_selection(self) -> RegionModel:
-        if (self.box is None) == (self.tets is None):
-            raise ValueError("give the tets of a region by either `box` or `tets`")
-        return self
 
     def select(self, mesh: TetMesh) -> NDArray[np.int64]:
         """Numbers (k,) of the selected tets."""

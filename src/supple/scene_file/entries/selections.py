@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Self
-
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from supple.scene.forces import Force, SoftTarget
+from supple.scene.located import at
 from supple.scene.pins import Pin
 from supple.scene.selection import InBox, Selection
-from supple.scene_file.entries.motions import KeyframesModel
-from supple.scene_file.located import at
-from supple.scene_file.model import Model, Name, Positive, Vector
-
-VertexIndex = Annotated[int, Field(ge=0, lt=2**31)]
+from supple.scene_file.entries.motions import KeyframesModel, built_motion
+from supple.scene_file.model import Index, Model, Name, Positive, Vector
 
 
 class InBoxModel(Model):
@@ -24,16 +20,12 @@ class InBoxModel(Model):
 
 
 class _SelectionModel(Model):
+    alternatives = ("vertices", "box", "give the vertices by either `vertices` or `box`")
+
     body: Name = Field(description="name of the body")
-    vertices: list[VertexIndex] | None = Field(default=None, min_length=1, description="vertex numbers, from 0")
+    vertices: list[Index] | None = Field(default=None, min_length=1, description="vertex numbers, from 0")
     box: InBoxModel | None = Field(default=None, description="instead of `vertices`: all vertices inside")
     name: Name | None = Field(default=None, description="used in messages and reports")
-
-    @model_validator(mode="after")
-    def _one_selection(self) -> Self:
-        if (self.vertices is None) == (self.box is None):
-            raise ValueError("give the vertices by either `vertices` or `box`")
-        return self
 
     def selection(self) -> Selection:
         if self.box is not None:
@@ -49,9 +41,7 @@ class PinModel(_SelectionModel):
     motion: KeyframesModel | None = Field(default=None, description="from the start; without it the vertices are held")
 
     def build(self) -> Pin:
-        with at("motion"):
-            motion = self.motion.build() if self.motion else None
-        return Pin(self.body, self.selection(), motion, name=self.name)
+        return Pin(self.body, self.selection(), built_motion(self.motion), name=self.name)
 
 
 class ForceModel(_SelectionModel):
@@ -70,6 +60,4 @@ class SoftTargetModel(_SelectionModel):
     motion: KeyframesModel | None = Field(default=None, description="of the springs' other ends")
 
     def build(self) -> SoftTarget:
-        with at("motion"):
-            motion = self.motion.build() if self.motion else None
-        return SoftTarget(self.body, self.selection(), self.stiffness, motion, name=self.name)
+        return SoftTarget(self.body, self.selection(), self.stiffness, built_motion(self.motion), name=self.name)

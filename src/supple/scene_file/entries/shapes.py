@@ -9,18 +9,16 @@ from pydantic import Field
 from supple.mesh import shapes
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
-from supple.scene_file.model import Count, Model, Positive
+from supple.scene_file.model import Count, Extents, Model, Positive
 
-Sizes = Annotated[list[Positive], Field(min_length=3, max_length=3)]
 Divisions = Annotated[list[Count], Field(min_length=3, max_length=3)]
-EdgeLength = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
 
 class BoxShapeModel(Model):
     """A box, centred at the origin, divided into a grid."""
 
     kind: Literal["box"]
-    size: Sizes = Field(default=[1.0, 1.0, 1.0], description="full edge lengths [m]")
+    size: Extents = Field(default=[1.0, 1.0, 1.0], description="full edge lengths [m]")
     divisions: Divisions = Field(default=[4, 4, 4], description="cells along x, y and z")
 
     def build(self) -> TetMesh:
@@ -35,7 +33,7 @@ class SphereShapeModel(Model):
 
     kind: Literal["sphere"]
     radius: Positive = Field(default=0.5, description="[m]")
-    edge_length: EdgeLength | None = Field(default=None, description="mean edge [m]; default: a fifth of the radius")
+    edge_length: Positive | None = Field(default=None, description="mean edge [m]; default: a fifth of the radius")
 
     def build(self) -> TetMesh:
         return shapes.sphere(self.radius, self.edge_length or 0.2 * self.radius)
@@ -50,7 +48,7 @@ class CylinderShapeModel(Model):
     kind: Literal["cylinder"]
     radius: Positive = Field(default=0.5, description="[m]")
     height: Positive = Field(default=1.0, description="[m]")
-    edge_length: EdgeLength | None = Field(
+    edge_length: Positive | None = Field(
         default=None, description="mean edge [m]; default: a fifth of the smaller of radius and height"
     )
 
@@ -69,7 +67,7 @@ class TorusShapeModel(Model):
     kind: Literal["torus"]
     radius: Positive = Field(default=0.5, description="of the circle in the middle of the tube [m]")
     tube_radius: Positive = Field(default=0.2, description="of the tube [m]")
-    edge_length: EdgeLength | None = Field(default=None, description="mean edge [m]; default: 0.4 of the tube's radius")
+    edge_length: Positive | None = Field(default=None, description="mean edge [m]; default: 0.4 of the tube's radius")
 
     def build(self) -> TetMesh:
         return shapes.torus(self.radius, self.tube_radius, self.edge_length or 0.4 * self.tube_radius)
@@ -83,7 +81,7 @@ class GummyBearShapeModel(Model):
 
     kind: Literal["gummy_bear"]
     height: Positive = Field(default=1.0, description="[m]")
-    edge_length: EdgeLength | None = Field(default=None, description="mean edge [m]; default: 0.08 of the height")
+    edge_length: Positive | None = Field(default=None, description="mean edge [m]; default: 0.08 of the height")
 
     def build(self) -> TetMesh:
         return shapes.gummy_bear(self.height, self.edge_length or 0.08 * self.height)

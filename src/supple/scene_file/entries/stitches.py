@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
+from supple.scene.stitches.registry import STITCHES
 from supple.scene.stitches.stitch import Stitch
-from supple.scene.stitches.vertex_edge import VertexEdgeStitch
-from supple.scene.stitches.vertex_triangle import SoftVertexTriangleStitch
-from supple.scene.stitches.vertex_vertex import VertexVertexStitch
-from supple.scene_file.model import Model, Name, NonNegative, Positive
+from supple.scene_file.model import Index, Model, Name, NonNegative, Positive
 
-Index = Annotated[int, Field(ge=0, lt=2**31)]
 PairList = Annotated[list[Annotated[list[Index], Field(min_length=2, max_length=2)]], Field(min_length=1)]
 PerPair = Positive | Annotated[list[Positive], Field(min_length=1)]
 Lengths = NonNegative | Annotated[list[NonNegative], Field(min_length=1)]
 
 
 class _StitchModel(Model):
+    kind: str
     first: Name = Field(description="the body whose vertices are stitched")
     second: Name = Field(description="a body, or an obstacle of triangles")
     max_distance: Positive | None = Field(
@@ -30,8 +28,8 @@ class _StitchModel(Model):
     damping: NonNegative = Field(default=0.0, description="Kelvin-Voigt time [s]")
     name: Name | None = Field(default=None, description="used in messages")
 
-    def shared(self) -> dict[str, Any]:
-        return {key: getattr(self, key) for key in type(self).model_fields if key != "kind"}
+    def build(self) -> Stitch:
+        return STITCHES[self.kind](**self.model_dump(exclude={"kind"}))
 
 
 class SoftVertexTriangleModel(_StitchModel):
@@ -49,9 +47,6 @@ class SoftVertexTriangleModel(_StitchModel):
         description="smallest distance at rest [m]; one, or one per pair; null: 1 % of the mean edge",
     )
 
-    def build(self) -> Stitch:
-        return SoftVertexTriangleStitch(**self.shared())
-
 
 class _SpringModel(_StitchModel):
     stiffness: PerPair = Field(description="of each spring [N/m]; one, or one per pair")
@@ -64,18 +59,12 @@ class VertexVertexModel(_SpringModel):
     kind: Literal["vertex_vertex"]
     pairs: PairList | None = Field(default=None, description="[vertex of the first, vertex of the second]")
 
-    def build(self) -> Stitch:
-        return VertexVertexStitch(**self.shared())
-
 
 class VertexEdgeModel(_SpringModel):
     """Springs from vertices to points of edges."""
 
     kind: Literal["vertex_edge"]
     pairs: PairList | None = Field(default=None, description="[vertex of the first, surface edge of the second]")
-
-    def build(self) -> Stitch:
-        return VertexEdgeStitch(**self.shared())
 
 
 StitchModel = Annotated[SoftVertexTriangleModel | VertexVertexModel | VertexEdgeModel, Field(discriminator="kind")]

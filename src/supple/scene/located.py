@@ -1,4 +1,4 @@
-"""Errors with the keys of the scene file at which they occurred."""
+"""Errors with the part of a scene that is wrong, by its keys: `("pins", 1, "vertices")`, as in a scene file."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from supple.errors import SceneError, SuppleError
-from supple.scene_file.yaml_reader import Key
+
+Key = str | int
 
 
 class LocatedError(SceneError):
-    """An error in the part of a scene file at `keys`."""
+    """An error in the part of a scene at `keys`."""
 
     def __init__(self, keys: tuple[Key, ...], message: str) -> None:
         super().__init__(message)
