@@ -11,7 +11,7 @@ from supple.viewer.engine.measurement.describe import describe, measures
 from supple.viewer.engine.scene.changes import change, flattened
 from supple.viewer.engine.scene.live_scene import LiveScene
 from supple.viewer.protocol import limits
-from supple.viewer.protocol.messages import (
+from supple.viewer.protocol.commands import (
     Grab,
     MoveGrab,
     MovePusher,

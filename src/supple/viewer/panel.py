@@ -18,7 +18,7 @@ from supple.viewer.controls.view_controls import ViewControls
 from supple.viewer.drawing.coloring.fields import FIELDS
 from supple.viewer.drawing.options import ViewOptions
 from supple.viewer.drawing.stage import Stage
-from supple.viewer.protocol.messages import SetView
+from supple.viewer.protocol.commands import SetView
 from supple.viewer.protocol.snapshots import Snapshot
 
 _NUMBERS_EVERY = 0.15  # [s]; numbers that change faster cannot be read

@@ -8,9 +8,8 @@ from typing import Any
 
 from supple.viewer.controls.controller import Controller, sequential
 from supple.viewer.controls.pending import PendingValue
-from supple.viewer.protocol.messages import SetParameter
-from supple.viewer.protocol.parameters import PARAMETERS, Parameter
-from supple.viewer.protocol.snapshots import Value
+from supple.viewer.protocol.commands import SetParameter
+from supple.viewer.protocol.parameters import PARAMETERS, Parameter, Value
 from supple.viewer.server.browser_values import number
 
 # The smallest power of ten of a slider whose left end is zero.

@@ -6,7 +6,7 @@ from typing import Any
 
 from supple.viewer.controls.controller import Controller, sequential
 from supple.viewer.protocol import limits
-from supple.viewer.protocol.messages import Pause, Play, Reset, SetSpeed, Step
+from supple.viewer.protocol.commands import Pause, Play, Reset, SetSpeed, Step
 from supple.viewer.protocol.snapshots import Snapshot
 from supple.viewer.server.browser_values import number, one_of
 from supple.viewer.server.plain_markdown import plain

@@ -9,7 +9,7 @@ from typing import Any
 from supple.errors import SuppleError
 from supple.viewer.controls.controller import Controller, notify
 from supple.viewer.protocol import limits
-from supple.viewer.protocol.messages import AddMesh
+from supple.viewer.protocol.commands import AddMesh
 from supple.viewer.server.uploads.meshing import Upload, mesh_of_upload
 from supple.viewer.server.uploads.transfers import Transfers
 

@@ -87,7 +87,7 @@ class Engine:
         """
         if not isinstance(command, Command):
             raise CommandError(
-                f"a {type(command).__name__} is not a command; give one of supple.viewer.protocol.messages"
+                f"a {type(command).__name__} is not a command; give one of supple.viewer.protocol.commands"
             )
         if not self.alive:
             return 0

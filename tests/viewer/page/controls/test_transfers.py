@@ -11,7 +11,7 @@ from supple.errors import MeshError
 from supple.viewer.controls import upload_controls
 from supple.viewer.controls.upload_controls import body_name
 from supple.viewer.protocol import limits
-from supple.viewer.protocol.messages import AddMesh
+from supple.viewer.protocol.commands import AddMesh
 from supple.viewer.server.plain_markdown import plain
 from supple.viewer.server.uploads.meshing import TetArrays
 from supple.viewer.server.uploads.transfers import printable_name

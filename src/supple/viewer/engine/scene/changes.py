@@ -27,8 +27,7 @@ from supple.viewer.engine.scene.obstacle_distance import moved_out
 from supple.viewer.engine.scene.pusher import Pusher
 from supple.viewer.engine.scene.solvers import SOLVERS, kind_of, with_value
 from supple.viewer.protocol import commands, limits
-from supple.viewer.protocol.parameters import find_parameter
-from supple.viewer.protocol.snapshots import Value
+from supple.viewer.protocol.parameters import Value, find_parameter
 
 # Distance between vertices and obstacles at a change to the implicit solver, as a share of the mean edge length.
 CLEARANCE = 1e-3

@@ -7,8 +7,7 @@ from collections.abc import Callable
 
 from supple.errors import CommandError
 from supple.system import Solver
-from supple.viewer.protocol.parameters import PARAMETERS
-from supple.viewer.protocol.snapshots import Value
+from supple.viewer.protocol.parameters import PARAMETERS, Value
 
 
 def _xpbd() -> Solver:
