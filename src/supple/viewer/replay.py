@@ -35,7 +35,7 @@ class Replay:
     server : see `supple.output.viser_server`; recording : must stay open while this object is used
     """
 
-    def __init__(self, server: Any, recording: Recording, options: ViewOptions | None = None) -> None:
+    def __init__(self, server: Any, recording: Recording) -> None:
         self._recording = recording
         self._model = model_of_recording(recording)
         self._cached = lru_cache(_KEPT)(lambda index: moment_of_frame(self._model, recording[index]))
@@ -44,7 +44,7 @@ class Replay:
         # Both the playing thread and visitors change the time.
         self._turn = threading.RLock()
         self._end = threading.Event()
-        self.stage = Stage(server, self.moment(0), options or ViewOptions())
+        self.stage = Stage(server, self.moment(0), ViewOptions())
         times = recording.times
         first, last = float(times[0]), float(times[-1])
         gui = server.gui

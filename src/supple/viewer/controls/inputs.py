@@ -41,8 +41,9 @@ class ParameterInput:
             self.handle = gui.add_checkbox(self._label(value), initial_value=bool(value))
         else:
             position = self._slider_position(value)
+            hint = "In powers of ten" if self.parameter.logarithmic else None
             self.handle = gui.add_slider(
-                self._label(value), *self._end_positions(), self._step(), initial_value=position, hint=self._hint()
+                self._label(value), *self._end_positions(), self._step(), initial_value=position, hint=hint
             )
         self.handle.on_update(sequential(self._moved))
 
@@ -116,9 +117,6 @@ class ParameterInput:
         if self.parameter.logarithmic:
             return f"{_SHORT_LABELS.get(self.parameter.name, name)} {with_unit(float(value), unit)}"
         return f"{name} [{unit}]" if unit else name
-
-    def _hint(self) -> str | None:
-        return "In powers of ten" if self.parameter.logarithmic else None
 
 
 def with_unit(value: float, unit: str) -> str:

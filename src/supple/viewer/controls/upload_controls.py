@@ -52,8 +52,8 @@ class UploadControls:
     def _work(self, client: Any, upload: Upload, youngs: float) -> None:
         """Runs in its own thread, while page and simulation go on."""
         try:
-            made = mesh_of_upload(upload, lambda seconds: self._show_message(_progress(seconds)), self._stop)
-            self._controller.send(client, lambda: AddMesh(made.vertices, made.tets, youngs, body_name(upload.name)))
+            vertices, tets = mesh_of_upload(upload, lambda seconds: self._show_message(_progress(seconds)), self._stop)
+            self._controller.send(client, lambda: AddMesh(vertices, tets, youngs, body_name(upload.name)))
         except SuppleError as error:
             self._refuse(client, str(error))
         except OSError as error:

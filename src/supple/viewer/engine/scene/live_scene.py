@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.errors import SolverError
+from supple.errors import CommandError, SolverError
 from supple.scene.forces import SoftTarget
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.simulate import first_frame
 from supple.state import State, Status, StepReport
-from supple.system import Solver, System, initial_state
+from supple.system import BodyRange, Solver, System, initial_state
 from supple.viewer.engine.scene.grab_spring import GrabSpring
 from supple.viewer.engine.scene.new_bodies import moved_apart
 from supple.viewer.engine.scene.pusher import Pusher
@@ -189,10 +189,22 @@ class LiveScene:
         self.frame = 0
         self.report = StepReport(Status.CONVERGED, 0)
 
+    def part(self, name: str) -> BodyRange:
+        """The rows of one body.
+
+        Raises
+        ------
+        CommandError : where there is no body of that name.
+        """
+        parts = self.system.bodies
+        for part in parts:
+            if part.name == name:
+                return part
+        raise CommandError(f"there is no body {name!r}; there are {', '.join(repr(each.name) for each in parts)}")
+
     def body_positions(self, name: str) -> NDArray[np.float64]:
         """(n, 3) of one body [m]."""
-        part = next(part for part in self.system.bodies if part.name == name)
-        return self.state.positions[part.vertices]
+        return self.state.positions[self.part(name).vertices]
 
     @property
     def up(self) -> NDArray[np.float64]:
