@@ -78,8 +78,6 @@ class ParameterInput:
             self._pending.requested(self._controller.send(event.client, lambda: SetParameter(name, value, whose)))
 
     def _end_positions(self) -> tuple[float, float]:
-        if self.parameter.kind is int:
-            return int(self._low), int(self._high)
         return self._slider_position(self._low), self._slider_position(self._high)
 
     def _step(self) -> float:
@@ -90,12 +88,8 @@ class ParameterInput:
 
     def _slider_position(self, value: Value) -> Any:
         """The slider position of a value."""
-        if self.parameter.kind is bool:
-            return bool(value)
-        if self.parameter.kind is int:
-            return int(value)
         if not self.parameter.logarithmic:
-            return float(value)
+            return self.parameter.kind(value)
         return max(_LEAST_POWER, math.log10(value)) if value > 0.0 else _LEAST_POWER
 
     def _value_of(self, position: object) -> Value:

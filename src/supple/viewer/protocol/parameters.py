@@ -36,12 +36,7 @@ class Parameter:
     logarithmic: bool = False
 
     def checked(self, value: object) -> Value:
-        """`value`, converted to `kind`.
-
-        Raises
-        ------
-        CommandError : where it is of another kind, not finite, or out of range.
-        """
+        """`value`, converted to `kind`; raises `CommandError` where it is of another kind or out of range."""
         if self.kind is bool:
             if not isinstance(value, (bool, np.bool_)):
                 raise CommandError(f"{self.name} is {displayed(value)}; give true or false")
@@ -74,12 +69,7 @@ PARAMETERS: dict[str, Parameter] = {
 
 
 def find_parameter(name: object) -> Parameter:
-    """The parameter of that name.
-
-    Raises
-    ------
-    CommandError : where there is none.
-    """
+    """The parameter of that name; raises `CommandError` where there is none."""
     if not isinstance(name, str) or name not in PARAMETERS:
         raise CommandError(f"there is no parameter {displayed(name)}; there are {', '.join(PARAMETERS)}")
     return PARAMETERS[name]

@@ -168,7 +168,8 @@ class LiveScene:
 
     def _stepped(self) -> tuple[State, StepReport]:
         state, report = self.setup.solver.step(self.system, self.state, self.setup.dt, self.workspace)
-        if report.status.can_go_on and not _is_finite(state):
+        finite = np.isfinite(state.positions).all() and np.isfinite(state.velocities).all()
+        if report.status.can_go_on and not finite:
             report = StepReport(Status.NOT_FINITE, report.iterations, "a position or velocity is not finite")
         return state, report
 
@@ -190,12 +191,7 @@ class LiveScene:
         self.report = StepReport(Status.CONVERGED, 0)
 
     def part(self, name: str) -> BodyRange:
-        """The rows of one body.
-
-        Raises
-        ------
-        CommandError : where there is no body of that name.
-        """
+        """The rows of one body; raises `CommandError` where there is none of that name."""
         parts = self.system.bodies
         for part in parts:
             if part.name == name:
@@ -225,7 +221,3 @@ def _shapes(scene: Scene) -> list[tuple[Any, ...]]:
     """The shapes to draw, as a key for comparison."""
     bodies = [(body.name, body.mesh, body.skin) for body in scene.bodies]
     return [*bodies, *((type(obstacle), obstacle.name, obstacle.motion) for obstacle in scene.obstacles)]
-
-
-def _is_finite(state: State) -> bool:
-    return bool(np.isfinite(state.positions).all() and np.isfinite(state.velocities).all())

@@ -42,12 +42,7 @@ def solver_values(solver: Solver) -> dict[str, Value]:
 
 
 def with_value(solver: Solver, name: str, value: Value) -> Solver:
-    """The solver with one parameter changed.
-
-    Raises
-    ------
-    CommandError : where this solver has no such parameter.
-    """
+    """The solver with one parameter changed; raises `CommandError` where it has no such parameter."""
     fields = _fields(solver)
     if name not in fields:
         raise CommandError(f"the solver {kind_of(solver)} has no parameter {name}")
