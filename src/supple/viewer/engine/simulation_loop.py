@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from supple.contact.obstacle_poses import ObstaclePoses
 from supple.errors import SuppleError
 from supple.state import State
 from supple.viewer.engine.measurement.contact_points import contact_points
-from supple.viewer.engine.measurement.describe import describe, measures, obstacle_poses
+from supple.viewer.engine.measurement.describe import describe, measures
 from supple.viewer.engine.measurement.tet_values import tet_values
 from supple.viewer.engine.pacing import Pacing
 from supple.viewer.engine.scene.changes import change
@@ -196,7 +197,7 @@ class SimulationLoop:
             frame=live.frame,
             time=state.time,
             positions=state.positions,
-            obstacle_poses=obstacle_poses(system, state.time),
+            obstacle_poses=ObstaclePoses(system.obstacles).at(state.time),
             pinned=system.pinned_vertices,
             grabs=tuple(grabs),
             pusher=None if pusher is None else (tuple(pusher.center.tolist()), pusher.radius),

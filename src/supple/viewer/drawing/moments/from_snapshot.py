@@ -13,7 +13,7 @@ from supple.mesh.tetmesh import TetMesh
 from supple.output.drawing import View
 from supple.output.recording.scene import RecordedObstacle
 from supple.output.recording.skinned_surface import SkinnedSurface
-from supple.viewer.drawing.moments.model import Model, ModelBody, Moment, colors_of
+from supple.viewer.drawing.moments.model import Model, ModelBody, Moment
 from supple.viewer.protocol.snapshots import PUSHER, BodyDescription, SceneDescription, Snapshot
 
 
@@ -55,10 +55,9 @@ class MomentBuilder:
         )
 
     def _model_of(self, scene: SceneDescription) -> Model:
-        colors = colors_of([body.name for body in scene.bodies])
         bodies = tuple(
-            ModelBody(body.name, body.vertices, body.tet_rows, body.triangles, self._skin_of(body), None, color)
-            for body, color in zip(scene.bodies, colors, strict=True)
+            ModelBody(body.name, body.vertices, body.tet_rows, body.triangles, self._skin_of(body), None, i)
+            for i, body in enumerate(scene.bodies)
         )
         tets = np.concatenate([body.tets + body.vertices.start for body in scene.bodies])
         return Model(

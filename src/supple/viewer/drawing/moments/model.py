@@ -32,16 +32,21 @@ class ModelBody:
     triangles : (t, 3) its boundary, numbered in the body, counter-clockwise from outside
     skin : a finer surface that follows its tets, or None
     material : or None where it is not known
-    color : (r, g, b) from 0 to 255
+    number : place among the bodies, which selects the color
     """
 
     name: str
     vertices: slice
     tets: slice
     triangles: NDArray[np.int32]
-    skin: SkinnedSurface | None = None
-    material: Material | None = None
-    color: tuple[int, int, int] = BODY_COLORS[0]
+    skin: SkinnedSurface | None
+    material: Material | None
+    number: int
+
+    @property
+    def color(self) -> tuple[int, int, int]:
+        """(r, g, b) from 0 to 255."""
+        return BODY_COLORS[self.number % len(BODY_COLORS)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,8 +169,3 @@ class Moment:
     def finite_positions(self) -> NDArray[np.float64]:
         """(n, 3) [m], with zeros instead of values that are not finite, which a browser cannot read."""
         return np.nan_to_num(self.positions, posinf=0.0, neginf=0.0)
-
-
-def colors_of(names: Sequence[str]) -> list[tuple[int, int, int]]:
-    """A color for each body."""
-    return [BODY_COLORS[i % len(BODY_COLORS)] for i in range(len(names))]

@@ -78,16 +78,6 @@ def _obstacle(obstacle: Obstacle) -> RecordedObstacle:
     return RecordedObstacle(name, type(obstacle).__name__, parameters, vertices, triangles)
 
 
-def obstacle_poses(system: System, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Rotations (k, 3, 3) and translations (k, 3) [m] of the obstacles at `time`."""
-    R = np.tile(np.eye(3), (len(system.obstacles), 1, 1))
-    t = np.zeros((len(system.obstacles), 3))
-    for k, obstacle in enumerate(system.obstacles):
-        if obstacle.motion is not None:
-            R[k], t[k] = obstacle.pose(time)
-    return R, t
-
-
 def measures(live: LiveScene) -> Measures:
     """The numbers of the present state, and of the last step."""
     report, details = live.report, live.report.details
