@@ -20,8 +20,8 @@ from statistics import median
 import supple as sp
 from supple.viewer.app import Address, opened_page
 from supple.viewer.engine.engine import Engine
+from supple.viewer.protocol.commands import Play, Reset, Step
 from supple.viewer.protocol.live_source import LiveSource
-from supple.viewer.protocol.messages import Play, Reset, Step
 
 WAYS = {
     "headless": "simulate(), no page",

@@ -14,8 +14,8 @@ from playwright.sync_api import sync_playwright
 import supple as sp
 from supple.mesh.primitives.surfaces import torus_surface
 from supple.viewer.app import Address, opened_page
+from supple.viewer.protocol.commands import Grab, ReleaseGrab, Reset, SetParameter, Step
 from supple.viewer.protocol.live_source import LiveSource
-from supple.viewer.protocol.messages import Grab, ReleaseGrab, Reset, SetParameter, Step
 
 FOLDER = Path(__file__).parent / "images"
 FLAGS = "--headless --no-sandbox --disable-gpu --use-angle=swiftshader --enable-unsafe-swiftshader"

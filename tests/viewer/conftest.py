@@ -5,8 +5,8 @@ import pytest
 import supple as sp
 from supple.viewer.engine.scene.live_scene import LiveScene
 from supple.viewer.engine.simulation_loop import SimulationLoop
+from supple.viewer.protocol.commands import Grab
 from supple.viewer.protocol.live_source import LiveSource
-from supple.viewer.protocol.messages import Grab
 
 
 def small_source(**changes):

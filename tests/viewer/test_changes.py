@@ -12,8 +12,7 @@ from supple.viewer.engine.scene.changes import change, without_body
 from supple.viewer.engine.scene.live_scene import LiveScene
 from supple.viewer.engine.scene.new_bodies import unused_name
 from supple.viewer.protocol import limits
-from supple.viewer.protocol.live_source import LiveSource
-from supple.viewer.protocol.messages import (
+from supple.viewer.protocol.commands import (
     AddBody,
     AddMesh,
     CopyBody,
@@ -27,6 +26,7 @@ from supple.viewer.protocol.messages import (
     Squash,
     Unpin,
 )
+from supple.viewer.protocol.live_source import LiveSource
 
 from .conftest import corner_grab, free_source, run, small_source
 

@@ -4,7 +4,7 @@ import threading
 import time
 
 from supple.viewer.protocol.command_queue import CommandQueue
-from supple.viewer.protocol.messages import Grab, MoveGrab, MovePusher, Pause, Play, ReleaseGrab, SetParameter, Step
+from supple.viewer.protocol.commands import Grab, MoveGrab, MovePusher, Pause, Play, ReleaseGrab, SetParameter, Step
 
 
 def drained(*commands, capacity=100):

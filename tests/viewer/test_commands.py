@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from supple.errors import CommandError
-from supple.viewer.protocol.messages import (
-    PARAMETERS,
+from supple.viewer.protocol.commands import (
     AddBody,
     CopyBody,
     Grab,
@@ -24,6 +23,7 @@ from supple.viewer.protocol.messages import (
     Step,
     Unpin,
 )
+from supple.viewer.protocol.parameters import PARAMETERS
 
 NAN, INF = math.nan, math.inf
 

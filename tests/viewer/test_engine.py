@@ -16,8 +16,7 @@ import pytest
 import supple as sp
 from supple.errors import CommandError, SceneError, SolverError
 from supple.viewer.engine.engine import Engine
-from supple.viewer.protocol.live_source import LiveSource
-from supple.viewer.protocol.messages import (
+from supple.viewer.protocol.commands import (
     AddBody,
     MoveGrab,
     Pause,
@@ -29,6 +28,7 @@ from supple.viewer.protocol.messages import (
     SetView,
     Step,
 )
+from supple.viewer.protocol.live_source import LiveSource
 from supple.viewer.protocol.outbox import DESCRIPTION, SNAPSHOT, Outbox
 
 from .conftest import small_source
@@ -219,7 +219,7 @@ def test_it_ends_when_the_process_of_the_page_is_killed(tmp_path):
         import supple as sp
         from supple.viewer.engine.engine import Engine
         from supple.viewer.protocol.live_source import LiveSource
-        from supple.viewer.protocol.messages import Play
+        from supple.viewer.protocol.commands import Play
 
         if __name__ == "__main__":
             body = sp.Body("cube", sp.shapes.box((1, 1, 1), (2, 2, 2)), sp.StableNeoHookean(youngs=1e5, poisson=0.3))

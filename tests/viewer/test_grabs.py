@@ -11,7 +11,7 @@ from supple.viewer.engine.measurement.describe import describe, measures
 from supple.viewer.engine.scene.changes import change, flattened
 from supple.viewer.engine.scene.live_scene import LiveScene
 from supple.viewer.protocol import limits
-from supple.viewer.protocol.messages import (
+from supple.viewer.protocol.commands import (
     Grab,
     MoveGrab,
     MovePusher,
@@ -61,7 +61,7 @@ class TestGrabs:
         change(MoveGrab(1, tuple((point + np.array([0, 0.3, 0])).tolist())), live)
         assert len(spring.patch) >= 4
         spring.pull(live.body_positions("cube"), live.state.positions[spring.patch])
-        forces = spring._motion(0.0)
+        forces = spring.soft_target.motion(0.0)
         assert np.ptp(forces, axis=0) == pytest.approx([0, 0, 0], abs=1e-12)
         assert forces[0] == pytest.approx([0, 0.3, 0])
 

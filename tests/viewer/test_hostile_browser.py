@@ -13,7 +13,7 @@ from websockets.sync.client import connect
 
 from supple.viewer.app import Address, opened_page
 from supple.viewer.engine.engine import Engine
-from supple.viewer.protocol.messages import Pause, Play, Reset
+from supple.viewer.protocol.commands import Pause, Play, Reset
 
 from .conftest import small_source
 from .server.test_gate import MALFORMED, camera

@@ -20,9 +20,10 @@ from supple.viewer.engine import simulation_loop
 from supple.viewer.engine.pacing import Pacing
 from supple.viewer.engine.scene.live_scene import LiveScene
 from supple.viewer.engine.simulation_loop import SimulationLoop
-from supple.viewer.protocol import limits, messages
+from supple.viewer.protocol import commands, limits
 from supple.viewer.protocol.command_queue import CommandQueue
 from supple.viewer.protocol.live_source import LiveSource
+from supple.viewer.protocol.parameters import PARAMETERS
 
 from .conftest import Collected
 
@@ -56,7 +57,7 @@ def crashes(state):
 
 @pytest.mark.parametrize("failure", [not_finite, silently_not_finite, refuses, crashes])
 def test_a_failed_step_pauses_at_the_last_good_state_with_a_notice(loop, failure):
-    loop.execute(messages.Play())
+    loop.execute(commands.Play())
     loop.step()
     good = loop.live.state
     solver = loop.live.setup.solver
@@ -69,7 +70,7 @@ def test_a_failed_step_pauses_at_the_last_good_state_with_a_notice(loop, failure
     assert notice.level == "error"
     assert notice.text.startswith("paused at t = 0.01667 s; ")
     loop.live.setup = dataclasses.replace(loop.live.setup, solver=solver)
-    loop.execute(messages.Play())
+    loop.execute(commands.Play())
     loop.step()
     assert loop.live.frame == 2
 
@@ -89,7 +90,7 @@ def stubborn(state):
 @pytest.mark.parametrize("endless", [endless, stubborn])
 def test_an_endless_step_is_given_up(loop, endless):
     loop.watch.longest = 0.2
-    loop.execute(messages.Play())
+    loop.execute(commands.Play())
     good, solver = loop.live.state, loop.live.setup.solver
     with_solver_that(loop, endless)
     loop.step()
@@ -158,7 +159,7 @@ def test_compilation_of_kernels_is_not_part_of_a_step(loop):
         return state, StepReport(Status.CONVERGED, 1)
 
     loop.watch.longest = 0.25
-    loop.execute(messages.Play())
+    loop.execute(commands.Play())
     with_solver_that(loop, compiles)
     loop.step()
     assert loop.notices == deque()
@@ -168,9 +169,9 @@ def test_compilation_of_kernels_is_not_part_of_a_step(loop):
 
 def test_a_request_to_pause_interrupts_a_long_step(loop):
     loop.watch.longest_awaited = 0.1
-    loop.execute(messages.Play())
+    loop.execute(commands.Play())
     with_solver_that(loop, endless)
-    threading.Timer(0.2, loop.inbox.put, (1, messages.Pause())).start()
+    threading.Timer(0.2, loop.inbox.put, (1, commands.Pause())).start()
     loop.step()
     assert "given up after" in loop.notices[-1].text
     loop.run_once(0.0)
@@ -179,19 +180,19 @@ def test_a_request_to_pause_interrupts_a_long_step(loop):
 
 
 def test_impossible_commands_become_notices_and_play_continues(loop):
-    loop.execute(messages.Play())
-    loop.execute(messages.RemoveBody("ghost"))
-    loop.execute(messages.SetParameter("edge_compliance", 0.1))
+    loop.execute(commands.Play())
+    loop.execute(commands.RemoveBody("ghost"))
+    loop.execute(commands.SetParameter("edge_compliance", 0.1))
     assert loop.playing
     assert [notice.number for notice in loop.notices] == [1, 2]
     assert "'ghost'" in loop.notices[0].text
     for _ in range(50):
-        loop.execute(messages.RemoveBody("ghost"))
+        loop.execute(commands.RemoveBody("ghost"))
     assert [notice.number for notice in loop.notices] == list(range(45, 53))
 
 
 def test_steps_are_simulated_without_waiting_for_the_clock(loop):
-    loop.execute(messages.Step(5))
+    loop.execute(commands.Step(5))
     for _ in range(7):
         loop.run_once(0.0)
     assert loop.live.frame == 5
@@ -199,19 +200,19 @@ def test_steps_are_simulated_without_waiting_for_the_clock(loop):
 
 
 def test_all_steps_count_until_a_reset(loop):
-    loop.inbox.put_all(enumerate([messages.Step(), messages.Step(), messages.Step(2)], 1))
+    loop.inbox.put_all(enumerate([commands.Step(), commands.Step(), commands.Step(2)], 1))
     for _ in range(6):
         loop.run_once(0.0)
     assert loop.live.frame == 4
-    loop.inbox.put_all(enumerate([messages.Step(3), messages.Reset()], 4))
+    loop.inbox.put_all(enumerate([commands.Step(3), commands.Reset()], 4))
     for _ in range(6):
         loop.run_once(0.0)
     assert loop.live.frame == 0
 
 
 def test_slow_motion_interpolates_states(loop):
-    loop.execute(messages.SetSpeed(0.1))
-    loop.execute(messages.Play())
+    loop.execute(commands.SetSpeed(0.1))
+    loop.execute(commands.Play())
     loop.step()
     loop.step()
     before, after = loop._before, loop.live.state
@@ -220,7 +221,7 @@ def test_slow_motion_interpolates_states(loop):
     assert half.time == pytest.approx(0.5 * (before.time + after.time))
     assert half.positions == pytest.approx(0.5 * (before.positions + after.positions))
     assert loop.snapshot(due + 1.0).time == after.time
-    loop.execute(messages.Pause())
+    loop.execute(commands.Pause())
     assert loop.snapshot(due - 0.5 * loop._interval()).positions is after.positions
 
 
@@ -231,7 +232,7 @@ def test_a_snapshot_contains_what_the_view_requests(loop):
     assert plain.velocities is None
     assert plain.tet_values is None
     assert plain.contact_points is None
-    loop.execute(messages.SetView("von_mises", velocities=True, contacts=True))
+    loop.execute(commands.SetView("von_mises", velocities=True, contacts=True))
     full = loop.snapshot(0.0)
     assert full.velocities.shape == full.positions.shape
     assert full.tet_values.shape == (len(loop.live.system.tets),)
@@ -244,8 +245,8 @@ def fails(*_):
 
 
 def test_a_failed_view_value_becomes_a_notice_and_the_simulation_continues(loop, monkeypatch):
-    loop.execute(messages.Play())
-    loop.execute(messages.SetView("J", contacts=True))
+    loop.execute(commands.Play())
+    loop.execute(commands.SetView("J", contacts=True))
     monkeypatch.setattr(simulation_loop, "contact_points", fails)
     for _ in range(3):
         loop.step()
@@ -257,7 +258,7 @@ def test_a_failed_view_value_becomes_a_notice_and_the_simulation_continues(loop,
     assert (last.frame, last.paused, last.contact_points) == (3, False, None)
     assert last.tet_values is not None
     monkeypatch.undo()
-    loop.execute(messages.SetView("J", contacts=True))
+    loop.execute(commands.SetView("J", contacts=True))
     loop.publish(0.0)
     assert loop.outbox.snapshots[-1].contact_points is not None
 
@@ -266,7 +267,7 @@ def test_a_failed_view_value_becomes_a_notice_and_the_simulation_continues(loop,
 def test_a_failed_snapshot_pauses_with_one_notice(loop, monkeypatch, function):
     loop.publish(0.0)
     monkeypatch.setattr(simulation_loop, function, fails)
-    loop.execute(messages.Play())
+    loop.execute(commands.Play())
     loop.step()
     loop.live.revision += 1
     for _ in range(3):
@@ -276,7 +277,7 @@ def test_a_failed_snapshot_pauses_with_one_notice(loop, monkeypatch, function):
     assert last.paused
     assert not loop.playing
     monkeypatch.undo()
-    loop.execute(messages.Play())
+    loop.execute(commands.Play())
     loop.step()
     loop.publish(0.0)
     last = loop.outbox.snapshots[-1]
@@ -355,37 +356,37 @@ def random_command(rng, bodies, solvers=("xpbd",)):
     """A command of any kind, with valid or hostile values; None where it is refused."""
     body = rng.choice([*bodies, "ghost"])
     point = tuple(rng.choice([rng.uniform(-2, 2), rng.uniform(-1e4, 1e4)]) for _ in range(3))
-    parameter = rng.choice(list(messages.PARAMETERS.values()))
+    parameter = rng.choice(list(PARAMETERS.values()))
     value = rng.uniform(parameter.low, min(parameter.high, 1e6))
     value = {bool: rng.random() < 0.5, int: min(round(value), 12), float: value}[parameter.kind]
     owner = body if parameter.owner == "body" else None
     size = rng.uniform(0.05, 1.0)
     made = rng.choice(
         [
-            lambda: messages.Play(),
-            lambda: messages.Pause(),
-            lambda: messages.Step(rng.randint(1, 3)),
-            lambda: messages.Reset(),
-            lambda: messages.SetSpeed(rng.uniform(0.01, 1.0)),
-            lambda: messages.SetSolver(rng.choice(solvers)),
-            lambda: messages.SetParameter(parameter.name, value, rng.choice([None, owner])),
-            lambda: messages.SetView(
+            lambda: commands.Play(),
+            lambda: commands.Pause(),
+            lambda: commands.Step(rng.randint(1, 3)),
+            lambda: commands.Reset(),
+            lambda: commands.SetSpeed(rng.uniform(0.01, 1.0)),
+            lambda: commands.SetSolver(rng.choice(solvers)),
+            lambda: commands.SetParameter(parameter.name, value, rng.choice([None, owner])),
+            lambda: commands.SetView(
                 rng.choice([None, "J", "von_mises", "energy"]), rng.random() < 0.5, rng.random() < 0.5
             ),
-            lambda: messages.Grab(
+            lambda: commands.Grab(
                 rng.randint(0, 20), body, (rng.randint(0, 80),), (1.0,), point, 10 ** rng.uniform(-2, 2)
             ),
-            lambda: messages.MoveGrab(rng.randint(0, 20), point),
-            lambda: messages.ReleaseGrab(rng.randint(0, 20)),
-            lambda: messages.Pin(body, rng.randint(0, 80)),
-            lambda: messages.Unpin(body, rng.randint(0, 80)),
-            lambda: messages.Unpin(),
-            lambda: messages.MovePusher(point, size),
-            lambda: messages.RemovePusher(),
-            lambda: messages.Squash(rng.uniform(limits.FLATTEST, limits.TALLEST)),
-            lambda: messages.AddBody(rng.choice(limits.SHAPES), size, rng.randint(3, 4), rng.choice([None, point])),
-            lambda: messages.CopyBody(body),
-            lambda: messages.RemoveBody(body),
+            lambda: commands.MoveGrab(rng.randint(0, 20), point),
+            lambda: commands.ReleaseGrab(rng.randint(0, 20)),
+            lambda: commands.Pin(body, rng.randint(0, 80)),
+            lambda: commands.Unpin(body, rng.randint(0, 80)),
+            lambda: commands.Unpin(),
+            lambda: commands.MovePusher(point, size),
+            lambda: commands.RemovePusher(),
+            lambda: commands.Squash(rng.uniform(limits.FLATTEST, limits.TALLEST)),
+            lambda: commands.AddBody(rng.choice(limits.SHAPES), size, rng.randint(3, 4), rng.choice([None, point])),
+            lambda: commands.CopyBody(body),
+            lambda: commands.RemoveBody(body),
         ]
     )
     if rng.random() < 0.2:  # make one value invalid

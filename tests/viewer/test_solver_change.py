@@ -11,7 +11,7 @@ from supple.viewer.engine.measurement.describe import describe, measures
 from supple.viewer.engine.scene.changes import change
 from supple.viewer.engine.scene.live_scene import LiveScene
 from supple.viewer.engine.scene.obstacle_distance import moved_out, signed_distance
-from supple.viewer.protocol.messages import MovePusher, SetSolver
+from supple.viewer.protocol.commands import MovePusher, SetSolver
 
 from .conftest import free_source, run, small_source
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import socket
 import threading
 import webbrowser
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +63,13 @@ def opened_page(source: LiveSource | str | Path, address: Address | None = None)
     """
     address = Address() if address is None else address
     with ExitStack() as ends:
-        draw = _live(source, ends) if isinstance(source, LiveSource) else _replay(source, ends)
+        if isinstance(source, LiveSource):
+            engine = ends.enter_context(Engine(source))
+            first = engine.latest()
+            assert first is not None  # the constructor of the engine waits for it
+            draw = partial(LivePage, simulation=engine, first=first)
+        else:
+            draw = partial(Replay, recording=ends.enter_context(read_recording(source)))
         require_free_port(address.host, address.port)  # viser would silently use the next port
         with gate(address.host, address.token):
             server = start_server(address.host, address.port)
@@ -73,18 +80,6 @@ def opened_page(source: LiveSource | str | Path, address: Address | None = None)
         host = socket.gethostname() if address.host in ("", "0.0.0.0", "::") else address.host
         query = f"/?token={address.token}" if address.token else ""
         yield OpenPage(f"http://{host}:{server.get_port()}{query}", server, content)
-
-
-def _live(source: LiveSource, ends: ExitStack) -> Callable[[Any], LivePage]:
-    engine = ends.enter_context(Engine(source))
-    first = engine.latest()
-    assert first is not None  # the constructor of the engine waits for it
-    return lambda server: LivePage(server, engine, first)
-
-
-def _replay(path: str | Path, ends: ExitStack) -> Callable[[Any], Replay]:
-    recording = ends.enter_context(read_recording(path))
-    return lambda server: Replay(server, recording)
 
 
 def serve(source: LiveSource | str | Path, address: Address | None = None, *, open_browser: bool = True) -> None:

@@ -31,16 +31,14 @@ class LivePage:
     server : see `supple.output.viser_server`; simulation : see `Simulation`; first : its first snapshot
     """
 
-    def __init__(
-        self, server: Any, simulation: Simulation, first: Snapshot, options: ViewOptions | None = None
-    ) -> None:
+    def __init__(self, server: Any, simulation: Simulation, first: Snapshot) -> None:
         self._simulation = simulation
         self._moment_builder = MomentBuilder()
         self._displayed, self._received_at = first, time.monotonic()
         self.controller = Controller(simulation, first)
         self.panel = Panel(server, self.controller)
         moment = self._moment_builder.moment(first)
-        self.stage = Stage(server, moment, options or ViewOptions(), self.panel.mouse.add_handlers)
+        self.stage = Stage(server, moment, ViewOptions(), self.panel.mouse.add_handlers)
         self.panel.attach(self.stage)
         self._frame_rate = FrameRate(server)
         self._end = threading.Event()

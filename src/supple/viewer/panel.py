@@ -18,7 +18,7 @@ from supple.viewer.controls.view_controls import ViewControls
 from supple.viewer.drawing.coloring.fields import FIELDS
 from supple.viewer.drawing.options import ViewOptions
 from supple.viewer.drawing.stage import Stage
-from supple.viewer.protocol.messages import SetView
+from supple.viewer.protocol.commands import SetView
 from supple.viewer.protocol.snapshots import Snapshot
 
 _NUMBERS_EVERY = 0.15  # [s]; numbers that change faster cannot be read
@@ -41,7 +41,7 @@ class Panel:
         tabs = gui.add_tab_group()
         self._bodies_tab, self._view_tab, self._solver_tab = (tabs.add_tab(name) for name in TABS)
         with self._bodies_tab:
-            self.mouse_controls = MouseControls(gui, controller, self._mouse_changed)
+            self.mouse_controls = MouseControls(gui, controller, lambda: self.mouse.switch())
         self.mouse = Mouse(server, controller, self.mouse_controls)
         self.stage: Stage | None = None
         self._numbers_at = self._plots_at = 0.0
@@ -98,9 +98,6 @@ class Panel:
                 for client in self._server.get_clients().values():
                     error = notice.level == "error"
                     notify(client, "Simulation", notice.text, "red" if error else "blue")
-
-    def _mouse_changed(self) -> None:
-        self.mouse.switch()
 
     def _view_changed(self, options: ViewOptions) -> None:
         """Request the values to draw from the simulation, which computes no others."""

@@ -35,7 +35,7 @@ class Replay:
     server : see `supple.output.viser_server`; recording : must stay open while this object is used
     """
 
-    def __init__(self, server: Any, recording: Recording, options: ViewOptions | None = None) -> None:
+    def __init__(self, server: Any, recording: Recording) -> None:
         self._recording = recording
         self._model = model_of_recording(recording)
         self._cached = lru_cache(_KEPT)(lambda index: moment_of_frame(self._model, recording[index]))
@@ -44,12 +44,12 @@ class Replay:
         # Both the playing thread and visitors change the time.
         self._turn = threading.RLock()
         self._end = threading.Event()
-        self.stage = Stage(server, self.moment(0), options or ViewOptions())
+        self.stage = Stage(server, self.moment(0), ViewOptions())
         times = recording.times
         first, last = float(times[0]), float(times[-1])
         gui = server.gui
         with gui.add_folder("Replay"):
-            self.play = gui.add_button("Pause")
+            self.play = gui.add_button("Pause" if last > first else "Play")
             step = (last - first) / max(1, len(times) - 1)
             self.slider = gui.add_slider(
                 "Time [s]", first, last, step if step > 0.0 else 1.0, initial_value=first, disabled=last == first
@@ -60,8 +60,6 @@ class Replay:
         self.controls = ViewControls(server, self.stage)
         self.record = RecordControls(server, self.stage)
         self.playing = last > first
-        if not self.playing:
-            self.play.label = "Play"
         self._time = first
         # The slider value that playing has set last. Another value comes from a visitor, whose event arrives soon.
         self._put = self.slider.value

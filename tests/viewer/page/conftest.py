@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.viewer.protocol.messages import (
+from supple.output.recording.scene import RecordedObstacle
+from supple.viewer.protocol.snapshots import (
     BodyDescription,
     Measures,
-    ObstacleDescription,
     SceneDescription,
     Snapshot,
     Timing,
@@ -61,9 +61,8 @@ def describe(*meshes: sp.TetMesh, skin=None, **changes) -> SceneDescription:
             )
         )
     x = np.concatenate([mesh.vertices for mesh in meshes])
-    floor = ObstacleDescription(
-        "floor", "HalfSpace", {"point": np.zeros(3), "normal": np.array([0.0, 1.0, 0.0])}, False, 0.5
-    )
+    shape = {"point": np.zeros(3), "normal": np.array([0.0, 1.0, 0.0])}
+    floor = RecordedObstacle("floor", "HalfSpace", shape, np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int32))
     made = SceneDescription(
         generation=1,
         revision=1,
@@ -84,7 +83,7 @@ def describe(*meshes: sp.TetMesh, skin=None, **changes) -> SceneDescription:
 
 def snapshot_of(description: SceneDescription, **changes) -> Snapshot:
     still, spins = np.zeros(3), np.zeros((len(description.bodies), 3))
-    measures = Measures("converged", "", 1.0, 2.0, 3.0, 0.9, still, still, spins, 0, None, 1)
+    measures = Measures(0.9, 1.0, 2.0, 3.0, 0.0, None, still, still, "converged", "", spins, 0, None, 1)
     made = Snapshot(
         description=description,
         frame=0,

@@ -8,8 +8,8 @@ import pytest
 import supple as sp
 from supple.mesh.primitives.surfaces import sphere_surface
 from supple.viewer.app import Address, opened_page
+from supple.viewer.protocol.commands import RemoveBody
 from supple.viewer.protocol.live_source import LiveSource
-from supple.viewer.protocol.messages import RemoveBody
 
 RADIUS, START = 0.3, 0.5
 MASS = 1000.0 * 4.0 / 3.0 * np.pi * RADIUS**3

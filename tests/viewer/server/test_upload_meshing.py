@@ -32,8 +32,8 @@ def ball(tmp_path_factory):
 def test_a_surface_is_meshed_and_scaled_and_no_file_is_left(ball, tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     seconds = []
-    made = mesh_of_upload(Upload("../../etc/ball.stl", ".stl", ball[".stl"], 0.25), seconds.append)
-    mesh = sp.TetMesh(made.vertices, made.tets)
+    arrays = mesh_of_upload(Upload("../../etc/ball.stl", ".stl", ball[".stl"], 0.25), seconds.append)
+    mesh = sp.TetMesh(*arrays)
     assert np.ptp(mesh.vertices, axis=0).max() == pytest.approx(0.25)
     np.testing.assert_allclose(mesh.vertices.min(axis=0), -mesh.vertices.max(axis=0), atol=0.01)
     assert seconds == sorted(seconds)

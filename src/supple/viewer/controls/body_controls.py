@@ -7,9 +7,9 @@ from typing import Any
 from supple.viewer.controls.controller import Controller, sequential
 from supple.viewer.controls.inputs import ParameterInput
 from supple.viewer.protocol import limits
-from supple.viewer.protocol.messages import AddBody, CopyBody, RemoveBody, Squash
-from supple.viewer.protocol.parameters import PARAMETERS
-from supple.viewer.protocol.snapshots import SceneDescription, Snapshot, Value
+from supple.viewer.protocol.commands import AddBody, CopyBody, RemoveBody, Squash
+from supple.viewer.protocol.parameters import PARAMETERS, Value
+from supple.viewer.protocol.snapshots import SceneDescription, Snapshot
 from supple.viewer.server.browser_values import number, one_of
 
 ALL = "all bodies"

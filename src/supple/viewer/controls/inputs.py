@@ -8,9 +8,8 @@ from typing import Any
 
 from supple.viewer.controls.controller import Controller, sequential
 from supple.viewer.controls.pending import PendingValue
-from supple.viewer.protocol.messages import SetParameter
-from supple.viewer.protocol.parameters import PARAMETERS, Parameter
-from supple.viewer.protocol.snapshots import Value
+from supple.viewer.protocol.commands import SetParameter
+from supple.viewer.protocol.parameters import PARAMETERS, Parameter, Value
 from supple.viewer.server.browser_values import number
 
 # The smallest power of ten of a slider whose left end is zero.
@@ -42,8 +41,9 @@ class ParameterInput:
             self.handle = gui.add_checkbox(self._label(value), initial_value=bool(value))
         else:
             position = self._slider_position(value)
+            hint = "In powers of ten" if self.parameter.logarithmic else None
             self.handle = gui.add_slider(
-                self._label(value), *self._end_positions(), self._step(), initial_value=position, hint=self._hint()
+                self._label(value), *self._end_positions(), self._step(), initial_value=position, hint=hint
             )
         self.handle.on_update(sequential(self._moved))
 
@@ -78,8 +78,6 @@ class ParameterInput:
             self._pending.requested(self._controller.send(event.client, lambda: SetParameter(name, value, whose)))
 
     def _end_positions(self) -> tuple[float, float]:
-        if self.parameter.kind is int:
-            return int(self._low), int(self._high)
         return self._slider_position(self._low), self._slider_position(self._high)
 
     def _step(self) -> float:
@@ -90,12 +88,8 @@ class ParameterInput:
 
     def _slider_position(self, value: Value) -> Any:
         """The slider position of a value."""
-        if self.parameter.kind is bool:
-            return bool(value)
-        if self.parameter.kind is int:
-            return int(value)
         if not self.parameter.logarithmic:
-            return float(value)
+            return self.parameter.kind(value)
         return max(_LEAST_POWER, math.log10(value)) if value > 0.0 else _LEAST_POWER
 
     def _value_of(self, position: object) -> Value:
@@ -117,9 +111,6 @@ class ParameterInput:
         if self.parameter.logarithmic:
             return f"{_SHORT_LABELS.get(self.parameter.name, name)} {with_unit(float(value), unit)}"
         return f"{name} [{unit}]" if unit else name
-
-    def _hint(self) -> str | None:
-        return "In powers of ten" if self.parameter.logarithmic else None
 
 
 def with_unit(value: float, unit: str) -> str:

@@ -22,7 +22,6 @@ class Measures:
     def __init__(self, gui: Any, snapshot: Snapshot) -> None:
         self._lock = threading.Lock()
         self._rows: deque[tuple[float, ...]] = deque(maxlen=_MOST_POINTS)
-        self._text = ""
         with gui.add_folder("Measures"):
             self._message = gui.add_markdown("")
             self.energy = self._plot(gui, "Energy [J]", (("kinetic", "#e65c3c"), ("elastic", "#409ce1")))
@@ -32,8 +31,7 @@ class Measures:
     def note(self, snapshot: Snapshot) -> None:
         """Store the values for the plots."""
         measures = snapshot.measures
-        fastest = float(np.linalg.norm(measures.spin, axis=1).max()) if len(measures.spin) else 0.0
-        row = (snapshot.time, measures.kinetic_energy, measures.elastic_energy, fastest)
+        row = (snapshot.time, measures.kinetic_energy, measures.elastic_energy, _fastest_spin(snapshot))
         with self._lock:
             if self._rows and snapshot.time < self._rows[-1][0]:
                 self._rows.clear()
@@ -42,9 +40,7 @@ class Measures:
 
     def show(self, snapshot: Snapshot) -> None:
         """Update numbers and plots."""
-        text = measures_text(snapshot)
-        if text != self._text:
-            self._message.content = self._text = text
+        self._message.content = measures_text(snapshot)
         with self._lock:
             rows = np.nan_to_num(np.array(self._rows, dtype=np.float64), posinf=0.0, neginf=0.0)
         self._draw(self.energy, rows, (1, 2))
@@ -72,13 +68,16 @@ class Measures:
 def measures_text(snapshot: Snapshot) -> str:
     """Counts, energies, the smallest J, and the status of the last step."""
     scene, measures = snapshot.description, snapshot.measures
-    spin = float(np.linalg.norm(measures.spin, axis=1).max()) if len(measures.spin) else 0.0
     total = measures.kinetic_energy + measures.elastic_energy + measures.potential_energy
     lines = [
         f"{scene.n_tets} tets, {scene.n_vertices} vertices, {scene.n_constraints} constraints",
-        f"energy {total:.3g} J, spin {spin:.3g} rad/s",
+        f"energy {total:.3g} J, spin {_fastest_spin(snapshot):.3g} rad/s",
         f"smallest J {measures.min_det_F:.3f}, contacts {measures.contacts}",
     ]
     if measures.status != "converged":
         lines.append(f"**{measures.status}** {measures.message}")
     return "  \n".join(lines)
+
+
+def _fastest_spin(snapshot: Snapshot) -> float:
+    return float(np.linalg.norm(snapshot.measures.spin, axis=1).max(initial=0.0))

@@ -13,7 +13,7 @@ from supple.viewer.controls.controller import Controller
 from supple.viewer.controls.mouse_controls import MouseControls
 from supple.viewer.drawing.picking import nearest_surface_point, point_on_camera_plane, surface_point_on_ray
 from supple.viewer.drawing.stage import Stage
-from supple.viewer.protocol.messages import Grab, MoveGrab, MovePusher, Pin, ReleaseGrab, Unpin
+from supple.viewer.protocol.commands import Grab, MoveGrab, MovePusher, Pin, ReleaseGrab, Unpin
 
 _BACKDROP = "/backdrop"
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from supple.viewer.controls.controller import Controller, sequential
 from supple.viewer.protocol import limits
-from supple.viewer.protocol.messages import RemovePusher, Unpin
+from supple.viewer.protocol.commands import RemovePusher, Unpin
 from supple.viewer.server.browser_values import number, one_of
 
 DRAG, PUSH = "drag and pin", "push"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 from typing import Any
 
 from supple.errors import SuppleError
@@ -16,6 +17,22 @@ from supple.viewer.server.plain_markdown import plain
 _PAGE = "page (HTML)"
 _MOST_SECONDS = 120.0  # of a page
 _MOST_BYTES = 300_000_000  # of recorded moments
+
+
+def _one_at_a_time(act: Callable[[Any, Any], None]) -> Callable[[Any, Any], None]:
+    """An event handler that acts for its visitor, unless another picture or file is being made."""
+
+    def react(self: RecordControls, event: Any) -> None:
+        if event.client is None or not self._busy.acquire(blocking=False):
+            return
+        try:
+            act(self, event.client)
+        except SuppleError as error:
+            self.show_message(str(error))
+        finally:
+            self._busy.release()
+
+    return react
 
 
 class RecordControls:
@@ -60,27 +77,17 @@ class RecordControls:
         """Display a line below the buttons."""
         self._message.content, self._message.visible = plain(text), bool(text)
 
-    def _send_screenshot(self, event: Any) -> None:
-        if event.client is None or not self._busy.acquire(blocking=False):
-            return
-        try:
-            event.client.send_file_download("supple.png", png_of(event.client), save_immediately=True)
-            self.show_message("")
-        except SuppleError as error:
-            self.show_message(str(error))
-        finally:
-            self._busy.release()
+    @_one_at_a_time
+    def _send_screenshot(self, client: Any) -> None:
+        client.send_file_download("supple.png", png_of(client), save_immediately=True)
+        self.show_message("")
 
-    def _toggle(self, event: Any) -> None:
-        if event.client is None or not self._busy.acquire(blocking=False):
-            return
-        try:
-            if self.recording:
-                self._end(event.client)
-            else:
-                self._begin(event.client)
-        finally:
-            self._busy.release()
+    @_one_at_a_time
+    def _toggle(self, client: Any) -> None:
+        if self.recording:
+            self._end(client)
+        else:
+            self._begin(client)
 
     def _begin(self, client: Any) -> None:
         kind = self.kind.value
@@ -110,8 +117,6 @@ class RecordControls:
                 kind = self.kind.value.lower()
                 client.send_file_download(f"supple.{kind}", capture.end(kind))
             self.show_message("")
-        except SuppleError as error:
-            self.show_message(str(error))
         finally:
             self.record.label = "Record"
             self.kind.disabled = False

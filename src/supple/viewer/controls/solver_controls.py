@@ -7,7 +7,7 @@ from typing import Any
 from supple.viewer.controls.controller import Controller, sequential
 from supple.viewer.controls.inputs import ParameterInput
 from supple.viewer.controls.pending import PendingValue
-from supple.viewer.protocol.messages import SetSolver
+from supple.viewer.protocol.commands import SetSolver
 from supple.viewer.protocol.parameters import PARAMETERS
 from supple.viewer.protocol.snapshots import Snapshot
 from supple.viewer.server.browser_values import one_of

@@ -6,7 +6,7 @@ from typing import Any
 
 from supple.viewer.controls.controller import Controller, sequential
 from supple.viewer.protocol import limits
-from supple.viewer.protocol.messages import Pause, Play, Reset, SetSpeed, Step
+from supple.viewer.protocol.commands import Pause, Play, Reset, SetSpeed, Step
 from supple.viewer.protocol.snapshots import Snapshot
 from supple.viewer.server.browser_values import number, one_of
 from supple.viewer.server.plain_markdown import plain
@@ -21,7 +21,7 @@ class TimeControls:
         self._controller = controller
         with gui.add_folder("Time"):
             self._message = gui.add_markdown("")
-            self._text = self._time_text = ""
+            self._time_text = ""
             self.play = gui.add_button("Play")
             self.frames = gui.add_button_group("Frames", _FRAME_ACTIONS)
             self.speed = gui.add_slider(
@@ -35,9 +35,7 @@ class TimeControls:
 
     def show(self, snapshot: Snapshot) -> None:
         """Display time, speed and state."""
-        label = "Play" if snapshot.paused else "Pause"
-        if self.play.label != label:
-            self.play.label = label
+        self.play.label = "Play" if snapshot.paused else "Pause"
         self._time_text = time_text(snapshot)
         self._show_message(self._time_text)
 
@@ -49,13 +47,11 @@ class TimeControls:
     def show_error(self, error: str) -> None:
         """Display that the simulation has ended."""
         self._show_message(f"**The simulation has ended:** {plain(error)}")
-        for handle in (self.play, self.speed):
-            if not handle.disabled:
-                handle.disabled = True
+        self.play.disabled = self.speed.disabled = True
 
     def _show_message(self, text: str) -> None:
-        if text != self._text:
-            self._message.content = self._text = text
+        if text != self._message.content:
+            self._message.content = text
 
     def _change_frame(self, event: Any) -> None:
         self._controller.send(event.client, Step if one_of(self.frames.value, _FRAME_ACTIONS) == "step" else Reset)

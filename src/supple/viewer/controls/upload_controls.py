@@ -9,7 +9,7 @@ from typing import Any
 from supple.errors import SuppleError
 from supple.viewer.controls.controller import Controller, notify
 from supple.viewer.protocol import limits
-from supple.viewer.protocol.messages import AddMesh
+from supple.viewer.protocol.commands import AddMesh
 from supple.viewer.server.uploads.meshing import Upload, mesh_of_upload
 from supple.viewer.server.uploads.transfers import Transfers
 
@@ -52,8 +52,8 @@ class UploadControls:
     def _work(self, client: Any, upload: Upload, youngs: float) -> None:
         """Runs in its own thread, while page and simulation go on."""
         try:
-            made = mesh_of_upload(upload, lambda seconds: self._show_message(_progress(seconds)), self._stop)
-            self._controller.send(client, lambda: AddMesh(made.vertices, made.tets, youngs, body_name(upload.name)))
+            vertices, tets = mesh_of_upload(upload, lambda seconds: self._show_message(_progress(seconds)), self._stop)
+            self._controller.send(client, lambda: AddMesh(vertices, tets, youngs, body_name(upload.name)))
         except SuppleError as error:
             self._refuse(client, str(error))
         except OSError as error:

@@ -10,7 +10,6 @@ from typing import Any
 from supple.viewer.drawing.camera import PRESETS, look_from
 from supple.viewer.drawing.coloring.color_scale import bar_html
 from supple.viewer.drawing.coloring.fields import FIELDS
-from supple.viewer.drawing.layers.contacts import contacts_text
 from supple.viewer.drawing.options import COLOR_BY_BODY, SURFACES, ViewOptions
 from supple.viewer.drawing.stage import Stage
 from supple.viewer.server.browser_values import number, one_of
@@ -39,16 +38,13 @@ class ViewControls:
             self.cut_axis = gui.add_dropdown("Cut across", _AXES, initial_value=options.cut_axis, visible=False)
             self.cut_place = gui.add_slider("Cut at", 0.0, 1.0, 0.01, initial_value=options.cut_place, visible=False)
             self._bar = gui.add_html("", visible=False)
-            self._last_bar = ""
             self.velocities = gui.add_checkbox("Velocities", initial_value=options.velocities)
             self.contacts = gui.add_checkbox("Contacts", initial_value=options.contacts)
             self.stitches = gui.add_checkbox("Stitches", initial_value=options.stitches)
             self._message = gui.add_markdown("", visible=False)
-            self._last_message = ""
             self.camera = gui.add_button_group("Camera", PRESETS)
-        for handle in (self.surface, self.color_by, self.explode, self.cut_axis, self.cut_place):
-            handle.on_update(lambda _: self.apply())
-        for handle in (self.velocities, self.contacts, self.stitches):
+        shape = self.surface, self.color_by, self.explode, self.cut_axis, self.cut_place
+        for handle in (*shape, self.velocities, self.contacts, self.stitches):
             handle.on_update(lambda _: self.apply())
         self.camera.on_click(self._look)
 
@@ -78,13 +74,10 @@ class ViewControls:
         stage = self._stage
         field, limits = stage.field, stage.color_range
         bar = "" if field is None or limits is None else bar_html(field, *limits)
-        if bar != self._last_bar:
-            self._bar.content, self._bar.visible = bar, bool(bar)
-            self._last_bar = bar
-        message = contacts_text(stage.moment) if stage.options.contacts else ""
-        if message != self._last_message:
-            self._message.content, self._message.visible = message, bool(message)
-            self._last_message = message
+        self._bar.content, self._bar.visible = bar, bool(bar)
+        found = stage.moment.contact_points
+        self._message.content = f"Contacts: {'not known' if found is None else len(found)}."
+        self._message.visible = stage.options.contacts
 
     def _look(self, event: Any) -> None:
         if event.client is not None:

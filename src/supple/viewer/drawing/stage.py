@@ -6,12 +6,14 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from supple.viewer.drawing.camera import set_initial_camera
 from supple.viewer.drawing.coloring.fields import FIELDS, Field
-from supple.viewer.drawing.layers.contacts import ContactView
+from supple.viewer.drawing.layers.dots import Dots
 from supple.viewer.drawing.layers.ground import Ground
 from supple.viewer.drawing.layers.obstacles import ObstacleView
-from supple.viewer.drawing.layers.pins import PinView
 from supple.viewer.drawing.layers.primitives.layer import Layer
 from supple.viewer.drawing.layers.skin import SkinView
 from supple.viewer.drawing.layers.springs import PusherView, SpringView
@@ -20,6 +22,8 @@ from supple.viewer.drawing.layers.tets import Cut, TetView
 from supple.viewer.drawing.layers.velocities import VelocityView
 from supple.viewer.drawing.moments.model import Model, Moment
 from supple.viewer.drawing.options import COLOR_BY_BODY, ViewOptions
+
+_PIN_COLOR, _CONTACT_COLOR = (20, 20, 24), (220, 40, 110)
 
 # Called with new meshes of bodies, for example to add mouse handlers.
 Prepare = Callable[[list[Any]], None]
@@ -41,7 +45,6 @@ class Stage:
         self._lock = threading.RLock()
         self.options, self.moment = options, moment
         self._layers: list[Layer] = []
-        self._bodies: Layer | None = None
         set_initial_camera(server, moment.model.view)
         self._build()
 
@@ -63,7 +66,7 @@ class Stage:
     @property
     def body_handles(self) -> list[Any]:
         """The meshes of the drawn bodies."""
-        return self._bodies.handles if self._bodies is not None else []
+        return self._bodies.nodes
 
     def show(self, moment: Moment) -> None:
         """Draw a moment; one of another model creates all layers again."""
@@ -88,16 +91,16 @@ class Stage:
             layer.remove()
         scene, moment, options = self._scene, self.moment, self.options
         self._bodies = self._make_bodies()
-        self._layers = [self._bodies, Ground(scene, moment), ObstacleView(scene, moment), PinView(scene, moment)]
-        self._layers += [SpringView(scene, moment), PusherView(scene, moment)]
+        self._layers = [self._bodies, Ground(scene, moment), ObstacleView(scene, moment), SpringView(scene, moment)]
+        self._layers += [PusherView(scene, moment), Dots(scene, moment, "/pins", _PIN_COLOR, 0.04, _pins)]
         if options.velocities:
             self._layers.append(VelocityView(scene, moment))
         if options.contacts:
-            self._layers.append(ContactView(scene, moment))
+            self._layers.append(Dots(scene, moment, "/contacts/points", _CONTACT_COLOR, 0.02, _contacts))
         if options.stitches:
             self._layers.append(StitchView(scene, moment))
         if self._prepare is not None:
-            self._prepare(self._bodies.handles)
+            self._prepare(self._bodies.nodes)
 
     def _make_bodies(self) -> Layer:
         options, field = self.options, self.field
@@ -108,3 +111,11 @@ class Stage:
         explode = options.explode if options.surface == "exploded tets" else 0.0
         cut = Cut("xyz".index(options.cut_axis), options.cut_place) if options.surface == "cut" else None
         return TetView(self._scene, self.moment, field, explode, cut)
+
+
+def _pins(moment: Moment) -> NDArray[np.float64]:
+    return moment.finite_positions[moment.pinned]
+
+
+def _contacts(moment: Moment) -> NDArray[np.float64]:
+    return np.zeros((0, 3)) if moment.contact_points is None else moment.contact_points

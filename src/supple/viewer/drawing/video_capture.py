@@ -109,9 +109,8 @@ class VideoCapture:
             raise OutputError(f"{kind.upper()} {missing}")
         if not self._frames:
             raise self._error or OutputError("there is no picture yet; record for longer")
-        count = len(self._frames)
-        lasted = self._times[-1] - self._times[0] if count > 1 else 0.1
-        rate = max(1.0, (count - 1) / lasted) if count > 1 else 10.0
+        lasted = self._times[-1] - self._times[0]
+        rate = max(1.0, (len(self._times) - 1) / lasted) if lasted > 0.0 else 10.0
         frames = (_unpacked(frame) for frame in self._frames)
         return gif_of(frames, rate) if kind == "gif" else mp4_of(frames, rate)
 

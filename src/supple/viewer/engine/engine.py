@@ -32,6 +32,10 @@ class Engine:
     source : what to simulate.
     start_timeout : longest time to wait for the first snapshot [s]; on a new machine, kernels are compiled before it.
 
+    Attributes
+    ----------
+    error : why the simulation ended, where it was not closed; otherwise None
+
     Raises
     ------
     SceneError, SolverError : where the source cannot be simulated.
@@ -43,7 +47,7 @@ class Engine:
         self._description: SceneDescription | None = None
         self._raw: tuple[SceneDescription, memoryview] | None = None
         self._latest: Snapshot | None = None
-        self._error: str | None = None
+        self.error: str | None = None
         self._closing = False
         self._number = 0
         self._number_lock = threading.Lock()
@@ -71,9 +75,9 @@ class Engine:
         threading.Thread(target=self._read, name="snapshots", daemon=True).start()
         threading.Thread(target=self._write, name="commands", daemon=True).start()
         with self._arrived:
-            self._arrived.wait_for(lambda: self._raw is not None or self._error is not None, start_timeout)
+            self._arrived.wait_for(lambda: self._raw is not None or self.error is not None, start_timeout)
         if self._raw is None:
-            reason = self._error or f"the simulation did not start within {start_timeout:g} s"
+            reason = self.error or f"the simulation did not start within {start_timeout:g} s"
             self.close()
             raise SolverError(reason)
 
@@ -87,7 +91,7 @@ class Engine:
         """
         if not isinstance(command, Command):
             raise CommandError(
-                f"a {type(command).__name__} is not a command; give one of supple.viewer.protocol.messages"
+                f"a {type(command).__name__} is not a command; give one of supple.viewer.protocol.commands"
             )
         if not self.alive:
             return 0
@@ -134,12 +138,7 @@ class Engine:
     @property
     def alive(self) -> bool:
         """Whether the process of the simulation runs."""
-        return not self._closing and self._error is None and self._process.is_alive()
-
-    @property
-    def error(self) -> str | None:
-        """Why the simulation ended, where it was not closed."""
-        return self._error
+        return not self._closing and self.error is None and self._process.is_alive()
 
     def close(self) -> None:
         """End the process of the simulation."""
@@ -171,7 +170,7 @@ class Engine:
             kind, content = data[:1], memoryview(data)[1:]
             with self._arrived:
                 if kind == ERROR:
-                    self._error = pickle.loads(content)
+                    self.error = pickle.loads(content)
                 elif kind == DESCRIPTION:
                     self._description = pickle.loads(content)
                 elif self._description is not None:
@@ -180,8 +179,8 @@ class Engine:
                 self._arrived.notify_all()
         self._process.join(GRACE)
         with self._arrived:
-            if not self._closing and self._error is None:
-                self._error = f"the simulation ended unexpectedly (exit code {self._process.exitcode})"
+            if not self._closing and self.error is None:
+                self.error = f"the simulation ended unexpectedly (exit code {self._process.exitcode})"
             self._arrived.notify_all()
 
     def _write(self) -> None:

@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from supple.contact.obstacle_poses import ObstaclePoses
 from supple.errors import SuppleError
 from supple.state import State
 from supple.viewer.engine.measurement.contact_points import contact_points
-from supple.viewer.engine.measurement.describe import describe, measures, obstacle_poses
+from supple.viewer.engine.measurement.describe import describe, measures
 from supple.viewer.engine.measurement.tet_values import tet_values
 from supple.viewer.engine.pacing import Pacing
 from supple.viewer.engine.scene.changes import change
@@ -29,6 +30,9 @@ from supple.viewer.protocol.snapshots import Notice, Snapshot
 logger = logging.getLogger(__name__)
 
 HEARTBEAT = 0.5  # longest time between two snapshots [s]
+# Shortest time between two snapshots [s]: slightly less than that between two frames, because jitter of the clock would
+# skip every second frame otherwise.
+SHORTEST = 0.9 / limits.FRAMES_PER_SECOND
 NOTICES_KEPT = 8
 
 
@@ -75,7 +79,7 @@ class SimulationLoop:
             self.step()
         now = time.perf_counter()
         since = now - self._published
-        if (self._fresh and since >= self._shortest()) or self._interpolates(now) or since >= HEARTBEAT:
+        if (self._fresh and since >= SHORTEST) or self._interpolates(now) or since >= HEARTBEAT:
             self.publish(now)
 
     def execute(self, command: commands.Command) -> None:
@@ -181,7 +185,9 @@ class SimulationLoop:
         live = self.live
         state = self._displayed_state(now)
         system, setup = live.system, live.setup
-        grabs = [spring.state(state.positions[_rows(live, spring.command.body)]) for spring in setup.grabs.values()]
+        grabs = [
+            spring.state(state.positions[live.part(spring.command.body).vertices]) for spring in setup.grabs.values()
+        ]
         pusher = setup.pusher
         contacts = self._requested("contacts", lambda: contact_points(system, state.positions, state.time))
         quantity = self.view.tet_values or ""
@@ -191,7 +197,7 @@ class SimulationLoop:
             frame=live.frame,
             time=state.time,
             positions=state.positions,
-            obstacle_poses=obstacle_poses(system, state.time),
+            obstacle_poses=ObstaclePoses(system.obstacles).at(state.time),
             pinned=system.pinned_vertices,
             grabs=tuple(grabs),
             pusher=None if pusher is None else (tuple(pusher.center.tolist()), pusher.radius),
@@ -219,10 +225,6 @@ class SimulationLoop:
             self.notify("error", f"{name.replace('_', ' ')} are off: {_one_line(error)}; choose them again to retry")
             return None
 
-    def _shortest(self) -> float:
-        # Slightly less than the time between two frames: otherwise jitter of the clock would skip every second frame.
-        return 0.9 / limits.FRAMES_PER_SECOND
-
     def _interval(self) -> float:
         return self.live.setup.dt / self.speed
 
@@ -230,7 +232,7 @@ class SimulationLoop:
         return self.playing and self.steps_left == 0 and self._interval() > 1.5 / limits.FRAMES_PER_SECOND
 
     def _interpolates(self, now: float) -> bool:
-        return self._in_slow_motion() and now - self._published >= self._shortest()
+        return self._in_slow_motion() and now - self._published >= SHORTEST
 
     def _displayed_state(self, now: float) -> State:
         after, before = self.live.state, self._before
@@ -251,7 +253,7 @@ class SimulationLoop:
         if self.playing:
             ends.append(self.pacing.due)
         if self._fresh or self._in_slow_motion():
-            ends.append(self._published + self._shortest())
+            ends.append(self._published + SHORTEST)
         return max(0.0, min(ends) - now)
 
 
@@ -270,10 +272,6 @@ class _Notices(logging.Handler):
         elif text not in self.received and len(self.received) < 1000:
             self.received.add(text)
             self.loop.notify("info", text)
-
-
-def _rows(live: LiveScene, body: str) -> slice:
-    return next(part.vertices for part in live.system.bodies if part.name == body)
 
 
 def _one_line(error: BaseException) -> str:

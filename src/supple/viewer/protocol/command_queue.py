@@ -50,7 +50,7 @@ class CommandQueue:
         self._waiting: list[Numbered] = []
         self._places: dict[Hashable, int] = {}
         self._changed = threading.Condition()
-        self._closed = False
+        self.closed = False  # whether no more commands will come
 
     def put(self, number: int, command: Command) -> bool:
         """Append a command. Returns False where the queue is full: the command is dropped.
@@ -85,7 +85,7 @@ class CommandQueue:
     def take(self, timeout: float | None) -> list[Numbered]:
         """All waiting commands, oldest first. Waits for the first one up to `timeout` [s] (None: without limit)."""
         with self._changed:
-            if not self._waiting and not self._closed:
+            if not self._waiting and not self.closed:
                 self._changed.wait(timeout)
             commands, self._waiting = self._waiting, []
             self._places.clear()
@@ -99,13 +99,8 @@ class CommandQueue:
     def close(self) -> None:
         """Wake the reader; no more commands will come."""
         with self._changed:
-            self._closed = True
+            self.closed = True
             self._changed.notify_all()
-
-    @property
-    def closed(self) -> bool:
-        """Whether no more commands will come."""
-        return self._closed
 
     def _releases(self, command: Command) -> bool:
         return isinstance(command, ReleaseGrab) and command.grab in self._grabs

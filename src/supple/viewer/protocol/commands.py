@@ -6,8 +6,10 @@ sends a notice and continues.
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +17,8 @@ from numpy.typing import NDArray
 from supple.errors import CommandError, SceneError
 from supple.scene.values import check_name
 from supple.viewer.protocol import limits
-from supple.viewer.protocol.displayed import displayed
-from supple.viewer.protocol.parameters import find_parameter
+from supple.viewer.protocol.parameters import Value, find_parameter
+from supple.viewer.protocol.values import displayed, number, whole
 
 Point = tuple[float, float, float]
 
@@ -29,6 +31,12 @@ class Command:
     ------
     CommandError : where a value is of the wrong kind, not finite, or beyond its limit; see `limits.py`.
     """
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if field.name in _CHECKS and not (value is None and field.default is None):
+                _set(self, field.name, _CHECKS[field.name](value, field.name))
 
 
 @dataclass(frozen=True)
@@ -47,9 +55,6 @@ class Step(Command):
 
     count: int = 1
 
-    def __post_init__(self) -> None:
-        _set(self, "count", _whole(self.count, "count", 1, limits.MOST_STEPS))
-
 
 @dataclass(frozen=True)
 class Reset(Command):
@@ -66,7 +71,7 @@ class SetSpeed(Command):
     factor: float
 
     def __post_init__(self) -> None:
-        _set(self, "factor", _number(self.factor, "speed", limits.SLOWEST_MOTION, limits.FASTEST_MOTION))
+        _set(self, "factor", number(self.factor, "speed", limits.SLOWEST_MOTION, limits.FASTEST_MOTION))
 
 
 @dataclass(frozen=True)
@@ -91,7 +96,7 @@ class SetParameter(Command):
     """
 
     name: str
-    value: float | int | bool
+    value: Value
     body: str | None = None
 
     def __post_init__(self) -> None:
@@ -148,12 +153,9 @@ class Grab(Command):
     stiffness: float = 1.0
 
     def __post_init__(self) -> None:
-        _set(self, "grab", _grab_number(self.grab))
-        _set(self, "body", _name(self.body, "body"))
+        super().__post_init__()
         _set(self, "vertices", _vertices(self.vertices))
         _set(self, "weights", _weights(self.weights, len(self.vertices)))
-        _set(self, "target", _point(self.target, "target"))
-        _set(self, "stiffness", _number(self.stiffness, "stiffness", limits.WEAKEST_GRAB, limits.STRONGEST_GRAB))
 
 
 @dataclass(frozen=True)
@@ -163,19 +165,12 @@ class MoveGrab(Command):
     grab: int
     target: Point
 
-    def __post_init__(self) -> None:
-        _set(self, "grab", _grab_number(self.grab))
-        _set(self, "target", _point(self.target, "target"))
-
 
 @dataclass(frozen=True)
 class ReleaseGrab(Command):
     """Remove a grab."""
 
     grab: int
-
-    def __post_init__(self) -> None:
-        _set(self, "grab", _grab_number(self.grab))
 
 
 @dataclass(frozen=True)
@@ -184,10 +179,6 @@ class Pin(Command):
 
     body: str
     vertex: int
-
-    def __post_init__(self) -> None:
-        _set(self, "body", _name(self.body, "body"))
-        _set(self, "vertex", _whole(self.vertex, "vertex", 0, 2**31 - 1))
 
 
 @dataclass(frozen=True)
@@ -200,9 +191,7 @@ class Unpin(Command):
     def __post_init__(self) -> None:
         if (self.body is None) != (self.vertex is None):
             raise CommandError("unpin needs a body and a vertex, or neither")
-        if self.body is not None:
-            _set(self, "body", _name(self.body, "body"))
-            _set(self, "vertex", _whole(self.vertex, "vertex", 0, 2**31 - 1))
+        super().__post_init__()
 
 
 @dataclass(frozen=True)
@@ -211,10 +200,6 @@ class MovePusher(Command):
 
     center: Point
     radius: float
-
-    def __post_init__(self) -> None:
-        _set(self, "center", _point(self.center, "center"))
-        _set(self, "radius", _number(self.radius, "radius", limits.SMALLEST_LENGTH, limits.LARGEST_LENGTH))
 
 
 @dataclass(frozen=True)
@@ -232,7 +217,7 @@ class Squash(Command):
     factor: float = 0.5
 
     def __post_init__(self) -> None:
-        _set(self, "factor", _number(self.factor, "factor", limits.FLATTEST, limits.TALLEST))
+        _set(self, "factor", number(self.factor, "factor", limits.FLATTEST, limits.TALLEST))
 
 
 @dataclass(frozen=True)
@@ -258,18 +243,6 @@ class AddBody(Command):
     density: float = 1000.0
     name: str | None = None
 
-    def __post_init__(self) -> None:
-        if self.shape not in limits.SHAPES:
-            raise CommandError(f"there is no shape {displayed(self.shape)}; there are {', '.join(limits.SHAPES)}")
-        _set(self, "size", _number(self.size, "size", limits.SMALLEST_LENGTH, limits.LARGEST_LENGTH))
-        _set(self, "resolution", _whole(self.resolution, "resolution", limits.COARSEST, limits.FINEST))
-        if self.position is not None:
-            _set(self, "position", _point(self.position, "position"))
-        for name in ("youngs", "poisson", "density"):
-            _set(self, name, find_parameter(name).checked(getattr(self, name)))
-        if self.name is not None:
-            _set(self, "name", _name(self.name, "name"))
-
 
 @dataclass(frozen=True, eq=False)
 class AddMesh(Command):
@@ -289,8 +262,7 @@ class AddMesh(Command):
 
     def __post_init__(self) -> None:
         _mesh_arrays(self.vertices, self.tets)
-        _set(self, "youngs", find_parameter("youngs").checked(self.youngs))
-        _set(self, "name", _name(self.name, "name"))
+        super().__post_init__()
 
 
 @dataclass(frozen=True)
@@ -300,11 +272,6 @@ class CopyBody(Command):
     body: str
     position: Point | None = None
 
-    def __post_init__(self) -> None:
-        _set(self, "body", _name(self.body, "body"))
-        if self.position is not None:
-            _set(self, "position", _point(self.position, "position"))
-
 
 @dataclass(frozen=True)
 class RemoveBody(Command):
@@ -312,33 +279,14 @@ class RemoveBody(Command):
 
     body: str
 
-    def __post_init__(self) -> None:
-        _set(self, "body", _name(self.body, "body"))
-
 
 def _set(command: Command, name: str, value: object) -> None:
     object.__setattr__(command, name, value)
 
 
-def _number(value: object, what: str, low: float, high: float) -> float:
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
-        raise CommandError(f"{what} is {displayed(value)}; give a number")
-    if not low <= value <= high or not math.isfinite(value):
-        raise CommandError(f"{what} is {displayed(value)}; it must be from {low:g} to {high:g}")
-    return float(value)
-
-
-def _whole(value: object, what: str, low: int, high: int) -> int:
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
-        raise CommandError(f"{what} is {displayed(value)}; give a whole number")
-    if not low <= value <= high:
-        raise CommandError(f"{what} is {displayed(value)}; it must be from {low} to {high}")
-    return int(value)
-
-
 def _point(value: object, what: str) -> Point:
     values = _items(value, what, 3, 3)
-    x, y, z = (_number(each, what, -limits.FARTHEST, limits.FARTHEST) for each in values)
+    x, y, z = (number(each, what, -limits.FARTHEST, limits.FARTHEST) for each in values)
     return x, y, z
 
 
@@ -365,22 +313,36 @@ def _mesh_arrays(vertices: object, tets: object) -> None:
 
 
 def _vertices(value: object) -> tuple[int, ...]:
-    vertices = tuple(_whole(each, "vertices", 0, 2**31 - 1) for each in _items(value, "vertices", 1, 4))
+    vertices = tuple(whole(each, "vertices", 0, 2**31 - 1) for each in _items(value, "vertices", 1, 4))
     if len(set(vertices)) != len(vertices):
         raise CommandError(f"vertices {list(vertices)} contains a vertex twice; give each once")
     return vertices
 
 
 def _weights(value: object, count: int) -> tuple[float, ...]:
-    weights = [_number(each, "weights", -1e3, 1e3) for each in _items(value, "weights", count, count)]
+    weights = [number(each, "weights", -1e3, 1e3) for each in _items(value, "weights", count, count)]
     total = sum(weights)
     if total < 1e-3:
         raise CommandError(f"weights {weights} sum to {total:g}; give barycentric coordinates")
     return tuple(each / total for each in weights)
 
 
-def _grab_number(value: object) -> int:
-    return _whole(value, "grab", 0, 2**31 - 1)
+def _index(value: object, what: str) -> int:
+    return whole(value, what, 0, 2**31 - 1)
+
+
+def _length(value: object, what: str) -> float:
+    return number(value, what, limits.SMALLEST_LENGTH, limits.LARGEST_LENGTH)
+
+
+def _shape(value: object, what: str) -> str:
+    if value not in limits.SHAPES:
+        raise CommandError(f"there is no {what} {displayed(value)}; there are {', '.join(limits.SHAPES)}")
+    return str(value)
+
+
+def _parameter(value: object, what: str) -> Value:
+    return find_parameter(what).checked(value)
 
 
 def _name(value: object, what: str) -> str:
@@ -389,3 +351,24 @@ def _name(value: object, what: str) -> str:
     except SceneError as error:
         raise CommandError(str(error)) from None
     return str(value)
+
+
+# By name of the field: equal names have equal meanings. Fields that are not here are checked by their own class.
+_CHECKS: dict[str, Callable[[Any, str], object]] = {
+    "body": _name,
+    "name": _name,
+    "grab": _index,
+    "vertex": _index,
+    "target": _point,
+    "center": _point,
+    "position": _point,
+    "radius": _length,
+    "size": _length,
+    "count": partial(whole, low=1, high=limits.MOST_STEPS),
+    "resolution": partial(whole, low=limits.COARSEST, high=limits.FINEST),
+    "stiffness": partial(number, low=limits.WEAKEST_GRAB, high=limits.STRONGEST_GRAB),
+    "shape": _shape,
+    "youngs": _parameter,
+    "poisson": _parameter,
+    "density": _parameter,
+}

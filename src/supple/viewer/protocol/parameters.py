@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from supple.errors import CommandError
-from supple.viewer.protocol.displayed import displayed
+from supple.viewer.protocol.values import displayed, number
 
 Owner = Literal["solver", "scene", "body"]
+Value = float | int | bool
 
 
 @dataclass(frozen=True)
@@ -35,26 +35,18 @@ class Parameter:
     unit: str = ""
     logarithmic: bool = False
 
-    def checked(self, value: object) -> float | int | bool:
-        """`value`, converted to `kind`.
-
-        Raises
-        ------
-        CommandError : where it is of another kind, not finite, or out of range.
-        """
+    def checked(self, value: object) -> Value:
+        """`value`, converted to `kind`; raises `CommandError` where it is of another kind or out of range."""
         if self.kind is bool:
             if not isinstance(value, (bool, np.bool_)):
                 raise CommandError(f"{self.name} is {displayed(value)}; give true or false")
             return bool(value)
-        if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
-            raise CommandError(f"{self.name} is {displayed(value)}; give a number")
-        if not self.low <= value <= self.high or not math.isfinite(value):
-            raise CommandError(f"{self.name} is {displayed(value)}; it must be from {self.low:g} to {self.high:g}")
+        checked = number(value, self.name, self.low, self.high)
         if self.kind is int:
-            if value != int(value):
+            if checked != int(checked):
                 raise CommandError(f"{self.name} is {displayed(value)}; give a whole number")
-            return int(value)
-        return float(value)
+            return int(checked)
+        return checked
 
 
 PARAMETERS: dict[str, Parameter] = {
@@ -77,12 +69,7 @@ PARAMETERS: dict[str, Parameter] = {
 
 
 def find_parameter(name: object) -> Parameter:
-    """The parameter of that name.
-
-    Raises
-    ------
-    CommandError : where there is none.
-    """
+    """The parameter of that name; raises `CommandError` where there is none."""
     if not isinstance(name, str) or name not in PARAMETERS:
         raise CommandError(f"there is no parameter {displayed(name)}; there are {', '.join(PARAMETERS)}")
     return PARAMETERS[name]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-Value = float | int | bool
+from supple.output.recording.scene import RecordedObstacle
+from supple.simulate import Diagnostics
+from supple.viewer.protocol.parameters import Value
 
 PUSHER = "pusher"  # name of the obstacle that the mouse moves
 
@@ -42,28 +43,12 @@ class BodyDescription:
 
 
 @dataclass(frozen=True, eq=False)
-class ObstacleDescription:
-    """One obstacle at time 0; `Snapshot.obstacle_poses` transforms it to other times.
-
-    Attributes
-    ----------
-    kind : the name of its class, such as "HalfSpace"
-    shape : its own parameters, and vertices and triangles where it is made of them
-    """
-
-    name: str
-    kind: str
-    shape: dict[str, Any]
-    moving: bool
-    friction: float
-
-
-@dataclass(frozen=True, eq=False)
 class SceneDescription:
     """Everything that does not change from frame to frame.
 
     Attributes
     ----------
+    obstacles : at time 0; `Snapshot.obstacle_poses` transforms them to other times
     generation : changes where bodies or obstacles are added or removed; the page then has to draw all of them again
     revision : changes with every change, also of a parameter or of the solver
     solver : "xpbd" or "implicit"; values : of the parameters of solver and scene, by name
@@ -76,7 +61,7 @@ class SceneDescription:
     generation: int
     revision: int
     bodies: tuple[BodyDescription, ...]
-    obstacles: tuple[ObstacleDescription, ...]
+    obstacles: tuple[RecordedObstacle, ...]
     solver: str
     values: dict[str, Value]
     up: NDArray[np.float64]
@@ -115,14 +100,12 @@ class Notice:
 
 
 @dataclass(frozen=True, eq=False)
-class Measures:
+class Measures(Diagnostics):
     """Numbers of one frame, for the panel.
 
     Attributes
     ----------
     status, message : of the last step, see `supple.state.Status`
-    kinetic_energy, elastic_energy, potential_energy : [J]; min_det_F : smallest J
-    linear_momentum, angular_momentum : (3,) of the scene, the latter about its center of mass
     spin : (bodies, 3) angular velocity of each body about its own center of mass [rad/s]
     contacts : number of active contacts; min_distance : smallest gap [m] or None
     iterations : of the last step
@@ -130,12 +113,6 @@ class Measures:
 
     status: str
     message: str
-    kinetic_energy: float
-    elastic_energy: float
-    potential_energy: float
-    min_det_F: float
-    linear_momentum: NDArray[np.float64]
-    angular_momentum: NDArray[np.float64]
     spin: NDArray[np.float64]
     contacts: int
     min_distance: float | None
@@ -197,17 +174,7 @@ class Snapshot:
     velocities: NDArray[np.float64] | None = None
     tet_values: NDArray[np.float64] | None = None
     tet_quantity: str | None = None
-    contact_points: NDArray[np.float64] | None = field(default=None)
-
-    @property
-    def generation(self) -> int:
-        """See `SceneDescription.generation`."""
-        return self.description.generation
-
-    @property
-    def revision(self) -> int:
-        """See `SceneDescription.revision`."""
-        return self.description.revision
+    contact_points: NDArray[np.float64] | None = None
 
     def body_positions(self, name: str) -> NDArray[np.float64]:
         """(n, 3) of one body [m]."""

@@ -226,11 +226,9 @@ def _watched(handler: Callable[[Any], Awaitable[None]], clients: set[Any]) -> Ca
 
 
 def _checked(receive: Callable[[], Awaitable[Any]]) -> Callable[[], Awaitable[bytes]]:
-    """The next message that is well-formed and of a kind that the page uses.
+    """Receives the next well-formed message of a kind that the page uses.
 
-    Raises
-    ------
-    Malformed : where a message is malformed, or messages come faster than any page sends them.
+    Raises `Malformed` where one is malformed, or messages come faster than any page sends them.
     """
     allowance = Allowance(limits.MESSAGES_PER_SECOND, limits.MESSAGES_AT_ONCE)
 

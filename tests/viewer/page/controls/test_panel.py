@@ -9,14 +9,12 @@ import pytest
 
 from supple.viewer import live_page
 from supple.viewer.drawing.moments.from_snapshot import MomentBuilder
-from supple.viewer.protocol.messages import (
+from supple.viewer.protocol.commands import (
     AddBody,
     CopyBody,
     Grab,
-    GrabState,
     MoveGrab,
     MovePusher,
-    Notice,
     Pause,
     Pin,
     Play,
@@ -30,9 +28,9 @@ from supple.viewer.protocol.messages import (
     SetView,
     Squash,
     Step,
-    Timing,
     Unpin,
 )
+from supple.viewer.protocol.snapshots import GrabState, Notice, Timing
 
 
 @pytest.fixture

@@ -11,9 +11,8 @@ from supple.errors import MeshError
 from supple.viewer.controls import upload_controls
 from supple.viewer.controls.upload_controls import body_name
 from supple.viewer.protocol import limits
-from supple.viewer.protocol.messages import AddMesh
+from supple.viewer.protocol.commands import AddMesh
 from supple.viewer.server.plain_markdown import plain
-from supple.viewer.server.uploads.meshing import TetArrays
 from supple.viewer.server.uploads.transfers import printable_name
 
 PART = limits.UPLOAD_PART
@@ -36,7 +35,7 @@ def meshed(monkeypatch):
 
     def mesh(upload, notify, stop):
         files.append(upload)
-        return TetArrays(box.vertices, box.tets)
+        return box.vertices, box.tets
 
     monkeypatch.setattr(upload_controls, "mesh_of_upload", mesh)
     return files

@@ -41,12 +41,13 @@ def test_a_snapshot_becomes_a_moment(fake):
 def test_the_pusher_does_not_create_a_new_model(fake):
     from dataclasses import replace
 
-    from supple.viewer.protocol.messages import ObstacleDescription
+    from supple.output.recording.scene import RecordedObstacle
 
     translator = MomentBuilder()
     before = translator.moment(fake.snapshot)
     old = fake.snapshot.description
-    ball = ObstacleDescription("pusher", "Sphere", {"center": np.zeros(3), "radius": 0.1, "inside": False}, True, 0.5)
+    shape = {"center": np.zeros(3), "radius": 0.1, "inside": False}
+    ball = RecordedObstacle("pusher", "Sphere", shape, np.zeros((0, 3)), np.zeros((0, 3), np.int32))
     pushed = translator.moment(
         fake.show(
             description=replace(old, generation=2, obstacles=(*old.obstacles, ball)),

@@ -82,7 +82,7 @@ def test_a_new_generation_creates_new_layers(server, fake):
 
 
 def test_springs_with_length_and_pins(server, fake):
-    from supple.viewer.protocol.messages import GrabState
+    from supple.viewer.protocol.snapshots import GrabState
 
     translator = MomentBuilder()
     stage = Stage(server, translator.moment(fake.snapshot), ViewOptions())

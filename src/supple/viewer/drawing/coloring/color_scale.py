@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from supple.viewer.drawing.coloring.fields import Field
 
 BINS = 16  # colors of a scale; each is one mesh on the page, because a mesh has one color
-_NOT_KNOWN = (150, 152, 158)
+NOT_KNOWN_COLOR = (150, 152, 158)
 # A scale grows immediately, and shrinks only where less than this share of it is used: otherwise its ends flicker.
 _SHRINK_BELOW = 0.3
 _QUANTILE = 0.98  # share of the values within the scale: otherwise one extreme tet would give all others the same color
@@ -23,11 +23,6 @@ def palette(field: Field) -> NDArray[np.uint8]:
 
     colors = colormaps["RdBu" if field.center is not None else "viridis"](np.linspace(0.0, 1.0, BINS))
     return np.round(255.0 * np.asarray(colors)[:, :3]).astype(np.uint8)
-
-
-def not_known_color() -> tuple[int, int, int]:
-    """Color of tets with an unknown value."""
-    return _NOT_KNOWN
 
 
 def bin_of(values: NDArray[np.float64], low: float, high: float) -> NDArray[np.int64]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from supple.materials.material import Elastic
 from supple.numerics.deformation import determinants
 from supple.viewer.drawing.moments.model import Moment
+from supple.viewer.engine.measurement.tet_values import von_mises
 
 
 @dataclass(frozen=True)
@@ -41,27 +42,25 @@ def volume_ratio(moment: Moment) -> NDArray[np.float64]:
     return determinants(moment.deformation_gradients)
 
 
-@np.errstate(all="ignore")
 def von_mises_stress(moment: Moment) -> NDArray[np.float64]:
-    """Von Mises stress of every tet (m,) [Pa], with sigma = P F^T / J: sqrt(3/2 s : s) with s its deviator."""
-    out = np.full(len(moment.model.tets), np.nan)
-    J = volume_ratio(moment)
-    for body in moment.model.bodies:
-        if isinstance(body.material, Elastic):
-            F = moment.deformation_gradients[body.tets]
-            sigma = body.material.first_piola(F) @ np.swapaxes(F, 1, 2) / J[body.tets, None, None]
-            deviator = sigma - np.trace(sigma, axis1=1, axis2=2)[:, None, None] / 3.0 * np.eye(3)
-            out[body.tets] = np.sqrt(1.5 * np.einsum("eij,eij->e", deviator, deviator))
-    return out
+    """Von Mises stress of every tet (m,) [Pa]."""
+    return _of_materials(moment, lambda material, F: von_mises(material.first_piola(F), F, determinants(F)))
 
 
-@np.errstate(all="ignore")
 def energy_density(moment: Moment) -> NDArray[np.float64]:
     """Elastic energy per rest volume of every tet (m,) [J/m^3]."""
+    return _of_materials(moment, lambda material, F: material.energy_density(F))
+
+
+@np.errstate(all="ignore")
+def _of_materials(
+    moment: Moment, compute: Callable[[Elastic, NDArray[np.float64]], NDArray[np.float64]]
+) -> NDArray[np.float64]:
+    """(m,) computed from the material of each body and its deformation gradients."""
     out = np.full(len(moment.model.tets), np.nan)
     for body in moment.model.bodies:
         if isinstance(body.material, Elastic):
-            out[body.tets] = body.material.energy_density(moment.deformation_gradients[body.tets])
+            out[body.tets] = compute(body.material, moment.deformation_gradients[body.tets])
     return out
 
 

@@ -25,7 +25,7 @@ class Ground(Layer):
         # Slightly above the floor, because two surfaces in the same plane flicker.
         place = view.center + (height + 2e-3 * view.radius - float(view.center @ up)) * up
         cell = 10.0 ** math.floor(math.log10(view.radius))
-        self._grid = scene.add_grid(
+        grid = scene.add_grid(
             "/ground",
             width=5.0 * view.radius,
             height=5.0 * view.radius,
@@ -38,12 +38,10 @@ class Ground(Layer):
             wxyz=turning_z_to(up),
             position=tuple(place),
         )
+        self.nodes = [grid]
 
     def update(self, moment: Moment) -> None:
         """The grid does not change."""
-
-    def remove(self) -> None:
-        self._grid.remove()
 
 
 def _corners(low: np.ndarray, high: np.ndarray) -> list[np.ndarray]:

@@ -33,6 +33,7 @@ class ObstacleView(Layer):
                 cast_shadow=picture.opacity == 1.0,
             )
             self._handles[picture.number] = handle, pose
+        self.nodes = [handle for handle, _ in self._handles.values()]
 
     def update(self, moment: Moment) -> None:
         for number, (handle, before) in self._handles.items():
@@ -40,7 +41,3 @@ class ObstacleView(Layer):
             if not np.array_equal(pose, before):
                 handle.wxyz, handle.position = quaternion(pose[:, :3]), pose[:, 3]
                 self._handles[number] = handle, pose
-
-    def remove(self) -> None:
-        for handle, _ in self._handles.values():
-            handle.remove()

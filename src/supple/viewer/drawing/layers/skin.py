@@ -30,18 +30,11 @@ class SkinView(Layer):
                 side="double",
             )
             self._parts.append((handle, body, used))
+        self.nodes = [handle for handle, _, _ in self._parts]
 
     def update(self, moment: Moment) -> None:
         for handle, body, used in self._parts:
             handle.vertices = single(_points(moment, body, used))
-
-    def remove(self) -> None:
-        for handle, _, _ in self._parts:
-            handle.remove()
-
-    @property
-    def handles(self) -> list[Any]:
-        return [handle for handle, _, _ in self._parts]
 
 
 def _points(moment: Moment, body: Any, used: Any) -> Any:

@@ -17,42 +17,35 @@ class SpringView(Layer):
 
     def __init__(self, scene: Any, moment: Moment) -> None:
         self._scene = scene
-        self._lines: Any = None
+        self._lines = scene.add_line_segments(
+            "/springs/lines",
+            np.zeros((1, 2, 3), dtype=np.float32),
+            _SPRING_COLOR,
+            thickness=5.0,
+            thickness_units="screen",
+            visible=False,
+        )
         self._labels: dict[int, Any] = {}
         self.update(moment)
 
     def update(self, moment: Moment) -> None:
         springs = moment.springs
-        self._draw_lines(moment)
+        self._lines.visible = bool(springs)
+        if springs:
+            self._lines.points = single(np.array(list(springs.values())))
         for gone in set(self._labels) - set(springs):
             self._labels.pop(gone).remove()
         for number, (point, target) in springs.items():
             text = length_text(float(np.linalg.norm(target - point)))
             middle = tuple(0.5 * (point + target))
-            label = self._labels.get(number)
-            if label is None:
+            if number in self._labels:
+                self._labels[number].position, self._labels[number].text = middle, text
+            else:
                 self._labels[number] = self._scene.add_label(f"/springs/{number}", text, position=middle)
-                continue
-            label.position = middle
-            if label.text != text:
-                label.text = text
-
-    def _draw_lines(self, moment: Moment) -> None:
-        ends = [np.stack(pair) for pair in moment.springs.values()]
-        if ends and self._lines is None:
-            self._lines = self._scene.add_line_segments(
-                "/springs/lines", single(np.stack(ends)), _SPRING_COLOR, thickness=5.0, thickness_units="screen"
-            )
-        elif ends:
-            self._lines.points = single(np.stack(ends))
-        if self._lines is not None and self._lines.visible != bool(ends):
-            self._lines.visible = bool(ends)
 
     def remove(self) -> None:
-        for label in self._labels.values():
-            label.remove()
-        if self._lines is not None:
-            self._lines.remove()
+        for node in (self._lines, *self._labels.values()):
+            node.remove()
 
 
 class PusherView(Layer):
@@ -62,19 +55,13 @@ class PusherView(Layer):
         self._ball = scene.add_icosphere(
             "/pusher", radius=1.0, color=_PUSHER_COLOR, opacity=0.85, subdivisions=4, visible=False
         )
+        self.nodes = [self._ball]
         self.update(moment)
 
     def update(self, moment: Moment) -> None:
+        self._ball.visible = moment.pusher is not None
         if moment.pusher is not None:
-            center, radius = moment.pusher
-            self._ball.position = tuple(center)
-            if self._ball.radius != radius:
-                self._ball.radius = radius
-        if self._ball.visible != (moment.pusher is not None):
-            self._ball.visible = moment.pusher is not None
-
-    def remove(self) -> None:
-        self._ball.remove()
+            self._ball.position, self._ball.radius = tuple(moment.pusher[0]), moment.pusher[1]
 
 
 def length_text(meters: float) -> str:

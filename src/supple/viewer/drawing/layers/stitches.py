@@ -12,16 +12,13 @@ class StitchView(Layer):
     """A line for each stitch."""
 
     def __init__(self, scene: Any, moment: Moment) -> None:
-        self._handle = None
+        self.nodes = []
         if len(moment.stitch_segments):
-            self._handle = scene.add_line_segments(
+            handle = scene.add_line_segments(
                 "/stitches", single(moment.stitch_segments), (30, 30, 34), thickness=2.5, thickness_units="screen"
             )
+            self.nodes = [handle]
 
     def update(self, moment: Moment) -> None:
-        if self._handle is not None:
-            self._handle.points = single(moment.stitch_segments)
-
-    def remove(self) -> None:
-        if self._handle is not None:
-            self._handle.remove()
+        for handle in self.nodes:
+            handle.points = single(moment.stitch_segments)

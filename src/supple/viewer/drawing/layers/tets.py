@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.viewer.drawing.coloring.color_scale import Limits, bin_of, not_known_color, palette
+from supple.mesh.topology import TET_FACETS
+from supple.viewer.drawing.coloring.color_scale import NOT_KNOWN_COLOR, Limits, bin_of, palette
 from supple.viewer.drawing.coloring.fields import Field
 from supple.viewer.drawing.layers.primitives.layer import Layer
 from supple.viewer.drawing.layers.primitives.triangles import ColoredTriangles
-from supple.viewer.drawing.moments.model import TET_FACETS, Model, Moment
+from supple.viewer.drawing.moments.model import Model, Moment
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,8 @@ class TetView(Layer):
         self._limits = Limits(field) if field is not None else None
         self.range: tuple[float, float] | None = None
         colors = palette(field) if field is not None else np.array([body.color for body in model.bodies])
-        self._triangles = ColoredTriangles(scene, "/bodies/tets", np.vstack([colors, [not_known_color()]]))
+        self._triangles = ColoredTriangles(scene, "/bodies/tets", np.vstack([colors, [NOT_KNOWN_COLOR]]))
+        self.nodes = self._triangles.handles
         kept = kept_tets(model, cut)
         self._corners, self._owner = exploded_facets(model, kept) if explode > 0.0 else outer_facets(model, kept)
         self._body = np.empty(len(model.tets), dtype=np.int64)
@@ -64,13 +66,6 @@ class TetView(Layer):
             self.range = self._limits.follow(values)
             color = bin_of(values, *self.range)
         self._triangles.update(x, color[self._owner])
-
-    def remove(self) -> None:
-        self._triangles.remove()
-
-    @property
-    def handles(self) -> list[Any]:
-        return list(self._triangles.handles)
 
     def _offsets(self, moment: Moment) -> NDArray[np.float64]:
         """(m, 3) displacement of each tet from the center of its body [m]."""

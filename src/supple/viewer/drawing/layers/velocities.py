@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from supple.viewer.drawing.layers.primitives.arrows import Arrows
-from supple.viewer.drawing.layers.primitives.layer import Layer
+from supple.viewer.drawing.layers.primitives.layer import Layer, single
 from supple.viewer.drawing.moments.model import Moment
 
 _MOST = 400  # arrows; more cannot be distinguished
@@ -23,7 +22,17 @@ class VelocityView(Layer):
         chosen = np.linspace(0, len(model.surface_vertices) - 1, min(_MOST, len(model.surface_vertices)))
         self._rows = model.surface_vertices[np.unique(chosen.astype(np.int64))]
         self._longest = 0.5 * model.view.radius
-        self._arrows = Arrows(scene, "/velocities", (40, 60, 90), _HEAD * model.view.radius)
+        self._head = _HEAD * model.view.radius
+        self._arrows = scene.add_arrows(
+            "/velocities",
+            np.zeros((1, 2, 3)),
+            (40, 60, 90),
+            shaft_radius=0.15 * self._head,
+            head_radius=0.4 * self._head,
+            head_length=self._head,
+            visible=False,
+        )
+        self.nodes = [self._arrows]
         self.update(moment)
 
     def update(self, moment: Moment) -> None:
@@ -33,9 +42,7 @@ class VelocityView(Layer):
         way = np.nan_to_num(_SECONDS * moment.velocities[self._rows], posinf=0.0, neginf=0.0)
         length = np.linalg.norm(way, axis=1, keepdims=True)
         way *= np.minimum(1.0, self._longest / np.maximum(length, 1e-300))
-        # Arrows shorter than their head are not drawn.
-        way[np.linalg.norm(way, axis=1) < _HEAD * moment.model.view.radius] = 0.0
-        self._arrows.update(start, start + way)
-
-    def remove(self) -> None:
-        self._arrows.remove()
+        some = np.linalg.norm(way, axis=1) >= self._head  # shorter arrows than their head are not drawn
+        self._arrows.visible = bool(some.any())
+        if some.any():
+            self._arrows.points = single(np.stack([start[some], (start + way)[some]], axis=1))

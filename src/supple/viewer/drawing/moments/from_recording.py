@@ -12,19 +12,16 @@ from supple.materials.material import Material
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.output.drawing import view_of
 from supple.output.recording.reader import RecordedFrame, Recording
-from supple.viewer.drawing.moments.model import Model, ModelBody, Moment, colors_of
+from supple.viewer.drawing.moments.model import Model, ModelBody, Moment
 
 _MATERIALS = {kind.__name__: kind for kind in (*ELASTIC_MATERIALS, EdgesAndVolume)}
 
 
 def model_of_recording(recording: Recording) -> Model:
     """The constant data of a recording."""
-    colors = colors_of([body.name for body in recording.bodies])
     bodies = tuple(
-        ModelBody(
-            body.name, body.vertices, body.tets, body.triangles, body.skin, material_from_text(body.material), color
-        )
-        for body, color in zip(recording.bodies, colors, strict=True)
+        ModelBody(body.name, body.vertices, body.tets, body.triangles, body.skin, material_from_text(body.material), i)
+        for i, body in enumerate(recording.bodies)
     )
     tets = np.ascontiguousarray(recording.tets, dtype=np.int32)
     return Model(

@@ -13,8 +13,8 @@ from supple.mesh.tetmesh import TetMesh
 from supple.output.drawing import View
 from supple.output.recording.scene import RecordedObstacle
 from supple.output.recording.skinned_surface import SkinnedSurface
-from supple.viewer.drawing.moments.model import Model, ModelBody, Moment, colors_of
-from supple.viewer.protocol.snapshots import PUSHER, BodyDescription, ObstacleDescription, SceneDescription, Snapshot
+from supple.viewer.drawing.moments.model import Model, ModelBody, Moment
+from supple.viewer.protocol.snapshots import PUSHER, BodyDescription, SceneDescription, Snapshot
 
 
 class MomentBuilder:
@@ -28,8 +28,8 @@ class MomentBuilder:
 
     def moment(self, snapshot: Snapshot) -> Moment:
         """The moment of a snapshot."""
-        if self._model is None or snapshot.generation != self._generation:
-            self._generation = snapshot.generation
+        if self._model is None or snapshot.description.generation != self._generation:
+            self._generation = snapshot.description.generation
             # The pusher also changes the generation, but a new model would interrupt a drag.
             key = _model_key(snapshot.description)
             if self._model is None or key != self._key:
@@ -55,15 +55,14 @@ class MomentBuilder:
         )
 
     def _model_of(self, scene: SceneDescription) -> Model:
-        colors = colors_of([body.name for body in scene.bodies])
         bodies = tuple(
-            ModelBody(body.name, body.vertices, body.tet_rows, body.triangles, self._skin_of(body), None, color)
-            for body, color in zip(scene.bodies, colors, strict=True)
+            ModelBody(body.name, body.vertices, body.tet_rows, body.triangles, self._skin_of(body), None, i)
+            for i, body in enumerate(scene.bodies)
         )
         tets = np.concatenate([body.tets + body.vertices.start for body in scene.bodies])
         return Model(
             bodies,
-            tuple(_obstacle(obstacle) for obstacle in _scene_obstacles(scene)),
+            _scene_obstacles(scene),
             np.concatenate([body.rest_positions for body in scene.bodies]),
             np.ascontiguousarray(tets, dtype=np.int32),
             _view_of(scene),
@@ -82,7 +81,7 @@ class MomentBuilder:
         return self._skins[key]
 
 
-def _scene_obstacles(scene: SceneDescription) -> tuple[ObstacleDescription, ...]:
+def _scene_obstacles(scene: SceneDescription) -> tuple[RecordedObstacle, ...]:
     """The obstacles without the pusher, which is the last one and has its own layer."""
     some = scene.obstacles
     return some[:-1] if some and some[-1].name == PUSHER else some
@@ -99,7 +98,7 @@ def _view_of(scene: SceneDescription) -> View:
     low, high, up = np.asarray(scene.low), np.asarray(scene.high), np.asarray(scene.up)
     bodies = View(low, high, up)
     for obstacle in scene.obstacles:
-        plane = _obstacle(obstacle).obstacle.plane
+        plane = obstacle.obstacle.plane
         if plane is not None and float(plane[1] @ up) > 0.99:
             below = float((bodies.center - plane[0]) @ up)
             if 0.0 < below < 4.0 * bodies.radius:
@@ -110,10 +109,3 @@ def _view_of(scene: SceneDescription) -> View:
 
 def _fingerprint(values: NDArray[Any]) -> int:
     return zlib.crc32(np.ascontiguousarray(values).tobytes())
-
-
-def _obstacle(obstacle: ObstacleDescription) -> RecordedObstacle:
-    shape = dict(obstacle.shape)
-    vertices = np.asarray(shape.pop("vertices", np.zeros((0, 3))), dtype=np.float64)
-    triangles = np.asarray(shape.pop("triangles", np.zeros((0, 3))), dtype=np.int32)
-    return RecordedObstacle(obstacle.name, obstacle.kind, shape, vertices, triangles)

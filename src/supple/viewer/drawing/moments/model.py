@@ -13,14 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.material import Material
+from supple.mesh.topology import TET_FACETS, facet_keys
 from supple.numerics.deformation import deformation_gradients
 from supple.output.drawing import BODY_COLORS, View
 from supple.output.recording.scene import RecordedObstacle
 from supple.output.recording.skinned_surface import SkinnedSurface
 from supple.output.recording.stitches import RecordedStitches
-
-# The four facets of a tet, each counter-clockwise from outside.
-TET_FACETS = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,16 +32,21 @@ class ModelBody:
     triangles : (t, 3) its boundary, numbered in the body, counter-clockwise from outside
     skin : a finer surface that follows its tets, or None
     material : or None where it is not known
-    color : (r, g, b) from 0 to 255
+    number : place among the bodies, which selects the color
     """
 
     name: str
     vertices: slice
     tets: slice
     triangles: NDArray[np.int32]
-    skin: SkinnedSurface | None = None
-    material: Material | None = None
-    color: tuple[int, int, int] = BODY_COLORS[0]
+    skin: SkinnedSurface | None
+    material: Material | None
+    number: int
+
+    @property
+    def color(self) -> tuple[int, int, int]:
+        """(r, g, b) from 0 to 255."""
+        return BODY_COLORS[self.number % len(BODY_COLORS)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,11 +113,9 @@ def facets_of(tets: NDArray[np.int32]) -> Facets:
     """All facets, each one once."""
     triangles = tets[:, TET_FACETS].reshape(-1, 3)
     owner = np.repeat(np.arange(len(tets)), 4)
-    key = np.sort(triangles, axis=1)
-    order = np.lexsort((key[:, 2], key[:, 1], key[:, 0]))
-    key = key[order]
-    second = np.zeros(len(key), dtype=bool)
-    second[1:] = (key[1:] == key[:-1]).all(axis=1)
+    key = facet_keys(triangles, int(tets.max()) + 1)
+    order = np.argsort(key, kind="stable")
+    second = np.diff(key[order], prepend=-1) == 0
     first = np.flatnonzero(~second)
     outer = np.full(len(key), -1)
     outer[np.flatnonzero(second) - 1] = owner[order[second]]
@@ -130,7 +131,7 @@ class Moment:
     model : its constant data; time : [s]
     positions : (n, 3) [m]; velocities : (n, 3) [m/s], or None where they are not known
     poses : (obstacles, 3, 4) rotation and translation of each obstacle since time 0
-    contact_points, contact_normals : (c, 3) [m], or None where they are not known
+    contact_points : (c, 3) [m], or None where they are not known
     pinned : (p,) vertices that are pinned
     springs : point of a body and target (3,) [m], by number of the grab
     pusher : center (3,) and radius of a ball [m], or None
@@ -143,7 +144,6 @@ class Moment:
     velocities: NDArray[np.float64] | None
     poses: NDArray[np.float64]
     contact_points: NDArray[np.float64] | None = None
-    contact_normals: NDArray[np.float64] | None = None
     pinned: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     springs: Mapping[int, tuple[NDArray[np.float64], NDArray[np.float64]]] = field(default_factory=dict)
     pusher: tuple[NDArray[np.float64], float] | None = None
@@ -169,8 +169,3 @@ class Moment:
     def finite_positions(self) -> NDArray[np.float64]:
         """(n, 3) [m], with zeros instead of values that are not finite, which a browser cannot read."""
         return np.nan_to_num(self.positions, posinf=0.0, neginf=0.0)
-
-
-def colors_of(names: Sequence[str]) -> list[tuple[int, int, int]]:
-    """A color for each body."""
-    return [BODY_COLORS[i % len(BODY_COLORS)] for i in range(len(names))]

@@ -8,14 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.output.recording.scene import RecordedObstacle
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.simulate import measure
 from supple.state import State
 from supple.system import BodyRange, System
 from supple.viewer.engine.scene.live_scene import LiveScene
 from supple.viewer.engine.scene.solvers import kind_of, solver_values
-from supple.viewer.protocol.parameters import PARAMETERS
-from supple.viewer.protocol.snapshots import BodyDescription, Measures, ObstacleDescription, SceneDescription, Value
+from supple.viewer.protocol.parameters import PARAMETERS, Value
+from supple.viewer.protocol.snapshots import BodyDescription, Measures, SceneDescription
 from supple.xpbd.details import XPBDDetails
 
 
@@ -69,37 +70,21 @@ def _material_values(material: Any) -> dict[str, Value]:
     return values
 
 
-def _obstacle(obstacle: Obstacle) -> ObstacleDescription:
-    shape, mesh = obstacle.values(), obstacle.surface_mesh
-    if mesh is not None:
-        shape |= {"vertices": mesh.vertices, "triangles": mesh.triangles.astype(np.int32)}
-    name = obstacle.name or obstacle.label
-    return ObstacleDescription(name, type(obstacle).__name__, shape, obstacle.motion is not None, obstacle.friction)
-
-
-def obstacle_poses(system: System, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Rotations (k, 3, 3) and translations (k, 3) [m] of the obstacles at `time`."""
-    R = np.tile(np.eye(3), (len(system.obstacles), 1, 1))
-    t = np.zeros((len(system.obstacles), 3))
-    for k, obstacle in enumerate(system.obstacles):
-        if obstacle.motion is not None:
-            R[k], t[k] = obstacle.pose(time)
-    return R, t
+def _obstacle(obstacle: Obstacle) -> RecordedObstacle:
+    mesh, name = obstacle.surface_mesh, obstacle.name or obstacle.label
+    vertices = np.zeros((0, 3)) if mesh is None else mesh.vertices
+    triangles = np.zeros((0, 3), dtype=np.int32) if mesh is None else mesh.triangles.astype(np.int32)
+    parameters = {"friction": obstacle.friction, **obstacle.values()}
+    return RecordedObstacle(name, type(obstacle).__name__, parameters, vertices, triangles)
 
 
 def measures(live: LiveScene) -> Measures:
     """The numbers of the present state, and of the last step."""
     report, details = live.report, live.report.details
-    found = measure(live.system, live.state)
     return Measures(
+        **vars(measure(live.system, live.state)),
         status=str(report.status),
         message=report.message,
-        kinetic_energy=found.kinetic_energy,
-        elastic_energy=found.elastic_energy,
-        potential_energy=found.potential_energy,
-        min_det_F=found.min_det_F,
-        linear_momentum=found.linear_momentum,
-        angular_momentum=found.angular_momentum,
         spin=np.array([spin(live.system, part, live.state) for part in live.system.bodies]),
         contacts=details.contacts,
         min_distance=details.smallest_gap if isinstance(details, XPBDDetails) else report.min_distance,

@@ -22,13 +22,12 @@ from supple.state import State
 from supple.system import BodyRange, initial_state
 from supple.viewer.engine.scene.grab_spring import make_spring
 from supple.viewer.engine.scene.live_scene import LiveScene
-from supple.viewer.engine.scene.new_bodies import body_of_mesh, check_size, new_body, place_for, unused_name
+from supple.viewer.engine.scene.new_bodies import check_size, new_body, place_for, unused_name
 from supple.viewer.engine.scene.obstacle_distance import moved_out
 from supple.viewer.engine.scene.pusher import Pusher
 from supple.viewer.engine.scene.solvers import SOLVERS, kind_of, with_value
 from supple.viewer.protocol import commands, limits
-from supple.viewer.protocol.parameters import find_parameter
-from supple.viewer.protocol.snapshots import Value
+from supple.viewer.protocol.parameters import Value, find_parameter
 
 # Distance between vertices and obstacles at a change to the implicit solver, as a share of the mean edge length.
 CLEARANCE = 1e-3
@@ -93,7 +92,7 @@ def _(command: commands.SetParameter, live: LiveScene) -> None:
 def _with_body_value(live: LiveScene, command: commands.SetParameter) -> Scene:
     scene = live.setup.scene
     if command.body is not None:
-        _part(live, command.body)
+        live.part(command.body)
     bodies = [
         _with_value(body, command.name, command.value) if command.body in (None, body.name) else None
         for body in scene.bodies
@@ -129,7 +128,7 @@ def _material_with_value(material: Material, name: str, value: float) -> Materia
 
 @change.register
 def _(command: commands.Grab, live: LiveScene) -> None:
-    part = _part(live, command.body)
+    part = live.part(command.body)
     others = {number: spring for number, spring in live.setup.grabs.items() if number != command.grab}
     if len(others) >= limits.MOST_GRABS:
         raise CommandError(f"there are {len(others)} grabs already; release one first")
@@ -153,7 +152,7 @@ def _(command: commands.ReleaseGrab, live: LiveScene) -> None:
 
 @change.register
 def _(command: commands.Pin, live: LiveScene) -> None:
-    part = _part(live, command.body)
+    part = live.part(command.body)
     if command.vertex >= len(part.body.mesh.vertices):
         raise CommandError(f"body {part.name!r} has no vertex {command.vertex}")
     if part.vertices.start + command.vertex in live.system.pinned_vertices:
@@ -172,7 +171,7 @@ def _(command: commands.Unpin, live: LiveScene) -> None:
         if setup.page_pins:
             live.adopt(replace(setup, page_pins={}))
         return
-    part = _part(live, command.body)
+    part = live.part(command.body)
     if (command.body, command.vertex) in setup.page_pins:
         left = {key: pin for key, pin in setup.page_pins.items() if key != (command.body, command.vertex)}
         live.adopt(replace(setup, page_pins=left))
@@ -241,19 +240,15 @@ def flattened(points: NDArray[np.float64], up: NDArray[np.float64], factor: floa
     return middle + (flat - middle) / np.sqrt(factor) + (low + factor * (heights - low))[:, None] * up
 
 
-@change.register
-def _(command: commands.AddBody, live: LiveScene) -> None:
+@change.register(commands.AddBody)
+@change.register(commands.AddMesh)
+def _(command: commands.AddBody | commands.AddMesh, live: LiveScene) -> None:
     _add(live, new_body(command, live.setup.scene, live.state.positions, live.up))
 
 
 @change.register
-def _(command: commands.AddMesh, live: LiveScene) -> None:
-    _add(live, body_of_mesh(command, live.setup.scene, live.state.positions, live.up))
-
-
-@change.register
 def _(command: commands.CopyBody, live: LiveScene) -> None:
-    body = _part(live, command.body).body
+    body = live.part(command.body).body
     place = place_for(body.mesh, command.position, live.state.positions, live.up)
     _add(
         live,
@@ -283,7 +278,7 @@ def _add(live: LiveScene, body: Body) -> None:
 
 @change.register
 def _(command: commands.RemoveBody, live: LiveScene) -> None:
-    part, setup = _part(live, command.body), live.setup
+    part, setup = live.part(command.body), live.setup
     if len(setup.scene.bodies) == 1:
         raise CommandError(f"body {part.name!r} is the only one; add another body first")
     keep = np.ones(len(live.state.positions), dtype=bool)
@@ -322,10 +317,3 @@ def _pairs_among(things: Sequence[str | None], pairs: Sequence[ContactPair]) -> 
 
     sides = [(pair, known(pair.first), known(pair.second)) for pair in pairs]
     return [replace(pair, first=first, second=second) for pair, first, second in sides if first and second]
-
-
-def _part(live: LiveScene, name: str) -> BodyRange:
-    for part in live.system.bodies:
-        if part.name == name:
-            return part
-    raise CommandError(f"there is no body {name!r}; there are {', '.join(repr(p.name) for p in live.system.bodies)}")

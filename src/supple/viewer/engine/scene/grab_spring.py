@@ -51,12 +51,9 @@ class GrabSpring:
             self.command.body,
             self.patch,
             self.stiffness / len(self.patch),
-            self._motion,
+            lambda time: self._displacements,
             name=f"grab {self.command.grab}",
         )
-
-    def _motion(self, time: float) -> NDArray[np.float64]:
-        return self._displacements
 
     def point(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
         """(3,) the point to which the spring is attached, from the vertices (n, 3) of the body [m]."""

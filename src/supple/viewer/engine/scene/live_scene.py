@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.errors import SolverError
+from supple.errors import CommandError, SolverError
 from supple.scene.forces import SoftTarget
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.simulate import first_frame
 from supple.state import State, Status, StepReport
-from supple.system import Solver, System, initial_state
+from supple.system import BodyRange, Solver, System, initial_state
 from supple.viewer.engine.scene.grab_spring import GrabSpring
 from supple.viewer.engine.scene.new_bodies import moved_apart
 from supple.viewer.engine.scene.pusher import Pusher
@@ -168,7 +168,8 @@ class LiveScene:
 
     def _stepped(self) -> tuple[State, StepReport]:
         state, report = self.setup.solver.step(self.system, self.state, self.setup.dt, self.workspace)
-        if report.status.can_go_on and not _is_finite(state):
+        finite = np.isfinite(state.positions).all() and np.isfinite(state.velocities).all()
+        if report.status.can_go_on and not finite:
             report = StepReport(Status.NOT_FINITE, report.iterations, "a position or velocity is not finite")
         return state, report
 
@@ -189,10 +190,17 @@ class LiveScene:
         self.frame = 0
         self.report = StepReport(Status.CONVERGED, 0)
 
+    def part(self, name: str) -> BodyRange:
+        """The rows of one body; raises `CommandError` where there is none of that name."""
+        parts = self.system.bodies
+        for part in parts:
+            if part.name == name:
+                return part
+        raise CommandError(f"there is no body {name!r}; there are {', '.join(repr(each.name) for each in parts)}")
+
     def body_positions(self, name: str) -> NDArray[np.float64]:
         """(n, 3) of one body [m]."""
-        part = next(part for part in self.system.bodies if part.name == name)
-        return self.state.positions[part.vertices]
+        return self.state.positions[self.part(name).vertices]
 
     @property
     def up(self) -> NDArray[np.float64]:
@@ -213,7 +221,3 @@ def _shapes(scene: Scene) -> list[tuple[Any, ...]]:
     """The shapes to draw, as a key for comparison."""
     bodies = [(body.name, body.mesh, body.skin) for body in scene.bodies]
     return [*bodies, *((type(obstacle), obstacle.name, obstacle.motion) for obstacle in scene.obstacles)]
-
-
-def _is_finite(state: State) -> bool:
-    return bool(np.isfinite(state.positions).all() and np.isfinite(state.velocities).all())

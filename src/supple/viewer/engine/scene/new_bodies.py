@@ -41,27 +41,22 @@ def make_mesh(shape: str, size: float, resolution: int) -> TetMesh:
     raise CommandError(f"there is no shape {shape!r}")
 
 
-def new_body(command: AddBody, scene: Scene, positions: NDArray[np.float64], up: NDArray[np.float64]) -> Body:
-    """The body that a command describes, above `positions` (n, 3) [m] where the command gives no position."""
-    mesh = make_mesh(command.shape, command.size, command.resolution)
-    material = StableNeoHookean(
-        youngs=command.youngs, poisson=command.poisson, density=command.density, damping=_DAMPING
-    )
-    name = command.name if command.name is not None else unused_name(scene, command.shape.replace("_", " "))
-    return Body(name, mesh, material, position=place_for(mesh, command.position, positions, up), friction=_FRICTION)
-
-
-def body_of_mesh(command: AddMesh, scene: Scene, positions: NDArray[np.float64], up: NDArray[np.float64]) -> Body:
-    """A body with the mesh of a command, above `positions` (n, 3) [m].
+def new_body(command: AddBody | AddMesh, scene: Scene, positions: NDArray[np.float64], up: NDArray[np.float64]) -> Body:
+    """The body that a command describes, above `positions` (n, 3) [m] where the command gives no position.
 
     Raises
     ------
-    MeshError : where the mesh cannot be used.
+    MeshError : where the mesh of the command cannot be used.
     """
-    mesh = TetMesh(command.vertices, command.tets)
-    material = StableNeoHookean(youngs=command.youngs, poisson=0.45, density=1000.0, damping=_DAMPING)
-    place = place_for(mesh, None, positions, up)
-    return Body(unused_name(scene, command.name), mesh, material, position=place, friction=_FRICTION)
+    if isinstance(command, AddMesh):
+        mesh, poisson, density, position = TetMesh(command.vertices, command.tets), 0.45, 1000.0, None
+        name = unused_name(scene, command.name)
+    else:
+        mesh = make_mesh(command.shape, command.size, command.resolution)
+        poisson, density, position = command.poisson, command.density, command.position
+        name = command.name if command.name is not None else unused_name(scene, command.shape.replace("_", " "))
+    material = StableNeoHookean(youngs=command.youngs, poisson=poisson, density=density, damping=_DAMPING)
+    return Body(name, mesh, material, position=place_for(mesh, position, positions, up), friction=_FRICTION)
 
 
 def place_for(

@@ -7,8 +7,7 @@ from collections.abc import Callable
 
 from supple.errors import CommandError
 from supple.system import Solver
-from supple.viewer.protocol.parameters import PARAMETERS
-from supple.viewer.protocol.snapshots import Value
+from supple.viewer.protocol.parameters import PARAMETERS, Value
 
 
 def _xpbd() -> Solver:
@@ -43,12 +42,7 @@ def solver_values(solver: Solver) -> dict[str, Value]:
 
 
 def with_value(solver: Solver, name: str, value: Value) -> Solver:
-    """The solver with one parameter changed.
-
-    Raises
-    ------
-    CommandError : where this solver has no such parameter.
-    """
+    """The solver with one parameter changed; raises `CommandError` where it has no such parameter."""
     fields = _fields(solver)
     if name not in fields:
         raise CommandError(f"the solver {kind_of(solver)} has no parameter {name}")

@@ -42,22 +42,14 @@ class Upload:
     size: float
 
 
-@dataclass(frozen=True, eq=False)
-class TetArrays:
-    """Vertices (n, 3) [m] and tets (m, 4), rows of them."""
-
-    vertices: NDArray[np.float64]
-    tets: NDArray[np.int32]
-
-
 def mesh_of_upload(
     upload: Upload, progress: Callable[[float], None] = lambda seconds: None, stop: threading.Event | None = None
-) -> TetArrays:
-    """Read a surface and mesh it with tets.
+) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Read a surface and mesh it: vertices (n, 3) [m] and tets (m, 4), rows of them.
 
     Parameters
     ----------
-    tell : called now and then with the seconds that have gone by
+    progress : called now and then with the seconds that have gone by
     stop : ends it early where it is set
 
     Raises
@@ -85,7 +77,7 @@ def mesh_of_upload(
         if code != 0 or not (folder / MESH).exists():
             raise MeshingError(f"{upload.name}: reading it failed (exit code {code}); make it smaller or save it again")
         with np.load(folder / MESH, allow_pickle=False) as mesh:
-            return TetArrays(mesh["vertices"], mesh["tets"])
+            return mesh["vertices"], mesh["tets"]
 
 
 def _run(folder: Path, progress: Callable[[float], None], stop: threading.Event) -> int:

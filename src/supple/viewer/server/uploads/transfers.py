@@ -71,12 +71,7 @@ class Transfers:
             self._rejected(client, str(error))
 
     def _announced(self, visitor: Any, message: Any) -> _Transfer:
-        """The transfer that a message announces.
-
-        Raises
-        ------
-        CommandError : where it is not accepted.
-        """
+        """The transfer that a message announces; raises `CommandError` where it is not accepted."""
         now = time.monotonic()
         for other, transfer in list(self._running.items()):
             if other == visitor or now - transfer.last > limits.UPLOAD_TIMEOUT:

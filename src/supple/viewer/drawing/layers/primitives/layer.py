@@ -12,20 +12,23 @@ from supple.viewer.drawing.moments.model import Moment
 
 
 class Layer(ABC):
-    """A drawn part of the picture, until `remove`. The `scene` of a layer is that of viser."""
+    """A drawn part of the picture, until `remove`. The `scene` of a layer is that of viser.
+
+    Attributes
+    ----------
+    nodes : what it has added to the page
+    """
+
+    nodes: list[Any]
 
     @abstractmethod
     def update(self, moment: Moment) -> None:
         """Draw this moment."""
 
-    @abstractmethod
     def remove(self) -> None:
         """Remove it from the page."""
-
-    @property
-    def handles(self) -> list[Any]:
-        """Meshes of bodies, which can be clicked and dragged."""
-        return []
+        for node in self.nodes:
+            node.remove()
 
 
 def single(values: NDArray[np.float64]) -> NDArray[np.float32]:

@@ -45,8 +45,7 @@ class ColoredTriangles:
         for i, handle in enumerate(self.handles):
             mine = corners[order[ends[i] : ends[i + 1]]]
             if len(mine) == 0:
-                if handle.visible:
-                    handle.visible = False
+                handle.visible = False
                 continue
             # The capacity is a power of two: the browser creates new buffers only where it changes.
             room = max(_LEAST, 1 << (len(mine) - 1).bit_length())
@@ -56,13 +55,7 @@ class ColoredTriangles:
             if room != self._room[i]:
                 handle.faces = _faces(room)
                 self._room[i] = room
-            if not handle.visible:
-                handle.visible = True
-
-    def remove(self) -> None:
-        """Remove them from the page."""
-        for handle in self.handles:
-            handle.remove()
+            handle.visible = True
 
 
 def _faces(count: int) -> NDArray[np.uint32]:
