@@ -1,7 +1,5 @@
 """The errors that Supple raises. Each text names the thing, what is wrong with it, and the remedy."""
 
-from __future__ import annotations
-
 
 class SuppleError(Exception):
     """Base of every error that Supple raises for bad input or an impossible request."""

@@ -14,10 +14,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from supple.errors import SceneError
+from supple.mesh.topology import graph_components
 from supple.scene.body import Body
 from supple.scene.forces import Force, SoftTarget
 from supple.scene.motion import Motion, moved_points, points_at_origin
@@ -187,7 +186,6 @@ def build_system(scene: Scene, start: State | None = None) -> System:
     rest_positions = np.concatenate(rest)
     all_edges = np.concatenate(edges).astype(np.int32)
     lengths = np.linalg.norm(rest_positions[all_edges[:, 0]] - rest_positions[all_edges[:, 1]], axis=1)
-    graph = coo_matrix((np.ones(len(all_edges)), (all_edges[:, 0], all_edges[:, 1])), shape=(n, n))
     return System(
         scene=scene,
         bodies=tuple(ranges),
@@ -200,7 +198,7 @@ def build_system(scene: Scene, start: State | None = None) -> System:
         edges=all_edges,
         rest_lengths=lengths,
         triangles=np.ascontiguousarray(np.concatenate(triangles), dtype=np.int32),
-        components=connected_components(graph, directed=False)[1].astype(np.int32),
+        components=graph_components(n, all_edges[:, 0], all_edges[:, 1]),
         gravity=np.asarray(scene.gravity, dtype=np.float64),
         forces=tuple(ForceRange(force, _anchored(force, ranges, start)[0]) for force in scene.forces),
         soft_targets=tuple(SoftTargetRange(item, *_anchored(item, ranges, start)) for item in scene.soft_targets),

@@ -1,1 +1,0 @@
-"""The shell: one file per command. Only here are there prints, progress bars and exit codes."""

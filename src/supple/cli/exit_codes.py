@@ -1,7 +1,5 @@
 """The exit codes of the shell."""
 
-from __future__ import annotations
-
 from enum import IntEnum
 
 

@@ -1,1 +1,0 @@
-"""Contact of surfaces, for both solvers: it knows neither."""

@@ -1,1 +1,0 @@
-"""Reading and writing files: whole files or none, and groups of files."""

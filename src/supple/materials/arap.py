@@ -1,7 +1,5 @@
 """As-rigid-as-possible elasticity as a material; the energy is in `stretch_energies/arap.py`."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from supple.materials.material import Elastic

@@ -1,7 +1,5 @@
 """Fixed corotated elasticity as a material; the energy is in `stretch_energies/fixed_corotated.py`."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from supple.materials.material import Elastic

@@ -1,7 +1,5 @@
 """Neo-Hookean elasticity with a logarithm as a material; the energy is in `stretch_energies/neo_hookean.py`."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from supple.materials.material import Elastic

@@ -1,7 +1,5 @@
 """St. Venant-Kirchhoff elasticity as a material; the energy is in `stretch_energies/st_venant_kirchhoff.py`."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from supple.materials.material import Elastic

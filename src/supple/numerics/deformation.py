@@ -1,7 +1,5 @@
 """Deformation gradients of tetrahedra and their determinants."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from supple.numerics.kernel_cache import njit

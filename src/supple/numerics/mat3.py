@@ -3,8 +3,6 @@
 A vector is (x, y, z). A matrix is nine numbers, row after row: M = (m00, m01, m02, m10, m11, m12, m20, m21, m22).
 """
 
-from __future__ import annotations
-
 from supple.numerics.kernel_cache import njit
 
 
@@ -75,15 +73,9 @@ def _row(array, e, i):
 @njit(error_model="numpy")
 def store_mat(M, array, e):
     """Write M as matrix e of an (m, 3, 3) array."""
-    array[e, 0, 0] = M[0]
-    array[e, 0, 1] = M[1]
-    array[e, 0, 2] = M[2]
-    array[e, 1, 0] = M[3]
-    array[e, 1, 1] = M[4]
-    array[e, 1, 2] = M[5]
-    array[e, 2, 0] = M[6]
-    array[e, 2, 1] = M[7]
-    array[e, 2, 2] = M[8]
+    for i in range(3):
+        for j in range(3):
+            array[e, i, j] = M[3 * i + j]
 
 
 @njit(error_model="numpy")

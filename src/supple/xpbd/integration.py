@@ -5,8 +5,6 @@ Positions far from the world's origin have few digits left for the small differe
 substep of 0.2 ms turns the round-off of a position into 7e-11 m/s.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from supple.numerics.kernel_cache import njit, prange

@@ -1,1 +1,0 @@
-"""Surfaces as the contact library sees them."""

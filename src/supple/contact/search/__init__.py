@@ -1,1 +1,0 @@
-"""Which points and triangles are near each other."""

@@ -1,7 +1,5 @@
 """Which points are inside closed surfaces, and how deep, from positions alone: for overlaps without a known history."""
 
-from __future__ import annotations
-
 import math
 
 from supple.numerics.geometry.closest_point import closest_on_triangle, combine

@@ -1,7 +1,5 @@
 """How far vertices may move before the lists of what is near them must be renewed."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,1 +1,0 @@
-"""Intersections at the start, and moving bodies apart."""

@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from supple.contact.start.intersections import Intersection, intersections_of
 from supple.contact.start.surfaces import StartSurfaces, start_surfaces
 from supple.errors import SceneError
+from supple.mesh.topology import graph_components
 from supple.scene.contact_pairs import PairTable, pair_table
 from supple.scene.scene import Scene
 from supple.system import PinRange, System, build_system, initial_state
@@ -334,8 +333,7 @@ def _groups(system: System) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
         else:
             held[number[stitch.first]] = True
     ends = np.array(joins, dtype=np.int64).reshape(-1, 2)
-    graph = coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(len(number), len(number)))
-    return connected_components(graph, directed=False)[1], held
+    return graph_components(len(number), ends[:, 0], ends[:, 1]), held
 
 
 def _triangles(item: Intersection) -> str:

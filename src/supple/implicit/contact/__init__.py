@@ -1,1 +1,0 @@
-"""Incremental potential contact: barriers that keep surfaces apart, friction, and the bound on steps."""

@@ -1,1 +1,0 @@
-"""What bounds a Newton step: no tetrahedron inverts, no surfaces touch."""

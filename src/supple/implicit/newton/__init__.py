@@ -1,1 +1,0 @@
-"""Projected Newton: objective, direction, step, convergence."""

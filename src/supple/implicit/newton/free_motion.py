@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_matrix, coo_matrix
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse import bsr_matrix
 
+from supple.mesh.topology import graph_components
 from supple.system import System
 
 
@@ -53,8 +53,7 @@ class FreeMotion:
             [self.piece[np.concatenate(ends)], self.piece[np.concatenate([c.indices for c in couplings])]], axis=1
         )
         pairs = np.unique(np.where(pairs < 0, held, pairs), axis=0)
-        graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(held + 1, held + 1))
-        cluster = connected_components(graph, directed=False)[1]
+        cluster = graph_components(held + 1, pairs[:, 0], pairs[:, 1])
         number = np.where(np.arange(cluster.max() + 1) == cluster[held], -1, 0)
         number[number == 0] = np.arange(int((number == 0).sum()))
         piece = np.where(self.piece >= 0, number[cluster[self.piece]], -1).astype(np.int32)

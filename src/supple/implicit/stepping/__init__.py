@@ -1,1 +1,0 @@
-"""One step of time: integrators, substeps, pinned and scripted vertices."""

@@ -4,8 +4,6 @@ Sources: Sorkine, Alexa, "As-Rigid-As-Possible Surface Modeling" (2007); Kim, Eb
 chapter 5.
 """
 
-from __future__ import annotations
-
 from supple.materials.stretch_energies.stretches import StretchFunctions, distance_from_rotations, rotation_quotients
 from supple.numerics.kernel_cache import njit
 

@@ -3,8 +3,6 @@
 Source: Stomakhin, Howes, Schroeder, Teran, "Energetically Consistent Invertible Elasticity" (2012), section 3.3.
 """
 
-from __future__ import annotations
-
 from supple.materials.stretch_energies.stretches import (
     StretchFunctions,
     distance_from_rotations,

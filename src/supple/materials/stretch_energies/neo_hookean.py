@@ -4,8 +4,6 @@ Source: Bonet, Wood, "Nonlinear Continuum Mechanics for Finite Element Analysis"
 "Physics-Based Simulation", chapter "Strain Energy".
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

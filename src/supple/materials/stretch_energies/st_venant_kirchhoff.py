@@ -3,8 +3,6 @@
 Source: Bonet, Wood, "Nonlinear Continuum Mechanics for Finite Element Analysis", section 6.3.
 """
 
-from __future__ import annotations
-
 from supple.materials.stretch_energies.stretches import StretchFunctions, green_strain
 from supple.numerics.kernel_cache import njit
 

@@ -3,8 +3,6 @@
 Source: Smith, de Goes, Kim, "Stable Neo-Hookean Flesh Simulation" (2018), without the logarithmic barrier.
 """
 
-from __future__ import annotations
-
 from supple.materials.stretch_energies.stretches import StretchFunctions, shape_and_volume, volume_change
 from supple.numerics.kernel_cache import njit
 

@@ -1,1 +1,0 @@
-"""How the ready-made shapes are built."""

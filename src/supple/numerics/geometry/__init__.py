@@ -1,1 +1,0 @@
-"""Predicates and queries on points and triangles."""

@@ -3,8 +3,6 @@
 Source: Ericson, "Real-Time Collision Detection" (2005), section 5.1.5.
 """
 
-from __future__ import annotations
-
 from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import cross, dot, subtract
 

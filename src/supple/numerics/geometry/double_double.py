@@ -4,8 +4,6 @@ Sources: Dekker (1971); Knuth, "The Art of Computer Programming", volume 2, sect
 for Double-Double and Quad-Double Arithmetic" (2007).
 """
 
-from __future__ import annotations
-
 from supple.numerics.kernel_cache import njit
 
 

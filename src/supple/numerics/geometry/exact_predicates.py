@@ -5,8 +5,6 @@ bound of the first stage, then the whole determinant as a sum of numbers that do
 coordinates must neither overflow nor underflow.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from supple.numerics.geometry.double_double import two_product, two_sum

@@ -4,8 +4,6 @@ Plain loops in one fixed order, so that the result has the same bits on every nu
 does not promise.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from supple.numerics.kernel_cache import njit, prange

@@ -1,1 +1,0 @@
-"""Recordings: written frame by frame, read without trust."""

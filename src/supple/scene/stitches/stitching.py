@@ -11,10 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from supple.errors import SceneError
+from supple.mesh.topology import graph_components
 from supple.scene.body import Body
 from supple.scene.located import at
 from supple.scene.obstacles.obstacle import Obstacle
@@ -138,8 +137,7 @@ class Stitching:
         of_point = np.concatenate([components[: self.body_vertices], pieces + np.arange(len(self.anchors))])
         ends = of_point[self.joins()]
         count = pieces + len(self.anchors)
-        graph = coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(count, count))
-        labels = connected_components(graph, directed=False)[1]
+        labels = graph_components(count, ends[:, 0], ends[:, 1])
         return np.unique(labels[components], return_inverse=True)[1].reshape(-1).astype(np.int32)
 
 

@@ -1,1 +1,0 @@
-"""One file per kind of entry of a scene file."""

@@ -1,1 +1,0 @@
-"""What crosses the boundary between the page's process and the simulation's process."""

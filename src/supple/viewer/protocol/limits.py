@@ -1,7 +1,5 @@
 """All limits of the viewer: what a page may request from the simulation, and what a browser may send."""
 
-from __future__ import annotations
-
 # Lengths and coordinates in a command [m].
 SMALLEST_LENGTH, LARGEST_LENGTH = 1e-4, 1e3
 FARTHEST = 1e4

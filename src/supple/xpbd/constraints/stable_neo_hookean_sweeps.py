@@ -4,8 +4,6 @@ Each row of `data` is a tet: 9 shape gradients b_1, b_2, b_3 in its principal ax
 length, 3 curvatures (`constraints_stable_neo_hookean.py`; derivation: docs/xpbd.md, "The block of two").
 """
 
-from __future__ import annotations
-
 from supple.numerics.kernel_cache import njit, prange
 from supple.xpbd.sweeps.compilation import FLAGS, serial_and_parallel
 

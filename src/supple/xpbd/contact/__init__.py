@@ -1,1 +1,0 @@
-"""How XPBD answers a contact: push-out and friction."""

@@ -8,8 +8,6 @@ inverse masses, so that the impulses satisfy |f_t| <= mu f_n exactly: one coeffi
 Source: Macklin, Müller, Chentanez, Kim, "Unified Particle Physics" (2014), section 6.1, with one coefficient.
 """
 
-from __future__ import annotations
-
 import math
 
 from supple.numerics.kernel_cache import njit

@@ -8,8 +8,6 @@ and never reverses it (unconditionally inelastic).
 Source: the pre-stabilization of Macklin et al., "Unified Particle Physics" (2014), section 4.4.
 """
 
-from __future__ import annotations
-
 from supple.numerics.kernel_cache import njit
 
 

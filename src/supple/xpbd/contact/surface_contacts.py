@@ -13,8 +13,6 @@ The point and the triangle are then moved apart along the line between them, acc
 momentum is conserved exactly; angular momentum up to the rotation of the contact within one substep.
 """
 
-from __future__ import annotations
-
 import math
 
 from supple.contact.search.spatial_hash import is_excluded

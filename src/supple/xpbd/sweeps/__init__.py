@@ -1,1 +1,0 @@
-"""Numbering, coloring and compilation of Gauss-Seidel sweeps."""

@@ -1,1 +1,0 @@
-"""Exact and floating-point geometry of the checks; independent of the solvers."""

@@ -1,7 +1,5 @@
 """A tree of axis-aligned boxes around triangles: which may meet is found without looking at all."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from supple.numerics.kernel_cache import njit

@@ -7,8 +7,6 @@ Source: Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust 
 2.2 to 2.5.
 """
 
-from __future__ import annotations
-
 from supple.numerics.kernel_cache import njit
 
 _SPLITTER = 134217729.0  # 2^27 + 1

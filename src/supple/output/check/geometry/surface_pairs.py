@@ -1,7 +1,5 @@
 """All pairs of triangles that meet, and the closest pair of those that do not: over a tree of boxes."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from supple.numerics.kernel_cache import njit

@@ -1,7 +1,5 @@
 """How far apart two triangles are that do not meet: in floating point, relative error a few units of round-off."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from supple.numerics.kernel_cache import njit

@@ -7,8 +7,6 @@ meets the other. Neighbours with a common side meet elsewhere if and only if one
 A triangle without area is no surface; what is left of it here is its sides. Its tetrahedron is flat, and that is found.
 """
 
-from __future__ import annotations
-
 from supple.numerics.kernel_cache import njit
 from supple.output.check.geometry.orientation import area_sign, volume_sign
 

@@ -1,1 +1,0 @@
-"""Fields and color scales."""

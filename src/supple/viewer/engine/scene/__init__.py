@@ -1,1 +1,0 @@
-"""The scene of the live page and its changes."""

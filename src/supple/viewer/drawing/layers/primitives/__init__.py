@@ -1,1 +1,0 @@
-"""What the layers draw with."""
