@@ -120,8 +120,9 @@ class Elastic(Material):
         ------
         SceneError : where the energy is not among those that the kernels are compiled for.
         """
-        if cls.stretch_functions in STRETCH_ENERGIES:
-            return STRETCH_ENERGIES.index(cls.stretch_functions)
+        for kind, energy in enumerate(STRETCH_ENERGIES):
+            if energy is cls.stretch_functions:
+                return kind
         raise SceneError(
             f"{cls.__name__}: its energy is not registered; add it to STRETCH_ENERGIES of supple.materials.kinds"
         )
