@@ -84,8 +84,11 @@ def dense_hessian(potential, x, project=False):
     dense = np.zeros((3 * len(x), 3 * len(x)))
     for v, block in enumerate(blocks.vertices):
         dense[3 * v : 3 * v + 3, 3 * v : 3 * v + 3] += block
-    for coupling in blocks.couplings:
-        dense += coupling.toarray()
+    for part in blocks.couplings:
+        for i, j, block in zip(part.rows, part.columns, part.blocks, strict=True):
+            dense[3 * i : 3 * i + 3, 3 * j : 3 * j + 3] += block
+            if i != j:
+                dense[3 * j : 3 * j + 3, 3 * i : 3 * i + 3] += block.T
     return dense
 
 

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from scipy.sparse import bsr_matrix
 
 import supple as sp
 from supple.implicit.energies.potential import ContactPotential, HessianBlocks, Potential, Projection
@@ -14,6 +13,7 @@ from supple.implicit.newton.free_motion import FreeMotion
 from supple.implicit.newton.hessian_projection import ProjectedTerms
 from supple.implicit.newton.linear_solver import LinearSolver
 from supple.implicit.newton.objective import Objective
+from supple.numerics.sparse.couplings import Couplings
 from supple.system import build_system
 
 MESH = sp.shapes.box((1, 1, 1), (2, 2, 2))
@@ -62,10 +62,8 @@ class Touch(ContactPotential):
 
     def add_hessian(self, x, out: HessianBlocks, project: bool):
         k = max(self.stiffness, 0.0) if project else self.stiffness
-        dense = np.zeros((3 * N, 3 * N))
-        for p, q, sign in ((self.a, self.a, 1), (self.b, self.b, 1), (self.a, self.b, -1), (self.b, self.a, -1)):
-            dense[3 * p : 3 * p + 3, 3 * q : 3 * q + 3] = sign * k * np.eye(3)
-        out.couplings.append(bsr_matrix(dense, blocksize=(3, 3)))
+        ends = np.array([self.a, self.b, self.a], dtype=np.int32), np.array([self.a, self.b, self.b], dtype=np.int32)
+        out.couplings.append(Couplings(*ends, np.array([1.0, 1.0, -1.0])[:, None, None] * k * np.eye(3)))
 
 
 def blocks(smallest: float) -> np.ndarray:

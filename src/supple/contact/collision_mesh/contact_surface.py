@@ -13,6 +13,7 @@ from scipy.sparse import bsr_matrix, coo_matrix, csc_matrix, csr_matrix, identit
 from supple.contact.collision_mesh.quad_split import split_quads
 from supple.contact.collision_mesh.stitch_filter import StitchFilter
 from supple.contact.obstacle_vertices import ObstacleRange
+from supple.numerics.sparse.couplings import Couplings
 from supple.system import System
 
 if TYPE_CHECKING:
@@ -60,18 +61,17 @@ class ContactSurface:
         for ends in self.middles.T:
             np.add.at(out, self.vertices[ends], 0.5 * rows[s:])
 
-    def blocks(self, hessian: csc_matrix, n: int) -> bsr_matrix:
-        """A symmetric matrix by the mesh's points (3 (s + k), 3 (s + k)) over all n vertices, in blocks."""
+    def couplings(self, hessian: csc_matrix) -> Couplings:
+        """A symmetric matrix by the mesh's points (3 (s + k), 3 (s + k)) in the solver's vertices."""
         size = 3 * len(self.vertices)
         if len(self.middles):
             hessian = self.weights.T @ hessian @ self.weights
         # The columns of a symmetric matrix, read as its rows.
         by_rows = csr_matrix((hessian.data, hessian.indices, hessian.indptr), shape=hessian.shape)
         blocks = bsr_matrix(by_rows, blocksize=(3, 3), shape=(size, size))
-        counts = np.zeros(n, dtype=np.int32)
-        counts[self.vertices] = np.diff(blocks.indptr)
-        start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
-        return bsr_matrix((blocks.data, self.vertices[blocks.indices], start), shape=(3 * n, 3 * n))
+        rows = np.repeat(np.arange(len(self.vertices)), np.diff(blocks.indptr))
+        once = blocks.indices >= rows
+        return Couplings(self.vertices[rows[once]], self.vertices[blocks.indices[once]], blocks.data[once])
 
     @cached_property
     def weights(self) -> csc_matrix:

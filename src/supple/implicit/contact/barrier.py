@@ -63,7 +63,7 @@ class LibraryPotential(ContactPotential):
             raise SolverError(
                 "contact: surfaces touch, or their distances leave what double precision can hold; start with a gap"
             ) from None
-        out.couplings.append(self.surface.blocks(hessian / self.unit, len(x)))
+        out.couplings.append(self.surface.couplings(hessian / self.unit))
 
 
 class Barrier(LibraryPotential):

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_matrix
 
 from supple.contact.collision_mesh.contact_surface import ContactSurface
 from supple.contact.obstacle_vertices import ObstacleRange
 from supple.implicit.energies.potential import ContactPotential, HessianBlocks
+from supple.numerics.sparse.couplings import Couplings
 
 # A step keeps at least this share of every distance; the bound for triangles is conservative in the same way.
 _KEEP = 0.1
@@ -161,7 +161,7 @@ class PlaneBarrier(ContactPotential):
         rows = np.concatenate([p.vertices[near]] * 2)
         columns = np.concatenate([p.base[near], p.tip[near]])
         blocks = np.concatenate([k[:, None, None] * n[:, :, None] * by[:, None, :] for by in (by_base, by_tip)])
-        out.couplings.append(_block_matrix(rows, columns, blocks, len(x)))
+        out.couplings.append(Couplings(rows, columns, blocks))
 
     def _by_plane(
         self, x: NDArray[np.float64], near: NDArray[np.bool_], d: NDArray[np.float64], n: NDArray[np.float64]
@@ -216,8 +216,7 @@ class PlaneFriction(ContactPotential):
         blocks *= self.forces[:, None, None]
         np.add.at(out.vertices, self.vertices, blocks)
         np.add.at(out.vertices, self.base, blocks)
-        ends = np.concatenate([self.vertices, self.base]), np.concatenate([self.base, self.vertices])
-        out.couplings.append(_block_matrix(*ends, np.concatenate([-blocks, -blocks]), len(x)))
+        out.couplings.append(Couplings(self.vertices, self.base, -blocks))
 
     def _slip(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         moved = x[self.vertices] - x[self.base] - self.start
@@ -258,12 +257,3 @@ def plane_friction(
         if rows.any():
             sticking[rows] = part.obstacle.carried(sticking[rows], *times) - part.targets(times[1])[0]
     return PlaneFriction(p.vertices[near], p.base[near], forces, normals[near], sticking, reach)
-
-
-def _block_matrix(
-    rows: NDArray[np.int32], columns: NDArray[np.int32], blocks: NDArray[np.float64], n: int
-) -> bsr_matrix:
-    """(3 n, 3 n) from blocks (k, 3, 3), each (row, column) once."""
-    order = np.lexsort((columns, rows))
-    start = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=n))]).astype(np.int32)
-    return bsr_matrix((blocks[order], columns[order], start), shape=(3 * n, 3 * n))

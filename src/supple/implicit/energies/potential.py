@@ -10,7 +10,8 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_matrix
+
+from supple.numerics.sparse.couplings import Couplings
 
 
 class Projection(Enum):
@@ -30,14 +31,14 @@ class HessianBlocks:
     memory : (m + k, 12, 12) of `elements`
     vertices : (n, 3, 3) one matrix for each vertex with itself [N/m]
     tet_count : m
-    couplings : (3 n, 3 n) matrices between vertices that no element joins, in blocks of 3 x 3 [N/m]
+    couplings : matrices between vertices that no element joins [N/m]
     blank : whether nothing has been added to `elements`; the memory may then hold an earlier sum
     """
 
     memory: NDArray[np.float64]
     vertices: NDArray[np.float64]
     tet_count: int
-    couplings: list[bsr_matrix] = field(default_factory=list)
+    couplings: list[Couplings] = field(default_factory=list)
     blank: bool = False
 
     def clear(self) -> None:

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_matrix
 
-from supple.mesh.topology import graph_components
+from supple.numerics.kernel_cache import njit
+from supple.numerics.sparse.couplings import Couplings
 from supple.system import System
 
 
@@ -43,23 +43,15 @@ class FreeMotion:
         inside = piece >= 0
         return cls(piece, system.masses, np.bincount(piece[inside], weights=system.masses[inside]).astype(np.float64))
 
-    def joined(self, couplings: Sequence[bsr_matrix]) -> FreeMotion:
+    def joined(self, couplings: Sequence[Couplings]) -> FreeMotion:
         """The same with pieces in contact as one piece, without those in contact with something held."""
         if not couplings or len(self.totals) == 0:
             return self
-        held = len(self.totals)
-        ends = [np.repeat(np.arange(len(self.piece)), np.diff(c.indptr)) for c in couplings]
-        pairs = np.stack(
-            [self.piece[np.concatenate(ends)], self.piece[np.concatenate([c.indices for c in couplings])]], axis=1
-        )
-        pairs = np.unique(np.where(pairs < 0, held, pairs), axis=0)
-        cluster = graph_components(held + 1, pairs[:, 0], pairs[:, 1])
-        number = np.where(np.arange(cluster.max() + 1) == cluster[held], -1, 0)
-        number[number == 0] = np.arange(int((number == 0).sum()))
-        piece = np.where(self.piece >= 0, number[cluster[self.piece]], -1).astype(np.int32)
-        inside = piece >= 0
-        totals = np.bincount(piece[inside], weights=self.masses[inside], minlength=int((number >= 0).sum()))
-        return FreeMotion(piece, self.masses, totals.astype(np.float64))
+        parent = np.arange(len(self.totals) + 1, dtype=np.int32)
+        for part in couplings:
+            _unite(part.rows, part.columns, self.piece, parent)
+        piece, totals = _numbered(parent, self.piece, self.totals)
+        return FreeMotion(piece, self.masses, totals)
 
     def correct(self, direction: NDArray[np.float64], gradient: NDArray[np.float64], scale: float) -> None:
         """Replace, in place, the translation of every free piece in a Newton direction by the exact one.
@@ -68,11 +60,60 @@ class FreeMotion:
         ----------
         direction, gradient : (n, 3); scale : s of the inertia term [s^2]
         """
-        if len(self.totals) == 0:
-            return
-        inside = self.piece >= 0
-        piece = self.piece[inside]
-        for k in range(3):
-            wrong = np.bincount(piece, weights=self.masses[inside] * direction[inside, k], minlength=len(self.totals))
-            total = np.bincount(piece, weights=gradient[inside, k], minlength=len(self.totals))
-            direction[inside, k] -= ((wrong + scale * total) / self.totals)[piece]
+        if len(self.totals):
+            _correct(self.piece, self.masses, self.totals, gradient, scale, direction)
+
+
+@njit(error_model="numpy")
+def _root(parent, k):
+    while parent[k] != k:
+        parent[k] = parent[parent[k]]
+        k = parent[k]
+    return k
+
+
+@njit(cache=True, error_model="numpy")
+def _unite(rows, columns, piece, parent):
+    """Join the pieces of coupled vertices. The last one stands for everything that is held; the larger root wins."""
+    held = len(parent) - 1
+    for t in range(len(rows)):
+        i, j = piece[rows[t]], piece[columns[t]]
+        if i == j:
+            continue
+        a, b = _root(parent, held if i < 0 else i), _root(parent, held if j < 0 else j)
+        parent[min(a, b)] = max(a, b)
+
+
+@njit(cache=True, error_model="numpy")
+def _numbered(parent, piece, masses):
+    """The number of each vertex's joined piece, or -1, and the masses of the joined pieces."""
+    held = len(parent) - 1
+    number = np.full(held + 1, -1, dtype=np.int32)
+    count = 0
+    for k in range(held):
+        root = _root(parent, k)
+        if root != held and number[root] < 0:
+            number[root] = count
+            count += 1
+    totals = np.zeros(count)
+    for k in range(held):
+        number[k] = number[_root(parent, k)]
+        if number[k] >= 0:
+            totals[number[k]] += masses[k]
+    joined = np.empty(len(piece), dtype=np.int32)
+    for v in range(len(piece)):
+        joined[v] = number[piece[v]] if piece[v] >= 0 else -1
+    return joined, totals
+
+
+@njit(cache=True, error_model="numpy")
+def _correct(piece, masses, totals, gradient, scale, direction):
+    shift = np.zeros((len(totals), 3))
+    for v in range(len(piece)):
+        if piece[v] >= 0:
+            for k in range(3):
+                shift[piece[v], k] += masses[v] * direction[v, k] + scale * gradient[v, k]
+    for v in range(len(piece)):
+        if piece[v] >= 0:
+            for k in range(3):
+                direction[v, k] -= shift[piece[v], k] / totals[piece[v]]

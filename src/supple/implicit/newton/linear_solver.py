@@ -5,17 +5,16 @@ from __future__ import annotations
 import logging
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Any
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_matrix
 
 from supple.implicit.energies.potential import HessianBlocks
 from supple.implicit.newton.direct_solver import solve_directly
 from supple.numerics.sparse.block_csr import SERIAL_BLOCKS, BlockPattern, build_pattern
-from supple.numerics.sparse.block_sum import JointPattern, join
+from supple.numerics.sparse.block_sum import JointPattern
+from supple.numerics.sparse.couplings import Couplings
 from supple.numerics.sparse.pcg import conjugate_gradients
 from supple.numerics.sparse.preconditioner import RowOrder, TwoLevel, order_rows, two_level
 from supple.numerics.thread_tuning import ThreadTuner
@@ -69,7 +68,6 @@ class LinearSolver:
     matrix: NDArray[np.float64] = field(init=False)
     preconditioner: TwoLevel = field(init=False)
     joint: JointPattern | None = None
-    joined: tuple[NDArray[np.int32], NDArray[np.int32]] | None = None
     age: int = -1
     fresh_iterations: int = 0
     pace: ThreadTuner = field(init=False)
@@ -94,41 +92,41 @@ class LinearSolver:
         self.pace = ThreadTuner(choice, choice, _REST)
 
     def begin_step(self) -> None:
-        """Discard the coarse level of earlier steps, so that a step depends on its state alone."""
-        self.age = -1
+        """Discard what earlier steps have left, so that a step depends on its state alone."""
+        self.age, self.joint = -1, None
 
     def assemble(self, hessian: HessianBlocks) -> None:
         """Assemble the matrix of a new Hessian, and update the preconditioner."""
         began = perf_counter()
         self.parallel = self.pace.choose()
         with one_thread(not self.parallel):
-            self.pattern.assemble(hessian.elements, hessian.vertices[self.order.vertices], self.elements)
-            self._add_couplings(hessian.couplings)
+            diagonal = hessian.vertices[self.order.vertices]
+            if hessian.couplings:
+                self._assemble_joint(hessian.elements, diagonal, Couplings.joined(hessian.couplings))
+            else:
+                if self.joint is not None:
+                    self.joint, self.age = None, -1
+                self.matrix, self.preconditioner = self.elements, self.elements_only
+                self.pattern.assemble(hessian.elements, diagonal, self.elements)
             if self.kind != "direct":
                 self.preconditioner.update(self.matrix, coarse=self.age < 0)
         self.spent = perf_counter() - began
 
-    def _add_couplings(self, couplings: list[bsr_matrix]) -> None:
-        """Add couplings of vertices that no element joins; the joint pattern is rebuilt where theirs has changed."""
-        if not couplings:
-            if self.joint is not None:
-                self.joint, self.joined, self.age = None, None, -1
-            self.matrix, self.preconditioner = self.elements, self.elements_only
-            return
-        extra: Any = couplings[0]
-        for more in couplings[1:]:
-            extra = extra + more
-        same = self.joined is not None and all(
-            np.array_equal(a, b) for a, b in zip(self.joined, (extra.indptr, extra.indices), strict=True)
-        )
-        if self.joint is None or not same:
-            self.joint = join(self.pattern, extra, self.row_of)
-            self.joined = extra.indptr, extra.indices
+    def _assemble_joint(
+        self, elements: NDArray[np.float64], diagonal: NDArray[np.float64], couplings: Couplings
+    ) -> None:
+        """Assemble with couplings of vertices that no element joins, on a new pattern where one has no block yet."""
+        places = self.joint.places(couplings) if self.joint is not None else None
+        if self.joint is None or places is None:
+            self.joint = JointPattern.of(self.pattern, couplings, self.row_of)
+            places = self.joint.places(couplings)
+            assert places is not None
             before = self.preconditioner.first
-            self.preconditioner = self.elements_only.on(self.joint.rows)
+            self.preconditioner = self.elements_only.on(self.joint.pattern)
             if not np.array_equal(before, self.preconditioner.first):
                 self.age = -1
-        self.matrix = self.joint.add(self.elements, extra.data)
+            self.matrix = np.empty((self.joint.pattern.blocks, 3, 3))
+        self.joint.assemble(elements, diagonal, couplings.blocks, places, self.matrix)
 
     def solve(
         self, force: NDArray[np.float64], tolerance: float, convex: bool = True

@@ -58,7 +58,7 @@ def move_pins(
         np.add.at(pull, nodes, moved.reshape(-1, 4, 3))
         pull = pull[:-1]
         for coupling in tools.hessian.couplings:
-            pull += (coupling @ displacement.ravel()).reshape(-1, 3)
+            coupling.add_product(displacement, pull)
         with tools.clock.of("linear_solve"):
             direction, report = tools.linear_solver.solve(-(gradient + pull), _TOLERANCE)
         if direction is None or not np.isfinite(direction).all():

@@ -125,7 +125,8 @@ def incidences(elements: NDArray[np.int32], rows: int) -> tuple[NDArray[np.int32
 
 
 @njit(cache=True, error_model="numpy")
-def _assemble_row(i, row_start, columns, mirror, entry_start, entries, element_blocks, diagonal_blocks, data):
+def assemble_row(i, row_start, columns, mirror, entry_start, entries, element_blocks, diagonal_blocks, data):
+    """Write the blocks of row i from the diagonal on, and their transposes."""
     for q in range(row_start[i], row_start[i + 1]):
         j = columns[q]
         if j < i:
@@ -179,4 +180,4 @@ def _assemble_row(i, row_start, columns, mirror, entry_start, entries, element_b
 @njit(cache=True, parallel=True, error_model="numpy")
 def _assemble(row_start, columns, mirror, entry_start, entries, element_blocks, diagonal_blocks, data):
     for i in prange(len(row_start) - 1):
-        _assemble_row(i, row_start, columns, mirror, entry_start, entries, element_blocks, diagonal_blocks, data)
+        assemble_row(i, row_start, columns, mirror, entry_start, entries, element_blocks, diagonal_blocks, data)

@@ -1,7 +1,8 @@
-"""The sum of a block matrix of fixed pattern and sparse blocks that change from solve to solve.
+"""The sum of element matrices and of couplings that change from solve to solve.
 
-Contacts couple vertices that no element couples, and other ones every time. The joint pattern is made anew where the
-contacts' pattern has changed; the matrix of the elements is copied into it, the contacts' blocks are added.
+Contacts couple vertices that no element couples, and other ones every time. The joint pattern is made anew where a
+coupling has no block in it. Assembly gathers, as that of the elements alone: each block is written by one thread, its
+element entries first, then its couplings in their order. Any number of threads gives the same bits.
 """
 
 from __future__ import annotations
@@ -10,109 +11,245 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_matrix
 
-from supple.numerics.kernel_cache import njit
-from supple.numerics.sparse.block_csr import BlockRows
+from supple.numerics.kernel_cache import njit, prange
+from supple.numerics.sparse.block_csr import SERIAL_BLOCKS, BlockPattern, assemble_row
+from supple.numerics.sparse.couplings import Couplings
+from supple.numerics.threads import threads_for
+
+
+@dataclass(frozen=True, eq=False)
+class CouplingPlaces:
+    """Where couplings add up.
+
+    Attributes
+    ----------
+    rows, columns : (t,) the couplings' vertices
+    start : (b + 1,) and entries : the couplings of each upper block, coded 2 t + 1 where the transpose is added
+    """
+
+    rows: NDArray[np.int32]
+    columns: NDArray[np.int32]
+    start: NDArray[np.int32]
+    entries: NDArray[np.int32]
 
 
 @dataclass(frozen=True, eq=False)
 class JointPattern:
-    """The union of two patterns.
+    """The blocks of elements and of couplings.
 
     Attributes
     ----------
-    rows : the union
-    of_base, of_extra : where each block of the two lies in the union; -1 for an extra one without a row
+    pattern : all blocks, with the element entries of each
+    row_of : (n,) row of each vertex, negative where it has none; couplings of such a vertex are left out
     """
 
-    rows: BlockRows
-    of_base: NDArray[np.int32]
-    of_extra: NDArray[np.int32]
+    pattern: BlockPattern
+    row_of: NDArray[np.int32]
 
-    def add(self, base: NDArray[np.float64], extra: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The blocks (b, 3, 3) of base + extra."""
-        data = np.zeros((self.rows.blocks, 3, 3))
-        _add(base, self.of_base, extra, self.of_extra, data)
-        return data
+    @classmethod
+    def of(cls, elements: BlockPattern, couplings: Couplings, row_of: NDArray[np.int32]) -> JointPattern:
+        """Add blocks for couplings to the pattern of the elements."""
+        arrays = _join(
+            elements.row_start,
+            elements.columns,
+            elements.entry_start,
+            couplings.rows,
+            couplings.columns,
+            row_of,
+        )
+        return cls(BlockPattern(*arrays, elements.entries), row_of)
 
+    def places(self, couplings: Couplings) -> CouplingPlaces | None:
+        """Where couplings add up; None where one has no block in this pattern."""
+        p = self.pattern
+        start, entries = _places(p.row_start, p.columns, couplings.rows, couplings.columns, self.row_of)
+        return None if start[0] < 0 else CouplingPlaces(couplings.rows, couplings.columns, start, entries)
 
-def join(base: BlockRows, extra: bsr_matrix, row_of: NDArray[np.int32]) -> JointPattern:
-    """Unite a pattern with that of a matrix over vertices.
+    def assemble(
+        self,
+        element_blocks: NDArray[np.float64],
+        diagonal_blocks: NDArray[np.float64],
+        coupling_blocks: NDArray[np.float64],
+        places: CouplingPlaces,
+        data: NDArray[np.float64],
+    ) -> None:
+        """Sum element matrices, per-vertex blocks and couplings into `data` (b, 3, 3).
 
-    Parameters
-    ----------
-    extra : symmetric, (3 n, 3 n) in blocks of 3 x 3; row_of : (n,) row of each vertex, negative where it has none.
-    """
-    row_start, columns, diagonal, of_base, of_extra = _join(
-        base.row_start, base.columns, extra.indptr, extra.indices, row_of
-    )
-    return JointPattern(BlockRows(row_start, columns, diagonal), of_base, of_extra)
+        Parameters
+        ----------
+        element_blocks, diagonal_blocks : see `BlockPattern.assemble`
+        coupling_blocks : (t, 3, 3)
+        """
+        p = self.pattern
+        with threads_for(p.blocks, SERIAL_BLOCKS):
+            _assemble(
+                p.row_start,
+                p.columns,
+                p.mirror,
+                p.entry_start,
+                p.entries,
+                element_blocks,
+                diagonal_blocks,
+                places.start,
+                places.entries,
+                coupling_blocks,
+                data,
+            )
 
 
 @njit(cache=True, error_model="numpy")
-def _join(row_start, columns, extra_start, extra_columns, row_of):
-    rows = len(row_start) - 1
-    vertex_of = np.full(rows, -1, dtype=np.int32)
-    for v in range(len(row_of)):
-        if row_of[v] >= 0:
-            vertex_of[row_of[v]] = v
-    seen = np.full(rows, -1, dtype=np.int32)
-    start = np.zeros(rows + 1, dtype=np.int32)
-    for i in range(rows):
-        for q in range(row_start[i], row_start[i + 1]):
-            seen[columns[q]] = i
-        count = row_start[i + 1] - row_start[i]
-        v = vertex_of[i]
-        for q in range(extra_start[v], extra_start[v + 1]):
-            j = row_of[extra_columns[q]]
-            if j >= 0 and seen[j] != i:
-                seen[j] = i
-                count += 1
-        start[i + 1] = start[i] + count
-    joint = np.empty(start[rows], dtype=np.int32)
-    diagonal = np.empty(rows, dtype=np.int32)
-    of_base = np.empty(len(columns), dtype=np.int32)
-    of_extra = np.full(len(extra_columns), -1, dtype=np.int32)
-    seen[:] = -1
-    where = np.empty(rows, dtype=np.int32)
-    for i in range(rows):
-        k = start[i]
+def _partners(rows, columns, row_of, n):
+    """For every row the rows that couplings join it to: starts (n + 1,) and numbers, which may repeat."""
+    start = np.zeros(n + 1, dtype=np.int32)
+    for t in range(len(rows)):
+        i, j = row_of[rows[t]], row_of[columns[t]]
+        if i >= 0 and j >= 0 and i != j:
+            start[i + 1] += 1
+            start[j + 1] += 1
+    for i in range(n):
+        start[i + 1] += start[i]
+    partners = np.empty(start[n], dtype=np.int32)
+    put = start[:-1].copy()
+    for t in range(len(rows)):
+        i, j = row_of[rows[t]], row_of[columns[t]]
+        if i >= 0 and j >= 0 and i != j:
+            partners[put[i]] = j
+            put[i] += 1
+            partners[put[j]] = i
+            put[j] += 1
+    return start, partners
+
+
+@njit(cache=True, error_model="numpy")
+def _join(row_start, columns, entry_start, coupled_rows, coupled_columns, row_of):
+    """The union of the elements' blocks and those of couplings, with the arrays of `BlockPattern` but the entries.
+
+    The element entries of a block keep their order, and blocks of couplings alone have none, so that the list of
+    entries stays as it is.
+    """
+    n = len(row_start) - 1
+    partner_start, partners = _partners(coupled_rows, coupled_columns, row_of, n)
+    most = len(columns) + len(partners)
+    start = np.zeros(n + 1, dtype=np.int32)
+    joint = np.empty(most, dtype=np.int32)
+    diagonal = np.empty(n, dtype=np.int32)
+    entries = np.zeros(most + 1, dtype=np.int32)
+    seen = np.full(n, -1, dtype=np.int32)
+    k = 0
+    for i in range(n):
+        begin = k
         for q in range(row_start[i], row_start[i + 1]):
             seen[columns[q]] = i
             joint[k] = columns[q]
             k += 1
-        v = vertex_of[i]
-        for q in range(extra_start[v], extra_start[v + 1]):
-            j = row_of[extra_columns[q]]
-            if j >= 0 and seen[j] != i:
+        own = k
+        for q in range(partner_start[i], partner_start[i + 1]):
+            j = partners[q]
+            if seen[j] != i:
                 seen[j] = i
                 joint[k] = j
                 k += 1
-        if k - start[i] > row_start[i + 1] - row_start[i]:
-            joint[start[i] : k].sort()
-        for p in range(start[i], k):
-            where[joint[p]] = p
+        if k > own:
+            joint[begin:k].sort()
+        start[i + 1] = k
+        q = row_start[i]
+        for p in range(begin, k):
             if joint[p] == i:
                 diagonal[i] = p
-        for q in range(row_start[i], row_start[i + 1]):
-            of_base[q] = where[columns[q]]
-        for q in range(extra_start[v], extra_start[v + 1]):
-            j = row_of[extra_columns[q]]
-            if j >= 0:
-                of_extra[q] = where[j]
-    return start, joint, diagonal, of_base, of_extra
+            entries[p] = entry_start[q]
+            if q < row_start[i + 1] and joint[p] == columns[q]:
+                q += 1
+    entries[k] = entry_start[len(columns)]
+    # Row by row, the blocks right of the diagonal are met in the order in which their transposes stand in their rows.
+    mirror = np.empty(k, dtype=np.int32)
+    met = start[:-1].copy()
+    for i in range(n):
+        for p in range(diagonal[i], start[i + 1]):
+            t = met[joint[p]]
+            met[joint[p]] += 1
+            mirror[p] = t
+            mirror[t] = p
+    return start, joint[:k].copy(), diagonal, mirror, entries[: k + 1].copy()
 
 
 @njit(cache=True, error_model="numpy")
-def _add(base, of_base, extra, of_extra, data):
-    for q in range(len(of_base)):
-        for r in range(3):
-            for c in range(3):
-                data[of_base[q], r, c] = base[q, r, c]
-    for q in range(len(of_extra)):
-        p = of_extra[q]
-        if p >= 0:
+def _places(row_start, columns, coupled_rows, coupled_columns, row_of):
+    """The arrays of `CouplingPlaces`; the first start is -1 where a coupling has no block."""
+    blocks = len(columns)
+    start = np.zeros(blocks + 1, dtype=np.int32)
+    where = np.full(len(coupled_rows), -1, dtype=np.int32)
+    for t in range(len(coupled_rows)):
+        i, j = row_of[coupled_rows[t]], row_of[coupled_columns[t]]
+        if i < 0 or j < 0:
+            continue
+        low, high = row_start[min(i, j)], row_start[min(i, j) + 1]
+        end = high
+        while low < high:
+            middle = (low + high) >> 1
+            if columns[middle] < max(i, j):
+                low = middle + 1
+            else:
+                high = middle
+        if low == end or columns[low] != max(i, j):
+            start[0] = -1
+            return start, where
+        where[t] = low
+        start[low + 1] += 1
+    for q in range(blocks):
+        start[q + 1] += start[q]
+    entries = np.empty(start[blocks], dtype=np.int32)
+    put = start[:-1].copy()
+    for t in range(len(where)):
+        q = where[t]
+        if q >= 0:
+            entries[put[q]] = 2 * t + (1 if row_of[coupled_rows[t]] > row_of[coupled_columns[t]] else 0)
+            put[q] += 1
+    return start, entries
+
+
+@njit(cache=True, error_model="numpy")
+def _add_row(i, row_start, columns, mirror, coupling_start, couplings, blocks, data):
+    for q in range(row_start[i], row_start[i + 1]):
+        j = columns[q]
+        if j < i or coupling_start[q] == coupling_start[q + 1]:
+            continue
+        for p in range(coupling_start[q], coupling_start[q + 1]):
+            t = couplings[p] >> 1
+            if couplings[p] & 1:
+                for r in range(3):
+                    for c in range(3):
+                        data[q, r, c] += blocks[t, c, r]
+            else:
+                for r in range(3):
+                    for c in range(3):
+                        data[q, r, c] += blocks[t, r, c]
+        if j == i:
+            # Blocks are symmetric up to round-off only; the matrix is symmetric to the last bit.
+            for r in range(3):
+                for c in range(r):
+                    data[q, r, c] = data[q, c, r]
+        else:
+            m = mirror[q]
             for r in range(3):
                 for c in range(3):
-                    data[p, r, c] += extra[q, r, c]
+                    data[m, c, r] = data[q, r, c]
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def _assemble(
+    row_start,
+    columns,
+    mirror,
+    entry_start,
+    entries,
+    element_blocks,
+    diagonal_blocks,
+    coupling_start,
+    couplings,
+    coupling_blocks,
+    data,
+):
+    for i in prange(len(row_start) - 1):
+        assemble_row(i, row_start, columns, mirror, entry_start, entries, element_blocks, diagonal_blocks, data)
+        _add_row(i, row_start, columns, mirror, coupling_start, couplings, coupling_blocks, data)
