@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from supple.contact.collision_mesh.contact_surface import ContactSurface
 from supple.contact.obstacle_vertices import ObstacleRange
-from supple.implicit.energies.potential import ContactPotential, HessianBlocks
+from supple.implicit.energies.potential import ContactPotential, FrictionPotential, HessianBlocks
 from supple.numerics.sparse.couplings import Couplings
 
 # A step keeps at least this share of every distance; the bound for triangles is conservative in the same way.
@@ -174,7 +174,7 @@ class PlaneBarrier(ContactPotential):
 
 
 @dataclass(frozen=True, eq=False)
-class PlaneFriction(ContactPotential):
+class PlaneFriction(FrictionPotential):
     """Lagged friction between vertices and half-spaces (see `friction`).
 
     Attributes
@@ -204,11 +204,10 @@ class PlaneFriction(ContactPotential):
         np.add.at(out, self.base, -force)
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
-        """Positive semi-definite without projection."""
         u, y = self._slip(x)
         e = self.reach
         across = self._over_slip(y)
-        along = np.where(y < e, 2.0 / e - 2.0 * y / (e * e), 0.0)
+        along = across if project else np.where(y < e, 2.0 / e - 2.0 * y / (e * e), 0.0)
         unit = u / np.maximum(y, 1e-300)[:, None]
         n = self.normals
         tangent = np.eye(3) - n[:, :, None] * n[:, None, :]

@@ -9,8 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.implicit.energies.potential import ContactPotential, HessianBlocks, Potential
-from supple.implicit.newton.hessian_projection import ProjectedTerms
+from supple.implicit.newton.hessian_projection import HessianModel
 from supple.implicit.timings import Clock
+
+
+_PROJECTED = HessianModel()
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,16 +59,16 @@ class Objective:
         return _gradient(self.terms, x)
 
     def model(
-        self, x: NDArray[np.float64], hessian: HessianBlocks | None, projected: ProjectedTerms = ProjectedTerms.ALL
+        self, x: NDArray[np.float64], hessian: HessianBlocks | None, kind: HessianModel = _PROJECTED
     ) -> Model:
-        """Energy and gradient at x; the Hessian with some terms projected into `hessian`, where that is given."""
+        """Energy and gradient at x; the Hessian of the given kind into `hessian`, where there is one."""
         gradient = np.zeros_like(x)
         if hessian is not None:
             hessian.clear()
         values = []
         for term in self.terms:
             with self.clock.of(term.label):
-                values.append(term.add_model(x, gradient, hessian, projected.includes(term.projection)))
+                values.append(term.add_model(x, gradient, hessian, kind.projects(term.projection)))
         return Model(x, sum(values), sum(abs(value) for value in values), gradient)
 
 
