@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from supple.implicit.contact.barrier import Barrier, LibraryPotential
 from supple.implicit.energies.potential import FrictionPotential, HessianBlocks
+from supple.numerics.sparse.couplings import Couplings
 
 
 class Friction(LibraryPotential, FrictionPotential):
@@ -44,7 +45,6 @@ class Friction(LibraryPotential, FrictionPotential):
         self.start = self.surface.points(start)
         self.unit = h
         self.slow = slow
-        self._g = {}
         self.potential = ipctk.FrictionPotential(slow)
         self.contacts = ipctk.TangentialCollisions()
         found = barrier.collisions.at(lagged)
@@ -65,42 +65,32 @@ class Friction(LibraryPotential, FrictionPotential):
         if not project:
             super().add_hessian(x, out, True)
             return
-        majorizer = np.zeros((0, 3, 3))
-        mesh = self.surface.mesh
-        points = self.surface.points(x) - self.start
-        ids, factors, blocks = [], [], []
+        mesh, surface = self.surface.mesh, self.surface
+        moved = surface.points(x) - self.start
         reach = self.slow * self.unit
+        rows, columns, blocks = [], [], []
         for k in range(len(self.contacts)):
-            c = self.contacts[k]
-            v = [i for i in c.vertex_ids(mesh.edges, mesh.faces) if i >= 0]
-            T = np.asarray(c.tangent_basis)
-            if k not in self._g:
-                g = np.zeros(len(v))
-                for a in range(len(v)):
-                    e = np.zeros(3 * len(v)); e[3 * a] = 1.0
-                    g[a] = c.relative_velocity(e)[0]
-                self._g[k] = g
-            g = self._g[k]
-            u = T.T @ (g @ points[v])
-            y = np.linalg.norm(u)
-            w = c.weight * c.mu_k * c.normal_force_magnitude * (2 / reach - y / reach**2 if y < reach else 1 / y)
-            B = w * T @ T.T
-            ids.append(v); factors.append(g); blocks.append(B)
-        from supple.numerics.sparse.couplings import Couplings
-        W = None
-        rows, cols, data = [], [], []
-        for v, g, B in zip(ids, factors, blocks):
-            # middles
-            vs, gs = [], []
-            for i, gi in zip(v, g):
-                s = len(self.surface.vertices)
-                if i < s:
-                    vs.append(self.surface.vertices[i]); gs.append(gi)
-                else:
-                    for m in self.surface.middles[i - s]:
-                        vs.append(self.surface.vertices[m]); gs.append(0.5 * gi)
-            for a in range(len(vs)):
-                for b in range(len(vs)):
-                    if vs[a] < vs[b] or a == b or (vs[a] == vs[b] ):
-                        rows.append(vs[a]); cols.append(vs[b]); data.append(gs[a] * gs[b] * B)
-        out.couplings.append(Couplings(np.array(rows, np.int32), np.array(cols, np.int32), np.array(data)))
+            contact = self.contacts[k]
+            points = [v for v in contact.vertex_ids(mesh.edges, mesh.faces) if v >= 0]
+            basis = np.asarray(contact.tangent_basis)
+            unit = np.eye(3 * len(points))[::3]
+            weights = np.array([contact.relative_velocity(e)[0] for e in unit])
+            y = float(np.linalg.norm(basis.T @ (weights @ moved[points])))
+            force = contact.weight * contact.mu_k * contact.normal_force_magnitude
+            block = force * (2.0 / reach - y / reach**2 if y < reach else 1.0 / y) * basis @ basis.T
+            ends = [(v, w) for p, c in zip(points, weights, strict=True) for v, w in self._ends(p, c)]
+            for a in range(len(ends)):
+                for b in range(a, len(ends)):
+                    twice = 2.0 if a != b and ends[a][0] == ends[b][0] else 1.0
+                    rows.append(ends[a][0])
+                    columns.append(ends[b][0])
+                    blocks.append(twice * ends[a][1] * ends[b][1] * block)
+        pairs = np.array([rows, columns], dtype=np.int32).reshape(2, -1)
+        out.couplings.append(Couplings(*pairs, np.array(blocks).reshape(-1, 3, 3)))
+
+    def _ends(self, point: int, weight: float) -> list[tuple[int, float]]:
+        """The solver's vertices that a point of the mesh depends on, with their shares of its weight."""
+        s = len(self.surface.vertices)
+        if point < s:
+            return [(int(self.surface.vertices[point]), weight)]
+        return [(int(v), 0.5 * weight) for v in self.surface.vertices[self.surface.middles[point - s]]]

@@ -67,7 +67,7 @@ class ProjectionPolicy:
     """
 
     now: ProjectedTerms = ProjectedTerms.ALL
-    majorize: bool = False
+    majorize: bool = True
     wait: int = 1
     remaining: int = 1
 

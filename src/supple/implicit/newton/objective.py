@@ -12,7 +12,6 @@ from supple.implicit.energies.potential import ContactPotential, HessianBlocks, 
 from supple.implicit.newton.hessian_projection import HessianModel
 from supple.implicit.timings import Clock
 
-
 _PROJECTED = HessianModel()
 
 
@@ -58,9 +57,7 @@ class Objective:
         """(n, 3) [N]."""
         return _gradient(self.terms, x)
 
-    def model(
-        self, x: NDArray[np.float64], hessian: HessianBlocks | None, kind: HessianModel = _PROJECTED
-    ) -> Model:
+    def model(self, x: NDArray[np.float64], hessian: HessianBlocks | None, kind: HessianModel = _PROJECTED) -> Model:
         """Energy and gradient at x; the Hessian of the given kind into `hessian`, where there is one."""
         gradient = np.zeros_like(x)
         if hessian is not None:
