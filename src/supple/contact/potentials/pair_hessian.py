@@ -71,5 +71,7 @@ def write_pair_hessian(kind, c, r, d, points, slopes, project, out, first):
                 along_p, along_q = op * n[x] + pp * p[x], nq * n[x] + qq * q[x]
                 for y in range(3):
                     out[b, x, y] = along_n * n[y] + along_p * p[y] + along_q * q[y]
+            if i == j:  # symmetric to the last bit
+                out[b, 1, 0], out[b, 2, 0], out[b, 2, 1] = out[b, 0, 1], out[b, 0, 2], out[b, 1, 2]
             b += 1
     return b

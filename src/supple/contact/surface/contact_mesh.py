@@ -29,7 +29,8 @@ class ContactMesh:
     edge_triangles, vertex_triangles : the triangles at each edge (one at a boundary, two on a manifold) and each point
     neighbors : the points that an edge joins to each point
     owner : (s,) number of the body, or (number of bodies) + number of the obstacle, of each point
-    areas : (s,) a third of the adjacent triangles' area at rest [m^2]; edge_lengths : (e,) at rest [m]
+    areas, edge_areas : (s,), (e,) a third of the adjacent triangles' area at rest [m^2]
+    edge_lengths : (e,) at rest [m]
     body_count : how many of the owners are bodies; names : of all owners
     collide : (p, p) which owners may touch
     stitched : pairs that do not collide because they are stitched to each other; None where there are no stitches
@@ -44,6 +45,7 @@ class ContactMesh:
     neighbors: Adjacency
     owner: NDArray[np.int32]
     areas: NDArray[np.float64]
+    edge_areas: NDArray[np.float64]
     edge_lengths: NDArray[np.float64]
     body_count: int
     names: tuple[str, ...]
@@ -111,7 +113,7 @@ def mesh_of_triangles(
     each = np.repeat(np.arange(len(triangles)), 3)
     a, b, c = rest[triangles].transpose(1, 0, 2)
     doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    areas = np.bincount(triangles.ravel(), weights=np.repeat(doubled / 6.0, 3), minlength=s)
+    thirds = np.repeat(doubled / 6.0, 3)
     stitched = None
     if stitches is not None and len(stitches[0]):
         stitched = stitch_filter((triangles, edges, triangle_edges), *stitches, owner, collide)
@@ -124,7 +126,8 @@ def mesh_of_triangles(
         vertex_triangles=adjacency(triangles.ravel(), each, s),
         neighbors=adjacency(edges.ravel(), edges[:, ::-1].ravel(), s),
         owner=owner,
-        areas=areas.astype(np.float64),
+        areas=np.bincount(triangles.ravel(), weights=thirds, minlength=s).astype(np.float64),
+        edge_areas=np.bincount(triangle_edges.ravel(), weights=thirds, minlength=len(edges)).astype(np.float64),
         edge_lengths=np.linalg.norm(rest[edges[:, 0]] - rest[edges[:, 1]], axis=1),
         body_count=body_count,
         names=names,
