@@ -1,0 +1,29 @@
+"""Lists of neighbors: for each of n things, the numbers of those that belong to it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Adjacency(NamedTuple):
+    """The lists of n things one after another; kernels take it as it is.
+
+    Attributes
+    ----------
+    start : (n + 1,) int32; items : (start[-1],) int32, those of thing k ascending at start[k] .. start[k + 1]
+    """
+
+    start: NDArray[np.int32]
+    items: NDArray[np.int32]
+
+
+def adjacency(rows: NDArray[np.integer], items: NDArray[np.integer], count: int) -> Adjacency:
+    """From pairs rows (k,), items (k,) of `count` things; each pair counts once."""
+    width = int(items.max(initial=0)) + 1
+    codes = np.unique(rows.astype(np.int64) * width + items)
+    of, found = np.divmod(codes, width)
+    start = np.searchsorted(of, np.arange(count + 1))
+    return Adjacency(start.astype(np.int32), found.astype(np.int32))

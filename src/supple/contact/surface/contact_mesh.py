@@ -1,0 +1,136 @@
+"""The surfaces that may touch, as one triangle mesh on embedded points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.contact.obstacle_vertices import ObstacleRange
+from supple.contact.surface.adjacency import Adjacency, adjacency
+from supple.contact.surface.embedded_points import EmbeddedPoints
+from supple.contact.surface.stitch_filter import StitchFilter, stitch_filter
+from supple.mesh.topology import edge_keys
+from supple.system import System
+
+
+@dataclass(frozen=True, eq=False)
+class ContactMesh:
+    """Surface triangles of bodies and obstacles (half-spaces aside), with s points, e edges and f triangles.
+
+    Indices are int32 and name rows of this mesh's own points, edges and triangles.
+
+    Attributes
+    ----------
+    points : where the points are
+    triangles : (f, 3) points; edges : (e, 2) points, the lower first, in lexicographic order
+    triangle_edges : (f, 3) edge k joins the corners k and k + 1
+    edge_triangles, vertex_triangles : the triangles at each edge (one at a boundary, two on a manifold) and each point
+    neighbors : the points that an edge joins to each point
+    owner : (s,) number of the body, or (number of bodies) + number of the obstacle, of each point
+    areas, edge_areas : (s,), (e,) a third of the adjacent triangles' area at rest [m^2]
+    edge_lengths : (e,) at rest [m]
+    body_count : how many of the owners are bodies; names : of all owners
+    collide : (p, p) which owners may touch
+    stitched : pairs that do not collide because they are stitched to each other; None where there are no stitches
+    """
+
+    points: EmbeddedPoints
+    triangles: NDArray[np.int32]
+    edges: NDArray[np.int32]
+    triangle_edges: NDArray[np.int32]
+    edge_triangles: Adjacency
+    vertex_triangles: Adjacency
+    neighbors: Adjacency
+    owner: NDArray[np.int32]
+    areas: NDArray[np.float64]
+    edge_areas: NDArray[np.float64]
+    edge_lengths: NDArray[np.float64]
+    body_count: int
+    names: tuple[str, ...]
+    collide: NDArray[np.bool_]
+    stitched: StitchFilter | None
+
+
+def contact_mesh(
+    system: System,
+    obstacles: tuple[ObstacleRange, ...],
+    collide: NDArray[np.bool_],
+    start: NDArray[np.float64],
+) -> ContactMesh:
+    """Join the surfaces of a system whose obstacles are vertices (see `with_obstacles`).
+
+    Parameters
+    ----------
+    collide : (p, p) which owners may touch, bodies before obstacles
+    start : (n, 3) where everything is at the start [m]
+    """
+    triangles = np.concatenate([system.triangles] + [part.triangles for part in obstacles if not part.is_plane])
+    vertices = np.unique(triangles).astype(np.int32)
+    number = np.full(len(system.rest_positions), -1, dtype=np.int32)
+    number[vertices] = np.arange(len(vertices), dtype=np.int32)
+    owner_of = np.full(len(system.rest_positions), -1, dtype=np.int32)
+    for k, part in enumerate(system.bodies):
+        owner_of[part.vertices] = k
+    for part in obstacles:
+        owner_of[part.vertices] = len(system.bodies) + part.index
+    return mesh_of_triangles(
+        EmbeddedPoints.at_vertices(vertices),
+        number[triangles],
+        owner_of[vertices],
+        system.rest_positions[vertices],
+        body_count=len(system.bodies),
+        names=tuple(part.name for part in system.bodies) + tuple(str(o.name) for o in system.obstacles),
+        collide=collide,
+        stitches=(np.append(number, -1)[system.stitching.nodes()], start[vertices]),
+    )
+
+
+def mesh_of_triangles(
+    points: EmbeddedPoints,
+    triangles: NDArray[np.int32],
+    owner: NDArray[np.int32],
+    rest: NDArray[np.float64],
+    *,
+    body_count: int,
+    names: tuple[str, ...],
+    collide: NDArray[np.bool_],
+    stitches: tuple[NDArray[np.int32], NDArray[np.float64]] | None = None,
+) -> ContactMesh:
+    """The mesh of triangles (f, 3) of points with rest positions (s, 3); for the other arguments see `ContactMesh`.
+
+    Parameters
+    ----------
+    stitches : nodes (k, 4) of stitches, -1 for none, and (s, 3) where the points are at the start
+    """
+    s = len(points)
+    triangles = np.ascontiguousarray(triangles, dtype=np.int32)
+    owner = np.ascontiguousarray(owner, dtype=np.int32)
+    keys, side = np.unique(edge_keys(triangles, s), return_inverse=True)
+    edges = np.ascontiguousarray(np.column_stack(np.divmod(keys, s)).astype(np.int32))
+    triangle_edges = np.ascontiguousarray(side.reshape(-1, 3).astype(np.int32))
+    each = np.repeat(np.arange(len(triangles)), 3)
+    a, b, c = rest[triangles].transpose(1, 0, 2)
+    doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    thirds = np.repeat(doubled / 6.0, 3)
+    stitched = None
+    if stitches is not None and len(stitches[0]):
+        stitched = stitch_filter((triangles, edges, triangle_edges), *stitches, owner, collide)
+    return ContactMesh(
+        points=points,
+        triangles=triangles,
+        edges=edges,
+        triangle_edges=triangle_edges,
+        edge_triangles=adjacency(triangle_edges.ravel(), each, len(edges)),
+        vertex_triangles=adjacency(triangles.ravel(), each, s),
+        neighbors=adjacency(edges.ravel(), edges[:, ::-1].ravel(), s),
+        owner=owner,
+        areas=np.bincount(triangles.ravel(), weights=thirds, minlength=s).astype(np.float64),
+        edge_areas=np.bincount(triangle_edges.ravel(), weights=thirds, minlength=len(edges)).astype(np.float64),
+        edge_lengths=np.linalg.norm(rest[edges[:, 0]] - rest[edges[:, 1]], axis=1),
+        body_count=body_count,
+        names=names,
+        collide=np.ascontiguousarray(collide),
+        stitched=stitched,
+    )

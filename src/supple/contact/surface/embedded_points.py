@@ -1,0 +1,73 @@
+"""Points that move with the vertices of a system: affine combinations of a few vertices each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.numerics.kernel_cache import njit, prange
+
+
+@dataclass(frozen=True, eq=False)
+class EmbeddedPoints:
+    """Points W x of vertices x, where the weights of each point sum to 1.
+
+    Attributes
+    ----------
+    start : (s + 1,) int32, where the combination of each point begins
+    vertices : (q,) int32; weights : (q,) float64
+    """
+
+    start: NDArray[np.int32]
+    vertices: NDArray[np.int32]
+    weights: NDArray[np.float64]
+
+    @classmethod
+    def at_vertices(cls, vertices: NDArray[np.int32]) -> EmbeddedPoints:
+        """One point at each of the vertices (s,), which are all different."""
+        start = np.arange(len(vertices) + 1, dtype=np.int32)
+        return cls(start, np.ascontiguousarray(vertices, dtype=np.int32), np.ones(len(vertices)))
+
+    def __len__(self) -> int:
+        return len(self.start) - 1
+
+    @cached_property
+    def are_vertices(self) -> bool:
+        """Whether every point is one vertex, and no vertex has two points."""
+        return len(self.vertices) == len(self) and len(np.unique(self.vertices)) == len(self)
+
+    def positions(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(s, 3) positions of the points, or displacements, from those of all vertices x (n, 3)."""
+        if self.are_vertices:
+            return x.take(self.vertices, axis=0)
+        out = np.empty((len(self), 3))
+        _combine(x, self.start, self.vertices, self.weights, out)
+        return out
+
+    def add_forces(self, forces: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+        """Add W^T forces, of forces (s, 3) on the points, to `out` (n, 3)."""
+        if self.are_vertices:
+            out[self.vertices] += forces
+        else:
+            _spread(forces, self.start, self.vertices, self.weights, out)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def _combine(x, start, vertices, weights, out):
+    for i in prange(len(start) - 1):
+        for j in range(3):
+            total = 0.0
+            for k in range(start[i], start[i + 1]):
+                total += weights[k] * x[vertices[k], j]
+            out[i, j] = total
+
+
+@njit(cache=True, error_model="numpy")
+def _spread(forces, start, vertices, weights, out):
+    for i in range(len(start) - 1):
+        for k in range(start[i], start[i + 1]):
+            for j in range(3):
+                out[vertices[k], j] += weights[k] * forces[i, j]

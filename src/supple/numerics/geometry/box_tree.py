@@ -1,0 +1,246 @@
+"""Overlaps of axis-aligned boxes: a binary tree of boxes over primitives in Morton order.
+
+The tree is complete: node k has the children 2 k and 2 k + 1, and the primitives are its leaves, in the order of their
+centers' Morton codes. When boxes change, only the boxes of the nodes are computed again.
+
+A node also has the label that all primitives below it share, or -1. Searches use it to leave out whole branches.
+
+Kernels search with a stack of nodes:
+
+    top = from_root(nodes, box, stack)                  # or after_leaf(nodes, leaf, box, stack): only later leaves
+    while top > 0:
+        leaf, top = next_leaf(nodes, labels, box, label, same, stack, top)
+        if leaf >= 0:
+            ...                                         # the box of primitive order[leaf] overlaps
+
+Source: Lauterbach et al., "Fast BVH Construction on GPUs" (2009), for the order along the Morton curve.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.numerics.kernel_cache import njit, prange
+
+# Entries of a search's stack: a tree over 2^31 primitives has 32 levels, and a search begins with one node of each.
+STACK = 80
+# Subtrees that are refitted independently of each other.
+_SUBTREES = 64
+# A tree is sorted again where its nodes have grown by this factor since it was sorted.
+_GROWTH = 1.5
+
+
+@dataclass(eq=False)
+class BoxTree:
+    """A tree over m boxes with labels.
+
+    Attributes
+    ----------
+    order : (m,) the primitive of each leaf
+    nodes : (2 p, 6) lowest and highest corner of each node, p the power of two that is at least m; node 1 is the root
+    labels : (2 p,) of the nodes
+    """
+
+    order: NDArray[np.int32]
+    nodes: NDArray[np.float64]
+    labels: NDArray[np.int32]
+    _size: float
+
+    @classmethod
+    def over(cls, boxes: NDArray[np.float64], labels: NDArray[np.int32] | None = None) -> BoxTree:
+        """A tree over boxes (m, 6), lowest and highest corner of each, with labels (m,) >= 0 (default: all 0)."""
+        leaves = 1
+        while leaves < len(boxes):
+            leaves *= 2
+        order = np.argsort(morton_codes(boxes), kind="stable").astype(np.int32)
+        own = np.zeros(len(boxes), dtype=np.int32) if labels is None else labels
+        nodes = np.empty((2 * leaves, 6))
+        size = _refit(boxes, order, nodes)
+        return cls(order, nodes, _labels_of_nodes(own, order, leaves), size)
+
+    def refit(self, boxes: NDArray[np.float64]) -> bool:
+        """Take over new boxes (m, 6) of the same primitives; returns whether the order still suits them."""
+        return _refit(boxes, self.order, self.nodes) <= _GROWTH * self._size
+
+
+def overlapping(tree: BoxTree, boxes: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """Which of the tree's primitives have a box that overlaps each of the boxes (q, 6); touching counts.
+
+    Returns
+    -------
+    start : (q + 1,); found : (start[-1],) the primitives of box k at found[start[k]:start[k + 1]]
+    """
+    start = np.zeros(len(boxes) + 1, dtype=np.int64)
+    if len(boxes) == 0 or len(tree.order) == 0:
+        return start, np.zeros(0, dtype=np.int32)
+    none = np.zeros(0, dtype=np.int32)
+    _overlapping(tree.nodes, tree.labels, tree.order, boxes, start, none)
+    np.cumsum(start, out=start)
+    found = np.empty(start[-1], dtype=np.int32)
+    _overlapping(tree.nodes, tree.labels, tree.order, boxes, start, found)
+    return start, found
+
+
+@njit(error_model="numpy")
+def overlap(nodes, i, box):
+    """Whether node i overlaps a box of six numbers; touching counts."""
+    return (
+        nodes[i, 0] <= box[3]
+        and nodes[i, 3] >= box[0]
+        and nodes[i, 1] <= box[4]
+        and nodes[i, 4] >= box[1]
+        and nodes[i, 2] <= box[5]
+        and nodes[i, 5] >= box[2]
+    )
+
+
+@njit(error_model="numpy")
+def from_root(nodes, box, stack):
+    """Begin a search of the whole tree; returns the height of the stack."""
+    if overlap(nodes, 1, box):
+        stack[0] = 1
+        return 1
+    return 0
+
+
+@njit(error_model="numpy")
+def after_leaf(nodes, leaf, box, stack):
+    """Begin a search of the leaves after this one: pairs of one set of primitives are then found once."""
+    i = len(nodes) // 2 + leaf
+    top = 0
+    while i > 1:
+        if i % 2 == 0 and overlap(nodes, i + 1, box):
+            stack[top] = i + 1
+            top += 1
+        i //= 2
+    return top
+
+
+@njit(error_model="numpy")
+def next_leaf(nodes, labels, box, label, same, stack, top):
+    """The next leaf that overlaps, or -1, and the height of the stack.
+
+    Parameters
+    ----------
+    label, same : where `same`, branches of other labels are left out; otherwise branches of this label. -1 and False:
+        nothing is left out
+    """
+    leaves = len(nodes) // 2
+    while top > 0:
+        top -= 1
+        i = stack[top]
+        if labels[i] >= 0 and (labels[i] == label) != same:
+            continue
+        if i >= leaves:
+            return i - leaves, top
+        if overlap(nodes, 2 * i + 1, box):
+            stack[top] = 2 * i + 1
+            top += 1
+        if overlap(nodes, 2 * i, box):
+            stack[top] = 2 * i
+            top += 1
+    return -1, 0
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def morton_codes(boxes):
+    """(m,) 63 bits: those of the three coordinates of each center in turn."""
+    low = np.empty(3)
+    size = 0.0
+    for j in range(3):
+        a, b = np.inf, -np.inf
+        for i in range(len(boxes)):
+            c = boxes[i, j] + boxes[i, 3 + j]
+            a, b = min(a, c), max(b, c)
+        low[j] = a
+        size = max(size, b - a)
+    scale = 2097151.0 / size if 0.0 < size < np.inf else 0.0
+    codes = np.empty(len(boxes), dtype=np.int64)
+    for i in prange(len(boxes)):
+        code = np.int64(0)
+        for j in range(3):
+            v = np.int64((boxes[i, j] + boxes[i, 3 + j] - low[j]) * scale)
+            v = (v | (v << 32)) & 0x1F00000000FFFF
+            v = (v | (v << 16)) & 0x1F0000FF0000FF
+            v = (v | (v << 8)) & 0x100F00F00F00F00F
+            v = (v | (v << 4)) & 0x10C30C30C30C30C3
+            v = (v | (v << 2)) & 0x1249249249249249
+            code |= v << j
+        codes[i] = code
+    return codes
+
+
+@njit(error_model="numpy")
+def _join(nodes, i):
+    """Compute node i from its children; returns the sum of its sides."""
+    size = 0.0
+    for j in range(3):
+        nodes[i, j] = min(nodes[2 * i, j], nodes[2 * i + 1, j])
+        nodes[i, 3 + j] = max(nodes[2 * i, 3 + j], nodes[2 * i + 1, 3 + j])
+        size += max(0.0, nodes[i, 3 + j] - nodes[i, j])
+    return size
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def _refit(boxes, order, nodes):
+    """Compute all nodes; returns the sum of the sides of those that are not leaves."""
+    leaves = len(nodes) // 2
+    subtrees = min(leaves, _SUBTREES)
+    each = leaves // subtrees
+    sizes = np.zeros(subtrees)
+    for s in prange(subtrees):
+        for k in range(s * each, (s + 1) * each):
+            if k < len(order):
+                for j in range(6):
+                    nodes[leaves + k, j] = boxes[order[k], j]
+            else:
+                for j in range(3):
+                    nodes[leaves + k, j] = np.inf
+                    nodes[leaves + k, 3 + j] = -np.inf
+        size = 0.0
+        width = each // 2
+        while width >= 1:
+            for i in range((subtrees + s) * width, (subtrees + s + 1) * width):
+                size += _join(nodes, i)
+            width //= 2
+        sizes[s] = size
+    total = 0.0
+    for s in range(subtrees):
+        total += sizes[s]
+    for i in range(subtrees - 1, 0, -1):
+        total += _join(nodes, i)
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def _labels_of_nodes(labels, order, leaves):
+    out = np.full(2 * leaves, -2, dtype=np.int32)  # -2 where there is no primitive
+    for k in range(len(order)):
+        out[leaves + k] = labels[order[k]]
+    for i in range(leaves - 1, 0, -1):
+        a, b = out[2 * i], out[2 * i + 1]
+        if a == b or b == -2:
+            out[i] = a
+        else:
+            out[i] = b if a == -2 else -1
+    return out
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def _overlapping(nodes, labels, order, boxes, start, found):
+    """Count the overlaps of box k in start[k + 1]; where `found` has room for them, write them instead."""
+    for q in prange(len(boxes)):
+        stack = np.empty(STACK, dtype=np.int64)
+        count = 0
+        top = from_root(nodes, boxes[q], stack)
+        while top > 0:
+            leaf, top = next_leaf(nodes, labels, boxes[q], -1, False, stack, top)
+            if leaf >= 0:
+                if len(found) > 0:
+                    found[start[q] + count] = order[leaf]
+                count += 1
+        if len(found) == 0:
+            start[q + 1] = count
