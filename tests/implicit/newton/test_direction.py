@@ -10,7 +10,7 @@ from supple.implicit.energies.potential import ContactPotential, HessianBlocks, 
 from supple.implicit.newton import direct_solver
 from supple.implicit.newton.direction import DirectionFinder, Tools
 from supple.implicit.newton.free_motion import FreeMotion
-from supple.implicit.newton.hessian_projection import HessianModel, ProjectedTerms
+from supple.implicit.newton.hessian_projection import ProjectedTerms
 from supple.implicit.newton.linear_solver import LinearSolver
 from supple.implicit.newton.objective import Objective
 from supple.numerics.sparse.couplings import Couplings
@@ -93,7 +93,7 @@ def finder(terms, solver: str, projected: ProjectedTerms) -> DirectionFinder:
 
 def find(terms, solver: str, projected: ProjectedTerms):
     made = finder(terms, solver, projected)
-    here = made.objective.model(MESH.vertices, made.tools.hessian, HessianModel(projected))
+    here = made.objective.model(MESH.vertices, made.tools.hessian, projected)
     found = made.find(here)
     assert found is not None
     assert not found.vector[PINNED].any()

@@ -3,13 +3,13 @@
 import pytest
 
 from supple.implicit.energies.potential import Projection
-from supple.implicit.newton.hessian_projection import HessianModel, ProjectedTerms, ProjectionPolicy
+from supple.implicit.newton.hessian_projection import ProjectedTerms, ProjectionPolicy
 
 
 def after(*notes: tuple[bool, bool]) -> ProjectionPolicy:
     policy = ProjectionPolicy()
     for slow, touching in notes:
-        policy.note(slow, touching, whole=True)
+        policy.note(slow, touching)
     return policy
 
 
@@ -29,7 +29,7 @@ def test_an_indefinite_hessian_is_tried_again_after_four_iterations_at_most():
     for _ in range(5):
         count = 0
         while policy.now is ProjectedTerms.ALL:
-            policy.note(slow=True, touching=False, whole=True)
+            policy.note(slow=True, touching=False)
             count += 1
         waits.append(count)
         policy.step_back(touching=False)
@@ -51,20 +51,3 @@ def test_terms_are_projected_by_their_declared_property():
         [True, False, False],
         [False, False, False],
     ]
-
-
-def test_friction_is_majorized_at_first_and_after_every_step_that_was_shortened():
-    policy = ProjectionPolicy()
-    majorized = [policy.model.majorized]
-    for whole in (True, True, False, False, True):
-        policy.note(slow=False, touching=True, whole=whole)
-        majorized.append(policy.model.majorized)
-    assert majorized == [True, False, False, True, True, False]
-
-
-@pytest.mark.parametrize("terms", ProjectedTerms)
-def test_frictions_majorizer_does_not_depend_on_the_other_terms(terms: ProjectedTerms):
-    for majorized in (False, True):
-        kind = HessianModel(terms, majorized)
-        assert kind.projects(Projection.MAJORIZED) == majorized
-        assert kind.projects(Projection.RELEASED_FIRST) == (terms is ProjectedTerms.ALL)

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.contact.closest.pair_geometry import VERTEX_VERTEX
+from supple.contact.potentials.friction_energy import Slips
 from supple.implicit.contact.half_spaces import PlaneFriction
 from supple.implicit.energies.inertia import Inertia
 from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
@@ -33,7 +35,7 @@ def two_tets(held: tuple[int, ...] = ()) -> System:
     return build_system(sp.Scene(bodies, pins=pins))
 
 
-def minimum(system: System, terms: list[Potential], tolerance: float) -> Outcome:
+def minimum(system: System, terms: list[Potential], tolerance: float, begin: np.ndarray) -> Outcome:
     tools = Tools(
         LinearSolver.of(system, "auto"),
         HessianBlocks.zeros(len(system.tets), len(system.rest_positions)),
@@ -43,7 +45,7 @@ def minimum(system: System, terms: list[Potential], tolerance: float) -> Outcome
     limits = StepLimits(InversionGuard(system, np.zeros(2, dtype=np.bool_), complete=True), None, tools.clock)
     problem = Problem(Objective(terms), H * H, Convergence(tolerance, 1e-6), 60, 1.0)
     tools.linear_solver.begin_step()
-    return minimize(problem, system.rest_positions.copy(), limits, tools)
+    return minimize(problem, begin, limits, tools)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,35 +71,41 @@ class Springs(Potential):
         out.tets[0] += self.stiffness * matrix
 
 
+@pytest.mark.parametrize("stiffness", [0.1, 1.0, 10.0])
 @pytest.mark.parametrize("reach", [1e-4, 1e-6, 1e-8])
-def test_vertices_that_stick_beside_vertices_that_slide_are_found_in_few_iterations(reach: float):
-    """Two vertices are held by less friction than pulls them, two by more; springs join all four."""
+def test_vertices_that_stick_beside_vertices_that_slide_are_found_in_few_iterations(reach: float, stiffness: float):
+    """Two vertices are held by less friction than pulls them, two by more; springs join all four.
+
+    The search begins where all slide. With the exact Hessian it takes up to 34 iterations and 264 cuts.
+    """
     system = two_tets()
     n = len(system.rest_positions)
     pull = np.zeros((n, 3))
     pull[:4, 0] = 5e-3
     masses = system.masses
     load = masses[:4] / H**2 * 5e-3
-    springs = Springs(0.1 * load[0] / 5e-3, system.rest_positions)
-    friction = PlaneFriction(
-        vertices=np.arange(4, dtype=np.int32),
-        base=np.full(4, 4, dtype=np.int32),
-        forces=np.array([0.3, 0.6, 3.0, 5.0]) * load,
+    springs = Springs(stiffness * load[0] / 5e-3, system.rest_positions)
+    slips = Slips(
+        kinds=np.full(4, VERTEX_VERTEX, dtype=np.int8),
+        points=np.array([[k, 4, -1, -1] for k in range(4)], dtype=np.int32),
+        coefficients=np.tile([1.0, -1.0, 0.0, 0.0], (4, 1)),
         normals=np.tile([0.0, 0.0, 1.0], (4, 1)),
-        start=system.rest_positions[:4] - system.rest_positions[4],
-        reach=reach,
+        offsets=system.rest_positions[:4] - system.rest_positions[4],
+        forces=np.array([0.3, 0.6, 3.0, 5.0]) * load,
     )
+    friction = PlaneFriction(slips, reach)
     terms: list[Potential] = [Inertia(masses, system.rest_positions + pull, H * H), springs, friction]
-    outcome = minimum(system, terms, 1e-2 * reach)
+    outcome = minimum(system, terms, 1e-2 * reach, system.rest_positions + pull)
     assert outcome.status is Status.CONVERGED
     moved = (outcome.end.positions - system.rest_positions)[:4, 0]
     # Two slide, and the forces of inertia, springs and full friction balance; two stay within the band.
     force = load - masses[:4] / H**2 * moved - springs.stiffness * (4 * moved - moved.sum())
-    assert force[:2] == pytest.approx(friction.forces[:2], rel=1e-4)
-    assert (moved[:2] > 1e-4).all()
+    assert force[:2] == pytest.approx(slips.forces[:2], rel=1e-4)
     assert (np.abs(moved[2:]) < reach).all()
-    assert (np.abs(force[2:]) < friction.forces[2:]).all()
+    assert (moved[:2] > reach).all()
+    assert (np.abs(force[2:]) < slips.forces[2:]).all()
     assert len(outcome.rows) <= 15
+    assert sum(row.cuts for row in outcome.rows) <= 1
 
 
 @dataclass(eq=False)
@@ -133,7 +141,7 @@ def test_hessians_are_made_where_a_step_was_accepted_alone():
     system = two_tets(held=(1, 2, 3))  # what nothing holds must not feel where it is
     counted = Counting(system.rest_positions, 1e-3)
     inertia = Inertia(np.full(len(system.masses), 1e-3), system.rest_positions, H * H)
-    outcome = minimum(system, [inertia, counted], 1e-9)
+    outcome = minimum(system, [inertia, counted], 1e-9, system.rest_positions)
     assert outcome.status is Status.CONVERGED
     cuts = sum(row.cuts for row in outcome.rows)
     assert cuts > 0

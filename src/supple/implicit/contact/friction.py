@@ -9,88 +9,126 @@ Source: Li et al., "Incremental Potential Contact" (2020), section 5.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.contact.barrier import Barrier, LibraryPotential
+from supple.contact.collision_mesh.contact_surface import ContactSurface
+from supple.contact.potentials.friction_energy import (
+    Slips,
+    add_friction_gradient,
+    friction_energy,
+    friction_hessian,
+    renew_duals,
+)
+from supple.implicit.contact.barrier import Barrier
 from supple.implicit.energies.potential import FrictionPotential, HessianBlocks
 from supple.numerics.sparse.couplings import Couplings
 
 
-class Friction(LibraryPotential, FrictionPotential):
-    """Of the contacts that a barrier has at one state.
+@dataclass(frozen=True, eq=False)
+class Friction(FrictionPotential):
+    """Of contacts between the points of a surface.
+
+    Attributes
+    ----------
+    reach : eps_v h [m]
+    found : the library's contacts
+    duals : (k, 3) the state of a minimization, see `friction_energy`; zero at first: the step is that of the majorizer
+    """
+
+    surface: ContactSurface
+    slips: Slips
+    reach: float
+    found: Any
+    duals: NDArray[np.float64] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "duals", np.zeros((len(self.slips.forces), 3)))
+
+    def value(self, x: NDArray[np.float64]) -> float:
+        return friction_energy(self._points(x), self.slips, self.reach)
+
+    def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+        points = self._points(x)
+        forces = np.zeros_like(points)
+        add_friction_gradient(points, self.slips, self.reach, forces)
+        self.surface.add_gradient(forces.ravel(), out)
+
+    def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
+        """The matrix of a primal-dual step, positive semi-definite without projection."""
+        between = friction_hessian(self._points(x), self.slips, self.reach, self.duals)
+        out.couplings.append(self._by_vertices(between))
+
+    def renew(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> None:
+        renew_duals(self._points(x), self._points(direction), self.slips, self.reach, self.duals)
+
+    def _points(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.ascontiguousarray(self.surface.points(x))
+
+    def _by_vertices(self, between: Couplings) -> Couplings:
+        s = len(self.surface.vertices)
+        ends = np.concatenate(
+            [np.column_stack([self.surface.vertices] * 2), self.surface.vertices[self.surface.middles]]
+        )
+        shares = np.repeat([[1.0, 0.0], [0.5, 0.5]], [s, len(ends) - s], axis=0)
+        rows, columns, blocks = [], [], []
+        same = between.rows == between.columns
+        for a in range(2):
+            for b in range(2):
+                i, j = ends[between.rows, a], ends[between.columns, b]
+                size = shares[between.rows, a] * shares[between.columns, b]
+                size = size * np.where(same, 1.0 if a == b else 0.5, np.where(i == j, 2.0, 1.0))
+                kept = size != 0.0
+                rows.append(i[kept])
+                columns.append(j[kept])
+                blocks.append((size[:, None, None] * between.blocks)[kept])
+        return Couplings(*(np.concatenate(part) for part in (rows, columns, blocks)))
+
+
+def friction(
+    barrier: Barrier,
+    lagged: NDArray[np.float64],
+    start: NDArray[np.float64],
+    coefficients: NDArray[np.float64],
+    reach: float,
+) -> Friction | None:
+    """Of the contacts that a barrier has at one state; None where there are none.
 
     Parameters
     ----------
-    lagged : (n, 3) positions of which normal forces and tangents are used
-    start : (n, 3) where the step began; h : its length [s]
+    lagged : (n, 3) positions of which normal forces and tangents are used; start : (n, 3) where the step began
     coefficients : (p, p) between owners of the surface
-    slow : eps_v [m/s]
+    reach : eps_v h [m]
     """
+    import ipctk
 
-    def __init__(
-        self,
-        barrier: Barrier,
-        lagged: NDArray[np.float64],
-        start: NDArray[np.float64],
-        h: float,
-        coefficients: NDArray[np.float64],
-        slow: float,
-    ) -> None:
-        import ipctk
+    surface = barrier.collisions.surface
+    found = barrier.collisions.at(lagged)
+    if found.empty() or not coefficients.any():
+        return None
+    owner = surface.owner.astype(np.float64)
 
-        self.surface = barrier.collisions.surface
-        self.start = self.surface.points(start)
-        self.unit = h
-        self.slow = slow
-        self.potential = ipctk.FrictionPotential(slow)
-        self.contacts = ipctk.TangentialCollisions()
-        found = barrier.collisions.at(lagged)
-        if not found.empty() and coefficients.any():
-            owner = self.surface.owner.astype(np.float64)
+    def blend(a: float, b: float) -> float:
+        """The library combines numbers of vertices. Here these are owners, and the pair is looked up."""
+        return float(coefficients[round(a), round(b)])
 
-            def blend(a: float, b: float) -> float:
-                """The library combines numbers of vertices. Here these are owners, and the pair is looked up."""
-                return float(coefficients[round(a), round(b)])
-
-            points = barrier.collisions.points(lagged)
-            self.contacts.build(self.surface.mesh, points, found, barrier.potential, owner, owner, blend)
-
-    def library_arguments(self, x: NDArray[np.float64]) -> tuple[Any, Any, NDArray[np.float64]]:
-        return self.contacts, self.surface.mesh, np.asfortranarray((self.surface.points(x) - self.start) / self.unit)
-
-    def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
-        if not project:
-            super().add_hessian(x, out, True)
-            return
-        mesh, surface = self.surface.mesh, self.surface
-        moved = surface.points(x) - self.start
-        reach = self.slow * self.unit
-        rows, columns, blocks = [], [], []
-        for k in range(len(self.contacts)):
-            contact = self.contacts[k]
-            points = [v for v in contact.vertex_ids(mesh.edges, mesh.faces) if v >= 0]
-            basis = np.asarray(contact.tangent_basis)
-            unit = np.eye(3 * len(points))[::3]
-            weights = np.array([contact.relative_velocity(e)[0] for e in unit])
-            y = float(np.linalg.norm(basis.T @ (weights @ moved[points])))
-            force = contact.weight * contact.mu_k * contact.normal_force_magnitude
-            block = force * (2.0 / reach - y / reach**2 if y < reach else 1.0 / y) * basis @ basis.T
-            ends = [(v, w) for p, c in zip(points, weights, strict=True) for v, w in self._ends(p, c)]
-            for a in range(len(ends)):
-                for b in range(a, len(ends)):
-                    twice = 2.0 if a != b and ends[a][0] == ends[b][0] else 1.0
-                    rows.append(ends[a][0])
-                    columns.append(ends[b][0])
-                    blocks.append(twice * ends[a][1] * ends[b][1] * block)
-        pairs = np.array([rows, columns], dtype=np.int32).reshape(2, -1)
-        out.couplings.append(Couplings(*pairs, np.array(blocks).reshape(-1, 3, 3)))
-
-    def _ends(self, point: int, weight: float) -> list[tuple[int, float]]:
-        """The solver's vertices that a point of the mesh depends on, with their shares of its weight."""
-        s = len(self.surface.vertices)
-        if point < s:
-            return [(int(self.surface.vertices[point]), weight)]
-        return [(int(v), 0.5 * weight) for v in self.surface.vertices[self.surface.middles[point - s]]]
+    contacts = ipctk.TangentialCollisions()
+    points = barrier.collisions.points(lagged)
+    contacts.build(surface.mesh, points, found, barrier.potential, owner, owner, blend)
+    k = len(contacts)
+    kinds, ids, weights = np.zeros(k, dtype=np.int8), np.full((k, 4), -1, dtype=np.int32), np.zeros((k, 4))
+    normals, forces = np.empty((k, 3)), np.empty(k)
+    for row in range(k):
+        contact = contacts[row]
+        own = [v for v in contact.vertex_ids(surface.mesh.edges, surface.mesh.faces) if v >= 0]
+        unit = np.eye(3 * len(own))[::3]
+        ids[row, : len(own)] = own
+        weights[row, : len(own)] = [contact.relative_velocity(e)[0] for e in unit]
+        kinds[row] = len(own) - 2
+        normals[row] = np.cross(*np.asarray(contact.tangent_basis).T)
+        forces[row] = contact.weight * contact.mu_k * contact.normal_force_magnitude
+    offsets = np.einsum("ki,kij->kj", weights, np.asarray(surface.points(start))[ids])
+    return Friction(surface, Slips(kinds, ids, weights, normals, offsets, forces), reach, contacts)

@@ -6,13 +6,21 @@ a vertex x is d = (x - c) . n, and its derivatives by c and the tip couple bodie
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.contact.closest.pair_geometry import VERTEX_VERTEX
 from supple.contact.collision_mesh.contact_surface import ContactSurface
 from supple.contact.obstacle_vertices import ObstacleRange
+from supple.contact.potentials.friction_energy import (
+    Slips,
+    add_friction_gradient,
+    friction_energy,
+    friction_hessian,
+    renew_duals,
+)
 from supple.implicit.energies.potential import ContactPotential, FrictionPotential, HessianBlocks
 from supple.numerics.sparse.couplings import Couplings
 
@@ -179,53 +187,30 @@ class PlaneFriction(FrictionPotential):
 
     Attributes
     ----------
-    vertices : (k,); base : (k,) a point of each one's plane, as a vertex
-    forces : (k,) mu lambda [N]; normals : (k, 3)
-    start : (k, 3) positions relative to `base`, if the vertices stuck to their planes during the step [m]
+    slips : of pairs of the solver's vertices: one near a plane, and a point of the plane
     reach : eps_v h [m], the displacement below which friction is static
+    duals : (k, 3), see `Friction`
     """
 
-    vertices: NDArray[np.int32]
-    base: NDArray[np.int32]
-    forces: NDArray[np.float64]
-    normals: NDArray[np.float64]
-    start: NDArray[np.float64]
+    slips: Slips
     reach: float
+    duals: NDArray[np.float64] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "duals", np.zeros((len(self.slips.forces), 3)))
 
     def value(self, x: NDArray[np.float64]) -> float:
-        _, y = self._slip(x)
-        e = self.reach
-        return float(self.forces @ np.where(y < e, y * y / e * (1.0 - y / (3.0 * e)) + e / 3.0, y))
+        return friction_energy(x, self.slips, self.reach)
 
     def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-        u, y = self._slip(x)
-        force = (self.forces * self._over_slip(y))[:, None] * u
-        np.add.at(out, self.vertices, force)
-        np.add.at(out, self.base, -force)
+        add_friction_gradient(x, self.slips, self.reach, out)
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
-        u, y = self._slip(x)
-        e = self.reach
-        across = self._over_slip(y)
-        along = across if project else np.where(y < e, 2.0 / e - 2.0 * y / (e * e), 0.0)
-        unit = u / np.maximum(y, 1e-300)[:, None]
-        n = self.normals
-        tangent = np.eye(3) - n[:, :, None] * n[:, None, :]
-        blocks = across[:, None, None] * tangent + (along - across)[:, None, None] * unit[:, :, None] * unit[:, None, :]
-        blocks *= self.forces[:, None, None]
-        np.add.at(out.vertices, self.vertices, blocks)
-        np.add.at(out.vertices, self.base, blocks)
-        out.couplings.append(Couplings(self.vertices, self.base, -blocks))
+        """The matrix of a primal-dual step, positive semi-definite without projection."""
+        out.couplings.append(friction_hessian(x, self.slips, self.reach, self.duals))
 
-    def _slip(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        moved = x[self.vertices] - x[self.base] - self.start
-        u = moved - np.einsum("ij,ij->i", moved, self.normals)[:, None] * self.normals
-        return u, np.linalg.norm(u, axis=1)
-
-    def _over_slip(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
-        """f1(y) / y."""
-        e = self.reach
-        return np.where(y < e, 2.0 / e - y / (e * e), 1.0 / np.maximum(y, e))
+    def renew(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> None:
+        renew_duals(x, direction, self.slips, self.reach, self.duals)
 
 
 def plane_friction(
@@ -255,4 +240,8 @@ def plane_friction(
         rows = p.obstacle[near] == index
         if rows.any():
             sticking[rows] = part.obstacle.carried(sticking[rows], *times) - part.targets(times[1])[0]
-    return PlaneFriction(p.vertices[near], p.base[near], forces, normals[near], sticking, reach)
+    pairs = np.full((len(near), 4), -1, dtype=np.int32)
+    pairs[:, 0], pairs[:, 1] = p.vertices[near], p.base[near]
+    kinds = np.full(len(near), VERTEX_VERTEX, dtype=np.int8)
+    weights = np.tile([1.0, -1.0, 0.0, 0.0], (len(near), 1))
+    return PlaneFriction(Slips(kinds, pairs, weights, normals[near], sticking, forces), reach)

@@ -14,7 +14,7 @@ from supple.contact.obstacle_vertices import ObstacleRange
 from supple.contact.start.start_error import raise_if_intersecting
 from supple.errors import SolverError
 from supple.implicit.contact.barrier import Barrier
-from supple.implicit.contact.friction import Friction
+from supple.implicit.contact.friction import Friction, friction
 from supple.implicit.contact.half_spaces import PlaneBarrier, PlaneFriction, Planes, plane_friction
 from supple.implicit.contact.scales import Scales
 from supple.scene.contact_pairs import PairTable
@@ -75,8 +75,8 @@ class ContactModel:
         h = times[1] - times[0]
         slow = self.scales.friction_velocity
         terms: list[Friction | PlaneFriction] = []
-        between = Friction(barriers.triangles, lagged, start, h, self.coefficients, slow)
-        if not between.contacts.empty():
+        between = friction(barriers.triangles, lagged, start, self.coefficients, slow * h)
+        if between is not None:
             terms.append(between)
         bodies = self.surface.body_count
         on_planes = self.coefficients[:bodies, bodies:]

@@ -20,7 +20,6 @@ class Projection(Enum):
     UNNEEDED = 0  # it is positive semi-definite everywhere
     RELEASED_FIRST = 1  # projected while Newton's method is far from the minimum
     RELEASED_LAST = 2  # projected until all other terms' true Hessians have not been enough
-    MAJORIZED = 3  # convex, but with a kink; projected, it is the Hessian of a quadratic that is nowhere below the term
 
 
 @dataclass(eq=False)
@@ -131,10 +130,13 @@ class ContactPotential(Potential):
 
 
 class FrictionPotential(ContactPotential):
-    """A term of friction. Its energy is a convex function of slips u, such as mu lambda f0(|u|).
+    """A term of friction. It has unknowns of its own, the duals, which make its Hessian that of a primal-dual step.
 
-    Its projected Hessian is that of the quadratic mu lambda (f0(|u|) + f1(|u|) (|v|^2 - |u|^2) / (2 |u|)) of slips v,
-    which touches the energy at v = u and is nowhere below it: mu lambda f1(|u|) / |u| T^T T with v = T x.
+    An objective with such a term serves one minimization.
     """
 
-    projection = Projection.MAJORIZED
+    projection = Projection.UNNEEDED
+
+    @abstractmethod
+    def renew(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> None:
+        """Set the duals to those at the end of a whole step from x (n, 3), whose Hessian gave `direction` (n, 3)."""

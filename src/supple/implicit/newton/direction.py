@@ -92,7 +92,7 @@ class DirectionFinder:
         vector, report = self._solve(gradient)
         while vector is None and self.policy.now is not ProjectedTerms.ALL:
             self.policy.step_back(bool(tools.hessian.couplings))
-            self.objective.model(here.positions, tools.hessian, self.policy.model)
+            self.objective.model(here.positions, tools.hessian, self.policy.now)
             vector, report = self._solve(gradient)
         if vector is None or not np.isfinite(vector).all():
             return None

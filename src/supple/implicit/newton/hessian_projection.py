@@ -2,14 +2,6 @@
 
 Far from the minimum all are. Near it, and where a body buckles, projection costs the quadratic rate of convergence:
 then the true Hessian is tried, first with contact still projected, which most often makes it indefinite.
-
-Friction has a kink: where a contact slides, its Hessian is zero along the slip, so that a step can overshoot the band
-in which it sticks by a thousand times the band's width, and the next one goes back as far. After a step that something
-has limited, the majorizer of friction takes the place of its Hessian: a step along it decreases friction whatever the
-length. After a whole step the Hessian itself, which converges faster, is used again.
-
-Source of the majorizer (iteratively reweighted least squares): Weiszfeld (1937); Hunter, Lange, "A Tutorial on MM
-Algorithms" (2004).
 """
 
 from __future__ import annotations
@@ -25,7 +17,7 @@ _LONGEST_WAIT = 4
 
 
 class ProjectedTerms(IntEnum):
-    """The terms whose Hessians are projected in an iteration, friction aside."""
+    """The terms whose Hessians are projected in an iteration."""
 
     ALL = 0
     RELEASED_LAST = 1
@@ -38,47 +30,22 @@ class ProjectedTerms(IntEnum):
         return self is ProjectedTerms.ALL and projection is Projection.RELEASED_FIRST
 
 
-@dataclass(frozen=True)
-class HessianModel:
-    """How the Hessian of one iteration is made.
-
-    Attributes
-    ----------
-    projected : the terms whose Hessians are projected
-    majorized : whether those of friction are
-    """
-
-    projected: ProjectedTerms = ProjectedTerms.ALL
-    majorized: bool = False
-
-    def projects(self, projection: Projection) -> bool:
-        """Whether the Hessian of a term that declares this `Potential.projection` is projected."""
-        return self.majorized if projection is Projection.MAJORIZED else self.projected.includes(projection)
-
-
 @dataclass(eq=False)
 class ProjectionPolicy:
     """What one minimization has found out.
 
     Attributes
     ----------
-    now : the terms to project next; majorize : whether to use the majorizer of friction next
+    now : the terms to project next
     wait : slow iterations between a failure of the true Hessian and its next trial; remaining : of them
     """
 
     now: ProjectedTerms = ProjectedTerms.ALL
-    majorize: bool = True
     wait: int = 1
     remaining: int = 1
 
-    @property
-    def model(self) -> HessianModel:
-        """The next Hessian."""
-        return HessianModel(self.now, self.majorize)
-
-    def note(self, slow: bool, touching: bool, whole: bool) -> None:
-        """After an iteration: whether it converged slowly, whether surfaces touch, and whether it took a whole step."""
-        self.majorize = not whole
+    def note(self, slow: bool, touching: bool) -> None:
+        """After an iteration: whether it converged slowly, and whether surfaces touch."""
         if not slow:
             self.remaining = max(self.remaining, 1)
             return

@@ -64,7 +64,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
     objective, convergence, hessian = problem.objective, problem.convergence, tools.hessian
     directions = DirectionFinder(objective, tools, problem.scale, convergence.step, problem.longest)
     policy, extension = directions.policy, Extension()
-    here = objective.model(x, hessian, policy.model)
+    here = objective.model(x, hessian, policy.now)
     rows: list[NewtonRow] = []
     if not np.isfinite(here.energy):
         return Outcome(Status.NOT_FINITE, here, "the energy at the start of Newton's method is not finite", rows)
@@ -84,10 +84,12 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
         slope = extension.factor * found.slope
         end, step, cuts = search(objective, here, vector, slope, largest, limits)
         extension.note(step, rate)
-        policy.note(rate > _LINEAR_RATE and largest == 1.0, found.touching, step == 1.0)
+        # Where the step is shorter, the duals of the whole direction are those that the next matrix needs, too.
+        objective.renew(here.positions, vector)
+        policy.note(rate > _LINEAR_RATE and largest == 1.0, found.touching)
         if step > 0.0:
             # A last step most often needs no Hessian at its end.
-            here = objective.model(end, None if last else hessian, policy.model)
+            here = objective.model(end, None if last else hessian, policy.now)
         row = NewtonRow(
             iteration=iteration,
             energy=here.energy,
@@ -107,7 +109,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
         if last:
             if step == 0.0 or _is_converged(problem, found.length, here, tools, found.touching):
                 return Outcome(Status.CONVERGED, here, "", rows)
-            here = objective.model(here.positions, hessian, policy.model)
+            here = objective.model(here.positions, hessian, policy.now)
         if step == 0.0:
             text = (
                 f"no step along Newton's direction ({found.length:.2e} m) lowers the energy, in iteration {iteration}"

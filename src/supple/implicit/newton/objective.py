@@ -8,11 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.energies.potential import ContactPotential, HessianBlocks, Potential
-from supple.implicit.newton.hessian_projection import HessianModel
+from supple.implicit.energies.potential import ContactPotential, FrictionPotential, HessianBlocks, Potential
+from supple.implicit.newton.hessian_projection import ProjectedTerms
 from supple.implicit.timings import Clock
-
-_PROJECTED = HessianModel()
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,15 +55,24 @@ class Objective:
         """(n, 3) [N]."""
         return _gradient(self.terms, x)
 
-    def model(self, x: NDArray[np.float64], hessian: HessianBlocks | None, kind: HessianModel = _PROJECTED) -> Model:
-        """Energy and gradient at x; the Hessian of the given kind into `hessian`, where there is one."""
+    def renew(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> None:
+        """Renew the duals of friction after a direction (n, 3) that was found at x (n, 3)."""
+        for term in self.terms:
+            if isinstance(term, FrictionPotential):
+                with self.clock.of(term.label):
+                    term.renew(x, direction)
+
+    def model(
+        self, x: NDArray[np.float64], hessian: HessianBlocks | None, projected: ProjectedTerms = ProjectedTerms.ALL
+    ) -> Model:
+        """Energy and gradient at x; the Hessian with some terms projected into `hessian`, where that is given."""
         gradient = np.zeros_like(x)
         if hessian is not None:
             hessian.clear()
         values = []
         for term in self.terms:
             with self.clock.of(term.label):
-                values.append(term.add_model(x, gradient, hessian, kind.projects(term.projection)))
+                values.append(term.add_model(x, gradient, hessian, projected.includes(term.projection)))
         return Model(x, sum(values), sum(abs(value) for value in values), gradient)
 
 
