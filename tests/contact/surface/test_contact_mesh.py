@@ -1,9 +1,12 @@
 """The contact mesh: where its points are, what is adjacent to what, and what stitches exclude."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import supple as sp
+from supple.contact.ccd.intersections import intersects
 from supple.contact.obstacle_vertices import obstacle_positions, with_obstacles
 from supple.contact.surface.contact_mesh import contact_mesh, mesh_of_triangles
 from supple.contact.surface.distances import edges_nearer, points_nearer
@@ -153,3 +156,18 @@ def listed(lists):
         for k in range(len(lists.start) - 1)
         for item in lists.items[lists.start[k] : lists.start[k + 1]].tolist()
     }
+
+
+def test_touching_seams_do_not_count_as_intersections():
+    half = sp.shapes.box((1, 1, 0.2), (6, 6, 1))
+    stitch = sp.SoftVertexTriangleStitch(
+        "a", "b", max_distance=0.02, youngs=1e5, poisson=0.4, min_separate_distance=1e-3
+    )
+    bodies = [sp.Body("a", half, RUBBER), sp.Body("b", half, RUBBER, position=(0, 0, 0.2))]
+    mesh, _, start = mesh_of(sp.Scene(bodies, stitches=[stitch]))
+    x = mesh.points.positions(start)
+    assert not intersects(mesh, x)
+    plain = replace(mesh, stitched=None)
+    assert intersects(plain, x)
+    through = x + np.array([0.1, 0.1, 0.25]) * (mesh.owner == 0)[:, None]
+    assert intersects(mesh, through)
