@@ -30,7 +30,7 @@ def pile(count: int) -> tuple[ContactMesh, NDArray[np.float64]]:
     """Bears beside and above each other, slightly turned: the surface, and where its points are (s, 3)."""
     bear = sp.shapes.gummy_bear().surface
     used, triangles = np.unique(bear.triangles, return_inverse=True)
-    one, triangles = bear.vertices[used], triangles.reshape(-1, 3)
+    one, triangles = bear.vertices[used], triangles.reshape(-1, 3).astype(np.int32)
     size = np.ptp(one, axis=0)
     side = int(np.ceil(count ** (1 / 3)))
     parts = []
