@@ -220,6 +220,11 @@ def first_frame(scene: Scene, start: StartFrame | State, solver: Solver | None =
             system = replace(system, start_states=(system.start_states[0], state))
     else:
         system = build_system(scene, state)
+    return start_frame(system, state, index, solver)
+
+
+def start_frame(system: System, state: State, index: int, solver: Solver | None) -> Frame:
+    """A frame without a step that led to it."""
     report = _report(system, state, StepReport(Status.CONVERGED, 0), 0.0)
     return Frame(index, state, system, report, solver=solver)
 
