@@ -208,7 +208,7 @@ def build_system(scene: Scene, start: State | None = None) -> System:
 
 
 def rebuilt_system(scene: Scene, start_states: tuple[State, ...], anchors: Sequence[NDArray[np.float64]]) -> System:
-    """The System of an earlier process, with the same bits: its `start_states`, and (k, 3) its `anchors` of each pin."""
+    """The System of an earlier process, with its bits: its `start_states`, and the (k, 3) `anchors` of each pin."""
     system = build_system(scene, start_states[0])
     pins = tuple(replace(pin, anchors=there) for pin, there in zip(system.pins, anchors, strict=True))
     return replace(system, pins=pins, start_states=start_states)

@@ -95,6 +95,9 @@ class RunPaths:
             )
 
     def remove_run(self) -> None:
-        """Delete an earlier run, but not its recording, which the next one replaces when it contains a frame."""
+        """Delete an earlier run, and what a run left that was killed before it had a journal."""
         if self.journal.exists():
+            self.journal.unlink()
             shutil.rmtree(self.own)
+        for path in (self.recording, *self.checkpoints()):
+            path.unlink(missing_ok=True)

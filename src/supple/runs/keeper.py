@@ -28,14 +28,15 @@ class Keeper:
     Parameters
     ----------
     paths : in the folder; recorder : of the recording in it; journal : of the run so far
+    checkpointed : index of the checkpoint that the run goes on from, or -1
     """
 
-    def __init__(self, paths: RunPaths, recorder: Recorder, journal: Journal) -> None:
+    def __init__(self, paths: RunPaths, recorder: Recorder, journal: Journal, checkpointed: int = -1) -> None:
         self.paths, self.recorder, self.journal = paths, recorder, journal
         self.log = RunLog(paths.log)
         self._last: Frame | None = None  # that was recorded
         self._good: Frame | None = None  # the last one that another step may start from
-        self._checkpointed = -1
+        self._checkpointed = checkpointed
         self._failure = ""  # the error that interrupted `begin` or `write`
 
     @property
@@ -44,15 +45,14 @@ class Keeper:
 
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         with self._watched():
+            # In this order, a run can be resumed as soon as it has a journal.
+            if self._checkpointed != first.index:
+                self._write_checkpoint(first)
             self.journal = self.journal.with_session(Session(first_frame=first.index, last_frame=first.index))
             write_journal(self.paths.journal, self.journal)
             self.log.note(f"frame {first.index} of {self.run.last_index}: begins, with {self.run.solver}")
             self.recorder.begin(first, dt, steps)
             self._last = self._good = first
-            if self.paths.checkpoint(first.index).exists():
-                self._checkpointed = first.index
-            else:
-                self._write_checkpoint(first)
 
     def write(self, frame: Frame) -> None:
         with self._watched():

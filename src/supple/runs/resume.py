@@ -13,6 +13,7 @@ from supple.output.checkpoint.file import Checkpoint, read_checkpoint
 from supple.output.checkpoint.scene_hash import scene_hash
 from supple.output.recording.continued import ContinuedRecorder
 from supple.output.recording.reader import read_recording
+from supple.output.recording.recorder import Recorder
 from supple.runs.contents import RunPaths
 from supple.runs.facts import differences, versions
 from supple.runs.journal import Journal, read_journal
@@ -40,10 +41,18 @@ class ResumedFolder(FolderSink):
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         """Lock the folder, and make room for the rest."""
         self._lock = FolderLock(self.paths.folder)
-        recorder = ContinuedRecorder(self.paths.recording, compress=self._journal.compress)
-        self._keeper = Keeper(self.paths, recorder, self._journal)
+        recorder = self._recorder()
+        self._keeper = Keeper(self.paths, recorder, self._journal, checkpointed=first.index)
         self._keeper.begin(first, dt, steps)
         self.paths.remove_checkpoints_after(first.index)
+
+    def _recorder(self) -> Recorder:
+        """A run that was killed at its very start has no recording yet."""
+        paths, journal = self.paths, self._journal
+        if paths.recording.exists():
+            return ContinuedRecorder(paths.recording, compress=journal.compress)
+        text = paths.scene.read_text(encoding="utf-8") if paths.scene.exists() else None
+        return Recorder(paths.recording, scene_text=text, solver=journal.run.solver, compress=journal.compress)
 
 
 def resume(
@@ -99,19 +108,21 @@ def last_checkpoint(paths: RunPaths) -> Checkpoint:
 
     Raises
     ------
-    OutputError : where there is none.
+    OutputError : where there is none, or the recording cannot be read.
     """
-    with read_recording(paths.recording) as recording:
-        recorded = recording[-1].index
+    recorded = -1
+    if paths.recording.exists():
+        with read_recording(paths.recording) as recording:
+            recorded = recording[-1].index
     for path in paths.checkpoints():
         try:
             checkpoint = read_checkpoint(path)
         except OutputError as error:
             logger.warning("%s", error)
             continue
-        if checkpoint.index <= recorded:
+        if checkpoint.index <= recorded or checkpoint.index == checkpoint.run.first_index:
             return checkpoint
-        logger.warning("%s: is later than the recording, which ends with frame %d", path, recorded)
+        logger.warning("%s: is later than the recording", path)
     raise OutputError(f"{paths.folder}: has no whole checkpoint, so that the run cannot be resumed; run it again")
 
 
