@@ -37,6 +37,7 @@ class Keeper:
         self._last: Frame | None = None  # that was recorded
         self._good: Frame | None = None  # the last one that another step may start from
         self._checkpointed = checkpointed
+        self._first_index: int | None = None  # of the session, once it is in the journal
         self._failure = ""  # the error that interrupted `begin` or `write`
 
     @property
@@ -50,6 +51,7 @@ class Keeper:
                 self._write_checkpoint(first)
             self.journal = self.journal.with_session(Session(first_frame=first.index, last_frame=first.index))
             write_journal(self.paths.journal, self.journal)
+            self._first_index = first.index
             self.log.note(f"frame {first.index} of {self.run.last_index}: begins, with {self.run.solver}")
             self.recorder.begin(first, dt, steps)
             self._last = self._good = first
@@ -73,30 +75,46 @@ class Keeper:
             raise
 
     def end(self) -> None:
-        """Write the last checkpoint and the tables. After a failure, errors are only logged: the first one counts."""
+        """Write the last checkpoint and the tables, and close everything; all that is possible after an error.
+
+        Raises
+        ------
+        OutputError : where the system refuses for the first time; otherwise, the first error has been raised before.
+        """
+        first: OutputError | None = None
         try:
-            is_there = self.paths.checkpoint_folder.is_dir()  # somebody may have removed it, which ended the run
-            if self._good is not None and self._good.index != self._checkpointed and is_there:
-                self._write_checkpoint(self._good)
-            self.recorder.end()
-            if self._last is not None:
-                for path in self.paths.tables:
-                    export(self.paths.recording, path.suffix[1:], path)
-            self._end_session()
-        except OutputError as error:
-            if not self._failure:
-                raise
-            logger.warning("%s", error)
+            for act in (self._write_last_checkpoint, self.recorder.end, self._end_session, self._write_tables):
+                try:
+                    act()
+                except OutputError as error:
+                    if self._failure:
+                        logger.warning("%s", error)
+                    else:
+                        first, self._failure = error, str(error)
         finally:
             self.recorder.end()
             self.log.close()
+        if first is not None:
+            raise first
+
+    def _write_last_checkpoint(self) -> None:
+        is_there = self.paths.checkpoint_folder.is_dir()  # where somebody has removed it, it is not made again
+        if self._good is not None and self._good.index != self._checkpointed and is_there:
+            self._write_checkpoint(self._good)
 
     def _end_session(self) -> None:
+        if self._first_index is None or not self.paths.own.is_dir():
+            return
         outcome, message = self._outcome()
-        index = self.journal.sessions[-1].first_frame if self._last is None else self._last.index
+        index = self._first_index if self._last is None else self._last.index
         ended = self.journal.with_last(ended=now(), last_frame=index, outcome=outcome, message=message)
         write_journal(self.paths.journal, ended)
         self.log.note(f"frame {index} of {self.run.last_index}: {outcome}{message and ': '}{message}")
+
+    def _write_tables(self) -> None:
+        if self._last is not None and self.paths.recording.exists():
+            for path in self.paths.tables:
+                export(self.paths.recording, path.suffix[1:], path)
 
     def _outcome(self) -> tuple[str, str]:
         """How the session ended, and why."""
