@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
@@ -63,6 +64,23 @@ def test_a_stopped_process_keeps_its_lock(tmp_path, holder):
     holder.send_signal(signal.SIGSTOP)
     time.sleep(0.05)
     assert is_locked(tmp_path)
+
+
+def test_asking_refuses_nobody(tmp_path):
+    asking = threading.Event()
+
+    def ask():
+        while not asking.is_set():
+            is_locked(tmp_path)
+
+    asker = threading.Thread(target=ask)
+    asker.start()
+    try:
+        for _ in range(200):
+            FolderLock(tmp_path).release()
+    finally:
+        asking.set()
+        asker.join()
 
 
 def test_a_file_of_that_name_is_no_lock(tmp_path):

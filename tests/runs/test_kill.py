@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import random
+import signal
 import subprocess
 import sys
 import time
@@ -66,27 +68,100 @@ def scene_of(tmp_path_factory):
     return made
 
 
-def killed(arguments, folder, seconds):
-    """Start a process, and kill it a while after its run folder has appeared; returns whether it was still running."""
-    process = subprocess.Popen([sys.executable, "-m", "supple", *map(str, arguments)], stderr=subprocess.PIPE)
-    begun = time.monotonic()
-    while not is_locked(folder) and process.poll() is None and time.monotonic() - begun < 120:
-        time.sleep(0.002)
-    time.sleep(seconds)
-    process.kill()
-    errors = process.communicate()[1].decode()
-    assert "Traceback" not in errors
-    return process.returncode != 0
+# Forks a process for each line: `run` or `resume`, scene file, folder. A fresh interpreter would take seconds to start.
+SERVER = """
+import os, sys
+import supple as sp
+from supple.runs.resume import resume
+from supple.runs.run_folder import RunFolder, SceneSource
+from supple.scene_file.resolved import resolved_scene
+
+def work(what, path, folder):
+    if what == "resume":
+        frames = resume(folder)
+    else:
+        run = sp.load_run(path)
+        files = resolved_scene(run, solver=None, dt=run.dt, steps=run.steps)
+        source = SceneSource({"kind": "scene_file"}, run.text, files)
+        sink = RunFolder(folder, run.solver, checkpoint_every=4, source=source)
+        frames = sp.simulate(run.scene, run.solver, run.dt, run.steps, sinks=[sink])
+    for frame in frames:
+        pass
+
+for path in sys.argv[1:]:
+    run = sp.load_run(path)
+    list(sp.simulate(run.scene, run.solver, run.dt, 8))
+print("ready", flush=True)
+for line in sys.stdin:
+    process = os.fork()
+    if process == 0:
+        try:
+            work(*line.split())
+        finally:
+            os._exit(0)
+    print(process, flush=True)
+    print(os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]), flush=True)
+"""
 
 
-def survives(out, scene_of, solver, seconds, kills):
-    """Kill a run several times, then let it end; it must equal the one that was never killed."""
+class Commands:
+    """Runs in processes of the command line."""
+
+    def start(self, what, path, out):
+        arguments = [what, path, "-o", out, "--checkpoint-every", 4] if what == "run" else [what, out]
+        command = [sys.executable, "-m", "supple", *map(str, arguments), "-q"]
+        self.process = subprocess.Popen(command, stderr=subprocess.PIPE)
+
+    def kill(self):
+        self.process.kill()
+        errors = self.process.communicate()[1].decode()
+        assert "Traceback" not in errors
+        return self.process.returncode
+
+
+class Forks:
+    """Runs in processes that a server forks."""
+
+    def __init__(self, paths):
+        one_thread = dict.fromkeys(("NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+        self.server = subprocess.Popen(
+            [sys.executable, "-c", SERVER, *map(str, paths)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env={**os.environ, **one_thread},
+        )
+        assert self.server.stdout.readline() == "ready\n"
+
+    def start(self, what, path, out):
+        self.server.stdin.write(f"{what} {path} {out}\n")
+        self.server.stdin.flush()
+        self.number = int(self.server.stdout.readline())
+
+    def kill(self):
+        os.kill(self.number, signal.SIGKILL)  # the server still waits for it, so that the number is not another's
+        return int(self.server.stdout.readline())
+
+    def close(self):
+        self.server.kill()
+        self.server.communicate()
+
+
+def survives(out, scene_of, starter, solver, seconds):
+    """Kill a run several times, then let it end; it must equal the one that was never killed.
+
+    Returns how often it was killed while it was running.
+    """
     path, whole, duration = scene_of(solver)
-    paths, interrupted = RunPaths(out), 0
-    for k in range(kills):
-        begins = not paths.journal.exists()  # a run that was killed even before that has left nothing to resume
-        arguments = ["run", path, "-o", out, "-q", "--checkpoint-every", 4] if begins else ["resume", out, "-q"]
-        interrupted += killed(arguments, out, seconds[k % len(seconds)] * duration)
+    paths, kills = RunPaths(out), 0
+    for share in seconds:
+        # A run that was killed before it had a journal has left nothing to resume.
+        starter.start("resume" if paths.journal.exists() else "run", path, out)
+        begun = time.monotonic()
+        while not is_locked(out) and not paths.recording.exists() and time.monotonic() - begun < 120:
+            time.sleep(0.001)
+        time.sleep(share * duration)
+        kills += starter.kill() != 0
         if paths.recording.exists():
             with sp.read_recording(paths.recording) as recording:
                 assert all(map(same_bits, whole, list(recording)[1:]))
@@ -101,18 +176,25 @@ def survives(out, scene_of, solver, seconds, kills):
     with sp.read_recording(paths.recording) as recording:
         assert [frame.index for frame in recording] == list(range(len(whole) + 1))
         assert all(map(same_bits, whole, list(recording)[1:]))
-    return interrupted
+    assert not is_locked(out)
+    return kills
 
 
 @pytest.mark.parametrize(("solver", "seconds"), [("xpbd", 0.5), ("bdf2", 0.6)])
 def test_a_killed_run_resumes(tmp_path, scene_of, solver, seconds):
-    survives(tmp_path / "out", scene_of, solver, [seconds], 1)
+    survives(tmp_path / "out", scene_of, Commands(), solver, [seconds])
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(25))
-@pytest.mark.parametrize("solver", SOLVERS)
-def test_a_hundred_killed_runs_resume(tmp_path, scene_of, solver, seed):
-    chance = random.Random(f"{solver} {seed}")
-    seconds = [chance.uniform(0.0, 1.2) for _ in range(3)]
-    survives(tmp_path / "out", scene_of, solver, seconds, chance.randint(1, 3))
+@pytest.mark.skipif(os.name != "posix", reason="only POSIX forks processes")
+def test_a_hundred_killed_runs_resume(tmp_path, scene_of):
+    chance, kills = random.Random(7), 0
+    starter = Forks([scene_of(solver)[0] for solver in SOLVERS])
+    try:
+        for k in range(100):
+            solver = list(SOLVERS)[k % len(SOLVERS)]
+            seconds = [chance.uniform(0.0, 0.6) for _ in range(3)]
+            kills += survives(tmp_path / f"out{k}", scene_of, starter, solver, seconds)
+    finally:
+        starter.close()
+    assert kills >= 100

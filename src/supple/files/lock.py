@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -11,6 +12,8 @@ from supple.errors import OutputError
 from supple.files.replacing import output_error
 
 LOCK_NAME = ".supple.lock"
+# `is_locked` holds the lock for a moment, which must not refuse a run [s].
+_TRIES, _PAUSE = 5, 0.02
 
 
 class FolderLock:
@@ -27,6 +30,7 @@ class FolderLock:
 
     def __init__(self, folder: Path) -> None:
         self._path = folder / LOCK_NAME
+        tries = 0
         while True:
             try:
                 self._file = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o644)
@@ -34,7 +38,11 @@ class FolderLock:
                 raise output_error(self._path, error) from None
             if not _lock(self._file):
                 os.close(self._file)
-                raise in_use(folder)
+                tries += 1
+                if tries == _TRIES:
+                    raise in_use(folder)
+                time.sleep(_PAUSE)
+                continue
             # The owner of the lock may have deleted the file after it was opened here.
             with suppress(OSError):
                 if os.path.samestat(os.fstat(self._file), self._path.stat()):

@@ -97,7 +97,8 @@ def read_journal(path: Path) -> Journal:
     OutputError : where it is missing, damaged, or of a newer version.
     """
     if not path.exists():
-        raise OutputError(f"{path.parent}: is no run folder: it has no {path.name}; give the --output of a run")
+        folder, inside = path.parent.parent, f"{path.parent.name}/{path.name}"
+        raise OutputError(f"{folder}: is no run folder: it has no {inside}; give the --output of a run")
     try:
         text = path.read_bytes()
         if json.loads(text)["format"] != _FORMAT:
