@@ -129,7 +129,7 @@ class Forks:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
-            env={**os.environ, **one_thread},
+            env={**os.environ, **one_thread, "NUMBA_THREADING_LAYER": "workqueue"},  # processes with OpenMP cannot fork
         )
         assert self.server.stdout.readline() == "ready\n"
 
