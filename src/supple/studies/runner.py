@@ -159,9 +159,7 @@ def _result_of(future: Any, measured_by: str) -> CaseResult:
     try:
         return future.result()
     except KilledWorker as error:
-        reason = (
-            f"every worker that simulated it was lost ({error.allowed_failures + 1} of them); see the folder workers"
-        )
+        reason = f"{error.allowed_failures + 1} workers were lost that simulated it; see the folder workers"
     except CancelledError:
         reason = "it was cancelled: the connection to the scheduler was lost"
     except Exception as error:  # in sending the job, or the result

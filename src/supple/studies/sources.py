@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import copyreg
 import hashlib
+import importlib
 import inspect
 import json
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from supple.errors import StudyError
@@ -19,6 +23,15 @@ from supple.scene_file.paths import unit_of, with_values
 from supple.scene_file.yaml_reader import YamlDocument, read_yaml
 from supple.scene_file.yaml_writer import yaml_text
 from supple.system import Solver
+
+
+def _by_name(module: ModuleType) -> tuple[Callable[[str], ModuleType], tuple[str]]:
+    return importlib.import_module, (module.__name__,)
+
+
+# A function that says `sp.Scene` refers to the module `supple`, which is of a class of lazy_loader's. It is sent to
+# workers by its name, as all other modules are. The scheduler, which sends jobs on, imports this file too.
+copyreg.pickle(type(sys.modules["supple"]), _by_name)  # pyright: ignore[reportArgumentType]
 
 SCENE_FILE = "scene.yaml"
 _BLOCK = 1 << 20
