@@ -23,6 +23,8 @@ _TERMINATE = 0.95
 _SHARE = 0.9
 _CONNECT_SECONDS = 30
 
+logger = logging.getLogger(__name__)
+
 
 class Workers(ABC):
     """Processes that simulate cases, one at a time each."""
@@ -117,6 +119,7 @@ class ClusterWorkers(Workers):
 
     def __init__(self, client: Any) -> None:
         self.client = client
+        self._warned = False
         for address, worker in self._workers().items():
             if worker["nthreads"] != 1:
                 raise StudyError(
@@ -135,7 +138,11 @@ class ClusterWorkers(Workers):
         return able
 
     def tend(self) -> None:
-        return  # the cluster's own supervisors start workers
+        # The cluster's own supervisors start workers; they may wait long in a queue.
+        missing = not self._workers()
+        if missing and not self._warned:
+            logger.warning("the scheduler %s has no workers; waiting for them", self.client.scheduler.address)
+        self._warned = missing
 
     def _workers(self) -> dict[str, Any]:
         return self.client.scheduler_info(n_workers=-1)["workers"]
