@@ -121,6 +121,8 @@ def test_a_failed_case_is_recorded_with_its_reason_and_is_never_fatal(cluster, t
             return {}["absent"]
         if kind == "wrong":
             return 3
+        if kind == "exit":
+            raise SystemExit("enough")
         youngs = 1e300 if kind == "stiff" else 1e4
         mesh = sp.shapes.box((1, 1, 1), (1, 1, 1))
         cube = sp.Body("cube", mesh, sp.StableNeoHookean(youngs=youngs, poisson=0.3), velocity=(0, 1e200, 0))
@@ -129,24 +131,25 @@ def test_a_failed_case_is_recorded_with_its_reason_and_is_never_fatal(cluster, t
     def measure(recording):
         return {"y": recording[-1].positions["cube"][:, 1].mean(), "n": len(recording)}
 
-    kinds = ["fine", "error", "bug", "wrong", "stiff"]
+    kinds = ["fine", "error", "bug", "wrong", "stiff", "exit"]
     progress = []
     options = {"measure": measure, "folder": tmp_path / "s", "scheduler": cluster, **SETTINGS}
     table = sp.sweep(make, {"kind": kinds}, progress=progress.append, **options)
-    assert table.done.tolist() == [True, False, False, False, False]
+    assert table.done.tolist() == [True] + [False] * 5
     assert table.reasons[0] == ""
     assert table.reasons[1] == "this scene is impossible"
     assert table.reasons[2] == "KeyError: 'absent'"
     assert table.reasons[3] == "make returned a int; return a Scene, or a Run with its own solver"
     assert table.reasons[4].startswith("frame 1: ")
+    assert table.reasons[5] == "SystemExit: enough"
     assert np.isnan(table["y"][1:]).all()
-    assert (progress[-1].done, progress[-1].failed, progress[-1].cases) == (1, 4, 5)
+    assert (progress[-1].done, progress[-1].failed, progress[-1].cases) == (1, 5, 6)
     assert progress[-1].seconds_left == 0.0
     trace = (tmp_path / "s" / "cases" / table.keys[2] / "log.txt").read_text(encoding="utf-8")
     assert "Traceback" in trace
     with (tmp_path / "s" / "table.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    assert [row["status"] for row in rows] == ["done"] + ["failed"] * 4
+    assert [row["status"] for row in rows] == ["done"] + ["failed"] * 5
     assert [row["reason"] for row in rows] == list(table.reasons)
     # Failed cases stay as they are, unless they are to be tried again.
     logs = tmp_path / "s" / "cases" / table.keys[2] / "log.txt"
@@ -155,6 +158,26 @@ def test_a_failed_case_is_recorded_with_its_reason_and_is_never_fatal(cluster, t
     assert logs.stat().st_mtime_ns == before
     sp.sweep(make, {"kind": kinds}, retry_failed=True, **options)
     assert logs.stat().st_mtime_ns > before
+
+
+def test_a_measure_that_fails_is_taken_again_without_a_simulation(cluster, scene_file, tmp_path):
+    def study(measure):
+        return sp.sweep(scene_file, {"steps": [3]}, measure=measure, folder=tmp_path / "s", scheduler=cluster)
+
+    def infinite(recording):
+        return float("inf")
+
+    def frames(recording):
+        return len(recording)
+
+    table = study(infinite)
+    assert table.reasons == ("the measure 'measure' is inf; it must be finite",)
+    first = result_times(tmp_path / "s")
+    table = study(frames)
+    assert table["measure"].tolist() == [4.0]
+    assert table.reasons == ("",)
+    assert result_times(tmp_path / "s") == first
+    assert study(lambda recording: "many").reasons[0].startswith("the measure 'measure' is 'many'; return a number")
 
 
 def killing(marks: Path, victims: str):

@@ -41,18 +41,17 @@ def run_case(job: Job, folder: Path, measure: Measure, measured_by: str) -> Case
     """
     with _ONE_CASE, numba_threads(_threads()):
         began = time.perf_counter()
-        result = read_result(folder)
+        result = CaseResult("failed")
         try:
-            if result is None or not result.simulated or not (folder / RECORDING).exists():
-                folder.mkdir(parents=True, exist_ok=True)
-                result = _simulated(job, folder)
+            result = _earlier(folder) or _simulated(job, folder)
             if result.simulated:
-                result = replace(result, status="done", reason="", measures={}, measured_by=measured_by)
-                result = replace(result, measures=_measured(folder / RECORDING, measure))
-        except Exception as error:  # of any kind: the function that makes the scene, and the measure, are the user's
+                result = replace(result, status="failed", reason="", measures={})
+                result = replace(result, status="done", measures=_measured(folder / RECORDING, measure))
+        # Of any kind: the function that makes the scene, and the measure, are the user's.
+        except (Exception, SystemExit) as error:
             with contextlib.suppress(OSError):
                 (folder / LOG).write_text(traceback.format_exc(), encoding="utf-8")
-            result = replace(result or CaseResult("failed"), status="failed", reason=_reason(error))
+            result = replace(result, reason=_reason(error))
         if result.status == "deferred":
             return result
         result = replace(result, measured_by=measured_by, wall_seconds=result.wall_seconds or _since(began))
@@ -63,7 +62,14 @@ def run_case(job: Job, folder: Path, measure: Measure, measured_by: str) -> Case
         return result
 
 
+def _earlier(folder: Path) -> CaseResult | None:
+    """The result of an earlier run of the study, where its recording is complete."""
+    result = read_result(folder)
+    return result if result is not None and result.simulated and (folder / RECORDING).exists() else None
+
+
 def _simulated(job: Job, folder: Path) -> CaseResult:
+    folder.mkdir(parents=True, exist_ok=True)
     run = job.load(folder)
     needed, allowed = _PROGRAM + run.solver.bytes_needed(run.scene), _memory_limit()
     if allowed is not None and needed > allowed:
