@@ -305,7 +305,7 @@ def test_an_interrupted_study_keeps_what_has_ended_and_leaves_no_process(tmp_pat
     workers = json.loads(subprocess.check_output(["python3", "-c", CHILDREN, str(process.pid)]))
     assert workers
     process.send_signal(signal.SIGINT)
-    _, error = process.communicate(timeout=60)
+    _, error = process.communicate(timeout=300)
     assert b"KeyboardInterrupt" in error
     with (tmp_path / "s" / "table.csv").open(encoding="utf-8", newline="") as file:
         assert [row["status"] for row in csv.DictReader(file)] == ["done", "done"]
