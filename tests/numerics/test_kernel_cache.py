@@ -33,10 +33,10 @@ def copied_package(tmp_path):
     package = tmp_path / "supple"
     shutil.copytree(SOURCES, package, ignore=shutil.ignore_patterns("__pycache__"))
 
-    def run():
+    def run(prelude=""):
         environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
         done = subprocess.run(
-            [sys.executable, "-c", RUN_KERNEL], capture_output=True, text=True, env=environment, cwd=tmp_path
+            [sys.executable, "-c", prelude + RUN_KERNEL], capture_output=True, text=True, env=environment, cwd=tmp_path
         )
         assert done.returncode == 0, done.stderr
         return done.stdout.strip()
@@ -68,6 +68,15 @@ def test_a_cache_that_cannot_be_read_is_made_anew(copied_package, content):
     for index in indices:
         index.write_bytes(pickle.dumps(numba.__version__) + content)
     assert run() == "[3.0, 2.0, 1.0] 0"
+    assert run().endswith(" 1")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="only POSIX limits the size of files")
+def test_a_kernel_runs_where_its_cache_has_no_room(copied_package):
+    _, run = copied_package
+    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))\n"
+    assert run("import sys; sys.dont_write_bytecode = True\n" + limit) == "[3.0, 2.0, 1.0] 0"
+    assert run() == "[3.0, 2.0, 1.0] 0", "nothing incomplete was kept"
     assert run().endswith(" 1")
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import pickle
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cached_property, partial
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
@@ -52,8 +53,14 @@ class KernelCache(FunctionCache):
         try:
             return super().load_overload(sig, target_context)
         except Exception:  # the files name a module that has moved since, or are damaged: unpickling may raise anything
-            self.flush()
+            with suppress(OSError):
+                self.flush()
             return None
+
+    def save_overload(self, sig, data):
+        # A kernel that is not kept is compiled again next time: a full disk is no reason to end a run.
+        with suppress(OSError):
+            super().save_overload(sig, data)
 
     @cached_property
     def _stamp(self) -> tuple[Any, bytes]:
