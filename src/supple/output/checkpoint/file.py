@@ -146,6 +146,7 @@ def _is_a_state(state: object, like: State) -> bool:
     return (
         isinstance(state, State)
         and isinstance(state.time, float)
+        and isinstance(state.inputs, dict)
         and all(
             isinstance(rows, np.ndarray)
             and rows.dtype == np.float64
