@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -42,8 +41,7 @@ class Batch:
     solver : of all copies
     dt : length of a step [s]
     parameters : for a function: by name, n values, of which each copy gets its own
-    threads : number of threads that copies run on; None: one per core, at most n. With more than one, each copy runs
-        on one thread.
+    threads : number of threads that step copies; None: one per core. Each copy runs on one of them.
 
     Raises
     ------
@@ -72,7 +70,7 @@ class Batch:
         needed = sum(solver.bytes_needed(one) for one in scenes)
         require_memory(needed, f"Batch: {n} copies of the scene", "give fewer copies, or make the meshes coarser")
         self.threads = min(int(n), int(threads or os.cpu_count() or 1))
-        with numba_threads(1 if self.threads > 1 else None):
+        with numba_threads(1):
             self._copies = [Copy.of(one, solver) for one in scenes]
         same_bodies(self._copies)
         self._start = self.snapshot()
@@ -86,36 +84,39 @@ class Batch:
     def scenes(self) -> tuple[Scene, ...]:
         return tuple(copy.system.scene for copy in self._copies)
 
-    def step(self, actions: Mapping[str, ArrayLike] | None = None) -> None:
-        """Advance all copies by `dt`.
+    def step(self, actions: Mapping[str, ArrayLike] | None = None, copies: ArrayLike | None = None) -> None:
+        """Advance copies by `dt`.
 
         Parameters
         ----------
         actions : by name of an input, the values that it shall have at the end of the step: one for each copy, in an
             array with n rows, or one for all. Other inputs stay as they are.
+        copies : which ones, as for `restore`; the others stay where they are
 
         Raises
         ------
         SceneError, SolverError : where an action does not suit its input, or a step cannot begin; no copy has moved.
         """
         wanted = self._wanted(actions)
-        after: list[Moment | None] = [None] * len(self)
-        left = itertools.count()
+        moving = self._numbers(copies)
+        after: dict[int, Moment] = {}
+        left = iter(moving)  # each thread takes the next copy; the iterator of a list is safe in threads
 
         def work() -> None:
             with numba_threads(1):
-                while (k := next(left)) < len(self):
+                for k in left:
                     after[k] = self._copies[k].after(self.dt, wanted[k])
 
         if self.threads == 1:
-            after = [copy.after(self.dt, values) for copy, values in zip(self._copies, wanted, strict=True)]
+            work()
         else:
             pool = self._threads()
-            for ended in [pool.submit(work) for _ in range(self.threads)]:
-                ended.result()
-        for copy, moment in zip(self._copies, after, strict=True):
-            assert moment is not None
-            copy.now = moment
+            running = [pool.submit(work) for _ in range(self.threads)]
+            for error in [one.exception() for one in running]:  # waits for all of them
+                if error is not None:
+                    raise error
+        for k, moment in after.items():
+            self._copies[k].now = moment
 
     def snapshot(self) -> BatchSnapshot:
         """Where all copies are. Steps from there have the same bits each time, also from the middle of contact."""
