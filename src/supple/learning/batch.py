@@ -55,7 +55,7 @@ class Batch:
         solver: Solver | None = None,
         dt: float = 1.0 / 60.0,
         *,
-        parameters: Mapping[str, Sequence[Any] | ArrayLike] | None = None,
+        parameters: Mapping[str, Sequence[Any] | NDArray[Any]] | None = None,
         threads: int | None = None,
     ) -> None:
         for name, count in (("n", n), ("threads", threads)):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from supple.errors import SceneError
 from supple.scene.scene import Scene
@@ -65,7 +65,7 @@ class Copy:
 
 
 def scenes_of(
-    source: Scene | Callable[..., Scene], n: int, parameters: Mapping[str, Sequence[Any] | ArrayLike] | None
+    source: Scene | Callable[..., Scene], n: int, parameters: Mapping[str, Sequence[Any] | NDArray[Any]] | None
 ) -> list[Scene]:
     """The scenes of n copies; see `Batch`."""
     if isinstance(source, Scene):

@@ -128,4 +128,6 @@ class BatchEnv(gymnasium.Env):
         self._vector.close()
 
 
-gymnasium.register("Supple/Reaching-v0", entry_point=BatchEnv, vector_entry_point=BatchVectorEnv)
+gymnasium.register(
+    "Supple/Reaching-v0", entry_point=f"{__name__}:BatchEnv", vector_entry_point=f"{__name__}:BatchVectorEnv"
+)

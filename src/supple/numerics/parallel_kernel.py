@@ -10,6 +10,7 @@ from typing import Any
 
 import numba
 from numba.core.dispatcher import Dispatcher
+from numba.np.ufunc.parallel import threading_layer
 
 
 class ParallelKernel:
@@ -65,7 +66,7 @@ class _Threads:
         """The parent's threads do not exist in the child, and its lock may have been held by one of them."""
         self.lock = threading.Lock()
         try:
-            self._lost = numba.threading_layer() == "omp"
+            self._lost = threading_layer() == "omp"
         except ValueError:  # the parent had not used any
             self._lost = False
 

@@ -10,18 +10,18 @@ from pathlib import Path
 from supple.errors import OutputError, SceneError
 from supple.files.lock import FolderLock, in_use, is_locked
 from supple.output.checkpoint.file import Checkpoint, read_checkpoint
-from supple.output.checkpoint.scene_hash import scene_hash
 from supple.output.recording.continued import ContinuedRecorder
 from supple.output.recording.reader import read_recording
 from supple.output.recording.recorder import Recorder
+from supple.runs.checkpoints import frame_of
 from supple.runs.contents import RunPaths
 from supple.runs.facts import differences, versions
 from supple.runs.journal import Journal, read_journal
 from supple.runs.keeper import Keeper
 from supple.runs.run_folder import FolderSink
 from supple.scene.scene import Scene
-from supple.simulate import Control, Frame, Frames, Sink, simulate, start_frame
-from supple.system import Solver, rebuilt_system
+from supple.simulate import Control, Frame, Frames, Sink, simulate
+from supple.system import Solver
 
 logger = logging.getLogger(__name__)
 
@@ -146,9 +146,7 @@ def _of_scene_file(paths: RunPaths, journal: Journal) -> tuple[Scene, Solver]:
 
 def _start(paths: RunPaths, checkpoint: Checkpoint, scene: Scene, solver: Solver) -> Frame:
     """The frame of a checkpoint."""
-    count = sum(len(body.mesh.vertices) for body in scene.bodies)
-    if len(checkpoint.state.positions) == count and len(checkpoint.anchors) == len(scene.pins):
-        system = rebuilt_system(scene, checkpoint.start_states, checkpoint.anchors)
-        if scene_hash(system, *checkpoint.run.span) == checkpoint.run.scene:
-            return start_frame(system, checkpoint.state, checkpoint.index, solver)
-    raise SceneError(f"{paths.folder}: the scene is not the one that was run; give that one, or start another run")
+    frame = frame_of(checkpoint, scene, solver)
+    if frame is None:
+        raise SceneError(f"{paths.folder}: the scene is not the one that was run; give that one, or start another run")
+    return frame

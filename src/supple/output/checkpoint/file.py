@@ -152,6 +152,7 @@ def _is_a_state(state: object, like: State) -> bool:
             and rows.dtype == np.float64
             and rows.ndim == 2
             and rows.shape == (len(like.positions), 3)
+            and bool(np.isfinite(rows).all())
             for rows in (state.positions, state.velocities)
         )
     )
