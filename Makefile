@@ -16,8 +16,8 @@ install = ($(BIN)/python -m uv pip install -q --compile-bytecode --python $(BIN)
 .DELETE_ON_ERROR:
 
 demo: .venv/.base
-	$(BIN)/supple demo squash --output out/squash
-	$(BIN)/supple demo bears --output out/bears
+	$(BIN)/supple demo squash --overwrite --output out/squash
+	$(BIN)/supple demo bears --overwrite --output out/bears
 
 test: .venv/.dev
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"

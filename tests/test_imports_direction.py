@@ -16,6 +16,7 @@ LAYERS = (
     ("cli",),
     ("demos",),
     ("viewer",),
+    ("runs",),
     ("output", "scene_file"),
     ("simulate",),
     ("xpbd", "implicit"),

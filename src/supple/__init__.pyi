@@ -39,6 +39,8 @@ from .output.progress import ProgressBar as ProgressBar
 from .output.recording.reader import Recording as Recording
 from .output.recording.reader import read_recording as read_recording
 from .output.recording.recorder import Recorder as Recorder
+from .runs.resume import resume as resume
+from .runs.run_folder import RunFolder as RunFolder
 from .scene.body import Body as Body
 from .scene.contact_pairs import ContactPair as ContactPair
 from .scene.forces import Force as Force

@@ -7,8 +7,8 @@ file does not depend on solvers, files or viewers.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -205,6 +205,13 @@ def build_system(scene: Scene, start: State | None = None) -> System:
         stitching=scene.stitching,
         start_states=_start_states(scene, start),
     )
+
+
+def rebuilt_system(scene: Scene, start_states: tuple[State, ...], anchors: Sequence[NDArray[np.float64]]) -> System:
+    """The System of an earlier process, with its bits: its `start_states`, and the (k, 3) `anchors` of each pin."""
+    system = build_system(scene, start_states[0])
+    pins = tuple(replace(pin, anchors=there) for pin, there in zip(system.pins, anchors, strict=True))
+    return replace(system, pins=pins, start_states=start_states)
 
 
 def _start_states(scene: Scene, start: State | None) -> tuple[State, ...]:

@@ -37,6 +37,7 @@ class Run:
     initial_positions : by body name, (n, 3) [m], of bodies that start deformed
     output : what to write beside the recording
     text : of the file, stored in the recording
+    description : the content of the file, with all defaults; folder : that paths in it are relative to
     """
 
     scene: Scene
@@ -46,6 +47,8 @@ class Run:
     initial_positions: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     output: OutputModel = field(default_factory=OutputModel)
     text: str | None = None
+    description: SceneFileModel | None = None
+    folder: Path = Path()
 
     @property
     def start(self) -> dict[str, dict[str, NDArray[np.float64]]]:
@@ -85,7 +88,8 @@ def load_run(path: str | Path, meshes: Callable[[Path], MeshStore] = MeshStore) 
     except ValidationError as error:
         raise scene_error(document, error) from None
     try:
-        return replace(_built(model, meshes(Path(path).parent)), text=document.text)
+        built = _built(model, meshes(Path(path).parent))
+        return replace(built, text=document.text, description=model, folder=Path(path).parent)
     except LocatedError as error:
         raise document.error(_keys_of_message(document.data, error.keys, str(error)), str(error)) from None
 
