@@ -16,7 +16,7 @@ LAYERS = (
     ("cli",),
     ("demos",),
     ("viewer",),
-    ("runs",),
+    ("studies",),
     ("output", "scene_file"),
     ("simulate",),
     ("xpbd", "implicit"),

@@ -17,6 +17,7 @@ from supple.errors import SceneError, SolverError
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.material import Elastic
 from supple.numerics.deformation import deformation_gradients, determinants
+from supple.numerics.memory import require_memory
 from supple.scene.scene import Scene
 from supple.scene.stitches.measures import largest_stitch_stretch, stitch_energy
 from supple.state import ContactPoints, SolverDetails, State, Status, StepReport
@@ -189,6 +190,9 @@ def simulate(
         raise SolverError(f"simulate: steps is {steps!r}; give a whole number of zero or more")
     if start is not None and (initial_positions is not None or initial_velocities is not None):
         raise SceneError("simulate: give `start`, or initial positions and velocities, not both")
+    tets = sum(len(body.mesh.tets) for body in scene.bodies)
+    what = f"simulate: the scene of {tets} tets"
+    require_memory(solver.bytes_needed(scene), what, "make the meshes coarser, or use XPBD")
     if start is None:
         start = initial_state(scene, initial_positions, initial_velocities)
     first = first_frame(scene, start, solver)

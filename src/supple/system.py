@@ -302,8 +302,20 @@ def _rigid_velocity(body: Body, placed: NDArray[np.float64]) -> NDArray[np.float
     return np.asarray(body.velocity) + np.cross(np.asarray(body.angular_velocity), placed - center)
 
 
+# Of a simulation by XPBD, at most, for each tet and its share of vertices, edges and surface. Measured: 970 on a cube
+# of 83,000 tets, 1600 on three thin plates in contact.
+_BYTES_PER_TET = 2000
+
+
 class Solver(ABC):
     """An immutable description of a method and its parameters; what changes is in the State and the workspace."""
+
+    def bytes_needed(self, scene: Scene) -> int:
+        """Estimate of the memory that a simulation takes beyond that of the program itself [bytes].
+
+        Solvers with other needs than arrays of the scene's size override this method.
+        """
+        return _BYTES_PER_TET * sum(len(body.mesh.tets) for body in scene.bodies)
 
     @abstractmethod
     def prepare(self, system: System) -> Any:
