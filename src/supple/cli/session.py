@@ -13,6 +13,7 @@ from supple.cli.print_error import print_error
 from supple.errors import OutputError
 from supple.scene.scene import Scene
 from supple.simulate import Frame, Sink, simulate
+from supple.state import Status
 from supple.system import Solver
 
 logger = logging.getLogger(__name__)
@@ -51,12 +52,14 @@ class Outcome:
     ----------
     code : the shell's exit code
     frames : number of simulated frames; last : the last frame; worst_J : the smallest J of all frames
+    all_converged : whether every frame did
     """
 
     code: ExitCode = ExitCode.OK
     frames: int = 0
     last: Frame | None = None
     worst_J: float = field(default=float("inf"))
+    all_converged: bool = True
 
 
 def run_session(
@@ -67,9 +70,14 @@ def run_session(
     *,
     products: Products,
     start: Mapping[str, Any] | None = None,
+    strict: bool = False,
     sinks: Sequence[Sink] = (),
 ) -> Outcome:
     """Simulate, record, and print a summary.
+
+    Parameters
+    ----------
+    strict : whether a frame that did not converge is a failure
 
     Raises
     ------
@@ -95,6 +103,7 @@ def run_session(
         for frame in frames:
             outcome.frames, outcome.last = outcome.frames + 1, frame
             outcome.worst_J = min(outcome.worst_J, frame.report.min_det_F)
+            outcome.all_converged &= frame.report.status is Status.CONVERGED
     except KeyboardInterrupt:
         frames.close()
         _warn_of_older_files(replace(products, page=False, plot=False))
@@ -107,6 +116,8 @@ def run_session(
         print_error(
             f"stopped at frame {outcome.last.index} ({report.status}): {report.message}; {recording} is complete"
         )
+    elif strict and not outcome.all_converged:
+        outcome.code = ExitCode.FAILED
     _warn_of_older_files(products)
     _write_products(recording, products)
     if not products.quiet:

@@ -5,7 +5,7 @@ Source: Macklin, Müller, Chentanez, "XPBD" (2016); Macklin et al., "Small Steps
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 import numba
@@ -19,11 +19,13 @@ from supple.numerics.thread_tuning import ThreadTuner
 from supple.numerics.threads import numba_threads
 from supple.state import State, Status, StepReport
 from supple.system import Solver, System
+from supple.xpbd.assessment.assessment import Assessment
+from supple.xpbd.assessment.findings import Findings
+from supple.xpbd.assessment.moment import Moment
 from supple.xpbd.constraints.registry import ConstraintSet, build_constraint_sets
 from supple.xpbd.constraints.stitch_anchors import StitchAnchors
 from supple.xpbd.constraints.stitches import stitch_constraints
 from supple.xpbd.contact.collisions import Collisions
-from supple.xpbd.contact.memory import ContactMemory
 from supple.xpbd.contact.settings import XPBDContact
 from supple.xpbd.details import XPBDDetails
 from supple.xpbd.external_forces import add_forces, pull_to_targets
@@ -37,9 +39,15 @@ from supple.xpbd.integration import (
     to_world,
     update_velocities,
 )
+from supple.xpbd.limits.rigid_fallback import RigidFallback
+from supple.xpbd.limits.volume_guard import VolumeGuard
+from supple.xpbd.memory import XPBDMemory
 from supple.xpbd.momentum import MomentumRestore
 from supple.xpbd.sweeps.ordering import Layout, make_layout, reordered
 
+# How often tets that are compressed too fast are projected in a substep, in turn with the contacts, before the motion
+# of their body is shortened.
+MOST_PROJECTIONS = 10
 # Below this much work, in edges or volumes, a sweep ends before a second thread has started.
 PARALLEL_FROM = 20_000
 _MOST_THREADS: int = config.NUMBA_NUM_THREADS  # pyright: ignore[reportAttributeAccessIssue]
@@ -64,6 +72,9 @@ class XPBDWorkspace:
     sets: list[ConstraintSet]
     momentum: MomentumRestore | None
     collisions: Collisions
+    guard: VolumeGuard
+    fallback: RigidFallback
+    assessment: Assessment
     pace: ThreadTuner
     anchors: StitchAnchors
     extended: NDArray[np.float64]
@@ -82,6 +93,10 @@ class XPBDWorkspace:
         for name in ("velocities", "origins", "world", "world_previous"):
             setattr(self, name, np.zeros((n, 3)))
 
+    def moment(self, time: float) -> Moment:
+        """What the assessment reads, at `time` [s]."""
+        return Moment(self.points, self.extended, self.velocities, self.origins, time)
+
 
 @dataclass(frozen=True)
 class XPBD(Solver):
@@ -93,6 +108,7 @@ class XPBD(Solver):
     momentum_restore : restore the momentum that constraint projection takes from free bodies (see
         `supple.xpbd.momentum`). False shows the behaviour of plain XPBD.
     contact : contact of bodies with each other and with themselves; None turns it off. Obstacles always act.
+    accuracy : how much softer than its material a body may be; beyond it, the status of a frame is `softened`.
     threads : number of threads. None: one, or all of Numba's where the scene is large enough and several threads are
         measured to be faster. The result has the same bits for any number.
 
@@ -105,6 +121,7 @@ class XPBD(Solver):
     momentum_restore: bool = True
     contact: XPBDContact | None = field(default_factory=XPBDContact)
     threads: int | None = None
+    accuracy: float = 0.02
 
     def __post_init__(self) -> None:
         _check_count("substeps", self.substeps)
@@ -112,6 +129,9 @@ class XPBD(Solver):
             raise SolverError(f"XPBD: momentum_restore is {self.momentum_restore!r}; give True or False")
         if self.contact is not None and not isinstance(self.contact, XPBDContact):
             raise SolverError(f"XPBD: contact is {self.contact!r}; give XPBDContact(...), or None to turn it off")
+        number = isinstance(self.accuracy, (int, float, np.number)) and not isinstance(self.accuracy, bool)
+        if not number or not 0.0 < self.accuracy < 1.0:
+            raise SolverError(f"XPBD: accuracy is {self.accuracy!r}; give a number above 0 and below 1, such as 0.02")
         if self.threads is not None:
             _check_count("threads", self.threads)
             if self.threads > _MOST_THREADS:
@@ -135,12 +155,16 @@ class XPBD(Solver):
         threads = self.threads or numba.get_num_threads()
         large = sum(made.work for made in sets) >= PARALLEL_FROM
         parallel = threads > 1 and (large or self.threads is not None)
+        collisions = Collisions(inner, self.contact)
         return XPBDWorkspace(
             system=inner,
             layout=layout,
             sets=sets,
             momentum=MomentumRestore(inner) if self.momentum_restore else None,
-            collisions=Collisions(inner, self.contact),
+            collisions=collisions,
+            guard=VolumeGuard(inner),
+            fallback=RigidFallback(inner),
+            assessment=Assessment(inner, self.contact, collisions.edge_length),
             pace=ThreadTuner(choice=parallel and self.threads is None, parallel=parallel),
             anchors=StitchAnchors(inner),
             extended=extended,
@@ -148,14 +172,56 @@ class XPBD(Solver):
 
     def step(self, system: System, state: State, dt: float, workspace: XPBDWorkspace) -> tuple[State, StepReport]:
         """Advance by `dt` [s] in `substeps` substeps. The returned state has its own arrays."""
-        ws, h = workspace, dt / self.substeps
+        ws = workspace
+        memory = state.memory if isinstance(state.memory, XPBDMemory) else None
+        held_back = self._advance(ws, state, dt, self.substeps, memory)
+        lost = first_lost(ws.points, ws.velocities)
+        if lost >= 0:
+            message = _lost_position_message(ws, lost, state.time + dt)
+            return state, StepReport(
+                Status.NOT_FINITE, self.substeps, message, details=self.initial_details(system, ws)
+            )
+        return self._reported(ws, state.time + dt, dt, held_back)
+
+    def _reported(self, ws: XPBDWorkspace, time: float, dt: float, held_back: int) -> tuple[State, StepReport]:
+        """The state at the end of a frame, and what is wrong with it."""
+        h = dt / self.substeps
+        new = _unload(ws, time)
+        ws.guard.measure(ws.points, False)
+        findings, ledger = ws.assessment.end(ws.moment(time), ws.world, ws.guard.J, h, self.accuracy)
+        memory = XPBDMemory(ws.collisions.memory(ws.world), ledger)
+        details = XPBDDetails(
+            contacts=ws.collisions.contacts,
+            smallest_gap=ws.collisions.smallest_gap,
+            softening=ws.assessment.softening.by_body(h),
+            energy_gained=findings.gained,
+            held_back=held_back,
+        )
+        message = findings.message(time, self._remedy(ws, dt, findings))
+        return replace(new, memory=memory), StepReport(findings.status, self.substeps, message, details=details)
+
+    def _remedy(self, ws: XPBDWorkspace, dt: float, findings: Findings) -> str:
+        """What helps against what was found."""
+        enough = ws.assessment.softening.substeps(dt, self.accuracy)[0]
+        if findings.status is not Status.SOFTENED:
+            enough = max(enough, 2 * self.substeps)
+        return f"take substeps={enough}"
+
+    def _advance(self, ws: XPBDWorkspace, state: State, dt: float, substeps: int, memory: XPBDMemory | None) -> int:
+        """Simulate the substeps of a frame from a state; returns in how many the motion of a body was shortened."""
+        h, held_back = dt / substeps, 0
         _load(ws, state)
-        targets = _pin_targets(ws.system, state.time, h, self.substeps)
+        targets = _pin_targets(ws.system, state.time, h, substeps)
         if ws.collisions:
-            memory = state.memory if isinstance(state.memory, ContactMemory) else None
-            ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt, memory)
+            contact = None if memory is None else memory.contact
+            ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt, contact)
+        ws.guard.measure(ws.points, False)
+        ledger = None if memory is None else memory.ledger
+        ws.guard.guarded[:] = ws.assessment.begin(ws.moment(state.time), ws.guard.J, h, ledger)
+        ws.guard.accept()
+        balance = ws.assessment.balance
         with numba_threads(self.threads):
-            for k in range(self.substeps):
+            for k in range(substeps):
                 interruption_point()
                 started = perf_counter()
                 parallel = ws.pace.choose()
@@ -164,24 +230,19 @@ class XPBD(Solver):
                 add_forces(ws.system, ws.points, ws.velocities, end, h)
                 for constraints in ws.sets:
                     constraints.project(ws.extended, h, parallel)
-                if ws.momentum is not None:
-                    ws.momentum.apply(ws.points, ws.previous, ws.velocities, h, parallel)
-                else:
-                    update_velocities(ws.points, ws.previous, ws.velocities, h)
+                _restore(ws, h, parallel)
                 ws.pace.note(parallel, perf_counter() - started)
                 pull_to_targets(ws.system, ws.points, ws.velocities, ws.origins, end, h)
                 if ws.collisions and not _collide(ws, end, h):
                     break
-        lost = first_lost(ws.points, ws.velocities)
-        if lost >= 0:
-            message = _lost_position_message(ws, lost, state.time + dt)
-            return state, StepReport(Status.NOT_FINITE, self.substeps, message, details=XPBDDetails())
-        details = XPBDDetails(ws.collisions.contacts, ws.collisions.smallest_gap)
-        return _unload(ws, state.time + dt), StepReport(Status.CONVERGED, self.substeps, details=details)
+                held_back += _keep_volumes(ws, end, h, parallel)
+                balance.note_loads(ws.points, ws.previous, ws.origins, end, h)
+                balance.note_contacts(ws.collisions.contacts)
+        return held_back
 
     def initial_details(self, system: System, workspace: XPBDWorkspace) -> XPBDDetails:
         """No contacts; see `Solver.initial_details`."""
-        return XPBDDetails()
+        return XPBDDetails(softening=dict.fromkeys((part.name for part in system.bodies), 0.0))
 
 
 def _check_count(name: str, value: object) -> None:
@@ -209,6 +270,7 @@ def _begin_substep(ws: XPBDWorkspace, targets: NDArray[np.float64], end: float, 
     predict[parallel](ws.points, ws.previous, ws.velocities, np.zeros(3) if damped else gravity, h)
     if len(targets):
         hold(ws.points, ws.system.pinned_vertices, targets, ws.origins)
+        ws.assessment.balance.note_pins(ws.points, ws.previous, parallel)
     ws.extended_previous[len(ws.points) :] = ws.extended[len(ws.points) :, :3]
     ws.anchors.place(ws.extended, ws.origins, end)
     for constraints in damped:
@@ -227,10 +289,39 @@ def _collide(ws: XPBDWorkspace, time: float, h: float) -> bool:
     return True
 
 
+def _keep_volumes(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
+    """Project tets that lose too much volume, in turn with contacts. Returns whether that was not enough."""
+    for _ in range(MOST_PROJECTIONS):
+        if not ws.guard.measure(ws.points, parallel):
+            ws.guard.accept()
+            return False
+        ws.guard.project(ws.points)
+        _restore(ws, h, parallel)
+        if ws.collisions and not _collide(ws, time, h):
+            return True
+    ws.guard.measure(ws.points, parallel)
+    failures = ws.guard.failures()
+    failed = bool(failures.any())
+    if failed:
+        ws.fallback.apply(ws.points, ws.previous, ws.guard.guarded, failures)
+        _restore(ws, h, parallel)
+        ws.guard.measure(ws.points, parallel)
+    ws.guard.accept()
+    return failed
+
+
+def _restore(ws: XPBDWorkspace, h: float, parallel: bool) -> None:
+    """The velocities of changed positions, with the momentum of the velocities before."""
+    if ws.momentum is not None:
+        ws.momentum.apply(ws.points, ws.previous, ws.velocities, h, parallel)
+    else:
+        update_velocities(ws.points, ws.previous, ws.velocities, h)
+
+
 def _unload(ws: XPBDWorkspace, time: float) -> State:
     to_world(ws.points, ws.origins, ws.world)
     new = ws.layout.new_from_old
-    return State(time, ws.world[new], ws.velocities[new], ws.collisions.memory(ws.world))
+    return State(time, ws.world[new], ws.velocities[new])
 
 
 def _pin_targets(system: System, time: float, h: float, substeps: int) -> NDArray[np.float64]:

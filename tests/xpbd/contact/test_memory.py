@@ -124,7 +124,7 @@ def test_another_scene_of_the_same_bodies_keeps_the_memory(obstacle, tolerance):
 def test_memory_that_does_not_describe_the_scene_is_dropped():
     """Other vertices, other triangles on as many vertices, and bodies that are elsewhere."""
     frame = run("self-contact", 1)[-1]
-    assert isinstance(frame.state.memory, ContactMemory)
+    assert isinstance(frame.state.memory.contact, ContactMemory)
     body, state = folded_strip(), frame.state
     fewer = pile()
     mirrored = sp.Body(

@@ -20,6 +20,7 @@ def run(
     solver: str | None = None,
     trace: Path | None = None,
     separate: Annotated[bool, Parameter(negative="")] = False,
+    strict: Annotated[bool, Parameter(negative="")] = False,
     page: bool | None = None,
     plot: bool | None = None,
     quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
@@ -44,6 +45,8 @@ def run(
         CSV file with every iteration of Newton's method; for the implicit solver.
     separate
         Move bodies apart that intersect at the start, where a small translation separates them, and print the moves.
+    strict
+        Exit with code 1 where a frame did not converge: see its status. The recording is complete.
     page
         Write index.html, which plays the recording in a browser; without this, as the scene file specifies.
     plot
@@ -72,6 +75,7 @@ def run(
         described.dt if dt is None else dt,
         described.steps if steps is None else steps,
         start=described.start,
+        strict=strict,
         sinks=traces(trace, used),
         products=Products(
             folder=output,

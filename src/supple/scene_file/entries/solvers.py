@@ -35,13 +35,14 @@ class XPBDModel(Model):
         default_factory=XPBDContactModel, description="of bodies with each other and themselves; null turns it off"
     )
     threads: int | None = Field(default=None, ge=1, le=1024, description="default: chosen by the size of the scene")
+    accuracy: Share = Field(default=0.02, description="how much softer than its material a body may be")
 
     def build(self) -> Solver:
         from supple.xpbd.contact.settings import XPBDContact
         from supple.xpbd.solver import XPBD
 
         contact = None if self.contact is None else XPBDContact(**self.contact.model_dump())
-        return XPBD(self.substeps, self.momentum_restore, contact, self.threads)
+        return XPBD(**self.model_dump(exclude={"kind", "contact"}), contact=contact)
 
 
 class ContactModel(Model):
