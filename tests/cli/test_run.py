@@ -65,7 +65,7 @@ def test_quiet_without_page_and_plot(folder, capfd):
     assert listing(folder / "out") == ["recording.vtkhdf"]
     with read_recording("out/recording.vtkhdf") as recording:
         assert recording.times.tolist() == [0.0, 0.25, 0.5]
-        assert "XPBD(substeps=20" in recording.solver
+        assert "XPBD(substeps='auto'" in recording.solver
 
 
 def test_options_override_page_and_plot_of_the_file(folder):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from supple.state import Status
 from supple.xpbd.assessment.assessment import Ledger
 from supple.xpbd.contact.memory import ContactMemory
 
@@ -15,8 +16,14 @@ class XPBDMemory:
     Attributes
     ----------
     contact : of contact; None without contact of surfaces
-    ledger : of the assessment of frames
+    ledger : of the assessment of frames; None at the start
+    substeps : what the last frame asks of the next one, zero where it was not repeated
+    futile : the statuses that the last frame had in spite of repetitions
+    crossings : number of pairs of triangles that are through each other
     """
 
-    contact: ContactMemory | None
-    ledger: Ledger
+    contact: ContactMemory | None = None
+    ledger: Ledger | None = None
+    substeps: float = 0.0
+    futile: frozenset[Status] = frozenset()
+    crossings: int = 0

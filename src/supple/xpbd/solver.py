@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from time import perf_counter
+from typing import Literal
 
 import numba
 import numpy as np
@@ -40,14 +41,17 @@ from supple.xpbd.integration import (
     update_velocities,
 )
 from supple.xpbd.limits.rigid_fallback import RigidFallback
-from supple.xpbd.limits.volume_guard import VolumeGuard
+from supple.xpbd.limits.volume_guard import ENOUGH, VolumeGuard
 from supple.xpbd.memory import XPBDMemory
 from supple.xpbd.momentum import MomentumRestore
+from supple.xpbd.substeps import FALL, SubstepChoice, Substeps
 from supple.xpbd.sweeps.ordering import Layout, make_layout, reordered
 
 # How often tets that are compressed too fast are projected in a substep, in turn with the contacts, before the motion
 # of their body is shortened.
 MOST_PROJECTIONS = 10
+# How often a bad frame is repeated with twice as many substeps.
+MOST_REPEATS = 3
 # Below this much work, in edges or volumes, a sweep ends before a second thread has started.
 PARALLEL_FROM = 20_000
 _MOST_THREADS: int = config.NUMBA_NUM_THREADS  # pyright: ignore[reportAttributeAccessIssue]
@@ -75,6 +79,7 @@ class XPBDWorkspace:
     guard: VolumeGuard
     fallback: RigidFallback
     assessment: Assessment
+    choice: SubstepChoice
     pace: ThreadTuner
     anchors: StitchAnchors
     extended: NDArray[np.float64]
@@ -104,11 +109,14 @@ class XPBD(Solver):
 
     Parameters
     ----------
-    substeps : number of substeps of a frame, each with one sweep over all constraints.
+    substeps : number of substeps of a frame, each with one sweep over all constraints. "auto": what the frame needs
+        (see `supple.xpbd.substeps`); a frame that turns out bad is repeated with more. `report.details` tells how many,
+        and why.
     momentum_restore : restore the momentum that constraint projection takes from free bodies (see
         `supple.xpbd.momentum`). False shows the behaviour of plain XPBD.
     contact : contact of bodies with each other and with themselves; None turns it off. Obstacles always act.
-    accuracy : how much softer than its material a body may be; beyond it, the status of a frame is `softened`.
+    accuracy : the share of its stiffness that a body may lack; beyond it, the status of a frame is `softened`.
+    max_substeps : the largest automatic number.
     threads : number of threads. None: one, or all of Numba's where the scene is large enough and several threads are
         measured to be faster. The result has the same bits for any number.
 
@@ -117,14 +125,17 @@ class XPBD(Solver):
     SolverError : where a value is of the wrong kind or out of range.
     """
 
-    substeps: int = 20
+    substeps: int | Literal["auto"] = "auto"
     momentum_restore: bool = True
     contact: XPBDContact | None = field(default_factory=XPBDContact)
     threads: int | None = None
     accuracy: float = 0.02
+    max_substeps: int = 1000
 
     def __post_init__(self) -> None:
-        _check_count("substeps", self.substeps)
+        if self.substeps != "auto":
+            _check_count("substeps", self.substeps, ", or 'auto'")
+        _check_count("max_substeps", self.max_substeps)
         if not isinstance(self.momentum_restore, bool):
             raise SolverError(f"XPBD: momentum_restore is {self.momentum_restore!r}; give True or False")
         if self.contact is not None and not isinstance(self.contact, XPBDContact):
@@ -156,6 +167,7 @@ class XPBD(Solver):
         large = sum(made.work for made in sets) >= PARALLEL_FROM
         parallel = threads > 1 and (large or self.threads is not None)
         collisions = Collisions(inner, self.contact)
+        assessment = Assessment(inner, self.contact, collisions.edge_length)
         return XPBDWorkspace(
             system=inner,
             layout=layout,
@@ -164,60 +176,107 @@ class XPBD(Solver):
             collisions=collisions,
             guard=VolumeGuard(inner),
             fallback=RigidFallback(inner),
-            assessment=Assessment(inner, self.contact, collisions.edge_length),
+            assessment=assessment,
+            choice=SubstepChoice(inner, assessment.softening, bool(collisions)),
             pace=ThreadTuner(choice=parallel and self.threads is None, parallel=parallel),
             anchors=StitchAnchors(inner),
             extended=extended,
         )
 
     def step(self, system: System, state: State, dt: float, workspace: XPBDWorkspace) -> tuple[State, StepReport]:
-        """Advance by `dt` [s] in `substeps` substeps. The returned state has its own arrays."""
-        ws = workspace
-        memory = state.memory if isinstance(state.memory, XPBDMemory) else None
-        held_back = self._advance(ws, state, dt, self.substeps, memory)
-        lost = first_lost(ws.points, ws.velocities)
-        if lost >= 0:
-            message = _lost_position_message(ws, lost, state.time + dt)
-            return state, StepReport(
-                Status.NOT_FINITE, self.substeps, message, details=self.initial_details(system, ws)
-            )
-        return self._reported(ws, state.time + dt, dt, held_back)
+        """Advance by `dt` [s]. The returned state has its own arrays.
 
-    def _reported(self, ws: XPBDWorkspace, time: float, dt: float, held_back: int) -> tuple[State, StepReport]:
-        """The state at the end of a frame, and what is wrong with it."""
-        h = dt / self.substeps
+        With automatic substeps, a frame that turns out bad is undone and repeated with twice as many.
+        """
+        ws, time = workspace, state.time + dt
+        memory = state.memory if isinstance(state.memory, XPBDMemory) else XPBDMemory()
+        used, repeats = self._first_choice(ws, state, dt, memory), 0
+        while True:
+            held_back = self._advance(ws, state, dt, used.count, memory)
+            lost = first_lost(ws.points, ws.velocities)
+            if lost < 0:
+                new, report, problem = self._reported(ws, time, dt, held_back, used, repeats, memory)
+            else:
+                problem = Status.NOT_FINITE
+            last = self.substeps != "auto" or used.count >= self.max_substeps or repeats == MOST_REPEATS
+            if last or problem is None or problem in memory.futile:
+                break
+            repeats += 1
+            used = Substeps(min(2 * used.count, self.max_substeps), f"a repetition: {problem}")
+        if lost >= 0:
+            message = _lost_position_message(ws, lost, time)
+            details = self.initial_details(system, ws)
+            return state, StepReport(Status.NOT_FINITE, used.count, message, details=details)
+        return new, report
+
+    def _first_choice(self, ws: XPBDWorkspace, state: State, dt: float, memory: XPBDMemory) -> Substeps:
+        """How many substeps the frame is simulated with at first."""
+        if self.substeps != "auto":
+            return Substeps(self.substeps, "the user")
+        _load(ws, state)
+        wanted = ws.choice.choose(ws.moment(state.time), dt, self.accuracy, memory.substeps)
+        if wanted.count > self.max_substeps:
+            return Substeps(self.max_substeps, f"max_substeps; {wanted.reason} asks for {wanted.count}")
+        return wanted
+
+    def _reported(
+        self,
+        ws: XPBDWorkspace,
+        time: float,
+        dt: float,
+        held_back: int,
+        used: Substeps,
+        repeats: int,
+        before: XPBDMemory,
+    ) -> tuple[State, StepReport, Status | None]:
+        """The state at the end of a frame, what is wrong with it, and the status that more substeps might cure."""
+        h = dt / used.count
         new = _unload(ws, time)
         ws.guard.measure(ws.points, False)
         findings, ledger = ws.assessment.end(ws.moment(time), ws.world, ws.guard.J, h, self.accuracy)
-        memory = XPBDMemory(ws.collisions.memory(ws.world), ledger)
+        status = findings.status
+        problem = status if status in (Status.INVERTED, Status.ENERGY_GAINED) else None
+        if findings.crossings > before.crossings:
+            problem = Status.INTERSECTING
+        elif problem is None and held_back:
+            problem = Status.INVERTED
+        memory = XPBDMemory(
+            contact=ws.collisions.memory(ws.world),
+            ledger=ledger,
+            substeps=float(used.count) if repeats else FALL * before.substeps,
+            futile=frozenset() if problem is None else before.futile | ({problem} if repeats else set()),
+            crossings=findings.crossings,
+        )
         details = XPBDDetails(
             contacts=ws.collisions.contacts,
             smallest_gap=ws.collisions.smallest_gap,
+            substeps=used.count,
+            repeats=repeats,
+            substeps_reason=used.reason,
             softening=ws.assessment.softening.by_body(h),
             energy_gained=findings.gained,
             held_back=held_back,
         )
-        message = findings.message(time, self._remedy(ws, dt, findings))
-        return replace(new, memory=memory), StepReport(findings.status, self.substeps, message, details=details)
+        message = findings.message(time, self._remedy(ws, dt, findings, used.count))
+        report = StepReport(status, used.count, message, details=details)
+        return replace(new, memory=memory), report, problem
 
-    def _remedy(self, ws: XPBDWorkspace, dt: float, findings: Findings) -> str:
+    def _remedy(self, ws: XPBDWorkspace, dt: float, findings: Findings, used: int) -> str:
         """What helps against what was found."""
         enough = ws.assessment.softening.substeps(dt, self.accuracy)[0]
         if findings.status is not Status.SOFTENED:
-            enough = max(enough, 2 * self.substeps)
-        return f"take substeps={enough}"
+            enough = max(enough, 2 * used)
+        return f"take {'max_substeps' if self.substeps == 'auto' else 'substeps'}={enough}"
 
-    def _advance(self, ws: XPBDWorkspace, state: State, dt: float, substeps: int, memory: XPBDMemory | None) -> int:
+    def _advance(self, ws: XPBDWorkspace, state: State, dt: float, substeps: int, memory: XPBDMemory) -> int:
         """Simulate the substeps of a frame from a state; returns in how many the motion of a body was shortened."""
         h, held_back = dt / substeps, 0
         _load(ws, state)
         targets = _pin_targets(ws.system, state.time, h, substeps)
         if ws.collisions:
-            contact = None if memory is None else memory.contact
-            ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt, contact)
+            ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt, memory.contact)
         ws.guard.measure(ws.points, False)
-        ledger = None if memory is None else memory.ledger
-        ws.guard.guarded[:] = ws.assessment.begin(ws.moment(state.time), ws.guard.J, h, ledger)
+        ws.guard.guarded[:] = ws.assessment.begin(ws.moment(state.time), ws.guard.J, h, memory.ledger)
         ws.guard.accept()
         balance = ws.assessment.balance
         with numba_threads(self.threads):
@@ -245,9 +304,9 @@ class XPBD(Solver):
         return XPBDDetails(softening=dict.fromkeys((part.name for part in system.bodies), 0.0))
 
 
-def _check_count(name: str, value: object) -> None:
+def _check_count(name: str, value: object, otherwise: str = "") -> None:
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
-        raise SolverError(f"XPBD: {name} is {value!r}; give a whole number of one or more")
+        raise SolverError(f"XPBD: {name} is {value!r}; give a whole number of one or more{otherwise}")
 
 
 def _load(ws: XPBDWorkspace, state: State) -> None:
@@ -291,8 +350,8 @@ def _collide(ws: XPBDWorkspace, time: float, h: float) -> bool:
 
 def _keep_volumes(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
     """Project tets that lose too much volume, in turn with contacts. Returns whether that was not enough."""
-    for _ in range(MOST_PROJECTIONS):
-        if not ws.guard.measure(ws.points, parallel):
+    for k in range(MOST_PROJECTIONS):
+        if not ws.guard.measure(ws.points, parallel, ENOUGH if k else 1.0):
             ws.guard.accept()
             return False
         ws.guard.project(ws.points)

@@ -29,13 +29,16 @@ class XPBDModel(Model):
     """Extended position-based dynamics in small steps: fast, robust, approximate."""
 
     kind: Literal["xpbd"]
-    substeps: Iterations = Field(default=20, description="per frame, each with one sweep over all constraints")
+    substeps: Iterations | Literal["auto"] = Field(
+        default="auto", description="per frame, each with one sweep over all constraints; auto: what the frame needs"
+    )
     momentum_restore: bool = Field(default=True, description="false: the momentum errors of XPBD are not corrected")
     contact: XPBDContactModel | None = Field(
         default_factory=XPBDContactModel, description="of bodies with each other and themselves; null turns it off"
     )
     threads: int | None = Field(default=None, ge=1, le=1024, description="default: chosen by the size of the scene")
-    accuracy: Share = Field(default=0.02, description="how much softer than its material a body may be")
+    accuracy: Share = Field(default=0.02, description="the share of its stiffness that a body may lack")
+    max_substeps: Iterations = Field(default=1000, description="the largest automatic number of substeps")
 
     def build(self) -> Solver:
         from supple.xpbd.contact.settings import XPBDContact

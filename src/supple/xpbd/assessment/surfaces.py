@@ -96,8 +96,8 @@ class SurfaceCheck:
         """(t,) the triangles that reach into the box of another thing that they collide with, or of their own."""
         count = len(self._names)
         boxes = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
-        np.minimum.at(boxes[0], self._owner, low)
-        np.maximum.at(boxes[1], self._owner, high)
+        owners, starts = np.unique(self._owner, return_index=True)  # ascending: triangles are sorted by their owner
+        boxes[0][owners], boxes[1][owners] = np.minimum.reduceat(low, starts), np.maximum.reduceat(high, starts)
         chosen = np.diagonal(self._collide)[self._owner].copy()
         for a, b in np.argwhere(np.triu(self._collide, 1)):
             lower, upper = np.maximum(boxes[0][a], boxes[0][b]), np.minimum(boxes[1][a], boxes[1][b])

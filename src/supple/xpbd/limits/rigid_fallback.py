@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.numerics.noninverting_step import noninverting_step
+from supple.numerics.noninverting_step import noninverting_step, volume_signs
 from supple.system import System
 
 # The share of its volume that a tet keeps at least.
@@ -53,6 +53,10 @@ class RigidFallback:
             motion[rows] = points[rows, :3] - base[rows]
             mine = guarded & (self.tet_labels == label)
             step = float(noninverting_step(base, motion, self.system.tets, mine, KEEP)[0])
+            # Positions are rounded, so that the volumes of slivers may differ from what the cubics promise.
+            tets = self.system.tets[mine]
+            while step > 0.0 and not (volume_signs(base + step * motion, tets) > 0.0).all():
+                step *= 0.5
             points[rows, :3] = base[rows] + step * motion[rows]
 
     def _rigid(self, x: NDArray, before: NDArray, rows: NDArray[np.intp]) -> NDArray[np.float64]:

@@ -24,8 +24,11 @@ from supple.xpbd.sweeps.compilation import serial_and_parallel
 
 # Above ONSET a tet may lose half of its volume in one substep; below, it may not lose any more.
 ONSET, KEEP = 0.25, 0.5
-# What the projections may leave over, as a share of the bound, before the substep counts as failed.
-LEAST_SHARE = 0.1
+# Shares of the bound: where the projections may end, and below which the substep counts as failed. What is left over is
+# projected in the next substep.
+ENOUGH, LEAST_SHARE = 0.7, 0.1
+# Below this J, nothing may be left over: otherwise J could fall by a share in every substep.
+STRICT = 0.1
 BLOCK = 1024
 
 
@@ -47,9 +50,9 @@ class VolumeGuard:
         self.guarded = np.zeros(m, dtype=np.bool_)
         self._below = np.zeros((m + BLOCK - 1) // BLOCK, dtype=np.int64)
 
-    def measure(self, points: NDArray[np.float64], parallel: bool) -> bool:
-        """Compute J at `points` (n, 4); returns whether a tet is below its bound."""
-        _measure[parallel](points, self.tets, self.scale, self.bounds, self.J, self._below)
+    def measure(self, points: NDArray[np.float64], parallel: bool, share: float = 1.0) -> bool:
+        """Compute J at `points` (n, 4); returns whether a tet is below this share of its bound."""
+        _measure[parallel](points, self.tets, self.scale, self.bounds, share, self.J, self._below)
         return bool(self._below.any())
 
     def project(self, points: NDArray[np.float64]) -> None:
@@ -77,22 +80,22 @@ def _edges(points, a, b, d, e):
 
 
 @njit(cache=True, error_model="numpy")
-def _measure_block(points, tets, scale, bounds, out, low, high):
+def _measure_block(points, tets, scale, bounds, share, out, low, high):
     below = 0
     for t in range(low, high):
         ux, uy, uz, vx, vy, vz, qx, qy, qz = _edges(points, tets[t, 0], tets[t, 1], tets[t, 2], tets[t, 3])
         det = ux * (vy * qz - vz * qy) + uy * (vz * qx - vx * qz) + uz * (vx * qy - vy * qx)
         J = det * scale[t]
         out[t] = J
-        below += bounds[t] > J
+        below += (share if bounds[t] > STRICT else 1.0) * bounds[t] > J
     return below
 
 
 @serial_and_parallel
-def _measure(points, tets, scale, bounds, out, below):
+def _measure(points, tets, scale, bounds, share, out, below):
     for block in prange(len(below)):
         low = block * BLOCK
-        below[block] = _measure_block(points, tets, scale, bounds, out, low, min(low + BLOCK, len(tets)))
+        below[block] = _measure_block(points, tets, scale, bounds, share, out, low, min(low + BLOCK, len(tets)))
 
 
 @njit(cache=True)
