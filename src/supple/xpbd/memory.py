@@ -17,7 +17,7 @@ class XPBDMemory:
     ----------
     contact : of contact; None without contact of surfaces
     ledger : of the assessment of frames; None at the start
-    substeps : what the last frame asks of the next one, zero where it was not repeated
+    substeps : what the last frame asks of the next one, where repetitions helped; falls back to zero
     futile : the statuses that the last frame had in spite of repetitions
     crossings : number of pairs of triangles that are through each other
     """

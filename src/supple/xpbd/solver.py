@@ -51,7 +51,7 @@ from supple.xpbd.sweeps.ordering import Layout, make_layout, reordered
 # of their body is shortened.
 MOST_PROJECTIONS = 10
 # How often a bad frame is repeated with twice as many substeps.
-MOST_REPEATS = 3
+MOST_REPEATS = 2
 # Below this much work, in edges or volumes, a sweep ends before a second thread has started.
 PARALLEL_FROM = 20_000
 _MOST_THREADS: int = config.NUMBA_NUM_THREADS  # pyright: ignore[reportAttributeAccessIssue]
@@ -68,6 +68,7 @@ class XPBDWorkspace:
     extended : (n + a, 4) positions about the component's origin [m] and inverse masses [1/kg], of the vertices and then
         of the anchors (inverse mass 0); extended_previous : (n + a, 3) positions at the beginning of the substep
     points, previous : the rows of the vertices
+    begun : (n, 3) positions at the beginning of the substep, which contacts do not change
     velocities, origins : (n, 3); world, world_previous : (n, 3) positions in world coordinates, for contacts
     """
 
@@ -86,6 +87,7 @@ class XPBDWorkspace:
     extended_previous: NDArray[np.float64] = field(init=False)
     points: NDArray[np.float64] = field(init=False)
     previous: NDArray[np.float64] = field(init=False)
+    begun: NDArray[np.float64] = field(init=False)
     velocities: NDArray[np.float64] = field(init=False)
     origins: NDArray[np.float64] = field(init=False)
     world: NDArray[np.float64] = field(init=False)
@@ -95,7 +97,7 @@ class XPBDWorkspace:
         n = len(self.system.masses)
         self.extended_previous = np.zeros((len(self.extended), 3))
         self.points, self.previous = self.extended[:n], self.extended_previous[:n]
-        for name in ("velocities", "origins", "world", "world_previous"):
+        for name in ("begun", "velocities", "origins", "world", "world_previous"):
             setattr(self, name, np.zeros((n, 3)))
 
     def moment(self, time: float) -> Moment:
@@ -243,7 +245,7 @@ class XPBD(Solver):
         memory = XPBDMemory(
             contact=ws.collisions.memory(ws.world),
             ledger=ledger,
-            substeps=float(used.count) if repeats else FALL * before.substeps,
+            substeps=float(used.count) if repeats and problem is None else FALL * before.substeps,
             futile=frozenset() if problem is None else before.futile | ({problem} if repeats else set()),
             crossings=findings.crossings,
         )
@@ -327,6 +329,7 @@ def _begin_substep(ws: XPBDWorkspace, targets: NDArray[np.float64], end: float, 
     damped = [constraints for constraints in ws.sets if constraints.damped]
     gravity = ws.system.gravity
     predict[parallel](ws.points, ws.previous, ws.velocities, np.zeros(3) if damped else gravity, h)
+    ws.begun[:] = ws.previous
     if len(targets):
         hold(ws.points, ws.system.pinned_vertices, targets, ws.origins)
         ws.assessment.balance.note_pins(ws.points, ws.previous, parallel)
@@ -362,7 +365,7 @@ def _keep_volumes(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> b
     failures = ws.guard.failures()
     failed = bool(failures.any())
     if failed:
-        ws.fallback.apply(ws.points, ws.previous, ws.guard.guarded, failures)
+        ws.fallback.apply(ws.points, ws.previous, ws.begun, ws.guard.bounds, failures)
         _restore(ws, h, parallel)
         ws.guard.measure(ws.points, parallel)
     ws.guard.accept()

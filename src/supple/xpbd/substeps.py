@@ -25,6 +25,9 @@ FEWEST = 10
 APPROACH = 0.5
 # By which a number from an earlier frame falls in every frame.
 FALL = 0.8
+# How many times the number of the other criteria it may be: a blow that lasts for some frames must not raise it to any
+# height.
+MOST_KEPT = 4
 
 
 class Substeps(NamedTuple):
@@ -59,11 +62,14 @@ class SubstepChoice:
         """
         stiff, body = self.softening.substeps(dt, accuracy)
         fast = math.ceil(self._closing_speed(moment, dt) * dt / (APPROACH * self.height)) if self.touches else 0
-        return max(
-            (Substeps(FEWEST, "the least number"), Substeps(stiff, f"the stiffness of body {body!r}"),
-             Substeps(fast, "the speed of approach"), Substeps(math.ceil(FALL * earlier), "the frame before")),
+        found = max(
+            Substeps(FEWEST, "the least number"),
+            Substeps(stiff, f"the stiffness of body {body!r}"),
+            Substeps(fast, "the speed of approach"),
             key=lambda each: each.count,
-        )  # fmt: skip
+        )
+        kept = min(math.ceil(FALL * earlier), MOST_KEPT * found.count)
+        return found if found.count >= kept else Substeps(kept, "the frame before")
 
     def _closing_speed(self, moment: Moment, dt: float) -> float:
         """An upper bound of the speed at which surfaces approach each other in the frame [m/s]."""

@@ -25,6 +25,8 @@ from supple.xpbd.assessment.moment import Moment
 
 # Of the shear modulus times the volume: energies below the square of this strain are round-off.
 LEAST_STRAIN = 1e-6
+# Of the work of pins in a substep: how much it may be off, since it is taken at the prediction.
+PIN_TOLERANCE = 0.1
 
 
 class EnergyBalance:
@@ -67,7 +69,8 @@ class EnergyBalance:
         before = points.copy()
         before[self._held, :3] = previous[self._held]
         energies = [self._at_pins.of(x, parallel, self._h).sum() for x in (before, points)]
-        self._work += max(float(energies[1] - energies[0]), 0.0)
+        work = float(energies[1] - energies[0])
+        self._work += max(work, 0.0) + PIN_TOLERANCE * abs(work)
 
     def note_loads(
         self,

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from supple.numerics.noninverting_step import noninverting_step, volume_signs
 from supple.system import System
+from supple.xpbd.limits.volume_guard import FLATTEST
 
-# The share of its volume that a tet keeps at least.
-KEEP = 0.1
+# The share of its volume that a tet keeps at least, and one that is nearly flat.
+KEEP, KEEP_FLAT = 0.1, 1.0 - 1e-6
 
 
 class RigidFallback:
@@ -34,7 +35,8 @@ class RigidFallback:
         self,
         points: NDArray[np.float64],
         previous: NDArray[np.float64],
-        guarded: NDArray[np.bool_],
+        begun: NDArray[np.float64],
+        bounds: NDArray[np.float64],
         bad: NDArray[np.bool_],
     ) -> None:
         """Shorten the motion of every component with a bad tet, in place.
@@ -42,22 +44,28 @@ class RigidFallback:
         Parameters
         ----------
         points : (n, 4) positions at the end of the substep [m], in the first three columns
-        previous : (n, 3) at its beginning [m]
-        guarded, bad : (m,) tets that must stay positive, and those that are not
+        previous : (n, 3) the positions that velocities are counted from, changed by contacts [m]
+        begun : (n, 3) those at the beginning of the substep, where all guarded tets are positive [m]
+        bounds : (m,) of the guard, minus infinity for tets that are not guarded; bad : (m,) tets below them
         """
+        guarded, flat = bounds > 0.0, bounds < FLATTEST
         for label in np.unique(self.tet_labels[bad]):
             rows = np.flatnonzero(self.labels == label)
-            base = previous.copy()
-            base[rows] = self._rigid(points[rows, :3], previous[rows], rows)
+            base = begun.copy()
+            base[rows] = self._rigid(points[rows, :3], begun[rows], rows)
             motion = np.zeros_like(base)
             motion[rows] = points[rows, :3] - base[rows]
             mine = guarded & (self.tet_labels == label)
-            step = float(noninverting_step(base, motion, self.system.tets, mine, KEEP)[0])
+            step = min(
+                float(noninverting_step(base, motion, self.system.tets, mine & (flat == is_flat), keep)[0])
+                for is_flat, keep in ((False, KEEP), (True, KEEP_FLAT))
+            )
             # Positions are rounded, so that the volumes of slivers may differ from what the cubics promise.
             tets = self.system.tets[mine]
             while step > 0.0 and not (volume_signs(base + step * motion, tets) > 0.0).all():
                 step *= 0.5
             points[rows, :3] = base[rows] + step * motion[rows]
+            previous[rows] = begun[rows]
 
     def _rigid(self, x: NDArray, before: NDArray, rows: NDArray[np.intp]) -> NDArray[np.float64]:
         held = self.pinned[rows]

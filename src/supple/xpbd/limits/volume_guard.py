@@ -29,6 +29,8 @@ ONSET, KEEP = 0.25, 0.5
 ENOUGH, LEAST_SHARE = 0.7, 0.1
 # Below this J, nothing may be left over: otherwise J could fall by a share in every substep.
 STRICT = 0.1
+# Below this J, a tet that loses any volume counts as failed: it is too flat to bound its loss by a share.
+FLATTEST = 1e-3
 BLOCK = 1024
 
 
@@ -62,7 +64,8 @@ class VolumeGuard:
     def failures(self) -> NDArray[np.bool_]:
         """(m,) the tets that have, as measured last, less than `LEAST_SHARE` of their bound."""
         # Written so that NaN fails.
-        return (self.bounds > 0.0) & ~(LEAST_SHARE * self.bounds <= self.J)
+        least = np.where(self.bounds < FLATTEST, 1.0 - 1e-6, LEAST_SHARE) * self.bounds
+        return (self.bounds > 0.0) & ~(least <= self.J)
 
     def accept(self) -> None:
         """Begin a substep at the positions that were measured last."""
