@@ -194,3 +194,18 @@ def test_ctrl_c_of_a_process(folder):
     assert "Traceback" not in err
     with read_recording("out/recording.vtkhdf") as recording:
         assert recording.times[-1] == pytest.approx((len(recording) - 1) / 60)
+
+
+def test_strict_fails_where_a_frame_did_not_converge(folder, capfd):
+    text = (folder / "scene.yaml").read_text()
+    assert "substeps: 5" in text
+    stiff = text.replace("substeps: 5", "substeps: 5, accuracy: 1e-9")
+    (folder / "scene.yaml").write_text(stiff)
+    command = ["run", "scene.yaml", "--no-page", "--no-plot", "--quiet"]
+    assert main(command) == ExitCode.OK
+    assert main([*command, "--strict"]) == ExitCode.FAILED
+    with read_recording("out/recording.vtkhdf") as recording:
+        assert {str(status) for status in recording.statuses[1:]} == {"softened"}
+        assert "too soft" in recording[-1].report.message
+    (folder / "scene.yaml").write_text(text.replace("substeps: 5", "substeps: 5, accuracy: 0.9"))
+    assert main([*command, "--strict"]) == ExitCode.OK

@@ -22,8 +22,7 @@ from supple.state import State, Status, StepReport
 from supple.system import Solver, System
 from supple.xpbd.assessment.assessment import Assessment
 from supple.xpbd.assessment.findings import Findings
-from supple.xpbd.assessment.moment import Moment
-from supple.xpbd.constraints.registry import ConstraintSet, build_constraint_sets
+from supple.xpbd.constraints.registry import build_constraint_sets
 from supple.xpbd.constraints.stitch_anchors import StitchAnchors
 from supple.xpbd.constraints.stitches import stitch_constraints
 from supple.xpbd.contact.collisions import Collisions
@@ -44,8 +43,10 @@ from supple.xpbd.limits.rigid_fallback import RigidFallback
 from supple.xpbd.limits.volume_guard import ENOUGH, VolumeGuard
 from supple.xpbd.memory import XPBDMemory
 from supple.xpbd.momentum import MomentumRestore
+from supple.xpbd.start import raise_if_inside
 from supple.xpbd.substeps import FALL, SubstepChoice, Substeps
-from supple.xpbd.sweeps.ordering import Layout, make_layout, reordered
+from supple.xpbd.sweeps.ordering import make_layout, reordered
+from supple.xpbd.workspace import XPBDWorkspace
 
 # How often tets that are compressed too fast are projected in a substep, in turn with the contacts, before the motion
 # of their body is shortened.
@@ -55,54 +56,6 @@ MOST_REPEATS = 2
 # Below this much work, in edges or volumes, a sweep ends before a second thread has started.
 PARALLEL_FROM = 20_000
 _MOST_THREADS: int = config.NUMBA_NUM_THREADS  # pyright: ignore[reportAttributeAccessIssue]
-
-
-@dataclass(eq=False)
-class XPBDWorkspace:
-    """What is computed once for a system, and scratch arrays, in the solver's own numbering of vertices.
-
-    It caches and never remembers: a step reads nothing of an earlier step but the state.
-
-    Attributes
-    ----------
-    extended : (n + a, 4) positions about the component's origin [m] and inverse masses [1/kg], of the vertices and then
-        of the anchors (inverse mass 0); extended_previous : (n + a, 3) positions at the beginning of the substep
-    points, previous : the rows of the vertices
-    begun : (n, 3) positions at the beginning of the substep, which contacts do not change
-    velocities, origins : (n, 3); world, world_previous : (n, 3) positions in world coordinates, for contacts
-    """
-
-    system: System
-    layout: Layout
-    sets: list[ConstraintSet]
-    momentum: MomentumRestore | None
-    collisions: Collisions
-    guard: VolumeGuard
-    fallback: RigidFallback
-    assessment: Assessment
-    choice: SubstepChoice
-    pace: ThreadTuner
-    anchors: StitchAnchors
-    extended: NDArray[np.float64]
-    extended_previous: NDArray[np.float64] = field(init=False)
-    points: NDArray[np.float64] = field(init=False)
-    previous: NDArray[np.float64] = field(init=False)
-    begun: NDArray[np.float64] = field(init=False)
-    velocities: NDArray[np.float64] = field(init=False)
-    origins: NDArray[np.float64] = field(init=False)
-    world: NDArray[np.float64] = field(init=False)
-    world_previous: NDArray[np.float64] = field(init=False)
-
-    def __post_init__(self) -> None:
-        n = len(self.system.masses)
-        self.extended_previous = np.zeros((len(self.extended), 3))
-        self.points, self.previous = self.extended[:n], self.extended_previous[:n]
-        for name in ("begun", "velocities", "origins", "world", "world_previous"):
-            setattr(self, name, np.zeros((n, 3)))
-
-    def moment(self, time: float) -> Moment:
-        """What the assessment reads, at `time` [s]."""
-        return Moment(self.points, self.extended, self.velocities, self.origins, time)
 
 
 @dataclass(frozen=True)
@@ -119,6 +72,7 @@ class XPBD(Solver):
     contact : contact of bodies with each other and with themselves; None turns it off. Obstacles always act.
     accuracy : the share of its stiffness that a body may lack; beyond it, the status of a frame is `softened`.
     max_substeps : the largest automatic number.
+    start : what becomes of bodies that begin inside of something: an error, or they are slowly pushed out.
     threads : number of threads. None: one, or all of Numba's where the scene is large enough and several threads are
         measured to be faster. The result has the same bits for any number.
 
@@ -133,11 +87,14 @@ class XPBD(Solver):
     threads: int | None = None
     accuracy: float = 0.02
     max_substeps: int = 1000
+    start: Literal["refuse", "push_out"] = "refuse"
 
     def __post_init__(self) -> None:
         if self.substeps != "auto":
             _check_count("substeps", self.substeps, ", or 'auto'")
         _check_count("max_substeps", self.max_substeps)
+        if self.start not in ("refuse", "push_out"):
+            raise SolverError(f"XPBD: start is {self.start!r}; give 'refuse' or 'push_out'")
         if not isinstance(self.momentum_restore, bool):
             raise SolverError(f"XPBD: momentum_restore is {self.momentum_restore!r}; give True or False")
         if self.contact is not None and not isinstance(self.contact, XPBDContact):
@@ -184,6 +141,17 @@ class XPBD(Solver):
             anchors=StitchAnchors(inner),
             extended=extended,
         )
+
+    def check(self, system: System, state: State, workspace: XPBDWorkspace) -> None:
+        """Raise where a body begins inside of something; a state of XPBD's own may be continued in any case.
+
+        Raises
+        ------
+        SceneError : names the things, the depth and the remedy.
+        """
+        if self.start == "refuse" and not isinstance(state.memory, XPBDMemory):
+            edge_length = workspace.collisions.edge_length
+            raise_if_inside(system, state.positions, state.time, self.contact, edge_length)
 
     def step(self, system: System, state: State, dt: float, workspace: XPBDWorkspace) -> tuple[State, StepReport]:
         """Advance by `dt` [s]. The returned state has its own arrays.

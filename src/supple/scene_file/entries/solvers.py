@@ -39,6 +39,9 @@ class XPBDModel(Model):
     threads: int | None = Field(default=None, ge=1, le=1024, description="default: chosen by the size of the scene")
     accuracy: Share = Field(default=0.02, description="the share of its stiffness that a body may lack")
     max_substeps: Iterations = Field(default=1000, description="the largest automatic number of substeps")
+    start: Literal["refuse", "push_out"] = Field(
+        default="refuse", description="bodies that begin inside of something: an error, or slowly pushed out"
+    )
 
     def build(self) -> Solver:
         from supple.xpbd.contact.settings import XPBDContact

@@ -26,7 +26,7 @@ from supple.xpbd.assessment.moment import Moment
 # Of the shear modulus times the volume: energies below the square of this strain are round-off.
 LEAST_STRAIN = 1e-6
 # Of the work of pins in a substep: how much it may be off, since it is taken at the prediction.
-PIN_TOLERANCE = 0.1
+PIN_TOLERANCE = 0.2
 
 
 class EnergyBalance:

@@ -52,7 +52,7 @@ class SurfaceCheck:
         self.tolerated = TOLERATED_DEPTH * edge_length
         self._poses = ObstaclePoses(system.obstacles)
         self._names = [f"body {part.name!r}" for part in system.bodies] + [o.label for o in system.obstacles]
-        self._collide = _collide(system, settings)
+        self._collide = colliding_pairs(system, settings)
         bodies, n = len(system.bodies), len(system.masses)
         triangles, points, self._owners = [system.triangles], [], []
         owner = [np.repeat(np.arange(bodies), [part.triangles.stop - part.triangles.start for part in system.bodies])]
@@ -73,7 +73,7 @@ class SurfaceCheck:
 
     def find(self, x: NDArray[np.float64], time: float) -> list[Overlap]:
         """What is through what, at world positions x (n, 3) [m] and a time [s]."""
-        return [*self._crossings(x, time), *self._depths(x, time)]
+        return [*self._crossings(x, time), *self.depths(x, time)]
 
     def _crossings(self, x: NDArray[np.float64], time: float) -> list[Overlap]:
         R, t = self._poses.at(time)
@@ -106,7 +106,8 @@ class SurfaceCheck:
                 chosen |= mine & (low <= upper).all(axis=1) & (high >= lower).all(axis=1)
         return chosen
 
-    def _depths(self, x: NDArray[np.float64], time: float) -> list[Overlap]:
+    def depths(self, x: NDArray[np.float64], time: float) -> list[Overlap]:
+        """Bodies with vertices deep inside of obstacles that have no triangles; arguments as of `find`."""
         R, t = self._poses.at(time)
         bodies, found = len(self.system.bodies), []
         for k in self._formulas:
@@ -120,8 +121,8 @@ class SurfaceCheck:
         return found
 
 
-def _collide(system: System, settings: XPBDContact | None) -> NDArray[np.bool_]:
-    """(p, p) which things must stay apart: bodies, then obstacles."""
+def colliding_pairs(system: System, settings: XPBDContact | None) -> NDArray[np.bool_]:
+    """(p, p) which things must stay apart: bodies, then obstacles, without those that are stitched to each other."""
     bodies = len(system.bodies)
     collide = pair_table(system.scene).collide.copy()
     if settings is None or not settings.body_collision:
