@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 from collections.abc import Callable, Generator, Mapping, Sequence
@@ -22,6 +23,8 @@ from supple.scene.scene import Scene
 from supple.scene.stitches.measures import largest_stitch_stretch, stitch_energy
 from supple.state import ContactPoints, SolverDetails, State, Status, StepReport
 from supple.system import BodyRange, Solver, System, build_system, initial_state
+
+logger = logging.getLogger(__name__)
 
 # Beyond these, dt^2 and 1 / dt^2 leave what float64 can hold.
 _DT_RANGE = (1e-30, 1e30)
@@ -67,6 +70,11 @@ class Report(Diagnostics):
     message: str = ""
     min_distance: float | None = None
     details: SolverDetails = field(default_factory=SolverDetails)
+
+    @property
+    def softening(self) -> Mapping[str, float]:
+        """By body, the share of its stiffness that it lacks, estimated; empty where the solver does not soften."""
+        return getattr(self.details, "softening", {})
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +169,8 @@ def simulate(
 ) -> Generator[Frame]:
     """Advance a scene and yield a frame after each step.
 
-    Where the solver cannot continue, ends early; the report of the last frame gives the reason.
+    Where the solver cannot continue, ends early; the report of the last frame gives the reason. At the end, a warning
+    in the log names the frames that did not converge, and why.
 
     Parameters
     ----------
@@ -237,7 +246,9 @@ def _steps(
     first: Frame, solver: Solver, dt: float, steps: int, workspace: Any, sinks: Sequence[Sink]
 ) -> Generator[Frame]:
     system, state = first.system, first.state
+    problems = Problems()
     with ExitStack() as ends:  # ends every sink, also where another sink fails
+        ends.callback(problems.warn)
         for sink in sinks:
             ends.callback(sink.end)
             sink.begin(first, dt, steps)
@@ -245,12 +256,43 @@ def _steps(
             began = time.perf_counter()
             state, step = solver.step(system, state, dt, workspace)
             seconds = time.perf_counter() - began
-            frame = Frame(index, state, system, _report(system, state, step, seconds), step.contacts, solver)
+            frame = Frame(index, state, system, _report(system, state, step, seconds), step.contacts)
+            problems.note(frame.report)
             for sink in sinks:
                 sink.write(frame)
             yield frame
             if not step.status.can_go_on:
                 break
+
+
+class Problems:
+    """The frames of a run that the solver could go on from although they did not converge.
+
+    Attributes
+    ----------
+    frames : number of frames; bad : how many of them did not converge
+    first : by status, the message of its first frame
+    """
+
+    def __init__(self) -> None:
+        self.frames = self.bad = 0
+        self.first: dict[Status, str] = {}
+
+    def note(self, report: Report) -> None:
+        """Take notice of a frame."""
+        self.frames += 1
+        if report.status is not Status.CONVERGED and report.status.can_go_on:
+            self.bad += 1
+            self.first.setdefault(report.status, report.message)
+
+    def __str__(self) -> str:
+        texts = "; ".join(f"{status}: {message}" if message else str(status) for status, message in self.first.items())
+        return f"{self.bad} of {self.frames} frames did not converge; first of each kind: {texts}" if self.bad else ""
+
+    def warn(self) -> None:
+        """Write a warning to the log, where there is something to warn of."""
+        if self.bad:
+            logger.warning("%s", self)
 
 
 def _report(system: System, state: State, step: StepReport, seconds: float) -> Report:

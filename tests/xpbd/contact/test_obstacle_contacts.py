@@ -59,7 +59,7 @@ def test_a_dropped_ball_comes_to_rest_on_it(kind):
     thickness = Collisions(build_system(scene), None).thickness
     level = thickness if level == "thickness" else level
     lowest, frame = [], None
-    for frame in sp.simulate(scene, XPBD(substeps=10), 1 / 60, 90):
+    for frame in sp.simulate(scene, XPBD(substeps=60, accuracy=0.9), 1 / 60, 150):
         assert frame.report.status == "converged"
         lowest.append(frame.positions["ball"][:, 1].min())
     assert min(lowest) > level - 0.1 * thickness
@@ -73,7 +73,7 @@ def test_a_dropped_ball_lands_on_a_ball_and_rolls_off(kind):
     obstacle = sp.Sphere(center=(0, -1, 0), radius=1) if kind == "ball" else ball_of_triangles()
     scene = sp.Scene([ball(0.13)], [obstacle])
     gaps = []
-    for frame in sp.simulate(scene, XPBD(substeps=10), 1 / 60, 60):
+    for frame in sp.simulate(scene, XPBD(substeps=60, accuracy=0.9), 1 / 60, 60):
         assert frame.report.status == "converged"
         gaps.append(np.linalg.norm(frame.positions["ball"] + [0, 1, 0], axis=1).min() - 1)
     # The triangles' planes are up to 3 mm inside of the ball.

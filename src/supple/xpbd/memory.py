@@ -1,0 +1,29 @@
+"""What XPBD must know of earlier steps beside positions and velocities. It is stored in `State.memory`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from supple.state import Status
+from supple.xpbd.assessment.assessment import Ledger
+from supple.xpbd.contact.memory import ContactMemory
+
+
+@dataclass(frozen=True, eq=False)
+class XPBDMemory:
+    """The memory of one state.
+
+    Attributes
+    ----------
+    contact : of contact; None without contact of surfaces
+    ledger : of the assessment of frames; None at the start
+    substeps : what the last frame asks of the next one, where repetitions helped; falls back to zero
+    futile : the statuses that the last frame had in spite of repetitions
+    crossings : number of pairs of triangles that are through each other
+    """
+
+    contact: ContactMemory | None = None
+    ledger: Ledger | None = None
+    substeps: float = 0.0
+    futile: frozenset[Status] = frozenset()
+    crossings: int = 0
