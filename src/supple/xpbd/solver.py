@@ -6,6 +6,7 @@ Source: Macklin, Müller, Chentanez, "XPBD" (2016); Macklin et al., "Small Steps
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import accumulate
 from time import perf_counter
 
 import numba
@@ -23,12 +24,11 @@ from supple.xpbd.constraints.registry import ConstraintSet, build_constraint_set
 from supple.xpbd.constraints.stitch_anchors import StitchAnchors
 from supple.xpbd.constraints.stitches import stitch_constraints
 from supple.xpbd.contact.collisions import Collisions
-from supple.xpbd.contact.memory import ContactMemory
 from supple.xpbd.contact.settings import XPBDContact
+from supple.xpbd.damping.kelvin_voigt import Damping, cycle_lengths, make_damping
 from supple.xpbd.details import XPBDDetails
 from supple.xpbd.external_forces import add_forces, pull_to_targets
 from supple.xpbd.integration import (
-    accelerate,
     apply_changes,
     first_lost,
     hold,
@@ -37,6 +37,7 @@ from supple.xpbd.integration import (
     to_world,
     update_velocities,
 )
+from supple.xpbd.memory import XPBDMemory
 from supple.xpbd.momentum import MomentumRestore
 from supple.xpbd.sweeps.ordering import Layout, make_layout, reordered
 
@@ -54,20 +55,20 @@ class XPBDWorkspace:
     Attributes
     ----------
     extended : (n + a, 4) positions about the component's origin [m] and inverse masses [1/kg], of the vertices and then
-        of the anchors (inverse mass 0); extended_previous : (n + a, 3) positions at the beginning of the substep
-    points, previous : the rows of the vertices
+        of the anchors (inverse mass 0); points : the rows of the vertices
+    previous : (n, 3) positions at the beginning of the substep [m]
     velocities, origins : (n, 3); world, world_previous : (n, 3) positions in world coordinates, for contacts
     """
 
     system: System
     layout: Layout
     sets: list[ConstraintSet]
+    damping: Damping | None
     momentum: MomentumRestore | None
     collisions: Collisions
     pace: ThreadTuner
     anchors: StitchAnchors
     extended: NDArray[np.float64]
-    extended_previous: NDArray[np.float64] = field(init=False)
     points: NDArray[np.float64] = field(init=False)
     previous: NDArray[np.float64] = field(init=False)
     velocities: NDArray[np.float64] = field(init=False)
@@ -77,9 +78,8 @@ class XPBDWorkspace:
 
     def __post_init__(self) -> None:
         n = len(self.system.masses)
-        self.extended_previous = np.zeros((len(self.extended), 3))
-        self.points, self.previous = self.extended[:n], self.extended_previous[:n]
-        for name in ("velocities", "origins", "world", "world_previous"):
+        self.points = self.extended[:n]
+        for name in ("previous", "velocities", "origins", "world", "world_previous"):
             setattr(self, name, np.zeros((n, 3)))
 
 
@@ -139,6 +139,7 @@ class XPBD(Solver):
             system=inner,
             layout=layout,
             sets=sets,
+            damping=make_damping(inner, layout, extended[:, 3]),
             momentum=MomentumRestore(inner) if self.momentum_restore else None,
             collisions=Collisions(inner, self.contact),
             pace=ThreadTuner(choice=parallel and self.threads is None, parallel=parallel),
@@ -151,17 +152,27 @@ class XPBD(Solver):
         ws, h = workspace, dt / self.substeps
         _load(ws, state)
         targets = _pin_targets(ws.system, state.time, h, self.substeps)
+        memory = state.memory if isinstance(state.memory, XPBDMemory) else XPBDMemory(None, None)
         if ws.collisions:
-            memory = state.memory if isinstance(state.memory, ContactMemory) else None
-            ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt, memory)
+            ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt, memory.contact)
+        # XPBD itself damps like tau = h.
+        damping = ws.damping if ws.damping is not None and ws.damping.tau > h else None
+        cycles = _cycles(self.substeps)
+        if damping is not None:
+            damping.begin_step(memory.viscous, state.velocities)
         with numba_threads(self.threads):
             for k in range(self.substeps):
                 interruption_point()
                 started = perf_counter()
                 parallel = ws.pace.choose()
                 end = state.time + (k + 1) * h
+                if damping is not None and k in cycles:
+                    moving = ws.anchors.velocities(end - h, h)
+                    damping.begin_cycle(ws.extended, ws.velocities, moving, cycles[k], h, parallel)
                 _begin_substep(ws, targets[k], end, h, parallel)
                 add_forces(ws.system, ws.points, ws.velocities, end, h)
+                if damping is not None:
+                    damping.push(ws.points, h)
                 for constraints in ws.sets:
                     constraints.project(ws.extended, h, parallel)
                 if ws.momentum is not None:
@@ -177,7 +188,7 @@ class XPBD(Solver):
             message = _lost_position_message(ws, lost, state.time + dt)
             return state, StepReport(Status.NOT_FINITE, self.substeps, message, details=XPBDDetails())
         details = XPBDDetails(ws.collisions.contacts, ws.collisions.smallest_gap)
-        return _unload(ws, state.time + dt), StepReport(Status.CONVERGED, self.substeps, details=details)
+        return _unload(ws, state.time + dt, damping), StepReport(Status.CONVERGED, self.substeps, details=details)
 
     def initial_details(self, system: System, workspace: XPBDWorkspace) -> XPBDDetails:
         """No contacts; see `Solver.initial_details`."""
@@ -198,23 +209,18 @@ def _load(ws: XPBDWorkspace, state: State) -> None:
     ws.anchors.place(ws.extended, ws.origins, state.time)
 
 
-def _begin_substep(ws: XPBDWorkspace, targets: NDArray[np.float64], end: float, h: float, parallel: bool) -> None:
-    """Predict positions, with pinned vertices at `targets` (k, 3), and apply damping.
+def _cycles(substeps: int) -> dict[int, int]:
+    """The first substep of each cycle of damping, and the cycle's length."""
+    lengths = cycle_lengths(substeps)
+    return dict(zip(accumulate(lengths, initial=0), lengths, strict=False))
 
-    Damping acts before gravity, forces and constraints, on the velocities at the beginning of the substep only. Later
-    in the substep it would reduce the load of a resting body, or undo corrections of neighbouring constraints.
-    """
-    damped = [constraints for constraints in ws.sets if constraints.damped]
-    gravity = ws.system.gravity
-    predict[parallel](ws.points, ws.previous, ws.velocities, np.zeros(3) if damped else gravity, h)
+
+def _begin_substep(ws: XPBDWorkspace, targets: NDArray[np.float64], end: float, h: float, parallel: bool) -> None:
+    """Predict positions, with pinned vertices at `targets` (k, 3)."""
+    predict[parallel](ws.points, ws.previous, ws.velocities, ws.system.gravity, h)
     if len(targets):
         hold(ws.points, ws.system.pinned_vertices, targets, ws.origins)
-    ws.extended_previous[len(ws.points) :] = ws.extended[len(ws.points) :, :3]
     ws.anchors.place(ws.extended, ws.origins, end)
-    for constraints in damped:
-        constraints.damp(ws.extended, ws.extended_previous, h, parallel)
-    if damped:
-        accelerate(ws.points, ws.velocities, gravity, h)
 
 
 def _collide(ws: XPBDWorkspace, time: float, h: float) -> bool:
@@ -227,10 +233,12 @@ def _collide(ws: XPBDWorkspace, time: float, h: float) -> bool:
     return True
 
 
-def _unload(ws: XPBDWorkspace, time: float) -> State:
+def _unload(ws: XPBDWorkspace, time: float, damping: Damping | None) -> State:
     to_world(ws.points, ws.origins, ws.world)
     new = ws.layout.new_from_old
-    return State(time, ws.world[new], ws.velocities[new], ws.collisions.memory(ws.world))
+    velocities = ws.velocities[new]
+    viscous = None if damping is None else damping.memory(velocities)
+    return State(time, ws.world[new], velocities, XPBDMemory(ws.collisions.memory(ws.world), viscous))
 
 
 def _pin_targets(system: System, time: float, h: float, substeps: int) -> NDArray[np.float64]:

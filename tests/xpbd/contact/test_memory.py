@@ -40,7 +40,7 @@ def folded_strip():
 def closing():
     """Velocities that close the strip, by body."""
     x = folded_strip().mesh.vertices
-    speed = np.where(x[:, 1] > 0.0, -6.0 * np.sign(x[:, 0]) * (x[:, 1] / x[:, 1].max()), 0.0)
+    speed = np.where(x[:, 1] > 0.0, -6.5 * np.sign(x[:, 0]) * (x[:, 1] / x[:, 1].max()), 0.0)
     return {"strip": np.stack([speed, 0.0 * speed, 0.3 * speed], axis=1)}
 
 
@@ -124,7 +124,7 @@ def test_another_scene_of_the_same_bodies_keeps_the_memory(obstacle, tolerance):
 def test_memory_that_does_not_describe_the_scene_is_dropped():
     """Other vertices, other triangles on as many vertices, and bodies that are elsewhere."""
     frame = run("self-contact", 1)[-1]
-    assert isinstance(frame.state.memory, ContactMemory)
+    assert isinstance(frame.state.memory.contact, ContactMemory)
     body, state = folded_strip(), frame.state
     fewer = pile()
     mirrored = sp.Body(
