@@ -15,8 +15,8 @@ from supple.xpbd.sweeps.lanes import nine, put_nine, put_twelve, twelve
 
 @njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
 def viscous_tet(x, v, b, shear, bulk):
-    """The forces (12) that balance the viscous stress of a tet, mean diagonal entries (4) of their matrix
-    [kg/s], and the square of the rates of the stretches [1/s^2].
+    """The forces (12) that balance the viscous stress of a tet, means of the diagonal entries (4) of
+    their matrix [kg/s], and the square of the rates of the stretches [1/s^2].
 
     With D = sym(F^T F') they are the gradient of shear |dev D|^2 + bulk / 2 (dJ/dF : F')^2.
 
@@ -84,25 +84,16 @@ def viscous_tet(x, v, b, shear, bulk):
         s10 * b30 + s11 * b31 + s12 * b32,
         s20 * b30 + s21 * b31 + s22 * b32,
     )
-    # A third of the traces of the diagonal blocks
+    # A third of the traces of the diagonal blocks, shear (|F|^2 |b|^2 + |F b|^2 / 3) + bulk |dJ/dF b|^2, with the means
+    # of |F b|^2 and |dJ/dF b|^2 over all directions of b.
     square = f00 * f00 + f01 * f01 + f02 * f02 + f10 * f10 + f11 * f11 + f12 * f12 + f20 * f20 + f21 * f21 + f22 * f22
-    b0, b1, b2 = -(b10 + b20 + b30), -(b11 + b21 + b31), -(b12 + b22 + b32)
-    ax, ay, az = f00 * b0 + f01 * b1 + f02 * b2, f10 * b0 + f11 * b1 + f12 * b2, f20 * b0 + f21 * b1 + f22 * b2
-    ex, ey, ez = c00 * b0 + c01 * b1 + c02 * b2, c10 * b0 + c11 * b1 + c12 * b2, c20 * b0 + c21 * b1 + c22 * b2
-    stretched = square * (b0 * b0 + b1 * b1 + b2 * b2) + (ax * ax + ay * ay + az * az) / 3.0
-    d0 = (shear * stretched + bulk * (ex * ex + ey * ey + ez * ez)) / 3.0
-    ax, ay, az = f00 * b10 + f01 * b11 + f02 * b12, f10 * b10 + f11 * b11 + f12 * b12, f20 * b10 + f21 * b11 + f22 * b12
-    ex, ey, ez = c00 * b10 + c01 * b11 + c02 * b12, c10 * b10 + c11 * b11 + c12 * b12, c20 * b10 + c21 * b11 + c22 * b12
-    stretched = square * (b10 * b10 + b11 * b11 + b12 * b12) + (ax * ax + ay * ay + az * az) / 3.0
-    d1 = (shear * stretched + bulk * (ex * ex + ey * ey + ez * ez)) / 3.0
-    ax, ay, az = f00 * b20 + f01 * b21 + f02 * b22, f10 * b20 + f11 * b21 + f12 * b22, f20 * b20 + f21 * b21 + f22 * b22
-    ex, ey, ez = c00 * b20 + c01 * b21 + c02 * b22, c10 * b20 + c11 * b21 + c12 * b22, c20 * b20 + c21 * b21 + c22 * b22
-    stretched = square * (b20 * b20 + b21 * b21 + b22 * b22) + (ax * ax + ay * ay + az * az) / 3.0
-    d2 = (shear * stretched + bulk * (ex * ex + ey * ey + ez * ez)) / 3.0
-    ax, ay, az = f00 * b30 + f01 * b31 + f02 * b32, f10 * b30 + f11 * b31 + f12 * b32, f20 * b30 + f21 * b31 + f22 * b32
-    ex, ey, ez = c00 * b30 + c01 * b31 + c02 * b32, c10 * b30 + c11 * b31 + c12 * b32, c20 * b30 + c21 * b31 + c22 * b32
-    stretched = square * (b30 * b30 + b31 * b31 + b32 * b32) + (ax * ax + ay * ay + az * az) / 3.0
-    d3 = (shear * stretched + bulk * (ex * ex + ey * ey + ez * ez)) / 3.0
+    area = c00 * c00 + c01 * c01 + c02 * c02 + c10 * c10 + c11 * c11 + c12 * c12 + c20 * c20 + c21 * c21 + c22 * c22
+    mean = shear * square * (10.0 / 27.0) + bulk * area / 9.0
+    b00, b01, b02 = b10 + b20 + b30, b11 + b21 + b31, b12 + b22 + b32
+    d0 = mean * (b00 * b00 + b01 * b01 + b02 * b02)
+    d1 = mean * (b10 * b10 + b11 * b11 + b12 * b12)
+    d2 = mean * (b20 * b20 + b21 * b21 + b22 * b22)
+    d3 = mean * (b30 * b30 + b31 * b31 + b32 * b32)
     return (
         -(h1x + h2x + h3x),
         -(h1y + h2y + h3y),
