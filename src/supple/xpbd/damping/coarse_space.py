@@ -7,6 +7,7 @@ turns and bends.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -82,7 +83,7 @@ class CoarseMatrix:
         self,
         groups: VertexGroups,
         masses: NDArray[np.float64],
-        elements: list[tuple[NDArray[np.int32], NDArray[np.float64]]],
+        elements: Iterable[tuple[NDArray[np.int32], NDArray[np.float64]]],
         H: float,
     ) -> None:
         self._groups = groups

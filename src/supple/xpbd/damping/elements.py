@@ -66,7 +66,7 @@ class ViscousSprings:
 
 def viscous_tets(system: System, inverse_masses: NDArray[np.float64]) -> ViscousTets:
     """All damped tetrahedra of bodies and stitches; `inverse_masses` (n + a,) includes those of the anchors."""
-    made = [_of_body(system, part, inverse_masses) for part in system.bodies]
+    made: list[tuple[NDArray, ...]] = [_of_body(system, part, inverse_masses) for part in system.bodies]
     stitches = system.stitching.tets
     V, mu, lam = stitches.rest_volumes, stitches.mu, stitches.lam
     made.append((stitches.vertices, stitches.rest_shape_inverse, stitches.damping, mu * V, *_bulk(mu, lam, V)))
@@ -76,7 +76,7 @@ def viscous_tets(system: System, inverse_masses: NDArray[np.float64]) -> Viscous
     return ViscousTets(*(np.ascontiguousarray(column[chosen]) for column in columns))
 
 
-def _of_body(system: System, part: BodyRange, w: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+def _of_body(system: System, part: BodyRange, w: NDArray[np.float64]) -> tuple[NDArray, ...]:
     corners, Dm_inv, V = system.tets[part.tets], system.rest_shape_inverse[part.tets], system.rest_volumes[part.tets]
     material = part.body.material
     if isinstance(material, EdgesAndVolume):
@@ -105,7 +105,7 @@ def viscous_springs(system: System, inverse_masses: NDArray[np.float64]) -> Visc
     """All damped edges of bodies and springs of stitches; `inverse_masses` as above."""
     springs = system.stitching.springs
     nothing = np.zeros(len(springs))
-    made = [(springs.vertices, springs.place, springs.damping, springs.stiffness, nothing)]
+    made: list[tuple[NDArray, ...]] = [(springs.vertices, springs.place, springs.damping, springs.stiffness, nothing)]
     for part in system.bodies:
         material = part.body.material
         if isinstance(material, EdgesAndVolume):
