@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from supple.state import Status
-from supple.xpbd.assessment.assessment import Ledger
 from supple.xpbd.contact.memory import ContactMemory
+from supple.xpbd.damping.kelvin_voigt import ViscousMemory
 
 
 @dataclass(frozen=True, eq=False)
@@ -16,14 +15,8 @@ class XPBDMemory:
     Attributes
     ----------
     contact : of contact; None without contact of surfaces
-    ledger : of the assessment of frames; None at the start
-    substeps : what the last frame asks of the next one, where repetitions helped; falls back to zero
-    futile : the statuses that the last frame had in spite of repetitions
-    crossings : number of pairs of triangles that are through each other
+    viscous : of damping; None where nothing is damped
     """
 
-    contact: ContactMemory | None = None
-    ledger: Ledger | None = None
-    substeps: float = 0.0
-    futile: frozenset[Status] = frozenset()
-    crossings: int = 0
+    contact: ContactMemory | None
+    viscous: ViscousMemory | None

@@ -40,7 +40,7 @@ def folded_strip():
 def closing():
     """Velocities that close the strip, by body."""
     x = folded_strip().mesh.vertices
-    speed = np.where(x[:, 1] > 0.0, -6.0 * np.sign(x[:, 0]) * (x[:, 1] / x[:, 1].max()), 0.0)
+    speed = np.where(x[:, 1] > 0.0, -6.5 * np.sign(x[:, 0]) * (x[:, 1] / x[:, 1].max()), 0.0)
     return {"strip": np.stack([speed, 0.0 * speed, 0.3 * speed], axis=1)}
 
 
