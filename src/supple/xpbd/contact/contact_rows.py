@@ -38,7 +38,15 @@ class LoadedRows(NamedTuple):
     def of_points(self, count: int) -> LoadedRows:
         """Those rows whose vertices are all below `count`."""
         kept = (self.vertices < count).all(axis=1)
-        return LoadedRows(*(each[kept] for each in self))
+        return LoadedRows(
+            self.keys[kept],
+            self.vertices[kept],
+            self.weights[kept],
+            self.normals[kept],
+            self.offsets[kept],
+            self.friction[kept],
+            self.forces[kept],
+        )
 
     @staticmethod
     def none() -> LoadedRows:

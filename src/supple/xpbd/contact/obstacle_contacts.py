@@ -240,7 +240,7 @@ class ObstacleContacts:
         n = len(self.inverse_masses)
         found = np.repeat(np.arange(len(self._starts) - 1), np.diff(self._starts)) * n + self._vertices[:count]
         kept = shapes * n + vertices
-        keys = np.union1d(found, kept)
+        keys = np.union1d(found, kept).astype(np.int64)
         held = np.zeros((len(keys), 3))
         held[np.searchsorted(keys, kept)] = loads
         self._enter(keys, held)

@@ -62,14 +62,9 @@ class SurfaceCollisions:
         self._stitched = stitched_points(system, s, poses)
         self._rules = (s.allowed, *excluded)
         self._edges = EdgePairs(sharp_edges(s, rest), s, self._stitched)
-        every = n + len(self._edges)
-        self._finder = PairFinder(every, pieces, edge_length)
-        # What searches: the points, and behind them the middles of edges.
-        self._searching = np.zeros((every, 3))
-        self._x = self._searching[:n]
-        self._before, self._gathered = np.zeros((n, 3)), np.zeros((n, 3))
-        searching_piece = np.concatenate([s.point_piece, self._edges.pieces])
-        self._shapes = (self._searching, searching_piece, s.triangles, s.triangle_piece)
+        self._finder = PairFinder(n, pieces, edge_length)
+        self._x, self._before, self._gathered = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
+        self._shapes = (self._x, s.point_piece, s.triangles, s.triangle_piece)
         self._pieces = (s.point_piece, s.triangles, s.triangle_piece, s.closed, s.gaps, s.friction)
         self._predicted = np.zeros((n, 3))
         self._points = (s.inverse_masses, np.concatenate([rates[s.rows], np.zeros(len(s.fixed_points))]))
@@ -77,8 +72,7 @@ class SurfaceCollisions:
         self._rows = ContactRows()
         self._smallest = np.zeros(n)
         self._pushed = False
-        self._radii = np.zeros((every, 3)), np.zeros((every, 3))
-        self._far, self._near = self._radii[0][:n], self._radii[1][:n]
+        self._far, self._near = np.zeros((n, 3)), np.zeros((n, 3))
         self._drifts = np.zeros((pieces + 1, 3))
         # Obstacles stand still, so that no motion is common to all points where there is one.
         self._all_share = len(s.fixed_points) == 0
@@ -223,11 +217,10 @@ class SurfaceCollisions:
         self._complete[:] = self._gap + LEAST_REACH * self.edge_length + self._depth.max(axis=0)
         self._far[:, 0] += self._complete
         self._near[:, 0] += self._complete
-        self._edges.search_from(self._searching, self._radii[0], self._gap)
-        self._finder.gather(self._shapes, self._radii, self._rules)
+        self._finder.gather(self._shapes, (self._far, self._near), self._rules)
         self._gathered[:] = self._x
         self._runs.renew()
-        self._edges.renew(self._searching, self._finder, self._far)
+        self._edges.renew(self._x, self._far[:, 1], self._gap)
         # Keys of points come before keys of edges.
         self._rows.renew(np.concatenate([self._runs.keys, self._edges.keys]))
         self._lists = self._runs.lists(np.searchsorted(self._rows.keys, self._runs.keys))

@@ -12,10 +12,8 @@ import math
 
 import numpy as np
 
-from supple.contact.search.spatial_hash import is_excluded
 from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import cross, dot, row, subtract
-from supple.xpbd.contact.detection.piece_runs import EDGE_EDGE, key_of
 from supple.xpbd.sweeps.compilation import serial_and_parallel
 
 # Edges whose sine of the angle between them is smaller are parallel: vertices and faces hold them apart.
@@ -81,74 +79,6 @@ def _edge_contact(x, x_prev, edges, e, f, closed_e, closed_f):
     if not (_supports(x, opposite, f, q, n, 1.0) and _supports(x, opposite, e, p, n, -1.0)):
         return nothing
     return True, s, t, n, dot(r, n)
-
-
-@njit(cache=True)
-def list_edge_pairs(x, finder, n_points, edges, edge_triangles, of_triangles, surfaces, stitched, reach, out):
-    """Keys of the pairs of edges that may touch. Writes as many as fit; returns their number, with repetitions.
-
-    Parameters
-    ----------
-    x : (n, 3) [m]
-    finder : n_active, active, starts, triangles of `PairFinder`; the points from n_points on are middles of edges
-    edges : ends (e, 2), opposite (e, 2); edge_triangles (e, 2), of_triangles (t, 3): see `SharpEdges`
-    surfaces : point_piece (n,), triangle_piece (t,), allowed (p, p), gaps (p, p)
-    stitched : starts (t + 1,) and points: those stitched to each triangle
-    reach : (e,) how far each edge may move [m]
-    out : (k,) int64
-    """
-    n_active, active, starts, listed = finder
-    ends, _ = edges
-    point_piece, triangle_piece, allowed, gaps = surfaces
-    count = 0
-    for index in range(n_active):
-        if active[index] < n_points:
-            continue
-        e = active[index] - n_points
-        mine = point_piece[ends[e, 0]]
-        for i in range(starts[active[index]], starts[active[index] + 1]):
-            t = listed[i]
-            its = triangle_piece[t]
-            if its == mine or not (allowed[mine, its] or allowed[its, mine]):
-                continue
-            if is_excluded(ends[e, 0], t, stitched[0], stitched[1]) or is_excluded(
-                ends[e, 1], t, stitched[0], stitched[1]
-            ):
-                continue
-            for k in range(3):
-                f = of_triangles[t, k]
-                if f < 0 or _is_stitched(ends, f, edge_triangles, e, stitched):
-                    continue
-                limit = max(gaps[mine, its], gaps[its, mine]) + reach[e] + reach[f]
-                if _distance(x, ends, e, f) > limit:
-                    continue
-                if count < len(out):
-                    out[count] = key_of(EDGE_EDGE, min(e, f), max(e, f))
-                count += 1
-    return count
-
-
-@njit
-def _is_stitched(ends, f, edge_triangles, e, stitched):
-    """Whether an end of edge f is stitched to a triangle of edge e."""
-    for k in range(2):
-        t = edge_triangles[e, k]
-        if t >= 0 and (
-            is_excluded(ends[f, 0], t, stitched[0], stitched[1]) or is_excluded(ends[f, 1], t, stitched[0], stitched[1])
-        ):
-            return True
-    return False
-
-
-@njit
-def _distance(x, ends, e, f):
-    """A lower bound of the distance of two edges [m]: that of their boxes."""
-    square = 0.0
-    for j in range(3):
-        a, b, c, d = x[ends[e, 0], j], x[ends[e, 1], j], x[ends[f, 0], j], x[ends[f, 1], j]
-        apart = max(0.0, min(a, b) - max(c, d), min(c, d) - max(a, b))
-        square += apart * apart
-    return math.sqrt(square)
 
 
 @serial_and_parallel

@@ -19,8 +19,8 @@ def key_of(kind, first, second):
 
 
 @njit(cache=True)
-def find_runs(lists, n_points, triangle_piece, run_ranges, run_starts, keys):
-    """Divide the lists of the points below n_points into runs. Returns the number of points and of runs.
+def find_runs(lists, triangle_piece, run_ranges, run_starts, keys):
+    """Divide the lists of all active points into runs. Returns the number of runs.
 
     Parameters
     ----------
@@ -30,13 +30,11 @@ def find_runs(lists, n_points, triangle_piece, run_ranges, run_starts, keys):
     keys : (count,) out: (point, piece) of each run
     """
     n_active, active, starts, listed = lists
-    runs, points = 0, 0
+    runs = 0
     run_ranges[0] = 0
     run_starts[0] = 0
     for index in range(n_active):
         p = active[index]
-        if p >= n_points:
-            break
         i, end = starts[p], starts[p + 1]
         while i < end:
             its = triangle_piece[listed[i]]
@@ -46,9 +44,8 @@ def find_runs(lists, n_points, triangle_piece, run_ranges, run_starts, keys):
                 i += 1
             runs += 1
             run_starts[runs] = i
-        points += 1
-        run_ranges[points] = runs
-    return points, runs
+        run_ranges[index + 1] = runs
+    return runs
 
 
 class PieceRuns:
@@ -60,7 +57,7 @@ class PieceRuns:
     """
 
     def __init__(self, finder: PairFinder, n_points: int, triangle_piece: NDArray[np.int32]) -> None:
-        self._finder, self._n_points, self._triangle_piece = finder, n_points, triangle_piece
+        self._finder, self._triangle_piece = finder, triangle_piece
         self._ranges = np.zeros(n_points + 1, dtype=np.int64)
         self._starts = np.zeros(1, dtype=np.int64)
         self._keys = np.zeros(0, dtype=np.int64)
@@ -73,9 +70,8 @@ class PieceRuns:
         if len(self._keys) < f.count:
             self._keys, self._starts = np.zeros(2 * f.count, dtype=np.int64), np.zeros(2 * f.count + 1, dtype=np.int64)
         lists = (f.n_active, f.active, f.starts, f.triangles)
-        self.n_active, runs = find_runs(
-            lists, self._n_points, self._triangle_piece, self._ranges, self._starts, self._keys
-        )
+        runs = find_runs(lists, self._triangle_piece, self._ranges, self._starts, self._keys)
+        self.n_active = f.n_active
         self.keys = self._keys[:runs]
 
     def lists(self, rows: NDArray[np.int64]) -> tuple:

@@ -24,19 +24,16 @@ class SharpEdges:
     ----------
     ends : (e, 2) points; opposite : (e, 2) the third corners of the two triangles, -1 where there is none
     triangles : (e, 2) the triangles themselves, -1 where there is none
-    of_triangles : (t, 3) the edges of each triangle; -1 for those that are not sharp
     """
 
     ends: NDArray[np.int32]
     opposite: NDArray[np.int32]
     triangles: NDArray[np.int32]
-    of_triangles: NDArray[np.int32]
 
 
 def sharp_edges(surfaces: ContactSurfaces, rest_positions: NDArray[np.float64]) -> SharpEdges:
     """The sharp edges of all pieces that may touch another piece; `rest_positions` (n, 3) of all points [m]."""
     triangles, pieces = surfaces.triangles, surfaces.triangle_piece
-    t = len(triangles)
     halves = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     low_high = np.sort(halves, axis=1)
     ends, edge_of, counts = np.unique(low_high, axis=0, return_inverse=True, return_counts=True)
@@ -50,18 +47,16 @@ def sharp_edges(surfaces: ContactSurfaces, rest_positions: NDArray[np.float64]) 
         has = counts > k
         half = order[starts[has] + k]
         opposite[has, k], beside[has, k] = third[half], half // 3
-    meets_others = (surfaces.allowed & ~np.eye(len(surfaces.closed), dtype=np.bool_)).any(axis=1)
+    meets_others = np.any(surfaces.allowed & ~np.eye(len(surfaces.closed), dtype=np.bool_), axis=1)
     piece = pieces[beside[:, 0]]
-    border = counts == 1
+    border = np.asarray(counts == 1)
     kept = meets_others[piece] & (
         border | ((counts == 2) & _is_sharp(surfaces, rest_positions, ends, beside, opposite))
     )
-    number = np.where(kept, np.cumsum(kept) - 1, -1).astype(np.int32)
     return SharpEdges(
         ends=ends[kept].astype(np.int32),
         opposite=opposite[kept],
         triangles=beside[kept],
-        of_triangles=np.ascontiguousarray(number[edge_of].reshape(t, 3)),
     )
 
 
