@@ -177,8 +177,8 @@ def solve_rows(x, x_prev, predicted, points, chosen, rows, h, limit, sweeps):
     """Sweep over the chosen rows, in place. Returns how many push, and the smallest gap before the substep (or inf).
 
     An overlap that existed when the substep began is removed at both ends of the substep alike, by at most `limit`; the
-    impulse only prevents the gap from becoming smaller than it was then (the pre-stabilization of Macklin et al., "Unified
-    Particle Physics", 2014, section 4.4).
+    impulse only prevents the gap from becoming smaller than it was then (pre-stabilization: Macklin
+    et al., "Unified Particle Physics", 2014, section 4.4).
 
     Parameters
     ----------
