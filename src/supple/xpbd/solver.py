@@ -241,14 +241,14 @@ class XPBD(Solver):
                     damping.begin_cycle(ws.extended, ws.velocities, moving, cycles[k], h, parallel)
                 _begin_substep(ws, targets[k], end, h, parallel)
                 add_forces(ws.system, ws.points, ws.velocities, end, h)
-                if damping is not None:
-                    damping.push(ws.points, h)
+                if ws.collisions:
+                    _push_contacts(ws, h)
                 for constraints in ws.sets:
                     constraints.project(ws.extended, h, parallel)
                 _restore(ws, h, parallel)
                 ws.pace.note(parallel, perf_counter() - started)
                 pull_to_targets(ws.system, ws.points, ws.velocities, ws.origins, end, h)
-                if ws.collisions and not _collide(ws, end, h):
+                if ws.collisions and not _collide(ws, end, h, parallel):
                     break
         lost = first_lost(ws.points, ws.velocities)
         if lost >= 0:
@@ -290,12 +290,20 @@ def _begin_substep(ws: XPBDWorkspace, targets: NDArray[np.float64], end: float, 
     ws.anchors.place(ws.extended, ws.origins, end)
 
 
-def _collide(ws: XPBDWorkspace, time: float, h: float) -> bool:
+def _push_contacts(ws: XPBDWorkspace, h: float) -> None:
+    """Apply the contact forces of the substep before to the prediction."""
+    if to_world(ws.points, ws.origins, ws.world):
+        to_world(ws.previous, ws.origins, ws.world_previous)
+        if ws.collisions.push(ws.world, ws.world_previous, h):
+            apply_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
+
+
+def _collide(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
     """Project the contacts of a substep, in the world. Returns False, without effect, where a position is lost."""
     if not to_world(ws.points, ws.origins, ws.world):
         return False
     to_world(ws.previous, ws.origins, ws.world_previous)
-    ws.collisions.project(ws.world, ws.world_previous, time, h)
+    ws.collisions.project(ws.world, ws.world_previous, time, h, parallel)
     apply_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
     return True
 

@@ -7,6 +7,7 @@ import pytest
 import supple as sp
 from supple.errors import SolverError
 from supple.system import build_system, initial_state
+from supple.xpbd.contact import surface_collisions
 from supple.xpbd.contact.collisions import Collisions
 from supple.xpbd.contact.settings import XPBDContact
 from supple.xpbd.solver import XPBD
@@ -48,6 +49,31 @@ def test_the_result_has_the_same_bits_on_any_number_of_threads():
     more = min(2, numba.config.NUMBA_NUM_THREADS)
     assert (run(1) == run(1)).all()
     assert (run(1) == run(more)).all()
+
+
+def test_contacts_found_on_several_threads_have_the_same_bits(monkeypatch):
+    """With the limit at one point, also small scenes search for contacts in parallel."""
+
+    def run(parallel):
+        scene = pile()
+        system, state = build_system(scene), initial_state(scene)
+        collisions = Collisions(system, XPBDContact())
+        x, v, h = state.positions.copy(), state.velocities.copy(), 1 / 600
+        contacts = 0
+        for k in range(60):
+            if k % 10 == 0:
+                collisions.begin_step(x, v, k * h, 10 * h, collisions.memory(x) if k else None)
+            before = x.copy()
+            x = x + h * (v + h * np.array([0.0, -9.81, 0.0]))
+            collisions.push(x, before, h)
+            contacts += collisions.project(x, before, (k + 1) * h, h, parallel)
+            v = (x - before) / h
+        return x, contacts
+
+    monkeypatch.setattr(surface_collisions, "PARALLEL_FROM", 1)
+    one, two = run(False), run(True)
+    assert (one[0] == two[0]).all()
+    assert one[1] == two[1] > 0
 
 
 def test_collisions_are_false_where_no_contact_is_possible():

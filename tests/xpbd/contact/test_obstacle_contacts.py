@@ -170,7 +170,7 @@ def test_a_moving_plane_compresses_a_body_and_leaves_a_pinned_vertex():
     scene = sp.Scene([body], [sp.HalfSpace(), lid], [sp.Pin("ball", [lowest])])
     frames = list(sp.simulate(scene, XPBD(substeps=10), 1 / 60, 36))
     y = frames[-1].positions["ball"][:, 1]
-    assert y.max() == pytest.approx(0.15, abs=1e-9)
+    assert y.max() == pytest.approx(0.15 - Collisions(build_system(scene), None).skin, abs=1e-9)
     assert np.ptp(y) == pytest.approx(0.15, abs=2e-3)
     assert y[lowest] == scene.bodies[0].place(body.mesh.vertices)[lowest, 1]
 
