@@ -17,6 +17,7 @@ LAYERS = (
     ("demos",),
     ("viewer",),
     ("studies",),
+    ("runs",),
     ("output", "scene_file"),
     ("simulate",),
     ("xpbd", "implicit"),

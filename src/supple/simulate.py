@@ -256,7 +256,7 @@ def _steps(
             began = time.perf_counter()
             state, step = solver.step(system, state, dt, workspace)
             seconds = time.perf_counter() - began
-            frame = Frame(index, state, system, _report(system, state, step, seconds), step.contacts)
+            frame = Frame(index, state, system, _report(system, state, step, seconds), step.contacts, solver)
             problems.note(frame.report)
             for sink in sinks:
                 sink.write(frame)

@@ -36,6 +36,7 @@ app = App(
 COMMANDS = {
     "demo": "supple.cli.commands.demo:demo",
     "run": "supple.cli.commands.run:run",
+    "resume": "supple.cli.commands.resume:resume",
     "sweep": "supple.cli.commands.sweep:sweep",
     "view": "supple.cli.commands.view:view",
     "mesh": "supple.cli.commands.mesh:mesh",

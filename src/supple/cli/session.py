@@ -126,7 +126,7 @@ def run_session(
         source=source,
     )
     frames = simulate(scene, solver, dt, steps, sinks=[folder, *sinks, *products.progress()], **(start or {}))
-    return _driven(frames, products)
+    return _driven(frames, products, strict)
 
 
 def resume_session(scene: Scene | None, solver: Solver | None, steps: int | None, *, products: Products) -> Outcome:
@@ -140,17 +140,23 @@ def resume_session(scene: Scene | None, solver: Solver | None, steps: int | None
     return _driven(resume(products.folder, scene, solver, steps=steps, sinks=products.progress()), products)
 
 
-def _driven(frames: Generator[Frame], products: Products) -> Outcome:
-    """Run the simulation until its end, or until Ctrl-C."""
+def _driven(frames: Generator[Frame], products: Products, strict: bool = False) -> Outcome:
+    """Run the simulation until its end, or until Ctrl-C; with `strict`, fail where a frame did not converge."""
     outcome = Outcome()
-    frames = simulate(scene, solver, dt, steps, sinks=all_sinks, **(start or {}))
-    try:
-        for frame in frames:
-            outcome.frames, outcome.last = outcome.frames + 1, frame
-            outcome.worst_J = min(outcome.worst_J, frame.report.min_det_F)
-            outcome.all_converged &= frame.report.status is Status.CONVERGED
-    except KeyboardInterrupt:
-        frames.close()
+    recording = RunPaths(products.folder).recording
+    with Interrupts() as interrupts:
+        try:
+            for frame in frames:
+                outcome.frames, outcome.last = outcome.frames + 1, frame
+                outcome.worst_J = min(outcome.worst_J, frame.report.min_det_F)
+                outcome.all_converged &= frame.report.status is Status.CONVERGED
+                if interrupts.asked:
+                    frames.close()
+                    outcome.code = ExitCode.INTERRUPTED
+        except KeyboardInterrupt:
+            frames.close()
+            outcome.code = ExitCode.INTERRUPTED
+    if outcome.code is ExitCode.INTERRUPTED:
         _warn_of_older_files(replace(products, page=False, plot=False))
         last = "" if outcome.last is None else f" to frame {outcome.last.index}"
         print_error(f"interrupted; {recording} is complete{last}; continue with: supple resume {products.folder}")

@@ -8,7 +8,7 @@ from typing import Any
 from supple.scene_file.entries.mesh_sources import TET_FILES
 from supple.scene_file.entries.solvers import model_of_kind
 from supple.scene_file.loader import Run
-from supple.scene_file.yaml_reader import yaml_text
+from supple.scene_file.yaml_writer import yaml_text
 
 SCENE_NAME, INPUTS = "scene.yaml", "inputs"
 

@@ -1,4 +1,4 @@
-"""Reading and writing YAML by the rules of version 1.2, with the line of each value; a repeated key is an error.
+"""Reading YAML by the rules of version 1.2, with the line of each value; a repeated key is an error.
 
 PyYAML follows YAML 1.1, where `1e5` is a text, `no` is false and `1:30` is ninety. Here scalars follow the core schema
 of YAML 1.2.2 (section 10.3.2). Only plain data is built, never any other object.
@@ -38,15 +38,6 @@ class SceneLoader(yaml.SafeLoader):
 
 for _kind, _pattern in (("null", _NULL), ("bool", _BOOL), ("int", _INT), ("float", _FLOAT)):
     SceneLoader.add_implicit_resolver(_PREFIX + _kind, re.compile(f"^(?:{_pattern.pattern})$"), None)
-
-
-class _Dumper(yaml.SafeDumper):
-    """PyYAML's writer, which quotes the texts that are other scalars of YAML 1.2."""
-
-    yaml_implicit_resolvers = _Loader.yaml_implicit_resolvers
-
-    def ignore_aliases(self, data: Any) -> bool:
-        return True
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,11 +111,6 @@ def read_yaml(path: str | Path) -> YamlDocument:
     if root is None:
         raise SceneError(f"{path}: the file is empty; a scene needs at least `bodies:`")
     return YamlDocument(path, text, _Builder(path).build(root, 0), root)
-
-
-def yaml_text(data: Any) -> str:
-    """Plain data as YAML; `read_yaml` returns the same data, numbers with the same bits."""
-    return yaml.dump(data, Dumper=_Dumper, sort_keys=False, default_flow_style=None, width=120, allow_unicode=True)
 
 
 def _read_text(path: Path) -> str:

@@ -5,7 +5,7 @@ Source: Macklin, Müller, Chentanez, "XPBD" (2016); Macklin et al., "Small Steps
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import accumulate
 from time import perf_counter
 from typing import Literal
@@ -28,7 +28,7 @@ from supple.xpbd.constraints.stitch_anchors import StitchAnchors
 from supple.xpbd.constraints.stitches import stitch_constraints
 from supple.xpbd.contact.collisions import Collisions
 from supple.xpbd.contact.settings import XPBDContact
-from supple.xpbd.damping.kelvin_voigt import Damping, cycle_lengths, make_damping
+from supple.xpbd.damping.kelvin_voigt import Damping, ViscousMemory, cycle_lengths, make_damping
 from supple.xpbd.details import XPBDDetails
 from supple.xpbd.external_forces import add_forces, pull_to_targets
 from supple.xpbd.integration import (
@@ -40,6 +40,8 @@ from supple.xpbd.integration import (
     to_world,
     update_velocities,
 )
+from supple.xpbd.limits.rigid_fallback import RigidFallback
+from supple.xpbd.limits.volume_guard import ENOUGH, VolumeGuard
 from supple.xpbd.memory import XPBDMemory
 from supple.xpbd.momentum import MomentumRestore
 from supple.xpbd.start import raise_if_inside
@@ -55,43 +57,6 @@ MOST_REPEATS = 2
 # Below this much work, in edges or volumes, a sweep ends before a second thread has started.
 PARALLEL_FROM = 20_000
 _MOST_THREADS: int = config.NUMBA_NUM_THREADS  # pyright: ignore[reportAttributeAccessIssue]
-
-
-@dataclass(eq=False)
-class XPBDWorkspace:
-    """What is computed once for a system, and scratch arrays, in the solver's own numbering of vertices.
-
-    It caches and never remembers: a step reads nothing of an earlier step but the state.
-
-    Attributes
-    ----------
-    extended : (n + a, 4) positions about the component's origin [m] and inverse masses [1/kg], of the vertices and then
-        of the anchors (inverse mass 0); points : the rows of the vertices
-    previous : (n, 3) positions at the beginning of the substep [m]
-    velocities, origins : (n, 3); world, world_previous : (n, 3) positions in world coordinates, for contacts
-    """
-
-    system: System
-    layout: Layout
-    sets: list[ConstraintSet]
-    damping: Damping | None
-    momentum: MomentumRestore | None
-    collisions: Collisions
-    pace: ThreadTuner
-    anchors: StitchAnchors
-    extended: NDArray[np.float64]
-    points: NDArray[np.float64] = field(init=False)
-    previous: NDArray[np.float64] = field(init=False)
-    velocities: NDArray[np.float64] = field(init=False)
-    origins: NDArray[np.float64] = field(init=False)
-    world: NDArray[np.float64] = field(init=False)
-    world_previous: NDArray[np.float64] = field(init=False)
-
-    def __post_init__(self) -> None:
-        n = len(self.system.masses)
-        self.points = self.extended[:n]
-        for name in ("previous", "velocities", "origins", "world", "world_previous"):
-            setattr(self, name, np.zeros((n, 3)))
 
 
 @dataclass(frozen=True)
@@ -221,13 +186,74 @@ class XPBD(Solver):
         if self.substeps != "auto":
             return Substeps(self.substeps, "the user")
         _load(ws, state)
-        targets = _pin_targets(ws.system, state.time, h, self.substeps)
-        memory = state.memory if isinstance(state.memory, XPBDMemory) else XPBDMemory(None, None)
+        wanted = ws.choice.choose(ws.moment(state.time), dt, self.accuracy, memory.substeps)
+        if wanted.count > self.max_substeps:
+            return Substeps(self.max_substeps, f"max_substeps; {wanted.reason} asks for {wanted.count}")
+        return wanted
+
+    def _reported(
+        self,
+        ws: XPBDWorkspace,
+        time: float,
+        dt: float,
+        held_back: int,
+        used: Substeps,
+        repeats: int,
+        before: XPBDMemory,
+    ) -> tuple[State, StepReport, Status | None]:
+        """The state at the end of a frame, what is wrong with it, and the status that more substeps might cure."""
+        h = dt / used.count
+        new, viscous = _unload(ws, time, self._damping(ws, h))
+        ws.guard.measure(ws.points, False)
+        findings, ledger = ws.assessment.end(ws.moment(time), ws.world, ws.guard.J, h, self.accuracy)
+        status = findings.status
+        problem = status if status in (Status.INVERTED, Status.ENERGY_GAINED) else None
+        if findings.crossings > before.crossings:
+            problem = Status.INTERSECTING
+        elif problem is None and held_back:
+            problem = Status.INVERTED
+        memory = XPBDMemory(
+            contact=ws.collisions.memory(ws.world),
+            viscous=viscous,
+            ledger=ledger,
+            substeps=float(used.count) if repeats and problem is None else FALL * before.substeps,
+            futile=frozenset() if problem is None else before.futile | ({problem} if repeats else set()),
+            crossings=findings.crossings,
+        )
+        details = XPBDDetails(
+            contacts=ws.collisions.contacts,
+            smallest_gap=ws.collisions.smallest_gap,
+            substeps=used.count,
+            repeats=repeats,
+            substeps_reason=used.reason,
+            softening=ws.assessment.softening.by_body(h),
+            energy_gained=findings.gained,
+            held_back=held_back,
+        )
+        message = findings.message(time, self._remedy(ws, dt, findings, used.count))
+        report = StepReport(status, used.count, message, details=details)
+        return replace(new, memory=memory), report, problem
+
+    def _remedy(self, ws: XPBDWorkspace, dt: float, findings: Findings, used: int) -> str:
+        """What helps against what was found."""
+        enough = ws.assessment.softening.substeps(dt, self.accuracy)[0]
+        if findings.status is not Status.SOFTENED:
+            enough = max(enough, 2 * used)
+        return f"take {'max_substeps' if self.substeps == 'auto' else 'substeps'}={enough}"
+
+    def _advance(self, ws: XPBDWorkspace, state: State, dt: float, substeps: int, memory: XPBDMemory) -> int:
+        """Simulate the substeps of a frame from a state; returns in how many the motion of a body was shortened."""
+        h, held_back = dt / substeps, 0
+        _load(ws, state)
+        targets = _pin_targets(ws.system, state.time, h, substeps)
         if ws.collisions:
             ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt, memory.contact)
-        # XPBD itself damps like tau = h.
-        damping = ws.damping if ws.damping is not None and ws.damping.tau > h else None
-        cycles = _cycles(self.substeps)
+        ws.guard.measure(ws.points, False)
+        ws.guard.guarded[:] = ws.assessment.begin(ws.moment(state.time), ws.guard.J, h, memory.ledger)
+        ws.guard.accept()
+        balance = ws.assessment.balance
+        damping = self._damping(ws, h)
+        cycles = _cycles(substeps)
         if damping is not None:
             damping.begin_step(memory.viscous, state.velocities)
         with numba_threads(self.threads):
@@ -241,6 +267,8 @@ class XPBD(Solver):
                     damping.begin_cycle(ws.extended, ws.velocities, moving, cycles[k], h, parallel)
                 _begin_substep(ws, targets[k], end, h, parallel)
                 add_forces(ws.system, ws.points, ws.velocities, end, h)
+                if damping is not None:
+                    damping.push(ws.points, h)
                 if ws.collisions:
                     _push_contacts(ws, h)
                 for constraints in ws.sets:
@@ -250,12 +278,15 @@ class XPBD(Solver):
                 pull_to_targets(ws.system, ws.points, ws.velocities, ws.origins, end, h)
                 if ws.collisions and not _collide(ws, end, h, parallel):
                     break
-        lost = first_lost(ws.points, ws.velocities)
-        if lost >= 0:
-            message = _lost_position_message(ws, lost, state.time + dt)
-            return state, StepReport(Status.NOT_FINITE, self.substeps, message, details=XPBDDetails())
-        details = XPBDDetails(ws.collisions.contacts, ws.collisions.smallest_gap)
-        return _unload(ws, state.time + dt, damping), StepReport(Status.CONVERGED, self.substeps, details=details)
+                held_back += _keep_volumes(ws, end, h, parallel)
+                balance.note_loads(ws.points, ws.previous, ws.origins, end, h)
+                balance.note_contacts(ws.collisions.contacts)
+        return held_back
+
+    @staticmethod
+    def _damping(ws: XPBDWorkspace, h: float) -> Damping | None:
+        """Damping in substeps of h [s]; None where XPBD itself damps as much, which is like tau = h."""
+        return ws.damping if ws.damping is not None and ws.damping.tau > h else None
 
     def initial_details(self, system: System, workspace: XPBDWorkspace) -> XPBDDetails:
         """No contacts; see `Solver.initial_details`."""
@@ -285,8 +316,10 @@ def _cycles(substeps: int) -> dict[int, int]:
 def _begin_substep(ws: XPBDWorkspace, targets: NDArray[np.float64], end: float, h: float, parallel: bool) -> None:
     """Predict positions, with pinned vertices at `targets` (k, 3)."""
     predict[parallel](ws.points, ws.previous, ws.velocities, ws.system.gravity, h)
+    ws.begun[:] = ws.previous
     if len(targets):
         hold(ws.points, ws.system.pinned_vertices, targets, ws.origins)
+        ws.assessment.balance.note_pins(ws.points, ws.previous, parallel)
     ws.anchors.place(ws.extended, ws.origins, end)
 
 
@@ -308,12 +341,42 @@ def _collide(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
     return True
 
 
-def _unload(ws: XPBDWorkspace, time: float, damping: Damping | None) -> State:
+def _keep_volumes(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
+    """Project tets that lose too much volume, in turn with contacts. Returns whether that was not enough."""
+    for k in range(MOST_PROJECTIONS):
+        if not ws.guard.measure(ws.points, parallel, ENOUGH if k else 1.0):
+            ws.guard.accept()
+            return False
+        ws.guard.project(ws.points)
+        _restore(ws, h, parallel)
+        if ws.collisions and not _collide(ws, time, h, parallel):
+            return True
+    ws.guard.measure(ws.points, parallel)
+    failures = ws.guard.failures()
+    failed = bool(failures.any())
+    if failed:
+        ws.fallback.apply(ws.points, ws.previous, ws.begun, ws.guard.bounds, failures)
+        _restore(ws, h, parallel)
+        ws.guard.measure(ws.points, parallel)
+    ws.guard.accept()
+    return failed
+
+
+def _restore(ws: XPBDWorkspace, h: float, parallel: bool) -> None:
+    """The velocities of changed positions, with the momentum of the velocities before."""
+    if ws.momentum is not None:
+        ws.momentum.apply(ws.points, ws.previous, ws.velocities, h, parallel)
+    else:
+        update_velocities(ws.points, ws.previous, ws.velocities, h)
+
+
+def _unload(ws: XPBDWorkspace, time: float, damping: Damping | None) -> tuple[State, ViscousMemory | None]:
+    """The state without its memory, and what damping remembers."""
     to_world(ws.points, ws.origins, ws.world)
     new = ws.layout.new_from_old
     velocities = ws.velocities[new]
     viscous = None if damping is None else damping.memory(velocities)
-    return State(time, ws.world[new], velocities, XPBDMemory(ws.collisions.memory(ws.world), viscous))
+    return State(time, ws.world[new], velocities), viscous
 
 
 def _pin_targets(system: System, time: float, h: float, substeps: int) -> NDArray[np.float64]:

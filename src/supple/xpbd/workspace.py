@@ -14,6 +14,7 @@ from supple.xpbd.assessment.moment import Moment
 from supple.xpbd.constraints.registry import ConstraintSet
 from supple.xpbd.constraints.stitch_anchors import StitchAnchors
 from supple.xpbd.contact.collisions import Collisions
+from supple.xpbd.damping.kelvin_voigt import Damping
 from supple.xpbd.limits.rigid_fallback import RigidFallback
 from supple.xpbd.limits.volume_guard import VolumeGuard
 from supple.xpbd.momentum import MomentumRestore
@@ -30,15 +31,15 @@ class XPBDWorkspace:
     Attributes
     ----------
     extended : (n + a, 4) positions about the component's origin [m] and inverse masses [1/kg], of the vertices and then
-        of the anchors (inverse mass 0); extended_previous : (n + a, 3) positions at the beginning of the substep
-    points, previous : the rows of the vertices
-    begun : (n, 3) positions at the beginning of the substep, which contacts do not change
+        of the anchors (inverse mass 0); points : the rows of the vertices
+    previous : (n, 3) positions at the beginning of the substep [m]; begun : those, which contacts do not change
     velocities, origins : (n, 3); world, world_previous : (n, 3) positions in world coordinates, for contacts
     """
 
     system: System
     layout: Layout
     sets: list[ConstraintSet]
+    damping: Damping | None
     momentum: MomentumRestore | None
     collisions: Collisions
     guard: VolumeGuard
@@ -48,7 +49,6 @@ class XPBDWorkspace:
     pace: ThreadTuner
     anchors: StitchAnchors
     extended: NDArray[np.float64]
-    extended_previous: NDArray[np.float64] = field(init=False)
     points: NDArray[np.float64] = field(init=False)
     previous: NDArray[np.float64] = field(init=False)
     begun: NDArray[np.float64] = field(init=False)
@@ -59,9 +59,8 @@ class XPBDWorkspace:
 
     def __post_init__(self) -> None:
         n = len(self.system.masses)
-        self.extended_previous = np.zeros((len(self.extended), 3))
-        self.points, self.previous = self.extended[:n], self.extended_previous[:n]
-        for name in ("begun", "velocities", "origins", "world", "world_previous"):
+        self.points = self.extended[:n]
+        for name in ("previous", "begun", "velocities", "origins", "world", "world_previous"):
             setattr(self, name, np.zeros((n, 3)))
 
     def moment(self, time: float) -> Moment:

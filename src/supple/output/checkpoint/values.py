@@ -1,7 +1,7 @@
 """Values as JSON and arrays, and back with the same bits.
 
-Known are None, truth values, numbers, texts, tuples, lists, mappings from texts, NumPy's arrays and scalars, and frozen
-dataclasses of these that are given as `classes`. Nothing that is read is executed.
+Known are None, truth values, numbers, texts, sets of texts, tuples, lists, mappings from texts, NumPy's arrays and scalars,
+and frozen dataclasses and named tuples of these that are given as `classes`. Nothing that is read is executed.
 """
 
 from __future__ import annotations
@@ -37,12 +37,14 @@ def encoded(value: Any, classes: Classes) -> tuple[Any, list[NDArray[Any]]]:
         if isinstance(item, np.ndarray | np.generic) and item.dtype.kind in "biuf":
             arrays.append(np.asarray(item))
             return {"array" if isinstance(item, np.ndarray) else "scalar": len(arrays) - 1}
-        if isinstance(item, (tuple, list)):
+        if isinstance(item, frozenset) and all(isinstance(part, str) for part in item):
+            return {"frozenset": sorted(str(part) for part in item)}
+        if type(item) in (tuple, list):
             return {type(item).__name__: [tree_of(part) for part in item]}
         if isinstance(item, Mapping) and all(isinstance(key, str) for key in item):
             return {"mapping": {key: tree_of(part) for key, part in item.items()}}
-        if is_dataclass(item) and classes.get(type(item).__name__) is type(item):
-            made_of = {field.name: tree_of(getattr(item, field.name)) for field in fields(item)}
+        if classes.get(type(item).__name__) is type(item):
+            made_of = {name: tree_of(getattr(item, name)) for name in _field_names(type(item))}
             return {"class": type(item).__name__, "fields": made_of}
         raise OutputError(
             f"a checkpoint cannot hold a {type(item).__name__}; register its class in supple.output.checkpoint.memories"
@@ -76,6 +78,8 @@ def decoded(tree: Any, arrays: list[NDArray[Any]], classes: Classes) -> Any:
                 if isinstance(content, bool) or not isinstance(content, int) or content < 0:
                     raise ValueError("the number of an array is wrong")
                 return arrays[content] if kind == "array" else arrays[content][()]
+            case "frozenset":
+                return frozenset(str(part) for part in content)
             case "tuple":
                 return tuple(value_of(part, depth + 1) for part in content)
             case "list":
@@ -87,15 +91,19 @@ def decoded(tree: Any, arrays: list[NDArray[Any]], classes: Classes) -> Any:
     return value_of(tree, 0)
 
 
+def _field_names(made: type) -> tuple[str, ...]:
+    """Of a dataclass or a named tuple."""
+    return tuple(field.name for field in fields(made)) if is_dataclass(made) else made._fields
+
+
 def _instance(made: type, given: dict[str, Any]) -> Any:
-    """A dataclass with these fields; all must be given, and none beside them."""
-    declared = {field.name: field.init for field in fields(made)}
-    if declared.keys() != given.keys():
+    """A dataclass or named tuple with these fields; all must be given, and none beside them."""
+    if set(_field_names(made)) != given.keys():
         raise ValueError(f"{made.__name__} has other fields in this version")
-    instance = made(**{key: value for key, value in given.items() if declared[key]})
-    for key, init in declared.items():
-        if not init:
-            object.__setattr__(instance, key, given[key])
+    later = [field.name for field in fields(made) if not field.init] if is_dataclass(made) else []
+    instance = made(**{key: value for key, value in given.items() if key not in later})
+    for key in later:
+        object.__setattr__(instance, key, given[key])
     return instance
 
 

@@ -63,7 +63,7 @@ class SurfaceCollisions:
         self._stitched = stitched_points(system, s, poses)
         self._rules = (s.allowed, *excluded)
         self._edges = EdgePairs(sharp_edges(s, rest), s, self._stitched)
-        self._finder = PairFinder(n, pieces, edge_length)
+        self._finder = PairFinder(n)
         self._x, self._before, self._gathered = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
         self._shapes = (self._x, s.point_piece, s.triangles, s.triangle_piece)
         self._pieces = (s.point_piece, s.triangles, s.triangle_piece, s.closed, s.gaps, s.friction)

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.search.spatial_hash import is_excluded
 from supple.contact.search.surfaces import ContactSurfaces
+from supple.numerics.adjacency import in_list
 from supple.numerics.kernel_cache import njit
 from supple.xpbd.contact.detection.piece_runs import EDGE_EDGE, key_of
 from supple.xpbd.contact.detection.sharp_edges import SharpEdges
@@ -24,7 +24,7 @@ def _is_stitched(ends, f, triangles, e, stitched):
         t = triangles[e, k]
         if t >= 0:
             for i in range(2):
-                if is_excluded(ends[f, i], t, stitched[0], stitched[1]):
+                if in_list(stitched, t, ends[f, i]):
                     return True
     return False
 

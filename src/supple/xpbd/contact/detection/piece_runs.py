@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.search.spatial_hash import PairFinder
+from supple.contact.search.point_lists import PairFinder
 from supple.numerics.kernel_cache import njit
 
 # Keys of rows: the kind of contact, the first and the second thing, 31 bits each for the latter two.

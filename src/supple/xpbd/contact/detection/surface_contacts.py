@@ -160,7 +160,7 @@ def _find_contacts_of(x, x_prev, p, runs, lists, surfaces, memory, near, part, s
         )
         if same and held >= 0 and (t < 0 or side > 0.0):
             entered[p] = -1
-        if t < 0 or is_excluded(p, t, stitched[0], stitched[1]):
+        if t < 0 or in_list(stitched, t, p):
             continue
         passed = distance == math.inf
         inside = closed[its] and side < 0.0 and not passed
