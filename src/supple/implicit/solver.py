@@ -33,6 +33,7 @@ from supple.implicit.stepping.substepping import Substepping
 from supple.implicit.stepping.workspace import Workspace
 from supple.implicit.timings import PARTS
 from supple.numerics.noninverting_step import KEEP
+from supple.scene.scene import Scene
 from supple.state import State, Status, StepReport
 from supple.system import Solver, System
 

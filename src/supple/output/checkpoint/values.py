@@ -1,7 +1,7 @@
 """Values as JSON and arrays, and back with the same bits.
 
-Known are None, truth values, numbers, texts, sets of texts, tuples, lists, mappings from texts, NumPy's arrays and scalars,
-and frozen dataclasses and named tuples of these that are given as `classes`. Nothing that is read is executed.
+Known are None, truth values, numbers, texts, sets of texts, tuples, lists, mappings from texts, NumPy's arrays and
+scalars, and frozen dataclasses and named tuples of these that are given as `classes`. Nothing that is read is executed.
 """
 
 from __future__ import annotations
