@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +68,7 @@ class ContactSurface:
             hessian = self.weights.T @ hessian @ self.weights
         # The columns of a symmetric matrix, read as its rows.
         by_rows = csr_matrix((hessian.data, hessian.indices, hessian.indptr), shape=hessian.shape)
-        blocks = bsr_matrix(by_rows, blocksize=(3, 3), shape=(size, size))
+        blocks: Any = bsr_matrix(by_rows, blocksize=(3, 3), shape=(size, size))
         rows = np.repeat(np.arange(len(self.vertices)), np.diff(blocks.indptr))
         once = blocks.indices >= rows
         return Couplings(self.vertices[rows[once]], self.vertices[blocks.indices[once]], blocks.data[once])

@@ -8,6 +8,7 @@ element entries first, then its couplings in their order. Any number of threads 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,7 +51,7 @@ class JointPattern:
     @classmethod
     def of(cls, elements: BlockPattern, couplings: Couplings, row_of: NDArray[np.int32]) -> JointPattern:
         """Add blocks for couplings to the pattern of the elements."""
-        arrays = _join(
+        arrays: Any = _join(
             elements.row_start,
             elements.columns,
             elements.entry_start,

@@ -39,7 +39,7 @@ def encoded(value: Any, classes: Classes) -> tuple[Any, list[NDArray[Any]]]:
             return {"array" if isinstance(item, np.ndarray) else "scalar": len(arrays) - 1}
         if isinstance(item, frozenset) and all(isinstance(part, str) for part in item):
             return {"frozenset": sorted(str(part) for part in item)}
-        if type(item) in (tuple, list):
+        if isinstance(item, (tuple, list)) and type(item) in (tuple, list):
             return {type(item).__name__: [tree_of(part) for part in item]}
         if isinstance(item, Mapping) and all(isinstance(key, str) for key in item):
             return {"mapping": {key: tree_of(part) for key, part in item.items()}}
