@@ -64,5 +64,5 @@ def cluster(tmp_path_factory):
     yield address
     for process in reversed(started):
         process.terminate()
-        process.wait(timeout=60)
+        process.wait(timeout=120)
     log.close()
