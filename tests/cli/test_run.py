@@ -214,6 +214,7 @@ def test_strict_fails_where_a_frame_did_not_converge(folder, capfd):
     (folder / "scene.yaml").write_text(stiff)
     command = ["run", "scene.yaml", "--no-page", "--no-plot", "--quiet"]
     assert main(command) == ExitCode.OK
+    command += ["--overwrite"]
     assert main([*command, "--strict"]) == ExitCode.FAILED
     with read_recording("out/recording.vtkhdf") as recording:
         assert {str(status) for status in recording.statuses[1:]} == {"softened"}

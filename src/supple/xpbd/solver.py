@@ -279,6 +279,8 @@ class XPBD(Solver):
                 if ws.collisions and not _collide(ws, end, h, parallel):
                     break
                 held_back += _keep_volumes(ws, end, h, parallel)
+                if ws.collisions:
+                    ws.collisions.end_substep()
                 balance.note_loads(ws.points, ws.previous, ws.origins, end, h)
                 balance.note_contacts(ws.collisions.contacts)
         return held_back
@@ -327,7 +329,7 @@ def _push_contacts(ws: XPBDWorkspace, h: float) -> None:
     """Apply the contact forces of the substep before to the prediction."""
     if to_world(ws.points, ws.origins, ws.world):
         to_world(ws.previous, ws.origins, ws.world_previous)
-        if ws.collisions.push(ws.world, ws.world_previous, h):
+        if ws.collisions.begin_substep(ws.world, ws.world_previous, h):
             apply_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
 
 

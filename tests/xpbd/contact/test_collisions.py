@@ -65,8 +65,9 @@ def test_contacts_found_on_several_threads_have_the_same_bits(monkeypatch):
                 collisions.begin_step(x, v, k * h, 10 * h, collisions.memory(x) if k else None)
             before = x.copy()
             x = x + h * (v + h * np.array([0.0, -9.81, 0.0]))
-            collisions.push(x, before, h)
+            collisions.begin_substep(x, before, h)
             contacts += collisions.project(x, before, (k + 1) * h, h, parallel)
+            collisions.end_substep()
             v = (x - before) / h
         return x, contacts
 
@@ -107,7 +108,9 @@ def test_positions_that_are_not_finite_do_not_stop_the_program():
     collisions.begin_step(x, state.velocities, 0.0, 1 / 60)
     x[3] = np.nan
     x[40] = 1e200
+    collisions.begin_substep(x, before, 1 / 600)
     collisions.project(x, before, 1 / 600, 1 / 600)
+    collisions.end_substep()
     collisions.begin_step(x, np.full_like(x, np.inf), 0.0, 1 / 60)
     assert np.isnan(x[3]).all()
 

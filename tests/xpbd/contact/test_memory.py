@@ -116,7 +116,7 @@ def test_another_scene_of_the_same_bodies_keeps_the_memory(obstacle, tolerance):
     frame = run("self-contact", 1)[-1]
     other = sp.Scene([folded_strip()], [obstacle], gravity=(0, 0, 0))
     kept = continued(self_contact(), frame)
-    assert (frame.state.memory.contact.entered >= 0).any()
+    assert (frame.state.memory.contact.surfaces.entered >= 0).any()
     assert difference(continued(other, frame), kept) <= tolerance
 
 

@@ -46,7 +46,7 @@ class Assessment:
     def __init__(self, system: System, settings: XPBDContact | None, edge_length: float) -> None:
         self.system = system
         self.softening = Softening(system)
-        self.balance = EnergyBalance(system)
+        self.balance = EnergyBalance(system, edge_length)
         self._surfaces = SurfaceCheck(system, settings, edge_length)
         self._ledger = Ledger()
 

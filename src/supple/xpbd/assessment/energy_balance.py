@@ -25,6 +25,9 @@ from supple.xpbd.assessment.moment import Moment
 
 # Of the shear modulus times the volume: energies below the square of this strain are round-off.
 LEAST_STRAIN = 1e-6
+# Of the mean surface edge: energies below that of a fall by this height are not judged. Contact lifts what begins on a
+# floor by its skin.
+LEAST_FALL = 0.05
 # Of the work of pins in a substep: how much it may be off, since it is taken at the prediction.
 PIN_TOLERANCE = 0.2
 
@@ -37,7 +40,7 @@ class EnergyBalance:
     is_judged : whether the work of everything that moved in the frame is known
     """
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, edge_length: float) -> None:
         self.system = system
         self.free = system.inverse_masses > 0.0
         self._masses = np.where(self.free, system.masses, 0.0)
@@ -50,7 +53,8 @@ class EnergyBalance:
         self._at_pins = ElasticEnergy(system, held) if self._moving_pins else None
         self._obstacles_move = any(obstacle.motion is not None for obstacle in system.obstacles)
         self._anchors_move = self._obstacles_move and len(system.stitching.anchors) > 0
-        self._least = LEAST_STRAIN**2 * _stiffness(system)
+        fall = LEAST_FALL * edge_length * float(np.linalg.norm(system.gravity))
+        self._least = LEAST_STRAIN**2 * _stiffness(system) + fall * float(self._masses.sum())
         self._begun = np.zeros(len(system.bodies))
         self._total = self._work = self._hard = self._h = 0.0
         self.is_judged = True

@@ -60,7 +60,7 @@ class Collisions:
         self.skin = SKIN * self.thickness
         self.contacts = 0
         self._smallest = math.inf
-        self._dt = 0.0
+        self._dt = self._removed = 0.0
         count = len(system.masses)
         self._reach = np.zeros(count)
         self._gathered = np.zeros((count, 3))
@@ -98,8 +98,8 @@ class Collisions:
             self.obstacles.begin_step(known, x, LEAST_REACH * self.edge_length)
             self._gather_obstacles(x, v, time)
 
-    def push(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> bool:
-        """Apply the contact forces of the substep before to the prediction, in place, before all other constraints.
+    def begin_substep(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> bool:
+        """Apply the forces kept of the substep before to the prediction, in place, before all other constraints.
 
         `project` then changes them as far as needed. Returns whether there are any forces.
 
@@ -108,13 +108,20 @@ class Collisions:
         x, x_prev : (n, 3) prediction, and positions at the beginning of the substep [m]
         h : length of the substep [s]
         """
-        bodies = self.surfaces is not None and self.surfaces.push(x, x_prev, h)
-        return self.obstacles.push(x, h) or bodies
+        self._removed = REMOVED_PER_FRAME * self.edge_length * min(1.0, h / self._dt)
+        bodies = self.surfaces is not None and self.surfaces.begin_substep(x, x_prev, h)
+        return self.obstacles.begin_substep(x, h) or bodies
+
+    def end_substep(self) -> None:
+        """Keep what the next substep begins with."""
+        if self.surfaces is not None:
+            self.surfaces.end_substep()
+        self.obstacles.end_substep()
 
     def project(
         self, x: NDArray[np.float64], x_prev: NDArray[np.float64], time: float, h: float, parallel: bool = False
     ) -> int:
-        """Resolve all contacts of one substep, in place. Returns their number.
+        """Resolve all contacts of one substep, in place. Returns their number. May be repeated within the substep.
 
         An overlap that existed when the substep began is removed from `x` and from `x_prev` alike, so that it causes no
         velocity (x - x_prev) / h. The caller must use both arrays afterwards.
@@ -127,7 +134,7 @@ class Collisions:
         parallel : whether contacts are searched on several threads.
         """
         self.contacts = 0
-        limit = REMOVED_PER_FRAME * self.edge_length * min(1.0, h / self._dt)
+        limit, self._removed = self._removed, 0.0
         if self.surfaces is not None:
             self._count(self.surfaces.project(x, x_prev, (time - h, time), limit, parallel))
         if self.obstacles:

@@ -3,8 +3,9 @@
 A row keeps a gap: n . r >= offset, with r = sum c_i x_i over four vertices (see `impulses`). Its impulse in total is a
 push along n and friction perpendicular to n. A substep begins with the force that was kept of the substep before. It is
 applied to the prediction, before the elastic constraints, so that these see the load that contact transmits. After
-them, sweeps change the impulse by what is missing, or too much, as long as the push remains zero or more. Without this
-memory, the force that a light body transmits in a substep is limited by the mass of its surface.
+them, sweeps change the impulse by what is missing, or too much, as long as the push remains zero or more. They may be
+repeated in a substep. At its end, the share of the force that the next one begins with is kept. Without this memory,
+the force that a light body transmits in a substep is limited by the mass of its surface.
 
 Source: Catto, "Iterative Dynamics with Temporal Coherence" (2005), sections 5 and 6 (accumulated impulses, warm
 starting).
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import dot, row, subtract
 from supple.xpbd.contact.friction import along_surface, friction_total
-from supple.xpbd.contact.impulses import apply_impulse, compliance, relative, shift_both
+from supple.xpbd.contact.impulses import apply_impulse, compliance, displace, relative, shift_both
 from supple.xpbd.contact.response_rates import kept_share
 
 
@@ -68,7 +69,7 @@ class ContactRows:
     ----------
     keys : (k,) what identifies the pair of each row, ascending
     vertices : (k, 4); weights : (k, 4); normals : (k, 3); offsets : (k,) gap that is kept [m]; friction : (k,)
-    forces : (k, 3) [N] on the first side, the mean over the substep
+    forces : (k, 3) [N] on the first side, the mean over the substep; shares : (k,) what the next substep keeps of them
     active : (k,) whether the pair is near in this substep: it touches, or holds a force
     deep : (k,) whether the first vertex may be inside the piece of the others
     """
@@ -82,7 +83,7 @@ class ContactRows:
         self.keys = keys
         self.vertices, self.weights = np.zeros((k, 4), dtype=np.int32), np.zeros((k, 4))
         self.normals, self.offsets, self.friction = np.zeros((k, 3)), np.zeros(k), np.zeros(k)
-        self.forces = np.zeros((k, 3))
+        self.forces, self.shares = np.zeros((k, 3)), np.zeros(k)
         self.active, self.deep = np.zeros(k, dtype=np.bool_), np.zeros(k, dtype=np.bool_)
         # As kernels receive them.
         self.described = (
@@ -92,6 +93,7 @@ class ContactRows:
             self.offsets,
             self.friction,
             self.forces,
+            self.shares,
             self.active,
             self.deep,
         )
@@ -106,6 +108,10 @@ class ContactRows:
         place = np.searchsorted(self.keys, loaded.keys)
         for name in ("vertices", "weights", "normals", "offsets", "friction", "forces"):
             getattr(self, name)[place] = getattr(loaded, name)
+
+    def keep(self) -> None:
+        """End a substep: the next one begins with a share of the forces."""
+        self.forces *= self.shares[:, None]
 
     def loaded(self) -> LoadedRows:
         """Copies of all rows that hold a force."""
@@ -138,7 +144,7 @@ def choose_rows(x, x_prev, inverse_masses, rows, first_obstacle, kind, h):
     x, x_prev, inverse_masses, h : see `push_rows`
     rows : `ContactRows.described`; first_obstacle : the first point of an obstacle
     """
-    vertices, weights, _, _, _, forces, active, _ = rows
+    vertices, weights, _, _, _, forces, _, active, _ = rows
     chosen = np.zeros(len(active), dtype=np.int64)
     count = 0
     for e in range(len(active)):
@@ -164,7 +170,7 @@ def push_rows(x, x_prev, inverse_masses, rows, h):
     rows : `ContactRows.described`
     h : length of the substep [s]
     """
-    vertices, weights, _, _, _, forces, _, _ = rows
+    vertices, weights, _, _, _, forces, _, _, _ = rows
     for e in range(len(forces)):
         f = row(forces, e)
         if f[0] != 0.0 or f[1] != 0.0 or f[2] != 0.0:
@@ -186,12 +192,12 @@ def solve_rows(x, x_prev, predicted, points, chosen, rows, h, limit, sweeps):
     predicted : (n, 3) the prediction, before forces and constraints [m]
     points : inverse_masses (n,) [1/kg], rates (n,) see `response_rates` [1/s^2]
     chosen : (c,) rows, in the order of a sweep
-    rows : `ContactRows.described`; forces are renewed
+    rows : `ContactRows.described`; forces are those that x contains, and shares are set
     h : length of the substep [s]
     limit : the largest part of an old overlap that one substep removes [m]
     sweeps : number of sweeps
     """
-    vertices, weights, normals, offsets, friction, forces, _, _ = rows
+    vertices, weights, normals, offsets, friction, forces, shares, _, _ = rows
     inverse_masses, rates = points
     h2 = h * h
     smallest = np.inf
@@ -210,7 +216,9 @@ def solve_rows(x, x_prev, predicted, points, chosen, rows, h, limit, sweeps):
         old = min(offsets[e] - before, limit)
         if old > 0.0 and total > 0.0:
             s = old / total
-            shift_both(x, x_prev, inverse_masses, vertices, weights, e, (s * n[0], s * n[1], s * n[2]))
+            d = (s * n[0], s * n[1], s * n[2])
+            shift_both(x, x_prev, inverse_masses, vertices, weights, e, d)
+            displace(predicted, inverse_masses, vertices, weights, e, d)
     for _ in range(sweeps):
         for k in range(len(chosen)):
             e = chosen[k]
@@ -244,8 +252,9 @@ def solve_rows(x, x_prev, predicted, points, chosen, rows, h, limit, sweeps):
         if pushes[k] > 0.0:
             share = _sustained(x_prev, predicted, inverse_masses, (vertices, weights, normals, offsets), e, pushes[k])
             share *= kept_share(h2 * _fastest(rates, vertices, weights, e))
+        shares[e] = share
         for j in range(3):
-            forces[e, j] = share * (pushes[k] * normals[e, j] + holds[k, j]) / h2
+            forces[e, j] = (pushes[k] * normals[e, j] + holds[k, j]) / h2
     return contacts, smallest
 
 
@@ -273,7 +282,7 @@ def _fastest(rates, vertices, weights, e):
 @njit(cache=True)
 def note_depths(x, chosen, rows, depth):
     """Increase depth (n,) to how deep points are inside other pieces, after all contacts are resolved [m]."""
-    vertices, weights, normals, _, _, _, _, deep = rows
+    vertices, weights, normals, _, _, _, _, _, deep = rows
     for e in chosen:
         if deep[e]:
             p = vertices[e, 0]

@@ -94,8 +94,8 @@ def _project_shapes(x, x_prev, points, candidates, shapes, rules, frames, frames
     Parameters
     ----------
     points : predicted (n, 3), positions before loads and constraints [m]; rates (n,), see `response_rates` [1/s^2]
-    candidates : starts (k + 1,), vertices (c,), as from `_find_candidates`; loads (c, 3), see `ObstacleContacts`: in,
-        those that x contains already; out, those of this substep
+    candidates : starts (k + 1,), vertices (c,), as from `_find_candidates`; loads (c, 3), those that x contains, and
+        shares (c,) of them for the next substep; see `ObstacleContacts`
     shapes : parameters (k, PARAMETERS), moving (k,)
     rules : owner (n,), the body of a vertex; collide (b, k), friction (b, k), of each body with each shape
     frames, frames_before : (k, 4, 3) at the end and at the beginning of the substep
@@ -104,7 +104,7 @@ def _project_shapes(x, x_prev, points, candidates, shapes, rules, frames, frames
         above this are not reported [m]
     """
     predicted, rates = points
-    starts, vertices, loads = candidates
+    starts, vertices, loads, shares = candidates
     parameters, moving = shapes
     owner, _, friction = rules
     limit, skin, near = scales
@@ -141,11 +141,12 @@ def _project_shapes(x, x_prev, points, candidates, shapes, rules, frames, frames
             contacts += push > 0.0
             # What stopped the approach with which the substep began does not return.
             impact = max(0.0, dot(subtract(p, row(predicted, i)), n) + skin - gap - old)
-            share = max(0.0, 1.0 - impact / push) * kept_share(h2 * rates[i]) if push > 0.0 else 0.0
+            shares[c] = max(0.0, 1.0 - impact / push) * kept_share(h2 * rates[i]) if push > 0.0 else 0.0
             for j in range(3):
                 x[i, j] += n[j] * (push - pushed + shift) + (hold[j] - held[j])
                 x_prev[i, j] += n[j] * shift
-                loads[c, j] = share * (n[j] * push + hold[j]) / h2
+                predicted[i, j] += n[j] * shift
+                loads[c, j] = (n[j] * push + hold[j]) / h2
     return contacts, smallest
 
 
@@ -176,8 +177,8 @@ def add_loads(x, vertices, loads, h):
 class ObstacleContacts:
     """The simple shapes of a scene and the vertices near them.
 
-    A contact that pushes keeps its load: the acceleration [m/s^2] that it gave its vertex in the substep. The next
-    substep begins with it (see `contact_rows`).
+    A contact that pushes has a load: the acceleration [m/s^2] that it gives its vertex in the substep. The next
+    substep begins with a share of it (see `contact_rows`).
     """
 
     def __init__(
@@ -198,8 +199,7 @@ class ObstacleContacts:
         )
         self._starts = np.zeros(len(shapes.contacts) + 1, dtype=np.int64)
         self._vertices = np.zeros(1024, dtype=np.int32)
-        self._loads = np.zeros((1024, 3))
-        self._pushed = False
+        self._loads, self._shares = np.zeros((1024, 3)), np.zeros(1024)
         self._rates = rates
         self._predicted = np.zeros((len(system.masses), 3))
         # Consecutive shapes with the same element function need one call.
@@ -215,7 +215,6 @@ class ObstacleContacts:
 
     def begin_step(self, memory: ObstacleMemory | None, x: NDArray[np.float64], tolerance: float) -> None:
         """Take over the loads of an earlier step, where it describes these shapes and positions x (n, 3) [m]."""
-        self._pushed = False
         self._starts[:] = 0
         shapes = self.shapes
         if memory is not None and memory.matches(shapes.frames, shapes.parameters, x, tolerance):
@@ -251,7 +250,7 @@ class ObstacleContacts:
         if len(self._vertices) < len(keys):
             self._vertices = np.zeros(2 * len(keys), dtype=np.int32)
         if len(self._loads) < len(keys):
-            self._loads = np.zeros((2 * len(keys), 3))
+            self._loads, self._shares = np.zeros((2 * len(keys), 3)), np.zeros(2 * len(keys))
         self._starts[:] = np.searchsorted(keys, np.arange(len(self._starts)) * n)
         self._vertices[: len(keys)] = keys % n
         self._loads[: len(keys)] = loads
@@ -263,15 +262,20 @@ class ObstacleContacts:
         shapes = np.searchsorted(self._starts, k, side="right") - 1
         return shapes.astype(np.int64), self._vertices[k], self._loads[k]
 
-    def push(self, x: NDArray[np.float64], h: float) -> bool:
-        """Apply the loads of the substep before to the prediction, in place. Returns whether there are any."""
+    def begin_substep(self, x: NDArray[np.float64], h: float) -> bool:
+        """See `Collisions.begin_substep`."""
         count = self._starts[-1]
         loads = self._loads[:count]
-        self._pushed = bool(loads.any())
+        pushed = bool(loads.any())
         self._predicted[:] = x
-        if self._pushed:
+        if pushed:
             add_loads(x, self._vertices[:count], loads, h)
-        return self._pushed
+        return pushed
+
+    def end_substep(self) -> None:
+        """Keep the share of the loads with which the next substep begins."""
+        count = self._starts[-1]
+        self._loads[:count] *= self._shares[:count, None]
 
     def project(
         self,
@@ -284,11 +288,9 @@ class ObstacleContacts:
 
         For `scales` see `_project_shapes`.
         """
-        if not self._pushed:
-            self._loads[:] = 0.0
-        self._pushed = False
         frames = tuple(self.shapes.placed(self.poses, time) for time in reversed(times))
-        described = ((self._starts, self._vertices, self._loads), self._arrays, self._rules, *frames)
+        candidates = (self._starts, self._vertices, self._loads, self._shares)
+        described = (candidates, self._arrays, self._rules, *frames)
         contacts, smallest = 0, math.inf
         for _, push, first, last in self._groups:
             found, gap = push(

@@ -72,7 +72,6 @@ class SurfaceCollisions:
         self._runs = PieceRuns(self._finder, n, s.triangle_piece)
         self._rows = ContactRows()
         self._smallest = np.zeros(n)
-        self._pushed = False
         self._far, self._near = np.zeros((n, 3)), np.zeros((n, 3))
         self._drifts = np.zeros((pieces + 1, 3))
         # Obstacles stand still, so that no motion is common to all points where there is one.
@@ -102,16 +101,16 @@ class SurfaceCollisions:
         self._gather(motions)
         self._excursions[:] = 0.0
 
-    def push(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> bool:
-        """Apply the forces of the substep before to the prediction, in place. Returns whether there are any."""
+    def begin_substep(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> bool:
+        """See `Collisions.begin_substep`."""
         rows = self._rows
-        self._pushed = bool(rows.forces.any())
+        pushed = bool(rows.forces.any())
         self._predicted[: len(self.surfaces.rows)] = x[self.surfaces.rows]
-        if self._pushed:
+        if pushed:
             self._take(x, x_prev)
             push_rows(self._x, self._before, self.surfaces.inverse_masses, rows.described, h)
             x[self.surfaces.rows] = self._x[: len(self.surfaces.rows)]
-        return self._pushed
+        return pushed
 
     def project(
         self,
@@ -127,8 +126,6 @@ class SurfaceCollisions:
         s.place_obstacles(self.poses, times[1], self._x)
         s.place_obstacles(self.poses, times[0], self._before)
         self._predicted[len(s.rows) :] = self._x[len(s.rows) :]
-        if not self._pushed:
-            self._rows.forces[:] = 0.0
         allowed = (self._far, self._near, s.point_piece, self._all_share, self._drifts)
         if any_beyond_radii(self._x, self._before, self._gathered, *allowed, self._excursions):
             self._gather((self._x - self._before) * (self._dt / h))
@@ -138,10 +135,13 @@ class SurfaceCollisions:
             if part[0] < part[1] and len(self._rows.keys):
                 found = self._resolve(kind, part, h, limit, parallel)
                 contacts, smallest = contacts + found[0], min(smallest, found[1])
-        self._pushed = False
         x[s.rows] = self._x[: len(s.rows)]
         x_prev[s.rows] = self._before[: len(s.rows)]
         return contacts, smallest
+
+    def end_substep(self) -> None:
+        """Keep the share of the forces with which the next substep begins."""
+        self._rows.keep()
 
     def _take(self, x: NDArray[np.float64], x_prev: NDArray[np.float64]) -> None:
         bodies = len(self.surfaces.rows)
@@ -195,7 +195,6 @@ class SurfaceCollisions:
         """Restore what `memory` holds of points that are still where they were, and find the overlaps of the others."""
         s = self.surfaces
         self._entered[:], self._excursions[:] = -1, 0.0
-        self._pushed = False
         known, loaded = 0, LoadedRows.none()
         if memory is not None:
             triangles = s.triangles[: s.body_triangles]

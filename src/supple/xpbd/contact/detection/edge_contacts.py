@@ -99,7 +99,7 @@ def find_edge_contacts(x, x_prev, pairs, edges, surfaces, near, first_obstacle, 
     first, second, numbers = pairs
     ends = edges[0]
     point_piece, closed, gaps, friction = surfaces
-    vertices, weights, normals, offsets, mus, forces, active, deep = rows
+    vertices, weights, normals, offsets, mus, forces, _, active, deep = rows
     for i in prange(len(first)):
         smallest[i] = np.inf
         e, f, r = first[i], second[i], numbers[i]

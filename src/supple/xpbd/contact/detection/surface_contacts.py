@@ -141,7 +141,7 @@ def _find_contacts_of(x, x_prev, p, runs, lists, surfaces, memory, near, part, s
     run_starts, run_rows, listed = lists
     point_piece, triangles, triangle_piece, closed, gaps, friction = surfaces
     depth, entered, complete = memory
-    vertices, weights, normals, offsets, mus, forces, active, deep = rows
+    vertices, weights, normals, offsets, mus, forces, _, active, deep = rows
     smallest = math.inf
     mine = point_piece[p]
     was_inside, depth[p] = depth[p], 0.0
