@@ -18,8 +18,8 @@ def _benchmarks_can_be_imported(monkeypatch):
 @pytest.mark.parametrize(
     "arguments",
     [
-        ["xpbd", "1", "5", "2"],
-        ["xpbd_without_contact", "1", "5", "2"],
+        ["xpbd", "1", "60", "2"],
+        ["xpbd_without_contact", "1", "60", "2"],
         ["implicit", "1", repr(1 / 120), "newmark", "0", "2"],
     ],
     ids=lambda arguments: arguments[0],

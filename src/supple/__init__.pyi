@@ -9,7 +9,6 @@ from .errors import SolverError as SolverError
 from .errors import StudyError as StudyError
 from .errors import SuppleError as SuppleError
 from .implicit.contact.settings import IPCContact as IPCContact
-from .implicit.limits.step_filter import largest_noninverting_step as largest_noninverting_step
 from .implicit.solver import Implicit as Implicit
 from .learning.batch import Batch as Batch
 from .learning.batch import BatchSnapshot as BatchSnapshot
@@ -30,6 +29,7 @@ from .mesh.tetgen_files import read_tetgen as read_tetgen
 from .mesh.tetgen_files import write_tetgen as write_tetgen
 from .mesh.tetmesh import TetMesh as TetMesh
 from .numerics.cubic import smallest_positive_cubic_root as smallest_positive_cubic_root
+from .numerics.noninverting_step import largest_noninverting_step as largest_noninverting_step
 from .numerics.svd3 import rotation_variant_svd as rotation_variant_svd
 from .output.check.checker import check_recording as check_recording
 from .output.check.report import CheckReport as CheckReport

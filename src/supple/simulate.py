@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 from collections.abc import Callable, Generator, Mapping, Sequence
@@ -23,6 +24,8 @@ from supple.scene.scene import Scene
 from supple.scene.stitches.measures import largest_stitch_stretch, stitch_energy
 from supple.state import ContactPoints, SolverDetails, State, Status, StepReport
 from supple.system import BodyRange, Solver, System, build_system, initial_state
+
+logger = logging.getLogger(__name__)
 
 # Beyond these, dt^2 and 1 / dt^2 leave what float64 can hold.
 _DT_RANGE = (1e-30, 1e30)
@@ -68,6 +71,11 @@ class Report(Diagnostics):
     message: str = ""
     min_distance: float | None = None
     details: SolverDetails = field(default_factory=SolverDetails)
+
+    @property
+    def softening(self) -> Mapping[str, float]:
+        """By body, the share of its stiffness that it lacks, estimated; empty where the solver does not soften."""
+        return getattr(self.details, "softening", {})
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +175,8 @@ def simulate(
 ) -> Frames:
     """Advance a scene and yield a frame after each step.
 
-    Where the solver cannot continue, ends early; the report of the last frame gives the reason.
+    Where the solver cannot continue, ends early; the report of the last frame gives the reason. At the end, a warning
+    in the log names the frames that did not converge, and why.
 
     Parameters
     ----------
@@ -283,7 +292,9 @@ def _steps(
     system, state, frame = first.system, first.state, first
     inputs = system.scene.inputs
     wanted = dict(state.inputs)
+    problems = Problems()
     with ExitStack() as ends:  # ends every sink, also where another sink fails
+        ends.callback(problems.warn)
         for sink in sinks:
             ends.callback(sink.end)
             sink.begin(first, dt, steps)
@@ -294,12 +305,43 @@ def _steps(
             state, step = advance(solver, system, state, dt, workspace, wanted)
             seconds = time.perf_counter() - began
             frame = Frame(index, state, system, completed_report(system, state, step, seconds), step.contacts, solver)
+            problems.note(frame.report)
             for sink in sinks:
                 sink.write(frame)
             sent = yield frame
             wanted |= checked_values(inputs, sent)
             if not step.status.can_go_on:
                 break
+
+
+class Problems:
+    """The frames of a run that the solver could go on from although they did not converge.
+
+    Attributes
+    ----------
+    frames : number of frames; bad : how many of them did not converge
+    first : by status, the message of its first frame
+    """
+
+    def __init__(self) -> None:
+        self.frames = self.bad = 0
+        self.first: dict[Status, str] = {}
+
+    def note(self, report: Report) -> None:
+        """Take notice of a frame."""
+        self.frames += 1
+        if report.status is not Status.CONVERGED and report.status.can_go_on:
+            self.bad += 1
+            self.first.setdefault(report.status, report.message)
+
+    def __str__(self) -> str:
+        texts = "; ".join(f"{status}: {message}" if message else str(status) for status, message in self.first.items())
+        return f"{self.bad} of {self.frames} frames did not converge; first of each kind: {texts}" if self.bad else ""
+
+    def warn(self) -> None:
+        """Write a warning to the log, where there is something to warn of."""
+        if self.bad:
+            logger.warning("%s", self)
 
 
 def completed_report(system: System, state: State, step: StepReport, seconds: float) -> Report:

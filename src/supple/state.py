@@ -12,18 +12,35 @@ from numpy.typing import NDArray
 
 
 class Status(StrEnum):
-    """How a step ended. It equals its name as text: `report.status == "converged"`."""
+    """How a step ended. It equals its name as text: `report.status == "converged"`.
+
+    Where several hold for one step, the report has the first of: inverted, intersecting, energy_gained, softened.
+
+    Attributes
+    ----------
+    CONVERGED : the step is what the solver promises
+    ITERATION_LIMIT, LINE_SEARCH_FAILED, BLOCKED : how Newton's method ended (`Implicit`)
+    NOT_FINITE : a position or velocity is lost
+    INVERTED : a tet is inside out that was not at the start (`XPBD`, as the following)
+    INTERSECTING : surfaces are through each other, or vertices deep inside of an obstacle
+    ENERGY_GAINED : more energy than the scene and what drives it had
+    SOFTENED : a body is softer than its material by more than the tolerance
+    """
 
     CONVERGED = "converged"
     ITERATION_LIMIT = "iteration_limit"
     LINE_SEARCH_FAILED = "line_search_failed"
     BLOCKED = "blocked"
     NOT_FINITE = "not_finite"
+    INVERTED = "inverted"
+    INTERSECTING = "intersecting"
+    ENERGY_GAINED = "energy_gained"
+    SOFTENED = "softened"
 
     @property
     def can_go_on(self) -> bool:
         """Whether the next step may start from the state that came with this status."""
-        return self in (Status.CONVERGED, Status.ITERATION_LIMIT)
+        return self not in (Status.LINE_SEARCH_FAILED, Status.BLOCKED, Status.NOT_FINITE)
 
 
 @dataclass(frozen=True, eq=False)

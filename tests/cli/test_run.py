@@ -69,7 +69,7 @@ def test_quiet_without_page_and_plot(folder, capfd):
     assert listing(folder / "out") == ALWAYS
     with read_recording("out/recording.vtkhdf") as recording:
         assert recording.times.tolist() == [0.0, 0.25, 0.5]
-        assert "XPBD(substeps=20" in recording.solver
+        assert "XPBD(substeps='auto'" in recording.solver
 
 
 def test_options_override_page_and_plot_of_the_file(folder):
@@ -205,3 +205,19 @@ def test_ctrl_c_of_a_process(folder):
     assert "Traceback" not in err
     with read_recording("out/recording.vtkhdf") as recording:
         assert recording.times[-1] == pytest.approx((len(recording) - 1) / 60)
+
+
+def test_strict_fails_where_a_frame_did_not_converge(folder, capfd):
+    text = (folder / "scene.yaml").read_text()
+    assert "substeps: 5" in text
+    stiff = text.replace("substeps: 5", "substeps: 5, accuracy: 1e-9")
+    (folder / "scene.yaml").write_text(stiff)
+    command = ["run", "scene.yaml", "--no-page", "--no-plot", "--quiet"]
+    assert main(command) == ExitCode.OK
+    command += ["--overwrite"]
+    assert main([*command, "--strict"]) == ExitCode.FAILED
+    with read_recording("out/recording.vtkhdf") as recording:
+        assert {str(status) for status in recording.statuses[1:]} == {"softened"}
+        assert "too soft" in recording[-1].report.message
+    (folder / "scene.yaml").write_text(text.replace("substeps: 5", "substeps: 5, accuracy: 0.9"))
+    assert main([*command, "--strict"]) == ExitCode.OK

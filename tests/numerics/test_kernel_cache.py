@@ -123,7 +123,8 @@ def test_what_the_digest_depends_on():
 
 
 def test_names_of_a_module_and_constants_count(monkeypatch):
-    from supple.numerics import coloring, mat3
+    from supple.numerics import mat3
+    from supple.xpbd import integration
 
     def calls_through_a_module(a):
         return mat3.dot(a, a)
@@ -131,6 +132,6 @@ def test_names_of_a_module_and_constants_count(monkeypatch):
     before = reached_code(calls_through_a_module)
     monkeypatch.setattr(mat3, "dot", njit(lambda a, b: 0.0))
     assert reached_code(calls_through_a_module) != before
-    before = reached_code(coloring.greedy_colors.py_func)
-    monkeypatch.setattr(coloring, "MAX_COLORS", 128)
-    assert reached_code(coloring.greedy_colors.py_func) != before
+    before = reached_code(integration.first_lost.py_func)
+    monkeypatch.setattr(integration, "FARTHEST", 128.0)
+    assert reached_code(integration.first_lost.py_func) != before

@@ -104,7 +104,7 @@ def test_details_of_an_unknown_class_are_recorded_as_those_of_the_known_base(tmp
 
         def step(self, system, state, dt, workspace):
             state, report = super().step(system, state, dt, workspace)
-            return state, replace(report, details=ForeignDetails(7, 0.5, 30.0))
+            return state, replace(report, details=ForeignDetails(7, 0.5, temperature=30.0))
 
     tools.record(tmp_path / "foreign.vtkhdf", 2, moved_by=Foreign())
     with read_recording(tmp_path / "foreign.vtkhdf") as recording:

@@ -29,7 +29,7 @@ from .conftest import (
 )
 
 SOLVERS = {
-    "xpbd": sp.XPBD(substeps=6),
+    "xpbd": sp.XPBD(substeps=8),
     "backward_euler": sp.Implicit(),
     "bdf2": sp.Implicit(integrator="bdf2"),
     "newmark": sp.Implicit(integrator="newmark"),
@@ -108,9 +108,8 @@ def test_frames_that_are_computed_differently_are_replaced_from_there(out, caplo
     write_checkpoint(paths.checkpoint(8), replace(checkpoint, run=replace(checkpoint.run, solver=str(other))))
     rest = list(sp.resume(out, drifting_scene(), other))
     assert rest[0].report.status == "iteration_limit"
-    assert [record.getMessage() for record in caplog.records] == [
-        f"{paths.recording}: frame 9 is computed differently now, and replaced from there"
-    ]
+    told = [record.getMessage() for record in caplog.records if record.name.startswith("supple.output")]
+    assert told == [f"{paths.recording}: frame 9 is computed differently now, and replaced from there"]
     with sp.read_recording(out / "recording.vtkhdf") as recording:
         assert recording.statuses[9] == "iteration_limit"
         assert len(recording) == STEPS + 1

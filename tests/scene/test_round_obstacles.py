@@ -7,7 +7,7 @@ import supple as sp
 
 JELLY = sp.StableNeoHookean(youngs=1e5, poisson=0.3, density=1000.0, damping=0.03)
 BALL = sp.shapes.sphere(radius=0.1, edge_length=0.07)
-SOLVERS = {"xpbd": sp.XPBD(substeps=10), "implicit": sp.Implicit()}
+SOLVERS = {"xpbd": sp.XPBD(), "implicit": sp.Implicit()}
 
 
 def rails(kind, tilt=0.0, **obstacle):

@@ -137,7 +137,7 @@ def test_parameters_of_both_solvers(load):
 
 def test_defaults(load):
     run = load(f"bodies: [{BODY}]\n")
-    assert (run.dt, run.steps, run.solver.substeps) == (1 / 60, 300, 20)
+    assert (run.dt, run.steps, run.solver.substeps) == (1 / 60, 300, "auto")
     np.testing.assert_allclose(run.scene.gravity, [0, -9.81, 0])
     assert run.start == {}
 

@@ -327,3 +327,13 @@ def test_free_names_differ_from_those_of_bodies_and_obstacles(live):
     scene = live.setup.scene
     named = dataclasses.replace(scene, obstacles=[sp.Sphere(name="cube 1", center=(0, -9, 0))])
     assert (unused_name(scene, "cube"), unused_name(named, "cube")) == ("cube 1", "cube 2")
+
+
+def test_zero_substeps_are_the_automatic_number(live):
+    change(SetParameter("substeps", 0), live)
+    assert live.setup.solver.substeps == "auto"
+    assert describe(live).values["substeps"] == 0
+    run(live, 1)
+    assert live.report.details.substeps >= 10
+    change(SetParameter("substeps", 7), live)
+    assert live.setup.solver.substeps == 7

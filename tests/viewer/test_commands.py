@@ -41,7 +41,7 @@ HOSTILE = [
     (SetSolver, (None,)),
     (SetParameter, ("__class__", 1)),
     (SetParameter, (["substeps"], 1)),
-    (SetParameter, ("substeps", 0)),
+    (SetParameter, ("substeps", -1)),
     (SetParameter, ("substeps", 2.5)),
     (SetParameter, ("substeps", 10**12)),
     (SetParameter, ("youngs", -1.0)),

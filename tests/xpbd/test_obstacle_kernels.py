@@ -21,9 +21,11 @@ for name in sys.argv[1:]:
     numbers[0, : len(shape.parameters)] = shape.parameters
     arrays = (numbers, np.zeros(1, dtype=np.bool_))
     rules = (np.zeros(1, np.int32), np.ones((1, 1), np.bool_), np.zeros((1, 1)))
-    found = (np.array([0, 1]), np.zeros(1, np.int32))
+    found = (np.array([0, 1]), np.zeros(1, np.int32), np.zeros((1, 3)))
     frames = shape.frame[None]
-    kernels_of(shape.contact)[1](x, x.copy(), found, arrays, rules, frames, frames, 0, 1, 1.0, 1.0)
+    points = (x.copy(), np.zeros(1))
+    scales = (1.0, 0.0, 1.0)
+    kernels_of(shape.contact)[1](x, x.copy(), points, found, arrays, rules, frames, frames, 0, 1, 1.0, scales)
     print(name, *np.round(x[0], 6) + 0.0)
 """
 PUSHED = {

@@ -109,8 +109,8 @@ def test_bodies_of_mixed_materials_behave_as_each_alone():
 def test_the_number_of_threads_does_not_change_a_bit(monkeypatch):
     monkeypatch.setattr(ordering, "SMALLEST_CHUNK", 100)
     materials = {
-        "jelly": sp.StableNeoHookean(youngs=1e5, poisson=0.4, damping=0.002),
-        "classic": sp.EdgesAndVolume(edge_compliance=1e-4, damping=0.001),
+        "jelly": sp.StableNeoHookean(youngs=1e5, poisson=0.4, damping=0.02),
+        "classic": sp.EdgesAndVolume(edge_compliance=1e-4, damping=0.01),
     }
     mesh = sp.shapes.box((1.0, 1.0, 3.0), (4, 4, 12))
     bodies = [

@@ -8,7 +8,7 @@ class ExitCode(IntEnum):
 
     OK = 0
     FAILED = 1
-    """A check of a recording failed, or a claim of a demo does not hold."""
+    """A check of a recording failed, a claim of a demo does not hold, or a frame did not converge with --strict."""
     INPUT = 2
     """The input, the options or the place for the output cannot be used: one line on stderr tells why."""
     SOLVER = 3

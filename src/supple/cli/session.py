@@ -17,6 +17,7 @@ from supple.runs.resume import resume
 from supple.runs.run_folder import RunFolder, SceneSource
 from supple.scene.scene import Scene
 from supple.simulate import Frame, Sink, simulate
+from supple.state import Status
 from supple.system import Solver
 
 if TYPE_CHECKING:
@@ -83,12 +84,14 @@ class Outcome:
     ----------
     code : the shell's exit code
     frames : number of simulated frames; last : the last frame; worst_J : the smallest J of all frames
+    all_converged : whether every frame did
     """
 
     code: ExitCode = ExitCode.OK
     frames: int = 0
     last: Frame | None = None
     worst_J: float = field(default=float("inf"))
+    all_converged: bool = True
 
 
 def run_session(
@@ -100,9 +103,14 @@ def run_session(
     products: Products,
     source: SceneSource,
     start: Mapping[str, Any] | None = None,
+    strict: bool = False,
     sinks: Sequence[Sink] = (),
 ) -> Outcome:
     """Simulate into a new run folder, and print a summary.
+
+    Parameters
+    ----------
+    strict : whether a frame that did not converge is a failure
 
     Raises
     ------
@@ -118,7 +126,7 @@ def run_session(
         source=source,
     )
     frames = simulate(scene, solver, dt, steps, sinks=[folder, *sinks, *products.progress()], **(start or {}))
-    return _driven(frames, products)
+    return _driven(frames, products, strict)
 
 
 def resume_session(scene: Scene | None, solver: Solver | None, steps: int | None, *, products: Products) -> Outcome:
@@ -132,8 +140,8 @@ def resume_session(scene: Scene | None, solver: Solver | None, steps: int | None
     return _driven(resume(products.folder, scene, solver, steps=steps, sinks=products.progress()), products)
 
 
-def _driven(frames: Generator[Frame], products: Products) -> Outcome:
-    """Run the simulation until its end, or until Ctrl-C."""
+def _driven(frames: Generator[Frame], products: Products, strict: bool = False) -> Outcome:
+    """Run the simulation until its end, or until Ctrl-C; with `strict`, fail where a frame did not converge."""
     outcome = Outcome()
     recording = RunPaths(products.folder).recording
     with Interrupts() as interrupts:
@@ -141,6 +149,7 @@ def _driven(frames: Generator[Frame], products: Products) -> Outcome:
             for frame in frames:
                 outcome.frames, outcome.last = outcome.frames + 1, frame
                 outcome.worst_J = min(outcome.worst_J, frame.report.min_det_F)
+                outcome.all_converged &= frame.report.status is Status.CONVERGED
                 if interrupts.asked:
                     frames.close()
                     outcome.code = ExitCode.INTERRUPTED
@@ -158,6 +167,8 @@ def _driven(frames: Generator[Frame], products: Products) -> Outcome:
         print_error(
             f"stopped at frame {outcome.last.index} ({report.status}): {report.message}; {recording} is complete"
         )
+    elif strict and not outcome.all_converged:
+        outcome.code = ExitCode.FAILED
     _warn_of_older_files(products)
     _write_products(recording, products)
     if not products.quiet:

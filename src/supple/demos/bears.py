@@ -85,7 +85,7 @@ BEARS = Demo(
         "bowl, with friction. The page draws a finer skin, embedded in the coarse tetrahedra that are simulated."
     ),
     scene=scene,
-    solvers={"xpbd": lambda: XPBD(substeps=40)},
+    solvers={"xpbd": lambda: XPBD(accuracy=0.1)},
     measurement=_Measurement,
     steps=180,
 )

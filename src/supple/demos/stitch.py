@@ -123,7 +123,7 @@ STITCH = Demo(
         "triangles of the bear's head hold them together, in the air and when they hit the floor."
     ),
     scene=scene,
-    solvers={"xpbd": lambda: XPBD(substeps=60), "implicit": lambda: Implicit(integrator="bdf2")},
+    solvers={"xpbd": lambda: XPBD(), "implicit": lambda: Implicit(integrator="bdf2")},
     measurement=_Measurement,
     steps=60,
 )

@@ -22,7 +22,6 @@ from supple.implicit.energies.regularization import regularization_of
 from supple.implicit.energies.stitch_damping import StitchViscosity
 from supple.implicit.energies.stitches import StitchEnergy
 from supple.implicit.limits.inversion_guard import refuse_inverted
-from supple.implicit.limits.step_filter import KEEP
 from supple.implicit.newton.direction import Tools
 from supple.implicit.newton.free_motion import FreeMotion
 from supple.implicit.newton.linear_solver import LinearSolver
@@ -33,6 +32,7 @@ from supple.implicit.stepping.substep import StepSettings, Substep, take_substep
 from supple.implicit.stepping.substepping import Substepping
 from supple.implicit.stepping.workspace import Workspace
 from supple.implicit.timings import PARTS
+from supple.numerics.noninverting_step import KEEP
 from supple.scene.scene import Scene
 from supple.state import State, Status, StepReport
 from supple.system import Solver, System

@@ -1,8 +1,8 @@
 """Which constraints may be projected at the same time, and in which order one thread should project them.
 
 Two constraints are independent where they share no vertex. `breadth_first_order` divides the vertices of a mesh
-into levels such that a constraint has vertices of at most two neighbouring levels; `greedy_colors` finds independent
-constraints near each other.
+into levels such that a constraint has vertices of at most two neighbouring levels; `independent_groups` finds
+independent constraints near each other.
 """
 
 from __future__ import annotations
@@ -11,8 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.numerics.kernel_cache import njit
-
-MAX_COLORS = 256
 
 
 def breadth_first_order(constraints: list[NDArray[np.int32]], n_vertices: int) -> tuple[NDArray, NDArray]:
@@ -77,48 +75,54 @@ def _breadth_first(pointers, neighbours):
 
 
 @njit(cache=True)
-def greedy_colors(constraints, n_vertices, block):
-    """Color each run of `block` constraints separately, such that constraints of one color share no vertex.
+def independent_groups(constraints, starts, n_vertices, width, window):
+    """Divide runs of constraints into groups of at most `width`, in which no two constraints share a vertex.
 
-    Every constraint gets the first color that none of its vertices has in its block. Beyond `MAX_COLORS` the last color
-    is shared. Therefore these colors only order constraints; they do not guarantee independence.
+    Each group takes, in order, what is independent among the next `window` constraints that have no group yet, so that
+    a group's constraints are near each other.
 
     Parameters
     ----------
     constraints : (m, k) int32 vertex indices
+    starts : (r + 1,) first constraint of each run; groups do not cross runs
     n_vertices : number of vertices
-    block : length of the runs
 
     Returns
     -------
-    (m,) int32 colors.
+    members : (g, width) int64 constraints; in a group that is not full, the first one fills the rest
+    counts : (g,) int64 constraints in each group; pointers : (r + 1,) int64 the first group of each run
     """
     m, k = constraints.shape
-    colors = np.zeros(m, np.int32)
-    words = MAX_COLORS // 64
-    used = np.zeros((n_vertices, words), np.uint64)
-    stamp = np.full(n_vertices, -1, np.int64)
-    one = np.uint64(1)
-    for c in range(m):
-        run = c // block
-        for a in range(k):
-            i = constraints[c, a]
-            if stamp[i] != run:
-                stamp[i] = run
-                for word in range(words):
-                    used[i, word] = 0
-        color = MAX_COLORS - 1
-        for word in range(words):
-            taken = np.uint64(0)
-            for a in range(k):
-                taken |= used[constraints[c, a], word]
-            if taken != ~np.uint64(0):
-                bit = 0
-                while (taken >> np.uint64(bit)) & one:
-                    bit += 1
-                color = 64 * word + bit
-                break
-        colors[c] = color
-        for a in range(k):
-            used[constraints[c, a], color // 64] |= one << np.uint64(color % 64)
-    return colors
+    members = np.empty((m, width), np.int64)
+    counts = np.empty(m, np.int64)
+    pointers = np.zeros(len(starts), np.int64)
+    owner = np.full(n_vertices, -1, np.int64)
+    pending = np.empty(window, np.int64)
+    group = 0
+    for run in range(len(starts) - 1):
+        next_one, waiting = starts[run], 0
+        while next_one < starts[run + 1] or waiting > 0:
+            while next_one < starts[run + 1] and waiting < window:
+                pending[waiting] = next_one
+                waiting += 1
+                next_one += 1
+            count, kept = 0, 0
+            for q in range(waiting):
+                c = pending[q]
+                free = count < width
+                for a in range(k):
+                    free = free and owner[constraints[c, a]] != group
+                if free:
+                    for a in range(k):
+                        owner[constraints[c, a]] = group
+                    members[group, count] = c
+                    count += 1
+                else:
+                    pending[kept] = c
+                    kept += 1
+            waiting = kept
+            members[group, count:] = members[group, 0]
+            counts[group] = count
+            group += 1
+        pointers[run + 1] = group
+    return members[:group].copy(), counts[:group].copy(), pointers

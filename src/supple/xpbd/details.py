@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from supple.state import SolverDetails
 
@@ -16,6 +17,18 @@ class XPBDDetails(SolverDetails):
     contacts : number of contacts that the last substep resolved
     smallest_gap : smallest signed distance of a vertex from a surface at the beginnings of the substeps [m], below zero
         where they overlapped; None where no gap was smaller than about one edge length. Pairs of edges are not in it.
+    substeps : number of substeps; repeats : how often the frame was undone and repeated with more
+    substeps_reason : what asked for this number
+    softening : by body, the share of its stiffness that it lacks at this length of the substep, estimated (see
+        `supple.xpbd.assessment.softening`)
+    energy_gained : energy that came from nowhere, and has not been lost since, over the energy of the scene [-]
+    held_back : substeps in which the motion of a body was shortened, so that no tet inverts
     """
 
     smallest_gap: float | None = None
+    substeps: int = 0
+    repeats: int = 0
+    substeps_reason: str = field(default="", compare=False)
+    softening: Mapping[str, float] = field(default_factory=dict)
+    energy_gained: float = 0.0
+    held_back: int = 0

@@ -63,16 +63,6 @@ def predict(points, previous, velocities, gravity, h):
 
 
 @njit(cache=True)
-def accelerate(points, velocities, gravity, h):
-    """The part of `predict` that is due to gravity: v += h g, x += h^2 g."""
-    for i in range(len(points)):
-        if points[i, 3] > 0.0:
-            for j in range(3):
-                velocities[i, j] += h * gravity[j]
-                points[i, j] += h * (h * gravity[j])
-
-
-@njit(cache=True)
 def update_velocities(points, previous, velocities, h):
     """v = (x - x_n) / h."""
     for i in range(len(points)):

@@ -5,8 +5,10 @@ Source: Macklin, Müller, Chentanez, "XPBD" (2016); Macklin et al., "Small Steps
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import accumulate
 from time import perf_counter
+from typing import Literal
 
 import numba
 import numpy as np
@@ -19,16 +21,17 @@ from supple.numerics.thread_tuning import ThreadTuner
 from supple.numerics.threads import numba_threads
 from supple.state import State, Status, StepReport
 from supple.system import Solver, System
-from supple.xpbd.constraints.registry import ConstraintSet, build_constraint_sets
+from supple.xpbd.assessment.assessment import Assessment
+from supple.xpbd.assessment.findings import Findings
+from supple.xpbd.constraints.registry import build_constraint_sets
 from supple.xpbd.constraints.stitch_anchors import StitchAnchors
 from supple.xpbd.constraints.stitches import stitch_constraints
 from supple.xpbd.contact.collisions import Collisions
-from supple.xpbd.contact.memory import ContactMemory
 from supple.xpbd.contact.settings import XPBDContact
+from supple.xpbd.damping.kelvin_voigt import Damping, ViscousMemory, cycle_lengths, make_damping
 from supple.xpbd.details import XPBDDetails
 from supple.xpbd.external_forces import add_forces, pull_to_targets
 from supple.xpbd.integration import (
-    accelerate,
     apply_changes,
     first_lost,
     hold,
@@ -37,50 +40,23 @@ from supple.xpbd.integration import (
     to_world,
     update_velocities,
 )
+from supple.xpbd.limits.rigid_fallback import RigidFallback
+from supple.xpbd.limits.volume_guard import ENOUGH, VolumeGuard
+from supple.xpbd.memory import XPBDMemory
 from supple.xpbd.momentum import MomentumRestore
-from supple.xpbd.sweeps.ordering import Layout, make_layout, reordered
+from supple.xpbd.start import raise_if_inside
+from supple.xpbd.substeps import FALL, SubstepChoice, Substeps
+from supple.xpbd.sweeps.ordering import make_layout, reordered
+from supple.xpbd.workspace import XPBDWorkspace
 
+# How often tets that are compressed too fast are projected in a substep, in turn with the contacts, before the motion
+# of their body is shortened.
+MOST_PROJECTIONS = 10
+# How often a bad frame is repeated with twice as many substeps.
+MOST_REPEATS = 2
 # Below this much work, in edges or volumes, a sweep ends before a second thread has started.
 PARALLEL_FROM = 20_000
 _MOST_THREADS: int = config.NUMBA_NUM_THREADS  # pyright: ignore[reportAttributeAccessIssue]
-
-
-@dataclass(eq=False)
-class XPBDWorkspace:
-    """What is computed once for a system, and scratch arrays, in the solver's own numbering of vertices.
-
-    It caches and never remembers: a step reads nothing of an earlier step but the state.
-
-    Attributes
-    ----------
-    extended : (n + a, 4) positions about the component's origin [m] and inverse masses [1/kg], of the vertices and then
-        of the anchors (inverse mass 0); extended_previous : (n + a, 3) positions at the beginning of the substep
-    points, previous : the rows of the vertices
-    velocities, origins : (n, 3); world, world_previous : (n, 3) positions in world coordinates, for contacts
-    """
-
-    system: System
-    layout: Layout
-    sets: list[ConstraintSet]
-    momentum: MomentumRestore | None
-    collisions: Collisions
-    pace: ThreadTuner
-    anchors: StitchAnchors
-    extended: NDArray[np.float64]
-    extended_previous: NDArray[np.float64] = field(init=False)
-    points: NDArray[np.float64] = field(init=False)
-    previous: NDArray[np.float64] = field(init=False)
-    velocities: NDArray[np.float64] = field(init=False)
-    origins: NDArray[np.float64] = field(init=False)
-    world: NDArray[np.float64] = field(init=False)
-    world_previous: NDArray[np.float64] = field(init=False)
-
-    def __post_init__(self) -> None:
-        n = len(self.system.masses)
-        self.extended_previous = np.zeros((len(self.extended), 3))
-        self.points, self.previous = self.extended[:n], self.extended_previous[:n]
-        for name in ("velocities", "origins", "world", "world_previous"):
-            setattr(self, name, np.zeros((n, 3)))
 
 
 @dataclass(frozen=True)
@@ -89,10 +65,15 @@ class XPBD(Solver):
 
     Parameters
     ----------
-    substeps : number of substeps of a frame, each with one sweep over all constraints.
+    substeps : number of substeps of a frame, each with one sweep over all constraints. "auto": what the frame needs
+        (see `supple.xpbd.substeps`); a frame that turns out bad is repeated with more. `report.details` tells how many,
+        and why.
     momentum_restore : restore the momentum that constraint projection takes from free bodies (see
         `supple.xpbd.momentum`). False shows the behaviour of plain XPBD.
     contact : contact of bodies with each other and with themselves; None turns it off. Obstacles always act.
+    accuracy : the share of its stiffness that a body may lack; beyond it, the status of a frame is `softened`.
+    max_substeps : the largest automatic number.
+    start : what becomes of bodies that begin inside of something: an error, or they are slowly pushed out.
     threads : number of threads. None: one, or all of Numba's where the scene is large enough and several threads are
         measured to be faster. The result has the same bits for any number.
 
@@ -101,17 +82,27 @@ class XPBD(Solver):
     SolverError : where a value is of the wrong kind or out of range.
     """
 
-    substeps: int = 20
+    substeps: int | Literal["auto"] = "auto"
     momentum_restore: bool = True
     contact: XPBDContact | None = field(default_factory=XPBDContact)
     threads: int | None = None
+    accuracy: float = 0.02
+    max_substeps: int = 1000
+    start: Literal["refuse", "push_out"] = "refuse"
 
     def __post_init__(self) -> None:
-        _check_count("substeps", self.substeps)
+        if self.substeps != "auto":
+            _check_count("substeps", self.substeps, ", or 'auto'")
+        _check_count("max_substeps", self.max_substeps)
+        if self.start not in ("refuse", "push_out"):
+            raise SolverError(f"XPBD: start is {self.start!r}; give 'refuse' or 'push_out'")
         if not isinstance(self.momentum_restore, bool):
             raise SolverError(f"XPBD: momentum_restore is {self.momentum_restore!r}; give True or False")
         if self.contact is not None and not isinstance(self.contact, XPBDContact):
             raise SolverError(f"XPBD: contact is {self.contact!r}; give XPBDContact(...), or None to turn it off")
+        number = isinstance(self.accuracy, (int, float, np.number)) and not isinstance(self.accuracy, bool)
+        if not number or not 0.0 < self.accuracy < 1.0:
+            raise SolverError(f"XPBD: accuracy is {self.accuracy!r}; give a number above 0 and below 1, such as 0.02")
         if self.threads is not None:
             _check_count("threads", self.threads)
             if self.threads > _MOST_THREADS:
@@ -135,58 +126,178 @@ class XPBD(Solver):
         threads = self.threads or numba.get_num_threads()
         large = sum(made.work for made in sets) >= PARALLEL_FROM
         parallel = threads > 1 and (large or self.threads is not None)
+        collisions = Collisions(inner, self.contact)
+        assessment = Assessment(inner, self.contact, collisions.edge_length)
         return XPBDWorkspace(
             system=inner,
             layout=layout,
             sets=sets,
+            damping=make_damping(inner, layout, extended[:, 3]),
             momentum=MomentumRestore(inner) if self.momentum_restore else None,
-            collisions=Collisions(inner, self.contact),
+            collisions=collisions,
+            guard=VolumeGuard(inner),
+            fallback=RigidFallback(inner),
+            assessment=assessment,
+            choice=SubstepChoice(inner, assessment.softening, bool(collisions)),
             pace=ThreadTuner(choice=parallel and self.threads is None, parallel=parallel),
             anchors=StitchAnchors(inner),
             extended=extended,
         )
 
+    def check(self, system: System, state: State, workspace: XPBDWorkspace) -> None:
+        """Raise where a body begins inside of something; a state of XPBD's own may be continued in any case.
+
+        Raises
+        ------
+        SceneError : names the things, the depth and the remedy.
+        """
+        if self.start == "refuse" and not isinstance(state.memory, XPBDMemory):
+            edge_length = workspace.collisions.edge_length
+            raise_if_inside(system, state.positions, state.time, self.contact, edge_length)
+
     def step(self, system: System, state: State, dt: float, workspace: XPBDWorkspace) -> tuple[State, StepReport]:
-        """Advance by `dt` [s] in `substeps` substeps. The returned state has its own arrays."""
-        ws, h = workspace, dt / self.substeps
+        """Advance by `dt` [s]. The returned state has its own arrays.
+
+        With automatic substeps, a frame that turns out bad is undone and repeated with twice as many.
+        """
+        ws, time = workspace, state.time + dt
+        memory = state.memory if isinstance(state.memory, XPBDMemory) else XPBDMemory()
+        used, repeats = self._first_choice(ws, state, dt, memory), 0
+        while True:
+            held_back = self._advance(ws, state, dt, used.count, memory)
+            lost = first_lost(ws.points, ws.velocities)
+            if lost < 0:
+                new, report, problem = self._reported(ws, time, dt, held_back, used, repeats, memory)
+            else:
+                problem = Status.NOT_FINITE
+            last = self.substeps != "auto" or used.count >= self.max_substeps or repeats == MOST_REPEATS
+            if last or problem is None or problem in memory.futile:
+                break
+            repeats += 1
+            used = Substeps(min(2 * used.count, self.max_substeps), f"a repetition: {problem}")
+        if lost >= 0:
+            message = _lost_position_message(ws, lost, time)
+            details = self.initial_details(system, ws)
+            return state, StepReport(Status.NOT_FINITE, used.count, message, details=details)
+        return new, report
+
+    def _first_choice(self, ws: XPBDWorkspace, state: State, dt: float, memory: XPBDMemory) -> Substeps:
+        """How many substeps the frame is simulated with at first."""
+        if self.substeps != "auto":
+            return Substeps(self.substeps, "the user")
         _load(ws, state)
-        targets = _pin_targets(ws.system, state.time, h, self.substeps)
+        wanted = ws.choice.choose(ws.moment(state.time), dt, self.accuracy, memory.substeps)
+        if wanted.count > self.max_substeps:
+            return Substeps(self.max_substeps, f"max_substeps; {wanted.reason} asks for {wanted.count}")
+        return wanted
+
+    def _reported(
+        self,
+        ws: XPBDWorkspace,
+        time: float,
+        dt: float,
+        held_back: int,
+        used: Substeps,
+        repeats: int,
+        before: XPBDMemory,
+    ) -> tuple[State, StepReport, Status | None]:
+        """The state at the end of a frame, what is wrong with it, and the status that more substeps might cure."""
+        h = dt / used.count
+        new, viscous = _unload(ws, time, self._damping(ws, h))
+        ws.guard.measure(ws.points, False)
+        findings, ledger = ws.assessment.end(ws.moment(time), ws.world, ws.guard.J, h, self.accuracy)
+        status = findings.status
+        problem = status if status in (Status.INVERTED, Status.ENERGY_GAINED) else None
+        if findings.crossings > before.crossings:
+            problem = Status.INTERSECTING
+        elif problem is None and held_back:
+            problem = Status.INVERTED
+        memory = XPBDMemory(
+            contact=ws.collisions.memory(ws.world),
+            viscous=viscous,
+            ledger=ledger,
+            substeps=float(used.count) if repeats and problem is None else FALL * before.substeps,
+            futile=frozenset() if problem is None else before.futile | ({problem} if repeats else set()),
+            crossings=findings.crossings,
+        )
+        details = XPBDDetails(
+            contacts=ws.collisions.contacts,
+            smallest_gap=ws.collisions.smallest_gap,
+            substeps=used.count,
+            repeats=repeats,
+            substeps_reason=used.reason,
+            softening=ws.assessment.softening.by_body(h),
+            energy_gained=findings.gained,
+            held_back=held_back,
+        )
+        message = findings.message(time, self._remedy(ws, dt, findings, used.count))
+        report = StepReport(status, used.count, message, details=details)
+        return replace(new, memory=memory), report, problem
+
+    def _remedy(self, ws: XPBDWorkspace, dt: float, findings: Findings, used: int) -> str:
+        """What helps against what was found."""
+        enough = ws.assessment.softening.substeps(dt, self.accuracy)[0]
+        if findings.status is not Status.SOFTENED:
+            enough = max(enough, 2 * used)
+        return f"take {'max_substeps' if self.substeps == 'auto' else 'substeps'}={enough}"
+
+    def _advance(self, ws: XPBDWorkspace, state: State, dt: float, substeps: int, memory: XPBDMemory) -> int:
+        """Simulate the substeps of a frame from a state; returns in how many the motion of a body was shortened."""
+        h, held_back = dt / substeps, 0
+        _load(ws, state)
+        targets = _pin_targets(ws.system, state.time, h, substeps)
         if ws.collisions:
-            memory = state.memory if isinstance(state.memory, ContactMemory) else None
-            ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt, memory)
+            ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt, memory.contact)
+        ws.guard.measure(ws.points, False)
+        ws.guard.guarded[:] = ws.assessment.begin(ws.moment(state.time), ws.guard.J, h, memory.ledger)
+        ws.guard.accept()
+        balance = ws.assessment.balance
+        damping = self._damping(ws, h)
+        cycles = _cycles(substeps)
+        if damping is not None:
+            damping.begin_step(memory.viscous, state.velocities)
         with numba_threads(self.threads):
-            for k in range(self.substeps):
+            for k in range(substeps):
                 interruption_point()
                 started = perf_counter()
                 parallel = ws.pace.choose()
                 end = state.time + (k + 1) * h
+                if damping is not None and k in cycles:
+                    moving = ws.anchors.velocities(end - h, h)
+                    damping.begin_cycle(ws.extended, ws.velocities, moving, cycles[k], h, parallel)
                 _begin_substep(ws, targets[k], end, h, parallel)
                 add_forces(ws.system, ws.points, ws.velocities, end, h)
+                if damping is not None:
+                    damping.push(ws.points, h)
+                if ws.collisions:
+                    _push_contacts(ws, h)
                 for constraints in ws.sets:
                     constraints.project(ws.extended, h, parallel)
-                if ws.momentum is not None:
-                    ws.momentum.apply(ws.points, ws.previous, ws.velocities, h, parallel)
-                else:
-                    update_velocities(ws.points, ws.previous, ws.velocities, h)
+                _restore(ws, h, parallel)
                 ws.pace.note(parallel, perf_counter() - started)
                 pull_to_targets(ws.system, ws.points, ws.velocities, ws.origins, end, h)
-                if ws.collisions and not _collide(ws, end, h):
+                if ws.collisions and not _collide(ws, end, h, parallel):
                     break
-        lost = first_lost(ws.points, ws.velocities)
-        if lost >= 0:
-            message = _lost_position_message(ws, lost, state.time + dt)
-            return state, StepReport(Status.NOT_FINITE, self.substeps, message, details=XPBDDetails())
-        details = XPBDDetails(ws.collisions.contacts, ws.collisions.smallest_gap)
-        return _unload(ws, state.time + dt), StepReport(Status.CONVERGED, self.substeps, details=details)
+                held_back += _keep_volumes(ws, end, h, parallel)
+                if ws.collisions:
+                    ws.collisions.end_substep()
+                balance.note_loads(ws.points, ws.previous, ws.origins, end, h)
+                balance.note_contacts(ws.collisions.contacts)
+        return held_back
+
+    @staticmethod
+    def _damping(ws: XPBDWorkspace, h: float) -> Damping | None:
+        """Damping in substeps of h [s]; None where XPBD itself damps as much, which is like tau = h."""
+        return ws.damping if ws.damping is not None and ws.damping.tau > h else None
 
     def initial_details(self, system: System, workspace: XPBDWorkspace) -> XPBDDetails:
         """No contacts; see `Solver.initial_details`."""
-        return XPBDDetails()
+        return XPBDDetails(softening=dict.fromkeys((part.name for part in system.bodies), 0.0))
 
 
-def _check_count(name: str, value: object) -> None:
+def _check_count(name: str, value: object, otherwise: str = "") -> None:
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
-        raise SolverError(f"XPBD: {name} is {value!r}; give a whole number of one or more")
+        raise SolverError(f"XPBD: {name} is {value!r}; give a whole number of one or more{otherwise}")
 
 
 def _load(ws: XPBDWorkspace, state: State) -> None:
@@ -198,39 +309,76 @@ def _load(ws: XPBDWorkspace, state: State) -> None:
     ws.anchors.place(ws.extended, ws.origins, state.time)
 
 
-def _begin_substep(ws: XPBDWorkspace, targets: NDArray[np.float64], end: float, h: float, parallel: bool) -> None:
-    """Predict positions, with pinned vertices at `targets` (k, 3), and apply damping.
+def _cycles(substeps: int) -> dict[int, int]:
+    """The first substep of each cycle of damping, and the cycle's length."""
+    lengths = cycle_lengths(substeps)
+    return dict(zip(accumulate(lengths, initial=0), lengths, strict=False))
 
-    Damping acts before gravity, forces and constraints, on the velocities at the beginning of the substep only. Later
-    in the substep it would reduce the load of a resting body, or undo corrections of neighbouring constraints.
-    """
-    damped = [constraints for constraints in ws.sets if constraints.damped]
-    gravity = ws.system.gravity
-    predict[parallel](ws.points, ws.previous, ws.velocities, np.zeros(3) if damped else gravity, h)
+
+def _begin_substep(ws: XPBDWorkspace, targets: NDArray[np.float64], end: float, h: float, parallel: bool) -> None:
+    """Predict positions, with pinned vertices at `targets` (k, 3)."""
+    predict[parallel](ws.points, ws.previous, ws.velocities, ws.system.gravity, h)
+    ws.begun[:] = ws.previous
     if len(targets):
         hold(ws.points, ws.system.pinned_vertices, targets, ws.origins)
-    ws.extended_previous[len(ws.points) :] = ws.extended[len(ws.points) :, :3]
+        ws.assessment.balance.note_pins(ws.points, ws.previous, parallel)
     ws.anchors.place(ws.extended, ws.origins, end)
-    for constraints in damped:
-        constraints.damp(ws.extended, ws.extended_previous, h, parallel)
-    if damped:
-        accelerate(ws.points, ws.velocities, gravity, h)
 
 
-def _collide(ws: XPBDWorkspace, time: float, h: float) -> bool:
+def _push_contacts(ws: XPBDWorkspace, h: float) -> None:
+    """Apply the contact forces of the substep before to the prediction."""
+    if to_world(ws.points, ws.origins, ws.world):
+        to_world(ws.previous, ws.origins, ws.world_previous)
+        if ws.collisions.begin_substep(ws.world, ws.world_previous, h):
+            apply_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
+
+
+def _collide(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
     """Project the contacts of a substep, in the world. Returns False, without effect, where a position is lost."""
     if not to_world(ws.points, ws.origins, ws.world):
         return False
     to_world(ws.previous, ws.origins, ws.world_previous)
-    ws.collisions.project(ws.world, ws.world_previous, time, h)
+    ws.collisions.project(ws.world, ws.world_previous, time, h, parallel)
     apply_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
     return True
 
 
-def _unload(ws: XPBDWorkspace, time: float) -> State:
+def _keep_volumes(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
+    """Project tets that lose too much volume, in turn with contacts. Returns whether that was not enough."""
+    for k in range(MOST_PROJECTIONS):
+        if not ws.guard.measure(ws.points, parallel, ENOUGH if k else 1.0):
+            ws.guard.accept()
+            return False
+        ws.guard.project(ws.points)
+        _restore(ws, h, parallel)
+        if ws.collisions and not _collide(ws, time, h, parallel):
+            return True
+    ws.guard.measure(ws.points, parallel)
+    failures = ws.guard.failures()
+    failed = bool(failures.any())
+    if failed:
+        ws.fallback.apply(ws.points, ws.previous, ws.begun, ws.guard.bounds, failures)
+        _restore(ws, h, parallel)
+        ws.guard.measure(ws.points, parallel)
+    ws.guard.accept()
+    return failed
+
+
+def _restore(ws: XPBDWorkspace, h: float, parallel: bool) -> None:
+    """The velocities of changed positions, with the momentum of the velocities before."""
+    if ws.momentum is not None:
+        ws.momentum.apply(ws.points, ws.previous, ws.velocities, h, parallel)
+    else:
+        update_velocities(ws.points, ws.previous, ws.velocities, h)
+
+
+def _unload(ws: XPBDWorkspace, time: float, damping: Damping | None) -> tuple[State, ViscousMemory | None]:
+    """The state without its memory, and what damping remembers."""
     to_world(ws.points, ws.origins, ws.world)
     new = ws.layout.new_from_old
-    return State(time, ws.world[new], ws.velocities[new], ws.collisions.memory(ws.world))
+    velocities = ws.velocities[new]
+    viscous = None if damping is None else damping.memory(velocities)
+    return State(time, ws.world[new], velocities), viscous
 
 
 def _pin_targets(system: System, time: float, h: float, substeps: int) -> NDArray[np.float64]:

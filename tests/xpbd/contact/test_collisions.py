@@ -7,6 +7,7 @@ import pytest
 import supple as sp
 from supple.errors import SolverError
 from supple.system import build_system, initial_state
+from supple.xpbd.contact import surface_collisions
 from supple.xpbd.contact.collisions import Collisions
 from supple.xpbd.contact.settings import XPBDContact
 from supple.xpbd.solver import XPBD
@@ -50,6 +51,32 @@ def test_the_result_has_the_same_bits_on_any_number_of_threads():
     assert (run(1) == run(more)).all()
 
 
+def test_contacts_found_on_several_threads_have_the_same_bits(monkeypatch):
+    """With the limit at one point, also small scenes search for contacts in parallel."""
+
+    def run(parallel):
+        scene = pile()
+        system, state = build_system(scene), initial_state(scene)
+        collisions = Collisions(system, XPBDContact())
+        x, v, h = state.positions.copy(), state.velocities.copy(), 1 / 600
+        contacts = 0
+        for k in range(60):
+            if k % 10 == 0:
+                collisions.begin_step(x, v, k * h, 10 * h, collisions.memory(x) if k else None)
+            before = x.copy()
+            x = x + h * (v + h * np.array([0.0, -9.81, 0.0]))
+            collisions.begin_substep(x, before, h)
+            contacts += collisions.project(x, before, (k + 1) * h, h, parallel)
+            collisions.end_substep()
+            v = (x - before) / h
+        return x, contacts
+
+    monkeypatch.setattr(surface_collisions, "PARALLEL_FROM", 1)
+    one, two = run(False), run(True)
+    assert (one[0] == two[0]).all()
+    assert one[1] == two[1] > 0
+
+
 def test_collisions_are_false_where_no_contact_is_possible():
     scene = sp.Scene(pile().bodies[:1])
     assert not Collisions(build_system(scene), None)
@@ -81,7 +108,9 @@ def test_positions_that_are_not_finite_do_not_stop_the_program():
     collisions.begin_step(x, state.velocities, 0.0, 1 / 60)
     x[3] = np.nan
     x[40] = 1e200
+    collisions.begin_substep(x, before, 1 / 600)
     collisions.project(x, before, 1 / 600, 1 / 600)
+    collisions.end_substep()
     collisions.begin_step(x, np.full_like(x, np.inf), 0.0, 1 / 60)
     assert np.isnan(x[3]).all()
 

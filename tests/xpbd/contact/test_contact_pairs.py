@@ -34,7 +34,7 @@ def block(name, position, tilted=False, friction=0.0):
 
 
 def last_of(scene, steps, solver=None):
-    *_, frame = sp.simulate(scene, solver or sp.XPBD(substeps=10), 1 / 60, steps)
+    *_, frame = sp.simulate(scene, solver or sp.XPBD(substeps=10, accuracy=0.9), 1 / 60, steps)
     assert frame.report.status == "converged"
     return frame
 
@@ -85,7 +85,7 @@ def test_friction_of_a_pair_acts_on_a_slope_beside_a_body_without_a_pair(flat):
     lifted = (0.05 if flat else 0.0565) * NORMAL
     bodies = [block(n, lifted + np.array([0, 0, z]), tilted=True) for n, z in (("own", -0.3), ("pair", 0.3))]
     scene = sp.Scene(bodies, [floor], contact_pairs=[sp.ContactPair("pair", "slope", friction=0.7)])
-    x = last_of(scene, 24, sp.XPBD(substeps=20)).positions
+    x = last_of(scene, 24, sp.XPBD(substeps=20, accuracy=0.9)).positions
     travel = {body.name: (x[body.name].mean(axis=0) - np.asarray(body.position)) @ DOWN for body in bodies}
     assert abs(travel["pair"]) < 3e-3
     assert travel["own"] == pytest.approx(0.5 * 9.81 * (np.sin(SLOPE) - 0.2 * np.cos(SLOPE)) * 0.4**2, rel=0.07)
@@ -97,7 +97,7 @@ def test_friction_between_bodies_is_that_of_their_pair():
     riders = [block(n, 0.1565 * NORMAL + (0, 0, z), True, friction=1.0) for n, z in (("own", -0.16), ("pair", 0.16))]
     floor = sp.HalfSpace(normal=NORMAL, friction=5.0, name="slope")
     scene = sp.Scene([plank, *riders], [floor], contact_pairs=[sp.ContactPair("plank", "pair", friction=0.8)])
-    x = last_of(scene, 18, sp.XPBD(substeps=20)).positions
+    x = last_of(scene, 18, sp.XPBD(substeps=20, accuracy=0.9)).positions
     slipped = {b.name: (x[b.name].mean(axis=0) - np.asarray(b.position)) @ DOWN for b in riders}
     assert abs(slipped["pair"]) < 0.01
     assert slipped["own"] > 0.07

@@ -73,10 +73,11 @@ def test_thin_plates_do_not_pass_through_each_other(speed):
 def test_bodies_that_start_deep_inside_each_other_separate_slowly():
     scene = sp.Scene([ball("a", (0, 0, 0)), ball("b", (0.11, 0.02, 0.01))], gravity=(0, 0, 0))
     fastest, frame = 0.0, None
-    for frame in sp.simulate(scene, XPBD(substeps=10), 1 / 60, 120):
-        assert frame.report.status == "converged"
+    for frame in sp.simulate(scene, XPBD(substeps=10, accuracy=0.9, start="push_out"), 1 / 60, 120):
+        assert frame.report.status in ("intersecting", "energy_gained", "converged")
         fastest = max(fastest, np.abs(frame.state.velocities).max())
     assert overlapping(frame) == 0
+    assert frame.report.status == "converged"
     assert fastest < 2.0
 
 
@@ -118,10 +119,10 @@ def test_the_legs_of_a_bent_beam_meet_and_do_not_cross(enabled):
         sp.HalfSpace(point=(0.07, 0, 0), normal=(-1, 0, 0), motion=lambda t: (-min(0.2 * t, 0.036), 0, 0)),
     ]
     scene = sp.Scene([body], squeeze, gravity=(0, 0, 0))
-    solver = XPBD(substeps=20, contact=XPBDContact(self_collision=enabled))
+    solver = XPBD(substeps=20, accuracy=0.9, contact=XPBDContact(self_collision=enabled))
     worst, crossed = -1.0, 0
     for frame in sp.simulate(scene, solver, 1 / 60, 24):
-        assert frame.report.status == "converged"
+        assert frame.report.status in ("converged", "intersecting")
         worst = max(worst, crossing_of_legs(frame))
         tets, x = body.mesh.tets, frame.state.positions
         surface = np.unique(body.mesh.surface.triangles)
@@ -153,6 +154,7 @@ def test_a_contact_conserves_momentum_exactly_and_moves_by_inverse_mass():
     collisions.begin_step(before, state.velocities, 0.0, 1 / 60)
     m = system.masses
     momentum = m @ (x - before)
+    collisions.begin_substep(x, before, 1 / 60)
     assert collisions.project(x, before, 1 / 60, 1 / 60) == 4
     assert np.abs(m @ (x - before) - momentum).max() < 1e-15 * m.sum()
     light_moved = (x - before)[system.bodies[0].vertices, 1]

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import supple as sp
-from supple.numerics.coloring import breadth_first_order, greedy_colors
+from supple.numerics.coloring import breadth_first_order, independent_groups
 from supple.system import build_system
 from supple.xpbd.sweeps import ordering
 from supple.xpbd.sweeps.ordering import make_layout, reordered
@@ -32,20 +32,34 @@ def test_constraints_span_at_most_two_levels(case):
 
 
 @settings(max_examples=50, deadline=None)
-@given(constraint_lists(), st.integers(1, 70))
-def test_equal_colors_of_a_run_share_no_vertex(case, run):
+@given(constraint_lists(), st.integers(1, 5), st.integers(1, 20), st.integers(0, 60))
+def test_the_members_of_a_group_share_no_vertex(case, width, window, cut):
     n, constraints = case
-    colors = greedy_colors(constraints, n, run)
-    for first in range(0, len(constraints), run):
-        rows = constraints[first : first + run]
-        for color in np.unique(colors[first : first + run]):
-            vertices = rows[colors[first : first + run] == color].ravel()
-            assert len(np.unique(vertices)) == len(vertices)
+    starts = np.array([0, min(cut, len(constraints)), len(constraints)])
+    members, counts, pointers = independent_groups(constraints, starts, n, width, window)
+    of_groups = [row[:count] for row, count in zip(members, counts, strict=True)]
+    assert sorted(np.concatenate([[], *of_groups])) == list(range(len(constraints)))
+    for group, row, count in zip(of_groups, members, counts, strict=True):
+        assert 1 <= count <= width
+        assert (row[count:] == row[0]).all()
+        assert len(np.unique(constraints[group])) == 4 * count
+    for run in range(2):
+        inside = [c for group in of_groups[pointers[run] : pointers[run + 1]] for c in group]
+        assert sorted(inside) == list(range(starts[run], starts[run + 1]))
 
 
-def test_a_vertex_of_more_than_64_constraints_gets_as_many_colors():
+def test_groups_of_a_box_are_full():
+    mesh = sp.shapes.box((1.0, 1.0, 1.0), (8, 8, 8))
+    for constraints in (mesh.tets.astype(np.int32), mesh.edges.astype(np.int32)):
+        _, counts, _ = independent_groups(constraints, np.array([0, len(constraints)]), len(mesh.vertices), 16, 1024)
+        assert counts.mean() > 0.96 * 16
+
+
+def test_constraints_of_one_vertex_have_a_group_each():
     star = np.array([[0, k] for k in range(1, 151)], dtype=np.int32)
-    assert sorted(greedy_colors(star, 151, 1000)) == list(range(150))
+    members, counts, _ = independent_groups(star, np.array([0, 150]), 151, 16, 64)
+    assert (counts == 1).all()
+    assert sorted(members[:, 0]) == list(range(150))
 
 
 @pytest.fixture
@@ -70,7 +84,7 @@ def test_chunks_of_one_parity_share_no_vertex(two_bodies, monkeypatch):
     inner = reordered(two_bodies, layout)
     assert layout.n_chunks > 8
     for constraints in (inner.tets, inner.edges):
-        order, chunks = layout.sort(constraints, np.zeros(len(constraints), dtype=np.int64))
+        order, chunks = layout.sort(constraints)
         assert sorted(order) == list(range(len(constraints)))
         assert (np.diff(chunks) >= 0).all()
         for parity in (0, 1):

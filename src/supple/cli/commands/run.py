@@ -22,6 +22,7 @@ def run(
     solver: str | None = None,
     trace: Path | None = None,
     separate: Annotated[bool, Parameter(negative="")] = False,
+    strict: Annotated[bool, Parameter(negative="")] = False,
     page: bool | None = None,
     plot: bool | None = None,
     checkpoint_every: CheckpointEvery = None,
@@ -49,6 +50,8 @@ def run(
         CSV file with every iteration of Newton's method; for the implicit solver.
     separate
         Move bodies apart that intersect at the start, where a small translation separates them, and print the moves.
+    strict
+        Exit with code 1 where a frame did not converge: see its status. The recording is complete.
     page
         Write index.html, which plays the recording in a browser; without this, as the scene file specifies.
     plot
@@ -89,6 +92,7 @@ def run(
         dt,
         steps,
         start=described.start,
+        strict=strict,
         sinks=traces(trace, used),
         products=replace(products, page=page, plot=plot, compress=described.output.compress),
         source=SceneSource(origin, described.text, resolved_scene(described, solver=solver, dt=dt, steps=steps)),

@@ -9,9 +9,12 @@ from numpy.typing import NDArray
 
 from supple.errors import SolverError
 from supple.implicit.energies.elasticity import SERIAL_TETS
-from supple.implicit.limits.step_filter import KEEP, keeps_volume, noninverting_step, volume_signs
 from supple.materials.kinds import needs_positive_volume
 from supple.materials.per_tet import TetMaterial
+from supple.materials.tet_energies import deformation_gradient
+from supple.numerics.kernel_cache import njit, prange
+from supple.numerics.mat3 import det
+from supple.numerics.noninverting_step import KEEP, noninverting_step, volume_signs
 from supple.numerics.threads import threads_for
 from supple.system import System
 
@@ -82,3 +85,13 @@ def refuse_inverted(system: System, material: TetMaterial, x: NDArray[np.float64
                 f"the start (tets {names}), where {type(part.body.material).__name__} has no finite energy; start "
                 "un-inverted, or use StableNeoHookean, which recovers"
             )
+
+
+@njit(parallel=True, cache=True, error_model="numpy")
+def keeps_volume(x, tets, Dm_inv, guarded):
+    """Whether J = det(Ds Dm^-1) > 0 in every guarded tet, in rounded numbers: a step is taken only where this holds."""
+    bad = 0
+    for e in prange(len(tets)):
+        if guarded[e] and not det(deformation_gradient(x, tets, Dm_inv, e)) > 0.0:
+            bad += 1
+    return bad == 0

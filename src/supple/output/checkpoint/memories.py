@@ -4,10 +4,20 @@ from __future__ import annotations
 
 from supple.implicit.stepping.conservation import EnergyMade
 from supple.implicit.stepping.integrators import History
-from supple.xpbd.contact.memory import ContactMemory
+from supple.xpbd.assessment.assessment import Ledger
+from supple.xpbd.contact.contact_rows import LoadedRows
+from supple.xpbd.contact.memory import ContactMemory, ObstacleMemory, SurfaceMemory
+from supple.xpbd.damping.kelvin_voigt import ViscousMemory
+from supple.xpbd.memory import XPBDMemory
 
 MEMORIES: tuple[type, ...] = (
     ContactMemory,
     EnergyMade,
     History,
+    Ledger,
+    LoadedRows,
+    ObstacleMemory,
+    SurfaceMemory,
+    ViscousMemory,
+    XPBDMemory,
 )

@@ -29,19 +29,26 @@ class XPBDModel(Model):
     """Extended position-based dynamics in small steps: fast, robust, approximate."""
 
     kind: Literal["xpbd"]
-    substeps: Iterations = Field(default=20, description="per frame, each with one sweep over all constraints")
+    substeps: Iterations | Literal["auto"] = Field(
+        default="auto", description="per frame, each with one sweep over all constraints; auto: what the frame needs"
+    )
     momentum_restore: bool = Field(default=True, description="false: the momentum errors of XPBD are not corrected")
     contact: XPBDContactModel | None = Field(
         default_factory=XPBDContactModel, description="of bodies with each other and themselves; null turns it off"
     )
     threads: int | None = Field(default=None, ge=1, le=1024, description="default: chosen by the size of the scene")
+    accuracy: Share = Field(default=0.02, description="the share of its stiffness that a body may lack")
+    max_substeps: Iterations = Field(default=1000, description="the largest automatic number of substeps")
+    start: Literal["refuse", "push_out"] = Field(
+        default="refuse", description="bodies that begin inside of something: an error, or slowly pushed out"
+    )
 
     def build(self) -> Solver:
         from supple.xpbd.contact.settings import XPBDContact
         from supple.xpbd.solver import XPBD
 
         contact = None if self.contact is None else XPBDContact(**self.contact.model_dump())
-        return XPBD(self.substeps, self.momentum_restore, contact, self.threads)
+        return XPBD(**self.model_dump(exclude={"kind", "contact"}), contact=contact)
 
 
 class ContactModel(Model):

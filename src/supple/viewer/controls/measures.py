@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.viewer.protocol.snapshots import Snapshot
+from supple.viewer.server.plain_markdown import plain
 
 _SECONDS = 10.0  # of simulated time in a plot
 _MOST_POINTS = 300
@@ -75,7 +76,7 @@ def measures_text(snapshot: Snapshot) -> str:
         f"smallest J {measures.min_det_F:.3f}, contacts {measures.contacts}",
     ]
     if measures.status != "converged":
-        lines.append(f"**{measures.status}** {measures.message}")
+        lines.append(f'<span style="color: #d92b2b">{plain(measures.status)}: {plain(measures.message)}</span>')
     return "  \n".join(lines)
 
 

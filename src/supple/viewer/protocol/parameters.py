@@ -52,7 +52,7 @@ class Parameter:
 PARAMETERS: dict[str, Parameter] = {
     parameter.name: parameter
     for parameter in (
-        Parameter("substeps", "substeps", "solver", int, 1, 200),
+        Parameter("substeps", "substeps (0: automatic)", "solver", int, 0, 200),
         Parameter("momentum_restore", "momentum restore", "solver", bool, 0, 1),
         Parameter("contact", "contact of bodies", "solver", bool, 0, 1),
         Parameter("dt", "time step", "scene", float, 1e-4, 0.1, "s", logarithmic=True),

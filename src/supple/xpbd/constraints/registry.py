@@ -28,7 +28,6 @@ class ConstraintSet(Protocol):
 
     count: int
     work: int  # cost of a sweep, in edges or volumes
-    damped: bool
 
     def project(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:
         """Project every constraint once, in place.
@@ -38,20 +37,6 @@ class ConstraintSet(Protocol):
         points : (n, 4) positions [m] and inverse masses [1/kg], in the solver's numbering.
         h : length of the substep [s].
         parallel : whether independent chunks run on several threads.
-        """
-        ...
-
-    def damp(self, points: NDArray[np.float64], previous: NDArray[np.float64], h: float, parallel: bool) -> None:
-        """Apply the Kelvin-Voigt damping of a substep to the motion from `previous` to `points`, in place.
-
-        The sweep goes forward and backward over all constraints, with half of the damping each time: only a symmetric
-        operator dissipates energy in every mode.
-
-        Parameters
-        ----------
-        points : (n, 4) as in `project`, predicted with the velocities at the beginning of the substep.
-        previous : (n, 3) positions at the beginning of the substep [m].
-        h, parallel : as in `project`.
         """
         ...
 

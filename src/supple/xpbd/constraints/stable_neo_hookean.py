@@ -18,22 +18,23 @@ from numpy.typing import NDArray
 
 from supple.materials.material import Elastic
 from supple.system import BodyRange, System
-from supple.xpbd.constraints.stable_neo_hookean_sweeps import sweep_elastic, sweep_viscous
+from supple.xpbd.constraints.block_of_two import project_blocks_of_two
+from supple.xpbd.sweeps.groups import Groups, make_groups
 from supple.xpbd.sweeps.ordering import Layout
-from supple.xpbd.sweeps.segments import Segments, gather, sort_into_segments
+from supple.xpbd.sweeps.sweep import Sweep
 
 logger = logging.getLogger(__name__)
 
 
 class BlocksOfTwo:
-    """Both constraints of any tetrahedra, in a given order.
+    """Both constraints of any tetrahedra, in given groups.
 
     Parameters
     ----------
     tets : (m, 4); Dm_inv : (m, 3, 3) [1/m]; volumes : (m,) at rest [m^3]
     moduli : mu and lam of the energy density, (m,) each, above zero [Pa]
     inverse_masses : of all vertices [1/kg]
-    segments : the order of the tets; damping : Kelvin-Voigt time of each of its kinds [s]
+    groups : of the tets
     """
 
     called = "stable Neo-Hookean tets"
@@ -43,46 +44,30 @@ class BlocksOfTwo:
         tets: tuple[NDArray, NDArray, NDArray],
         moduli: tuple[NDArray, NDArray],
         inverse_masses: NDArray[np.float64],
-        segments: Segments,
-        damping: NDArray[np.float64],
+        groups: Groups,
     ) -> None:
-        order = segments.order
-        (corners, Dm_inv, V), (mu, lam) = (tuple(values[order] for values in some) for some in (tets, moduli))
-        self.segments = segments
-        self.corners = np.ascontiguousarray(corners, dtype=np.uint32)
-        self.count = len(order)
+        (corners, Dm_inv, V), (mu, lam) = tets, moduli
+        self.count = len(corners)
         # The projection of one of these tets costs about three times as much as that of an edge or a volume.
         self.work = 3 * self.count
-        gradients, self.curvatures = _principal_axes(Dm_inv, inverse_masses[corners])
-        # The columns of `data`: 9 shape gradients, mu V, lam V, 1 + mu/lam, step length, 3 curvatures: two cache lines.
-        self.data = np.empty((self.count, 16))
-        self.data[:, :9] = gradients.reshape(-1, 9)
-        self.data[:, 9] = mu * V
-        self.data[:, 10] = lam * V
-        self.data[:, 11] = 1.0 + mu / lam
-        self.data[:, 13:16] = self.curvatures
-        self.damping = damping
-        self.damped = bool(damping.any())
-        self._prepared_for = 0.0
+        w = inverse_masses[corners]
+        gradients, curvatures = _principal_axes(Dm_inv, w)
+        # The longest step, phi h^2, with which a tet cannot overshoot.
+        self._longest = 1.0 / np.maximum(2.0 * mu * V * curvatures[:, 2], np.finfo(float).tiny)
+        material = np.column_stack([mu * V, lam * V, 1.0 + mu / lam, self._longest])
+        constants = np.hstack([gradients.reshape(-1, 9), material, curvatures, w])
+        self._sweep = Sweep(project_blocks_of_two, corners, constants, groups)
+        self._warned_for = 0.0
 
     def project(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:
         """See `ConstraintSet.project`."""
-        if h != self._prepared_for:
-            self._prepare(h)
-        pointers, bounds = self.segments.chunk_pointers, self.segments.bounds
-        sweep_elastic[parallel](points, self.corners, self.data, pointers, bounds)
+        if h != self._warned_for:
+            self._warn_if_shortened(h)
+        self._sweep.run(points, h, parallel)
 
-    def damp(self, points: NDArray[np.float64], previous: NDArray[np.float64], h: float, parallel: bool) -> None:
-        """See `ConstraintSet.damp`."""
-        pointers, bounds = self.segments.chunk_pointers, self.segments.bounds
-        gammas = self.damping[self.segments.kinds] / h
-        sweep_viscous[parallel](points, previous, self.corners, self.data, h, pointers, bounds, gammas)
-
-    def _prepare(self, h: float) -> None:
-        """Step lengths for substeps of h [s]: h^2 phi, with phi the largest factor at which a tet cannot overshoot."""
-        stiffness = 2.0 * self.data[:, 9] * self.curvatures[:, 2] * h**2
-        self.data[:, 12] = h**2 * (1.0 / np.maximum(1.0, stiffness))
-        self._prepared_for = h
+    def _warn_if_shortened(self, h: float) -> None:
+        self._warned_for = h
+        stiffness = h**2 / self._longest
         shortened = np.count_nonzero(stiffness > 1.0) / self.count
         if shortened > 0.5:
             logger.warning(
@@ -100,14 +85,13 @@ class StableNeoHookeanConstraints(BlocksOfTwo):
 
     def __init__(self, system: System, parts: list[BodyRange], layout: Layout) -> None:
         materials = [cast(Elastic, part.body.material).per_tet(part.tets.stop - part.tets.start) for part in parts]
-        rows, kind, table = gather(parts, "tets", [material.damping[:, None] for material in materials])
+        rows = np.concatenate([np.arange(part.tets.start, part.tets.stop) for part in parts])
         mu = np.concatenate([material.mu for material in materials])
         lam = np.concatenate([material.lam for material in materials])  # E / (2 (1 + nu) (1 - 2 nu)): above zero
         movable = (system.inverse_masses[system.tets[rows]] > 0.0).any(axis=1)
-        rows, kind, mu, lam = rows[movable], kind[movable], mu[movable], lam[movable]
+        rows, mu, lam = rows[movable], mu[movable], lam[movable]
         tets = system.tets[rows], system.rest_shape_inverse[rows], system.rest_volumes[rows]
-        segments = sort_into_segments(layout, system.tets[rows], kind)
-        super().__init__(tets, (mu, lam), system.inverse_masses, segments, table[:, 0])
+        super().__init__(tets, (mu, lam), system.inverse_masses, make_groups(layout, tets[0]))
 
 
 def _principal_axes(

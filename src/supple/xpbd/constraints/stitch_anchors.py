@@ -28,3 +28,9 @@ class StitchAnchors:
         """Write the positions at `time` [s] into the last of the rows (n + a, 3 or 4)."""
         if len(self.anchors):
             rows[self.first :, :3] = self.anchors.at(time) - origins[self.partners]
+
+    def velocities(self, time: float, h: float) -> NDArray[np.float64]:
+        """(a, 3) mean velocities over the h [s] before `time` [m/s]."""
+        if not len(self.anchors):
+            return np.zeros((0, 3))
+        return (self.anchors.at(time) - self.anchors.at(time - h)) / h

@@ -15,6 +15,7 @@ from supple.system import System
 from supple.xpbd.contact.memory import ContactMemory
 from supple.xpbd.contact.obstacle_contacts import ObstacleContacts
 from supple.xpbd.contact.obstacle_shapes import build_shapes
+from supple.xpbd.contact.response_rates import response_rates
 from supple.xpbd.contact.settings import XPBDContact
 from supple.xpbd.contact.surface_collisions import SurfaceCollisions
 
@@ -23,6 +24,8 @@ LEAST_REACH = 0.1
 # Fractions of the mean surface edge: how much of an old overlap is removed in one frame (a faster removal would make
 # bodies jump apart), the largest gap that is reported, and the default thickness.
 REMOVED_PER_FRAME, NEAR, DEFAULT_THICKNESS = 0.05, 1.0, 0.05
+# Fraction of the thickness: the gap that vertices keep from simple shapes, so that what rests does not touch.
+SKIN = 0.01
 
 
 class Collisions:
@@ -44,18 +47,20 @@ class Collisions:
         self.settings = settings
         self.edge_length = mean_edge_length(system)
         self.poses = ObstaclePoses(system.obstacles)
+        rates = response_rates(system)
         table = pair_table(system.scene)
-        self.obstacles = ObstacleContacts(build_shapes(system.obstacles), self.poses, system, table)
+        self.obstacles = ObstacleContacts(build_shapes(system.obstacles), self.poses, system, table, rates)
         thickness = settings.thickness if settings is not None else None
         self.thickness = thickness if thickness is not None else DEFAULT_THICKNESS * self.edge_length
         switches = (False, False) if settings is None else (settings.body_collision, settings.self_collision)
         surfaces = build_surfaces(system, table, *switches, self.thickness, self.edge_length)
         self.surfaces = (
-            SurfaceCollisions(system, surfaces, self.poses, self.edge_length) if surfaces.is_needed else None
+            SurfaceCollisions(system, surfaces, self.poses, self.edge_length, rates) if surfaces.is_needed else None
         )
+        self.skin = SKIN * self.thickness
         self.contacts = 0
         self._smallest = math.inf
-        self._dt = 0.0
+        self._dt = self._removed = 0.0
         count = len(system.masses)
         self._reach = np.zeros(count)
         self._gathered = np.zeros((count, 3))
@@ -87,12 +92,36 @@ class Collisions:
         self._smallest = math.inf
         self._dt = dt
         if self.surfaces is not None:
-            self.surfaces.begin_step(x, v, time, dt, memory)
+            self.surfaces.begin_step(x, v, time, dt, None if memory is None else memory.surfaces)
         if self.obstacles:
+            known = None if memory is None else memory.obstacles
+            self.obstacles.begin_step(known, x, LEAST_REACH * self.edge_length)
             self._gather_obstacles(x, v, time)
 
-    def project(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], time: float, h: float) -> int:
-        """Resolve all contacts of one substep, in place. Returns their number.
+    def begin_substep(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> bool:
+        """Apply the forces kept of the substep before to the prediction, in place, before all other constraints.
+
+        `project` then changes them as far as needed. Returns whether there are any forces.
+
+        Parameters
+        ----------
+        x, x_prev : (n, 3) prediction, and positions at the beginning of the substep [m]
+        h : length of the substep [s]
+        """
+        self._removed = REMOVED_PER_FRAME * self.edge_length * min(1.0, h / self._dt)
+        bodies = self.surfaces is not None and self.surfaces.begin_substep(x, x_prev, h)
+        return self.obstacles.begin_substep(x, h) or bodies
+
+    def end_substep(self) -> None:
+        """Keep what the next substep begins with."""
+        if self.surfaces is not None:
+            self.surfaces.end_substep()
+        self.obstacles.end_substep()
+
+    def project(
+        self, x: NDArray[np.float64], x_prev: NDArray[np.float64], time: float, h: float, parallel: bool = False
+    ) -> int:
+        """Resolve all contacts of one substep, in place. Returns their number. May be repeated within the substep.
 
         An overlap that existed when the substep began is removed from `x` and from `x_prev` alike, so that it causes no
         velocity (x - x_prev) / h. The caller must use both arrays afterwards.
@@ -102,20 +131,25 @@ class Collisions:
         x : (n, 3) positions at the end of the substep, after all other constraints [m]
         x_prev : (n, 3) positions at its beginning [m]
         time : end of the substep [s]; h : its length [s].
+        parallel : whether contacts are searched on several threads.
         """
         self.contacts = 0
-        limit = REMOVED_PER_FRAME * self.edge_length * min(1.0, h / self._dt)
+        limit, self._removed = self._removed, 0.0
         if self.surfaces is not None:
-            self._count(self.surfaces.project(x, x_prev, (time - h, time), limit))
+            self._count(self.surfaces.project(x, x_prev, (time - h, time), limit, parallel))
         if self.obstacles:
             if any_beyond_reach(x, self._gathered, self._reach):
                 self._gather_obstacles(x, (x - x_prev) / h, time)
-            self._count(self.obstacles.project(x, x_prev, (time - h, time), limit, NEAR * self.edge_length))
+            self._count(
+                self.obstacles.project(x, x_prev, (time - h, time), (limit, self.skin, NEAR * self.edge_length))
+            )
         return self.contacts
 
     def memory(self, x: NDArray[np.float64]) -> ContactMemory | None:
         """What the next frame needs beside positions and velocities; `x` (n, 3) are the final positions [m]."""
-        return None if self.surfaces is None else self.surfaces.memory(x)
+        surfaces = None if self.surfaces is None else self.surfaces.memory(x)
+        obstacles = self.obstacles.memory(x) if self.obstacles else None
+        return ContactMemory(surfaces, obstacles) if self else None
 
     def _gather_obstacles(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float) -> None:
         falling = 0.5 * math.hypot(*self.system.gravity) * self._dt**2

@@ -1,11 +1,12 @@
-"""Coulomb friction at the level of positions.
+"""Coulomb friction with impulses that are accumulated over the sweeps of a substep.
 
-In a substep a contact moves two surfaces apart by `normal` (only the part that removes velocity counts); the surfaces
-have slipped by the vector s along each other. Friction reverses all of s where |s| <= mu normal (the contact sticks),
-and a length mu normal of it otherwise (it slides). Both corrections are divided between the two sides by the same
-inverse masses, so that the impulses satisfy |f_t| <= mu f_n exactly: one coefficient, static and kinetic.
+A contact has pushed its sides apart by an impulse f_n >= 0 and holds a tangential impulse f_t. The surfaces have still
+slipped by the vector s along each other. The impulse that would reverse the slip is added to f_t, and the sum is
+shortened to mu f_n where it is longer: shorter, and the contact sticks; longer, and it slides. Thus |f_t| <= mu f_n
+exactly: one coefficient, static and kinetic. A contact that sticks begins the next substep with its f_t.
 
-Source: Macklin, Müller, Chentanez, Kim, "Unified Particle Physics" (2014), section 6.1, with one coefficient.
+Source: Macklin, Müller, Chentanez, Kim, "Unified Particle Physics" (2014), section 6.1, with one coefficient;
+accumulation: Catto, "Iterative Dynamics with Temporal Coherence" (2005), section 6.
 """
 
 import math
@@ -15,22 +16,27 @@ from supple.numerics.mat3 import dot
 
 
 @njit
-def friction_correction(slip, n, mu, normal):
-    """Correction of the relative position that reverses the slip.
+def along_surface(v, n):
+    """The part of a vector that is perpendicular to the unit normal n."""
+    a = dot(v, n)
+    return (v[0] - a * n[0], v[1] - a * n[1], v[2] - a * n[2])
+
+
+@njit
+def friction_total(held, slip, n, limit):
+    """The tangential correction in total, from the one that is held already.
 
     Parameters
     ----------
-    slip : relative motion of the surfaces over the substep [m]; only its part along the surface is used
+    held : tangential correction of the relative position that is already part of the motion [m]
+    slip : relative motion of the surfaces over the substep, including it [m]; only its part along the surface is used
     n : unit normal of the contact
-    mu : coefficient
-    normal : correction along n [m], zero or more
+    limit : greatest length of the correction, mu times the normal one [m]
     """
-    if mu <= 0.0 or normal <= 0.0:
-        return (0.0, 0.0, 0.0)
-    along = dot(slip, n)
-    t = (slip[0] - along * n[0], slip[1] - along * n[1], slip[2] - along * n[2])
+    s = along_surface(slip, n)
+    t = (held[0] - s[0], held[1] - s[1], held[2] - s[2])
     length = math.sqrt(dot(t, t))
-    if length <= 0.0:
-        return (0.0, 0.0, 0.0)
-    share = min(1.0, mu * normal / length)
-    return (-share * t[0], -share * t[1], -share * t[2])
+    if length <= limit:
+        return t
+    share = limit / length
+    return (share * t[0], share * t[1], share * t[2])

@@ -21,12 +21,13 @@ from numpy.typing import NDArray
 
 from supple.contact.obstacle_poses import ObstaclePoses
 from supple.numerics.kernel_cache import njit, reached_code
-from supple.numerics.mat3 import row
+from supple.numerics.mat3 import dot, row, subtract
 from supple.scene.contact_pairs import PairTable
 from supple.system import System
-from supple.xpbd.contact.friction import friction_correction
+from supple.xpbd.contact.friction import along_surface, friction_total
+from supple.xpbd.contact.memory import ObstacleMemory
 from supple.xpbd.contact.obstacle_shapes import ObstacleShapes
-from supple.xpbd.contact.overlap import split_overlap
+from supple.xpbd.contact.response_rates import kept_share
 
 
 @njit
@@ -84,23 +85,30 @@ def _find_candidates(x, reach, masses_inverse, shapes, rules, frames, starts, ve
     return count
 
 
-def _project_shapes(x, x_prev, candidates, shapes, rules, frames, frames_before, first, last, limit, near):
+def _project_shapes(x, x_prev, points, candidates, shapes, rules, frames, frames_before, first, last, h, scales):
     """Push vertices out of the shapes [first, last), in place. Returns the number of contacts and the smallest gap.
 
-    The gap is that before the substep, or inf.
+    The gap is that before the substep, or inf. An overlap that existed when the substep began is removed at both ends
+    of the substep alike, by at most the limit; the push only prevents the gap from becoming smaller than it was then.
 
     Parameters
     ----------
-    candidates : starts (k + 1,), vertices, as from `_find_candidates`
+    points : predicted (n, 3), positions before loads and constraints [m]; rates (n,), see `response_rates` [1/s^2]
+    candidates : starts (k + 1,), vertices (c,), as from `_find_candidates`; loads (c, 3), those that x contains, and
+        shares (c,) of them for the next substep; see `ObstacleContacts`
     shapes : parameters (k, PARAMETERS), moving (k,)
     rules : owner (n,), the body of a vertex; collide (b, k), friction (b, k), of each body with each shape
     frames, frames_before : (k, 4, 3) at the end and at the beginning of the substep
-    limit : see `split_overlap`; near : gaps above this are not reported [m]
+    h : length of the substep [s]
+    scales : limit, the largest part of an old overlap that one substep removes; skin, the gap that is kept; near, gaps
+        above this are not reported [m]
     """
-    starts, vertices = candidates
+    predicted, rates = points
+    starts, vertices, loads, shares = candidates
     parameters, moving = shapes
     owner, _, friction = rules
-    contacts, smallest = 0, math.inf
+    limit, skin, near = scales
+    contacts, smallest, h2 = 0, math.inf, h * h
     for k in range(first, last):
         numbers = parameters[k]
         for c in range(starts[k], starts[k + 1]):
@@ -110,11 +118,16 @@ def _project_shapes(x, x_prev, candidates, shapes, rules, frames, frames_before,
             gap, gap_before, normal = contact(numbers, _local(frames_before, k, p_before), s)
             if gap_before < near:
                 smallest = min(smallest, gap_before)
-            if not gap < 0.0:
+            load = row(loads, c)
+            loaded = load[0] != 0.0 or load[1] != 0.0 or load[2] != 0.0
+            if not gap < skin and not loaded:
                 continue
-            contacts += 1
             n = _turned(frames, k, normal)
-            impulse, shift = split_overlap(gap, gap_before, limit)
+            load = (h2 * load[0], h2 * load[1], h2 * load[2])
+            pushed, held = max(0.0, dot(load, n)), along_surface(load, n)
+            old = max(0.0, skin - gap_before)
+            shift = min(old, limit)
+            push = max(0.0, pushed + skin - gap - old)
             carried = p  # position, at the beginning, of the obstacle's point that is now at p
             if moving[k]:
                 d = _turned(frames_before, k, s)
@@ -124,10 +137,16 @@ def _project_shapes(x, x_prev, candidates, shapes, rules, frames, frames_before,
                     frames_before[k, 0, 2] + d[2],
                 )
             slip = (carried[0] - p_before[0], carried[1] - p_before[1], carried[2] - p_before[2])
-            back = friction_correction(slip, n, friction[owner[i], k], impulse)
+            hold = friction_total(held, slip, n, friction[owner[i], k] * push)
+            contacts += push > 0.0
+            # What stopped the approach with which the substep began does not return.
+            impact = max(0.0, dot(subtract(p, row(predicted, i)), n) + skin - gap - old)
+            shares[c] = max(0.0, 1.0 - impact / push) * kept_share(h2 * rates[i]) if push > 0.0 else 0.0
             for j in range(3):
-                x[i, j] += n[j] * (impulse + shift) + back[j]
+                x[i, j] += n[j] * (push - pushed + shift) + (hold[j] - held[j])
                 x_prev[i, j] += n[j] * shift
+                predicted[i, j] += n[j] * shift
+                loads[c, j] = (n[j] * push + hold[j]) / h2
     return contacts, smallest
 
 
@@ -147,10 +166,24 @@ def kernels_of(function: Callable[..., Any]) -> tuple[Callable[..., Any], Callab
     return compiled[0], compiled[1]
 
 
-class ObstacleContacts:
-    """The simple shapes of a scene and the vertices near them."""
+@njit(cache=True)
+def add_loads(x, vertices, loads, h):
+    """x += h^2 a, for the loads a (c, 3) [m/s^2] of these vertices (c,)."""
+    for c in range(len(vertices)):
+        for j in range(3):
+            x[vertices[c], j] += h * h * loads[c, j]
 
-    def __init__(self, shapes: ObstacleShapes, poses: ObstaclePoses, system: System, table: PairTable) -> None:
+
+class ObstacleContacts:
+    """The simple shapes of a scene and the vertices near them.
+
+    A contact that pushes has a load: the acceleration [m/s^2] that it gives its vertex in the substep. The next
+    substep begins with a share of it (see `contact_rows`).
+    """
+
+    def __init__(
+        self, shapes: ObstacleShapes, poses: ObstaclePoses, system: System, table: PairTable, rates: NDArray[np.float64]
+    ) -> None:
         self.shapes = shapes
         self.poses = poses
         self.inverse_masses = np.ascontiguousarray(system.inverse_masses)
@@ -166,6 +199,9 @@ class ObstacleContacts:
         )
         self._starts = np.zeros(len(shapes.contacts) + 1, dtype=np.int64)
         self._vertices = np.zeros(1024, dtype=np.int32)
+        self._loads, self._shares = np.zeros((1024, 3)), np.zeros(1024)
+        self._rates = rates
+        self._predicted = np.zeros((len(system.masses), 3))
         # Consecutive shapes with the same element function need one call.
         self._groups = []
         first = 0
@@ -177,8 +213,20 @@ class ObstacleContacts:
     def __bool__(self) -> bool:
         return len(self.shapes.contacts) > 0
 
+    def begin_step(self, memory: ObstacleMemory | None, x: NDArray[np.float64], tolerance: float) -> None:
+        """Take over the loads of an earlier step, where it describes these shapes and positions x (n, 3) [m]."""
+        self._starts[:] = 0
+        shapes = self.shapes
+        if memory is not None and memory.matches(shapes.frames, shapes.parameters, x, tolerance):
+            self._enter(memory.shapes * len(self.inverse_masses) + memory.vertices, memory.loads)
+
+    def memory(self, x: NDArray[np.float64]) -> ObstacleMemory:
+        """What the next step needs; `x` (n, 3) are the positions at the end of this one [m]."""
+        return ObstacleMemory(self.shapes.frames, self.shapes.parameters, x.copy(), *self._loaded())
+
     def gather(self, x: NDArray[np.float64], reach: NDArray[np.float64], time: float) -> None:
-        """List the vertices (of n) that may touch a shape before they have moved by `reach` (n,) [m]."""
+        """List the vertices (of n) that may touch a shape before they have moved by `reach` (n,) [m], or are loaded."""
+        shapes, vertices, loads = self._loaded()
         frames = self.shapes.placed(self.poses, time)
         described = (self._arrays, self._rules, frames, self._starts)
         while True:
@@ -186,18 +234,68 @@ class ObstacleContacts:
             for find, _, first, last in self._groups:
                 count = find(x, reach, self.inverse_masses, *described, self._vertices, first, last, count)
             if count <= len(self._vertices):
-                return
+                break
             self._vertices = np.zeros(2 * count, dtype=np.int32)
+        n = len(self.inverse_masses)
+        found = np.repeat(np.arange(len(self._starts) - 1), np.diff(self._starts)) * n + self._vertices[:count]
+        kept = shapes * n + vertices
+        keys = np.union1d(found, kept).astype(np.int64)
+        held = np.zeros((len(keys), 3))
+        held[np.searchsorted(keys, kept)] = loads
+        self._enter(keys, held)
+
+    def _enter(self, keys: NDArray[np.int64], loads: NDArray[np.float64]) -> None:
+        """Make the lists from ascending keys (c,), shape times n plus vertex, and their loads (c, 3)."""
+        n = len(self.inverse_masses)
+        if len(self._vertices) < len(keys):
+            self._vertices = np.zeros(2 * len(keys), dtype=np.int32)
+        if len(self._loads) < len(keys):
+            self._loads, self._shares = np.zeros((2 * len(keys), 3)), np.zeros(2 * len(keys))
+        self._starts[:] = np.searchsorted(keys, np.arange(len(self._starts)) * n)
+        self._vertices[: len(keys)] = keys % n
+        self._loads[: len(keys)] = loads
+
+    def _loaded(self) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64]]:
+        """Copies of the shapes, the vertices and the loads of all contacts that push."""
+        count = self._starts[-1]
+        k = np.flatnonzero(self._loads[:count].any(axis=1))
+        shapes = np.searchsorted(self._starts, k, side="right") - 1
+        return shapes.astype(np.int64), self._vertices[k], self._loads[k]
+
+    def begin_substep(self, x: NDArray[np.float64], h: float) -> bool:
+        """See `Collisions.begin_substep`."""
+        count = self._starts[-1]
+        loads = self._loads[:count]
+        pushed = bool(loads.any())
+        self._predicted[:] = x
+        if pushed:
+            add_loads(x, self._vertices[:count], loads, h)
+        return pushed
+
+    def end_substep(self) -> None:
+        """Keep the share of the loads with which the next substep begins."""
+        count = self._starts[-1]
+        self._loads[:count] *= self._shares[:count, None]
 
     def project(
-        self, x: NDArray[np.float64], x_prev: NDArray[np.float64], times: tuple[float, float], limit: float, near: float
+        self,
+        x: NDArray[np.float64],
+        x_prev: NDArray[np.float64],
+        times: tuple[float, float],
+        scales: tuple[float, float, float],
     ) -> tuple[int, float]:
-        """Push vertices out at the end of the substep `times` = (beginning, end) [s]: contacts, smallest gap [m]."""
+        """Push vertices out at the end of the substep `times` = (beginning, end) [s]: contacts, smallest gap [m].
+
+        For `scales` see `_project_shapes`.
+        """
         frames = tuple(self.shapes.placed(self.poses, time) for time in reversed(times))
-        described = ((self._starts, self._vertices), self._arrays, self._rules, *frames)
+        candidates = (self._starts, self._vertices, self._loads, self._shares)
+        described = (candidates, self._arrays, self._rules, *frames)
         contacts, smallest = 0, math.inf
         for _, push, first, last in self._groups:
-            found, gap = push(x, x_prev, *described, first, last, limit, near)
+            found, gap = push(
+                x, x_prev, (self._predicted, self._rates), *described, first, last, times[1] - times[0], scales
+            )
             contacts += found
             smallest = min(smallest, gap)
         return contacts, smallest

@@ -14,21 +14,45 @@ from supple.contact.search.reach import any_beyond_radii, mean_motions, search_r
 from supple.contact.search.stitch_masks import stitched_points
 from supple.contact.search.surfaces import ContactSurfaces
 from supple.system import System
-from supple.xpbd.contact.memory import ContactMemory
-from supple.xpbd.contact.surface_contacts import project_surfaces
+from supple.xpbd.contact.contact_rows import (
+    ContactRows,
+    LoadedRows,
+    choose_rows,
+    deactivate,
+    note_depths,
+    push_rows,
+    solve_rows,
+)
+from supple.xpbd.contact.detection.edge_contacts import find_edge_contacts
+from supple.xpbd.contact.detection.edge_pairs import EdgePairs
+from supple.xpbd.contact.detection.piece_runs import PieceRuns
+from supple.xpbd.contact.detection.sharp_edges import sharp_edges
+from supple.xpbd.contact.detection.surface_contacts import find_contacts
+from supple.xpbd.contact.memory import SurfaceMemory
 
 # Of the mean surface edge: the least and the largest motion of a point that lists of candidates allow for, and the
 # largest gap that is reported.
 LEAST_REACH, MOST_REACH, NEAR = 0.1, 0.5, 1.0
+# Sweeps over all contacts of a substep; see docs/xpbd_contact.md for what more of them would change.
+SWEEPS = 2
+# Below this many active points, contacts are found before a second thread has started.
+PARALLEL_FROM = 500
 
 
 class SurfaceCollisions:
-    """Points against triangles. The lists of candidates are renewed when a point has moved too far.
+    """Points against triangles, and edges against edges. Lists of candidates are renewed when a point moved too far.
 
     `begin_step` sets all that substeps read, from its arguments alone.
     """
 
-    def __init__(self, system: System, surfaces: ContactSurfaces, poses: ObstaclePoses, edge_length: float) -> None:
+    def __init__(
+        self,
+        system: System,
+        surfaces: ContactSurfaces,
+        poses: ObstaclePoses,
+        edge_length: float,
+        rates: NDArray[np.float64],
+    ) -> None:
         self.surfaces = s = surfaces
         self.poses = poses
         self.edge_length = edge_length
@@ -38,24 +62,30 @@ class SurfaceCollisions:
         excluded = excluded_pairs(s, rest, 2.0 * min(widest, 0.5 * edge_length))
         self._stitched = stitched_points(system, s, poses)
         self._rules = (s.allowed, *excluded)
+        self._edges = EdgePairs(sharp_edges(s, rest), s, self._stitched)
         self._finder = PairFinder(n)
         self._x, self._before, self._gathered = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
         self._shapes = (self._x, s.point_piece, s.triangles, s.triangle_piece)
-        self._pieces = (s.inverse_masses, s.point_piece, s.triangles, s.triangle_piece, s.closed, s.gaps, s.friction)
+        self._pieces = (s.point_piece, s.triangles, s.triangle_piece, s.closed, s.gaps, s.friction)
+        self._predicted = np.zeros((n, 3))
+        self._points = (s.inverse_masses, np.concatenate([rates[s.rows], np.zeros(len(s.fixed_points))]))
+        self._runs = PieceRuns(self._finder, n, s.triangle_piece)
+        self._rows = ContactRows()
+        self._smallest = np.zeros(n)
         self._far, self._near = np.zeros((n, 3)), np.zeros((n, 3))
         self._drifts = np.zeros((pieces + 1, 3))
         # Obstacles stand still, so that no motion is common to all points where there is one.
         self._all_share = len(s.fixed_points) == 0
         self._complete = np.zeros(n)
         self._gap = np.where(s.allowed, s.gaps, 0.0).max(axis=1)[s.point_piece]
-        # See `ContactMemory`.
+        # See `SurfaceMemory`.
         self._depth = np.zeros((2, n))
         self._entered = np.zeros(n, dtype=np.int32)
         self._excursions = np.zeros(n)
         self._dt = 0.0
 
     def begin_step(
-        self, x: NDArray[np.float64], v: NDArray[np.float64], time: float, dt: float, memory: ContactMemory | None
+        self, x: NDArray[np.float64], v: NDArray[np.float64], time: float, dt: float, memory: SurfaceMemory | None
     ) -> None:
         """See `Collisions.begin_step`."""
         bodies = len(self.surfaces.rows)
@@ -71,57 +101,109 @@ class SurfaceCollisions:
         self._gather(motions)
         self._excursions[:] = 0.0
 
+    def begin_substep(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> bool:
+        """See `Collisions.begin_substep`."""
+        rows = self._rows
+        pushed = bool(rows.forces.any())
+        self._predicted[: len(self.surfaces.rows)] = x[self.surfaces.rows]
+        if pushed:
+            self._take(x, x_prev)
+            push_rows(self._x, self._before, self.surfaces.inverse_masses, rows.described, h)
+            x[self.surfaces.rows] = self._x[: len(self.surfaces.rows)]
+        return pushed
+
     def project(
-        self, x: NDArray[np.float64], x_prev: NDArray[np.float64], times: tuple[float, float], limit: float
+        self,
+        x: NDArray[np.float64],
+        x_prev: NDArray[np.float64],
+        times: tuple[float, float],
+        limit: float,
+        parallel: bool,
     ) -> tuple[int, float]:
-        """Keep surfaces apart over the substep `times` = (beginning, end) [s]; returns what `project_surfaces` does."""
-        s, finder = self.surfaces, self._finder
-        bodies = len(s.rows)
-        np.take(x, s.rows, axis=0, out=self._x[:bodies])
-        np.take(x_prev, s.rows, axis=0, out=self._before[:bodies])
+        """Keep surfaces apart over the substep `times` = (beginning, end) [s]; returns what `solve_rows` does."""
+        s, h = self.surfaces, times[1] - times[0]
+        self._take(x, x_prev)
         s.place_obstacles(self.poses, times[1], self._x)
         s.place_obstacles(self.poses, times[0], self._before)
+        self._predicted[len(s.rows) :] = self._x[len(s.rows) :]
         allowed = (self._far, self._near, s.point_piece, self._all_share, self._drifts)
         if any_beyond_radii(self._x, self._before, self._gathered, *allowed, self._excursions):
-            self._gather((self._x - self._before) * (self._dt / (times[1] - times[0])))
-        lists = (finder.n_active, finder.active, finder.starts, finder.triangles)
-        scales = (limit, NEAR * self.edge_length)
+            self._gather((self._x - self._before) * (self._dt / h))
         contacts, smallest = 0, np.inf
         # Obstacles come last because they cannot be moved.
         for kind, part in enumerate(((0, s.body_triangles), (s.body_triangles, len(s.triangles)))):
-            if part[0] < part[1] and finder.n_active:
-                memory = (self._depth[kind], self._entered, self._complete)
-                found = project_surfaces(
-                    self._x, self._before, lists, self._pieces, memory, scales, part, self._stitched
-                )
+            if part[0] < part[1] and len(self._rows.keys):
+                found = self._resolve(kind, part, h, limit, parallel)
                 contacts, smallest = contacts + found[0], min(smallest, found[1])
-        x[s.rows] = self._x[:bodies]
-        x_prev[s.rows] = self._before[:bodies]
+        x[s.rows] = self._x[: len(s.rows)]
+        x_prev[s.rows] = self._before[: len(s.rows)]
         return contacts, smallest
 
-    def memory(self, x: NDArray[np.float64]) -> ContactMemory:
+    def end_substep(self) -> None:
+        """Keep the share of the forces with which the next substep begins."""
+        self._rows.keep()
+
+    def _take(self, x: NDArray[np.float64], x_prev: NDArray[np.float64]) -> None:
+        bodies = len(self.surfaces.rows)
+        np.take(x, self.surfaces.rows, axis=0, out=self._x[:bodies])
+        np.take(x_prev, self.surfaces.rows, axis=0, out=self._before[:bodies])
+
+    def _resolve(self, kind: int, part: tuple[int, int], h: float, limit: float, parallel: bool) -> tuple[int, float]:
+        """Find and resolve the contacts with the triangles of one part: of bodies (0) or of obstacles (1)."""
+        s, rows = self.surfaces, self._rows
+        bodies, near = len(s.rows), NEAR * self.edge_length
+        described = rows.described
+        smallest = np.inf
+        deactivate(rows.active)
+        n_active = self._lists[0]
+        if n_active:
+            shapes = (self._pieces, (self._depth[kind], self._entered, self._complete))
+            several = parallel and n_active >= PARALLEL_FROM
+            find_contacts[several](
+                self._x, self._before, self._lists, *shapes, near, part, self._stitched, described, self._smallest
+            )
+            smallest = self._smallest[:n_active].min()
+        if len(self._edges.keys):
+            several = parallel and len(self._edges.keys) >= PARALLEL_FROM
+            rules = (s.point_piece, s.closed, s.gaps, s.friction)
+            which = (near, bodies, kind)
+            find_edge_contacts[several](
+                self._x, self._before, self._pairs, self._edges.arrays, rules, *which, described, self._edges.smallest
+            )
+            smallest = min(smallest, self._edges.smallest.min())
+        chosen = choose_rows(self._x, self._before, s.inverse_masses, described, bodies, kind, h)
+        contacts, least = solve_rows(
+            self._x, self._before, self._predicted, self._points, chosen, described, h, limit, SWEEPS
+        )
+        note_depths(self._x, chosen, described, self._depth[kind])
+        return contacts, float(min(smallest, least))
+
+    def memory(self, x: NDArray[np.float64]) -> SurfaceMemory:
         """What the next step needs; `x` (n, 3) are the positions at the end of this one, after all contacts [m]."""
         s = self.surfaces
         positions = np.concatenate([x[s.rows], self._x[len(s.rows) :]])
-        return ContactMemory(
+        return SurfaceMemory(
             s.triangles[: s.body_triangles],
             positions,
             self._depth.copy(),
             self._entered.copy(),
             self._excursions.copy(),
+            self._rows.loaded(),
         )
 
-    def _recall(self, memory: ContactMemory | None) -> None:
+    def _recall(self, memory: SurfaceMemory | None) -> None:
         """Restore what `memory` holds of points that are still where they were, and find the overlaps of the others."""
         s = self.surfaces
         self._entered[:], self._excursions[:] = -1, 0.0
-        known = 0
+        known, loaded = 0, LoadedRows.none()
         if memory is not None:
             triangles = s.triangles[: s.body_triangles]
             known = memory.matching_points(triangles, self._x, LEAST_REACH * self.edge_length)
             self._entered[:known] = memory.entered[:known]
             self._excursions[:known] = memory.excursions[:known]
             self._depth[:, :known] = memory.depth[:, :known]
+            loaded = memory.loaded.of_points(known)
+        self._rows.restore(loaded, loaded.keys)
         if known < len(self._x):
             self._find_overlaps()
 
@@ -137,6 +219,12 @@ class SurfaceCollisions:
         self._near[:, 0] += self._complete
         self._finder.gather(self._shapes, (self._far, self._near), self._rules)
         self._gathered[:] = self._x
+        self._runs.renew()
+        self._edges.renew(self._x, self._far[:, 1], self._gap)
+        # Keys of points come before keys of edges.
+        self._rows.renew(np.concatenate([self._runs.keys, self._edges.keys]))
+        self._lists = self._runs.lists(np.searchsorted(self._rows.keys, self._runs.keys))
+        self._pairs = self._edges.numbered(np.searchsorted(self._rows.keys, self._edges.keys))
 
     def _find_overlaps(self) -> None:
         """Set how deep each point is inside other pieces, from positions alone."""

@@ -16,15 +16,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.numerics.coloring import breadth_first_order, greedy_colors
+from supple.numerics.coloring import breadth_first_order
 from supple.system import System
 
-# Chunks of fewer constraints (about 10 us) are not worth the start of a thread.
-SMALLEST_CHUNK = 1024
+# Smaller chunks are not worth the start of a thread (about 10 us), and more of their groups are not full.
+SMALLEST_CHUNK = 4096
 MOST_CHUNKS = 64
-# Within a chunk, constraints are interleaved over runs of this length: long enough for about twenty independent
-# constraints in sequence (a processor overlaps them), short enough for the run's vertices to stay in the first cache.
-RUN_LENGTH = 1024
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +33,7 @@ class Layout:
     old_from_new, new_from_old : (n,) int32, between the System's vertex numbers and the solver's.
     rank : (n,) int32, position of each vertex (solver's number) along the levels.
     chunk : (n,) int32, the chunk of each vertex (solver's number); a constraint belongs to its lowest vertex's chunk.
+    body : (n,) int32, the body of each vertex (solver's number).
     n_chunks : number of chunks.
     """
 
@@ -43,25 +41,18 @@ class Layout:
     new_from_old: NDArray[np.int32]
     rank: NDArray[np.int32]
     chunk: NDArray[np.int32]
+    body: NDArray[np.int32]
     n_chunks: int
 
-    def sort(self, constraints: NDArray[np.int32], kind: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    def sort(self, constraints: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
         """The order of constraints (m, k) of the solver's vertex numbers, and the chunk of each one in that order.
 
-        They are sorted by chunk, then by `kind` (m,) (constraints of one kind share their constants), then along the
-        levels, interleaved.
+        They are sorted by chunk, then by body, then along the levels.
         """
-        if len(constraints) == 0:
-            return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int32)
         ranks = self.rank[constraints]
         lowest = constraints[np.arange(len(constraints)), ranks.argmin(axis=1)]
         chunk = self.chunk[lowest]
-        order = np.lexsort((ranks.min(axis=1), kind, chunk))
-        colors = greedy_colors(np.ascontiguousarray(constraints[order]), len(self.rank), RUN_LENGTH)
-        run = np.arange(len(order)) // RUN_LENGTH
-        # Runs do not respect chunk and kind, so these come first in the final order.
-        interleaved = np.lexsort((colors, run, kind[order], chunk[order]))
-        order = order[interleaved]
+        order = np.lexsort((ranks.min(axis=1), self.body[lowest], chunk))
         return order, chunk[order].astype(np.int32)
 
 
@@ -90,6 +81,7 @@ def make_layout(system: System) -> Layout:
         new_from_old=new_from_old,
         rank=rank_of_old[old_from_new],
         chunk=chunk_of_level[levels],
+        body=body_of_old[old_from_new],
         n_chunks=int(chunk_of_level[-1]) + 1,
     )
 

@@ -26,6 +26,10 @@ def _implicit() -> Solver:
 SOLVERS: dict[str, Callable[[], Solver]] = {"xpbd": _xpbd, "implicit": _implicit}
 
 
+# The number of substeps that stands for "auto" on a page.
+AUTOMATIC = 0
+
+
 def kind_of(solver: Solver) -> str:
     """The name of a solver on the page: that of its class, in lower case."""
     return type(solver).__name__.lower()
@@ -37,7 +41,7 @@ def solver_values(solver: Solver) -> dict[str, Value]:
     for name in _fields(solver):
         if name in PARAMETERS and PARAMETERS[name].owner == "solver":
             value = getattr(solver, name)
-            values[name] = value is not None if name == "contact" else value
+            values[name] = value is not None if name == "contact" else AUTOMATIC if value == "auto" else value
     return values
 
 
@@ -47,6 +51,8 @@ def with_value(solver: Solver, name: str, value: Value) -> Solver:
     if name not in fields:
         raise CommandError(f"the solver {kind_of(solver)} has no parameter {name}")
     changed: object = value
+    if name == "substeps" and value == AUTOMATIC:
+        changed = "auto"
     if name == "contact":
         changed = getattr(solver, name) or getattr(type(solver)(), name) if value else None
     return dataclasses.replace(solver, **{name: changed})  # pyright: ignore[reportArgumentType]

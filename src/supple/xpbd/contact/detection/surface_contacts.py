@@ -9,18 +9,17 @@ Of all triangles of a piece that are near a point, one is selected (`_select_tri
 3. A point may be behind a nearby triangle of its own piece without contact: it is on the other face of a thin part. So
    within one piece, only triangles count that the point was outside of when the substep began, or has passed through.
 
-The point and the triangle are then moved apart along the line between them, according to their inverse masses. Linear
-momentum is conserved exactly; angular momentum up to the rotation of the contact within one substep.
+Every point is independent of the others, so that they are distributed over the threads. The contacts that are found are
+rows of `ContactRows`, which are solved afterwards in a fixed order.
 """
 
 import math
 
 from supple.numerics.adjacency import in_list
 from supple.numerics.geometry.closest_point import area_normal, between, closest_on_triangle, combine
-from supple.numerics.kernel_cache import njit
+from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import dot, row, subtract
-from supple.xpbd.contact.friction import friction_correction
-from supple.xpbd.contact.overlap import split_overlap
+from supple.xpbd.sweeps.compilation import serial_and_parallel
 
 # Squared distances with a relative difference below this are equal: the point is nearest to a common edge or corner.
 TIE = 1e-9
@@ -121,21 +120,6 @@ def _select_triangle(x, x_prev, p, triangles, near, same, closed, entered, reach
 
 
 @njit
-def _place_at_start(x_prev, p, corners, where):
-    """The place on a triangle's face that was below the point when the substep began, otherwise `where`.
-
-    The lever arms of impulses are these positions, so an impulse there, along the normal, does not change the angular
-    momentum. Along a face the gap is the same everywhere.
-    """
-    if min(where[0], where[1], where[2]) <= 0.0:
-        return where
-    before = closest_on_triangle(row(x_prev, p), corners[0], corners[1], corners[2])
-    if min(before[0], before[1], before[2]) <= 0.0:
-        return where
-    return before
-
-
-@njit
 def _direction(x, p, triangle, where, passed, side, open_sheet):
     """The unit normal of the contact, out of the piece."""
     a, b, c = triangle
@@ -151,103 +135,80 @@ def _direction(x, p, triangle, where, passed, side, open_sheet):
 
 
 @njit
-def _relative(x, p, corners, where):
-    """The point relative to the place on the triangle [m]."""
-    return subtract(row(x, p), combine(where, corners[0], corners[1], corners[2]))
-
-
-@njit
-def _move(x, w, p, t, triangles, where, d):
-    """Change the relative position by d times the sum of the weighted inverse masses."""
-    for j in range(3):
-        x[p, j] += w[p] * d[j]
+def _find_contacts_of(x, x_prev, p, runs, lists, surfaces, memory, near, part, stitched, rows):
+    """The contacts of point p with the pieces near it; returns the smallest distance that is no contact, or inf."""
+    first_run, last_run = runs
+    run_starts, run_rows, listed = lists
+    point_piece, triangles, triangle_piece, closed, gaps, friction = surfaces
+    depth, entered, complete = memory
+    vertices, weights, normals, offsets, mus, forces, _, active, deep = rows
+    smallest = math.inf
+    mine = point_piece[p]
+    was_inside, depth[p] = depth[p], 0.0
+    for k in range(first_run, last_run):
+        begin, end = run_starts[k], run_starts[k + 1]
+        if not part[0] <= listed[begin] < part[1]:
+            continue
+        its, e = triangle_piece[listed[begin]], run_rows[k]
+        same = mine == its
+        gap = gaps[mine, its]
+        held = entered[p] if same else -1
+        pushed = forces[e, 0] != 0.0 or forces[e, 1] != 0.0 or forces[e, 2] != 0.0
+        deep[e] = False
+        t, where, side, distance = _select_triangle(
+            x, x_prev, p, triangles, listed[begin:end], same, closed[its], held, complete[p]
+        )
+        if same and held >= 0 and (t < 0 or side > 0.0):
+            entered[p] = -1
+        if t < 0 or in_list(stitched, t, p):
+            continue
+        passed = distance == math.inf
+        inside = closed[its] and side < 0.0 and not passed
+        if inside and distance > complete[p]:
+            # At this distance the sign is not reliable, unless the point was inside before.
+            if was_inside > 0.0 and not same:
+                depth[p] = max(depth[p], distance)
+            continue
+        if not passed and not inside and distance >= gap:
+            if distance < near:
+                smallest = min(smallest, distance)
+            if not pushed:
+                continue
+        n = _direction(x, p, _corners(x, triangles, t), where, passed, side, not closed[its])
+        if passed and same:
+            entered[p] = t
+        vertices[e, 0], weights[e, 0] = p, 1.0
         for i in range(3):
-            k = triangles[t, i]
-            x[k, j] -= w[k] * where[i] * d[j]
+            vertices[e, 1 + i], weights[e, 1 + i] = triangles[t, i], -where[i]
+            normals[e, i] = n[i]
+        offsets[e], mus[e] = gap, friction[mine, its]
+        active[e], deep[e] = True, not same and closed[its]
+    return smallest
 
 
-@njit
-def _resolve(x, x_prev, w, p, t, triangles, where, n, gap, mu, limit):
-    """Push point and triangle apart to the gap, with friction. Returns their distance when the substep began [m]."""
-    now = _relative(x, p, _corners(x, triangles, t), where)
-    before = _relative(x_prev, p, _corners(x_prev, triangles, t), where)
-    impulse, shift = split_overlap(dot(now, n) - gap, dot(before, n) - gap, limit)
-    total = w[p]
-    for i in range(3):
-        total += w[triangles[t, i]] * where[i] * where[i]
-    if impulse + shift > 0.0 and total > 0.0:
-        back = friction_correction(subtract(now, before), n, mu, impulse)
-        both, s = (impulse + shift) / total, shift / total
-        change = (both * n[0] + back[0] / total, both * n[1] + back[1] / total, both * n[2] + back[2] / total)
-        _move(x, w, p, t, triangles, where, change)
-        if shift > 0.0:
-            _move(x_prev, w, p, t, triangles, where, (s * n[0], s * n[1], s * n[2]))
-    return dot(before, n)
-
-
-@njit(cache=True)
-def project_surfaces(x, x_prev, lists, surfaces, memory, scales, part, stitched):
-    """Keep points and triangles apart, in place. Returns the number of contacts and the smallest previous gap (or inf).
+@serial_and_parallel
+def find_contacts(x, x_prev, lists, surfaces, memory, near, part, stitched, rows, smallest):
+    """Find which points touch triangles now, and fill in their rows.
 
     Parameters
     ----------
     x, x_prev : (n, 3) at the end and at the beginning of the substep [m]
-    lists : n_active, active points, starts (n + 1,), triangles: see `PairFinder`
-    surfaces : inverse_masses (n,), point_piece (n,), triangles (t, 3), triangle_piece (t,), closed (p,), gaps (p, p),
-        friction (p, p): see `ContactSurfaces`
+    lists : of `PieceRuns`: n_active, points, run_ranges, run_starts, run_rows, triangles
+    surfaces : point_piece (n,), triangles (t, 3), triangle_piece (t,), closed (p,), gaps (p, p), friction (p, p): see
+        `ContactSurfaces`
     memory : depth (n,) [m], how deep a point is inside a piece of this part; entered (n,), see `ContactMemory`;
         complete (n,) [m], the distance up to which its list of triangles is complete
-    scales : limit, see `split_overlap`; near, gaps above this are not reported [m]
+    near : gaps above this are not reported [m]
     part : (first, end) of the triangles to be considered: those of bodies, or those of obstacles
     stitched : starts (t + 1,) and points: those stitched to each triangle. A triangle that a point is stitched to can
         be selected as any other, but does not push the point.
+    rows : `ContactRows.described`
+    smallest : (n,) out: the smallest distance without contact of each active point, or inf [m]
     """
-    n_active, active, starts, listed = lists
-    w, point_piece, triangles, triangle_piece, closed, gaps, friction = surfaces
-    depth, entered, complete = memory
-    limit, near = scales
-    contacts, smallest = 0, math.inf
-    for index in range(n_active):
-        p = active[index]
-        mine = point_piece[p]
-        i, end = starts[p], starts[p + 1]
-        was_inside, depth[p] = depth[p], 0.0
-        while i < end:
-            its = triangle_piece[listed[i]]
-            begin = i
-            while i < end and triangle_piece[listed[i]] == its:
-                i += 1
-            if not part[0] <= listed[begin] < part[1]:
-                continue
-            same = mine == its
-            gap = gaps[mine, its]
-            held = entered[p] if same else -1
-            t, where, side, distance = _select_triangle(
-                x, x_prev, p, triangles, listed[begin:i], same, closed[its], held, complete[p]
-            )
-            if same and held >= 0 and (t < 0 or side > 0.0):
-                entered[p] = -1
-            if t < 0 or in_list(stitched, t, p):
-                continue
-            passed = distance == math.inf
-            inside = closed[its] and side < 0.0 and not passed
-            if inside and distance > complete[p]:
-                # At this distance the sign is not reliable, unless the point was inside before.
-                if was_inside > 0.0 and not same:
-                    depth[p] = max(depth[p], distance)
-                continue
-            if not passed and not inside and distance >= gap:
-                if distance < near:
-                    smallest = min(smallest, distance)
-                continue
-            n = _direction(x, p, _corners(x, triangles, t), where, passed, side, not closed[its])
-            where = _place_at_start(x_prev, p, _corners(x_prev, triangles, t), where)
-            if passed and same:
-                entered[p] = t
-            before = _resolve(x, x_prev, w, p, t, triangles, where, n, gap, friction[mine, its], limit)
-            left = dot(_relative(x, p, _corners(x, triangles, t), where), n)
-            if not same and closed[its]:
-                depth[p] = max(depth[p], -left)
-            contacts += 1
-            smallest = min(smallest, before)
-    return contacts, smallest
+    n_active, points, run_ranges, run_starts, run_rows, listed = lists
+    for index in prange(n_active):
+        runs = (run_ranges[index], run_ranges[index + 1])
+        found = (run_starts, run_rows, listed)
+        smallest[index] = _find_contacts_of(
+            x, x_prev, points[index], runs, found, surfaces, memory, near, part, stitched, rows
+        )

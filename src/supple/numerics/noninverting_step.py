@@ -12,7 +12,7 @@ to the share `keep`. All coefficients are lowered by the largest possible round-
 longer than the true one.
 
 Source: Li, Jiang, Luo, "Physics-Based Simulation", equations 23.3.1 and 23.3.2, whose closed form of the root is
-replaced (see `numerics.cubic`).
+replaced (see `supple.numerics.cubic`).
 """
 
 from __future__ import annotations
@@ -23,11 +23,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SolverError
-from supple.materials.tet_energies import deformation_gradient
 from supple.numerics.cubic import last_positive_before_root, positive_on_unit_interval
 from supple.numerics.geometry import double_double as dd
 from supple.numerics.kernel_cache import njit, prange
-from supple.numerics.mat3 import cross, det, dot, row, subtract
+from supple.numerics.mat3 import cross, dot, row, subtract
 
 # The default share of its volume that a tet keeps in one step.
 KEEP = 0.2
@@ -160,16 +159,6 @@ def noninverting_step(x, direction, tets, guarded, keep):
             step = steps[r]
             tet = limiting[r]
     return step, tet
-
-
-@njit(parallel=True, cache=True, error_model="numpy")
-def keeps_volume(x, tets, Dm_inv, guarded):
-    """Whether J = det(Ds Dm^-1) > 0 in every guarded tet, in rounded numbers: a step is taken only where this holds."""
-    bad = 0
-    for e in prange(len(tets)):
-        if guarded[e] and not det(deformation_gradient(x, tets, Dm_inv, e)) > 0.0:
-            bad += 1
-    return bad == 0
 
 
 @njit(cache=True, error_model="numpy")

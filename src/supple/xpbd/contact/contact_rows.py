@@ -1,0 +1,289 @@
+"""The contacts of surfaces as rows of arrays, and the Gauss-Seidel sweeps over them.
+
+A row keeps a gap: n . r >= offset, with r = sum c_i x_i over four vertices (see `impulses`). Its impulse in total is a
+push along n and friction perpendicular to n. A substep begins with the force that was kept of the substep before. It is
+applied to the prediction, before the elastic constraints, so that these see the load that contact transmits. After
+them, sweeps change the impulse by what is missing, or too much, as long as the push remains zero or more. They may be
+repeated in a substep. At its end, the share of the force that the next one begins with is kept. Without this memory,
+the force that a light body transmits in a substep is limited by the mass of its surface.
+
+Source: Catto, "Iterative Dynamics with Temporal Coherence" (2005), sections 5 and 6 (accumulated impulses, warm
+starting).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.numerics.kernel_cache import njit
+from supple.numerics.mat3 import dot, row, subtract
+from supple.xpbd.contact.friction import along_surface, friction_total
+from supple.xpbd.contact.impulses import apply_impulse, compliance, displace, relative, shift_both
+from supple.xpbd.contact.response_rates import kept_share
+
+
+class LoadedRows(NamedTuple):
+    """Rows that hold a force; see `ContactRows`."""
+
+    keys: NDArray[np.int64]
+    vertices: NDArray[np.int32]
+    weights: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    offsets: NDArray[np.float64]
+    friction: NDArray[np.float64]
+    forces: NDArray[np.float64]
+
+    def of_points(self, count: int) -> LoadedRows:
+        """Those rows whose vertices are all below `count`."""
+        kept = (self.vertices < count).all(axis=1)
+        return LoadedRows(
+            self.keys[kept],
+            self.vertices[kept],
+            self.weights[kept],
+            self.normals[kept],
+            self.offsets[kept],
+            self.friction[kept],
+            self.forces[kept],
+        )
+
+    @staticmethod
+    def none() -> LoadedRows:
+        return LoadedRows(
+            np.zeros(0, dtype=np.int64),
+            np.zeros((0, 4), dtype=np.int32),
+            np.zeros((0, 4)),
+            np.zeros((0, 3)),
+            np.zeros(0),
+            np.zeros(0),
+            np.zeros((0, 3)),
+        )
+
+
+class ContactRows:
+    """Rows for every pair that may touch. A row that keeps its pair keeps its force, also when lists are renewed.
+
+    Attributes
+    ----------
+    keys : (k,) what identifies the pair of each row, ascending
+    vertices : (k, 4); weights : (k, 4); normals : (k, 3); offsets : (k,) gap that is kept [m]; friction : (k,)
+    forces : (k, 3) [N] on the first side, the mean over the substep; shares : (k,) what the next substep keeps of them
+    active : (k,) whether the pair is near in this substep: it touches, or holds a force
+    deep : (k,) whether the first vertex may be inside the piece of the others
+    """
+
+    def __init__(self) -> None:
+        self.resize(np.zeros(0, dtype=np.int64))
+
+    def resize(self, keys: NDArray[np.int64]) -> None:
+        """Rows without forces, for these pairs."""
+        k = len(keys)
+        self.keys = keys
+        self.vertices, self.weights = np.zeros((k, 4), dtype=np.int32), np.zeros((k, 4))
+        self.normals, self.offsets, self.friction = np.zeros((k, 3)), np.zeros(k), np.zeros(k)
+        self.forces, self.shares = np.zeros((k, 3)), np.zeros(k)
+        self.active, self.deep = np.zeros(k, dtype=np.bool_), np.zeros(k, dtype=np.bool_)
+        # As kernels receive them.
+        self.described = (
+            self.vertices,
+            self.weights,
+            self.normals,
+            self.offsets,
+            self.friction,
+            self.forces,
+            self.shares,
+            self.active,
+            self.deep,
+        )
+
+    def renew(self, keys: NDArray[np.int64]) -> None:
+        """Rows for these pairs (ascending) and for all that hold a force; these keep it."""
+        self.restore(self.loaded(), keys)
+
+    def restore(self, loaded: LoadedRows, keys: NDArray[np.int64]) -> None:
+        """Rows for these pairs (ascending), and those of `loaded`."""
+        self.resize(np.union1d(keys, loaded.keys))
+        place = np.searchsorted(self.keys, loaded.keys)
+        for name in ("vertices", "weights", "normals", "offsets", "friction", "forces"):
+            getattr(self, name)[place] = getattr(loaded, name)
+
+    def keep(self) -> None:
+        """End a substep: the next one begins with a share of the forces."""
+        self.forces *= self.shares[:, None]
+
+    def loaded(self) -> LoadedRows:
+        """Copies of all rows that hold a force."""
+        k = np.flatnonzero(self.forces.any(axis=1))
+        return LoadedRows(
+            self.keys[k],
+            self.vertices[k],
+            self.weights[k],
+            self.normals[k],
+            self.offsets[k],
+            self.friction[k],
+            self.forces[k],
+        )
+
+
+@njit(cache=True)
+def deactivate(active):
+    """Begin a search for contacts: no row takes part."""
+    active[:] = False
+
+
+@njit(cache=True)
+def choose_rows(x, x_prev, inverse_masses, rows, first_obstacle, kind, h):
+    """The active rows of one kind: with triangles and edges of bodies (0), or of obstacles (1).
+
+    A row that is not active and holds a force has lost its pair: its impulse is taken back.
+
+    Parameters
+    ----------
+    x, x_prev, inverse_masses, h : see `push_rows`
+    rows : `ContactRows.described`; first_obstacle : the first point of an obstacle
+    """
+    vertices, weights, _, _, _, forces, _, active, _ = rows
+    chosen = np.zeros(len(active), dtype=np.int64)
+    count = 0
+    for e in range(len(active)):
+        if (vertices[e, 3] >= first_obstacle) != (kind == 1):
+            continue
+        if active[e]:
+            chosen[count] = e
+            count += 1
+        elif forces[e, 0] != 0.0 or forces[e, 1] != 0.0 or forces[e, 2] != 0.0:
+            d = (-h * h * forces[e, 0], -h * h * forces[e, 1], -h * h * forces[e, 2])
+            apply_impulse(x, x_prev, inverse_masses, vertices, weights, e, d)
+            forces[e, :] = 0.0
+    return chosen[:count]
+
+
+@njit(cache=True)
+def push_rows(x, x_prev, inverse_masses, rows, h):
+    """Apply the forces of the substep before to the prediction x (n, 3), as impulses of this substep.
+
+    Parameters
+    ----------
+    x, x_prev : (n, 3) prediction, and positions at the beginning of the substep [m]
+    rows : `ContactRows.described`
+    h : length of the substep [s]
+    """
+    vertices, weights, _, _, _, forces, _, _, _ = rows
+    for e in range(len(forces)):
+        f = row(forces, e)
+        if f[0] != 0.0 or f[1] != 0.0 or f[2] != 0.0:
+            d = (h * h * f[0], h * h * f[1], h * h * f[2])
+            apply_impulse(x, x_prev, inverse_masses, vertices, weights, e, d)
+
+
+@njit(cache=True)
+def solve_rows(x, x_prev, predicted, points, chosen, rows, h, limit, sweeps):
+    """Sweep over the chosen rows, in place. Returns how many push, and the smallest gap before the substep (or inf).
+
+    An overlap that existed when the substep began is removed at both ends of the substep alike, by at most `limit`; the
+    impulse only prevents the gap from becoming smaller than it was then (pre-stabilization: Macklin
+    et al., "Unified Particle Physics", 2014, section 4.4).
+
+    Parameters
+    ----------
+    x, x_prev : (n, 3) at the end and at the beginning of the substep [m]; x includes the forces' impulses
+    predicted : (n, 3) the prediction, before forces and constraints [m]
+    points : inverse_masses (n,) [1/kg], rates (n,) see `response_rates` [1/s^2]
+    chosen : (c,) rows, in the order of a sweep
+    rows : `ContactRows.described`; forces are those that x contains, and shares are set
+    h : length of the substep [s]
+    limit : the largest part of an old overlap that one substep removes [m]
+    sweeps : number of sweeps
+    """
+    vertices, weights, normals, offsets, friction, forces, shares, _, _ = rows
+    inverse_masses, rates = points
+    h2 = h * h
+    smallest = np.inf
+    pushes, holds = np.zeros(len(chosen)), np.zeros((len(chosen), 3))
+    for k in range(len(chosen)):
+        e = chosen[k]
+        n = row(normals, e)
+        force = row(forces, e)
+        pushes[k] = max(0.0, h2 * dot(force, n))
+        t = along_surface(force, n)
+        for j in range(3):
+            holds[k, j] = h2 * t[j]
+        before = dot(relative(x_prev, vertices, weights, e), n)
+        smallest = min(smallest, before)
+        total = compliance(inverse_masses, vertices, weights, e)
+        old = min(offsets[e] - before, limit)
+        if old > 0.0 and total > 0.0:
+            s = old / total
+            d = (s * n[0], s * n[1], s * n[2])
+            shift_both(x, x_prev, inverse_masses, vertices, weights, e, d)
+            displace(predicted, inverse_masses, vertices, weights, e, d)
+    for _ in range(sweeps):
+        for k in range(len(chosen)):
+            e = chosen[k]
+            total = compliance(inverse_masses, vertices, weights, e)
+            if not total > 0.0:
+                continue
+            n = row(normals, e)
+            r, r_prev = relative(x, vertices, weights, e), relative(x_prev, vertices, weights, e)
+            missing = min(0.0, dot(r_prev, n) - offsets[e]) - (dot(r, n) - offsets[e])
+            push = max(0.0, pushes[k] + missing / total)
+            held = row(holds, k)
+            # Corrections of positions in place of impulses: divided by the same inverse masses.
+            scaled = (held[0] * total, held[1] * total, held[2] * total)
+            hold = friction_total(scaled, subtract(r, r_prev), n, friction[e] * push * total)
+            hold = (hold[0] / total, hold[1] / total, hold[2] / total)
+            more = push - pushes[k]
+            d = (
+                more * n[0] + hold[0] - held[0],
+                more * n[1] + hold[1] - held[1],
+                more * n[2] + hold[2] - held[2],
+            )
+            pushes[k] = push
+            for j in range(3):
+                holds[k, j] = hold[j]
+            apply_impulse(x, x_prev, inverse_masses, vertices, weights, e, d)
+    contacts = 0
+    for k in range(len(chosen)):
+        e = chosen[k]
+        contacts += pushes[k] > 0.0
+        share = 0.0
+        if pushes[k] > 0.0:
+            share = _sustained(x_prev, predicted, inverse_masses, (vertices, weights, normals, offsets), e, pushes[k])
+            share *= kept_share(h2 * _fastest(rates, vertices, weights, e))
+        shares[e] = share
+        for j in range(3):
+            forces[e, j] = (pushes[k] * normals[e, j] + holds[k, j]) / h2
+    return contacts, smallest
+
+
+@njit
+def _sustained(x_prev, predicted, inverse_masses, rows, e, push):
+    """The part of a push that did not stop the approach with which the substep began: that part does not return."""
+    vertices, weights, normals, offsets = rows
+    n = row(normals, e)
+    before = dot(relative(x_prev, vertices, weights, e), n) - offsets[e]
+    approach = min(0.0, before) - (dot(relative(predicted, vertices, weights, e), n) - offsets[e])
+    impact = max(0.0, approach) / compliance(inverse_masses, vertices, weights, e)
+    return max(0.0, 1.0 - impact / push)
+
+
+@njit
+def _fastest(rates, vertices, weights, e):
+    """The largest rate of the vertices that take part."""
+    rate = 0.0
+    for i in range(4):
+        if weights[e, i] != 0.0:
+            rate = max(rate, rates[vertices[e, i]])
+    return rate
+
+
+@njit(cache=True)
+def note_depths(x, chosen, rows, depth):
+    """Increase depth (n,) to how deep points are inside other pieces, after all contacts are resolved [m]."""
+    vertices, weights, normals, _, _, _, _, _, deep = rows
+    for e in chosen:
+        if deep[e]:
+            p = vertices[e, 0]
+            depth[p] = max(depth[p], -dot(relative(x, vertices, weights, e), row(normals, e)))

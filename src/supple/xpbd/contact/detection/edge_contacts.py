@@ -1,0 +1,132 @@
+"""Edges against edges of other pieces.
+
+Two edges touch where the nearest points of their lines are inside of both, and where the direction between the lines
+separates the pieces locally: both faces of one edge lie on one side of it, both faces of the other on the other side.
+In all other cases a vertex is nearer to a face.
+
+Source: Ericson, "Real-Time Collision Detection" (2005), section 5.1.9 (nearest points of segments); Gregorius, "The
+Separating Axis Test between Convex Polyhedra" (2013), for the second condition.
+"""
+
+import math
+
+import numpy as np
+
+from supple.numerics.kernel_cache import njit, prange
+from supple.numerics.mat3 import cross, dot, row, subtract
+from supple.xpbd.sweeps.compilation import serial_and_parallel
+
+# Edges whose sine of the angle between them is smaller are parallel: vertices and faces hold them apart.
+PARALLEL = 1e-3
+
+
+@njit
+def _nearest(p, u, q, v):
+    """Parameters on the lines p + s u and q + t v of their nearest points; s = -1 where the lines are parallel."""
+    a, b, c = dot(u, u), dot(u, v), dot(v, v)
+    det = a * c - b * b
+    if det <= PARALLEL * PARALLEL * a * c:
+        return -1.0, -1.0
+    w = subtract(p, q)
+    d, e = dot(u, w), dot(v, w)
+    return (b * e - c * d) / det, (a * e - b * d) / det
+
+
+@njit
+def _supports(x, opposite, e, origin, n, sign):
+    """Whether both faces of edge e are on the side to which sign n points away from."""
+    for k in range(2):
+        o = opposite[e, k]
+        if o < 0:
+            return True
+        d = subtract(row(x, o), origin)
+        if sign * dot(d, n) > 1e-9 * math.sqrt(dot(d, d)):
+            return False
+    return True
+
+
+@njit
+def _edge_contact(x, x_prev, edges, e, f, closed_e, closed_f):
+    """Contact of the edges e and f: whether it exists, s, t, the unit normal from f to e, the signed distance [m]."""
+    ends, opposite = edges
+    nothing = (False, 0.0, 0.0, (0.0, 0.0, 0.0), math.inf)
+    a, b, c, d = ends[e, 0], ends[e, 1], ends[f, 0], ends[f, 1]
+    p, q = row(x, a), row(x, c)
+    u, v = subtract(row(x, b), p), subtract(row(x, d), q)
+    s, t = _nearest(p, u, q, v)
+    if not (0.0 < s < 1.0 and 0.0 < t < 1.0):
+        return nothing
+    n = cross(u, v)
+    length = math.sqrt(dot(n, n))
+    n = (n[0] / length, n[1] / length, n[2] / length)
+    w = subtract(p, q)
+    r = (w[0] + s * u[0] - t * v[0], w[1] + s * u[1] - t * v[1], w[2] + s * u[2] - t * v[2])
+    # The faces of closed pieces tell which side is free; the border of a sheet has two sides, and keeps the old one.
+    side = 0.0
+    if closed_f:
+        for k in range(2):
+            side -= dot(n, subtract(row(x, opposite[f, k]), q))
+    if closed_e:
+        for k in range(2):
+            side += dot(n, subtract(row(x, opposite[e, k]), p))
+    if not (closed_e or closed_f):
+        p0, q0 = row(x_prev, a), row(x_prev, c)
+        u0, v0 = subtract(row(x_prev, b), p0), subtract(row(x_prev, d), q0)
+        w0 = subtract(p0, q0)
+        side = dot(n, (w0[0] + s * u0[0] - t * v0[0], w0[1] + s * u0[1] - t * v0[1], w0[2] + s * u0[2] - t * v0[2]))
+    if side < 0.0:
+        n = (-n[0], -n[1], -n[2])
+    if not (_supports(x, opposite, f, q, n, 1.0) and _supports(x, opposite, e, p, n, -1.0)):
+        return nothing
+    return True, s, t, n, dot(r, n)
+
+
+@serial_and_parallel
+def find_edge_contacts(x, x_prev, pairs, edges, surfaces, near, first_obstacle, kind, rows, smallest):
+    """Find which edges touch now, and fill in their rows.
+
+    Parameters
+    ----------
+    x, x_prev : (n, 3) at the end and at the beginning of the substep [m]
+    pairs : first (k,), second (k,) edges, and their rows (k,)
+    edges : ends (e, 2), opposite (e, 2): see `SharpEdges`
+    surfaces : point_piece (n,), closed (p,), gaps (p, p), friction (p, p)
+    near : distances above this are not reported [m]
+    first_obstacle : the first point of an obstacle; kind : 0 for pairs of bodies only, 1 for those with an obstacle
+    rows : see `find_contacts`
+    smallest : (k,) out: the distance of pairs that are near and do not touch, otherwise inf [m]
+    """
+    first, second, numbers = pairs
+    ends = edges[0]
+    point_piece, closed, gaps, friction = surfaces
+    vertices, weights, normals, offsets, mus, forces, _, active, deep = rows
+    for i in prange(len(first)):
+        smallest[i] = np.inf
+        e, f, r = first[i], second[i], numbers[i]
+        if (ends[f, 0] >= first_obstacle) != (kind == 1):
+            continue
+        mine, its = point_piece[ends[e, 0]], point_piece[ends[f, 0]]
+        gap = max(gaps[mine, its], gaps[its, mine])
+        found, s, t, n, distance = _edge_contact(x, x_prev, edges, e, f, closed[mine], closed[its])
+        if not found:
+            continue
+        pushed = forces[r, 0] != 0.0 or forces[r, 1] != 0.0 or forces[r, 2] != 0.0
+        if distance >= gap:
+            if distance < near:
+                smallest[i] = distance
+            if not pushed:
+                continue
+        c = (1.0 - s, s, t - 1.0, -t)
+        before = 0.0
+        for k in range(4):
+            end = ends[e, k] if k < 2 else ends[f, k - 2]
+            before += c[k] * dot(row(x_prev, end), n)
+        # Edges far below each other's faces are in line by chance, in the hollow of a dented surface.
+        if before <= 0.0 and not pushed:
+            continue
+        vertices[r, 0], vertices[r, 1], vertices[r, 2], vertices[r, 3] = ends[e, 0], ends[e, 1], ends[f, 0], ends[f, 1]
+        weights[r, 0], weights[r, 1], weights[r, 2], weights[r, 3] = c
+        for j in range(3):
+            normals[r, j] = n[j]
+        offsets[r], mus[r] = gap, friction[mine, its]
+        active[r], deep[r] = True, False

@@ -1,0 +1,104 @@
+"""The sum of the viscous forces of all elements, in the groups and chunks of the sweeps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.numerics.kernel_cache import njit, prange
+from supple.xpbd.sweeps.compilation import FLAGS, SerialAndParallel, kernel_with, serial_and_parallel
+from supple.xpbd.sweeps.groups import WIDTH, Groups
+
+
+class ForceSum:
+    """Elements whose forces are linear in the velocities.
+
+    Parameters
+    ----------
+    forces : compiled function (X, V, k, data, g, h) with `forceinline`, see `forces_of_tets`
+    elements : (m, k) vertices; constants : (m, c); groups : of these elements
+
+    Attributes
+    ----------
+    members : (g, WIDTH) the elements of each group
+    rates : (g,) largest square of a rate of strain of its elements in the last sum [1/s^2]
+    """
+
+    def __init__(
+        self,
+        forces: Callable[..., Any],
+        elements: NDArray[np.int32],
+        constants: NDArray[np.float64],
+        groups: Groups,
+    ) -> None:
+        self._corners = np.ascontiguousarray(elements[groups.members], dtype=np.uint32)
+        self._data = groups.lanes(constants)
+        self._counts, self._pointers = groups.counts, groups.pointers
+        self.members = groups.members
+        self.rates = np.zeros(len(self._counts))
+        self._kernels = _sum_of(forces, elements.shape[1])
+
+    def add(self, motion: NDArray[np.float64], h: float, out: NDArray[np.float64], parallel: bool) -> None:
+        """Add the forces to `out`.
+
+        Parameters
+        ----------
+        motion : (n, 6) positions [m] and velocities [m/s]; out : (n, 4) [N], and mean diagonal entries of the
+            matrix [kg/s]; h : length of the substep [s]
+        """
+        self._kernels[parallel](motion, self._corners, self._counts, self._data, self._pointers, h, out, self.rates)
+
+
+@cache
+def _sum_of(forces: Any, corners: int) -> SerialAndParallel:
+    chunk = kernel_with(_sum_chunk, forces.py_func.__qualname__, forces=forces, CORNERS=corners)
+    compiled = njit(fastmath=FLAGS, error_model="numpy")(chunk)
+    return serial_and_parallel(kernel_with(_sum, forces.py_func.__qualname__, _sum_chunk=compiled))
+
+
+CORNERS = 0
+
+
+def forces(X, V, k, data, g, h):
+    """Stands for the forces of one kind of elements in `_sum_chunk`."""
+    raise NotImplementedError
+
+
+def _sum_chunk(motion, corners, counts, data, first, last, h, out, rates):
+    X = np.zeros((3 * CORNERS, WIDTH))
+    V = np.zeros((3 * CORNERS, WIDTH))
+    k = np.zeros((CORNERS + 1, WIDTH))
+    for g in range(first, last):
+        count = counts[g]
+        for lane in range(count):
+            for c in range(CORNERS):
+                p = corners[g, lane, c]
+                X[3 * c, lane] = motion[p, 0]
+                X[3 * c + 1, lane] = motion[p, 1]
+                X[3 * c + 2, lane] = motion[p, 2]
+                V[3 * c, lane] = motion[p, 3]
+                V[3 * c + 1, lane] = motion[p, 4]
+                V[3 * c + 2, lane] = motion[p, 5]
+        forces(X, V, k, data, g, h)
+        fastest = 0.0
+        for lane in range(count):
+            fastest = max(fastest, k[CORNERS, lane])
+            for c in range(CORNERS):
+                p = corners[g, lane, c]
+                out[p, 0] += V[3 * c, lane]
+                out[p, 1] += V[3 * c + 1, lane]
+                out[p, 2] += V[3 * c + 2, lane]
+                out[p, 3] += k[c, lane]
+        rates[g] = fastest
+
+
+def _sum(motion, corners, counts, data, pointers, h, out, rates):
+    n_chunks = len(pointers) - 1
+    for parity in range(2):
+        for k in prange((n_chunks + 1 - parity) // 2):
+            c = 2 * k + parity
+            _sum_chunk(motion, corners, counts, data, pointers[c], pointers[c + 1], h, out, rates)

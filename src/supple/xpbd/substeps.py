@@ -1,0 +1,95 @@
+"""How many substeps a frame needs, found before it is simulated.
+
+The largest of:
+
+- what keeps every body's stiffness within the accuracy (`assessment.softening`);
+- what lets surfaces approach each other by less than half the mean height of a tet in a substep: contact may not find
+  surfaces that pass each other within one substep, and the guard of volumes stops a compression by less than that;
+- after a frame that had to be repeated with more substeps: a number that falls back from there.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from supple.system import System
+from supple.xpbd.assessment.moment import Moment
+from supple.xpbd.assessment.softening import Softening
+
+# Fewer substeps damp slow oscillations too much: a mode of frequency w decays at h w^2 / 2.
+FEWEST = 10
+# Of the mean height of a tet: how far surfaces may approach each other in a substep.
+APPROACH = 0.5
+# By which a number from an earlier frame falls in every frame.
+FALL = 0.8
+# How many times the number of the other criteria it may be: a blow that lasts for some frames must not raise it to any
+# height.
+MOST_KEPT = 4
+
+
+class Substeps(NamedTuple):
+    """A number of substeps, and what asks for it."""
+
+    count: int
+    reason: str
+
+
+class SubstepChoice:
+    """What is needed to choose the number of substeps for a system.
+
+    Parameters
+    ----------
+    system : in the solver's numbering; softening : of its bodies; touches : whether there is any contact
+    """
+
+    def __init__(self, system: System, softening: Softening, touches: bool) -> None:
+        self.system, self.softening, self.touches = system, softening, touches
+        Dm_inv = system.rest_shape_inverse
+        b = np.concatenate([-Dm_inv.sum(axis=1, keepdims=True), Dm_inv], axis=1)
+        heights = 1.0 / np.linalg.norm(b, axis=2).max(axis=1)
+        self.height = min(float(heights[part.tets].mean()) for part in system.bodies)
+
+    def choose(self, moment: Moment, dt: float, accuracy: float, earlier: float) -> Substeps:
+        """The number of substeps for a frame that begins at a moment.
+
+        Parameters
+        ----------
+        dt : length of the frame [s]; accuracy : how much of its stiffness a body may lack
+        earlier : what the frame before asks for, zero or more
+        """
+        stiff, body = self.softening.substeps(dt, accuracy)
+        fast = math.ceil(self._closing_speed(moment, dt) * dt / (APPROACH * self.height)) if self.touches else 0
+        found = max(
+            Substeps(FEWEST, "the least number"),
+            Substeps(stiff, f"the stiffness of body {body!r}"),
+            Substeps(fast, "the speed of approach"),
+            key=lambda each: each.count,
+        )
+        kept = min(math.ceil(FALL * earlier), MOST_KEPT * found.count)
+        return found if found.count >= kept else Substeps(kept, "the frame before")
+
+    def _closing_speed(self, moment: Moment, dt: float) -> float:
+        """An upper bound of the speed at which surfaces approach each other in the frame [m/s]."""
+        v = moment.velocities
+        falling = math.hypot(*self.system.gravity) * dt
+        fastest = 0.0
+        if self.system.obstacles:
+            fastest = float(np.sqrt(np.einsum("ij,ij->i", v, v).max())) + self._obstacle_speed(moment, dt) + falling
+        if len(self.system.bodies) > 1:
+            relative = v - (self.system.masses @ v) / self.system.masses.sum()
+            fastest = max(fastest, 2.0 * float(np.sqrt(np.einsum("ij,ij->i", relative, relative).max())))
+        return fastest if math.isfinite(fastest) else 0.0
+
+    def _obstacle_speed(self, moment: Moment, dt: float) -> float:
+        """The largest mean speed of an obstacle over the frame, at the corners of the box about all bodies [m/s]."""
+        moving = [obstacle for obstacle in self.system.obstacles if obstacle.motion is not None]
+        if not moving:
+            return 0.0
+        x = moment.points[:, :3] + moment.origins
+        low, high = x.min(axis=0), x.max(axis=0)
+        corners = np.array([[(low, high)[k >> a & 1][a] for a in range(3)] for k in range(8)])
+        ends = [obstacle.carried(corners, moment.time, moment.time + dt) for obstacle in moving]
+        return max(float(np.linalg.norm(end - corners, axis=1).max()) for end in ends) / dt

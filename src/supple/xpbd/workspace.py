@@ -1,0 +1,68 @@
+"""What XPBD computes once for a system, and its scratch arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.numerics.thread_tuning import ThreadTuner
+from supple.system import System
+from supple.xpbd.assessment.assessment import Assessment
+from supple.xpbd.assessment.moment import Moment
+from supple.xpbd.constraints.registry import ConstraintSet
+from supple.xpbd.constraints.stitch_anchors import StitchAnchors
+from supple.xpbd.contact.collisions import Collisions
+from supple.xpbd.damping.kelvin_voigt import Damping
+from supple.xpbd.limits.rigid_fallback import RigidFallback
+from supple.xpbd.limits.volume_guard import VolumeGuard
+from supple.xpbd.momentum import MomentumRestore
+from supple.xpbd.substeps import SubstepChoice
+from supple.xpbd.sweeps.ordering import Layout
+
+
+@dataclass(eq=False)
+class XPBDWorkspace:
+    """What is computed once for a system, and scratch arrays, in the solver's own numbering of vertices.
+
+    It caches and never remembers: a step reads nothing of an earlier step but the state.
+
+    Attributes
+    ----------
+    extended : (n + a, 4) positions about the component's origin [m] and inverse masses [1/kg], of the vertices and then
+        of the anchors (inverse mass 0); points : the rows of the vertices
+    previous : (n, 3) positions at the beginning of the substep [m]; begun : those, which contacts do not change
+    velocities, origins : (n, 3); world, world_previous : (n, 3) positions in world coordinates, for contacts
+    """
+
+    system: System
+    layout: Layout
+    sets: list[ConstraintSet]
+    damping: Damping | None
+    momentum: MomentumRestore | None
+    collisions: Collisions
+    guard: VolumeGuard
+    fallback: RigidFallback
+    assessment: Assessment
+    choice: SubstepChoice
+    pace: ThreadTuner
+    anchors: StitchAnchors
+    extended: NDArray[np.float64]
+    points: NDArray[np.float64] = field(init=False)
+    previous: NDArray[np.float64] = field(init=False)
+    begun: NDArray[np.float64] = field(init=False)
+    velocities: NDArray[np.float64] = field(init=False)
+    origins: NDArray[np.float64] = field(init=False)
+    world: NDArray[np.float64] = field(init=False)
+    world_previous: NDArray[np.float64] = field(init=False)
+
+    def __post_init__(self) -> None:
+        n = len(self.system.masses)
+        self.points = self.extended[:n]
+        for name in ("previous", "begun", "velocities", "origins", "world", "world_previous"):
+            setattr(self, name, np.zeros((n, 3)))
+
+    def moment(self, time: float) -> Moment:
+        """What the assessment reads, at `time` [s]."""
+        return Moment(self.points, self.extended, self.velocities, self.origins, time)

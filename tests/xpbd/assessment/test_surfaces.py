@@ -1,0 +1,65 @@
+"""Surfaces through each other at the end of a frame are found and named, and only those that must stay apart."""
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.system import build_system, initial_state
+from supple.xpbd.assessment.surfaces import SurfaceCheck
+from supple.xpbd.contact.settings import XPBDContact
+
+CUBE = sp.shapes.box((1.0, 1.0, 1.0), (2, 2, 2))
+JELLY = sp.StableNeoHookean(youngs=1e5, poisson=0.4)
+PLATE = sp.SurfaceMesh([[-2, 0.1, -2], [2, 0.1, -2], [0, 0.1, 3]], [[0, 1, 2]])
+
+
+def found(scene, settings=None, x=None):
+    check = SurfaceCheck(build_system(scene), settings or XPBDContact(), 0.5)
+    return [str(each) for each in check.find(initial_state(scene).positions if x is None else x, 0.0)]
+
+
+def cubes(**more):
+    bodies = [sp.Body(name, CUBE, JELLY, position=(0.7 * k, 0.1 * k, 0.13 * k)) for k, name in enumerate("ab")]
+    return sp.Scene(bodies, **more)
+
+
+def test_two_bodies_through_each_other_are_named():
+    (text,) = found(cubes())
+    assert text.startswith("body 'a' passes through body 'b' (")
+
+
+@pytest.mark.parametrize(
+    ("scene", "settings"),
+    [
+        (cubes(contact_pairs=[sp.ContactPair("a", "b", collide=False)]), None),
+        (cubes(), XPBDContact(body_collision=False)),
+        (sp.Scene([sp.Body("a", CUBE, JELLY), sp.Body("b", CUBE, JELLY, position=(1.1, 0, 0))]), None),
+    ],
+    ids=["excluded pair", "turned off", "apart"],
+)
+def test_what_may_pass_or_is_apart_is_not_found(scene, settings):
+    assert found(scene, settings) == []
+
+
+def test_a_body_through_itself_is_found_unless_self_contact_is_off():
+    bar = sp.shapes.box((3.0, 0.2, 0.2), (12, 1, 1))
+    angle = 2.2 * np.pi * (bar.vertices[:, 0] + 1.5) / 3.0
+    radius = 0.45 + bar.vertices[:, 1]
+    x = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), bar.vertices[:, 2]])
+    scene = sp.Scene([sp.Body("ring", bar, JELLY)])
+    (text,) = found(scene, x=x)
+    assert text.startswith("body 'ring' passes through itself (")
+    assert found(scene, XPBDContact(self_collision=False), x) == []
+
+
+def test_depths_in_obstacles_and_crossed_triangles_are_found():
+    floor = sp.HalfSpace(point=(0, -0.4, 0), name="floor")
+    sheet = sp.TriangleObstacle(PLATE, name="sheet")
+    inner = sp.Sphere(center=(0, 0, 0), radius=0.6, inside=True, name="room")
+    texts = found(sp.Scene([sp.Body("a", CUBE, JELLY)], [floor, sheet, inner]))
+    assert texts[0].startswith("body 'a' passes through obstacle 'sheet' (")
+    assert texts[1:] == ["body 'a' is 0.1 m deep in obstacle 'floor'", "body 'a' is 0.27 m deep in obstacle 'room'"]
+
+
+def test_a_vertex_that_barely_overlaps_an_obstacle_is_not_found():
+    assert found(sp.Scene([sp.Body("a", CUBE, JELLY)], [sp.HalfSpace(point=(0, -0.49, 0))])) == []

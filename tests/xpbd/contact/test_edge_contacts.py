@@ -1,0 +1,100 @@
+"""Edges against edges: bodies whose vertices do not meet any face."""
+
+import ipctk
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.system import build_system
+from supple.xpbd.contact.collisions import Collisions
+from supple.xpbd.contact.settings import XPBDContact
+from supple.xpbd.solver import XPBD
+
+STUFF = sp.StableNeoHookean(youngs=2e5, poisson=0.4, density=1000)
+
+
+def crossing(speed=1.0, friction=0.0):
+    """Two square bars, each standing on an edge, one across the other: only two long edges meet."""
+    bar = sp.shapes.box((0.4, 0.05, 0.05), (1, 1, 1))
+    turned = (np.pi / 4, 0, 0)
+    low = sp.Body("low", bar, STUFF, rotation=turned, friction=friction)
+    across = sp.TetMesh(bar.vertices[:, [2, 1, 0]] * [1, 1, -1], bar.tets)
+    high = sp.Body(
+        "high",
+        across,
+        STUFF,
+        position=(0.013, 0.09, 0.007),
+        rotation=(0, 0, np.pi / 4),
+        velocity=(0, -speed, 0),
+        friction=friction,
+    )
+    return sp.Scene([low, high], gravity=(0, 0, 0))
+
+
+def surfaces_meet(frame):
+    system = frame.system
+    mesh = ipctk.CollisionMesh(system.rest_positions, system.edges, system.triangles)
+    return ipctk.has_intersections(mesh, np.asfortranarray(frame.state.positions))
+
+
+@pytest.mark.parametrize("speed", [0.3, 3.0])
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+def test_two_crossing_bars_stop_each_other(speed, friction):
+    scene = crossing(speed, friction)
+    system = build_system(scene)
+    state = next(iter(sp.simulate(scene, XPBD(), 1e-9, 1))).state
+    m = system.masses[:, None]
+    linear, angular = (m * state.velocities).sum(axis=0), np.cross(state.positions, m * state.velocities).sum(axis=0)
+    energy = 0.5 * np.sum(m * state.velocities**2)
+    smallest = []
+    for frame in sp.simulate(scene, XPBD(substeps=40), 1 / 60, 30):
+        assert not surfaces_meet(frame)
+        now = m * frame.state.velocities
+        assert np.abs(now.sum(axis=0) - linear).max() < 1e-11 * np.abs(linear).max()
+        moment = np.cross(frame.state.positions, now).sum(axis=0)
+        assert np.abs(moment - angular).max() < 1e-10 * np.abs(linear).max()
+        assert frame.report.kinetic_energy + frame.report.elastic_energy < energy * 1.02
+        if frame.report.details.smallest_gap is not None:
+            smallest.append(frame.report.details.smallest_gap)
+    thickness = Collisions(system, XPBDContact()).thickness
+    assert min(smallest) == pytest.approx(thickness, rel=0.05)
+
+
+def test_a_bar_rests_across_another_and_keeps_the_thickness():
+    """Pinned below; the upper bar is held against falling off by friction."""
+    scene = crossing(0.0, 1.0)
+    low, high = scene.bodies
+    pinned = sp.Pin("low", np.arange(len(low.mesh.vertices)))
+    scene = sp.Scene([low, high], pins=[pinned], gravity=(0, -1.0, 0))
+    thickness = Collisions(build_system(scene), XPBDContact()).thickness
+    gaps = []
+    for frame in sp.simulate(scene, XPBD(substeps=40), 1 / 60, 30):
+        assert not surfaces_meet(frame)
+        gaps.append(frame.report.details.smallest_gap)
+    assert min(gaps) == pytest.approx(thickness, rel=0.05)
+
+
+def test_a_bar_stops_on_an_edge_of_a_triangle_obstacle():
+    scene = crossing(2.0)
+    low, high = scene.bodies
+    obstacle = sp.TriangleObstacle(sp.SurfaceMesh(low.place(low.mesh.vertices), low.mesh.surface.triangles))
+    for frame in sp.simulate(sp.Scene([high], [obstacle], gravity=(0, 0, 0)), XPBD(substeps=20), 1 / 60, 20):
+        assert frame.positions["high"][:, 1].mean() > 0.05
+
+
+def test_flat_and_reentrant_edges_are_left_out():
+    box = sp.Body("a", sp.shapes.box((0.1, 0.1, 0.1), (3, 3, 3)), STUFF)
+    other = sp.Body("b", sp.shapes.box((0.1, 0.1, 0.1), (1, 1, 1)), STUFF, position=(0, 1, 0))
+    surfaces = Collisions(build_system(sp.Scene([box, other])), XPBDContact()).surfaces
+    assert len(surfaces._edges) == 12 * 3 + 12
+    # An L: twelve cells of its outline are edges, the reentrant one is not.
+    mesh = sp.shapes.box((0.2, 0.2, 0.1), (2, 2, 1))
+    middles = mesh.vertices[mesh.tets].mean(axis=1)
+    part = sp.TetMesh.dropping_unused(mesh.vertices, mesh.tets[(middles[:, 0] < 0) | (middles[:, 1] < 0)])
+    system = build_system(sp.Scene([sp.Body("l", part, STUFF), other]))
+    surfaces = Collisions(system, XPBDContact()).surfaces
+    ends = surfaces._edges.edges.ends
+    x = system.rest_positions[surfaces.surfaces.rows]
+    across = np.abs(x[ends]).max(axis=1)[:, :2].max(axis=1) < 1e-9
+    assert not across.any()
+    assert len(ends) == 12 + 2 * 8 + 5

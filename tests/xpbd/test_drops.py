@@ -1,0 +1,89 @@
+"""Random drops with defaults: nothing turns over or gains energy, and what is in the floor is reported."""
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.xpbd.solver import XPBD
+
+DT = 1.0 / 60.0
+
+
+def shape(generator, size):
+    kind = generator.integers(3)
+    if kind == 0:
+        return sp.shapes.box((size, size * generator.uniform(0.4, 1.0), size), (3, 3, 3))
+    if kind == 1:
+        return sp.shapes.sphere(radius=size / 2, edge_length=size / 5)
+    return sp.shapes.cylinder(radius=size / 2, height=size, edge_length=size / 5)
+
+
+def drop(seed, smallest=6e-3, stiffest=2e6):
+    """One to three bodies of E = 5e3 to 2e6 Pa and 6 mm to 30 cm, thrown at the floor with up to 12 m/s."""
+    generator = np.random.default_rng(seed)
+    size = 10 ** generator.uniform(np.log10(smallest), np.log10(0.3))
+    speed, bodies, height = generator.uniform(0.0, 12.0), [], 0.0
+    for k in range(generator.integers(1, 4)):
+        youngs = 10 ** generator.uniform(np.log10(5e3), np.log10(stiffest))
+        material = sp.StableNeoHookean(
+            youngs=youngs, poisson=generator.uniform(0.0, 0.47), density=10 ** generator.uniform(2.3, 3.7)
+        )
+        height += size * generator.uniform(1.5, 2.0)
+        axis = generator.normal(size=3)
+        bodies.append(
+            sp.Body(
+                f"body {k}",
+                shape(generator, size),
+                material,
+                position=(0, height, 0),
+                rotation=axis / np.linalg.norm(axis),
+                velocity=(0, -speed, 0),
+            )
+        )
+    return sp.Scene(bodies, [sp.HalfSpace(friction=0.5)])
+
+
+def check(scene, steps, most=0.02):
+    start = first_energy(scene)
+    for frame in sp.simulate(scene, XPBD(), DT, steps):
+        report = frame.report
+        assert report.min_det_F > 0.0
+        assert report.status not in ("inverted", "energy_gained", "not_finite"), report.message
+        energy = report.kinetic_energy + report.elastic_energy + report.potential_energy
+        assert energy < (1.0 + most) * start
+        deepest = -min(x[:, 1].min() for x in frame.positions.values())
+        assert deepest < 1e-3 * np.ptp(frame.state.positions) or report.status == "intersecting"
+        assert all(x[:, 1].mean() > 0.0 for x in frame.positions.values())
+
+
+def first_energy(scene):
+    total = 0.0
+    for body in scene.bodies:
+        mass = body.mesh.volume * float(body.material.density)
+        total += mass * (0.5 * float(np.dot(body.velocity, body.velocity)) + 9.81 * float(body.position[1]))
+    return total
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, 3, 6])
+def test_random_drops(seed):
+    check(drop(seed, smallest=0.04, stiffest=2e5), 25)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(100, 300))
+def test_many_random_drops(seed):
+    check(drop(seed), 40, most=0.05)
+
+
+def test_a_small_soft_ball_dropped_ten_centimetres():
+    mesh = sp.shapes.sphere(radius=0.02, edge_length=0.006)
+    ball = sp.Body("ball", mesh, sp.StableNeoHookean(youngs=3e4, poisson=0.4), position=(0, 0.12, 0))
+    check(sp.Scene([ball], [sp.HalfSpace(friction=0.5)]), 30)
+
+
+def test_eight_small_soft_balls_in_a_heap():
+    mesh = sp.shapes.sphere(radius=0.02, edge_length=0.01)
+    jelly = sp.StableNeoHookean(youngs=3e4, poisson=0.4)
+    places = [(0.042 * i, 0.03 + 0.042 * j, 0.042 * k) for i in range(2) for j in range(2) for k in range(2)]
+    bodies = [sp.Body(f"ball {n}", mesh, jelly, position=place, friction=0.3) for n, place in enumerate(places)]
+    check(sp.Scene(bodies, [sp.HalfSpace(friction=0.3)]), 30)
