@@ -352,7 +352,7 @@ def test_a_case_that_always_kills_its_worker_fails_and_the_others_do_not(cluster
     options = {"measure": DROP, "folder": tmp_path / "s", "scheduler": cluster, **SETTINGS}
     table = sp.sweep(make, {"case": cases}, **options)
     assert table.done.tolist() == [True, True, False, True]
-    assert "workers were lost" in table.reasons[2]
+    assert table.reasons[2].startswith("2 workers were lost")
     tried = (marks / "case-3").stat().st_size
     sp.sweep(make, {"case": cases}, **options)  # lost workers are worth another try
     assert (marks / "case-3").stat().st_size > tried
@@ -376,9 +376,9 @@ def test_a_case_too_large_for_its_share_of_the_memory_runs_on_fewer_workers(tmp_
 
     monkeypatch.setattr(module, "available_bytes", lambda: 4_000_000_000)
     values = [0, int(2e9), int(5e9)]
-    table = sp.sweep(make, {"tets": values}, measure=limit, folder=tmp_path / "s", workers=3)
+    table = sp.sweep(make, {"tets": values}, measure=limit, folder=tmp_path / "s", workers=2)
     assert table.done.tolist() == [True, True, False]
-    np.testing.assert_allclose(table["measure"][:2], [1.2e9, 3.6e9], rtol=1e-3)
+    np.testing.assert_allclose(table["measure"][:2], [1.8e9, 3.6e9], rtol=1e-3)
     assert table.reasons[2] == "needs about 5.3 GB of memory; 3.6 GB can be used here"
 
 

@@ -65,14 +65,16 @@ def simulate_case(run: Run, folder: Path, checkpoint_seconds: float) -> tuple[in
     if first is None:
         checkpoint.unlink(missing_ok=True)
         recorder = Recorder(recording, scene_text=run.text, solver=run.solver, compress=run.output.compress)
-        start = {"initial_positions": run.initial_positions or None}
     else:
         recorder = ContinuedRecorder(recording, compress=run.output.compress)
-        start = {"start": first}
+    positions = (run.initial_positions or None) if first is None else None
     done = first.index if first is not None else 0
     sinks = [recorder, CheckpointSink(checkpoint, recorder, run, checkpoint_seconds)]
     index, problem = done, ""
-    for frame in simulate(run.scene, run.solver, run.dt, run.steps - done, sinks=sinks, **start):
+    frames = simulate(
+        run.scene, run.solver, run.dt, run.steps - done, initial_positions=positions, start=first, sinks=sinks
+    )
+    for frame in frames:
         index = frame.index
         if not frame.report.status.can_go_on:
             problem = f"frame {index}: {frame.report.status}: {frame.report.message}"
