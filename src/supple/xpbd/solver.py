@@ -139,6 +139,7 @@ class XPBD(Solver):
             fallback=RigidFallback(inner),
             assessment=assessment,
             choice=SubstepChoice(inner, assessment.softening, bool(collisions)),
+            threads=self.threads or (None if large else 1),
             pace=ThreadTuner(choice=parallel and self.threads is None, parallel=parallel),
             anchors=StitchAnchors(inner),
             extended=extended,
@@ -160,7 +161,11 @@ class XPBD(Solver):
 
         With automatic substeps, a frame that turns out bad is undone and repeated with twice as many.
         """
-        ws, time = workspace, state.time + dt
+        with numba_threads(workspace.threads):
+            return self._step(system, state, dt, workspace)
+
+    def _step(self, system: System, state: State, dt: float, ws: XPBDWorkspace) -> tuple[State, StepReport]:
+        time = state.time + dt
         memory = state.memory if isinstance(state.memory, XPBDMemory) else XPBDMemory()
         used, repeats = self._first_choice(ws, state, dt, memory), 0
         while True:
@@ -256,33 +261,32 @@ class XPBD(Solver):
         cycles = _cycles(substeps)
         if damping is not None:
             damping.begin_step(memory.viscous, state.velocities)
-        with numba_threads(self.threads):
-            for k in range(substeps):
-                interruption_point()
-                started = perf_counter()
-                parallel = ws.pace.choose()
-                end = state.time + (k + 1) * h
-                if damping is not None and k in cycles:
-                    moving = ws.anchors.velocities(end - h, h)
-                    damping.begin_cycle(ws.extended, ws.velocities, moving, cycles[k], h, parallel)
-                _begin_substep(ws, targets[k], end, h, parallel)
-                add_forces(ws.system, ws.points, ws.velocities, end, h)
-                if damping is not None:
-                    damping.push(ws.points, h)
-                if ws.collisions:
-                    _push_contacts(ws, h)
-                for constraints in ws.sets:
-                    constraints.project(ws.extended, h, parallel)
-                _restore(ws, h, parallel)
-                ws.pace.note(parallel, perf_counter() - started)
-                pull_to_targets(ws.system, ws.points, ws.velocities, ws.origins, end, h)
-                if ws.collisions and not _collide(ws, end, h, parallel):
-                    break
-                held_back += _keep_volumes(ws, end, h, parallel)
-                if ws.collisions:
-                    ws.collisions.end_substep()
-                balance.note_loads(ws.points, ws.previous, ws.origins, end, h)
-                balance.note_contacts(ws.collisions.contacts)
+        for k in range(substeps):
+            interruption_point()
+            started = perf_counter()
+            parallel = ws.pace.choose()
+            end = state.time + (k + 1) * h
+            if damping is not None and k in cycles:
+                moving = ws.anchors.velocities(end - h, h)
+                damping.begin_cycle(ws.extended, ws.velocities, moving, cycles[k], h, parallel)
+            _begin_substep(ws, targets[k], end, h, parallel)
+            add_forces(ws.system, ws.points, ws.velocities, end, h)
+            if damping is not None:
+                damping.push(ws.points, h)
+            if ws.collisions:
+                _push_contacts(ws, h)
+            for constraints in ws.sets:
+                constraints.project(ws.extended, h, parallel)
+            _restore(ws, h, parallel)
+            ws.pace.note(parallel, perf_counter() - started)
+            pull_to_targets(ws.system, ws.points, ws.velocities, ws.origins, end, h)
+            if ws.collisions and not _collide(ws, end, h, parallel):
+                break
+            held_back += _keep_volumes(ws, end, h, parallel)
+            if ws.collisions:
+                ws.collisions.end_substep()
+            balance.note_loads(ws.points, ws.previous, ws.origins, end, h)
+            balance.note_contacts(ws.collisions.contacts)
         return held_back
 
     @staticmethod

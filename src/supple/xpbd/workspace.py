@@ -30,6 +30,7 @@ class XPBDWorkspace:
 
     Attributes
     ----------
+    threads : of Numba's parallel kernels; None leaves their number as it is
     extended : (n + a, 4) positions about the component's origin [m] and inverse masses [1/kg], of the vertices and then
         of the anchors (inverse mass 0); points : the rows of the vertices
     previous : (n, 3) positions at the beginning of the substep [m]; begun : those, which contacts do not change
@@ -46,6 +47,7 @@ class XPBDWorkspace:
     fallback: RigidFallback
     assessment: Assessment
     choice: SubstepChoice
+    threads: int | None
     pace: ThreadTuner
     anchors: StitchAnchors
     extended: NDArray[np.float64]
