@@ -147,7 +147,7 @@ def _edge_patches(tets, Dm_inv, volumes, region, law) -> EdgePatches:
     ends = np.sort(tets[:, _EDGES], axis=2).reshape(-1, 2)
     first, patch = _numbered(np.column_stack([ends, np.repeat(region, 6)]).astype(np.int64))
     shares = np.repeat(volumes / 6.0, 6)
-    total = np.bincount(patch, weights=shares)
+    total = np.bincount(patch, weights=shares).astype(np.float64)
     start, vertices, owner, slot = _slots(patch, np.repeat(tets, 6, axis=0))
     of_nodes = np.concatenate([-Dm_inv.sum(axis=1, keepdims=True), Dm_inv], axis=1)
     weighted = (shares[:, None, None] * np.repeat(of_nodes, 6, axis=0)).reshape(-1, 3)
@@ -179,7 +179,7 @@ def _vertex_patches(tets, volumes, region, kind, rest) -> VertexPatches:
         np.searchsorted(patch[order], np.arange(len(start))).astype(np.int32),
         order.astype(np.int32),
         slot.reshape(m, 4, 4),
-        np.bincount(patch, weights=shares),
+        np.bincount(patch, weights=shares).astype(np.float64),
         np.repeat(kind, 4)[first],
         _means(patch, shares, np.repeat(rest, 4)),
         patch.reshape(m, 4),

@@ -119,7 +119,7 @@ def read_physics(file: CheckedFile, header: dict[str, Any], m: int) -> RecordedP
     region = np.full(m, NO_REGION, dtype=np.int32)
     if physics.get("patches", False):
         region = file.array(f"{_GROUP}/region", "i", (m,)).astype(np.int32)
-    return RecordedPhysics(kind, mu, lam, compliances, *counts, region)
+    return RecordedPhysics(kind, mu, lam, compliances, *counts, region=region)
 
 
 def read_untouching(file: CheckedFile, header: dict[str, Any]) -> tuple[tuple[int, int], ...]:
