@@ -49,7 +49,8 @@ def njit(function: FunctionType | None = None, *, cache: bool = False, parallel:
 
 
 def _compiled(function: FunctionType, cache: bool, options: dict[str, Any]) -> Any:
-    compiled: Any = numba.njit(**{"nogil": True, **options})(function)
+    options = {"nogil": True, **options}
+    compiled: Any = numba.njit(**options)(function)
     if cache and isinstance(compiled, Dispatcher):
         compiled._cache = KernelCache(function)  # pyright: ignore[reportAttributeAccessIssue]
     return compiled
