@@ -260,15 +260,21 @@ def test_a_killed_worker_loses_no_case_and_its_own_goes_on_from_the_checkpoint(t
             assert [frame.index for frame in recording] == list(range(FALL_STEPS + 1))
 
 
+def simulate_in(run, folder, seconds):
+    from supple.runs.recorded import simulate_recorded
+
+    return simulate_recorded(run, folder / "recording.vtkhdf", folder / "checkpoint", seconds)
+
+
 def begun_case(folder, seconds=0.0):
     """A case that was interrupted after its sixth frame, as a killed worker leaves it; the whole case beside it."""
-    from supple.studies import simulate_case as module
+    from supple.runs import recorded as module
 
     run = sp.Run(make_fall(10.0), SETTINGS["solver"], FALL_DT, FALL_STEPS)
     whole, half = folder / "whole", folder / "half"
     for path in (whole, half):
         path.mkdir(parents=True)
-    module.simulate_case(run, whole, seconds)
+    simulate_in(run, whole, seconds)
 
     class Killed(BaseException):
         pass
@@ -282,24 +288,22 @@ def begun_case(folder, seconds=0.0):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module.CheckpointSink, "write", killed)
         with pytest.raises(Killed):
-            module.simulate_case(run, half, seconds)
+            simulate_in(run, half, seconds)
     return run, whole, half
 
 
 @pytest.mark.parametrize("fault", ["none", "damaged", "another case", "no recording"])
 def test_a_begun_case_has_the_bits_of_an_uninterrupted_one_or_begins_again(tmp_path, caplog, fault):
-    from supple.studies.simulate_case import simulate_case
-
     run, whole, half = begun_case(tmp_path)
     checkpoint = half / "checkpoint"
     if fault == "damaged":
         checkpoint.write_bytes(checkpoint.read_bytes()[:-1])
     if fault == "another case":
         run = sp.Run(make_fall(5.0), run.solver, run.dt, run.steps)
-        simulate_case(run, whole, 30.0)
+        simulate_in(run, whole, 30.0)
     if fault == "no recording":
         (half / "recording.vtkhdf").unlink()
-    assert simulate_case(run, half, 0.0) == (FALL_STEPS, "")
+    assert simulate_in(run, half, 0.0) == (FALL_STEPS, "")
     assert not checkpoint.exists()
     with sp.read_recording(whole / "recording.vtkhdf") as one, sp.read_recording(half / "recording.vtkhdf") as two:
         assert len(one) == len(two) == FALL_STEPS + 1

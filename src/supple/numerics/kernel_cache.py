@@ -37,7 +37,7 @@ def njit(function: FunctionType | None = None, *, cache: bool = False, parallel:
     cache : whether the machine code is kept on disk, see `KernelCache`.
     parallel : whether loops over `prange` may use several threads. The kernel is then a `ParallelKernel`, as is every
         kernel that calls one.
-    options : as of `numba.njit`.
+    options : as of `numba.njit`; `nogil=False` for a kernel with parts in Python.
     """
     if function is None:
         return partial(njit, cache=cache, parallel=parallel, **options)
@@ -50,7 +50,8 @@ def njit(function: FunctionType | None = None, *, cache: bool = False, parallel:
 
 
 def _compiled(function: FunctionType, cache: bool, options: dict[str, Any]) -> Any:
-    compiled: Any = numba.njit(nogil=True, **options)(function)
+    options = {"nogil": True, **options}
+    compiled: Any = numba.njit(**options)(function)
     if cache and isinstance(compiled, Dispatcher):
         compiled._cache = KernelCache(function)  # pyright: ignore[reportAttributeAccessIssue]
     return compiled

@@ -20,8 +20,8 @@ from supple.errors import StudyError, SuppleError
 from supple.files.lock import FolderLock
 from supple.numerics.threads import numba_threads
 from supple.output.recording.reader import Recording, read_recording
-from supple.studies.cases import LOG, RECORDING, CaseResult, read_result, write_result
-from supple.studies.simulate_case import simulate_case
+from supple.runs.recorded import simulate_recorded
+from supple.studies.cases import CHECKPOINT, LOG, RECORDING, CaseResult, read_result, write_result
 from supple.studies.sources import Job
 
 Measure = Callable[[Recording], "float | Mapping[str, float]"]
@@ -86,7 +86,7 @@ def _simulated(job: Job, folder: Path, checkpoint_seconds: float) -> CaseResult:
     needed, allowed = _PROGRAM + run.solver.bytes_needed(run.scene), _memory_limit()
     if allowed is not None and needed > allowed:
         return CaseResult("deferred", bytes_needed=needed)
-    frames, problem = simulate_case(run, folder, checkpoint_seconds)
+    frames, problem = simulate_recorded(run, folder / RECORDING, folder / CHECKPOINT, checkpoint_seconds)
     status = "failed" if problem else "done"
     reason = problem[:_LONGEST_REASON]
     return CaseResult(status, reason=reason, frames=frames, simulated=not problem, bytes_needed=needed)

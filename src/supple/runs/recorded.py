@@ -1,4 +1,4 @@
-"""Simulating and recording a case, from its last checkpoint where a worker was lost that had begun with it."""
+"""Simulating into a recording alone, as studies do: with one checkpoint beside it as long as it is not complete."""
 
 from __future__ import annotations
 
@@ -14,13 +14,12 @@ from supple.runs.checkpoints import checkpoint_of, facts_of, frame_of
 from supple.runs.facts import differences, versions
 from supple.scene_file.loader import Run
 from supple.simulate import Frame, simulate
-from supple.studies.cases import CHECKPOINT, RECORDING
 
 logger = logging.getLogger(__name__)
 
 
 class CheckpointSink:
-    """Keeps the latest frame of a case that may go on, at most once in so many seconds.
+    """Keeps the latest frame that a run may go on from, at most once in so many seconds.
 
     Parameters
     ----------
@@ -34,7 +33,7 @@ class CheckpointSink:
         self._written = time.monotonic()
 
     def begin(self, first: Frame, dt: float, steps: int) -> None:
-        """Nothing is written: a case that takes less time than `seconds` has no checkpoint."""
+        """Nothing is written: a run that takes less time than `seconds` has no checkpoint."""
 
     def write(self, frame: Frame) -> None:
         """Write a checkpoint where one is due."""
@@ -48,20 +47,19 @@ class CheckpointSink:
         self._written = time.monotonic()
 
     def end(self) -> None:
-        """The checkpoint stays where the case has not ended; `simulate_case` deletes it otherwise."""
+        """The checkpoint stays where the run has not ended; `simulate_recorded` deletes it otherwise."""
 
 
-def simulate_case(run: Run, folder: Path, checkpoint_seconds: float) -> tuple[int, str]:
-    """Simulate and record a case; the number of frames, and why it stopped early.
+def simulate_recorded(run: Run, recording: Path, checkpoint: Path, checkpoint_seconds: float) -> tuple[int, str]:
+    """Simulate and record a run; the number of frames, and why it stopped early.
 
-    An interruption changes no bit of the recording.
+    Where an earlier process was killed, the run goes on from the checkpoint; that changes no bit of the recording.
 
     Raises
     ------
-    SuppleError : where the case cannot be simulated or recorded.
+    SuppleError : where it cannot be simulated or recorded.
     """
-    recording, checkpoint = folder / RECORDING, folder / CHECKPOINT
-    first = _interrupted(run, folder)
+    first = _interrupted(run, recording, checkpoint)
     if first is None:
         checkpoint.unlink(missing_ok=True)
         recorder = Recorder(recording, scene_text=run.text, solver=run.solver, compress=run.output.compress)
@@ -82,10 +80,9 @@ def simulate_case(run: Run, folder: Path, checkpoint_seconds: float) -> tuple[in
     return index, problem
 
 
-def _interrupted(run: Run, folder: Path) -> Frame | None:
-    """The frame to go on from; None where the case has to begin."""
-    path = folder / CHECKPOINT
-    if not path.exists() or not (folder / RECORDING).exists():
+def _interrupted(run: Run, recording: Path, path: Path) -> Frame | None:
+    """The frame to go on from; None where the run has to begin."""
+    if not path.exists() or not recording.exists():
         return None
     try:
         checkpoint = read_checkpoint(path)
@@ -97,5 +94,5 @@ def _interrupted(run: Run, folder: Path) -> Frame | None:
         logger.warning("%s", error)
         return None
     if frame is None:
-        logger.warning("%s: is of another case or of other versions; the case begins again", path)
+        logger.warning("%s: is of another run or of other versions; the run begins again", path)
     return frame
