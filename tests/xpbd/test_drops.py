@@ -131,7 +131,7 @@ def test_random_piles_converge_and_pass_the_check(seed, tmp_path):
 @pytest.mark.parametrize("seed", range(100, 300))
 def test_many_random_piles_are_what_their_statuses_say(seed, tmp_path):
     statuses = check_recorded(pile(seed), tmp_path / "pile.vtkhdf", 20)
-    assert statuses <= {"converged", "softened", "intersecting"}
+    assert not statuses & {"inverted", "not_finite"}
 
 
 def test_a_small_soft_ball_dropped_ten_centimetres():
