@@ -21,7 +21,7 @@ for name in sys.argv[1:]:
     numbers[0, : len(shape.parameters)] = shape.parameters
     arrays = (numbers, np.zeros(1, dtype=np.bool_))
     rules = (np.zeros(1, np.int32), np.ones((1, 1), np.bool_), np.zeros((1, 1)))
-    found = (np.array([0, 1]), np.zeros(1, np.int32), np.zeros((1, 3)))
+    found = (np.array([0, 1]), np.zeros(1, np.int32), np.zeros((1, 3)), np.zeros(1))
     frames = shape.frame[None]
     points = (x.copy(), np.zeros(1))
     scales = (1.0, 0.0, 1.0)

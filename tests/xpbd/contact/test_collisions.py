@@ -124,3 +124,30 @@ def test_contacts_far_from_the_origin_are_the_same():
         return frames[-1].state.positions - shift
 
     assert np.abs(drop(np.array([1000.0, 0.0, -2000.0])) - drop(np.zeros(3))).max() < 1e-5
+
+
+def test_contacts_that_are_projected_again_in_a_substep_keep_their_forces():
+    """The guard of volumes asks for it. Nothing has moved in between here."""
+
+    def run(times):
+        body = sp.Body("b", sp.shapes.box((0.2, 0.1, 0.2), (2, 1, 2)), SOFT, position=(0, 0.0505, 0))
+        system = build_system(sp.Scene([body], [sp.HalfSpace(friction=0.5)]))
+        state = initial_state(system.scene)
+        collisions = Collisions(system, None)
+        x, v, h = state.positions.copy(), state.velocities + np.array([0.1, 0.0, 0.0]), 1 / 600
+        collisions.begin_step(x, v, 0.0, 1 / 60)
+        for k in range(10):
+            before = x.copy()
+            x = x + h * (v + h * np.array([0.0, -9.81, 0.0]))
+            collisions.begin_substep(x, before, h)
+            x[:, 1] -= 50.0 * h * h  # as elastic forces that press the body down
+            for _ in range(times):
+                collisions.project(x, before, (k + 1) * h, h)
+            collisions.end_substep()
+            v = (x - before) / h
+        return x, collisions.memory(x).obstacles.loads
+
+    one, two = run(1), run(3)
+    assert np.abs(one[1]).max() > 1.0
+    assert one[0] == pytest.approx(two[0], abs=1e-12)
+    assert one[1] == pytest.approx(two[1], abs=1e-6)

@@ -53,7 +53,7 @@ class EnergyBalance:
         self._at_pins = ElasticEnergy(system, held) if self._moving_pins else None
         self._obstacles_move = any(obstacle.motion is not None for obstacle in system.obstacles)
         self._anchors_move = self._obstacles_move and len(system.stitching.anchors) > 0
-        fall = LEAST_FALL * edge_length * float(np.linalg.norm(system.gravity))
+        fall = LEAST_FALL * edge_length * math.hypot(*system.gravity)
         self._least = LEAST_STRAIN**2 * _stiffness(system) + fall * float(self._masses.sum())
         self._begun = np.zeros(len(system.bodies))
         self._total = self._work = self._hard = self._h = 0.0

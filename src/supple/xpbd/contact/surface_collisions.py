@@ -26,8 +26,8 @@ from supple.xpbd.contact.contact_rows import (
 from supple.xpbd.contact.detection.edge_contacts import find_edge_contacts
 from supple.xpbd.contact.detection.edge_pairs import EdgePairs
 from supple.xpbd.contact.detection.piece_runs import PieceRuns
-from supple.xpbd.contact.detection.sharp_edges import sharp_edges
 from supple.xpbd.contact.detection.surface_contacts import find_contacts
+from supple.xpbd.contact.detection.surface_edges import surface_edges
 from supple.xpbd.contact.memory import SurfaceMemory
 
 # Of the mean surface edge: the least and the largest motion of a point that lists of candidates allow for, and the
@@ -62,7 +62,7 @@ class SurfaceCollisions:
         excluded = excluded_pairs(s, rest, 2.0 * min(widest, 0.5 * edge_length))
         self._stitched = stitched_points(system, s, poses)
         self._rules = (s.allowed, *excluded)
-        self._edges = EdgePairs(sharp_edges(s, rest), s, self._stitched)
+        self._edges = EdgePairs(surface_edges(s), s, self._stitched)
         self._finder = PairFinder(n)
         self._x, self._before, self._gathered = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
         self._shapes = (self._x, s.point_piece, s.triangles, s.triangle_piece)

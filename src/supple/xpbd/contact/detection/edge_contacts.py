@@ -89,7 +89,7 @@ def find_edge_contacts(x, x_prev, pairs, edges, surfaces, near, first_obstacle, 
     ----------
     x, x_prev : (n, 3) at the end and at the beginning of the substep [m]
     pairs : first (k,), second (k,) edges, and their rows (k,)
-    edges : ends (e, 2), opposite (e, 2): see `SharpEdges`
+    edges : ends (e, 2), opposite (e, 2): see `SurfaceEdges`
     surfaces : point_piece (n,), closed (p,), gaps (p, p), friction (p, p)
     near : distances above this are not reported [m]
     first_obstacle : the first point of an obstacle; kind : 0 for pairs of bodies only, 1 for those with an obstacle

@@ -1,4 +1,4 @@
-"""The pairs of sharp edges that may touch: a sweep along one axis over the boxes of edges near other pieces.
+"""The pairs of edges that may touch: a sweep along one axis over the boxes of edges near other pieces.
 
 Source: Ericson, "Real-Time Collision Detection" (2005), section 7.5.
 """
@@ -12,7 +12,7 @@ from supple.contact.search.surfaces import ContactSurfaces
 from supple.numerics.adjacency import in_list
 from supple.numerics.kernel_cache import njit
 from supple.xpbd.contact.detection.piece_runs import EDGE_EDGE, key_of
-from supple.xpbd.contact.detection.sharp_edges import SharpEdges
+from supple.xpbd.contact.detection.surface_edges import SurfaceEdges
 
 _EDGE_BITS = (1 << 31) - 1
 
@@ -105,7 +105,7 @@ class EdgePairs:
 
     def __init__(
         self,
-        edges: SharpEdges,
+        edges: SurfaceEdges,
         surfaces: ContactSurfaces,
         stitched: tuple[NDArray[np.int64], NDArray[np.int32]],
     ) -> None:
