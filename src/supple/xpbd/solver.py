@@ -52,8 +52,8 @@ from supple.xpbd.workspace import XPBDWorkspace
 # How often tets that are compressed too fast are projected in a substep, in turn with the contacts, before the motion
 # of their body is shortened.
 MOST_PROJECTIONS = 10
-# How often a bad frame is repeated with twice as many substeps.
-MOST_REPEATS = 2
+# How often a bad frame is repeated with twice as many substeps. What crosses with twice as many crosses with more, too.
+MOST_REPEATS, MOST_FOR_CROSSINGS = 2, 1
 # Below this much work, in edges or volumes, a sweep ends before a second thread has started.
 PARALLEL_FROM = 20_000
 _MOST_THREADS: int = config.NUMBA_NUM_THREADS  # pyright: ignore[reportAttributeAccessIssue]
@@ -175,7 +175,8 @@ class XPBD(Solver):
                 new, report, problem = self._reported(ws, time, dt, held_back, used, repeats, memory)
             else:
                 problem = Status.NOT_FINITE
-            last = self.substeps != "auto" or used.count >= self.max_substeps or repeats == MOST_REPEATS
+            most = MOST_FOR_CROSSINGS if problem is Status.INTERSECTING else MOST_REPEATS
+            last = self.substeps != "auto" or used.count >= self.max_substeps or repeats >= most
             if last or problem is None or problem in memory.futile:
                 break
             repeats += 1
