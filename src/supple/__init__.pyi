@@ -11,6 +11,8 @@ from .errors import SuppleError as SuppleError
 from .implicit.contact.settings import IPCContact as IPCContact
 from .implicit.limits.step_filter import largest_noninverting_step as largest_noninverting_step
 from .implicit.solver import Implicit as Implicit
+from .learning.batch import Batch as Batch
+from .learning.batch import BatchSnapshot as BatchSnapshot
 from .materials.arap import ARAP as ARAP
 from .materials.edges_and_volume import EdgesAndVolume as EdgesAndVolume
 from .materials.fixed_corotated import FixedCorotated as FixedCorotated
@@ -46,6 +48,8 @@ from .scene.body import Body as Body
 from .scene.contact_pairs import ContactPair as ContactPair
 from .scene.forces import Force as Force
 from .scene.forces import SoftTarget as SoftTarget
+from .scene.inputs import ForceInput as ForceInput
+from .scene.inputs import MotionInput as MotionInput
 from .scene.motion import Keyframes as Keyframes
 from .scene.obstacles.box import Box as Box
 from .scene.obstacles.capsule import Capsule as Capsule

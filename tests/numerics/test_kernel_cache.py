@@ -17,6 +17,7 @@ from numba.core.dispatcher import Dispatcher
 
 import supple
 from supple.numerics.kernel_cache import KernelCache, njit, reached_code
+from supple.numerics.parallel_kernel import ParallelKernel
 
 SOURCES = Path(supple.__file__).parent
 # Prints the result of a kernel of svd3.py, and how often the cache had it.
@@ -87,9 +88,10 @@ def test_every_cached_kernel_of_the_package_uses_this_cache():
             continue
         for value in vars(importlib.import_module(module.name)).values():
             for kernel in value if isinstance(value, tuple) else (value,):
-                if isinstance(kernel, Dispatcher) and not isinstance(kernel._cache, NullCache):
-                    assert isinstance(kernel._cache, KernelCache), kernel
-                    kernels += 1
+                for form in kernel.forms if isinstance(kernel, ParallelKernel) else (kernel,):
+                    if isinstance(form, Dispatcher) and not isinstance(form._cache, NullCache):
+                        assert isinstance(form._cache, KernelCache), form
+                        kernels += 1
     assert kernels > 50
 
 

@@ -166,6 +166,15 @@ class StudyFileModel(Model):
     measures: dict[Name, MeasureModel] = Field(min_length=1, max_length=1000)
 
 
+def study_schema() -> dict[str, Any]:
+    """The JSON Schema (draft 2020-12) of study files, for editors and other programs."""
+    schema = StudyFileModel.model_json_schema()
+    factors = schema["properties"]["factors"]
+    levels = {"type": "array", "minItems": 1, "maxItems": MOST_LEVELS, "description": "values"}
+    factors["additionalProperties"] = {"anyOf": [levels, factors["additionalProperties"]]}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "Supple study"}
+
+
 def load_study(path: str | Path) -> Study:
     """Read a study file (YAML), and the scene file that it names.
 
