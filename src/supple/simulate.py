@@ -16,6 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError, SolverError
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.material import Elastic
+from supple.materials.patches.energy import patch_energies
+from supple.materials.per_tet import NO_REGION
 from supple.numerics.deformation import deformation_gradients, determinants
 from supple.numerics.memory import require_memory
 from supple.scene.inputs import checked_values, drive_inputs, hold_inputs
@@ -322,13 +324,20 @@ def measure(system: System, state: State) -> Diagnostics:
     return Diagnostics(
         min_det_F=float(J.min()),
         kinetic_energy=0.5 * float(m @ np.einsum("ij,ij->i", v, v)),
-        elastic_energy=sum(_elastic_energy(system, part, x, F[part.tets], J[part.tets]) for part in system.bodies),
+        elastic_energy=sum(_elastic_energy(system, part, x, F[part.tets], J[part.tets]) for part in system.bodies)
+        + _energy_of_patches(system, x),
         potential_energy=-float((m @ x) @ system.gravity),
         stitch_energy=stitch_energy(stitching, points) if len(stitching) else 0.0,
         largest_stitch_stretch=largest_stitch_stretch(stitching, points) if len(stitching) else None,
         linear_momentum=momentum,
         angular_momentum=m @ np.cross(x - center, v - momentum / m.sum()),
     )
+
+
+def _energy_of_patches(system: System, x: NDArray) -> float:
+    if system.patches is None:
+        return 0.0
+    return sum(float(energies.sum()) for energies in patch_energies(system.patches, x))
 
 
 def _elastic_energy(system: System, part: BodyRange, x: NDArray, F: NDArray, J: NDArray) -> float:
@@ -345,5 +354,8 @@ def _elastic_energy(system: System, part: BodyRange, x: NDArray, F: NDArray, J: 
             energy += 0.5 * float(C @ C) / material.volume_compliance
         return energy
     if isinstance(material, Elastic):
-        return float(material.energy_density(F) @ volumes)
+        densities = material.energy_density(F)
+        if system.patches is not None:
+            densities[material.per_tet(len(volumes)).region != NO_REGION] = 0.0
+        return float(densities @ volumes)
     return 0.0
