@@ -5,7 +5,7 @@ import yaml
 from jsonschema import Draft202012Validator
 
 import supple as sp
-from supple.studies.factors import Levels, LogUniform
+from supple.studies.sampling.factors import Levels, LogUniform
 from supple.studies.study_file import study_schema
 
 from .conftest import SCENE

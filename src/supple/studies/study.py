@@ -14,11 +14,11 @@ from supple.errors import StudyError, SuppleError
 from supple.files.lock import FolderLock
 from supple.files.replacing import output_error, whole_file
 from supple.studies.cases import Case, CaseResult, case_key, read_result, write_result
-from supple.studies.designs import Design
-from supple.studies.factors import Factor
 from supple.studies.measures import Measures
 from supple.studies.run_case import Measure
 from supple.studies.runner import Measuring, StudyProgress, Tally, Task, run_tasks
+from supple.studies.sampling.designs import Design
+from supple.studies.sampling.factors import Factor
 from supple.studies.sources import Source
 from supple.studies.table import StudyTable
 from supple.studies.workers import Opener, cluster_workers, local_workers

@@ -13,9 +13,9 @@ from supple.errors import StudyError
 from supple.scene_file.model import FilePath, Model, Name, Number
 from supple.scene_file.validation_errors import scene_error
 from supple.scene_file.yaml_reader import YamlDocument, read_yaml
-from supple.studies import designs
-from supple.studies.factors import MOST_LEVELS, Factor, Levels, LogUniform, Uniform
 from supple.studies.measures import BodyMeasure, Measures, SeriesMeasure
+from supple.studies.sampling import designs
+from supple.studies.sampling.factors import MOST_LEVELS, Factor, Levels, LogUniform, Uniform
 from supple.studies.sources import FileSource
 from supple.studies.study import Study
 
