@@ -21,8 +21,9 @@ demo: .venv/.base
 	$(BIN)/supple demo squash --overwrite --output out/squash
 	$(BIN)/supple demo bears --overwrite --output out/bears
 
+# Three processes on two cores: tests of the page and of other processes wait much of their time.
 test: .venv/.dev
-	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"
+	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not slow"
 
 test-all: .venv/.dev
 	$(BIN)/python -m pytest -n 2 --dist worksteal
