@@ -52,6 +52,8 @@ from supple.xpbd.workspace import XPBDWorkspace
 # How often tets that are compressed too fast are projected in a substep, in turn with the contacts, before the motion
 # of their body is shortened.
 MOST_PROJECTIONS = 10
+# After how many of these projections contacts are projected, which costs about ten times as much.
+CONTACTS_EACH = 3
 # How often a bad frame is repeated with twice as many substeps. What crosses with twice as many crosses with more, too.
 MOST_REPEATS, MOST_FOR_CROSSINGS = 2, 1
 # Below this much work, in edges or volumes, a sweep ends before a second thread has started.
@@ -350,13 +352,17 @@ def _collide(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
 
 def _keep_volumes(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
     """Project tets that lose too much volume, in turn with contacts. Returns whether that was not enough."""
+    apart = True  # whether contacts were projected last
     for k in range(MOST_PROJECTIONS):
-        if not ws.guard.measure(ws.points, parallel, ENOUGH if k else 1.0):
+        low = ws.guard.measure(ws.points, parallel, ENOUGH if k else 1.0)
+        if not low and apart:
             ws.guard.accept()
             return False
-        ws.guard.project(ws.points)
-        _restore(ws, h, parallel)
-        if ws.collisions and not _collide(ws, time, h, parallel):
+        if low:
+            ws.guard.project(ws.points)
+            _restore(ws, h, parallel)
+        apart = not low or k % CONTACTS_EACH == 0
+        if apart and ws.collisions and not _collide(ws, time, h, parallel):
             return True
     ws.guard.measure(ws.points, parallel)
     failures = ws.guard.failures()
