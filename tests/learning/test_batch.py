@@ -123,7 +123,7 @@ def test_copies_are_independent_and_can_be_reset_one_by_one():
 
 
 def test_a_copy_that_cannot_go_on_stays_and_the_others_go_on():
-    batch = sp.Batch(cubes(), 2, sp.XPBD(substeps=2), DT, threads=1)
+    batch = sp.Batch(cubes(), 2, sp.XPBD(substeps=20), DT, threads=1)
     batch.step({"pull": [(1e300, 0, 0), (0, 0, 0)]})
     assert batch.statuses == (sp.Status.NOT_FINITE, sp.Status.CONVERGED)
     assert batch.can_go_on.tolist() == [False, True]
