@@ -125,6 +125,7 @@ def test_a_click_pins_a_vertex_and_another_one_unpins_it(resting):
     screen.wait(lambda: dark() < 5, "no pin in the picture")
 
 
+@pytest.mark.slow  # without a browser: tests/viewer/test_changes.py, test_solver_change.py
 def test_a_slider_takes_effect(resting):
     screen = resting.screen
     screen.show_tab("Solver")
@@ -157,6 +158,7 @@ def test_a_squashed_ball_recovers(resting):
     resting.drawn(lambda red: abs(red[2] - seen) < 0.1 * seen, "the ball's own shape in the picture")
 
 
+@pytest.mark.slow  # without a browser: tests/viewer/test_changes.py, test_solver_change.py
 def test_another_solver_continues(still):
     screen, solver = still.screen, still.panel.solver
     screen.show_tab("Solver")
