@@ -1,13 +1,8 @@
 """Studies on real worker processes: results, resumption, failures, and workers that are killed."""
 
 import csv
-import json
 import os
 import signal
-import subprocess
-import sys
-import textwrap
-import time
 from pathlib import Path
 
 import numpy as np
@@ -185,7 +180,6 @@ def killing(marks: Path, victims: str):
 
     def make(case):
         import os
-        import signal
 
         import supple as sp
 
@@ -219,7 +213,6 @@ def killing_in_mid_run(marks: Path):
 
     def make(case):
         import os
-        import signal
         from dataclasses import dataclass
 
         import supple as sp
@@ -360,114 +353,6 @@ def test_a_case_that_always_kills_its_worker_fails_and_the_others_do_not(cluster
     tried = (marks / "case-3").stat().st_size
     sp.sweep(make, {"case": cases}, **options)  # lost workers are worth another try
     assert (marks / "case-3").stat().st_size > tried
-
-
-def test_a_case_too_large_for_its_share_of_the_memory_runs_on_fewer_workers(tmp_path, monkeypatch):
-    from supple.studies import workers as module
-
-    def make(tets):
-        class Large(sp.XPBD):
-            def bytes_needed(self, scene):
-                return tets
-
-        cube = sp.Body("cube", sp.shapes.box((1, 1, 1), (1, 1, 1)), sp.EdgesAndVolume())
-        return sp.Run(sp.Scene([cube]), Large(substeps=1, contact=None), 0.01, 2)
-
-    def limit(recording):
-        from distributed import get_worker
-
-        return get_worker().memory_manager.memory_limit
-
-    monkeypatch.setattr(module, "available_bytes", lambda: 4_000_000_000)
-    values = [0, int(2e9), int(5e9)]
-    table = sp.sweep(make, {"tets": values}, measure=limit, folder=tmp_path / "s", workers=2)
-    assert table.done.tolist() == [True, True, False]
-    np.testing.assert_allclose(table["measure"][:2], [1.8e9, 3.6e9], rtol=1e-3)
-    assert table.reasons[2] == "needs about 5.3 GB of memory; 3.6 GB can be used here"
-
-
-def test_a_cluster_without_a_worker_large_enough(cluster, tmp_path):
-    def make(tets):
-        class Large(sp.XPBD):
-            def bytes_needed(self, scene):
-                return tets
-
-        cube = sp.Body("cube", sp.shapes.box((1, 1, 1), (1, 1, 1)), sp.EdgesAndVolume())
-        return sp.Run(sp.Scene([cube]), Large(substeps=1, contact=None), 0.01, 2)
-
-    def frames(recording):
-        return len(recording)
-
-    table = sp.sweep(make, {"tets": [0, int(9e9)]}, measure=frames, folder=tmp_path / "s", scheduler=cluster)
-    assert table["measure"].tolist()[0] == 3
-    assert table.reasons[1] == "needs about 9.3 GB of memory; the largest worker has 2 GB"
-
-
-SCRIPT = """
-import sys, time
-import supple as sp
-
-folder = sys.argv[1]
-
-def make(case):
-    if case > 2:
-        open(folder + "/slow", "w").close()
-        time.sleep(600)
-    cube = sp.Body("cube", sp.shapes.box((1, 1, 1), (1, 1, 1)), sp.EdgesAndVolume())
-    return sp.Scene([cube], gravity=(0, -case, 0))
-
-def low(recording):
-    return recording[-1].positions["cube"][:, 1].min()
-
-sp.sweep(make, {"case": [1, 2, 3, 4]}, measure=low, folder=folder + "/s", workers=1,
-         solver=sp.XPBD(substeps=1, contact=None), dt=0.01, steps=2)
-"""
-
-
-@pytest.mark.skipif(os.name != "posix", reason="interrupts a process by a signal")
-def test_an_interrupted_study_keeps_what_has_ended_and_leaves_no_process(tmp_path):
-    """The script has no `if __name__ == "__main__"`: workers do not import it."""
-    script = tmp_path / "script.py"
-    script.write_text(SCRIPT, encoding="utf-8")
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-    process = subprocess.Popen(
-        [sys.executable, str(script), str(tmp_path)],
-        env=environment,
-        stderr=subprocess.PIPE,
-        # Whoever runs the tests in the background may have had SIGINT ignored; a person at a terminal has not.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )
-    end = time.monotonic() + 120
-    while not (tmp_path / "slow").exists() and time.monotonic() < end:
-        time.sleep(0.1)
-    workers = json.loads(subprocess.check_output(["python3", "-c", CHILDREN, str(process.pid)]))
-    assert workers
-    process.send_signal(signal.SIGINT)
-    _, error = process.communicate(timeout=300)
-    assert b"KeyboardInterrupt" in error
-    with (tmp_path / "s" / "table.csv").open(encoding="utf-8", newline="") as file:
-        assert [row["status"] for row in csv.DictReader(file)] == ["done", "done"]
-    end = time.monotonic() + 30
-    while any(Path(f"/proc/{pid}").exists() for pid in workers) and time.monotonic() < end:
-        time.sleep(0.1)
-    assert [pid for pid in workers if Path(f"/proc/{pid}").exists()] == []
-
-
-CHILDREN = textwrap.dedent("""
-    import json, pathlib, sys
-    parents = {}
-    for stat in pathlib.Path("/proc").glob("[0-9]*/stat"):
-        try:
-            text = stat.read_text()
-        except OSError:
-            continue
-        parents[int(stat.parent.name)] = int(text.rpartition(")")[2].split()[1])
-    found, new = set(), {int(sys.argv[1])}
-    while new:
-        new = {pid for pid, parent in parents.items() if parent in new}
-        found |= new
-    print(json.dumps(sorted(found)))
-""")
 
 
 @pytest.mark.parametrize(

@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import sys
+import threading
 from collections.abc import Generator
 from contextlib import contextmanager
+
+_lock = threading.Lock()
+_inside = 0
+_before = 0
 
 
 @contextmanager
@@ -18,9 +23,16 @@ def one_contact_thread() -> Generator[None]:
     if ipctk is None:
         yield
         return
-    before = ipctk.get_num_threads()
-    ipctk.set_num_threads(1)
+    global _inside, _before
+    with _lock:  # simulations may run in several threads: the last one gives the library its threads back
+        if _inside == 0:
+            _before = ipctk.get_num_threads()
+            ipctk.set_num_threads(1)
+        _inside += 1
     try:
         yield
     finally:
-        ipctk.set_num_threads(before)
+        with _lock:
+            _inside -= 1
+            if _inside == 0:
+                ipctk.set_num_threads(_before)
