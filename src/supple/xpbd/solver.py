@@ -52,8 +52,8 @@ from supple.xpbd.workspace import XPBDWorkspace
 # How often tets that are compressed too fast are projected in a substep, in turn with the contacts, before the motion
 # of their body is shortened.
 MOST_PROJECTIONS = 10
-# After how many of these projections contacts are projected, which costs about ten times as much.
-CONTACTS_EACH = 3
+# After how many of these projections contacts of surfaces are searched, which costs about ten times as much.
+SEARCH_EACH = 3
 # How often a bad frame is repeated with twice as many substeps. What crosses with twice as many crosses with more, too.
 MOST_REPEATS, MOST_FOR_CROSSINGS = 2, 1
 # Below this much work, in edges or volumes, a sweep ends before a second thread has started.
@@ -340,29 +340,32 @@ def _push_contacts(ws: XPBDWorkspace, h: float) -> None:
             apply_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
 
 
-def _collide(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
+def _collide(ws: XPBDWorkspace, time: float, h: float, parallel: bool, search: bool = True) -> bool:
     """Project the contacts of a substep, in the world. Returns False, without effect, where a position is lost."""
     if not to_world(ws.points, ws.origins, ws.world):
         return False
     to_world(ws.previous, ws.origins, ws.world_previous)
-    ws.collisions.project(ws.world, ws.world_previous, time, h, parallel)
+    if search:
+        ws.collisions.project(ws.world, ws.world_previous, time, h, parallel)
+    else:
+        ws.collisions.project_again(ws.world, ws.world_previous, time, h)
     apply_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
     return True
 
 
 def _keep_volumes(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
     """Project tets that lose too much volume, in turn with contacts. Returns whether that was not enough."""
-    apart = True  # whether contacts were projected last
+    searched = True  # whether the contacts that were projected last had been searched anew
     for k in range(MOST_PROJECTIONS):
         low = ws.guard.measure(ws.points, parallel, ENOUGH if k else 1.0)
-        if not low and apart:
+        if not low and searched:
             ws.guard.accept()
             return False
         if low:
             ws.guard.project(ws.points)
             _restore(ws, h, parallel)
-        apart = not low or k % CONTACTS_EACH == 0
-        if apart and ws.collisions and not _collide(ws, time, h, parallel):
+        searched = not low or k % SEARCH_EACH == 0
+        if ws.collisions and not _collide(ws, time, h, parallel, searched):
             return True
     ws.guard.measure(ws.points, parallel)
     failures = ws.guard.failures()

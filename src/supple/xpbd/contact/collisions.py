@@ -137,13 +137,23 @@ class Collisions:
         limit, self._removed = self._removed, 0.0
         if self.surfaces is not None:
             self._count(self.surfaces.project(x, x_prev, (time - h, time), limit, parallel))
+        self._project_obstacles(x, x_prev, time, h, limit)
+        return self.contacts
+
+    def project_again(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], time: float, h: float) -> int:
+        """`project` for positions that have changed since, without a new search for contacts of surfaces."""
+        self.contacts = 0 if self.surfaces is None else self.surfaces.project_again(x, x_prev, h)
+        self._project_obstacles(x, x_prev, time, h, 0.0)
+        return self.contacts
+
+    def _project_obstacles(
+        self, x: NDArray[np.float64], x_prev: NDArray[np.float64], time: float, h: float, limit: float
+    ) -> None:
         if self.obstacles:
             if any_beyond_reach(x, self._gathered, self._reach):
                 self._gather_obstacles(x, (x - x_prev) / h, time)
-            self._count(
-                self.obstacles.project(x, x_prev, (time - h, time), (limit, self.skin, NEAR * self.edge_length))
-            )
-        return self.contacts
+            scales = (limit, self.skin, NEAR * self.edge_length)
+            self._count(self.obstacles.project(x, x_prev, (time - h, time), scales))
 
     def memory(self, x: NDArray[np.float64]) -> ContactMemory | None:
         """What the next frame needs beside positions and velocities; `x` (n, 3) are the final positions [m]."""

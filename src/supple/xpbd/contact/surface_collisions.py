@@ -72,6 +72,8 @@ class SurfaceCollisions:
         self._runs = PieceRuns(self._finder, n, s.triangle_piece)
         self._rows = ContactRows()
         self._smallest = np.zeros(n)
+        # Of the last search: the rows of each kind that take part.
+        self._chosen = [np.zeros(0, dtype=np.int64)] * 2
         self._far, self._near = np.zeros((n, 3)), np.zeros((n, 3))
         self._drifts = np.zeros((pieces + 1, 3))
         # Obstacles stand still, so that no motion is common to all points where there is one.
@@ -132,12 +134,20 @@ class SurfaceCollisions:
         contacts, smallest = 0, np.inf
         # Obstacles come last because they cannot be moved.
         for kind, part in enumerate(((0, s.body_triangles), (s.body_triangles, len(s.triangles)))):
+            self._chosen[kind] = self._chosen[kind][:0]
             if part[0] < part[1] and len(self._rows.keys):
-                found = self._resolve(kind, part, h, limit, parallel)
-                contacts, smallest = contacts + found[0], min(smallest, found[1])
-        x[s.rows] = self._x[: len(s.rows)]
-        x_prev[s.rows] = self._before[: len(s.rows)]
+                gap = self._find(kind, part, h, parallel)
+                pushes, least = self._solve(kind, h, limit)
+                contacts, smallest = contacts + pushes, min(smallest, gap, least)
+        self._give(x, x_prev)
         return contacts, smallest
+
+    def project_again(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> int:
+        """Project the contacts of the last search at positions that have changed since then; returns their number."""
+        self._take(x, x_prev)
+        contacts = sum(self._solve(kind, h, 0.0)[0] for kind, chosen in enumerate(self._chosen) if len(chosen))
+        self._give(x, x_prev)
+        return contacts
 
     def end_substep(self) -> None:
         """Keep the share of the forces with which the next substep begins."""
@@ -148,8 +158,20 @@ class SurfaceCollisions:
         np.take(x, self.surfaces.rows, axis=0, out=self._x[:bodies])
         np.take(x_prev, self.surfaces.rows, axis=0, out=self._before[:bodies])
 
-    def _resolve(self, kind: int, part: tuple[int, int], h: float, limit: float, parallel: bool) -> tuple[int, float]:
-        """Find and resolve the contacts with the triangles of one part: of bodies (0) or of obstacles (1)."""
+    def _give(self, x: NDArray[np.float64], x_prev: NDArray[np.float64]) -> None:
+        bodies = len(self.surfaces.rows)
+        x[self.surfaces.rows] = self._x[:bodies]
+        x_prev[self.surfaces.rows] = self._before[:bodies]
+
+    def _solve(self, kind: int, h: float, limit: float) -> tuple[int, float]:
+        """Project the chosen rows of one kind; returns what `solve_rows` does."""
+        chosen, described = self._chosen[kind], self._rows.described
+        found = solve_rows(self._x, self._before, self._predicted, self._points, chosen, described, h, limit, SWEEPS)
+        note_depths(self._x, chosen, described, self._depth[kind])
+        return found
+
+    def _find(self, kind: int, part: tuple[int, int], h: float, parallel: bool) -> float:
+        """Find the contacts with the triangles of one part, of bodies (0) or of obstacles (1); the smallest gap [m]."""
         s, rows = self.surfaces, self._rows
         bodies, near = len(s.rows), NEAR * self.edge_length
         described = rows.described
@@ -171,12 +193,8 @@ class SurfaceCollisions:
                 self._x, self._before, self._pairs, self._edges.arrays, rules, *which, described, self._edges.smallest
             )
             smallest = min(smallest, self._edges.smallest.min())
-        chosen = choose_rows(self._x, self._before, s.inverse_masses, described, bodies, kind, h)
-        contacts, least = solve_rows(
-            self._x, self._before, self._predicted, self._points, chosen, described, h, limit, SWEEPS
-        )
-        note_depths(self._x, chosen, described, self._depth[kind])
-        return contacts, float(min(smallest, least))
+        self._chosen[kind] = choose_rows(self._x, self._before, s.inverse_masses, described, bodies, kind, h)
+        return float(smallest)
 
     def memory(self, x: NDArray[np.float64]) -> SurfaceMemory:
         """What the next step needs; `x` (n, 3) are the positions at the end of this one, after all contacts [m]."""
