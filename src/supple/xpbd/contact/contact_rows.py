@@ -104,7 +104,8 @@ class ContactRows:
 
     def restore(self, loaded: LoadedRows, keys: NDArray[np.int64]) -> None:
         """Rows for these pairs (ascending), and those of `loaded`."""
-        self.resize(np.union1d(keys, loaded.keys))
+        new = loaded.keys[~_among(loaded.keys, keys)]
+        self.resize(np.sort(np.concatenate([keys, new])) if len(new) else keys)
         place = np.searchsorted(self.keys, loaded.keys)
         for name in ("vertices", "weights", "normals", "offsets", "friction", "forces"):
             getattr(self, name)[place] = getattr(loaded, name)
@@ -125,6 +126,13 @@ class ContactRows:
             self.friction[k],
             self.forces[k],
         )
+
+
+def _among(few: NDArray[np.int64], keys: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which of a few numbers are among `keys` (k,), ascending."""
+    if not len(keys):
+        return np.zeros(len(few), dtype=np.bool_)
+    return keys[np.minimum(np.searchsorted(keys, few), len(keys) - 1)] == few
 
 
 @njit(cache=True)

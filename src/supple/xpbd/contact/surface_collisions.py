@@ -23,18 +23,27 @@ from supple.xpbd.contact.contact_rows import (
     push_rows,
     solve_rows,
 )
-from supple.xpbd.contact.detection.edge_contacts import find_edge_contacts
+from supple.xpbd.contact.detection.edge_contacts import find_edge_contacts, find_passages
 from supple.xpbd.contact.detection.edge_pairs import EdgePairs
 from supple.xpbd.contact.detection.piece_runs import PieceRuns
-from supple.xpbd.contact.detection.surface_contacts import find_contacts
+from supple.xpbd.contact.detection.surface_contacts import (
+    boxes_of_triangles,
+    find_contacts,
+    find_point_passages,
+    near_triangles,
+)
 from supple.xpbd.contact.detection.surface_edges import surface_edges
 from supple.xpbd.contact.memory import SurfaceMemory
 
 # Of the mean surface edge: the least and the largest motion of a point that lists of candidates allow for, and the
 # largest gap that is reported.
 LEAST_REACH, MOST_REACH, NEAR = 0.1, 0.5, 1.0
+# Of the mean surface edge: how far contacts may move a point in a substep, where edges are looked for.
+SLACK = 0.1
 # Sweeps over all contacts of a substep; see docs/xpbd_contact.md for what more of them would change.
 SWEEPS = 2
+# How often contacts are solved again because edges have passed through each other.
+MOST_PASSAGES = 20
 # Below this many active points, contacts are found before a second thread has started.
 PARALLEL_FROM = 500
 
@@ -62,6 +71,9 @@ class SurfaceCollisions:
         excluded = excluded_pairs(s, rest, 2.0 * min(widest, 0.5 * edge_length))
         self._stitched = stitched_points(system, s, poses)
         self._rules = (s.allowed, *excluded)
+        self._slack = widest + SLACK * edge_length
+        self._near_pairs = np.zeros(0, dtype=np.int64)
+        self._near_triangles, self._swept = np.zeros((0, 3), dtype=np.int64), np.zeros((len(s.triangles), 6))
         self._edges = EdgePairs(surface_edges(s), s, self._stitched)
         self._finder = PairFinder(n)
         self._x, self._before, self._gathered = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
@@ -100,7 +112,7 @@ class SurfaceCollisions:
         motions[:bodies] = v[self.surfaces.rows] * dt
         self._before[:] = self._x
         self._recall(memory)
-        self._gather(motions)
+        self._gather(motions, False)
         self._excursions[:] = 0.0
 
     def begin_substep(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> bool:
@@ -130,14 +142,21 @@ class SurfaceCollisions:
         self._predicted[len(s.rows) :] = self._x[len(s.rows) :]
         allowed = (self._far, self._near, s.point_piece, self._all_share, self._drifts)
         if any_beyond_radii(self._x, self._before, self._gathered, *allowed, self._excursions):
-            self._gather((self._x - self._before) * (self._dt / h))
+            self._gather((self._x - self._before) * (self._dt / h), parallel)
         contacts, smallest = 0, np.inf
+        self._near_pairs = self._edges.swept(self._x, self._before, self._slack, parallel)
+        boxes_of_triangles[parallel](self._x, self._before, s.triangles, self._slack, self._swept)
+        self._near_triangles = near_triangles(self._x, self._before, self._lists, s.triangles, self._swept)
         # Obstacles come last because they cannot be moved.
         for kind, part in enumerate(((0, s.body_triangles), (s.body_triangles, len(s.triangles)))):
             self._chosen[kind] = self._chosen[kind][:0]
             if part[0] < part[1] and len(self._rows.keys):
                 gap = self._find(kind, part, h, parallel)
                 pushes, least = self._solve(kind, h, limit)
+                for _ in range(MOST_PASSAGES):
+                    if not self._find_passages(kind, part, h):
+                        break
+                    pushes, _ = self._solve(kind, h, 0.0)
                 contacts, smallest = contacts + pushes, min(smallest, gap, least)
         self._give(x, x_prev)
         return contacts, smallest
@@ -170,6 +189,18 @@ class SurfaceCollisions:
         note_depths(self._x, chosen, described, self._depth[kind])
         return found
 
+    def _find_passages(self, kind: int, part: tuple[int, int], h: float) -> bool:
+        """Let points and edges that have passed through something take part. Returns whether there are any."""
+        s, described = self.surfaces, self._rows.described
+        points = (self._x, self._before, self._near_triangles, self._pieces, part, self._stitched)
+        passed = find_point_passages(*points, described, self._entered)
+        rules = (s.point_piece, s.closed, s.gaps, s.friction)
+        found = (self._x, self._before, self._pairs, self._near_pairs, self._edges.arrays[0], rules)
+        passed += find_passages(*found, len(s.rows), kind, described)
+        if passed:
+            self._chosen[kind] = choose_rows(self._x, self._before, s.inverse_masses, described, len(s.rows), kind, h)
+        return passed > 0
+
     def _find(self, kind: int, part: tuple[int, int], h: float, parallel: bool) -> float:
         """Find the contacts with the triangles of one part, of bodies (0) or of obstacles (1); the smallest gap [m]."""
         s, rows = self.surfaces, self._rows
@@ -186,13 +217,10 @@ class SurfaceCollisions:
             )
             smallest = self._smallest[:n_active].min()
         if len(self._edges.keys):
-            several = parallel and len(self._edges.keys) >= PARALLEL_FROM
             rules = (s.point_piece, s.closed, s.gaps, s.friction)
             which = (near, bodies, kind)
-            find_edge_contacts[several](
-                self._x, self._before, self._pairs, self._edges.arrays, rules, *which, described, self._edges.smallest
-            )
-            smallest = min(smallest, self._edges.smallest.min())
+            found = (self._x, self._before, self._pairs, self._near_pairs, self._edges.arrays, rules)
+            smallest = min(smallest, find_edge_contacts(*found, *which, described))
         self._chosen[kind] = choose_rows(self._x, self._before, s.inverse_masses, described, bodies, kind, h)
         return float(smallest)
 
@@ -225,7 +253,7 @@ class SurfaceCollisions:
         if known < len(self._x):
             self._find_overlaps()
 
-    def _gather(self, motions: NDArray[np.float64]) -> None:
+    def _gather(self, motions: NDArray[np.float64], parallel: bool) -> None:
         """List what may touch while no point moves farther than in a frame of these motions (n, 3) [m]."""
         s = self.surfaces
         mean_motions(motions, s.point_piece, self._all_share, self._drifts)
@@ -238,7 +266,7 @@ class SurfaceCollisions:
         self._finder.gather(self._shapes, (self._far, self._near), self._rules)
         self._gathered[:] = self._x
         self._runs.renew()
-        self._edges.renew(self._x, self._far[:, 1], self._gap)
+        self._edges.renew(self._x, self._far[:, 1], self._gap, parallel)
         # Keys of points come before keys of edges.
         self._rows.renew(np.concatenate([self._runs.keys, self._edges.keys]))
         self._lists = self._runs.lists(np.searchsorted(self._rows.keys, self._runs.keys))

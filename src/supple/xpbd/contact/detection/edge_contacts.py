@@ -12,6 +12,7 @@ import math
 
 import numpy as np
 
+from supple.numerics.geometry.closest_point import between
 from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.xpbd.sweeps.compilation import serial_and_parallel
@@ -81,39 +82,113 @@ def _edge_contact(x, x_prev, edges, e, f, closed_e, closed_f):
     return True, s, t, n, dot(r, n)
 
 
+@njit
+def _lines(x, ends, e, f):
+    """Origins and directions of two edges, and six times the volume that they span."""
+    p, q = row(x, ends[e, 0]), row(x, ends[f, 0])
+    u, v = subtract(row(x, ends[e, 1]), p), subtract(row(x, ends[f, 1]), q)
+    return p, u, q, v, dot(subtract(p, q), cross(u, v))
+
+
+@njit
+def _passage(x, x_prev, ends, e, f):
+    """Whether edge e has passed through edge f in this substep, s, t, and the unit normal to the side where e was.
+
+    All points move on straight lines. The volume that the edges span is zero when they are in one plane; it is taken as
+    linear between both ends of the substep.
+    """
+    p1, u1, q1, v1, now = _lines(x, ends, e, f)
+    p0, u0, q0, v0, then = _lines(x_prev, ends, e, f)
+    nothing = (False, 0.0, 0.0, (0.0, 0.0, 0.0))
+    if then * now > 0.0 or then == 0.0:
+        return nothing
+    k = then / (then - now)
+    u, v = between(u0, u1, k), between(v0, v1, k)
+    s, t = _nearest(between(p0, p1, k), u, between(q0, q1, k), v)
+    if not (0.0 < s < 1.0 and 0.0 < t < 1.0):
+        return nothing
+    n = cross(u, v)
+    length = math.copysign(math.sqrt(dot(n, n)), then)
+    return True, s, t, (n[0] / length, n[1] / length, n[2] / length)
+
+
 @serial_and_parallel
-def find_edge_contacts(x, x_prev, pairs, edges, surfaces, near, first_obstacle, kind, rows, smallest):
-    """Find which edges touch now, and fill in their rows.
+def boxes_of_motion(x, x_prev, ends, margin, out):
+    """Write the box that each edge sweeps in the substep, with a margin, to out (e, 6): its low and its high corner."""
+    for e in prange(len(ends)):
+        a, b = ends[e, 0], ends[e, 1]
+        for j in range(3):
+            out[e, j] = min(x[a, j], x[b, j], x_prev[a, j], x_prev[b, j]) - margin
+            out[e, 3 + j] = max(x[a, j], x[b, j], x_prev[a, j], x_prev[b, j]) + margin
+
+
+@njit(cache=True)
+def overlapping(first, second, boxes):
+    """The numbers of the pairs whose boxes overlap, ascending."""
+    out = np.empty(len(first), dtype=np.int64)
+    count = 0
+    for i in range(len(first)):
+        e, f = first[i], second[i]
+        out[count] = i
+        count += (
+            boxes[e, 0] <= boxes[f, 3]
+            and boxes[f, 0] <= boxes[e, 3]
+            and boxes[e, 1] <= boxes[f, 4]
+            and boxes[f, 1] <= boxes[e, 4]
+            and boxes[e, 2] <= boxes[f, 5]
+            and boxes[f, 2] <= boxes[e, 5]
+        )
+    return out[:count].copy()
+
+
+@njit
+def _enter(rows, r, ends, e, f, s, t, n, gap, mu):
+    """Fill in the row r of a contact of the edges e and f."""
+    vertices, weights, normals, offsets, mus, _, _, active, deep = rows
+    vertices[r, 0], vertices[r, 1], vertices[r, 2], vertices[r, 3] = ends[e, 0], ends[e, 1], ends[f, 0], ends[f, 1]
+    weights[r, 0], weights[r, 1], weights[r, 2], weights[r, 3] = 1.0 - s, s, t - 1.0, -t
+    for j in range(3):
+        normals[r, j] = n[j]
+    offsets[r], mus[r] = gap, mu
+    active[r], deep[r] = True, False
+
+
+@njit(cache=True)
+def find_edge_contacts(x, x_prev, pairs, near_pairs, edges, surfaces, near, first_obstacle, kind, rows):
+    """Find which edges touch now, and fill in their rows. Returns the smallest distance of those that do not [m].
 
     Parameters
     ----------
     x, x_prev : (n, 3) at the end and at the beginning of the substep [m]
-    pairs : first (k,), second (k,) edges, and their rows (k,)
+    pairs : first (k,), second (k,) edges, and their rows (k,); near_pairs : numbers of those that are looked at
     edges : ends (e, 2), opposite (e, 2): see `SurfaceEdges`
     surfaces : point_piece (n,), closed (p,), gaps (p, p), friction (p, p)
     near : distances above this are not reported [m]
     first_obstacle : the first point of an obstacle; kind : 0 for pairs of bodies only, 1 for those with an obstacle
     rows : see `find_contacts`
-    smallest : (k,) out: the distance of pairs that are near and do not touch, otherwise inf [m]
     """
     first, second, numbers = pairs
     ends = edges[0]
     point_piece, closed, gaps, friction = surfaces
-    vertices, weights, normals, offsets, mus, forces, _, active, deep = rows
-    for i in prange(len(first)):
-        smallest[i] = np.inf
+    forces = rows[5]
+    smallest = np.inf
+    for i in near_pairs:
         e, f, r = first[i], second[i], numbers[i]
         if (ends[f, 0] >= first_obstacle) != (kind == 1):
             continue
         mine, its = point_piece[ends[e, 0]], point_piece[ends[f, 0]]
-        gap = max(gaps[mine, its], gaps[its, mine])
+        gap, mu = max(gaps[mine, its], gaps[its, mine]), friction[mine, its]
+        passed, s, t, n = _passage(x, x_prev, ends, e, f)
+        if passed:
+            _enter(rows, r, ends, e, f, s, t, n, gap, mu)
+            continue
         found, s, t, n, distance = _edge_contact(x, x_prev, edges, e, f, closed[mine], closed[its])
         if not found:
             continue
         pushed = forces[r, 0] != 0.0 or forces[r, 1] != 0.0 or forces[r, 2] != 0.0
         if distance >= gap:
             if distance < near:
-                smallest[i] = distance
+                smallest = min(smallest, distance)
             if not pushed:
                 continue
         c = (1.0 - s, s, t - 1.0, -t)
@@ -124,9 +199,24 @@ def find_edge_contacts(x, x_prev, pairs, edges, surfaces, near, first_obstacle, 
         # Edges far below each other's faces are in line by chance, in the hollow of a dented surface.
         if before <= 0.0 and not pushed:
             continue
-        vertices[r, 0], vertices[r, 1], vertices[r, 2], vertices[r, 3] = ends[e, 0], ends[e, 1], ends[f, 0], ends[f, 1]
-        weights[r, 0], weights[r, 1], weights[r, 2], weights[r, 3] = c
-        for j in range(3):
-            normals[r, j] = n[j]
-        offsets[r], mus[r] = gap, friction[mine, its]
-        active[r], deep[r] = True, False
+        _enter(rows, r, ends, e, f, s, t, n, gap, mu)
+    return smallest
+
+
+@njit(cache=True)
+def find_passages(x, x_prev, pairs, near_pairs, ends, surfaces, first_obstacle, kind, rows):
+    """Activate the rows of the edges that have passed through each other; returns how many. For arguments see above."""
+    first, second, numbers = pairs
+    point_piece, _, gaps, friction = surfaces
+    count = 0
+    for i in near_pairs:
+        e, f = first[i], second[i]
+        if (ends[f, 0] >= first_obstacle) != (kind == 1):
+            continue
+        passed, s, t, n = _passage(x, x_prev, ends, e, f)
+        if passed:
+            mine, its = point_piece[ends[e, 0]], point_piece[ends[f, 0]]
+            gap = max(gaps[mine, its], gaps[its, mine])
+            _enter(rows, numbers[i], ends, e, f, s, t, n, gap, friction[mine, its])
+            count += 1
+    return count

@@ -1,20 +1,30 @@
-"""The pairs of edges that may touch: a sweep along one axis over the boxes of edges near other pieces.
-
-Source: Ericson, "Real-Time Collision Detection" (2005), section 7.5.
-"""
+"""The pairs of edges that may touch: a tree over the boxes of edges near other pieces."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.contact.search.pair_kernels import RUNS, sort_pairs
+from supple.contact.search.room import Room
 from supple.contact.search.surfaces import ContactSurfaces
+from supple.contact.surface.distances import edge_edge_square
 from supple.numerics.adjacency import in_list
-from supple.numerics.kernel_cache import njit
+from supple.numerics.geometry.box_tree import STACK, BoxTree, after_leaf, next_leaf, overlap
+from supple.numerics.kernel_cache import njit, prange
+from supple.xpbd.contact.detection.edge_contacts import boxes_of_motion, overlapping
 from supple.xpbd.contact.detection.piece_runs import EDGE_EDGE, key_of
 from supple.xpbd.contact.detection.surface_edges import SurfaceEdges
+from supple.xpbd.sweeps.compilation import serial_and_parallel
 
-_EDGE_BITS = (1 << 31) - 1
+
+@njit(cache=True)
+def keys_of_edges(first, second):
+    """The keys of pairs of edges (k,)."""
+    out = np.empty(len(first), dtype=np.int64)
+    for i in range(len(first)):
+        out[i] = key_of(EDGE_EDGE, first[i], second[i])
+    return out
 
 
 @njit
@@ -37,62 +47,58 @@ def boxes_of_edges(x, ends, margin, pieces, together, boxes, piece_boxes):
     ----------
     x : (n, 3) points; ends : (e, 2); margin : (e,) [m]; pieces : (e,)
     together : (p, p) whether two different pieces may touch, either way
-    boxes : low, high (e, 3) out; piece_boxes : low, high (p, 3) out [m]
+    boxes : (e, 6) out; piece_boxes : (p, 6) out, low and high corners [m]
     """
-    low, high = boxes
-    piece_low, piece_high = piece_boxes
-    piece_low[:] = np.inf
-    piece_high[:] = -np.inf
+    piece_boxes[:, :3] = np.inf
+    piece_boxes[:, 3:] = -np.inf
     for e in range(len(ends)):
         k = pieces[e]
         for j in range(3):
             a, b = x[ends[e, 0], j], x[ends[e, 1], j]
-            low[e, j], high[e, j] = min(a, b) - margin[e], max(a, b) + margin[e]
-            piece_low[k, j], piece_high[k, j] = min(piece_low[k, j], low[e, j]), max(piece_high[k, j], high[e, j])
+            boxes[e, j], boxes[e, 3 + j] = min(a, b) - margin[e], max(a, b) + margin[e]
+            piece_boxes[k, j] = min(piece_boxes[k, j], boxes[e, j])
+            piece_boxes[k, 3 + j] = max(piece_boxes[k, 3 + j], boxes[e, 3 + j])
     meets = np.zeros(len(ends), dtype=np.bool_)
     for e in range(len(ends)):
         for k in range(len(together)):
-            if together[pieces[e], k] and not meets[e]:
-                inside = True
-                for j in range(3):
-                    inside = inside and low[e, j] <= piece_high[k, j] and high[e, j] >= piece_low[k, j]
-                meets[e] = inside
+            meets[e] = meets[e] or (together[pieces[e], k] and overlap(piece_boxes, k, boxes[e]))
     return meets
 
 
-@njit(cache=True)
-def sweep_boxes(order, boxes, pieces, together, ends, triangles, stitched, out):
-    """Keys of the pairs of edges whose boxes overlap. Writes as many as fit; returns their number.
+@serial_and_parallel
+def overlapping_pairs(x, margin, boxes, near, nodes, labels, order, pieces, together, ends, triangles, starts, points, room, counts, out):
+    """Write the pairs of edges whose boxes overlap, each once, to the room of each run, and their number to `counts`.
 
     Parameters
     ----------
-    order : (k,) edges in the order of the lower ends of their boxes along x
-    boxes, pieces, together, ends : see `boxes_of_edges`
-    triangles : (e, 2) beside each edge, -1 for none; stitched : starts (t + 1,) and points stitched to each triangle
-    out : (c,) int64
+    x, margin, boxes, pieces, together, ends : see `boxes_of_edges`
+    near : (k,) the edges of the tree; nodes, labels, order : of the tree over their boxes, labelled with pieces
+    triangles : (e, 2) beside each edge, -1 for none; starts (t + 1,), points : those stitched to each triangle
     """
-    low, high = boxes
-    count = 0
-    for i in range(len(order)):
-        e = order[i]
-        for k in range(i + 1, len(order)):
-            f = order[k]
-            if low[f, 0] > high[e, 0]:
-                break
-            if (
-                low[f, 1] > high[e, 1]
-                or high[f, 1] < low[e, 1]
-                or low[f, 2] > high[e, 2]
-                or high[f, 2] < low[e, 2]
-                or not together[pieces[e], pieces[f]]
-                or _is_stitched(ends, f, triangles, e, stitched)
-                or _is_stitched(ends, e, triangles, f, stitched)
-            ):
-                continue
-            if count < len(out):
-                out[count] = key_of(EDGE_EDGE, min(e, f), max(e, f))
-            count += 1
-    return count
+    for r in prange(RUNS):
+        stack = np.empty(STACK, dtype=np.int64)
+        count = 0
+        for q in range(r, len(order), RUNS):
+            e = near[order[q]]
+            top = after_leaf(nodes, q, boxes[e], stack)
+            while top > 0:
+                leaf, top = next_leaf(nodes, labels, boxes[e], pieces[e], False, stack, top)
+                if leaf < 0:
+                    continue
+                f = near[order[leaf]]
+                reach = margin[e] + margin[f]
+                if (
+                    not together[pieces[e], pieces[f]]
+                    or edge_edge_square(x, ends, e, f) > reach * reach
+                    or _is_stitched(ends, f, triangles, e, (starts, points))
+                    or _is_stitched(ends, e, triangles, f, (starts, points))
+                ):
+                    continue
+                if room[r] + count < room[r + 1]:
+                    out[room[r] + count, 0] = min(e, f)
+                    out[room[r] + count, 1] = max(e, f)
+                count += 1
+        counts[r] = count
 
 
 class EdgePairs:
@@ -113,19 +119,20 @@ class EdgePairs:
         self.edges = edges
         self.arrays = (edges.ends, edges.opposite)
         self.keys = np.zeros(0, dtype=np.int64)
-        self.smallest = np.zeros(0)
         self._pieces = surfaces.point_piece[edges.ends[:, 0]]
         self._together = (surfaces.allowed | surfaces.allowed.T) & ~np.eye(p, dtype=np.bool_)
         self._stitched = stitched
-        self._boxes = np.zeros((e, 3)), np.zeros((e, 3))
-        self._piece_boxes = np.zeros((p, 3)), np.zeros((p, 3))
-        self._found = np.zeros(1024, dtype=np.int64)
+        self._boxes, self._piece_boxes = np.zeros((e, 6)), np.zeros((p, 6))
+        self._room = Room()
+        self._swept = np.zeros((e, 6))
         self._first = self._second = np.zeros(0, dtype=np.int32)
 
     def __len__(self) -> int:
         return len(self.edges.ends)
 
-    def renew(self, x: NDArray[np.float64], motions: NDArray[np.float64], gaps: NDArray[np.float64]) -> None:
+    def renew(
+        self, x: NDArray[np.float64], motions: NDArray[np.float64], gaps: NDArray[np.float64], parallel: bool
+    ) -> None:
         """List the pairs that may touch before a point has moved too far.
 
         Parameters
@@ -135,18 +142,29 @@ class EdgePairs:
         a, b = self.edges.ends.T
         margin = np.maximum(motions[a], motions[b]) + 0.5 * gaps[a]
         meets = boxes_of_edges(x, self.edges.ends, margin, self._pieces, self._together, self._boxes, self._piece_boxes)
-        near = np.flatnonzero(meets & np.isfinite(self._boxes[0]).all(axis=1))
-        order = near[np.argsort(self._boxes[0][near, 0], kind="stable")]
-        described = (self._pieces, self._together, self.edges.ends, self.edges.triangles, self._stitched)
-        while True:
-            count = sweep_boxes(order, self._boxes, *described, self._found)
-            if count <= len(self._found):
-                break
-            self._found = np.zeros(2 * count, dtype=np.int64)
-        self.keys = np.sort(self._found[:count])
-        self._first = ((self.keys >> 31) & _EDGE_BITS).astype(np.int32)
-        self._second = (self.keys & _EDGE_BITS).astype(np.int32)
-        self.smallest = np.full(len(self.keys), np.inf)
+        near = np.flatnonzero(meets & np.isfinite(self._boxes).all(axis=1))
+        pairs = np.zeros((0, 2), dtype=np.int32)
+        if len(near):
+            tree = BoxTree.over(self._boxes[near], self._pieces[near])
+            nodes = (near, tree.nodes, tree.labels, tree.order)
+            rules = (self._pieces, self._together, self.edges.ends, self.edges.triangles, *self._stitched)
+            room = self._room
+            while True:
+                overlapping_pairs[parallel](x, margin, self._boxes, *nodes, *rules, room.start, room.counts, room.pairs)
+                if not room.is_too_small():
+                    break
+            pairs = sort_pairs(room.pairs, room.start, room.counts, len(self.edges.ends))
+        self._first, self._second = np.ascontiguousarray(pairs[:, 0]), np.ascontiguousarray(pairs[:, 1])
+        self.keys = keys_of_edges(self._first, self._second)
+
+    def swept(
+        self, x: NDArray[np.float64], x_prev: NDArray[np.float64], margin: float, parallel: bool
+    ) -> NDArray[np.int64]:
+        """The numbers of the pairs that come near each other in a substep from x_prev to x (n, 3), up to 2 margins [m]."""
+        if not len(self.keys):
+            return self.keys
+        boxes_of_motion[parallel](x, x_prev, self.edges.ends, margin, self._swept)
+        return overlapping(self._first, self._second, self._swept)
 
     def numbered(self, rows: NDArray[np.int64]) -> tuple:
         """The argument `pairs` of `find_edge_contacts`, for these rows."""

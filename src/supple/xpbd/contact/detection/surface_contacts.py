@@ -15,6 +15,8 @@ rows of `ContactRows`, which are solved afterwards in a fixed order.
 
 import math
 
+import numpy as np
+
 from supple.numerics.adjacency import in_list
 from supple.numerics.geometry.closest_point import area_normal, between, closest_on_triangle, combine
 from supple.numerics.kernel_cache import njit, prange
@@ -135,13 +137,24 @@ def _direction(x, p, triangle, where, passed, side, open_sheet):
 
 
 @njit
+def _enter(rows, r, p, triangles, t, where, n, gap, mu):
+    """Fill in the row r of a contact of point p with triangle t."""
+    vertices, weights, normals, offsets, mus, _, _, active, _ = rows
+    vertices[r, 0], weights[r, 0] = p, 1.0
+    for i in range(3):
+        vertices[r, 1 + i], weights[r, 1 + i] = triangles[t, i], -where[i]
+        normals[r, i] = n[i]
+    offsets[r], mus[r], active[r] = gap, mu, True
+
+
+@njit
 def _find_contacts_of(x, x_prev, p, runs, lists, surfaces, memory, near, part, stitched, rows):
     """The contacts of point p with the pieces near it; returns the smallest distance that is no contact, or inf."""
     first_run, last_run = runs
     run_starts, run_rows, listed = lists
     point_piece, triangles, triangle_piece, closed, gaps, friction = surfaces
     depth, entered, complete = memory
-    vertices, weights, normals, offsets, mus, forces, _, active, deep = rows
+    forces, deep = rows[5], rows[8]
     smallest = math.inf
     mine = point_piece[p]
     was_inside, depth[p] = depth[p], 0.0
@@ -177,12 +190,8 @@ def _find_contacts_of(x, x_prev, p, runs, lists, surfaces, memory, near, part, s
         n = _direction(x, p, _corners(x, triangles, t), where, passed, side, not closed[its])
         if passed and same:
             entered[p] = t
-        vertices[e, 0], weights[e, 0] = p, 1.0
-        for i in range(3):
-            vertices[e, 1 + i], weights[e, 1 + i] = triangles[t, i], -where[i]
-            normals[e, i] = n[i]
-        offsets[e], mus[e] = gap, friction[mine, its]
-        active[e], deep[e] = True, not same and closed[its]
+        _enter(rows, e, p, triangles, t, where, n, gap, friction[mine, its])
+        deep[e] = not same and closed[its]
     return smallest
 
 
@@ -212,3 +221,61 @@ def find_contacts(x, x_prev, lists, surfaces, memory, near, part, stitched, rows
         smallest[index] = _find_contacts_of(
             x, x_prev, points[index], runs, found, surfaces, memory, near, part, stitched, rows
         )
+
+
+@serial_and_parallel
+def boxes_of_triangles(x, x_prev, triangles, margin, out):
+    """Write the box that each triangle sweeps in the substep, with a margin, to out (t, 6)."""
+    for t in prange(len(triangles)):
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        for j in range(3):
+            low, high = min(x[a, j], x[b, j], x[c, j]), max(x[a, j], x[b, j], x[c, j])
+            out[t, j] = min(low, x_prev[a, j], x_prev[b, j], x_prev[c, j]) - margin
+            out[t, 3 + j] = max(high, x_prev[a, j], x_prev[b, j], x_prev[c, j]) + margin
+
+
+@njit(cache=True)
+def near_triangles(x, x_prev, lists, triangles, boxes):
+    """The points, the rows and the triangles, (k, 3), whose boxes overlap in the substep. For `lists` see above."""
+    n_active, points, run_ranges, run_starts, run_rows, listed = lists
+    out = np.empty((run_starts[run_ranges[n_active]], 3), dtype=np.int64)
+    count = 0
+    for index in range(n_active):
+        p = points[index]
+        for k in range(run_ranges[index], run_ranges[index + 1]):
+            for i in range(run_starts[k], run_starts[k + 1]):
+                t = listed[i]
+                overlap = True
+                for j in range(3):
+                    overlap = overlap and min(x[p, j], x_prev[p, j]) <= boxes[t, 3 + j]
+                    overlap = overlap and max(x[p, j], x_prev[p, j]) >= boxes[t, j]
+                if overlap:
+                    out[count, 0], out[count, 1], out[count, 2] = p, run_rows[k], t
+                    count += 1
+    return out[:count].copy()
+
+
+@njit(cache=True)
+def find_point_passages(x, x_prev, near_triangles, surfaces, part, stitched, rows, entered):
+    """Activate the rows of the points that have passed through a triangle; returns how many. For arguments see above."""
+    point_piece, triangles, triangle_piece, closed, gaps, friction = surfaces
+    normals = rows[2]
+    count = 0
+    for i in range(len(near_triangles)):
+        p, r, t = near_triangles[i, 0], near_triangles[i, 1], near_triangles[i, 2]
+        if not part[0] <= t < part[1]:
+            continue
+        mine, its = point_piece[p], triangle_piece[t]
+        corners, corners0 = _corners(x, triangles, t), _corners(x_prev, triangles, t)
+        time, side, where = _passage(row(x, p), row(x_prev, p), corners, corners0, not closed[its])
+        if time > 1.0 or in_list(stitched, t, p):
+            continue
+        n = _direction(x, p, corners, where, True, side, not closed[its])
+        if normals[r, 0] == n[0] and normals[r, 1] == n[1] and normals[r, 2] == n[2]:
+            continue
+        if mine == its:
+            entered[p] = t
+        _enter(rows, r, p, triangles, t, where, n, gaps[mine, its], friction[mine, its])
+        rows[8][r] = mine != its and closed[its]
+        count += 1
+    return count
