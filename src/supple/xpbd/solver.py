@@ -40,7 +40,7 @@ from supple.xpbd.integration import (
     to_world,
     update_velocities,
 )
-from supple.xpbd.limits.rigid_fallback import RigidFallback
+from supple.xpbd.limits.rigid_fallback import RigidFallback, united
 from supple.xpbd.limits.volume_guard import ENOUGH, VolumeGuard
 from supple.xpbd.memory import XPBDMemory
 from supple.xpbd.momentum import MomentumRestore
@@ -54,6 +54,8 @@ from supple.xpbd.workspace import XPBDWorkspace
 MOST_PROJECTIONS = 10
 # After how many of these projections contacts of surfaces are searched, which costs about ten times as much.
 SEARCH_EACH = 3
+# Of the motion of components that have passed through each other in spite of that: the shares that are tried.
+SHARES = (0.5, 0.25, 0.1, 0.0, 0.0)
 # How often a bad frame is repeated with twice as many substeps. What crosses with twice as many crosses with more, too.
 MOST_REPEATS, MOST_FOR_CROSSINGS = 2, 1
 # Below this much work, in edges or volumes, a sweep ends before a second thread has started.
@@ -227,6 +229,7 @@ class XPBD(Solver):
             substeps=float(used.count) if repeats and problem is None else FALL * before.substeps,
             futile=frozenset() if problem is None else before.futile | ({problem} if repeats else set()),
             crossings=findings.crossings,
+            crossing=findings.crossing,
         )
         details = XPBDDetails(
             contacts=ws.collisions.contacts,
@@ -255,7 +258,10 @@ class XPBD(Solver):
         _load(ws, state)
         targets = _pin_targets(ws.system, state.time, h, substeps)
         if ws.collisions:
-            ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt, memory.contact)
+            crossing = memory.crossing
+            if crossing is None:
+                crossing = ws.assessment.crossing(ws.world, state.time)
+            ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt, memory.contact, crossing.tolist())
         ws.guard.measure(ws.points, False)
         ws.guard.guarded[:] = ws.assessment.begin(ws.moment(state.time), ws.guard.J, h, memory.ledger)
         ws.guard.accept()
@@ -358,7 +364,7 @@ def _keep_volumes(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> b
     searched = True  # whether the contacts that were projected last had been searched anew
     for k in range(MOST_PROJECTIONS):
         low = ws.guard.measure(ws.points, parallel, ENOUGH if k else 1.0)
-        if not low and searched:
+        if not low and searched and ws.collisions.parted:
             ws.guard.accept()
             return False
         if low:
@@ -367,15 +373,34 @@ def _keep_volumes(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> b
         searched = not low or k % SEARCH_EACH == 0
         if ws.collisions and not _collide(ws, time, h, parallel, searched):
             return True
+    return _shorten(ws, h, parallel)
+
+
+def _shorten(ws: XPBDWorkspace, h: float, parallel: bool) -> bool:
+    """Shorten the motion of what has still turned over or passed through something. Returns whether there was any."""
     ws.guard.measure(ws.points, parallel)
     failures = ws.guard.failures()
+    arrays = (ws.points, ws.velocities, ws.previous, ws.begun, ws.origins, h, ws.guard.bounds)
     failed = bool(failures.any())
     if failed:
-        ws.fallback.apply(ws.points, ws.previous, ws.begun, ws.guard.bounds, failures)
-        _restore(ws, h, parallel)
-        ws.guard.measure(ws.points, parallel)
+        ws.fallback.apply(*arrays, [[label] for label in np.unique(ws.fallback.tet_labels[failures])])
+    groups: list[set[int]] = []
+    for share in SHARES:
+        passed = _passed(ws)
+        if not len(passed):
+            break
+        failed, groups = True, united(groups, passed.tolist())
+        ws.fallback.apply(*arrays, [sorted(group) for group in groups], share)
+    ws.guard.measure(ws.points, parallel)
     ws.guard.accept()
     return failed
+
+
+def _passed(ws: XPBDWorkspace) -> NDArray[np.int64]:
+    """(k, 2) the components that passed through each other in this substep; see `SurfaceCollisions.passed`."""
+    to_world(ws.points, ws.origins, ws.world)
+    to_world(ws.begun, ws.origins, ws.world_previous)
+    return ws.collisions.passed(ws.world, ws.world_previous, ws.fallback.labels)
 
 
 def _restore(ws: XPBDWorkspace, h: float, parallel: bool) -> None:

@@ -32,6 +32,7 @@ class ContactSurfaces:
     point_piece : (n,)
     triangles : (t, 3) indices of points, sorted by piece, those of bodies first; triangle_piece : (t,)
     body_triangles : number of triangles of bodies
+    owner : (p,) the row of the piece's body or obstacle in the scene's `PairTable`
     closed : (p,) whether a piece has an inside
     allowed : (p, p) whether points of the first piece may touch triangles of the second
     gaps : (p, p) gap that is kept between the two [m]; friction : (p, p) Coulomb coefficients
@@ -45,6 +46,7 @@ class ContactSurfaces:
     triangles: NDArray[np.int32]
     triangle_piece: NDArray[np.int32]
     body_triangles: int
+    owner: NDArray[np.int64]
     closed: NDArray[np.bool_]
     allowed: NDArray[np.bool_]
     gaps: NDArray[np.float64]
@@ -120,6 +122,7 @@ def build_surfaces(
         triangles=all_triangles,
         triangle_piece=piece_of[all_triangles[:, 0]],
         body_triangles=len(bodies.triangles),
+        owner=np.array([piece.owner for piece in pieces], dtype=np.int64),
         closed=np.array([piece.closed for piece in pieces], dtype=np.bool_),
         allowed=allowed,
         gaps=gaps,

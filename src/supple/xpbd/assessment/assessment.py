@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from supple.system import System
 from supple.xpbd.assessment.energy_balance import EnergyBalance
-from supple.xpbd.assessment.findings import Findings, count_inverted, tangled_bodies
+from supple.xpbd.assessment.findings import Findings, count_inverted, numbers_of, tangled_bodies
 from supple.xpbd.assessment.moment import Moment
 from supple.xpbd.assessment.softening import Softening
 from supple.xpbd.assessment.surfaces import SurfaceCheck
@@ -64,6 +64,10 @@ class Assessment:
         for part in self.system.bodies:
             sound[part.tets] = part.name not in tangled
         return sound
+
+    def crossing(self, world: NDArray[np.float64], time: float) -> NDArray[np.int64]:
+        """(k, 2) the bodies, and obstacles after them, whose surfaces cross at world (n, 3) [m] and a time [s]."""
+        return numbers_of(self._surfaces.crossings(world, time))
 
     def end(
         self, moment: Moment, world: NDArray[np.float64], J: NDArray[np.float64], h: float, accuracy: float

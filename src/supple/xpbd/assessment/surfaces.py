@@ -27,12 +27,14 @@ class Overlap:
     ----------
     first, second : names with their kind, such as "body 'ball'"; equal where a body is through itself
     pairs : number of pairs of triangles; depth : of a vertex in an obstacle that has no triangles [m]
+    numbers : of the two things: bodies, then obstacles
     """
 
     first: str
     second: str
     pairs: int = 0
     depth: float = 0.0
+    numbers: tuple[int, int] = (-1, -1)
 
     def __str__(self) -> str:
         if not self.pairs:
@@ -73,9 +75,10 @@ class SurfaceCheck:
 
     def find(self, x: NDArray[np.float64], time: float) -> list[Overlap]:
         """What is through what, at world positions x (n, 3) [m] and a time [s]."""
-        return [*self._crossings(x, time), *self.depths(x, time)]
+        return [*self.crossings(x, time), *self.depths(x, time)]
 
-    def _crossings(self, x: NDArray[np.float64], time: float) -> list[Overlap]:
+    def crossings(self, x: NDArray[np.float64], time: float) -> list[Overlap]:
+        """The surfaces that cross; arguments as of `find`."""
         R, t = self._poses.at(time)
         rows = np.array(self._owners, dtype=np.int64)
         points = np.concatenate([x, np.einsum("kij,kj->ki", R[rows], self._fixed) + t[rows]])
@@ -90,7 +93,10 @@ class SurfaceCheck:
         )
         owners = np.sort(self._owner[picked][pairs[kinds == CROSSING]], axis=1)
         found, counts = np.unique(owners, axis=0, return_counts=True) if len(owners) else (owners, [])
-        return [Overlap(self._names[a], self._names[b], int(k)) for (a, b), k in zip(found, counts, strict=True)]
+        return [
+            Overlap(self._names[a], self._names[b], int(k), numbers=(int(a), int(b)))
+            for (a, b), k in zip(found, counts, strict=True)
+        ]
 
     def _near(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.bool_]:
         """(t,) the triangles that reach into the box of another thing that they collide with, or of their own."""

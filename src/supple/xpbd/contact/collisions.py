@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,6 +81,7 @@ class Collisions:
         time: float,
         dt: float,
         memory: ContactMemory | None = None,
+        crossing: Iterable[tuple[int, int]] = (),
     ) -> None:
         """Find what may touch within the frame.
 
@@ -88,11 +90,13 @@ class Collisions:
         x, v : (n, 3) positions [m] and velocities [m/s] at the beginning of the frame.
         time : beginning of the frame [s]; dt : its length [s].
         memory : see `memory`, of the frame before; None where there is none.
+        crossing : pairs of bodies and obstacles (counted after the bodies) whose surfaces cross at the beginning. What
+            passes through what is not prevented there, because it would keep them from parting.
         """
         self._smallest = math.inf
         self._dt = dt
         if self.surfaces is not None:
-            self.surfaces.begin_step(x, v, time, dt, None if memory is None else memory.surfaces)
+            self.surfaces.begin_step(x, v, time, dt, None if memory is None else memory.surfaces, crossing)
         if self.obstacles:
             known = None if memory is None else memory.obstacles
             self.obstacles.begin_step(known, x, LEAST_REACH * self.edge_length)
@@ -154,6 +158,28 @@ class Collisions:
                 self._gather_obstacles(x, (x - x_prev) / h, time)
             scales = (limit, self.skin, NEAR * self.edge_length)
             self._count(self.obstacles.project(x, x_prev, (time - h, time), scales))
+
+    @property
+    def parted(self) -> bool:
+        """Whether nothing had passed through anything after the last `project`."""
+        return self.surfaces is None or self.surfaces.parted
+
+    def passed(
+        self, x: NDArray[np.float64], begun: NDArray[np.float64], labels: NDArray[np.int64]
+    ) -> NDArray[np.int64]:
+        """Which surfaces passed through each other in the substep that was projected last.
+
+        Parameters
+        ----------
+        x, begun : (n, 3) at its end and at its beginning [m]; labels : (n,) of the vertices, one for each component
+
+        Returns
+        -------
+        pairs : (k, 2) labels; -1 for an obstacle
+        """
+        if self.surfaces is None:
+            return np.zeros((0, 2), dtype=np.int64)
+        return self.surfaces.component(labels)[self.surfaces.passed(x, begun)]
 
     def memory(self, x: NDArray[np.float64]) -> ContactMemory | None:
         """What the next frame needs beside positions and velocities; `x` (n, 3) are the final positions [m]."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,7 +25,11 @@ from supple.xpbd.contact.contact_rows import (
     push_rows,
     solve_rows,
 )
-from supple.xpbd.contact.detection.edge_contacts import find_edge_contacts, find_passages
+from supple.xpbd.contact.detection.edge_contacts import (
+    find_edge_contacts,
+    find_edge_passages,
+    note_edge_passages,
+)
 from supple.xpbd.contact.detection.edge_pairs import EdgePairs
 from supple.xpbd.contact.detection.piece_runs import PieceRuns
 from supple.xpbd.contact.detection.surface_contacts import (
@@ -31,6 +37,7 @@ from supple.xpbd.contact.detection.surface_contacts import (
     find_contacts,
     find_point_passages,
     near_triangles,
+    note_point_passages,
 )
 from supple.xpbd.contact.detection.surface_edges import surface_edges
 from supple.xpbd.contact.memory import SurfaceMemory
@@ -84,6 +91,9 @@ class SurfaceCollisions:
         self._runs = PieceRuns(self._finder, n, s.triangle_piece)
         self._rows = ContactRows()
         self._smallest = np.zeros(n)
+        self._apart = np.ones((pieces, pieces), dtype=np.bool_)
+        # Whether nothing had passed through anything after the last projection.
+        self.parted = True
         # Of the last search: the rows of each kind that take part.
         self._chosen = [np.zeros(0, dtype=np.int64)] * 2
         self._far, self._near = np.zeros((n, 3)), np.zeros((n, 3))
@@ -99,9 +109,20 @@ class SurfaceCollisions:
         self._dt = 0.0
 
     def begin_step(
-        self, x: NDArray[np.float64], v: NDArray[np.float64], time: float, dt: float, memory: SurfaceMemory | None
+        self,
+        x: NDArray[np.float64],
+        v: NDArray[np.float64],
+        time: float,
+        dt: float,
+        memory: SurfaceMemory | None,
+        crossing: Iterable[tuple[int, int]],
     ) -> None:
         """See `Collisions.begin_step`."""
+        owner = self.surfaces.owner
+        self._apart[:] = True
+        for a, b in crossing:
+            both = (owner[:, None] == a) & (owner == b)
+            self._apart &= ~(both | both.T)
         bodies = len(self.surfaces.rows)
         self._dt = dt
         np.take(x, self.surfaces.rows, axis=0, out=self._x[:bodies])
@@ -144,6 +165,7 @@ class SurfaceCollisions:
         if any_beyond_radii(self._x, self._before, self._gathered, *allowed, self._excursions):
             self._gather((self._x - self._before) * (self._dt / h), parallel)
         contacts, smallest = 0, np.inf
+        self.parted = True
         self._near_pairs = self._edges.swept(self._x, self._before, self._slack, parallel)
         boxes_of_triangles[parallel](self._x, self._before, s.triangles, self._slack, self._swept)
         self._near_triangles = near_triangles(self._x, self._before, self._lists, s.triangles, self._swept)
@@ -153,10 +175,11 @@ class SurfaceCollisions:
             if part[0] < part[1] and len(self._rows.keys):
                 gap = self._find(kind, part, h, parallel)
                 pushes, least = self._solve(kind, h, limit)
-                for _ in range(MOST_PASSAGES):
+                for k in range(MOST_PASSAGES):
                     if not self._find_passages(kind, part, h):
                         break
                     pushes, _ = self._solve(kind, h, 0.0)
+                    self.parted &= k < MOST_PASSAGES - 1
                 contacts, smallest = contacts + pushes, min(smallest, gap, least)
         self._give(x, x_prev)
         return contacts, smallest
@@ -167,6 +190,27 @@ class SurfaceCollisions:
         contacts = sum(self._solve(kind, h, 0.0)[0] for kind, chosen in enumerate(self._chosen) if len(chosen))
         self._give(x, x_prev)
         return contacts
+
+    def passed(self, x: NDArray[np.float64], begun: NDArray[np.float64]) -> NDArray[np.int64]:
+        """(k, 2) the pieces of which one has passed through the other from `begun` to x (n, 3) [m]."""
+        s = self.surfaces
+        self._take(x, begun)
+        shapes = (self._x, self._before)
+        boxes_of_triangles[False](*shapes, s.triangles, 0.0, self._swept)
+        triangles = near_triangles(*shapes, self._lists, s.triangles, self._swept)
+        passed = np.zeros_like(self._apart)
+        note_point_passages(*shapes, triangles, self._pieces, self._apart, self._stitched, passed)
+        edges = self._edges.swept(*shapes, 0.0, False)
+        rules = (s.point_piece, s.closed, s.gaps, s.friction, self._apart)
+        note_edge_passages(*shapes, self._pairs, edges, self._edges.arrays[0], rules, passed)
+        return np.argwhere(passed)
+
+    def component(self, labels: NDArray[np.int64]) -> NDArray[np.int64]:
+        """(p,) the label of each piece, of the labels of all vertices; -1 for obstacles."""
+        s = self.surfaces
+        found = np.full(len(s.owner), -1, dtype=np.int64)
+        found[s.point_piece[: len(s.rows)]] = labels[s.rows]
+        return found
 
     def end_substep(self) -> None:
         """Keep the share of the forces with which the next substep begins."""
@@ -192,11 +236,11 @@ class SurfaceCollisions:
     def _find_passages(self, kind: int, part: tuple[int, int], h: float) -> bool:
         """Let points and edges that have passed through something take part. Returns whether there are any."""
         s, described = self.surfaces, self._rows.described
-        points = (self._x, self._before, self._near_triangles, self._pieces, part, self._stitched)
+        points = (self._x, self._before, self._near_triangles, self._pieces, self._apart, part, self._stitched)
         passed = find_point_passages(*points, described, self._entered)
-        rules = (s.point_piece, s.closed, s.gaps, s.friction)
+        rules = (s.point_piece, s.closed, s.gaps, s.friction, self._apart)
         found = (self._x, self._before, self._pairs, self._near_pairs, self._edges.arrays[0], rules)
-        passed += find_passages(*found, len(s.rows), kind, described)
+        passed += find_edge_passages(*found, len(s.rows), kind, described)
         if passed:
             self._chosen[kind] = choose_rows(self._x, self._before, s.inverse_masses, described, len(s.rows), kind, h)
         return passed > 0
@@ -217,7 +261,7 @@ class SurfaceCollisions:
             )
             smallest = self._smallest[:n_active].min()
         if len(self._edges.keys):
-            rules = (s.point_piece, s.closed, s.gaps, s.friction)
+            rules = (s.point_piece, s.closed, s.gaps, s.friction, self._apart)
             which = (near, bodies, kind)
             found = (self._x, self._before, self._pairs, self._near_pairs, self._edges.arrays, rules)
             smallest = min(smallest, find_edge_contacts(*found, *which, described))

@@ -1,15 +1,23 @@
-"""The last resort of the volume guard: a component keeps only so much of its deformation as leaves every tet positive.
+"""The last resort of a substep: components keep only so much of their relative motion as is possible.
 
-Where the projections of a substep did not succeed, the motion of a component is shortened towards a rigid one:
+Where projections did not keep every tet positive, the motion of a component is shortened towards a rigid one:
 x(a) = y + a (x - y), with y the places x_n of the beginning, moved as a rigid body with the momentum of the substep. At
 a = 0 all tets have their volumes of the beginning, so that an a above 0 exists; the largest one is the root of a cubic
-for each tet. The kinetic energy falls: in the metric of the masses, the rigid motion is the projection of the motion.
+for each tet.
 
-A component with pinned vertices moves with its pins: y has the pins at their new places, and the other vertices where
-they were. Where pins alone turn a tet over, nothing helps.
+Where they did not keep surfaces apart, the components that passed through each other are shortened together, towards
+one rigid motion of all of them: at a = 0 nothing moves with respect to anything else. This is a perfectly inelastic
+collision.
+
+The kinetic energy falls: in the metric of the masses, the rigid motion is the projection of the motion.
+
+Components with pinned vertices, and those that passed through an obstacle, are held: y has the pins at their new
+places, and the other vertices where they were. Where pins alone turn a tet over, nothing helps.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,31 +42,44 @@ class RigidFallback:
     def apply(
         self,
         points: NDArray[np.float64],
+        velocities: NDArray[np.float64],
         previous: NDArray[np.float64],
         begun: NDArray[np.float64],
+        origins: NDArray[np.float64],
+        h: float,
         bounds: NDArray[np.float64],
-        bad: NDArray[np.bool_],
+        groups: Sequence[Sequence[int]],
+        most: float = 1.0,
     ) -> None:
-        """Shorten the motion of every component with a bad tet, in place.
+        """Shorten the motion of groups of components, in place.
 
         Parameters
         ----------
         points : (n, 4) positions at the end of the substep [m], in the first three columns
+        velocities : (n, 3) at the end of the substep [m/s]
         previous : (n, 3) the positions that velocities are counted from, changed by contacts [m]
         begun : (n, 3) those at the beginning of the substep, where all guarded tets are positive [m]
-        bounds : (m,) of the guard, minus infinity for tets that are not guarded; bad : (m,) tets below them
+        origins : (n, 3) of these positions in the world [m]; h : length of the substep [s]
+        bounds : (m,) of the guard, minus infinity for tets that are not guarded
+        groups : labels of components; -1 for an obstacle
+        most : the largest share a of the motion
         """
         guarded, flat = bounds > 0.0, bounds < FLATTEST
-        for label in np.unique(self.tet_labels[bad]):
-            rows = np.flatnonzero(self.labels == label)
+        for group in groups:
+            rows = np.flatnonzero(np.isin(self.labels, group))
+            shift = origins[rows] - origins[rows[0]]
+            held = -1 in group or bool(self.pinned[rows].any())
             base = begun.copy()
-            base[rows] = self._rigid(points[rows, :3], begun[rows], rows)
+            base[rows] = self._rigid(points[rows, :3] + shift, begun[rows] + shift, rows, held) - shift
             motion = np.zeros_like(base)
             motion[rows] = points[rows, :3] - base[rows]
-            mine = guarded & (self.tet_labels == label)
+            mine = guarded & np.isin(self.tet_labels, group)
             step = min(
-                float(noninverting_step(base, motion, self.system.tets, mine & (flat == is_flat), keep)[0])
-                for is_flat, keep in ((False, KEEP), (True, KEEP_FLAT))
+                most,
+                *(
+                    float(noninverting_step(base, motion, self.system.tets, mine & (flat == is_flat), keep)[0])
+                    for is_flat, keep in ((False, KEEP), (True, KEEP_FLAT))
+                ),
             )
             # Positions are rounded, so that the volumes of slivers may differ from what the cubics promise.
             tets = self.system.tets[mine]
@@ -66,13 +87,35 @@ class RigidFallback:
                 step *= 0.5
             points[rows, :3] = base[rows] + step * motion[rows]
             previous[rows] = begun[rows]
+            v = (points[rows, :3] - begun[rows]) / h
+            if not held:
+                change = self._restored(begun[rows] + shift, v - velocities[rows], rows)
+                v -= change
+                points[rows, :3] -= h * change
+            velocities[rows] = v
 
-    def _rigid(self, x: NDArray, before: NDArray, rows: NDArray[np.intp]) -> NDArray[np.float64]:
-        held = self.pinned[rows]
-        if held.any():
-            return np.where(held[:, None], x, before)
+    def _rigid(self, x: NDArray, before: NDArray, rows: NDArray[np.intp], held: bool) -> NDArray[np.float64]:
+        if held:
+            return np.where(self.pinned[rows][:, None], x, before)
         m = self.system.masses[rows]
         center, center_before = m @ x / m.sum(), m @ before / m.sum()
         U, _, Vt = np.linalg.svd(((before - center_before) * m[:, None]).T @ (x - center))
         U[:, -1] *= np.sign(np.linalg.det(U @ Vt))
         return (before - center_before) @ (U @ Vt) + center
+
+    def _restored(self, x: NDArray, change: NDArray, rows: NDArray[np.intp]) -> NDArray[np.float64]:
+        """The rigid velocity field (k, 3) with both momenta of a change of velocities (k, 3), about positions x."""
+        m = self.system.masses[rows]
+        r = x - m @ x / m.sum()
+        inertia = np.einsum("i,ij,ij->", m, r, r) * np.eye(3) - np.einsum("i,ij,ik->jk", m, r, r)
+        spin = np.linalg.lstsq(inertia, np.cross(r, m[:, None] * change).sum(axis=0), rcond=None)[0]
+        return m @ change / m.sum() + np.cross(spin, r)
+
+
+def united(groups: Sequence[set[int]], pairs: Sequence[Sequence[int]]) -> list[set[int]]:
+    """Groups of labels, with those joined that a pair belongs to, in ascending order of their least labels."""
+    found = [set(group) for group in groups]
+    for pair in pairs:
+        joined = set(pair).union(*(group for group in found if not group.isdisjoint(pair)))
+        found = [group for group in found if group.isdisjoint(pair)] + [joined]
+    return sorted(found, key=min)

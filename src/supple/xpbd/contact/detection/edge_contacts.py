@@ -162,14 +162,15 @@ def find_edge_contacts(x, x_prev, pairs, near_pairs, edges, surfaces, near, firs
     x, x_prev : (n, 3) at the end and at the beginning of the substep [m]
     pairs : first (k,), second (k,) edges, and their rows (k,); near_pairs : numbers of those that are looked at
     edges : ends (e, 2), opposite (e, 2): see `SurfaceEdges`
-    surfaces : point_piece (n,), closed (p,), gaps (p, p), friction (p, p)
+    surfaces : point_piece (n,), closed (p,), gaps (p, p), friction (p, p), apart (p, p): which pieces did not cross when
+        the frame began, so that no edges may pass through each other
     near : distances above this are not reported [m]
     first_obstacle : the first point of an obstacle; kind : 0 for pairs of bodies only, 1 for those with an obstacle
     rows : see `find_contacts`
     """
     first, second, numbers = pairs
     ends = edges[0]
-    point_piece, closed, gaps, friction = surfaces
+    point_piece, closed, gaps, friction, apart = surfaces
     forces = rows[5]
     smallest = np.inf
     for i in near_pairs:
@@ -179,7 +180,7 @@ def find_edge_contacts(x, x_prev, pairs, near_pairs, edges, surfaces, near, firs
         mine, its = point_piece[ends[e, 0]], point_piece[ends[f, 0]]
         gap, mu = max(gaps[mine, its], gaps[its, mine]), friction[mine, its]
         passed, s, t, n = _passage(x, x_prev, ends, e, f)
-        if passed:
+        if passed and apart[mine, its]:
             _enter(rows, r, ends, e, f, s, t, n, gap, mu)
             continue
         found, s, t, n, distance = _edge_contact(x, x_prev, edges, e, f, closed[mine], closed[its])
@@ -204,19 +205,31 @@ def find_edge_contacts(x, x_prev, pairs, near_pairs, edges, surfaces, near, firs
 
 
 @njit(cache=True)
-def find_passages(x, x_prev, pairs, near_pairs, ends, surfaces, first_obstacle, kind, rows):
+def find_edge_passages(x, x_prev, pairs, near_pairs, ends, surfaces, first_obstacle, kind, rows):
     """Activate the rows of the edges that have passed through each other; returns how many. For arguments see above."""
     first, second, numbers = pairs
-    point_piece, _, gaps, friction = surfaces
+    point_piece, _, gaps, friction, apart = surfaces
     count = 0
     for i in near_pairs:
         e, f = first[i], second[i]
-        if (ends[f, 0] >= first_obstacle) != (kind == 1):
+        mine, its = point_piece[ends[e, 0]], point_piece[ends[f, 0]]
+        if (ends[f, 0] >= first_obstacle) != (kind == 1) or not apart[mine, its]:
             continue
         passed, s, t, n = _passage(x, x_prev, ends, e, f)
         if passed:
-            mine, its = point_piece[ends[e, 0]], point_piece[ends[f, 0]]
             gap = max(gaps[mine, its], gaps[its, mine])
             _enter(rows, numbers[i], ends, e, f, s, t, n, gap, friction[mine, its])
             count += 1
     return count
+
+
+@njit(cache=True)
+def note_edge_passages(x, x_prev, pairs, near_pairs, ends, surfaces, passed):
+    """Set passed[k, l] for the pieces k and l whose edges have passed through each other. For arguments see above."""
+    first, second, _ = pairs
+    point_piece, _, _, _, apart = surfaces
+    for i in near_pairs:
+        e, f = first[i], second[i]
+        mine, its = point_piece[ends[e, 0]], point_piece[ends[f, 0]]
+        if apart[mine, its] and not passed[mine, its]:
+            passed[mine, its] = _passage(x, x_prev, ends, e, f)[0]

@@ -66,7 +66,9 @@ def boxes_of_edges(x, ends, margin, pieces, together, boxes, piece_boxes):
 
 
 @serial_and_parallel
-def overlapping_pairs(x, margin, boxes, near, nodes, labels, order, pieces, together, ends, triangles, starts, points, room, counts, out):
+def overlapping_pairs(
+    x, margin, boxes, near, nodes, labels, order, pieces, together, ends, triangles, starts, points, room, counts, out
+):
     """Write the pairs of edges whose boxes overlap, each once, to the room of each run, and their number to `counts`.
 
     Parameters

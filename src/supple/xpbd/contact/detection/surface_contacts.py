@@ -256,16 +256,21 @@ def near_triangles(x, x_prev, lists, triangles, boxes):
 
 
 @njit(cache=True)
-def find_point_passages(x, x_prev, near_triangles, surfaces, part, stitched, rows, entered):
-    """Activate the rows of the points that have passed through a triangle; returns how many. For arguments see above."""
+def find_point_passages(x, x_prev, near_triangles, surfaces, apart, part, stitched, rows, entered):
+    """Activate the rows of the points that have passed through a triangle; returns how many.
+
+    Parameters
+    ----------
+    near_triangles : see above; apart : (p, p) see `find_edge_contacts`; for the others see `find_contacts`
+    """
     point_piece, triangles, triangle_piece, closed, gaps, friction = surfaces
     normals = rows[2]
     count = 0
     for i in range(len(near_triangles)):
         p, r, t = near_triangles[i, 0], near_triangles[i, 1], near_triangles[i, 2]
-        if not part[0] <= t < part[1]:
-            continue
         mine, its = point_piece[p], triangle_piece[t]
+        if not part[0] <= t < part[1] or not apart[mine, its]:
+            continue
         corners, corners0 = _corners(x, triangles, t), _corners(x_prev, triangles, t)
         time, side, where = _passage(row(x, p), row(x_prev, p), corners, corners0, not closed[its])
         if time > 1.0 or in_list(stitched, t, p):
@@ -279,3 +284,16 @@ def find_point_passages(x, x_prev, near_triangles, surfaces, part, stitched, row
         rows[8][r] = mine != its and closed[its]
         count += 1
     return count
+
+
+@njit(cache=True)
+def note_point_passages(x, x_prev, near_triangles, surfaces, apart, stitched, passed):
+    """Set passed[k, l] for the pieces where a point of k has passed through l. For arguments see above."""
+    point_piece, triangles, triangle_piece, closed, _, _ = surfaces
+    for i in range(len(near_triangles)):
+        p, t = near_triangles[i, 0], near_triangles[i, 2]
+        mine, its = point_piece[p], triangle_piece[t]
+        if passed[mine, its] or not apart[mine, its] or in_list(stitched, t, p):
+            continue
+        corners, corners0 = _corners(x, triangles, t), _corners(x_prev, triangles, t)
+        passed[mine, its] = _passage(row(x, p), row(x_prev, p), corners, corners0, not closed[its])[0] <= 1.0
