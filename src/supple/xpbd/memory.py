@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from supple.xpbd.assessment.assessment import Ledger
 from supple.xpbd.contact.memory import ContactMemory
 from supple.xpbd.damping.kelvin_voigt import ViscousMemory
@@ -24,7 +21,6 @@ class XPBDMemory:
     substeps : what the last frame asks of the next one, where repetitions helped; falls back to zero
     futile : the statuses that the last frame had in spite of repetitions
     crossings : number of pairs of triangles that are through each other
-    crossing : (k, 2) the bodies, and obstacles after them, that they belong to; None at the start
     """
 
     contact: ContactMemory | None = None
@@ -33,4 +29,3 @@ class XPBDMemory:
     substeps: float = 0.0
     futile: frozenset[str] = frozenset()
     crossings: int = 0
-    crossing: NDArray[np.int64] | None = None

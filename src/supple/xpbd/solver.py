@@ -229,7 +229,6 @@ class XPBD(Solver):
             substeps=float(used.count) if repeats and problem is None else FALL * before.substeps,
             futile=frozenset() if problem is None else before.futile | ({problem} if repeats else set()),
             crossings=findings.crossings,
-            crossing=findings.crossing,
         )
         details = XPBDDetails(
             contacts=ws.collisions.contacts,
@@ -258,10 +257,8 @@ class XPBD(Solver):
         _load(ws, state)
         targets = _pin_targets(ws.system, state.time, h, substeps)
         if ws.collisions:
-            crossing = memory.crossing
-            if crossing is None:
-                crossing = ws.assessment.crossing(ws.world, state.time)
-            ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt, memory.contact, crossing.tolist())
+            crossing = ws.assessment.crossing(ws.world, state.time).tolist()
+            ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt, memory.contact, crossing)
         ws.guard.measure(ws.points, False)
         ws.guard.guarded[:] = ws.assessment.begin(ws.moment(state.time), ws.guard.J, h, memory.ledger)
         ws.guard.accept()

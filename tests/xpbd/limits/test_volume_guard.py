@@ -8,7 +8,7 @@ import pytest
 import supple as sp
 from supple.numerics.noninverting_step import volume_signs
 from supple.system import build_system, initial_state
-from supple.xpbd.limits.rigid_fallback import RigidFallback
+from supple.xpbd.limits.rigid_fallback import RigidFallback, united
 from supple.xpbd.limits.volume_guard import ONSET, VolumeGuard
 from supple.xpbd.solver import XPBD
 
@@ -85,13 +85,49 @@ def test_the_last_resort_leaves_every_tet_positive_from_any_motion(pinned):
     for size in (0.01, 1.0, 1e3):
         motion = size * generator.normal(size=system.rest_positions.shape) + [size, 0, 0]
         motion[system.pinned_vertices] = 0.0
-        points = points_of(system, system.rest_positions + motion)
-        momentum = system.masses @ points[:, :3]
-        bad = ~(volume_signs(np.ascontiguousarray(points[:, :3]), system.tets) > 0.0)
-        RigidFallback(system).apply(points, rest.copy(), rest, np.full(len(bad), 0.5), bad)
+        points, velocities = points_of(system, system.rest_positions + motion), motion / 1e-3
+        momenta = momenta_of(system, rest, velocities)
+        bounds = np.full(len(system.tets), 0.5)
+        RigidFallback(system).apply(points, velocities, rest.copy(), rest, np.zeros_like(rest), 1e-3, bounds, [[0]])
         assert (volume_signs(np.ascontiguousarray(points[:, :3]), system.tets) > 0.0).all()
         if not pinned:
-            np.testing.assert_allclose(system.masses @ points[:, :3], momentum, rtol=1e-9)
+            np.testing.assert_allclose(momenta_of(system, rest, velocities), momenta, atol=1e-9 * abs(momenta).max())
+
+
+def test_bodies_that_are_stopped_together_keep_both_momenta_and_the_third_moves_on():
+    material = sp.StableNeoHookean(youngs=1e4, poisson=0.4)
+    places = [(0, 0, 0), (0.06, 0.01, 0), (1, 0, 0)]
+    bodies = [sp.Body(f"cube {k}", CUBE, material, position=place) for k, place in enumerate(places)]
+    system = build_system(sp.Scene(bodies))
+    fallback, rest = RigidFallback(system), system.rest_positions
+    velocities = np.repeat([[3.0, 1, 0], [-2, 0, 1], [0, 5, 0]], len(CUBE.vertices), axis=0)
+    velocities += np.random.default_rng(3).normal(size=rest.shape)
+    origins = np.round(rest)  # another one for the third body
+    begun, h = rest - origins, 1e-3
+    old, points = velocities.copy(), points_of(system, begun + h * velocities)
+    labels = [fallback.labels[part.vertices.start] for part in system.bodies]
+    bounds = np.full(len(system.tets), -np.inf)
+    fallback.apply(points, velocities, begun.copy(), begun, origins, h, bounds, [labels[:2]], 0.0)
+    two = slice(0, 2 * len(CUBE.vertices))
+    now, before = momenta_of(system, rest, velocities), momenta_of(system, rest, old)
+    np.testing.assert_allclose(now, before, atol=1e-12 * abs(before).max())
+    np.testing.assert_array_equal(velocities[two.stop :], old[two.stop :])
+    # One rigid motion: distances change with the square of the step only.
+    x = begun[two] + h * velocities[two]
+    lengths = np.linalg.norm(x[:, None] - x, axis=2) - np.linalg.norm(begun[two][:, None] - begun[two], axis=2)
+    assert abs(lengths).max() < 1e-3 * h * abs(old).max()
+    np.testing.assert_allclose(points[two, :3], x, atol=1e-15)
+    assert np.sum(system.masses[:, None] * velocities**2) < np.sum(system.masses[:, None] * old**2)
+
+
+def momenta_of(system, x, v):
+    m = system.masses[:, None]
+    return np.concatenate([(m * v).sum(axis=0), (m * np.cross(x, v)).sum(axis=0)])
+
+
+def test_groups_that_share_a_member_become_one():
+    assert united([{1, 2}, {5}], [[2, 3], [7, 8]]) == [{1, 2, 3}, {5}, {7, 8}]
+    assert united([{1, 2}, {3}], [[2, 3], [-1, 9]]) == [{-1, 9}, {1, 2, 3}]
 
 
 @MATERIALS

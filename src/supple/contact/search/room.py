@@ -25,6 +25,6 @@ class Room:
         """Whether some run found more than fits; then there is room for that, and more, for the next attempt."""
         if (self.counts <= np.diff(self.start)).all():
             return False
-        np.cumsum(self.counts + self.counts // 4 + 16, out=self.start[1:])
+        np.cumsum(self.counts + self.counts // 2 + 64, out=self.start[1:])
         self.pairs = np.empty((self.start[-1], 2), dtype=np.int32)
         return True

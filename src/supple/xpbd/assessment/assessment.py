@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from supple.system import System
 from supple.xpbd.assessment.energy_balance import EnergyBalance
-from supple.xpbd.assessment.findings import Findings, count_inverted, numbers_of, tangled_bodies
+from supple.xpbd.assessment.findings import Findings, count_inverted, tangled_bodies
 from supple.xpbd.assessment.moment import Moment
 from supple.xpbd.assessment.softening import Softening
 from supple.xpbd.assessment.surfaces import SurfaceCheck
@@ -67,7 +67,8 @@ class Assessment:
 
     def crossing(self, world: NDArray[np.float64], time: float) -> NDArray[np.int64]:
         """(k, 2) the bodies, and obstacles after them, whose surfaces cross at world (n, 3) [m] and a time [s]."""
-        return numbers_of(self._surfaces.crossings(world, time))
+        overlaps = self._surfaces.find(world, time)
+        return np.array([each.numbers for each in overlaps if each.pairs], dtype=np.int64).reshape(-1, 2)
 
     def end(
         self, moment: Moment, world: NDArray[np.float64], J: NDArray[np.float64], h: float, accuracy: float

@@ -41,11 +41,6 @@ class Findings:
         return sum(overlap.pairs for overlap in self.overlaps)
 
     @property
-    def crossing(self) -> NDArray[np.int64]:
-        """(k, 2) which things cross: bodies, then obstacles."""
-        return numbers_of(self.overlaps)
-
-    @property
     def status(self) -> Status:
         """The first that holds of those in `Status`."""
         return next((status for status, _ in self._problems()), Status.CONVERGED)
@@ -68,11 +63,6 @@ class Findings:
         for share, name in self.softened:
             found.append((Status.SOFTENED, f"body {name!r} about {_percent(share)} too soft"))
         return found
-
-
-def numbers_of(overlaps: list[Overlap]) -> NDArray[np.int64]:
-    """(k, 2) the numbers of the things whose surfaces cross."""
-    return np.array([overlap.numbers for overlap in overlaps if overlap.pairs], dtype=np.int64).reshape(-1, 2)
 
 
 def _percent(share: float) -> str:

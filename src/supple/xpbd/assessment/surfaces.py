@@ -71,14 +71,19 @@ class SurfaceCheck:
         self._triangles = np.ascontiguousarray(np.concatenate(triangles), dtype=np.int32)
         self._owner = np.concatenate(owner).astype(np.int32)
         self._fixed = np.concatenate(points) if points else np.zeros((0, 3))
+        # The arguments and the result of the last search: the end of a frame is the beginning of the next one.
+        self._last: tuple[NDArray[np.float64], float, list[Overlap]] = (np.zeros((0, 3)), -np.inf, [])
         self._surface = [np.unique(system.triangles[part.triangles]) for part in system.bodies]
 
     def find(self, x: NDArray[np.float64], time: float) -> list[Overlap]:
         """What is through what, at world positions x (n, 3) [m] and a time [s]."""
-        return [*self.crossings(x, time), *self.depths(x, time)]
+        known, at, found = self._last
+        if time != at or not np.array_equal(known, x):
+            found = [*self._crossings(x, time), *self.depths(x, time)]
+            self._last = (x.copy(), time, found)
+        return found
 
-    def crossings(self, x: NDArray[np.float64], time: float) -> list[Overlap]:
-        """The surfaces that cross; arguments as of `find`."""
+    def _crossings(self, x: NDArray[np.float64], time: float) -> list[Overlap]:
         R, t = self._poses.at(time)
         rows = np.array(self._owners, dtype=np.int64)
         points = np.concatenate([x, np.einsum("kij,kj->ki", R[rows], self._fixed) + t[rows]])

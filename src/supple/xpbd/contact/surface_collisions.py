@@ -50,7 +50,7 @@ SLACK = 0.1
 # Sweeps over all contacts of a substep; see docs/xpbd_contact.md for what more of them would change.
 SWEEPS = 2
 # How often contacts are solved again because edges have passed through each other.
-MOST_PASSAGES = 20
+MOST_PASSAGES = 5
 # Below this many active points, contacts are found before a second thread has started.
 PARALLEL_FROM = 500
 

@@ -86,13 +86,16 @@ class RigidFallback:
             while step > 0.0 and not (volume_signs(base + step * motion, tets) > 0.0).all():
                 step *= 0.5
             points[rows, :3] = base[rows] + step * motion[rows]
-            previous[rows] = begun[rows]
             v = (points[rows, :3] - begun[rows]) / h
             if not held:
-                change = self._restored(begun[rows] + shift, v - velocities[rows], rows)
+                change = self._excess(begun[rows] + shift, v, previous[rows] + shift, velocities[rows], rows)
                 v -= change
-                points[rows, :3] -= h * change
-            velocities[rows] = v
+                # Not where the body turned so far in the substep that this field would turn tets over.
+                moved = base + step * motion
+                moved[rows] -= h * change
+                if (volume_signs(moved, tets) > 0.0).all():
+                    points[rows, :3] = moved[rows]
+            velocities[rows], previous[rows] = v, begun[rows]
 
     def _rigid(self, x: NDArray, before: NDArray, rows: NDArray[np.intp], held: bool) -> NDArray[np.float64]:
         if held:
@@ -103,13 +106,14 @@ class RigidFallback:
         U[:, -1] *= np.sign(np.linalg.det(U @ Vt))
         return (before - center_before) @ (U @ Vt) + center
 
-    def _restored(self, x: NDArray, change: NDArray, rows: NDArray[np.intp]) -> NDArray[np.float64]:
-        """The rigid velocity field (k, 3) with both momenta of a change of velocities (k, 3), about positions x."""
+    def _excess(self, x: NDArray, v: NDArray, x_old: NDArray, v_old: NDArray, rows: NDArray) -> NDArray[np.float64]:
+        """The rigid field of velocities (k, 3) about x with the momenta of (x, v) without those of (x_old, v_old)."""
         m = self.system.masses[rows]
-        r = x - m @ x / m.sum()
+        center = m @ x / m.sum()
+        r = x - center
+        moment = (m[:, None] * (np.cross(r, v) - np.cross(x_old - center, v_old))).sum(axis=0)
         inertia = np.einsum("i,ij,ij->", m, r, r) * np.eye(3) - np.einsum("i,ij,ik->jk", m, r, r)
-        spin = np.linalg.lstsq(inertia, np.cross(r, m[:, None] * change).sum(axis=0), rcond=None)[0]
-        return m @ change / m.sum() + np.cross(spin, r)
+        return m @ (v - v_old) / m.sum() + np.cross(np.linalg.lstsq(inertia, moment, rcond=None)[0], r)
 
 
 def united(groups: Sequence[set[int]], pairs: Sequence[Sequence[int]]) -> list[set[int]]:

@@ -162,15 +162,15 @@ def find_edge_contacts(x, x_prev, pairs, near_pairs, edges, surfaces, near, firs
     x, x_prev : (n, 3) at the end and at the beginning of the substep [m]
     pairs : first (k,), second (k,) edges, and their rows (k,); near_pairs : numbers of those that are looked at
     edges : ends (e, 2), opposite (e, 2): see `SurfaceEdges`
-    surfaces : point_piece (n,), closed (p,), gaps (p, p), friction (p, p), apart (p, p): which pieces did not cross when
-        the frame began, so that no edges may pass through each other
+    surfaces : point_piece (n,), closed (p,), gaps (p, p), friction (p, p), apart (p, p): which pieces did not cross
+        when the frame began, so that nothing of them may pass through each other
     near : distances above this are not reported [m]
     first_obstacle : the first point of an obstacle; kind : 0 for pairs of bodies only, 1 for those with an obstacle
     rows : see `find_contacts`
     """
     first, second, numbers = pairs
     ends = edges[0]
-    point_piece, closed, gaps, friction, apart = surfaces
+    point_piece, closed, gaps, friction, _ = surfaces
     forces = rows[5]
     smallest = np.inf
     for i in near_pairs:
@@ -179,10 +179,6 @@ def find_edge_contacts(x, x_prev, pairs, near_pairs, edges, surfaces, near, firs
             continue
         mine, its = point_piece[ends[e, 0]], point_piece[ends[f, 0]]
         gap, mu = max(gaps[mine, its], gaps[its, mine]), friction[mine, its]
-        passed, s, t, n = _passage(x, x_prev, ends, e, f)
-        if passed and apart[mine, its]:
-            _enter(rows, r, ends, e, f, s, t, n, gap, mu)
-            continue
         found, s, t, n, distance = _edge_contact(x, x_prev, edges, e, f, closed[mine], closed[its])
         if not found:
             continue

@@ -66,10 +66,10 @@ def boxes_of_edges(x, ends, margin, pieces, together, boxes, piece_boxes):
 
 
 @serial_and_parallel
-def overlapping_pairs(
+def pairs_within_margins(
     x, margin, boxes, near, nodes, labels, order, pieces, together, ends, triangles, starts, points, room, counts, out
 ):
-    """Write the pairs of edges whose boxes overlap, each once, to the room of each run, and their number to `counts`.
+    """Write the pairs of edges that are nearer than both margins, each once, to the room of each run; see `Room`.
 
     Parameters
     ----------
@@ -152,7 +152,9 @@ class EdgePairs:
             rules = (self._pieces, self._together, self.edges.ends, self.edges.triangles, *self._stitched)
             room = self._room
             while True:
-                overlapping_pairs[parallel](x, margin, self._boxes, *nodes, *rules, room.start, room.counts, room.pairs)
+                pairs_within_margins[parallel](
+                    x, margin, self._boxes, *nodes, *rules, room.start, room.counts, room.pairs
+                )
                 if not room.is_too_small():
                     break
             pairs = sort_pairs(room.pairs, room.start, room.counts, len(self.edges.ends))
@@ -162,7 +164,7 @@ class EdgePairs:
     def swept(
         self, x: NDArray[np.float64], x_prev: NDArray[np.float64], margin: float, parallel: bool
     ) -> NDArray[np.int64]:
-        """The numbers of the pairs that come near each other in a substep from x_prev to x (n, 3), up to 2 margins [m]."""
+        """The numbers of the pairs whose ways from x_prev to x (n, 3) come as near as 2 margins [m]."""
         if not len(self.keys):
             return self.keys
         boxes_of_motion[parallel](x, x_prev, self.edges.ends, margin, self._swept)
