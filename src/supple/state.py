@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 class Status(StrEnum):
     """How a step ended. It equals its name as text: `report.status == "converged"`.
 
-    Where several hold for one step, the report has the first of: inverted, intersecting, energy_gained, softened.
+    Where several hold for one step, the report has the first of: inverted, intersecting, held_back, energy_gained,
+    softened.
 
     Attributes
     ----------
@@ -23,6 +24,7 @@ class Status(StrEnum):
     NOT_FINITE : a position or velocity is lost
     INVERTED : a tet is inside out that was not at the start (`XPBD`, as the following)
     INTERSECTING : surfaces are through each other, or vertices deep inside of an obstacle
+    HELD_BACK : in too many substeps the motion of bodies was shortened to keep tets positive and surfaces apart
     ENERGY_GAINED : more energy than the scene and what drives it had
     SOFTENED : a body is softer than its material by more than the tolerance
     """
@@ -34,6 +36,7 @@ class Status(StrEnum):
     NOT_FINITE = "not_finite"
     INVERTED = "inverted"
     INTERSECTING = "intersecting"
+    HELD_BACK = "held_back"
     ENERGY_GAINED = "energy_gained"
     SOFTENED = "softened"
 

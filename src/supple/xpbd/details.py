@@ -22,7 +22,8 @@ class XPBDDetails(SolverDetails):
     softening : by body, the share of its stiffness that it lacks at this length of the substep, estimated (see
         `supple.xpbd.assessment.softening`)
     energy_gained : energy that came from nowhere, and has not been lost since, over the energy of the scene [-]
-    held_back : substeps in which the motion of a body was shortened, so that no tet inverts
+    held_back : substeps in which the motion of a body was shortened, so that no tet inverts and nothing passes
+        through anything
     """
 
     smallest_gap: float | None = None

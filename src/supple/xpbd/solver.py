@@ -215,7 +215,9 @@ class XPBD(Solver):
         h = dt / used.count
         new, viscous = _unload(ws, time, self._damping(ws, h))
         ws.guard.measure(ws.points, False)
-        findings, ledger = ws.assessment.end(ws.moment(time), ws.world, ws.guard.J, h, self.accuracy)
+        findings, ledger = ws.assessment.end(
+            ws.moment(time), ws.world, ws.guard.J, h, self.accuracy, held_back / used.count
+        )
         status = findings.status
         problem = status if status in (Status.INVERTED, Status.ENERGY_GAINED) else None
         if findings.crossings > before.crossings:

@@ -35,6 +35,14 @@ def test_the_worst_gives_the_status_and_all_are_in_the_message():
     )
 
 
+def test_substeps_in_which_bodies_were_held_back_count_from_a_tenth_on():
+    assert Findings(held=0.1).status is Status.CONVERGED
+    findings = Findings(held=0.375, gained=0.5, gains=True)
+    assert findings.status is Status.HELD_BACK
+    assert findings.status.can_go_on
+    assert findings.message(1.0, "").startswith("bodies were held back in 38 % of the substeps, ")
+
+
 def test_energy_counts_only_in_frames_that_add_to_it():
     assert Findings(gained=0.5).status is Status.CONVERGED
     assert Findings(gained=0.019, gains=True).status is Status.CONVERGED

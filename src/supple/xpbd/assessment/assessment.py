@@ -71,7 +71,13 @@ class Assessment:
         return np.array([each.numbers for each in overlaps if each.pairs], dtype=np.int64).reshape(-1, 2)
 
     def end(
-        self, moment: Moment, world: NDArray[np.float64], J: NDArray[np.float64], h: float, accuracy: float
+        self,
+        moment: Moment,
+        world: NDArray[np.float64],
+        J: NDArray[np.float64],
+        h: float,
+        accuracy: float,
+        held: float = 0.0,
     ) -> tuple[Findings, Ledger]:
         """Judge the end of a frame.
 
@@ -79,6 +85,7 @@ class Assessment:
         ----------
         world : (n, 3) positions in the world [m]; J : (m,) of all tets
         h : length of the substeps [s]; accuracy : how much stiffness a body may lack
+        held : the share of the substeps in which the motion of bodies was shortened
         """
         before = self._ledger
         tangled = before.tangled & tangled_bodies(self.system, J)
@@ -88,6 +95,7 @@ class Assessment:
         findings = Findings(
             inverted=count_inverted(self.system, J, tangled),
             overlaps=self._surfaces.find(world, moment.time),
+            held=held,
             gained=excess / scale if scale > 0.0 else 0.0,
             gains=gain > LEAST_GAIN * scale,
             gainer=self.system.bodies[gainer].name,

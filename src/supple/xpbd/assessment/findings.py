@@ -11,8 +11,8 @@ from supple.state import Status
 from supple.system import System
 from supple.xpbd.assessment.surfaces import Overlap
 
-# The share of the scene's energy that may come from nowhere.
-ENERGY_TOLERANCE = 0.02
+# The share of the scene's energy that may come from nowhere, and that of the substeps in which motion may be shortened.
+ENERGY_TOLERANCE, HELD_TOLERANCE = 0.02, 0.1
 
 
 @dataclass(frozen=True)
@@ -23,6 +23,7 @@ class Findings:
     ----------
     inverted : number of inverted tets by body, without bodies that began with some
     overlaps : what is through what
+    held : the share of the substeps in which the motion of bodies was shortened
     gained : energy from nowhere over the energy of the scene [-]; gains : whether it grew in this frame
     gainer : the body whose energy rose most
     softened : (share, body) for each body that is softer than the accuracy allows
@@ -30,6 +31,7 @@ class Findings:
 
     inverted: dict[str, int] = field(default_factory=dict)
     overlaps: list[Overlap] = field(default_factory=list)
+    held: float = 0.0
     gained: float = 0.0
     gains: bool = False
     gainer: str = ""
@@ -57,6 +59,8 @@ class Findings:
         found += [(Status.INTERSECTING, str(overlap)) for overlap in self.overlaps[:3]]
         if len(self.overlaps) > 3:
             found.append((Status.INTERSECTING, f"{len(self.overlaps) - 3} more such pairs"))
+        if self.held > HELD_TOLERANCE:
+            found.append((Status.HELD_BACK, f"bodies were held back in {_percent(self.held)} of the substeps"))
         if self.gains and self.gained > ENERGY_TOLERANCE:
             text = f"{_percent(self.gained)} of the energy came from nowhere, most in body {self.gainer!r}"
             found.append((Status.ENERGY_GAINED, text))

@@ -44,7 +44,7 @@ from supple.xpbd.contact.memory import SurfaceMemory
 
 # Of the mean surface edge: the least and the largest motion of a point that lists of candidates allow for, and the
 # largest gap that is reported.
-LEAST_REACH, MOST_REACH, NEAR = 0.1, 0.5, 1.0
+LEAST_REACH, MOST_REACH, NEAR = 0.05, 0.3, 1.0
 # Of the mean surface edge: how far contacts may move a point in a substep, where edges are looked for.
 SLACK = 0.1
 # Sweeps over all contacts of a substep; see docs/xpbd_contact.md for what more of them would change.
@@ -178,7 +178,8 @@ class SurfaceCollisions:
                 for k in range(MOST_PASSAGES):
                     if not self._find_passages(kind, part, h):
                         break
-                    pushes, _ = self._solve(kind, h, 0.0)
+                    # What was about to pass through is parted as an overlap is; otherwise it would remain that near.
+                    pushes, _ = self._solve(kind, h, 0.0 if k else limit)
                     self.parted &= k < MOST_PASSAGES - 1
                 contacts, smallest = contacts + pushes, min(smallest, gap, least)
         self._give(x, x_prev)

@@ -170,7 +170,7 @@ def find_edge_contacts(x, x_prev, pairs, near_pairs, edges, surfaces, near, firs
     """
     first, second, numbers = pairs
     ends = edges[0]
-    point_piece, closed, gaps, friction, _ = surfaces
+    point_piece, closed, gaps, friction, apart = surfaces
     forces = rows[5]
     smallest = np.inf
     for i in near_pairs:
@@ -194,7 +194,7 @@ def find_edge_contacts(x, x_prev, pairs, near_pairs, edges, surfaces, near, firs
             end = ends[e, k] if k < 2 else ends[f, k - 2]
             before += c[k] * dot(row(x_prev, end), n)
         # Edges far below each other's faces are in line by chance, in the hollow of a dented surface.
-        if before <= 0.0 and not pushed:
+        if before <= 0.0 and not pushed and apart[mine, its]:
             continue
         _enter(rows, r, ends, e, f, s, t, n, gap, mu)
     return smallest
