@@ -165,7 +165,7 @@ class Collisions:
         return self.surfaces is None or self.surfaces.parted
 
     def passed(
-        self, x: NDArray[np.float64], begun: NDArray[np.float64], labels: NDArray[np.int64]
+        self, x: NDArray[np.float64], begun: NDArray[np.float64], labels: NDArray[np.integer]
     ) -> NDArray[np.int64]:
         """Which surfaces passed through each other in the substep that was projected last.
 

@@ -206,7 +206,7 @@ class SurfaceCollisions:
         note_edge_passages(*shapes, self._pairs, edges, self._edges.arrays[0], rules, passed)
         return np.argwhere(passed)
 
-    def component(self, labels: NDArray[np.int64]) -> NDArray[np.int64]:
+    def component(self, labels: NDArray[np.integer]) -> NDArray[np.int64]:
         """(p,) the label of each piece, of the labels of all vertices; -1 for obstacles."""
         s = self.surfaces
         found = np.full(len(s.owner), -1, dtype=np.int64)
