@@ -175,9 +175,9 @@ def find_edge_contacts(x, x_prev, pairs, near_pairs, edges, surfaces, near, firs
     smallest = np.inf
     for i in near_pairs:
         e, f, r = first[i], second[i], numbers[i]
-        if (ends[f, 0] >= first_obstacle) != (kind == 1):
-            continue
         mine, its = point_piece[ends[e, 0]], point_piece[ends[f, 0]]
+        if (ends[f, 0] >= first_obstacle) != (kind == 1) or mine == its:
+            continue
         gap, mu = max(gaps[mine, its], gaps[its, mine]), friction[mine, its]
         found, s, t, n, distance = _edge_contact(x, x_prev, edges, e, f, closed[mine], closed[its])
         if not found:

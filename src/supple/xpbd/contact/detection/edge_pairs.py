@@ -39,6 +39,13 @@ def _is_stitched(ends, f, triangles, e, stitched):
     return False
 
 
+@njit
+def _share_an_end(ends, e, f):
+    return (
+        ends[e, 0] == ends[f, 0] or ends[e, 0] == ends[f, 1] or ends[e, 1] == ends[f, 0] or ends[e, 1] == ends[f, 1]
+    )
+
+
 @njit(cache=True)
 def boxes_of_edges(x, ends, margin, pieces, together, boxes, piece_boxes):
     """Write the boxes of edges, with their margins. Returns which of them meet the box of another piece they may touch.
@@ -67,7 +74,7 @@ def boxes_of_edges(x, ends, margin, pieces, together, boxes, piece_boxes):
 
 @serial_and_parallel
 def pairs_within_margins(
-    x, margin, boxes, near, nodes, labels, order, pieces, together, ends, triangles, starts, points, room, counts, out
+    x, margin, own_margin, boxes, near, nodes, labels, order, pieces, together, ends, triangles, starts, points, room, counts, out
 ):
     """Write the pairs of edges that are nearer than both margins, each once, to the room of each run; see `Room`.
 
@@ -82,24 +89,28 @@ def pairs_within_margins(
         count = 0
         for q in range(r, len(order), RUNS):
             e = near[order[q]]
-            top = after_leaf(nodes, q, boxes[e], stack)
-            while top > 0:
-                leaf, top = next_leaf(nodes, labels, boxes[e], pieces[e], False, stack, top)
-                if leaf < 0:
+            for same in (False, True):
+                if same and not together[pieces[e], pieces[e]]:
                     continue
-                f = near[order[leaf]]
-                reach = margin[e] + margin[f]
-                if (
-                    not together[pieces[e], pieces[f]]
-                    or edge_edge_square(x, ends, e, f) > reach * reach
-                    or _is_stitched(ends, f, triangles, e, (starts, points))
-                    or _is_stitched(ends, e, triangles, f, (starts, points))
-                ):
-                    continue
-                if room[r] + count < room[r + 1]:
-                    out[room[r] + count, 0] = min(e, f)
-                    out[room[r] + count, 1] = max(e, f)
-                count += 1
+                top = after_leaf(nodes, q, boxes[e], stack)
+                while top > 0:
+                    leaf, top = next_leaf(nodes, labels, boxes[e], pieces[e], same, stack, top)
+                    if leaf < 0:
+                        continue
+                    f = near[order[leaf]]
+                    reach = own_margin[e] + own_margin[f] if same else margin[e] + margin[f]
+                    if (
+                        not together[pieces[e], pieces[f]]
+                        or _share_an_end(ends, e, f)
+                        or edge_edge_square(x, ends, e, f) > reach * reach
+                        or _is_stitched(ends, f, triangles, e, (starts, points))
+                        or _is_stitched(ends, e, triangles, f, (starts, points))
+                    ):
+                        continue
+                    if room[r] + count < room[r + 1]:
+                        out[room[r] + count, 0] = min(e, f)
+                        out[room[r] + count, 1] = max(e, f)
+                    count += 1
         counts[r] = count
 
 
@@ -122,7 +133,7 @@ class EdgePairs:
         self.arrays = (edges.ends, edges.opposite)
         self.keys = np.zeros(0, dtype=np.int64)
         self._pieces = surfaces.point_piece[edges.ends[:, 0]]
-        self._together = (surfaces.allowed | surfaces.allowed.T) & ~np.eye(p, dtype=np.bool_)
+        self._together = surfaces.allowed | surfaces.allowed.T
         self._stitched = stitched
         self._boxes, self._piece_boxes = np.zeros((e, 6)), np.zeros((p, 6))
         self._room = Room()
@@ -133,7 +144,7 @@ class EdgePairs:
         return len(self.edges.ends)
 
     def renew(
-        self, x: NDArray[np.float64], motions: NDArray[np.float64], gaps: NDArray[np.float64], parallel: bool
+        self, x: NDArray[np.float64], motions: tuple, gaps: NDArray[np.float64], parallel: bool
     ) -> None:
         """List the pairs that may touch before a point has moved too far.
 
@@ -142,7 +153,7 @@ class EdgePairs:
         x : (n, 3); motions : (n,) how far each point may move; gaps : (n,) the largest gap that it keeps [m]
         """
         a, b = self.edges.ends.T
-        margin = np.maximum(motions[a], motions[b]) + 0.5 * gaps[a]
+        margin, own = (np.maximum(each[a], each[b]) + 0.5 * gaps[a] for each in motions)
         meets = boxes_of_edges(x, self.edges.ends, margin, self._pieces, self._together, self._boxes, self._piece_boxes)
         near = np.flatnonzero(meets & np.isfinite(self._boxes).all(axis=1))
         pairs = np.zeros((0, 2), dtype=np.int32)
@@ -153,7 +164,7 @@ class EdgePairs:
             room = self._room
             while True:
                 pairs_within_margins[parallel](
-                    x, margin, self._boxes, *nodes, *rules, room.start, room.counts, room.pairs
+                    x, margin, own, self._boxes, *nodes, *rules, room.start, room.counts, room.pairs
                 )
                 if not room.is_too_small():
                     break

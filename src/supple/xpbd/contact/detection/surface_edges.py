@@ -45,7 +45,7 @@ def surface_edges(surfaces: ContactSurfaces) -> SurfaceEdges:
         has = counts > k
         half = order[starts[has] + k]
         opposite[has, k], beside[has, k] = third[half], half // 3
-    meets_others = np.any(surfaces.allowed & ~np.eye(len(surfaces.closed), dtype=np.bool_), axis=1)
+    meets_others = np.any(surfaces.allowed | surfaces.allowed.T, axis=1)
     piece = pieces[beside[:, 0]]
     kept = meets_others[piece] & (counts <= 2)
     return SurfaceEdges(
