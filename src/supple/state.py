@@ -36,9 +36,10 @@ class Status(StrEnum):
     NOT_FINITE = "not_finite"
     INVERTED = "inverted"
     INTERSECTING = "intersecting"
-    HELD_BACK = "held_back"
     ENERGY_GAINED = "energy_gained"
     SOFTENED = "softened"
+    # Recordings store the number of a status in this list: a new one comes last.
+    HELD_BACK = "held_back"
 
     @property
     def can_go_on(self) -> bool:

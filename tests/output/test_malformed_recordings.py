@@ -15,6 +15,7 @@ import pytest
 from supple.errors import OutputError
 from supple.output.export.exporter import export
 from supple.output.recording.reader import read_recording
+from supple.state import Status
 
 
 def _header(**changes):
@@ -95,7 +96,7 @@ DAMAGES = {
     "points of text": (_set("VTKHDF/Points", "here"), "has shape"),
     "points of integers": (_set("VTKHDF/Points", np.zeros((25 * 54, 3), dtype=int)), "holds int64"),
     "times are not finite": (_set("supple/frames/time", np.full(25, np.nan)), "time is not finite"),
-    "unknown status": (_set("supple/frames/status", np.full(25, 9, dtype=np.uint8)), "newer Supple"),
+    "unknown status": (_set("supple/frames/status", np.full(25, len(Status), dtype=np.uint8)), "newer Supple"),
     "newer format": (_newer, "format 99, this one reads 2"),
     "another program's": (_delete("supple"), "a VTKHDF UnstructuredGrid of another program"),
 }

@@ -82,7 +82,8 @@ def check_differences(exact, change, scale):
     if errors.min() < 1e-8 * size:
         assert errors.min() < errors.max() / 4
         return
-    assert 1.9 < slope(errors, steps) < 2.1
+    # The error at the shortest step may be round-off.
+    assert 1.9 < slope(errors[:4], steps[:4]) < 2.1
 
 
 @pytest.mark.parametrize("material", ELASTIC_MATERIALS, ids=lambda m: m.__name__)

@@ -1,8 +1,10 @@
-"""Edges against edges of other pieces.
+"""Edges against edges.
 
-Two edges touch where the nearest points of their lines are inside of both, and where the direction between the lines
-separates the pieces locally: both faces of one edge lie on one side of it, both faces of the other on the other side.
+Two edges of different pieces touch where the nearest points of their lines are inside of both, and where the direction
+between the lines separates the pieces locally: both faces of one edge lie on one side of it, both faces of the other on the other side.
 In all other cases a vertex is nearer to a face.
+
+Besides, two edges touch where they have passed through each other since the substep began, also within one piece.
 
 Source: Ericson, "Real-Time Collision Detection" (2005), section 5.1.9 (nearest points of segments); Gregorius, "The
 Separating Axis Test between Convex Polyhedra" (2013), for the second condition.

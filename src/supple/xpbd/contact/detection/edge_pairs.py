@@ -1,4 +1,4 @@
-"""The pairs of edges that may touch: a tree over the boxes of edges near other pieces."""
+"""The pairs of edges that may touch: a tree over the boxes of edges near other pieces, or their own."""
 
 from __future__ import annotations
 
@@ -41,19 +41,17 @@ def _is_stitched(ends, f, triangles, e, stitched):
 
 @njit
 def _share_an_end(ends, e, f):
-    return (
-        ends[e, 0] == ends[f, 0] or ends[e, 0] == ends[f, 1] or ends[e, 1] == ends[f, 0] or ends[e, 1] == ends[f, 1]
-    )
+    return ends[e, 0] == ends[f, 0] or ends[e, 0] == ends[f, 1] or ends[e, 1] == ends[f, 0] or ends[e, 1] == ends[f, 1]
 
 
 @njit(cache=True)
 def boxes_of_edges(x, ends, margin, pieces, together, boxes, piece_boxes):
-    """Write the boxes of edges, with their margins. Returns which of them meet the box of another piece they may touch.
+    """Write the boxes of edges, with their margins. Returns which of them meet the box of a piece they may touch.
 
     Parameters
     ----------
     x : (n, 3) points; ends : (e, 2); margin : (e,) [m]; pieces : (e,)
-    together : (p, p) whether two different pieces may touch, either way
+    together : (p, p) whether two pieces may touch, either way
     boxes : (e, 6) out; piece_boxes : (p, 6) out, low and high corners [m]
     """
     piece_boxes[:, :3] = np.inf
@@ -74,13 +72,29 @@ def boxes_of_edges(x, ends, margin, pieces, together, boxes, piece_boxes):
 
 @serial_and_parallel
 def pairs_within_margins(
-    x, margin, own_margin, boxes, near, nodes, labels, order, pieces, together, ends, triangles, starts, points, room, counts, out
+    x,
+    margin,
+    own_margin,
+    boxes,
+    near,
+    nodes,
+    labels,
+    order,
+    pieces,
+    together,
+    ends,
+    triangles,
+    starts,
+    points,
+    room,
+    counts,
+    out,
 ):
     """Write the pairs of edges that are nearer than both margins, each once, to the room of each run; see `Room`.
 
     Parameters
     ----------
-    x, margin, boxes, pieces, together, ends : see `boxes_of_edges`
+    x, margin, boxes, pieces, together, ends : see `boxes_of_edges`; own_margin : (e,) for pairs of one piece [m]
     near : (k,) the edges of the tree; nodes, labels, order : of the tree over their boxes, labelled with pieces
     triangles : (e, 2) beside each edge, -1 for none; starts (t + 1,), points : those stitched to each triangle
     """
@@ -143,9 +157,7 @@ class EdgePairs:
     def __len__(self) -> int:
         return len(self.edges.ends)
 
-    def renew(
-        self, x: NDArray[np.float64], motions: tuple, gaps: NDArray[np.float64], parallel: bool
-    ) -> None:
+    def renew(self, x: NDArray[np.float64], motions: tuple, gaps: NDArray[np.float64], parallel: bool) -> None:
         """List the pairs that may touch before a point has moved too far.
 
         Parameters

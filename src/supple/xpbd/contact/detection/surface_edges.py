@@ -30,7 +30,7 @@ class SurfaceEdges:
 
 
 def surface_edges(surfaces: ContactSurfaces) -> SurfaceEdges:
-    """The edges of all pieces that may touch another piece, with one or two triangles."""
+    """The edges of all pieces that may touch something, with one or two triangles."""
     triangles, pieces = surfaces.triangles, surfaces.triangle_piece
     halves = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     low_high = np.sort(halves, axis=1)
@@ -45,9 +45,9 @@ def surface_edges(surfaces: ContactSurfaces) -> SurfaceEdges:
         has = counts > k
         half = order[starts[has] + k]
         opposite[has, k], beside[has, k] = third[half], half // 3
-    meets_others = np.any(surfaces.allowed | surfaces.allowed.T, axis=1)
+    may_touch = np.any(surfaces.allowed | surfaces.allowed.T, axis=1)
     piece = pieces[beside[:, 0]]
-    kept = meets_others[piece] & (counts <= 2)
+    kept = may_touch[piece] & (counts <= 2)
     return SurfaceEdges(
         ends=ends[kept].astype(np.int32),
         opposite=opposite[kept],
