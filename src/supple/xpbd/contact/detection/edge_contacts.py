@@ -1,7 +1,8 @@
 """Edges against edges.
 
 Two edges of different pieces touch where the nearest points of their lines are inside of both, and where the direction
-between the lines separates the pieces locally: both faces of one edge lie on one side of it, both faces of the other on the other side.
+between the lines separates the pieces locally: both faces of one edge lie on one side of it, both faces of the other on
+the other side.
 In all other cases a vertex is nearer to a face.
 
 Besides, two edges touch where they have passed through each other since the substep began, also within one piece.
