@@ -1,4 +1,4 @@
-"""Lagged, smoothed Coulomb friction between triangles.
+"""Lagged, smoothed Coulomb friction, between triangles and with half-spaces.
 
 Normal forces, directions and points of contact are those of a given state; the force on the relative displacement u in
 the tangent plane since the step began is mu lambda f1(|u|), which rises smoothly from zero to mu lambda at the
@@ -9,51 +9,40 @@ Source: Li et al., "Incremental Potential Contact" (2020), section 5.
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.contact.barrier import Barrier, LibraryPotential
+from supple.contact.potentials.friction_energy import Slips, add_friction_gradient, friction_energy, friction_hessian
+from supple.contact.surface.embedded_couplings import vertex_couplings
+from supple.contact.surface.embedded_points import EmbeddedPoints
+from supple.implicit.energies.potential import ContactPotential, HessianBlocks
 
 
-class Friction(LibraryPotential):
-    """Of the contacts that a barrier has at one state.
+@dataclass(frozen=True, eq=False)
+class Friction(ContactPotential):
+    """Of contacts between points.
 
-    Parameters
+    Attributes
     ----------
-    lagged : (n, 3) positions of which normal forces and tangents are used
-    start : (n, 3) where the step began; h : its length [s]
-    coefficients : (p, p) between owners of the surface
-    slow : eps_v [m/s]
+    points : that `slips` refers to; reach : eps_v h [m]
     """
 
-    def __init__(
-        self,
-        barrier: Barrier,
-        lagged: NDArray[np.float64],
-        start: NDArray[np.float64],
-        h: float,
-        coefficients: NDArray[np.float64],
-        slow: float,
-    ) -> None:
-        import ipctk
+    points: EmbeddedPoints
+    slips: Slips
+    reach: float
 
-        self.surface = barrier.collisions.surface
-        self.start = self.surface.points(start)
-        self.unit = h
-        self.potential = ipctk.FrictionPotential(slow)
-        self.contacts = ipctk.TangentialCollisions()
-        found = barrier.collisions.at(lagged)
-        if not found.empty() and coefficients.any():
-            owner = self.surface.owner.astype(np.float64)
+    def value(self, x: NDArray[np.float64]) -> float:
+        return friction_energy(self.points.positions(x), self.slips, self.reach)
 
-            def blend(a: float, b: float) -> float:
-                """The library combines numbers of vertices. Here these are owners, and the pair is looked up."""
-                return float(coefficients[round(a), round(b)])
+    def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+        points = self.points.positions(x)
+        forces = np.zeros_like(points)
+        add_friction_gradient(points, self.slips, self.reach, forces)
+        self.points.add_forces(forces, out)
 
-            points = barrier.collisions.points(lagged)
-            self.contacts.build(self.surface.mesh, points, found, barrier.potential, owner, owner, blend)
-
-    def library_arguments(self, x: NDArray[np.float64]) -> tuple[Any, Any, NDArray[np.float64]]:
-        return self.contacts, self.surface.mesh, np.asfortranarray((self.surface.points(x) - self.start) / self.unit)
+    def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
+        """Positive semi-definite without projection; with it, the quadratic above (see `friction_hessian`)."""
+        between = friction_hessian(self.points.positions(x), self.slips, self.reach, project)
+        out.couplings.append(vertex_couplings(self.points, between))
