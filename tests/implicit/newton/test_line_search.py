@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
-from supple.implicit.newton.hessian_projection import ProjectedTerms
 from supple.implicit.newton.line_search import Extension, search
 from supple.implicit.newton.objective import Objective
 
@@ -48,43 +47,42 @@ def take(start: float, direction: float, largest: float = 1.0, states: Where = A
     here = objective.model(np.array([[start, 0.0, 0.0]]), hessian)
     vector = np.array([[direction, 0.0, 0.0]])
     along = float((here.gradient * vector).sum()) if slope is None else slope
-    end, step, cuts = search(objective, here, vector, along, largest, states, hessian, ProjectedTerms.NONE)
-    return end.positions[0, 0], step, cuts, hessian.vertices[0, 0, 0]
+    before = hessian.vertices.copy()
+    end, step, cuts = search(objective, here, vector, along, largest, states)
+    assert np.array_equal(hessian.vertices, before)  # trials need energies alone
+    return end[0, 0], step, cuts
 
 
-def test_a_good_step_is_taken_whole_and_brings_its_hessian():
-    end, step, cuts, curvature = take(0.5, 0.5)
+def test_a_good_step_is_taken_whole():
+    end, step, cuts = take(0.5, 0.5)
     assert (end, step, cuts) == (1.0, 1.0, 0)
-    assert curvature == pytest.approx(2.0)
 
 
 def test_a_step_too_long_is_halved_until_the_energy_falls():
-    end, step, cuts, curvature = take(0.5, 8.0)
+    end, step, cuts = take(0.5, 8.0)
     assert cuts > 0
     assert step == 0.5**cuts
     assert abs(end) ** 4 / 4 - end**2 / 2 < 0.5**4 / 4 - 0.5**2 / 2
-    assert curvature == pytest.approx(3 * end**2 - 1)
 
 
 def test_the_first_length_is_the_largest_that_is_allowed():
-    end, step, cuts, _ = take(0.5, 0.5, largest=0.3)
+    end, step, cuts = take(0.5, 0.5, largest=0.3)
     assert (end, step, cuts) == (pytest.approx(0.65), 0.3, 0)
 
 
 def test_a_state_that_the_filter_rejects_is_not_the_end():
-    end, step, cuts, _ = take(0.5, 0.5, states=Where(lambda u: u < 0.7))
+    end, step, cuts = take(0.5, 0.5, states=Where(lambda u: u < 0.7))
     assert (end, step, cuts) == (0.625, 0.25, 2)
 
 
 def test_nothing_is_taken_where_no_state_is_admissible():
-    end, step, _, curvature = take(0.5, 0.5, states=Where(lambda u: False))
+    end, step, _ = take(0.5, 0.5, states=Where(lambda u: False))
     assert (end, step) == (0.5, 0.0)
-    assert curvature == pytest.approx(3 * 0.5**2 - 1)
 
 
 @pytest.mark.parametrize(("largest", "slope"), [(0.0, -1.0), (1.0, 0.0), (1.0, 1.0)])
 def test_nothing_is_taken_uphill_or_where_no_length_is_allowed(largest: float, slope: float):
-    end, step, cuts, _ = take(0.5, 0.5, largest=largest, slope=slope)
+    end, step, cuts = take(0.5, 0.5, largest=largest, slope=slope)
     assert (end, step, cuts) == (0.5, 0.0, 0)
 
 

@@ -7,7 +7,18 @@ points o at the beginning of the step. F' rises smoothly from 0 to 1 at the disp
 
     F(y) = y^2 / e - y^3 / (3 e^2) + e / 3  for y < e, else y
 
-Source: Li et al., "Incremental Potential Contact" (2020), section 5.
+The gradient by u is f p with p = F'(|u|) u / |u|. Where a contact slides, the Hessian is zero along the slip, so that
+Newton's steps overshoot the band in which it sticks by a thousand times its width. Primal-dual steps do not: p is a
+second unknown, w, and the equation
+
+    w / r(|u|) - u = 0,    r(y) = F'(y) / y
+
+is linearized in both. Eliminating the change of w leaves f (r I + r' / (r |u|) w u^T) T, made symmetric, in the place
+of the Hessian. It is positive semi-definite for |w| <= 1, the exact Hessian for w = p, and the majorizer of
+iteratively reweighted least squares for w = 0.
+
+Sources: Li et al., "Incremental Potential Contact" (2020), section 5; Chan, Golub, Mulet, "A Nonlinear Primal-Dual
+Method for Total Variation-Based Image Restoration" (1999), sections 3 and 4.
 """
 
 from __future__ import annotations
@@ -54,14 +65,16 @@ def friction_potential(y, e):
 
 @njit(error_model="numpy")
 def friction_ratio(y, e):
-    """F'(y) / y [1/m]"""
+    """r(y) = F'(y) / y [1/m]"""
     return 1.0 / y if y >= e else (2.0 - y / e) / e
 
 
 @njit(error_model="numpy")
-def friction_curvature(y, e):
-    """F''(y) [1/m]"""
-    return 0.0 if y >= e else 2.0 * (1.0 - y / e) / e
+def ratio_slope(y, e):
+    """r'(y) / (r(y) y) [1/m^2], not positive; 0 at y = 0, where it is multiplied by zero."""
+    if y == 0.0:
+        return 0.0
+    return -1.0 / (y * y) if y >= e else -1.0 / (y * (2.0 * e - y))
 
 
 @njit(error_model="numpy")
@@ -101,29 +114,29 @@ def add_friction_gradient(x, slips, reach, out):
                 out[points[k, i], j] += size * coefficients[k, i] * u[j]
 
 
-def friction_hessian(x: NDArray[np.float64], slips: Slips, reach: float, majorize: bool) -> Couplings:
-    """The Hessian at x (s, 3), or with `majorize` that of the quadratic above E that touches it there [N/m].
+def friction_hessian(x: NDArray[np.float64], slips: Slips, reach: float, duals: NDArray[np.float64]) -> Couplings:
+    """The matrix of a primal-dual step at x (s, 3), positive semi-definite [N/m].
 
-    Both are positive semi-definite. The quadratic above has f F'(|u|) / |u| T for each contact: iteratively reweighted
-    least squares.
+    Parameters
+    ----------
+    duals : (k, 3) w, in the contacts' planes, none longer than 1; see the module
     """
     start = block_starts(slips.kinds)
     rows, columns = block_points(slips.kinds, slips.points, start)
     blocks = np.empty((start[-1], 3, 3))
     with threads_for(len(slips.kinds), _PARALLEL_FROM):
-        _write_hessians(x, slips, start, reach, majorize, blocks)
+        _write_hessians(x, slips, start, reach, duals, blocks)
     return Couplings(rows, columns, blocks)
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def _write_hessians(x, slips, start, reach, majorize, out):
+def _write_hessians(x, slips, start, reach, duals, out):
     kinds, _, coefficients, normals, _, forces = slips
     for k in prange(len(kinds)):
         u = slip_of(x, slips, k)
         y = (u[0] * u[0] + u[1] * u[1] + u[2] * u[2]) ** 0.5
         across = friction_ratio(y, reach)
-        # Along the slip the ratio changes to the curvature.
-        more = 0.0 if majorize or y == 0.0 else (friction_curvature(y, reach) - across) / (y * y)
+        along = 0.5 * ratio_slope(y, reach)
         count = point_count(kinds[k])
         b = start[k]
         for i in range(count):
@@ -131,6 +144,36 @@ def _write_hessians(x, slips, start, reach, majorize, out):
                 size = forces[k] * coefficients[k, i] * coefficients[k, j]
                 for p in range(3):
                     for q in range(3):
-                        entry = more * u[p] * u[q] - across * normals[k, p] * normals[k, q]
+                        entry = along * (duals[k, p] * u[q] + u[p] * duals[k, q])
+                        entry -= across * normals[k, p] * normals[k, q]
                         out[b, p, q] = size * (entry + across if p == q else entry)
                 b += 1
+
+
+@njit(cache=True, error_model="numpy")
+def renew_duals(x, way, slips, reach, duals):
+    """Overwrite the duals (k, 3) by those at the end of a primal-dual step from x along all of `way` (s, 3).
+
+    They are the forces, as shares of the largest ones, that the matrix of the step predicts, cut to the length 1.
+    """
+    kinds, points, coefficients, normals, _, _ = slips
+    for k in range(len(kinds)):
+        u = slip_of(x, slips, k)
+        y = (u[0] * u[0] + u[1] * u[1] + u[2] * u[2]) ** 0.5
+        across, along = friction_ratio(y, reach), 0.5 * ratio_slope(y, reach)
+        a = b = c = 0.0
+        for i in range(point_count(kinds[k])):
+            a += coefficients[k, i] * way[points[k, i], 0]
+            b += coefficients[k, i] * way[points[k, i], 1]
+            c += coefficients[k, i] * way[points[k, i], 2]
+        high = a * normals[k, 0] + b * normals[k, 1] + c * normals[k, 2]
+        d = (a - high * normals[k, 0], b - high * normals[k, 1], c - high * normals[k, 2])
+        by_slip = along * (u[0] * d[0] + u[1] * d[1] + u[2] * d[2])
+        by_dual = along * (duals[k, 0] * d[0] + duals[k, 1] * d[1] + duals[k, 2] * d[2])
+        length = 0.0
+        for p in range(3):
+            duals[k, p] = across * (u[p] + d[p]) + by_slip * duals[k, p] + by_dual * u[p]
+            length += duals[k, p] * duals[k, p]
+        if length > 1.0:
+            for p in range(3):
+                duals[k, p] /= length**0.5

@@ -9,29 +9,40 @@ Source: Li et al., "Incremental Potential Contact" (2020), section 5.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.potentials.friction_energy import Slips, add_friction_gradient, friction_energy, friction_hessian
+from supple.contact.potentials.friction_energy import (
+    Slips,
+    add_friction_gradient,
+    friction_energy,
+    friction_hessian,
+    renew_duals,
+)
 from supple.contact.surface.embedded_couplings import vertex_couplings
 from supple.contact.surface.embedded_points import EmbeddedPoints
-from supple.implicit.energies.potential import ContactPotential, HessianBlocks
+from supple.implicit.energies.potential import FrictionPotential, HessianBlocks
 
 
 @dataclass(frozen=True, eq=False)
-class Friction(ContactPotential):
+class Friction(FrictionPotential):
     """Of contacts between points.
 
     Attributes
     ----------
-    points : that `slips` refers to; reach : eps_v h [m]
+    points : that `slips` refers to; reach : eps_v h [m], the displacement below which friction is static
+    duals : (k, 3) the state of a minimization, see `friction_energy`; zero at first: the step is that of the majorizer
     """
 
     points: EmbeddedPoints
     slips: Slips
     reach: float
+    duals: NDArray[np.float64] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "duals", np.zeros((len(self.slips.forces), 3)))
 
     def value(self, x: NDArray[np.float64]) -> float:
         return friction_energy(self.points.positions(x), self.slips, self.reach)
@@ -43,6 +54,10 @@ class Friction(ContactPotential):
         self.points.add_forces(forces, out)
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
-        """Positive semi-definite without projection; with it, the quadratic above (see `friction_hessian`)."""
-        between = friction_hessian(self.points.positions(x), self.slips, self.reach, project)
+        """The matrix of a primal-dual step, positive semi-definite without projection."""
+        between = friction_hessian(self.points.positions(x), self.slips, self.reach, self.duals)
         out.couplings.append(vertex_couplings(self.points, between))
+
+    def renew(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> None:
+        positions = self.points.positions
+        renew_duals(positions(x), positions(direction), self.slips, self.reach, self.duals)

@@ -127,3 +127,16 @@ class ContactPotential(Potential):
 
     label = "contact"
     projection = Projection.RELEASED_LAST
+
+
+class FrictionPotential(ContactPotential):
+    """A term of friction. It has unknowns of its own, the duals, which make its Hessian that of a primal-dual step.
+
+    An objective with such a term serves one minimization.
+    """
+
+    projection = Projection.UNNEEDED
+
+    @abstractmethod
+    def renew(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> None:
+        """Set the duals to those at the end of a whole step from x (n, 3), whose Hessian gave `direction` (n, 3)."""

@@ -10,9 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.energies.potential import HessianBlocks
 from supple.implicit.limits.step_limits import StepLimits
-from supple.implicit.newton.hessian_projection import ProjectedTerms
 from supple.implicit.newton.objective import Model, Objective
 
 # The textbook's values: Armijo's c_1, and bisection. 40 halvings are 1e-12 of the direction.
@@ -51,33 +49,26 @@ def search(
     slope: float,
     largest: float,
     limits: StepLimits,
-    hessian: HessianBlocks | None,
-    projected: ProjectedTerms,
-) -> tuple[Model, float, int]:
+) -> tuple[NDArray[np.float64], float, int]:
     """A sufficient decrease along `direction` (n, 3), at an admissible state.
 
     Parameters
     ----------
     start : the objective where the search begins; slope : gradient . direction
     largest : first length to try; limits : which ends are admissible
-    hessian, projected : where the Hessian at the end goes, if it is wanted, and which terms are projected in it
 
     Returns
     -------
-    end, step, cuts : the objective at the end; the length, 0 where no decrease was found; how often it was halved.
+    end, step, cuts : positions (n, 3); the length, 0 where no decrease was found; how often it was halved.
     """
     if not (slope < 0.0 and largest > 0.0):
-        return start, 0.0, 0
+        return start.positions, 0.0, 0
     step = largest
     for cuts in range(_MOST_CUTS):
         moved = start.positions + step * direction
-        # The first try is nearly always good, and its model is then the one at the end.
-        model = objective.model(moved, hessian, projected) if cuts == 0 else None
-        energy, size = (model.energy, model.size) if model is not None else objective.value_and_size(moved)
+        energy, size = objective.value_and_size(moved)
         enough = energy <= start.energy + _SUFFICIENT * step * slope + _ROUND_OFF * max(size, start.size)
         if enough and limits.allows(moved):
-            return model or objective.model(moved, hessian, projected), step, cuts
+            return moved, step, cuts
         step *= _SHRINK
-    if hessian is not None:
-        objective.model(start.positions, hessian, projected)
-    return start, 0.0, _MOST_CUTS
+    return start.positions, 0.0, _MOST_CUTS

@@ -8,6 +8,7 @@ Source: Li, Jiang, Luo, "Physics-Based Simulation", chapter "Optimization Framew
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -28,6 +29,9 @@ logger = logging.getLogger(__name__)
 # Directions that shrink by less than this factor converge linearly: Newton's method with the true Hessian is faster.
 _LINEAR_RATE = 0.2
 
+# Forces are nearly balanced where their sum is below this share of contact's.
+_NEARLY = 0.1
+
 
 @dataclass(frozen=True, eq=False)
 class Problem:
@@ -40,6 +44,7 @@ class Problem:
     convergence : when the minimum is reached
     max_iterations : of Newton
     longest : largest component [m] that a direction may have where there is no inertia
+    outdated : whether the objective is due for a change at positions (n, 3) where forces are nearly balanced
     """
 
     objective: Objective
@@ -47,6 +52,7 @@ class Problem:
     convergence: Convergence
     max_iterations: int
     longest: float
+    outdated: Callable[[NDArray[np.float64]], bool] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,11 +87,15 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
             extension.factor = 1.0
         vector = extension.factor * found.vector
         largest, _ = limits.largest_step(here.positions, vector)
-        policy.note(rate > _LINEAR_RATE and largest == 1.0, found.touching)
-        memory = None if last else hessian
         slope = extension.factor * found.slope
-        here, step, cuts = search(objective, here, vector, slope, largest, limits, memory, policy.now)
+        end, step, cuts = search(objective, here, vector, slope, largest, limits)
         extension.note(step, rate)
+        # Where the step is shorter, the duals of the whole direction are those that the next matrix needs, too.
+        objective.renew(here.positions, vector)
+        policy.note(rate > _LINEAR_RATE and largest == 1.0, found.touching)
+        if step > 0.0:
+            # A last step most often needs no Hessian at its end.
+            here = objective.model(end, None if last else hessian, policy.now)
         row = NewtonRow(
             iteration=iteration,
             energy=here.energy,
@@ -106,6 +116,8 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
             if step == 0.0 or _is_converged(problem, found.length, here, tools, found.touching):
                 return Outcome(Status.CONVERGED, here, "", rows)
             here = objective.model(here.positions, hessian, policy.now)
+        elif found.touching and step == 1.0 and _is_outdated(problem, here, tools):
+            return Outcome(Status.CONVERGED, here, "", rows)
         if step == 0.0:
             text = (
                 f"no step along Newton's direction ({found.length:.2e} m) lowers the energy, in iteration {iteration}"
@@ -117,6 +129,14 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
         f"the tolerance is {convergence.step:.2e} m"
     )
     return Outcome(Status.ITERATION_LIMIT, here, text, rows)
+
+
+def _is_outdated(problem: Problem, here: Model, tools: Tools) -> bool:
+    """Whether the objective is due for a change before its minimum is reached: what is left would be lost work."""
+    if problem.outdated is None:
+        return False
+    contact = _free_norm(problem.objective.contact_gradient(here.positions), tools)
+    return _free_norm(here.gradient.copy(), tools) <= _NEARLY * contact and problem.outdated(here.positions)
 
 
 def _is_converged(problem: Problem, length: float, here: Model, tools: Tools, touching: bool) -> bool:

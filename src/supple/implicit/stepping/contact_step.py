@@ -83,15 +83,15 @@ class ContactStep:
             self.stiffness_increases += 1
             self.nearest = nearest
             return True
-        if self.model.coefficients.any() and self._friction_is_outdated(x):
+        if self.friction_is_outdated(x):
             self.friction_updates += 1
             return True
         return False
 
-    def _friction_is_outdated(self, x: NDArray[np.float64]) -> bool:
+    def friction_is_outdated(self, x: NDArray[np.float64]) -> bool:
         """Whether friction has to be updated with the normal forces at x (n, 3)."""
-        assert self.model is not None
-        assert self.barriers is not None
+        if self.model is None or self.barriers is None or not self.model.coefficients.any():
+            return False
         wanted = self.model.friction_iterations
         if self.friction_updates + 1 >= (_MOST_UPDATES if wanted is None else wanted):
             return False

@@ -97,6 +97,7 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
         Convergence(settings.shortest(workspace, h), settings.force_tolerance),
         settings.max_iterations,
         workspace.diagonal,
+        contact.friction_is_outdated,
     )
     tools.linear_solver.begin_step()
     x = state.positions
