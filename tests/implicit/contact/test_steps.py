@@ -91,8 +91,8 @@ def test_a_step_towards_a_plane_leaves_a_tenth_of_the_distance(scale):
     x = scale * np.array([[0.3, 0.5, 0.0], [0, 0, 0], [0, 2, 0]])
     direction = scale * np.array([[5.0, -1.0, 0.0], [0, 0, 0], [0, 0, 0]])
     assert largest_plane_step(x, direction) == pytest.approx(0.45, rel=1e-14)
-    assert planes_of(1).largest_step(x, -direction) == 1.0
-    assert planes_of(1).largest_step(x, np.zeros_like(x)) == 1.0
+    assert largest_plane_step(x, -direction) == 1.0
+    assert largest_plane_step(x, np.zeros_like(x)) == 1.0
     # The plane goes the same way.
     direction[1:, 1] = -scale
     assert largest_plane_step(x, direction) == 1.0
