@@ -159,7 +159,7 @@ def test_bodies_that_separate_may_move_as_far_as_the_search_covers(way):
     direction[len(x) // 2 :, 1] = way
     step = model.largest_step(x, direction)
     assert not crosses(model, x, direction, step)
-    # Up to 64 pieces of two mean edges each are looked at.
+    # Up to 128 pieces of a mean edge each are looked at.
     assert step == 1.0 if way <= 49.0 else 0.0 < step < 1.0
 
 
