@@ -13,7 +13,6 @@ from supple.implicit.contact.build import contact_model
 from supple.implicit.contact.points import forces_on_owners
 from supple.implicit.contact.scales import smallest_diagonal
 from supple.implicit.contact.settings import IPCContact
-from supple.implicit.contact.threads import one_contact_thread
 from supple.implicit.details import ImplicitDetails
 from supple.implicit.energies.damping import viscosity_of
 from supple.implicit.energies.elasticity import elasticity_of
@@ -154,7 +153,6 @@ class Implicit(Solver):
             damped,
         )
 
-    @one_contact_thread()
     def check(self, system: System, state: State, workspace: Workspace) -> None:
         """Raise where a step cannot start from `state`; see `Solver.check`.
 
@@ -179,7 +177,6 @@ class Implicit(Solver):
             seconds=dict.fromkeys((*PARTS, "other"), 0.0),
         )
 
-    @one_contact_thread()
     def step(self, system: System, state: State, dt: float, workspace: Workspace) -> tuple[State, StepReport]:
         """Advance by dt in one or more substeps; see `Solver.step`.
 

@@ -9,8 +9,13 @@ from numpy.typing import NDArray
 
 from supple.contact.potentials.contacts import Contacts
 from supple.contact.potentials.edge_contacts import edge_weights, write_edge_contacts
-from supple.contact.potentials.vertex_contacts import grouped_minima, vertex_minima, write_vertex_contacts
-from supple.contact.surface.adjacency import Adjacency
+from supple.contact.potentials.known_weights import KnownWeights
+from supple.contact.potentials.vertex_contacts import (
+    alternating_sums,
+    grouped_by_vertex,
+    near_features,
+    write_vertex_contacts,
+)
 from supple.contact.surface.contact_mesh import ContactMesh
 from supple.numerics.threads import threads_for
 
@@ -18,14 +23,20 @@ from supple.numerics.threads import threads_for
 _PARALLEL_FROM = 2000
 
 
-class Topology(NamedTuple):
-    """What kernels need of a `ContactMesh`."""
+class Found(NamedTuple):
+    """What `ContactSet.of` has found.
 
-    triangles: NDArray[np.int32]
-    edges: NDArray[np.int32]
-    triangle_edges: NDArray[np.int32]
-    edge_triangles: Adjacency
-    neighbors: Adjacency
+    Attributes
+    ----------
+    contacts : those with a weight
+    least : the smallest distance of the pairs, infinite where none is below dhat [m]
+    codes, weights : what is to be known where the search goes on, for `KnownWeights`
+    """
+
+    contacts: Contacts
+    least: float
+    codes: NDArray[np.int64]
+    weights: NDArray[np.float64]
 
 
 class ContactSet:
@@ -38,35 +49,66 @@ class ContactSet:
 
     def __init__(self, mesh: ContactMesh, dhat: float) -> None:
         self.dhat = dhat
-        self._topology = Topology(
-            mesh.triangles, mesh.edges, mesh.triangle_edges, mesh.edge_triangles, mesh.neighbors
-        )
-        self._areas = mesh.areas
-        self._edge_areas = mesh.edge_areas
+        self._mesh = mesh
+        self._of_vertices = (mesh.triangles, mesh.edges, *mesh.neighbors)
+        self._of_edges = (mesh.triangles, mesh.edges, *mesh.edge_triangles)
 
     def of(
-        self, x: NDArray[np.float64], vertex_triangle: NDArray[np.int32], edge_edge: NDArray[np.int32]
-    ) -> tuple[Contacts, float]:
-        """The contacts at x (s, 3), and the smallest distance of the pairs, or infinity where none is below dhat [m].
+        self,
+        x: NDArray[np.float64],
+        vertex_triangle: NDArray[np.int32],
+        edge_edge: NDArray[np.int32],
+        known: KnownWeights,
+    ) -> Found:
+        """The contacts at x (s, 3).
 
         Parameters
         ----------
         vertex_triangle, edge_edge : (k, 2), (l, 2) all pairs that may be nearer than dhat
+        known : the weights that do not depend on x
         """
-        topology, dhat = self._topology, self.dhat
+        mesh, dhat = self._mesh, self.dhat
+        triangles, edges = mesh.triangles, mesh.edges
         with threads_for(len(vertex_triangle) + len(edge_edge), _PARALLEL_FROM):
-            codes, squares = vertex_minima(x, vertex_triangle, topology, dhat)
-            grouped = grouped_minima(vertex_triangle, codes, len(x))
-            weights, edge_squares = edge_weights(x, edge_edge, topology, self._edge_areas, dhat)
-            vertices = len(grouped[0])
-            out = _empty(vertices + int(np.count_nonzero(weights)))
-            write_vertex_contacts(x, vertex_triangle, codes, grouped, topology, self._areas, dhat, out)
-        write_edge_contacts(x, edge_edge, weights, topology.edges, vertices, out)
+            features, squares = near_features(
+                x, vertex_triangle, triangles, mesh.triangle_edges, len(edges), dhat
+            )
+            areas, edge_squares, edge_keys, edges_grown = edge_weights(
+                x, edge_edge, self._of_edges, mesh.edge_areas, dhat, *known
+            )
+            rows, start = grouped_by_vertex(vertex_triangle, features, len(x))
+            codes, signs, counts = alternating_sums(
+                x, vertex_triangle, features, rows, start, triangles, edges, mesh.triangle_edges, dhat
+            )
+            starts = np.column_stack([start, np.append(0, np.cumsum(counts))])
+            count = int(starts[-1, 1])
+            out = _empty(count + 2 * int(np.count_nonzero(areas)))
+            keys, grown = np.empty(count, dtype=np.int64), np.empty(count)
+            write_vertex_contacts(
+                x,
+                vertex_triangle,
+                rows,
+                starts,
+                codes,
+                signs,
+                self._of_vertices,
+                mesh.owner,
+                mesh.areas,
+                dhat,
+                *known,
+                out,
+                keys,
+                grown,
+            )
+        write_edge_contacts(x, edge_edge, areas, edges, count, out)
         least = min(squares.min(initial=np.inf), edge_squares.min(initial=np.inf))
-        counted = out.weights > 0.0
+        new, new_edges = grown >= 0.0, edges_grown >= 0.0
+        new_codes = np.concatenate([keys[new], edge_keys[new_edges]])
+        new_weights = np.concatenate([grown[new], edges_grown[new_edges]])
+        counted = (out.weights != 0.0) & (out.distances < dhat)
         if not counted.all():
             out = Contacts(*(array[counted] for array in out))
-        return out, float(np.sqrt(least))
+        return Found(out, float(np.sqrt(least)), new_codes, new_weights)
 
 
 def _empty(count: int) -> Contacts:

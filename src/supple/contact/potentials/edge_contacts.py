@@ -1,16 +1,20 @@
 """Contacts of edges that cross each other, where at least one of them protrudes from its surface.
 
-Both closest points lie inside the edges: their ends are vertices, which have contacts of their own. Where two flat
-faces lie on each other, no edge protrudes, and none counts. The ridge of a knife has a contact with every edge that it
-crosses; so have two ridges that cross.
+The energy of a pair is that of the distance of the two edges, minus that of the smallest distance of an end from the other
+edge: it is zero where the closest point is an end, because vertices have contacts of their own, and along a ridge of
+several edges the sum with the energy of its vertices is constant.
+
+Where two flat faces lie on each other, no edge protrudes, and none counts. The ridge of a knife has a contact with every
+edge that it crosses; so have two ridges that cross.
 """
 
 import math
 
 import numpy as np
 
-from supple.contact.closest.pair_geometry import EDGE_EDGE
-from supple.contact.potentials.vertex_contacts import NEARER_SHARE, inward
+from supple.contact.closest.pair_geometry import EDGE_EDGE, VERTEX_EDGE, VERTEX_VERTEX
+from supple.contact.potentials.known_weights import has_grown, known_weight
+from supple.contact.potentials.vertex_contacts import NEARER_SHARE, nearest_of_edge
 from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import cross, dot, row, subtract
 
@@ -22,21 +26,25 @@ _SHARE = 0.75
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def edge_weights(x, pairs, mesh, areas, dhat):
-    """Areas (l,) [m^2] of the contacts of pairs (l, 2) of edges, zero where there is none, and squared distances.
+def edge_weights(x, pairs, mesh, areas, dhat, known_codes, known_values):
+    """Areas of the contacts of pairs of edges.
 
     Parameters
     ----------
-    x : (s, 3) [m]; mesh : triangles, edges, triangle_edges, edge_triangles, neighbors (see `ContactMesh`)
+    x : (s, 3) [m]; pairs : (l, 2); mesh : triangles, edges, start and items of edge_triangles (see `ContactMesh`)
     areas : (e,) a third of each edge's triangles at rest [m^2]
 
     Returns
     -------
-    weights : (l,); squares : (l,) infinite where the edges do not cross, or not below dhat [m^2]
+    weights : (l,) [m^2], zero where there is no contact
+    squares : (l,) squared distances, infinite where the edges do not cross, or not below dhat [m^2]
+    keys : (l,) codes of the pairs, for `KnownWeights`
+    grown : (l,) weights that are to be known [m^2], -1 where they do not change
     """
-    triangles, edges, _, edge_triangles, _ = mesh
-    weights = np.zeros(len(pairs))
-    squares = np.full(len(pairs), np.inf)
+    triangles, edges, edge_start, edge_items = mesh
+    weights, squares = np.zeros(len(pairs)), np.full(len(pairs), np.inf)
+    keys, grown = np.empty(len(pairs), np.int64), np.full(len(pairs), -1.0)
+    h = NEARER_SHARE * dhat
     for k in prange(len(pairs)):
         e, f = pairs[k, 0], pairs[k, 1]
         a, b, c, d = row(x, edges[e, 0]), row(x, edges[e, 1]), row(x, edges[f, 0]), row(x, edges[f, 1])
@@ -45,14 +53,20 @@ def edge_weights(x, pairs, mesh, areas, dhat):
         if not (crossing > 0.0 and 0.0 < s < 1.0 and 0.0 < t < 1.0 and square < dhat * dhat):
             continue
         squares[k] = square
-        one = _height(x, triangles, edges, edge_triangles, e, r, -1.0)
-        other = _height(x, triangles, edges, edge_triangles, f, r, 1.0)
-        h = NEARER_SHARE * dhat
+        one = _height(x, triangles, edges, edge_start, edge_items, e, r, -1.0)
+        other = _height(x, triangles, edges, edge_start, edge_items, f, r, 1.0)
         protruding = min(1.0, max(0.0, max(one, other) / h))
         nearest = min(1.0, max(0.0, 1.0 + min(one, other) / h))
         angle = min(1.0, crossing / _CROSSING)
-        weights[k] = _SHARE * (areas[e] + areas[f]) * protruding * nearest * angle * (2.0 - angle)
-    return weights, squares
+        full = _SHARE * (areas[e] + areas[f])
+        now = full * protruding * nearest * angle * (2.0 - angle)
+        # Below zero: the codes of vertices are not.
+        keys[k] = -1 - np.int64(e) * len(edges) - f
+        known = known_weight(known_codes, known_values, keys[k])
+        if has_grown(known, now, full):
+            grown[k] = now
+        weights[k] = now if known < 0.0 else known
+    return weights, squares, keys, grown
 
 
 @njit(error_model="numpy")
@@ -75,36 +89,73 @@ def crossing_point(a, b, c, d):
 
 
 @njit(error_model="numpy")
-def _height(x, triangles, edges, edge_triangles, e, r, sign):
+def _height(x, triangles, edges, edge_start, edge_items, e, r, sign):
     """How far the surface recedes beside edge e, against the direction sign * r, over the edge's length [m].
 
     Negative where it comes nearer.
     """
-    start, items = edge_triangles
     length = math.sqrt(dot(r, r))
     least = np.inf
-    for k in range(start[e], start[e + 1]):
-        least = min(least, -sign * dot(r, inward(x, triangles, items[k], edges[e, 0], edges[e, 1])) / length)
+    for k in range(edge_start[e], edge_start[e + 1]):
+        least = min(least, -sign * dot(r, _inward(x, triangles, edge_items[k], edges[e, 0], edges[e, 1])) / length)
     along = subtract(row(x, edges[e, 1]), row(x, edges[e, 0]))
     return least * math.sqrt(dot(along, along))
 
 
+@njit(error_model="numpy")
+def _inward(x, triangles, t, a, b):
+    """Unit vector in the plane of triangle t from its edge of the points a and b inwards; zero without area."""
+    o = triangles[t, 0] + triangles[t, 1] + triangles[t, 2] - a - b
+    along, over = subtract(row(x, b), row(x, a)), subtract(row(x, o), row(x, a))
+    m = cross(cross(along, over), along)
+    length = math.sqrt(dot(m, m))
+    if length == 0.0:
+        return (0.0, 0.0, 0.0)
+    return (m[0] / length, m[1] / length, m[2] / length)
+
+
 @njit(cache=True, error_model="numpy")
 def write_edge_contacts(x, pairs, weights, edges, first, out):
-    """Write the contacts with a weight into the rows of `out`, a `Contacts`, from row `first` on."""
+    """Write two contacts for each pair with a weight into the rows of `out`, a `Contacts`, from row `first` on."""
     kinds, points, coefficients, vectors, distances, areas = out
     n = first
     for k in range(len(pairs)):
         if weights[k] == 0.0:
             continue
         e, f = pairs[k, 0], pairs[k, 1]
-        points[n, 0], points[n, 1], points[n, 2], points[n, 3] = edges[e, 0], edges[e, 1], edges[f, 0], edges[f, 1]
-        s, t, r, _ = crossing_point(
-            row(x, points[n, 0]), row(x, points[n, 1]), row(x, points[n, 2]), row(x, points[n, 3])
-        )
+        ids = (edges[e, 0], edges[e, 1], edges[f, 0], edges[f, 1])
+        a, b, c, d = row(x, ids[0]), row(x, ids[1]), row(x, ids[2]), row(x, ids[3])
+        s, t, r, _ = crossing_point(a, b, c, d)
         kinds[n] = EDGE_EDGE
+        points[n, 0], points[n, 1], points[n, 2], points[n, 3] = ids
         coefficients[n, 0], coefficients[n, 1], coefficients[n, 2], coefficients[n, 3] = 1.0 - s, s, t - 1.0, -t
         vectors[n, 0], vectors[n, 1], vectors[n, 2] = r
         distances[n] = math.sqrt(dot(r, r))
         areas[n] = weights[k]
-        n += 1
+        _write_end(x, ids, n + 1, kinds, points, coefficients, vectors, distances)
+        areas[n + 1] = -weights[k]
+        n += 2
+
+
+@njit(error_model="numpy")
+def _write_end(x, ids, n, kinds, points, coefficients, vectors, distances):
+    """Row n: the end of two edges that is nearest to the other edge, with that edge or an end of it."""
+    least = np.inf
+    for end in range(4):
+        one, other = (ids[2], ids[3]) if end < 2 else (ids[0], ids[1])
+        w, r = nearest_of_edge(row(x, ids[end]), row(x, one), row(x, other))
+        square = dot(r, r)
+        if square < least:
+            least = square
+            points[n, 0], points[n, 3] = ids[end], -1
+            coefficients[n, 0], coefficients[n, 3] = 1.0, 0.0
+            if 0.0 < w < 1.0:
+                kinds[n] = VERTEX_EDGE
+                points[n, 1], points[n, 2] = one, other
+                coefficients[n, 1], coefficients[n, 2] = w - 1.0, -w
+            else:
+                kinds[n] = VERTEX_VERTEX
+                points[n, 1], points[n, 2] = (one if w == 0.0 else other), -1
+                coefficients[n, 1], coefficients[n, 2] = -1.0, 0.0
+            vectors[n, 0], vectors[n, 1], vectors[n, 2] = r
+    distances[n] = math.sqrt(least)

@@ -1,4 +1,4 @@
-"""The Hessian of an energy E(d) of the distance d of one pair, with E' <= 0 <= E'', in closed form.
+"""The Hessian of an energy E(d) of the distance d of one pair, in closed form.
 
 With n = r / d, the coefficients c and the modes (q_k, D_k) of `pair_geometry.tangent_modes`, let
 
@@ -29,14 +29,16 @@ def mode_matrix(slope, d, cc, w, project):
     slope : E'; d : distance; cc : c . c; w : D_k . D_k, 0 for a mode without a parameter
     """
     if w == 0.0:
-        return (0.0 if project else slope / d), 0.0, 0.0
+        return (max(0.0, slope / d) if project else slope / d), 0.0, 0.0
     if not project:
         return 0.0, -slope, -slope * d
     # In the basis of the unit vectors of beta and delta, of lengths |c| and sqrt(w), the matrix is
-    # (-E' / d) ((0, |c| g), (|c| g, g^2)) with g = d sqrt(w). Its positive eigenvalue belongs to (|c|, l).
+    # (-E' / d) ((0, |c| g), (|c| g, g^2)) with g = d sqrt(w). Its positive eigenvalue -sqrt(w) E' l belongs to (|c|, l).
     root = math.sqrt(w)
     g = d * root
     l = 0.5 * (g + math.sqrt(g * g + 4.0 * cc))
+    if slope > 0.0:  # of a pair that attracts it is the other one
+        l = -cc / l
     s00 = -slope * root * l / (cc + l * l)
     ratio = l / root
     return s00, s00 * ratio, s00 * ratio * ratio
@@ -53,7 +55,7 @@ def write_pair_hessian(kind, c, r, d, points, slopes, project, out, first):
     slopes : E', E''
     """
     n = (r[0] / d, r[1] / d, r[2] / d)
-    slope, curvature = slopes
+    slope, curvature = slopes[0], max(0.0, slopes[1]) if project else slopes[1]
     cc = c[0] * c[0] + c[1] * c[1] + c[2] * c[2] + c[3] * c[3]
     p, D, w, q, F, v = tangent_modes(kind, n, points[0], points[1], points[2], points[3])
     s00, s01, s11 = mode_matrix(slope, d, cc, w, project)

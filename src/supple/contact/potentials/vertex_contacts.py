@@ -1,14 +1,16 @@
-"""Contacts of vertices: each local minimum of a vertex's distance from the surfaces around it counts once.
+"""Contacts of vertices with the triangles, edges and vertices around them.
+
+The energy of a vertex in front of a surface is that of its distances from the triangles, minus that of its distances from
+the edges between them, plus that of its distances from the vertices between those: all terms cancel but one where the
+surface is flat or convex, whatever its triangles. In a valley both sides count. The sum has a continuous gradient.
 
 A vertex stands for half of its area: the vertices of the other surface stand for the other half, so that faces that lie
 on each other press on each other with the pressure of the barrier, whatever their meshes.
 
-A closest point inside a triangle is a minimum. On an edge it is one if no triangle of the edge leads nearer, at a corner
-if no edge of the corner does. A vertex that hangs over such an edge or corner while its own surface comes nearer
-elsewhere gets less weight, down to none: what is nearer there are parts of the other surface in front of its faces, or
-two edges.
+A vertex that hangs over an edge or a corner, while its own surface comes nearer to that beside it, gets less weight, down
+to none: what is in contact there are vertices of the other surface with the faces of this one, or two edges.
 
-Minima in nearly the same direction are one contact, which they share: a vertex in a flat valley has several.
+Source of the alternating sum: Li et al., "Convergent Incremental Potential Contact" (2023), section 4.
 """
 
 import math
@@ -16,214 +18,271 @@ import math
 import numpy as np
 
 from supple.contact.closest.pair_geometry import VERTEX_EDGE, VERTEX_TRIANGLE, VERTEX_VERTEX
+from supple.contact.potentials.known_weights import has_grown, known_weight
 from supple.numerics.geometry.closest_point import closest_on_triangle
 from supple.numerics.kernel_cache import njit, prange
-from supple.numerics.mat3 import cross, dot, row, subtract
-
-# Sines of angles that count as round-off.
-_ROUND_OFF = 1e-6
+from supple.numerics.mat3 import dot, row, subtract
 
 # A vertex counts in full while none of its neighbors is nearer, and not at all where one is nearer by this share of dhat.
 NEARER_SHARE = 0.25
 
-# Minima whose directions differ by less than some 26 degrees are one contact; beyond 60 degrees they are two.
-_SAME, _DIFFERENT = 0.9, 0.5
+# Most parts of one triangle: itself, its edges, its corners.
+_PARTS = 7
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def vertex_minima(x, pairs, mesh, dhat):
-    """Where the distance of vertices from triangles has a local minimum over the surface, below dhat.
+def near_features(x, pairs, triangles, triangle_edges, edge_count, dhat):
+    """The parts of triangles that are closest to vertices.
 
     Parameters
     ----------
     x : (s, 3) [m]; pairs : (k, 2) of vertices and triangles
-    mesh : triangles, edges, triangle_edges, edge_triangles, neighbors (see `ContactMesh`)
 
     Returns
     -------
-    codes : (k,) number of the triangle, f + number of the edge or f + e + number of the vertex on which it is; -1 where
-        there is none
-    squares : (k,) squared distance of the pair [m^2], infinite where not below dhat
+    features : (k,) number of the triangle, f + number of the edge or f + e + number of the vertex; -1 where the triangle
+        is not nearer than dhat
+    squares : (k,) squared distances [m^2], infinite where not below dhat
     """
-    triangles, edges, triangle_edges, edge_triangles, neighbors = mesh
-    codes = np.full(len(pairs), -1, dtype=np.int32)
+    features = np.full(len(pairs), -1, dtype=np.int32)
     squares = np.full(len(pairs), np.inf)
     for k in prange(len(pairs)):
-        t = pairs[k, 1]
-        p = row(x, pairs[k, 0])
-        ids = (triangles[t, 0], triangles[t, 1], triangles[t, 2])
-        a, b, c = row(x, ids[0]), row(x, ids[1]), row(x, ids[2])
+        p, t = row(x, pairs[k, 0]), pairs[k, 1]
+        a, b, c = row(x, triangles[t, 0]), row(x, triangles[t, 1]), row(x, triangles[t, 2])
         u = closest_on_triangle(p, a, b, c)
-        r = _difference(p, a, b, c, u)
-        square = dot(r, r)
+        f, g, h = subtract(p, a), subtract(b, a), subtract(c, a)
+        square = 0.0
+        for j in range(3):
+            # Differences of points are as small as triangles.
+            square += (f[j] - u[1] * g[j] - u[2] * h[j]) ** 2
         if not square < dhat * dhat:
             continue
         squares[k] = square
         inside = (u[0] > 0.0) + (u[1] > 0.0) + (u[2] > 0.0)
         if inside == 3:
-            codes[k] = t
+            features[k] = t
         elif inside == 2:
-            i = 1 if u[0] == 0.0 else (2 if u[1] == 0.0 else 0)
-            e = triangle_edges[t, i]
-            if _is_minimum_on_edge(x, triangles, edges, edge_triangles, e, r, square):
-                codes[k] = len(triangles) + e
+            features[k] = len(triangles) + triangle_edges[t, 1 if u[0] == 0.0 else (2 if u[1] == 0.0 else 0)]
         else:
-            q = ids[0] if u[0] > 0.0 else (ids[1] if u[1] > 0.0 else ids[2])
-            if _is_minimum_at_vertex(x, neighbors, q, r, square):
-                codes[k] = len(triangles) + len(edges) + q
-    return codes, squares
-
-
-@njit(error_model="numpy")
-def _difference(p, a, b, c, u):
-    """p minus the point with barycentric coordinates u, from differences of points, which are as small as triangles."""
-    f, g, h = subtract(p, a), subtract(b, a), subtract(c, a)
-    return (
-        f[0] - u[1] * g[0] - u[2] * h[0],
-        f[1] - u[1] * g[1] - u[2] * h[1],
-        f[2] - u[1] * g[2] - u[2] * h[2],
-    )
-
-
-@njit(error_model="numpy")
-def inward(x, triangles, t, a, b):
-    """Unit vector in the plane of triangle t from its edge of the points a and b inwards; zero without area."""
-    o = triangles[t, 0] + triangles[t, 1] + triangles[t, 2] - a - b
-    along, over = subtract(row(x, b), row(x, a)), subtract(row(x, o), row(x, a))
-    m = cross(cross(along, over), along)
-    length = math.sqrt(dot(m, m))
-    if length == 0.0:
-        return (0.0, 0.0, 0.0)
-    return (m[0] / length, m[1] / length, m[2] / length)
-
-
-@njit(error_model="numpy")
-def _is_minimum_on_edge(x, triangles, edges, edge_triangles, e, r, square):
-    start, items = edge_triangles
-    limit = _ROUND_OFF * math.sqrt(square)
-    for k in range(start[e], start[e + 1]):
-        if dot(r, inward(x, triangles, items[k], edges[e, 0], edges[e, 1])) > limit:
-            return False
-    return True
-
-
-@njit(error_model="numpy")
-def _is_minimum_at_vertex(x, neighbors, q, r, square):
-    start, items = neighbors
-    for k in range(start[q], start[q + 1]):
-        way = subtract(row(x, items[k]), row(x, q))
-        if dot(r, way) > _ROUND_OFF * math.sqrt(square * dot(way, way)):
-            return False
-    return True
+            features[k] = len(triangles) + edge_count + triangles[t, 0 if u[0] > 0.0 else (1 if u[1] > 0.0 else 2)]
+    return features, squares
 
 
 @njit(cache=True, error_model="numpy")
-def grouped_minima(pairs, codes, s):
-    """The rows of the pairs that have a minimum, by vertex, each minimum of a vertex once.
-
-    Returns
-    -------
-    rows : (m,) rows of `pairs`, ascending within a vertex
-    start : (m + 1,), of which the first (groups + 1) say where each vertex begins; groups : how many vertices there are
-    """
-    first = np.full(s, -1, dtype=np.int32)
-    last = np.empty(s, dtype=np.int32)
-    kept = np.empty(len(pairs), dtype=np.int32)
-    following = np.empty(len(pairs), dtype=np.int32)
-    order = np.empty(len(pairs), dtype=np.int32)
-    count = groups = 0
+def grouped_by_vertex(pairs, features, s):
+    """The rows (m,) of the pairs that have a feature, by vertex, and where each vertex begins (groups + 1,)."""
+    count = np.zeros(s, dtype=np.int32)
+    order = np.empty(s, dtype=np.int32)
+    groups = total = 0
     for k in range(len(pairs)):
-        if codes[k] < 0:
-            continue
-        v = pairs[k, 0]
-        if first[v] < 0:
-            order[groups] = v
-            groups += 1
-            first[v] = last[v] = count
-        else:
-            known = False
-            i = first[v]
-            while i >= 0:
-                known = known or codes[kept[i]] == codes[k]
-                i = following[i]
-            if known:
-                continue
-            following[last[v]] = count
-            last[v] = count
-        kept[count] = k
-        following[count] = -1
-        count += 1
-    rows = np.empty(count, dtype=np.int32)
+        if features[k] >= 0:
+            if count[pairs[k, 0]] == 0:
+                order[groups] = pairs[k, 0]
+                groups += 1
+            count[pairs[k, 0]] += 1
+            total += 1
     start = np.empty(groups + 1, dtype=np.int32)
-    n = 0
+    start[0] = 0
     for g in range(groups):
-        start[g] = n
-        i = first[order[g]]
-        while i >= 0:
-            rows[n] = kept[i]
-            n += 1
-            i = following[i]
-    start[groups] = n
+        start[g + 1] = start[g] + count[order[g]]
+        count[order[g]] = start[g]
+    rows = np.empty(total, dtype=np.int32)
+    for k in range(len(pairs)):
+        if features[k] >= 0:
+            rows[count[pairs[k, 0]]] = k
+            count[pairs[k, 0]] += 1
     return rows, start
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def write_vertex_contacts(x, pairs, codes, grouped, mesh, areas, dhat, out):
-    """Write the contacts of `grouped_minima` into the first rows of `out`, a `Contacts`; weights may be zero."""
-    triangles, edges, _, _, neighbors = mesh
-    rows, start = grouped
-    kinds, points, coefficients, vectors, distances, weights = out
+def alternating_sums(x, pairs, features, rows, start, triangles, edges, triangle_edges, dhat):
+    """The features that are left of each vertex's alternating sum, and how often each counts.
+
+    Returns
+    -------
+    codes, signs : (7 m,), those of a group from 7 * start on; counts : (groups,) how many there are
+    """
+    codes = np.empty(_PARTS * len(rows), dtype=np.int32)
+    signs = np.empty(_PARTS * len(rows), dtype=np.int32)
+    counts = np.empty(len(start) - 1, dtype=np.int32)
     for g in prange(len(start) - 1):
-        v = pairs[rows[start[g]], 0]
-        p = row(x, v)
-        for k in range(start[g], start[g + 1]):
-            t, code = pairs[rows[k], 1], codes[rows[k]]
-            points[k, 0], coefficients[k, 0] = v, 1.0
-            for i in range(1, 4):
-                points[k, i], coefficients[k, i] = -1, 0.0
-            if code < len(triangles):
-                kinds[k] = VERTEX_TRIANGLE
-                a, b, c = row(x, triangles[t, 0]), row(x, triangles[t, 1]), row(x, triangles[t, 2])
-                u = closest_on_triangle(p, a, b, c)
-                for i in range(3):
-                    points[k, i + 1], coefficients[k, i + 1] = triangles[t, i], -u[i]
-                r = _difference(p, a, b, c, u)
-            elif code < len(triangles) + len(edges):
-                kinds[k] = VERTEX_EDGE
-                e = code - len(triangles)
-                a, along = row(x, edges[e, 0]), subtract(row(x, edges[e, 1]), row(x, edges[e, 0]))
-                w = min(1.0, max(0.0, dot(subtract(p, a), along) / dot(along, along)))
-                points[k, 1], points[k, 2] = edges[e, 0], edges[e, 1]
-                coefficients[k, 1], coefficients[k, 2] = w - 1.0, -w
-                r = (p[0] - a[0] - w * along[0], p[1] - a[1] - w * along[1], p[2] - a[2] - w * along[2])
-            else:
-                kinds[k] = VERTEX_VERTEX
-                q = code - len(triangles) - len(edges)
-                points[k, 1], coefficients[k, 1] = q, -1.0
-                r = subtract(p, row(x, q))
-            vectors[k, 0], vectors[k, 1], vectors[k, 2] = r
+        counts[g] = _alternating_sum(
+            x, pairs, features, rows, start[g], start[g + 1], triangles, edges, triangle_edges, dhat, codes, signs
+        )
+    return codes, signs, counts
+
+
+@njit(error_model="numpy")
+def _alternating_sum(x, pairs, features, rows, begin, end, triangles, edges, triangle_edges, dhat, codes, signs):
+    first, n = _PARTS * begin, 0
+    p = row(x, pairs[rows[begin], 0])
+    for k in range(begin, end):
+        n = _add(codes, signs, first, n, features[rows[k]], 1)
+    if end - begin > 1:
+        for k in range(begin, end):
+            t = pairs[rows[k], 1]
+            for i in range(3):
+                e, q = triangle_edges[t, i], triangles[t, i]
+                shared = _sharing_edge(pairs, rows, k, begin, end, triangle_edges, e)
+                if shared > 1:
+                    feature, square = _closest_on_edge(x, p, edges, e, len(triangles))
+                    if square < dhat * dhat:
+                        n = _add(codes, signs, first, n, feature, 1 - shared)
+                around, sides = _sharing_vertex(pairs, rows, k, begin, end, triangles, triangle_edges, edges, q)
+                away = subtract(p, row(x, q))
+                # The triangles and edges of a closed fan cancel, those of an open one leave one.
+                if around > 1 and around >= sides and dot(away, away) < dhat * dhat:
+                    n = _add(codes, signs, first, n, len(triangles) + len(edges) + q, 1 + around - sides)
+    left = 0
+    for i in range(first, first + n):
+        if signs[i] != 0:
+            codes[first + left], signs[first + left] = codes[i], signs[i]
+            left += 1
+    return left
+
+
+@njit(error_model="numpy")
+def _add(codes, signs, first, n, code, sign):
+    """Count a code once more; returns how many codes there are."""
+    for i in range(first, first + n):
+        if codes[i] == code:
+            signs[i] += sign
+            return n
+    codes[first + n], signs[first + n] = code, sign
+    return n + 1
+
+
+@njit(error_model="numpy")
+def _sharing_edge(pairs, rows, k, begin, end, triangle_edges, e):
+    """How many triangles of a group have edge e; 0 where one before the k-th has it."""
+    count = 0
+    for other in range(begin, end):
+        t = pairs[rows[other], 1]
+        if triangle_edges[t, 0] == e or triangle_edges[t, 1] == e or triangle_edges[t, 2] == e:
+            if other < k:
+                return 0
+            count += 1
+    return count
+
+
+@njit(error_model="numpy")
+def _sharing_vertex(pairs, rows, k, begin, end, triangles, triangle_edges, edges, q):
+    """How many triangles of a group have vertex q, and how many different edges at q they have; 0 as above."""
+    around = sides = 0
+    for other in range(begin, end):
+        t = pairs[rows[other], 1]
+        if triangles[t, 0] == q or triangles[t, 1] == q or triangles[t, 2] == q:
+            if other < k:
+                return 0, 0
+            around += 1
+            for i in range(3):
+                e = triangle_edges[t, i]
+                if (edges[e, 0] == q or edges[e, 1] == q) and _sharing_edge(
+                    pairs, rows, other, begin, end, triangle_edges, e
+                ):
+                    sides += 1
+    return around, sides
+
+
+@njit(error_model="numpy")
+def _closest_on_edge(x, p, edges, e, triangle_count):
+    """The feature of an edge that is closest to p, and the squared distance [m^2]."""
+    a, b = row(x, edges[e, 0]), row(x, edges[e, 1])
+    w, r = nearest_of_edge(p, a, b)
+    if w <= 0.0:
+        return triangle_count + len(edges) + edges[e, 0], dot(r, r)
+    if w >= 1.0:
+        return triangle_count + len(edges) + edges[e, 1], dot(r, r)
+    return triangle_count + e, dot(r, r)
+
+
+@njit(error_model="numpy")
+def nearest_of_edge(p, a, b):
+    """w in [0, 1], and the vector to p from the closest point (1 - w) a + w b."""
+    along, r = subtract(b, a), subtract(p, a)
+    length = dot(along, along)
+    w = min(1.0, max(0.0, dot(r, along) / length)) if length > 0.0 else 0.0
+    if w == 1.0:
+        return w, subtract(p, b)
+    return w, (r[0] - w * along[0], r[1] - w * along[1], r[2] - w * along[2])
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def write_vertex_contacts(
+    x, pairs, rows, starts, codes, signs, mesh, owner, areas, dhat, known_codes, known_values, out, keys, grown
+):
+    """Write the contacts of `alternating_sums` into the first rows of `out`, a `Contacts`.
+
+    Parameters
+    ----------
+    starts : (groups + 1, 2) where each group begins in `rows` and in `out`
+    mesh : triangles, edges, start and items of neighbors (see `ContactMesh`)
+    keys : (m,) a code of each contact's vertex and the owner of the other side, for `KnownWeights`
+    grown : (m,) weights of the vertices that are to be known [m^2], -1 where they do not change
+    """
+    triangles, edges, near_start, near_items = mesh
+    kinds, points, coefficients, vectors, distances, weights = out
+    height = NEARER_SHARE * dhat
+    for g in prange(len(starts) - 1):
+        v = pairs[rows[starts[g, 0]], 0]
+        offset = _PARTS * starts[g, 0] - starts[g, 1]
+        for k in range(starts[g, 1], starts[g + 1, 1]):
+            _write_contact(x, v, codes[offset + k], triangles, edges, kinds, points, coefficients, k)
+            for j in range(3):
+                vectors[k, j] = 0.0
+                for i in range(1, 4):
+                    # Differences of points are as small as triangles.
+                    vectors[k, j] += coefficients[k, i] * (x[points[k, i], j] - x[v, j])
+            r = row(vectors, k)
             distances[k] = math.sqrt(dot(r, r))
-        for k in range(start[g], start[g + 1]):
-            share = 0.0
-            for other in range(start[g], start[g + 1]):
-                share += 1.0 if other == k else _sameness(vectors, distances, k, other)
-            weights[k] = 0.5 * areas[v] / share
-            if kinds[k] != VERTEX_TRIANGLE:
-                weights[k] *= _own_side(x, neighbors, v, row(vectors, k), distances[k], NEARER_SHARE * dhat)
+            keys[k] = np.int64(v) * len(x) + owner[points[k, 1]]
+            weights[k] = 0.0
+            if signs[offset + k] > 0:
+                weights[k] = 0.5 * areas[v]
+                if kinds[k] != VERTEX_TRIANGLE:
+                    weights[k] *= _own_side(x, near_start, near_items, v, r, distances[k], height)
+        for k in range(starts[g, 1], starts[g + 1, 1]):
+            best = 0.0
+            for other in range(starts[g, 1], starts[g + 1, 1]):
+                if keys[other] == keys[k]:
+                    best = max(best, weights[other])
+            grown[k] = best
+        for k in range(starts[g, 1], starts[g + 1, 1]):
+            known = known_weight(known_codes, known_values, keys[k])
+            now = grown[k]
+            if not has_grown(known, now, 0.5 * areas[v]):
+                grown[k] = -1.0
+            weights[k] = signs[offset + k] * (now if known < 0.0 else known)
 
 
 @njit(error_model="numpy")
-def _sameness(vectors, distances, k, other):
-    """1 for two minima in the same direction, 0 for different ones."""
-    cosine = dot(row(vectors, k), row(vectors, other)) / (distances[k] * distances[other])
-    return min(1.0, max(0.0, (cosine - _DIFFERENT) / (_SAME - _DIFFERENT)))
+def _write_contact(x, v, code, triangles, edges, kinds, points, coefficients, k):
+    """Kind, points and coefficients of contact k: of vertex v with the feature that a code names."""
+    p = row(x, v)
+    points[k, 0], coefficients[k, 0] = v, 1.0
+    for i in range(1, 4):
+        points[k, i], coefficients[k, i] = -1, 0.0
+    if code < len(triangles):
+        kinds[k] = VERTEX_TRIANGLE
+        t = code
+        u = closest_on_triangle(p, row(x, triangles[t, 0]), row(x, triangles[t, 1]), row(x, triangles[t, 2]))
+        for i in range(3):
+            points[k, i + 1], coefficients[k, i + 1] = triangles[t, i], -u[i]
+    elif code < len(triangles) + len(edges):
+        kinds[k] = VERTEX_EDGE
+        e = code - len(triangles)
+        points[k, 1], points[k, 2] = edges[e, 0], edges[e, 1]
+        w, _ = nearest_of_edge(p, row(x, points[k, 1]), row(x, points[k, 2]))
+        coefficients[k, 1], coefficients[k, 2] = w - 1.0, -w
+    else:
+        kinds[k] = VERTEX_VERTEX
+        points[k, 1], coefficients[k, 1] = code - len(triangles) - len(edges), -1.0
 
 
 @njit(error_model="numpy")
-def _own_side(x, neighbors, v, r, d, height):
+def _own_side(x, near_start, near_items, v, r, d, height):
     """1 where no neighbor of vertex v is nearer to what lies at -r, 0 where one is nearer by `height`."""
-    start, items = neighbors
     nearer = 0.0
-    for k in range(start[v], start[v + 1]):
-        nearer = min(nearer, dot(r, subtract(row(x, items[k]), row(x, v))) / d)
+    for k in range(near_start[v], near_start[v + 1]):
+        nearer = min(nearer, dot(r, subtract(row(x, near_items[k]), row(x, v))) / d)
     return max(0.0, 1.0 + nearer / height)

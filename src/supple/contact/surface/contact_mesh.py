@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.obstacle_vertices import ObstacleRange
-from supple.contact.surface.adjacency import Adjacency, adjacency
 from supple.contact.surface.embedded_points import EmbeddedPoints
 from supple.contact.surface.stitch_filter import StitchFilter, stitch_filter
 from supple.mesh.topology import edge_keys
+from supple.numerics.adjacency import Adjacency, adjacency
 from supple.system import System
 
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from supple.contact.surface.adjacency import Adjacency, adjacency
 from supple.contact.surface.touching import touching_pairs
+from supple.numerics.adjacency import Adjacency, adjacency
 from supple.scene.stitches.masks import stitched_crossings, stitched_edges, stitched_triangles
 
 # Parts that are nearer than this share of the mean edge at the start touch.

@@ -5,11 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.contact.surface.distances import edges_nearer, points_nearer
 from supple.numerics.geometry.box_tree import BoxTree, overlapping
-from supple.numerics.geometry.closest_point import between, closest_on_triangle, combine
-from supple.numerics.geometry.closest_segments import closest_on_segments
-from supple.numerics.kernel_cache import njit, prange
-from supple.numerics.mat3 import dot, row, subtract
 
 
 def boxes_of(x: NDArray[np.float64], simplices: NDArray[np.int32], margin: float) -> NDArray[np.float64]:
@@ -39,39 +36,16 @@ def touching_pairs(
     corners = triangles[points[:, 1]]
     kept = owners[owner[points[:, 0]], owner[corners[:, 0]]] & (corners != points[:, :1]).all(axis=1)
     points = points[kept]
-    points = points[_points_near(x, triangles, points, reach)]
+    points = points[points_nearer(x, triangles, points, reach)]
     sides = _pairs(boxes_of(x, edges, 0.0), boxes_of(x, edges, reach))
     sides = sides[sides[:, 0] < sides[:, 1]]
     one, other = edges[sides[:, 0]], edges[sides[:, 1]]
     kept = owners[owner[one[:, 0]], owner[other[:, 0]]] & (one[:, :, None] != other[:, None]).all(axis=(1, 2))
     sides = sides[kept]
-    return points, sides[_edges_near(x, edges, sides, reach)]
+    return points, sides[edges_nearer(x, edges, sides, reach)]
 
 
 def _pairs(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.int32]:
     """Rows (k, 2) of boxes (m, 6) and boxes (n, 6) that overlap, in ascending order of the first."""
     start, found = overlapping(BoxTree.over(second), first)
     return np.column_stack([np.repeat(np.arange(len(first), dtype=np.int32), np.diff(start)), found])
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def _points_near(x, triangles, pairs, reach):
-    near = np.zeros(len(pairs), dtype=np.bool_)
-    for k in prange(len(pairs)):
-        t = pairs[k, 1]
-        p, a, b, c = row(x, pairs[k, 0]), row(x, triangles[t, 0]), row(x, triangles[t, 1]), row(x, triangles[t, 2])
-        d = subtract(p, combine(closest_on_triangle(p, a, b, c), a, b, c))
-        near[k] = dot(d, d) < reach * reach
-    return near
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def _edges_near(x, edges, pairs, reach):
-    near = np.zeros(len(pairs), dtype=np.bool_)
-    for k in prange(len(pairs)):
-        e, f = pairs[k, 0], pairs[k, 1]
-        a, b, c, d = row(x, edges[e, 0]), row(x, edges[e, 1]), row(x, edges[f, 0]), row(x, edges[f, 1])
-        s, t = closest_on_segments(a, b, c, d)
-        r = subtract(between(a, b, s), between(c, d, t))
-        near[k] = dot(r, r) < reach * reach
-    return near

@@ -1,15 +1,20 @@
-"""All pairs of triangles with a common point: a sweep along one axis, then exact tests of the pairs it finds."""
+"""All pairs of triangles with a common point: a tree of their boxes, then exact tests of the pairs it finds."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.numerics.adjacency import in_list
+from supple.numerics.geometry.box_tree import STACK, BoxTree, after_leaf, next_leaf
 from supple.numerics.geometry.exact_predicates import side_of_line, side_of_plane
-from supple.numerics.kernel_cache import njit
+from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import cross, row, subtract
 
 APART, TOUCHING, CROSSING = 0, 1, 2
+
+# Triangles are divided into this many runs, whatever the number of threads.
+_RUNS = 64
 
 
 @njit
@@ -159,33 +164,51 @@ def triangles_meet(x, first, second, sides):
     return worst
 
 
-@njit(cache=True, error_model="numpy")
-def _sweep(x, triangles, owner, collide, low, high, order, axis, most, pairs, kinds):
-    """Write as many pairs as fit; returns the number of pairs, at most `most`."""
-    count = 0
+@njit(error_model="numpy")
+def _crossings_of_run(r, x, triangles, owner, collide, ignored, tree, most, pairs, kinds):
+    """Write the pairs of every `_RUNS`-th leaf with later leaves, as far as they fit; returns their number."""
+    nodes, labels, order = tree
+    leaves = len(nodes) // 2
+    stack = np.empty(STACK, dtype=np.int64)
     sides = np.zeros((2, 3), dtype=np.int64)
-    y, z = (axis + 1) % 3, (axis + 2) % 3
-    for a in range(len(order)):
-        i = order[a]
+    count = 0
+    for q in range(r, len(order), _RUNS):
+        i = order[q]
+        box = nodes[leaves + q]
         mine = collide[owner[i]]
-        for b in range(a + 1, len(order)):
-            j = order[b]
-            if low[j, axis] > high[i, axis]:
-                break
-            if low[j, y] > high[i, y] or low[i, y] > high[j, y] or low[j, z] > high[i, z] or low[i, z] > high[j, z]:
+        label = -1 if mine[owner[i]] else owner[i]
+        top = after_leaf(nodes, q, box, stack)
+        while top > 0:
+            leaf, top = next_leaf(nodes, labels, box, label, False, stack, top)
+            if leaf < 0:
                 continue
-            if not mine[owner[j]]:
+            j = order[leaf]
+            low, high = min(i, j), max(i, j)
+            if not mine[owner[j]] or in_list(ignored, low, high):
                 continue
             kind = triangles_meet(x, triangles[i], triangles[j], sides)
             if kind == APART:
                 continue
             if count < len(pairs):
-                pairs[count, 0], pairs[count, 1] = min(i, j), max(i, j)
+                pairs[count, 0], pairs[count, 1] = low, high
                 kinds[count] = kind
             count += 1
             if count == most:
                 return count
     return count
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def _crossings(x, triangles, owner, collide, ignored, tree, most, room, pairs, kinds, counts):
+    """The pairs of all runs, of which rows room[r] .. room[r + 1] are for run r; see `crossing_triangles`."""
+    start, items = ignored
+    nodes, labels, order = tree
+    for r in prange(_RUNS):
+        first, last = room[r], room[r + 1]
+        its = pairs[first:last], kinds[first:last]
+        counts[r] = _crossings_of_run(
+            r, x, triangles, owner, collide, (start, items), (nodes, labels, order), most, its[0], its[1]
+        )
 
 
 def crossing_triangles(
@@ -194,6 +217,7 @@ def crossing_triangles(
     owner: NDArray[np.int32],
     collide: NDArray[np.bool_],
     most: int = -1,
+    ignored: tuple[NDArray[np.int32], NDArray[np.int32]] | None = None,
 ) -> tuple[NDArray[np.int64], NDArray[np.int8]]:
     """Pairs of triangles with common points other than shared vertices, in ascending order, lower row first.
 
@@ -202,6 +226,7 @@ def crossing_triangles(
     x : (n, 3) [m]; triangles : (t, 3); owner : (t,) number of the object of each triangle
     collide : (p, p) which pairs of objects are tested; the diagonal: triangles of one object with each other
     most : the search ends after this many pairs; -1: no limit
+    ignored : pairs that are not tested, as starts (t + 1,) and the higher rows for each lower one
 
     Returns
     -------
@@ -210,18 +235,21 @@ def crossing_triangles(
     if len(triangles) == 0:
         return np.zeros((0, 2), dtype=np.int64), np.zeros(0, dtype=np.int8)
     corners = x[triangles]
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    # Along the axis on which boxes overlap least.
-    extent = np.maximum(np.ptp(x[triangles.ravel()], axis=0), 1e-300)
-    axis = int(((high - low).mean(axis=0) / extent).argmin())
-    order = np.argsort(low[:, axis], kind="stable")
-    capacity = 4096
+    boxes = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
+    tree = BoxTree.over(boxes, owner.astype(np.int32))
+    arrays = tree.nodes, tree.labels, tree.order
+    none = np.zeros(len(triangles) + 1, dtype=np.int32)
+    lists = (none, none[:0]) if ignored is None else (ignored[0], ignored[1])
+    counts = np.full(_RUNS, 64, dtype=np.int64)
     while True:
-        pairs, kinds = np.zeros((capacity, 2), dtype=np.int64), np.zeros(capacity, dtype=np.int8)
-        count = _sweep(x, triangles, owner, collide, low, high, order, axis, most, pairs, kinds)
-        if count <= capacity:
+        room = np.concatenate([[0], np.cumsum(counts)])
+        pairs, kinds = np.zeros((room[-1], 2), dtype=np.int64), np.zeros(room[-1], dtype=np.int8)
+        _crossings(x, triangles, owner, collide, lists, arrays, most, room, pairs, kinds, counts)
+        if (counts <= np.diff(room)).all():
             break
-        capacity = count
-    pairs, kinds = pairs[:count], kinds[:count]
+    found = np.concatenate([np.arange(first, first + count) for first, count in zip(room, counts, strict=False)])
+    pairs, kinds = pairs[found], kinds[found]
     ascending = np.lexsort((pairs[:, 1], pairs[:, 0]))
+    if most >= 0:
+        ascending = ascending[:most]
     return pairs[ascending], kinds[ascending]

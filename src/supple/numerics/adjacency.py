@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.numerics.kernel_cache import njit
+
 
 class Adjacency(NamedTuple):
     """The lists of n things one after another; kernels take it as it is.
@@ -27,3 +29,12 @@ def adjacency(rows: NDArray[np.integer], items: NDArray[np.integer], count: int)
     of, found = np.divmod(codes, width)
     start = np.searchsorted(of, np.arange(count + 1))
     return Adjacency(start.astype(np.int32), found.astype(np.int32))
+
+
+@njit(error_model="numpy")
+def in_list(lists, k, item):
+    """Whether an item is in the list of thing k; `lists` are an `Adjacency` or its two arrays."""
+    for i in range(lists[0][k], lists[0][k + 1]):  # noqa: SIM110
+        if lists[1][i] == item:
+            return True
+    return False

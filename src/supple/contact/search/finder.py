@@ -1,0 +1,146 @@
+"""Candidates for contact, kept from one search to the next while no new ones are possible."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.contact.search.candidates import Candidates
+from supple.contact.search.pair_kernels import motion_of_owners, pairs_within
+from supple.contact.search.surface_trees import Rule, SurfaceTrees
+from supple.contact.surface.contact_mesh import ContactMesh
+
+# Margins are this share of the present motion, between these shares of dhat and of the mean edge: what moves by little
+# needs no new search for several steps, and what moves by much needs one anyway.
+_SHARE, _LEAST, _MOST = 0.5, 0.5, 0.1
+# Points that are nearer to a straight way than this share of the margin are on it.
+_ON_WAY = 0.25
+
+
+class CandidateFinder:
+    """Finds what is near what on a surface that moves.
+
+    Contacts within one owner and between two owners are kept apart: the first do not change where a body moves as a
+    whole.
+
+    Parameters
+    ----------
+    dhat : [m] candidates are pairs that may be nearer than this
+
+    Attributes
+    ----------
+    mesh : the surface
+    """
+
+    def __init__(self, mesh: ContactMesh, dhat: float) -> None:
+        self.mesh = mesh
+        trees = SurfaceTrees(mesh)
+        one = np.eye(len(mesh.collide), dtype=np.bool_)
+        self._lists = [
+            _KeptList(mesh, dhat, trees, Rule(np.ascontiguousarray(mesh.collide & kind), same))
+            for kind, same in ((one, True), (~one, False))
+        ]
+        self._parts: list[Candidates] = []
+        self._joined: Candidates | None = None
+
+    def find(self, begin: NDArray[np.float64], end: NDArray[np.float64]) -> Candidates:
+        """Every pair that may come nearer than dhat while points move straight from `begin` (s, 3) to `end`, and more.
+
+        The pairs with a common point, pairs that may not touch, and stitched pairs are left out.
+        """
+        return self._together([kept.find(begin, end) for kept in self._lists])
+
+    def at(self, points: NDArray[np.float64]) -> Candidates:
+        """Every pair that is nearer than dhat at `points` (s, 3), and more; see `find`."""
+        return self._together([kept.at(points) for kept in self._lists])
+
+    def _together(self, parts: list[Candidates]) -> Candidates:
+        if self._joined is None or any(a is not b for a, b in zip(parts, self._parts, strict=True)):
+            self._parts, self._joined = parts, parts[0].joined(parts[1])
+        return self._joined
+
+
+class _KeptList:
+    """The candidates of one rule.
+
+    `_near` holds all pairs that come nearer than dhat while no two owners move by more than 2 * `_margin` with respect
+    to each other, counted from `_reference`. `_wide` holds those that come nearer than dhat + 2 * `_wide_margin` along
+    the latest way.
+    """
+
+    def __init__(self, mesh: ContactMesh, dhat: float, trees: SurfaceTrees, rule: Rule) -> None:
+        self._mesh, self._dhat, self._trees, self._rule = mesh, dhat, trees, rule
+        edge = float(mesh.edge_lengths.mean()) if len(mesh.edge_lengths) else 0.0
+        self._margins = _LEAST * dhat, max(_LEAST * dhat, _MOST * edge)
+        self._near: Candidates | None = None
+        self._reference = np.zeros((0, 3))
+        self._margin = 0.0
+        self._wide: Candidates | None = None
+        self._begin = self._way = np.zeros((0, 3))
+        self._wide_margin = 0.0
+        owners = len(mesh.collide)
+        self._means, self._deviations, self._boxes = np.empty((owners, 3)), np.empty(owners), np.empty((owners, 6))
+        self._possible = bool(rule.allowed.any()) and len(mesh.triangles) > 0
+        self._nothing = Candidates(np.zeros((0, 2), np.int32), np.zeros((0, 2), np.int32))
+
+    def find(self, begin: NDArray[np.float64], end: NDArray[np.float64]) -> Candidates:
+        if not self._possible:
+            return self._nothing
+        if self._near is not None and self._covers(begin, end):
+            return self._near
+        return self._search(begin, end - begin)
+
+    def at(self, points: NDArray[np.float64]) -> Candidates:
+        if not self._possible:
+            return self._nothing
+        if self._near is not None and self._covers(points):
+            return self._near
+        if self._wide is not None:
+            off = _distance_from_way(points, self._begin, self._way)
+            if off <= _ON_WAY * self._wide_margin:
+                self._keep_near(points, self._wide_margin - off)
+                assert self._near is not None
+                return self._near
+        return self._search(points, np.zeros_like(points))
+
+    def _search(self, begin: NDArray[np.float64], way: NDArray[np.float64]) -> Candidates:
+        """The candidates along a way, which become `_wide`; those at its beginning become `_near`."""
+        relative = way - self._drift(way) if self._rule.same else way
+        longest = float(np.sqrt(np.einsum("ij,ij->i", relative, relative).max(initial=0.0)))
+        least, most = self._margins
+        margin = min(max(_SHARE * longest, least), most)
+        found = self._trees.find(self._rule, begin, relative, self._dhat + 2.0 * margin)
+        self._wide, self._begin, self._way, self._wide_margin = found, begin.copy(), way, margin
+        self._keep_near(begin, margin)
+        return found
+
+    def _drift(self, way: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(s, 3) the mean of the way over each owner."""
+        owner, count = self._mesh.owner, len(self._means)
+        counts = np.maximum(np.bincount(owner, minlength=count), 1)
+        means = np.stack([np.bincount(owner, weights=way[:, j], minlength=count) / counts for j in range(3)], axis=1)
+        return means[owner]
+
+    def _keep_near(self, points: NDArray[np.float64], margin: float) -> None:
+        assert self._wide is not None
+        self._near = self._wide.nearer_than(self._mesh, points, self._dhat + 2.0 * margin)
+        self._reference, self._margin = points.copy(), margin
+
+    def _covers(self, *ends: NDArray[np.float64]) -> bool:
+        """Whether `_near` has all candidates while points move straight between the ends."""
+        self._boxes[:, :3], self._boxes[:, 3:] = np.inf, -np.inf
+        moved = []
+        for x in ends:
+            motion_of_owners(x, self._reference, self._mesh.owner, self._boxes, self._means, self._deviations)
+            moved.append((self._means.copy(), self._deviations.copy()))
+        limit = 2.0 * self._margin
+        return all(pairs_within(self._boxes, *each, self._rule.allowed, self._dhat, limit) for each in moved)
+
+
+def _distance_from_way(x: NDArray[np.float64], begin: NDArray[np.float64], way: NDArray[np.float64]) -> float:
+    """The largest distance of a point from its place at the moment of a common motion that suits all best [m]."""
+    moved = x - begin
+    square = float(np.vdot(way, way))
+    part = min(max(float(np.vdot(moved, way)) / square, 0.0), 1.0) if square > 0.0 else 0.0
+    moved -= part * way
+    return float(np.sqrt(np.einsum("ij,ij->i", moved, moved).max(initial=0.0)))

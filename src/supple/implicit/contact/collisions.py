@@ -1,0 +1,91 @@
+"""Contacts of surfaces at a point of the search for a minimum, and how far a step may go before anything touches."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.contact.ccd.largest_step import largest_step
+from supple.contact.potentials.contact_set import ContactSet, Found
+from supple.contact.potentials.contacts import Contacts
+from supple.contact.potentials.known_weights import KnownWeights
+from supple.contact.search.finder import CandidateFinder
+from supple.contact.surface.contact_mesh import ContactMesh
+from supple.contact.surface.intersection import intersects
+
+# Swept boxes of a long way overlap everything. It is divided into pieces of this many mean edges.
+_PIECE = 2.0
+_MAX_PIECES = 64
+
+
+class Collisions:
+    """Contacts between the triangles of a mesh; those at the latest positions are kept.
+
+    Parameters
+    ----------
+    dhat : [m] contacts are pairs that are nearer than this.
+    """
+
+    def __init__(self, mesh: ContactMesh, dhat: float) -> None:
+        self.mesh = mesh
+        self.dhat = dhat
+        self._finder = CandidateFinder(mesh, dhat)
+        self._set = ContactSet(mesh, dhat)
+        self._piece = _PIECE * float(mesh.edge_lengths.mean()) if len(mesh.edge_lengths) else np.inf
+        self._x: NDArray[np.float64] | None = None
+        self._points = np.zeros((0, 3))
+        self._found: Found | None = None
+        self._known = KnownWeights.none()
+
+    def points(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The mesh's points (s, 3) at x (n, 3), which must not change afterwards."""
+        if x is not self._x:
+            self._x, self._points, self._found = x, self.mesh.points.positions(x), None
+        return self._points
+
+    def at(self, x: NDArray[np.float64]) -> Contacts:
+        """All contacts at x (n, 3)."""
+        return self._at(x).contacts
+
+    def smallest_distance(self, x: NDArray[np.float64]) -> float:
+        """Between surfaces [m]; infinite where nothing is nearer than dhat."""
+        return self._at(x).least
+
+    def forget_weights(self) -> None:
+        """From now on, contacts have the weights that belong to where they are."""
+        self._known, self._found = KnownWeights.none(), None
+
+    def keep_weights(self, x: NDArray[np.float64]) -> None:
+        """Contacts at x (n, 3) keep their weights wherever they go (see `KnownWeights`)."""
+        found = self._at(x)
+        if len(found.codes):
+            self._known, self._found = self._known.grown(found.codes, found.weights), None
+
+    def _at(self, x: NDArray[np.float64]) -> Found:
+        points = self.points(x)
+        if self._found is None:
+            candidates = self._finder.at(points)
+            self._found = self._set.of(points, candidates.vertex_triangle, candidates.edge_edge, self._known)
+        return self._found
+
+    def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> float:
+        """How far along `direction` (n, 3), at most 1, nothing touches."""
+        start = self.points(x)
+        way = self.mesh.points.positions(direction)
+        longest = float(np.sqrt(np.einsum("ij,ij->i", way, way).max(initial=0.0)))
+        if not np.isfinite(longest):
+            return 0.0
+        pieces = max(1, int(np.ceil(min(longest / self._piece, _MAX_PIECES))))
+        length = min(1.0, self._piece * pieces / longest) / pieces if longest > 0.0 else 1.0
+        for k in range(pieces):
+            begin = start if k == 0 else start + (k * length) * way
+            candidates = self._finder.find(begin, start + ((k + 1) * length) * way)
+            share, _, _ = largest_step(self.mesh, begin, length * way, candidates)
+            if share < 1.0:
+                return (k + share) * length
+        # A complete way must give exactly 1: pieces * (1 / pieces) can be slightly less.
+        return 1.0 if longest <= pieces * self._piece else pieces * length
+
+    def intersect(self, x: NDArray[np.float64]) -> bool:
+        """Whether any two triangles that may not cross do so at x."""
+        return intersects(self.mesh, self.points(x))
