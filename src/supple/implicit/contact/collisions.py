@@ -5,17 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.ccd.largest_step import largest_step
+from supple.contact.ccd.intersections import intersects
+from supple.contact.ccd.largest_step import Limit, largest_step_in_pieces
 from supple.contact.potentials.contact_set import ContactSet, Found
 from supple.contact.potentials.contacts import Contacts
 from supple.contact.potentials.known_weights import KnownWeights
 from supple.contact.search.finder import CandidateFinder
 from supple.contact.surface.contact_mesh import ContactMesh
-from supple.contact.surface.intersection import intersects
-
-# Swept boxes of a long way overlap everything. It is divided into pieces of this many mean edges.
-_PIECE = 2.0
-_MAX_PIECES = 64
 
 
 class Collisions:
@@ -31,7 +27,6 @@ class Collisions:
         self.dhat = dhat
         self._finder = CandidateFinder(mesh, dhat)
         self._set = ContactSet(mesh, dhat)
-        self._piece = _PIECE * float(mesh.edge_lengths.mean()) if len(mesh.edge_lengths) else np.inf
         self._x: NDArray[np.float64] | None = None
         self._points = np.zeros((0, 3))
         self._found: Found | None = None
@@ -68,23 +63,9 @@ class Collisions:
             self._found = self._set.of(points, candidates.vertex_triangle, candidates.edge_edge, self._known)
         return self._found
 
-    def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> float:
-        """How far along `direction` (n, 3), at most 1, nothing touches."""
-        start = self.points(x)
-        way = self.mesh.points.positions(direction)
-        longest = float(np.sqrt(np.einsum("ij,ij->i", way, way).max(initial=0.0)))
-        if not np.isfinite(longest):
-            return 0.0
-        pieces = max(1, int(np.ceil(min(longest / self._piece, _MAX_PIECES))))
-        length = min(1.0, self._piece * pieces / longest) / pieces if longest > 0.0 else 1.0
-        for k in range(pieces):
-            begin = start if k == 0 else start + (k * length) * way
-            candidates = self._finder.find(begin, start + ((k + 1) * length) * way)
-            share, _, _ = largest_step(self.mesh, begin, length * way, candidates)
-            if share < 1.0:
-                return (k + share) * length
-        # A complete way must give exactly 1: pieces * (1 / pieces) can be slightly less.
-        return 1.0 if longest <= pieces * self._piece else pieces * length
+    def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> Limit:
+        """How far along `direction` (n, 3), at most 1, nothing touches, and the pair that allows no more."""
+        return largest_step_in_pieces(self._finder, self.points(x), self.mesh.points.positions(direction))
 
     def intersect(self, x: NDArray[np.float64]) -> bool:
         """Whether any two triangles that may not cross do so at x."""

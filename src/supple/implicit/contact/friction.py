@@ -32,8 +32,8 @@ class Friction(FrictionPotential):
 
     Attributes
     ----------
-    points : that `slips` refers to; reach : eps_v h [m]
-    duals : (k, 3) see `friction_energy`; they change in a minimization. At first they are zero
+    points : that `slips` refers to; reach : eps_v h [m], the displacement below which friction is static
+    duals : (k, 3) the state of a minimization, see `friction_energy`; zero at first: the step is that of the majorizer
     """
 
     points: EmbeddedPoints
@@ -59,5 +59,5 @@ class Friction(FrictionPotential):
         out.couplings.append(vertex_couplings(self.points, between))
 
     def renew(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> None:
-        points, way = self.points.positions(x), self.points.positions(direction)
-        renew_duals(points, way, self.slips, self.reach, self.duals)
+        positions = self.points.positions
+        renew_duals(positions(x), positions(direction), self.slips, self.reach, self.duals)

@@ -97,7 +97,7 @@ class ContactModel:
         step = self.planes.largest_step(x, direction)
         if step == 0.0:
             return 0.0
-        return step * self.collisions.largest_step(x, step * direction)
+        return step * self.collisions.largest_step(x, step * direction).step
 
     def allows(self, x: NDArray[np.float64]) -> bool:
         """Whether every vertex is in front of every plane."""
