@@ -87,7 +87,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
         if (last and not found.touching) or found.projected is not ProjectedTerms.ALL or not limits.guard.complete:
             extension.factor = 1.0
         vector = extension.factor * found.vector
-        largest, _ = limits.largest_step(here.positions, vector)
+        largest, _, reason = limits.largest_step(here.positions, vector)
         slope = extension.factor * found.slope
         end, step, cuts = search(objective, here, vector, slope, largest, limits)
         extension.note(step, rate)
@@ -108,6 +108,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
             filter=largest,
             step=step,
             cuts=cuts,
+            limit="; ".join(([reason] if reason else []) + (["energy"] if cuts else [])),
             projected=found.projected is ProjectedTerms.ALL,
         )
         rows.append(row)
