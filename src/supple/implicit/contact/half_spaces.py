@@ -99,11 +99,16 @@ class Planes:
         """[m]; infinite where there is no pair."""
         return self.near(x)[3]
 
-    def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> float:
-        """Largest step along `direction` (n, 3), at most 1, that keeps a tenth of every point's distance."""
+    def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, int]:
+        """Largest step along `direction` (n, 3), at most 1, that keeps a tenth of every point's distance.
+
+        Returns
+        -------
+        step, row : of the pair that allows no more, -1 where there is none
+        """
         if len(self) == 0:
-            return 1.0
-        return largest_plane_step(self.positions(x), self.points.positions(direction), self.pairs, _KEEP)[0]
+            return 1.0, -1
+        return largest_plane_step(self.positions(x), self.points.positions(direction), self.pairs, _KEEP)
 
 
 @dataclass(frozen=True, eq=False)

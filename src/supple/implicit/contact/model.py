@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.contact.ccd.largest_step import Limit
 from supple.contact.obstacle_vertices import ObstacleRange
 from supple.contact.potentials.barrier_energy import barrier_forces
 from supple.contact.potentials.friction_lag import lagged_slips, sides
@@ -77,9 +78,7 @@ class ContactModel:
         reach = self.scales.friction_velocity * (times[1] - times[0])
         between = self._friction_between(barriers.triangles, lagged, start, reach)
         bodies = self.mesh.body_count
-        with_planes = plane_friction(
-            barriers.planes, lagged, start, times, self.coefficients[:bodies, bodies:], reach
-        )
+        with_planes = plane_friction(barriers.planes, lagged, start, times, self.coefficients[:bodies, bodies:], reach)
         return [term for term in (between, with_planes) if term is not None]
 
     def _friction_between(
@@ -92,12 +91,14 @@ class ContactModel:
         slips = lagged_slips(contacts, forces, began, self.mesh.owner, self.coefficients)
         return Friction(self.mesh.points, slips, reach) if len(slips.forces) else None
 
-    def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> float:
-        """How far along `direction` (n, 3), at most 1, nothing touches."""
-        step = self.planes.largest_step(x, direction)
+    def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, str]:
+        """How far along `direction` (n, 3), at most 1, nothing touches, and the names of the pair that allows no more."""
+        step, row = self.planes.largest_step(x, direction)
+        names = "" if row < 0 else self._names(self._plane_owners(row))
         if step == 0.0:
-            return 0.0
-        return step * self.collisions.largest_step(x, step * direction).step
+            return 0.0, names
+        limit = self.collisions.largest_step(x, step * direction)
+        return step * limit.step, self._names(self._owners(limit)) if limit.kind else names
 
     def allows(self, x: NDArray[np.float64]) -> bool:
         """Whether every vertex is in front of every plane."""
@@ -135,9 +136,20 @@ class ContactModel:
             return "two surfaces"
         if above < between:
             k = int(heights.argmin())
-            return self._names([int(self.planes.owner[k]), self.mesh.body_count + int(self.planes.obstacle[k])])
+            return self._names(self._plane_owners(k))
         k = int(contacts.distances.argmin())
         return self._names(sorted({int(self.mesh.owner[side[k]]) for side in sides(contacts)}))
+
+    def _owners(self, limit: Limit) -> list[int]:
+        """Of the pair that limits a step."""
+        mesh, (i, j) = self.mesh, limit.pair
+        edges = limit.kind == "edge-edge"
+        points = (mesh.edges[i, 0], mesh.edges[j, 0]) if edges else (i, mesh.triangles[j, 0])
+        return sorted({int(mesh.owner[p]) for p in points})
+
+    def _plane_owners(self, row: int) -> list[int]:
+        """Of a pair of a point and a half-space."""
+        return [int(self.planes.owner[row]), self.mesh.body_count + int(self.planes.obstacle[row])]
 
     def _names(self, owners: list[int]) -> str:
         kinds = [f"{'body' if k < self.mesh.body_count else 'obstacle'} {self.mesh.names[k]!r}" for k in owners]

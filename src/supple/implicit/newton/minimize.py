@@ -29,8 +29,9 @@ logger = logging.getLogger(__name__)
 # Directions that shrink by less than this factor converge linearly: Newton's method with the true Hessian is faster.
 _LINEAR_RATE = 0.2
 
-# Forces are nearly balanced where their sum is below this share of contact's.
-_NEARLY = 0.1
+# Forces are nearly balanced where their sum is below this share of contact's. Larger ones leave errors in friction that
+# a block shows that just sticks on its slope.
+_NEARLY = 3e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +87,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
         if (last and not found.touching) or found.projected is not ProjectedTerms.ALL or not limits.guard.complete:
             extension.factor = 1.0
         vector = extension.factor * found.vector
-        largest, _ = limits.largest_step(here.positions, vector)
+        largest, _, reason = limits.largest_step(here.positions, vector)
         slope = extension.factor * found.slope
         end, step, cuts = search(objective, here, vector, slope, largest, limits)
         extension.note(step, rate)
@@ -107,6 +108,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
             filter=largest,
             step=step,
             cuts=cuts,
+            limit="; ".join(([reason] if reason else []) + (["energy"] if cuts else [])),
             projected=found.projected is ProjectedTerms.ALL,
         )
         rows.append(row)
