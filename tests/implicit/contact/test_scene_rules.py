@@ -125,8 +125,8 @@ def test_a_scene_in_millimetres_has_the_shapes_of_the_scene_in_metres():
 
 
 _BITS = """
-import sys, hashlib, numba, numpy as np, ipctk
-numba.set_num_threads(int(sys.argv[1])); ipctk.set_num_threads(int(sys.argv[1]))
+import sys, hashlib, numba, numpy as np
+numba.set_num_threads(int(sys.argv[1]))
 import supple as sp
 def cube(name, **body):
     material = sp.StableNeoHookean(youngs=2e4, poisson=0.3, density=1000.0)

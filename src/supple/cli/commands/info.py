@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 SCENE_FILES = (".yaml", ".yml")
 RECORDINGS = (".vtkhdf", ".hdf", ".h5")
-PACKAGES = ("numpy", "scipy", "numba", "h5py", "tetgen", "ipctk", "viser", "pydantic")
+PACKAGES = ("numpy", "scipy", "numba", "h5py", "tetgen", "viser", "pydantic")
 EXTRAS = ("pytetwild", "pymeshfix", "usd-core", "pyvista")
 
 

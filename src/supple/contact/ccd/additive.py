@@ -21,13 +21,16 @@ import math
 from supple.numerics.geometry.closest_point import closest_on_triangle, combine
 from supple.numerics.geometry.closest_segments import closest_on_segments
 from supple.numerics.kernel_cache import njit
-from supple.numerics.mat3 import dot, row, subtract
+from supple.numerics.mat3 import cross, dot, row, subtract
 
 # The share of its distance that a pair keeps; and where the search for the longest step ends.
 KEEP = 0.1
-_CLOSE_ENOUGH = 1.25
+_CLOSE_ENOUGH = 1.05
+# Along the direction of the distance, no points of the two parts are nearer than the distance; the share allows for
+# round-off.
+_PRECISE = 0.99
 # Steps for one pair. The result is conservative wherever they end.
-_MOST_STEPS = 256
+_MOST_STEPS = 10_000
 # Of coordinates and ways: round-off of a position that is computed from them.
 ROUND_OFF = 4.0 * 2.0**-52
 
@@ -44,16 +47,19 @@ def _moved(x, p, t):
 
 @njit(error_model="numpy")
 def _time_to(gap, speed, keep):
-    """When gap + t speed falls to `keep`: zero where it is there, infinite where it does not fall."""
+    """When gap + t speed falls to `keep`: 0 where it is below or there is no gap, infinite where it does not fall."""
+    if not gap > 0.0:
+        return 0.0
     if speed >= 0.0:
         return math.inf
     return max(0.0, (gap - keep) / -speed)
 
 
 @njit(error_model="numpy")
-def _bound(n, a, p, b, q, time, keep):
-    """The smaller of `time` and that at which a point a + t p has the distance `keep` from b + t q along n."""
-    return min(time, _time_to(dot(n, subtract(a, b)), dot(n, subtract(p, q)), keep))
+def _bound(n, a, p, b, q, so_far, keep):
+    """The time and the gap so far, or those of a point a + t p and b + t q along n where they are smaller."""
+    gap = dot(n, subtract(a, b))
+    return min(so_far[0], _time_to(gap, dot(n, subtract(p, q)), keep)), min(so_far[1], gap)
 
 
 @njit(error_model="numpy")
@@ -65,6 +71,35 @@ def _direction(r):
     u = (r[0] / size, r[1] / size, r[2] / size)
     length = math.sqrt(dot(u, u))
     return (u[0] / length, u[1] / length, u[2] / length), size * length
+
+
+@njit(error_model="numpy")
+def _point_triangle_bound(n, a, b, c, p, q, r, keep):
+    """How long all corners keep their distance along n from a point at the origin, and the least distance now."""
+    zero = (0.0, 0.0, 0.0)
+    least = _bound(n, a, p, zero, zero, (math.inf, math.inf), keep)
+    least = _bound(n, b, q, zero, zero, least, keep)
+    return _bound(n, c, r, zero, zero, least, keep)
+
+
+@njit(error_model="numpy")
+def _edge_edge_bound(n, b, c, d, p, q, r, keep):
+    """The same for both ends of the edge c d and both ends of the edge of the origin and b."""
+    zero = (0.0, 0.0, 0.0)
+    least = _bound(n, c, q, zero, zero, (math.inf, math.inf), keep)
+    least = _bound(n, d, r, zero, zero, least, keep)
+    least = _bound(n, c, q, b, p, least, keep)
+    return _bound(n, d, r, b, p, least, keep)
+
+
+@njit(error_model="numpy")
+def _normal(u, v, n):
+    """The unit vector normal to u and v, on the side of n.
+
+    Where parts are nearer than 1e-8 of their sizes, round-off turns the direction of their distance, but not this one.
+    """
+    m, _ = _direction(cross(u, v))
+    return m if dot(m, n) >= 0.0 else (-m[0], -m[1], -m[2])
 
 
 @njit(error_model="numpy")
@@ -84,23 +119,25 @@ def point_triangle_time(x, way, v, corners, limit):
     size = max(_largest(o), _largest(a), _largest(b), _largest(c))
     error = ROUND_OFF * (size + max(_largest(shift), _largest(p), _largest(q), _largest(r)))
     time, keep = 0.0, -1.0
+    a0, b0, c0 = a, b, c
     for _ in range(_MOST_STEPS):
-        n, d = _direction(combine(closest_on_triangle(zero, a, b, c), a, b, c))
+        n, gap = _direction(combine(closest_on_triangle(zero, a, b, c), a, b, c))
         if keep < 0.0:
-            keep = KEEP * d + error
-        elif d <= _CLOSE_ENOUGH * keep:
+            keep = KEEP * gap + error
+        elif gap <= _CLOSE_ENOUGH * keep:
             return time
-        step = _bound(n, a, p, zero, zero, math.inf, keep)
-        step = _bound(n, b, q, zero, zero, step, keep)
-        step = _bound(n, c, r, zero, zero, step, keep)
-        if d == 0.0:
-            step = 0.0
+        step, least = _point_triangle_bound(n, a, b, c, p, q, r, keep)
+        if not least > _PRECISE * gap:
+            m = _normal(subtract(b, a), subtract(c, a), n)
+            other_step, other_least = _point_triangle_bound(m, a, b, c, p, q, r, keep)
+            if other_least > least:
+                step = other_step
         if time + step > limit:
             return math.inf
         if not step > 0.0:
             return time
         time += step
-        a, b, c = _moved(a, p, step), _moved(b, q, step), _moved(c, r, step)
+        a, b, c = _moved(a0, p, time), _moved(b0, q, time), _moved(c0, r, time)
     return time
 
 
@@ -118,6 +155,7 @@ def edge_edge_time(x, way, one, other, limit):
     size = max(_largest(o), _largest(b), _largest(c), _largest(d))
     error = ROUND_OFF * (size + max(_largest(shift), _largest(p), _largest(q), _largest(r)))
     time, keep = 0.0, -1.0
+    b0, c0, d0 = b, c, d
     for _ in range(_MOST_STEPS):
         s, t = closest_on_segments(zero, b, c, d)
         w = subtract(d, c)
@@ -126,16 +164,15 @@ def edge_edge_time(x, way, one, other, limit):
             keep = KEEP * gap + error
         elif gap <= _CLOSE_ENOUGH * keep:
             return time
-        step = _bound(n, c, q, zero, zero, math.inf, keep)
-        step = _bound(n, d, r, zero, zero, step, keep)
-        step = _bound(n, c, q, b, p, step, keep)
-        step = _bound(n, d, r, b, p, step, keep)
-        if gap == 0.0:
-            step = 0.0
+        step, least = _edge_edge_bound(n, b, c, d, p, q, r, keep)
+        if not least > _PRECISE * gap:
+            other_step, other_least = _edge_edge_bound(_normal(b, w, n), b, c, d, p, q, r, keep)
+            if other_least > least:
+                step = other_step
         if time + step > limit:
             return math.inf
         if not step > 0.0:
             return time
         time += step
-        b, c, d = _moved(b, p, step), _moved(c, q, step), _moved(d, r, step)
+        b, c, d = _moved(b0, p, time), _moved(c0, q, time), _moved(d0, r, time)
     return time

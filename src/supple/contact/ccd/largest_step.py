@@ -16,7 +16,7 @@ from supple.numerics.kernel_cache import njit, prange
 # What a long way sweeps overlaps everything, and most of a long way is not taken: it is divided into pieces of this
 # many mean edges, which are examined one after another.
 _PIECE = 1.0
-_MOST_PIECES = 64
+_MOST_PIECES = 128
 # Pairs are divided into this many runs, whatever the number of threads.
 _RUNS = 64
 # Boxes that stay this share of a pair's distance apart need no closer look.

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from supple.contact.search.spatial_hash import PairFinder
+from supple.contact.search.point_lists import PairFinder
 from supple.contact.search.surfaces import ContactSurfaces
 
 
@@ -53,11 +53,11 @@ def pairs_closer_than(
     positions : (n, 3) of all points [m]; pieces : (p, p) whether points of one piece and triangles of another count
     """
     n, t = len(surfaces.point_piece), len(surfaces.triangles)
-    finder = PairFinder(n, len(surfaces.closed), closer_than)
+    finder = PairFinder(n)
     look = np.zeros((n, 3))
     look[:, 0] = closer_than
     none = (pieces, np.zeros(t + 1, dtype=np.int64), np.zeros(0, dtype=np.int32))
     shapes = (positions, surfaces.point_piece, surfaces.triangles, surfaces.triangle_piece)
     finder.gather(shapes, (look, look), none)
     points = np.repeat(np.arange(n, dtype=np.int32), np.diff(finder.starts))
-    return points, finder.triangles[: finder.count]
+    return points, finder.triangles

@@ -111,7 +111,10 @@ class _KeptList:
         margin = min(max(_SHARE * longest, least), most)
         found = self._trees.find(self._rule, begin, relative, self._dhat + 2.0 * margin)
         self._wide, self._begin, self._way, self._wide_margin = found, begin.copy(), way, margin
-        self._keep_near(begin, margin)
+        if longest > margin:
+            self._keep_near(begin, margin)
+        else:
+            self._near, self._reference, self._margin = found, self._begin, margin
         return found
 
     def _drift(self, way: NDArray[np.float64]) -> NDArray[np.float64]:

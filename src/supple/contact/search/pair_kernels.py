@@ -62,7 +62,7 @@ def _boxes_overlap(a, b, i):
 
 
 @njit(error_model="numpy")
-def _meets_partner(box, owner, partners, owner_boxes):
+def meets_partner(box, owner, partners, owner_boxes):
     """Whether a box overlaps that of an owner that may touch its own."""
     for k in range(partners[0][owner], partners[0][owner + 1]):
         if _boxes_overlap(box, owner_boxes, partners[1][k]):
@@ -71,18 +71,19 @@ def _meets_partner(box, owner, partners, owner_boxes):
 
 
 @njit(cache=True, error_model="numpy")
-def partner_lists(boxes, allowed, start, items):
-    """Lists of the owners that each may touch and whose boxes (p, 6) overlap its own; returns their length.
+def partner_lists(boxes, others, allowed, start, items):
+    """Lists of the owners that each may touch, where its box and that of the other overlap; returns their length.
 
     Parameters
     ----------
+    boxes, others : (p, 6) of each owner as the first and as the second of a pair
     allowed : (p, p); start : (p + 1,) and items : (p * p,) are written
     """
     count = 0
     for a in range(len(boxes)):
         start[a] = count
         for b in range(len(boxes)):
-            if allowed[a, b] and _boxes_overlap(boxes[a], boxes, b):
+            if allowed[a, b] and _boxes_overlap(boxes[a], others, b):
                 items[count] = b
                 count += 1
     start[len(boxes)] = count
@@ -107,7 +108,7 @@ def _points_of_run(r, shape, motion, rule, tree, reach, first, last, out):
             high = low + way[v, j]
             box[j] = min(low, high) - reach
             box[3 + j] = max(low, high) + reach
-        if not _meets_partner(box, mine, partners, owner_boxes):
+        if not meets_partner(box, mine, partners, owner_boxes):
             continue
         top = from_root(nodes, box, stack)
         while top > 0:
@@ -146,7 +147,7 @@ def _edges_of_run(r, shape, motion, rule, tree, reach, first, last, out):
         for j in range(3):
             box[j] = nodes[leaves + q, j] - reach
             box[3 + j] = nodes[leaves + q, 3 + j] + reach
-        if not _meets_partner(box, mine, partners, owner_boxes):
+        if not meets_partner(box, mine, partners, owner_boxes):
             continue
         long = reach + max(lengths[a], lengths[b])
         top = after_leaf(nodes, q, box, stack)

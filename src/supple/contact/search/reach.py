@@ -39,7 +39,7 @@ def mean_motions(motions, pieces, all_share, out):
 
 @njit(cache=True)
 def search_radii(motions, moved, excursions, pieces, drifts, scales, far, near):
-    """How far points may move, from their velocities: the arguments `far` and `near` of `spatial_hash.find_pairs`.
+    """How far points may move, from their velocities: the arguments `far` and `near` of `PairFinder.gather`.
 
     Parameters
     ----------

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +9,6 @@ from numpy.typing import NDArray
 
 from supple.contact.search.candidates import Candidates
 from supple.contact.search.pair_kernels import (
-    RUNS,
     boxes_of_owners,
     find_edges,
     find_points,
@@ -18,6 +16,7 @@ from supple.contact.search.pair_kernels import (
     sort_pairs,
     swept_boxes,
 )
+from supple.contact.search.room import Room
 from supple.contact.surface.contact_mesh import ContactMesh
 from supple.numerics.adjacency import Adjacency
 from supple.numerics.geometry.box_tree import BoxTree, morton_codes
@@ -35,23 +34,6 @@ class Rule(NamedTuple):
     same: bool
 
 
-@dataclass(eq=False)
-class _Room:
-    """Where the runs of a search write their pairs; grows as needed and is kept from search to search."""
-
-    start: NDArray[np.int64] = field(default_factory=lambda: np.zeros(RUNS + 1, dtype=np.int64))
-    counts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(RUNS, dtype=np.int64))
-    pairs: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int32))
-
-    def is_too_small(self) -> bool:
-        """Whether some run found more than fits; then there is room for that, and more, for the next attempt."""
-        if (self.counts <= np.diff(self.start)).all():
-            return False
-        np.cumsum(self.counts + self.counts // 4 + 16, out=self.start[1:])
-        self.pairs = np.empty((self.start[-1], 2), dtype=np.int32)
-        return True
-
-
 class SurfaceTrees:
     """Searches a surface that moves. The trees are refitted, and sorted again where that makes them bad."""
 
@@ -63,7 +45,7 @@ class SurfaceTrees:
         self._queries = np.zeros(0, dtype=np.int32)
         # Obstacles never touch each other, so they have one label.
         self._label = np.minimum(np.arange(len(mesh.collide)), mesh.body_count).astype(np.int32)
-        self._rooms: dict[bool, tuple[_Room, _Room]] = {True: (_Room(), _Room()), False: (_Room(), _Room())}
+        self._rooms: dict[bool, tuple[Room, Room]] = {True: (Room(), Room()), False: (Room(), Room())}
         none = np.zeros(max(len(mesh.points), len(mesh.edges)) + 1, dtype=np.int32)
         nothing = Adjacency(none, none[:0])
         stitched = mesh.stitched
@@ -81,7 +63,7 @@ class SurfaceTrees:
         owner_boxes = np.empty((len(mesh.collide), 6))
         boxes_of_owners(begin, way, mesh.owner, owner_boxes)
         partners = Adjacency(np.empty(len(rule.allowed) + 1, np.int32), np.empty(rule.allowed.size, np.int32))
-        if not partner_lists(_enlarged(owner_boxes, reach), rule.allowed, *partners):
+        if not partner_lists(_enlarged(owner_boxes, reach), owner_boxes, rule.allowed, *partners):
             return Candidates(np.zeros((0, 2), np.int32), np.zeros((0, 2), np.int32))
         motion = way, np.sqrt(np.einsum("ij,ij->i", way, way))
         of_points, of_edges = self._rooms[rule.same]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.search.spatial_hash import boxes_of_pieces
+from supple.contact.search.boxes import boxes_of_pieces
 from supple.contact.start.surfaces import StartSurfaces, winding_number
 from supple.numerics.geometry.triangle_crossings import CROSSING, crossing_triangles
 from supple.scene.contact_pairs import PairTable

@@ -1,4 +1,4 @@
-"""Distances between parts of a triangle mesh: points and triangles, edges and edges."""
+"""Distances and nearest places of parts of a triangle mesh: points and triangles, edges and edges."""
 
 import numpy as np
 
@@ -41,3 +41,30 @@ def edges_nearer(x, edges, pairs, reach):
     for k in prange(len(pairs)):
         near[k] = edge_edge_square(x, edges, pairs[k, 0], pairs[k, 1]) < reach * reach
     return near
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def middles_of_points(x, triangles, pairs):
+    """(k, 3) the middle between each point of pairs (k, 2) and the place on its triangle that is nearest to it."""
+    out = np.empty((len(pairs), 3))
+    for k in prange(len(pairs)):
+        t = pairs[k, 1]
+        p, a, b, c = row(x, pairs[k, 0]), row(x, triangles[t, 0]), row(x, triangles[t, 1]), row(x, triangles[t, 2])
+        q = combine(closest_on_triangle(p, a, b, c), a, b, c)
+        for j in range(3):
+            out[k, j] = 0.5 * (p[j] + q[j])
+    return out
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def middles_of_edges(x, edges, pairs):
+    """(k, 3) the middle between the nearest places on the two edges of each of the pairs (k, 2)."""
+    out = np.empty((len(pairs), 3))
+    for k in prange(len(pairs)):
+        e, f = pairs[k, 0], pairs[k, 1]
+        a, b, c, d = row(x, edges[e, 0]), row(x, edges[e, 1]), row(x, edges[f, 0]), row(x, edges[f, 1])
+        s, t = closest_on_segments(a, b, c, d)
+        p, q = between(a, b, s), between(c, d, t)
+        for j in range(3):
+            out[k, j] = 0.5 * (p[j] + q[j])
+    return out

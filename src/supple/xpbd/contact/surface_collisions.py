@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.obstacle_poses import ObstaclePoses
+from supple.contact.search.boxes import boxes_of_pieces
 from supple.contact.search.excluded_pairs import excluded_pairs
 from supple.contact.search.point_inside import depths_inside
+from supple.contact.search.point_lists import PairFinder
 from supple.contact.search.reach import any_beyond_radii, mean_motions, search_radii
-from supple.contact.search.spatial_hash import PairFinder, boxes_of_pieces
 from supple.contact.search.stitch_masks import stitched_points
 from supple.contact.search.surfaces import ContactSurfaces
 from supple.system import System
@@ -37,7 +38,7 @@ class SurfaceCollisions:
         excluded = excluded_pairs(s, rest, 2.0 * min(widest, 0.5 * edge_length))
         self._stitched = stitched_points(system, s, poses)
         self._rules = (s.allowed, *excluded)
-        self._finder = PairFinder(n, pieces, edge_length)
+        self._finder = PairFinder(n)
         self._x, self._before, self._gathered = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
         self._shapes = (self._x, s.point_piece, s.triangles, s.triangle_piece)
         self._pieces = (s.inverse_masses, s.point_piece, s.triangles, s.triangle_piece, s.closed, s.gaps, s.friction)

@@ -15,7 +15,7 @@ momentum is conserved exactly; angular momentum up to the rotation of the contac
 
 import math
 
-from supple.contact.search.spatial_hash import is_excluded
+from supple.numerics.adjacency import in_list
 from supple.numerics.geometry.closest_point import area_normal, between, closest_on_triangle, combine
 from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import dot, row, subtract
@@ -227,7 +227,7 @@ def project_surfaces(x, x_prev, lists, surfaces, memory, scales, part, stitched)
             )
             if same and held >= 0 and (t < 0 or side > 0.0):
                 entered[p] = -1
-            if t < 0 or is_excluded(p, t, stitched[0], stitched[1]):
+            if t < 0 or in_list(stitched, t, p):
                 continue
             passed = distance == math.inf
             inside = closed[its] and side < 0.0 and not passed

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
-
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.contact.surface.distances import middles_of_edges, middles_of_points
+from supple.contact.surface.touching import touching_pairs
+from supple.mesh.topology import unique_edges
+from supple.scene.contact_pairs import pair_table
 from supple.system import System
 from supple.viewer.engine.scene.obstacle_distance import signed_distance
 from supple.viewer.protocol import limits
@@ -19,7 +21,7 @@ def contact_points(system: System, positions: NDArray[np.float64], time: float) 
     """(c, 3) points [m] where surfaces are closer than NEAR mean edges; at most `MOST_CONTACT_POINTS`.
 
     On half-spaces, boxes and spheres these are vertices of bodies. Between bodies, and on triangle obstacles, they are
-    the middles of the pairs of vertices, edges and triangles that IPC finds.
+    the middles between vertices and triangles, and between edges, that are near each other.
     """
     near = NEAR * _mean_edge(system)
     skin = np.unique(system.triangles)
@@ -38,25 +40,30 @@ def _mean_edge(system: System) -> float:
 
 
 def _between_surfaces(system: System, positions: NDArray[np.float64], time: float, near: float) -> NDArray[np.float64]:
-    if find_spec("ipctk") is None:  # it has no wheels for Linux on ARM
-        return np.zeros((0, 3))
-    import ipctk
-
-    vertices, triangles = [positions], [system.triangles]
+    """(c, 3) middles of the pairs of things that may touch and are nearer than `near` [m]."""
+    points, triangles, owner = [positions], [system.triangles], [_body_of_vertices(system)]
     count = len(positions)
-    for obstacle in system.obstacles:
+    for k, obstacle in enumerate(system.obstacles):
         mesh = obstacle.surface_mesh
         if mesh is not None:
             R, t = obstacle.pose(time)
-            vertices.append(mesh.vertices @ R.T + t)
+            points.append(mesh.vertices @ R.T + t)
             triangles.append(mesh.triangles + count)
+            owner.append(np.full(len(mesh.vertices), len(system.bodies) + k, dtype=np.int32))
             count += len(mesh.vertices)
-    F = np.concatenate(triangles).astype(np.int32)
-    used, compact = np.unique(F, return_inverse=True)
-    X = np.asfortranarray(np.concatenate(vertices)[used])
-    F = np.asfortranarray(compact.reshape(F.shape), dtype=np.int32)
-    E = ipctk.edges(F)
-    found = ipctk.NormalCollisions()
-    found.build(ipctk.CollisionMesh(X, E, F), X, near)
-    middles = [X[[i for i in found[k].vertex_ids(E, F) if i >= 0]].mean(axis=0) for k in range(len(found))]
-    return np.array(middles).reshape(-1, 3)
+    numbered = np.concatenate(triangles)
+    used, compact = np.unique(numbered, return_inverse=True)
+    faces = np.ascontiguousarray(compact.reshape(numbered.shape), dtype=np.int32)
+    edges = unique_edges(faces, len(used))
+    x = np.concatenate(points)[used]
+    collide = pair_table(system.scene).collide
+    of_points, of_edges = touching_pairs(x, faces, edges, np.concatenate(owner)[used], collide, near)
+    return np.concatenate([middles_of_points(x, faces, of_points), middles_of_edges(x, edges, of_edges)])
+
+
+def _body_of_vertices(system: System) -> NDArray[np.int32]:
+    """(n,) the number of each vertex's body."""
+    owner = np.empty(len(system.rest_positions), dtype=np.int32)
+    for k, part in enumerate(system.bodies):
+        owner[part.vertices] = k
+    return owner

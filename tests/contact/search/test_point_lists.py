@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from supple.contact.search.spatial_hash import PairFinder
+from supple.contact.search.point_lists import PairFinder
 from supple.numerics.geometry.closest_point import closest_on_triangle
 
 
@@ -31,8 +31,8 @@ def test_closest_point_agrees_with_the_plane_and_the_edges():
         assert np.linalg.norm(p - u[0] * a - u[1] * b - u[2] * c) == pytest.approx(distance(p, a, b, c), abs=1e-12)
 
 
-def find(points, triangles, far, near, pieces, edge, excluded=None):
-    finder = PairFinder(len(points), int(pieces.max()) + 1, edge)
+def find(points, triangles, far, near, pieces, excluded=None):
+    finder = PairFinder(len(points))
     starts, masked = excluded if excluded else (np.zeros(len(triangles) + 1, np.int64), np.zeros(0, np.int32))
     shapes = (points, pieces, triangles, pieces[triangles[:, 0]])
     k = int(pieces.max()) + 1
@@ -43,14 +43,13 @@ def find(points, triangles, far, near, pieces, edge, excluded=None):
     return found
 
 
-@pytest.mark.parametrize("edge", [0.05, 0.3, 5.0])
-def test_each_near_pair_is_found_once_and_no_other(edge):
+def test_each_near_pair_is_found_once_and_no_other():
     rng = np.random.default_rng(2)
     points = rng.uniform(-1, 1, size=(90, 3))
     triangles = np.arange(90, dtype=np.int32).reshape(-1, 3)
     points[1::3] = points[::3] + rng.normal(scale=0.2, size=(30, 3))
     points[2::3] = points[::3] + rng.normal(scale=0.2, size=(30, 3))
-    points[0:3] = [[-3, -0.1, -3], [3, -0.1, -3], [0, 0.1, 3]]  # one triangle far larger than a cell
+    points[0:3] = [[-3, -0.1, -3], [3, -0.1, -3], [0, 0.1, 3]]  # one triangle far larger than others
     pieces = (np.arange(90) // 45).astype(np.int32)
     far, near = rng.uniform(0, 0.2, size=(90, 3)), rng.uniform(0, 0.1, size=(90, 3))
     far[7, 0] = 2.5  # a point with a large search radius
@@ -62,7 +61,7 @@ def test_each_near_pair_is_found_once_and_no_other(edge):
             look = near if pieces[p] == pieces[corners[0]] else far
             if distance(points[p], *points[corners]) <= look[p, 0] + look[corners, 1].max():
                 expected.append((p, t))
-    assert find(points, triangles, far, near, pieces, edge) == expected
+    assert find(points, triangles, far, near, pieces) == expected
     assert len(expected) > 60
 
 
@@ -71,8 +70,8 @@ def test_excluded_pairs_and_positions_that_are_not_finite_are_omitted():
     triangles = np.array([[0, 1, 2]], dtype=np.int32)
     pieces = np.zeros(5, dtype=np.int32)
     look = np.full((5, 3), 0.2)
-    assert find(points, triangles, look, look, pieces, 1.0) == [(3, 0), (4, 0)]
+    assert find(points, triangles, look, look, pieces) == [(3, 0), (4, 0)]
     masked = (np.array([0, 1]), np.array([3], dtype=np.int32))
-    assert find(points, triangles, look, look, pieces, 1.0, masked) == [(4, 0)]
+    assert find(points, triangles, look, look, pieces, masked) == [(4, 0)]
     points[1, 1] = np.nan
-    assert find(points, triangles, look, look, pieces, 1.0) == []
+    assert find(points, triangles, look, look, pieces) == []

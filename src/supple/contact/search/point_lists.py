@@ -1,0 +1,183 @@
+"""Lists of the triangles near each point, with search radii that differ from point to point.
+
+A pair of a point and a triangle is listed where their distance is at most the search radius of the point and the
+largest possible motion of a corner of the triangle. Both are smaller for pairs of one piece, whose motion is that
+relative to the piece.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.contact.search.boxes import boxes_of_pieces
+from supple.contact.search.pair_kernels import RUNS, boxes_of_owners, meets_partner, partner_lists, sort_pairs
+from supple.contact.search.room import Room
+from supple.contact.surface.distances import point_triangle_square
+from supple.numerics.adjacency import in_list
+from supple.numerics.geometry.box_tree import STACK, BoxTree, from_root, next_leaf
+from supple.numerics.kernel_cache import njit, prange
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def _boxes_of_triangles(points, triangles, radii, out):
+    """Write the box of each triangle, enlarged by the largest motion of a corner, to out (t, 6)."""
+    for t in prange(len(triangles)):
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        moves = max(radii[a, 1], radii[b, 1], radii[c, 1])
+        for j in range(3):
+            out[t, j] = min(points[a, j], points[b, j], points[c, j]) - moves
+            out[t, 3 + j] = max(points[a, j], points[b, j], points[c, j]) + moves
+
+
+@njit(error_model="numpy")
+def _near_point(p, radius, shapes, radii, rules, same, tree, pieces, found, count):
+    """Append the triangles that are near point p, of its own piece or of others; returns the number of all found.
+
+    Parameters
+    ----------
+    radius : of the search [m]; for the other arguments see `_list_pairs`
+    pieces : for each piece those that the search looks for, and their boxes
+    found : (first, last, out): rows of `out` that may be written; where they are full, pairs are only counted
+    """
+    points, point_piece, triangles, triangle_piece = shapes
+    allowed, excluded = rules
+    nodes, labels, order = tree
+    first, last, out = found
+    mine = point_piece[p]
+    stack = np.empty(STACK, dtype=np.int64)
+    box = np.empty(6)
+    for j in range(3):
+        box[j], box[3 + j] = points[p, j] - radius, points[p, j] + radius
+    if not meets_partner(box, mine, pieces[0], pieces[1]):
+        return count
+    top = from_root(nodes, box, stack)
+    while top > 0:
+        leaf, top = next_leaf(nodes, labels, box, mine, same, stack, top)
+        if leaf < 0:
+            continue
+        t = order[leaf]
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        if not allowed[mine, triangle_piece[t]] or p in (a, b, c):
+            continue
+        r = radius + max(radii[a, 1], radii[b, 1], radii[c, 1])
+        if point_triangle_square(points, p, triangles, t) > r * r or in_list(excluded, t, p):
+            continue
+        if first + count < last:
+            out[first + count, 0] = p
+            out[first + count, 1] = t
+        count += 1
+    return count
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def _list_pairs(shapes, radii, rules, partners, boxes, far_tree, near_tree, room, counts, out):
+    """Write the pairs of each run of points to its room of `out`, and their number to `counts`.
+
+    Parameters
+    ----------
+    shapes, radii, rules : see `PairFinder.gather`
+    partners : for each piece the others that its points may come near, and itself where that is allowed: two lists, as
+        starts (p + 1,) and pieces
+    boxes : (p, 6) of the pieces' triangles, enlarged as in `far_tree`
+    far_tree, near_tree : nodes, labels and order of trees of triangles, for pairs of two pieces and of one
+    """
+    points, point_piece, triangles, triangle_piece = shapes
+    far, near = radii
+    allowed, excluded_starts, excluded_points = rules
+    (other_starts, others), (own_starts, own) = partners
+    far_nodes, far_labels, far_order = far_tree
+    near_nodes, near_labels, near_order = near_tree
+    for r in prange(RUNS):
+        its_shapes = (points, point_piece, triangles, triangle_piece)
+        its_rules = (allowed, (excluded_starts, excluded_points))
+        found = (room[r], room[r + 1], out)
+        count = 0
+        for p in range(r, len(points), RUNS):
+            tree = (far_nodes, far_labels, far_order)
+            pieces = ((other_starts, others), boxes)
+            count = _near_point(p, far[p, 0], its_shapes, far, its_rules, False, tree, pieces, found, count)
+            tree = (near_nodes, near_labels, near_order)
+            pieces = ((own_starts, own), boxes)
+            count = _near_point(p, near[p, 0], its_shapes, near, its_rules, True, tree, pieces, found, count)
+        counts[r] = count
+
+
+class PairFinder:
+    """Lists of triangles near each of n points. Every search reuses the same memory.
+
+    After `gather`, the triangles near point p are `triangles[starts[p]:starts[p + 1]]` in ascending order, and
+    `active[:n_active]` are the points that have any.
+    """
+
+    def __init__(self, n_points: int) -> None:
+        self._room = Room()
+        self._trees: list[BoxTree] = []
+        self.starts = np.zeros(n_points + 1, dtype=np.int64)
+        self.active = np.zeros(0, dtype=np.int32)
+        self.triangles = np.zeros(0, dtype=np.int32)
+        self.n_active = 0
+        self.count = 0
+
+    def gather(self, shapes: tuple, radii: tuple, rules: tuple) -> None:
+        """Find all pairs that may touch; none where something is not finite.
+
+        Parameters
+        ----------
+        shapes : points (n, 3), point_piece (n,), triangles (t, 3), triangle_piece (t,)
+        radii : two (n, >= 2) arrays, for pairs of different pieces and for pairs of one piece: the search radius of a
+            point (with its own motion), and how far its motion may move a corner of a triangle [m]
+        rules : allowed (p, p), whether points of the first may touch triangles of the second; and the excluded points
+            of each triangle as starts (t + 1,) and points
+        """
+        points: NDArray[np.float64] = shapes[0]
+        pairs = np.zeros((0, 2), dtype=np.int32)
+        if np.isfinite(points).all() and len(shapes[2]):
+            pairs = self._pairs(shapes, radii, rules)
+        self.starts[:] = np.searchsorted(pairs[:, 0], np.arange(len(self.starts)))
+        self.active = np.flatnonzero(np.diff(self.starts)).astype(np.int32)
+        self.triangles = np.ascontiguousarray(pairs[:, 1])
+        self.n_active, self.count = len(self.active), len(pairs)
+
+    def _pairs(self, shapes: tuple, radii: tuple, rules: tuple) -> NDArray[np.int32]:
+        """(k, 2) points and triangles, ascending."""
+        points, point_piece, triangles, triangle_piece = shapes
+        trees, far_boxes = self._sorted(points, triangles, triangle_piece, radii)
+        room = self._room
+        pieces = len(rules[0])
+        of_points, of_triangles = np.empty((2, pieces, 3)), np.empty((pieces, 6))
+        boxes_of_pieces(points, point_piece, radii[0], *of_points)
+        boxes_of_owners(far_boxes[:, :3], far_boxes[:, 3:] - far_boxes[:, :3], triangle_piece, of_triangles)
+        partners = []
+        for kind in (~np.eye(pieces, dtype=np.bool_), np.eye(pieces, dtype=np.bool_)):
+            lists = np.empty(pieces + 1, np.int32), np.empty(pieces * pieces, np.int32)
+            partner_lists(np.concatenate(of_points, axis=1), of_triangles, rules[0] & kind, *lists)
+            partners.append(lists)
+        arrays = [(tree.nodes, tree.labels, tree.order) for tree in trees]
+        while True:
+            _list_pairs(
+                shapes, radii, rules, tuple(partners), of_triangles, *arrays, room.start, room.counts, room.pairs
+            )
+            if not room.is_too_small():
+                break
+        return sort_pairs(room.pairs, room.start, room.counts, len(points))
+
+    def _sorted(
+        self,
+        points: NDArray[np.float64],
+        triangles: NDArray[np.int32],
+        triangle_piece: NDArray[np.int32],
+        radii: tuple[NDArray[np.float64], NDArray[np.float64]],
+    ) -> tuple[list[BoxTree], NDArray[np.float64]]:
+        """The trees of triangles for pairs of different pieces and of one piece, and the boxes (t, 6) of the first."""
+        trees, all_boxes = [], []
+        for k, each in enumerate(radii):
+            boxes = np.empty((len(triangles), 6))
+            _boxes_of_triangles(points, triangles, each, boxes)
+            all_boxes.append(boxes)
+            if k < len(self._trees) and self._trees[k].refit(boxes):
+                trees.append(self._trees[k])
+            else:
+                trees.append(BoxTree.over(boxes, triangle_piece))
+        self._trees = trees
+        return trees, all_boxes[0]

@@ -1,0 +1,151 @@
+"""Additive detection of collisions: no step is too long, and none is needlessly short."""
+
+from fractions import Fraction
+
+import ipctk
+import numpy as np
+import pytest
+
+from supple.contact.ccd.additive import KEEP, ROUND_OFF, edge_edge_time, point_triangle_time
+from supple.numerics.kernel_cache import njit
+
+COUNT = 10_000
+POINT_TRIANGLE, EDGE_EDGE = 0, 1
+
+
+@njit
+def all_times(kind, x, way, out):
+    one, other, corners = np.array([0, 1]), np.array([2, 3]), np.array([1, 2, 3])
+    for k in range(len(x)):
+        if kind == POINT_TRIANGLE:
+            out[k] = point_triangle_time(x[k], way[k], 0, corners, 1.0)
+        else:
+            out[k] = edge_edge_time(x[k], way[k], one, other, 1.0)
+
+
+def times(kind, x, way):
+    out = np.empty(len(x))
+    all_times(kind, x, way, out)
+    return out
+
+
+def configurations(kind, count=COUNT):
+    """Four points and their ways: random, coplanar, parallel, without area or length, nearly touching, sliding.
+
+    Sizes are 1e-9 to 1e3 m, and the places up to 1e3 m from the origin, as far as the points remain distinct.
+    """
+    rng = np.random.default_rng(7 + kind)
+    x, way = rng.normal(size=(count, 4, 3)), rng.normal(size=(count, 4, 3)) * 10.0 ** rng.uniform(-2, 1, (count, 1, 1))
+    family = np.arange(count) % 8
+    first = slice(0, 1) if kind == POINT_TRIANGLE else slice(0, 2)
+    near = family == 1  # parts near each other
+    x[near] *= np.array([1.0, 1.0, 1e-6])
+    flat = family == 2  # in one plane at the start, parts apart in it
+    x[flat, :, 2] = 0.0
+    x[flat, first, 0] += 3.0
+    parallel = family == 3
+    x[parallel, 3] = x[parallel, 2] + (x[parallel, 1] - x[parallel, 0])
+    almost = family == 4
+    x[almost, 3] = x[almost, 2] + (x[almost, 1] - x[almost, 0]) + 1e-8 * rng.normal(size=(almost.sum(), 3))
+    thin = family == 5  # a triangle without area; an edge without length
+    x[thin, 3] = x[thin, 2]
+    together = family == 6  # nearly all of the motion is common
+    way[together] = 100.0 * way[together, :1] + way[together]
+    sliding = family == 7  # past each other at a small distance
+    x[sliding] *= np.array([1.0, 1.0, 0.0])
+    x[sliding, first, 2] = 1e-4
+    way[sliding, :, 2] *= 1e-5
+    towards = np.arange(count) % 3 > 0  # two thirds are sent towards each other
+    between = x.mean(axis=1, keepdims=True) - x[:, first].mean(axis=1, keepdims=True)
+    way[towards, first] += 4.0 * between[towards]
+    size = 10.0 ** rng.uniform(-9, 3, count)
+    x, way = x * size[:, None, None], way * size[:, None, None]
+    far = 10.0 ** rng.uniform(-9, 3, count)
+    far[far > 1e3 * size] = 0.0
+    return x + far[:, None, None] * rng.normal(size=(count, 1, 3)), way, family
+
+
+def distances(kind, x, way, t):
+    """(n,) at the rounded positions x + t way, from exact differences of coordinates."""
+    out = np.empty(len(x))
+    for k, place in enumerate(x + t[:, None, None] * way):
+        exact = [[Fraction(c) for c in point] for point in place.tolist()]
+        local = np.array([[float(a - b) for a, b in zip(point, exact[0], strict=True)] for point in exact])
+        size = np.abs(local).max() or 1.0  # the library squares lengths
+        out[k] = size * np.sqrt(distance(kind, local / size))
+    return out
+
+
+def distance(kind, points):
+    """Squared; the library's formula for two edges is wrong where one of them has no length."""
+    a, b, c, d = points
+    if kind == EDGE_EDGE and (c == d).all():
+        return ipctk.point_edge_distance(c, a, b)
+    return (ipctk.point_triangle_distance, ipctk.edge_edge_distance)[kind](a, b, c, d)
+
+
+def errors(x, way):
+    return 2.0 * ROUND_OFF * (np.abs(x).max(axis=(1, 2)) + np.abs(way).max(axis=(1, 2)))
+
+
+@pytest.mark.parametrize("kind", [POINT_TRIANGLE, EDGE_EDGE])
+def test_every_pair_keeps_a_tenth_of_its_distance_and_no_step_is_needlessly_short(kind):
+    x, way, family = configurations(kind)
+    t = times(kind, x, way)
+    start = distances(kind, x, way, np.zeros(len(x)))
+    limited = t <= 1.0
+    taken = np.where(limited, t, 1.0)
+    error = errors(x, way)
+    for share in (0.1, 0.4, 0.7, 0.9, 1.0):
+        kept = distances(kind, x, way, share * taken)
+        assert (kept >= KEEP * start - error).all(), family[kept < KEEP * start - error]
+        assert (kept[start > 20.0 * error] > 0.0).all()
+    # A step ends only where little more than the tenth is left.
+    assert (kept[limited] <= 1.06 * KEEP * start[limited] + 4.0 * error[limited]).all()
+    assert 0.2 < limited.mean() < 0.8
+    assert set(family[limited]) == set(range(8))
+
+
+@pytest.mark.parametrize("kind", [POINT_TRIANGLE, EDGE_EDGE])
+def test_steps_agree_with_the_library(kind):
+    """Both keep a tenth of the distance. Where it falls to about that and grows again, one may stop, the other not."""
+    x, way, _ = configurations(kind, 3000)
+    start = distances(kind, x, way, np.zeros(len(x)))
+    plain = start > 1e-6 * np.abs(x).max(axis=(1, 2))  # where round-off is no issue for the library either
+    ccd = ipctk.AdditiveCCD()
+    detect = (ccd.point_triangle_ccd, ccd.edge_edge_ccd)[kind]
+    expected = []
+    for a, p in zip(x[plain], way[plain], strict=True):
+        hit, toi = detect(*(a / np.abs(a).max()), *((a + p) / np.abs(a).max()))
+        expected.append(toi if hit else 1.0)
+    found = np.minimum(times(kind, x[plain], way[plain]), 1.0)
+    assert len(found) > 1500
+    ratio = found / np.array(expected)
+    assert (np.quantile(ratio, [0.01, 0.5, 0.99]) > [0.95, 0.99, 0.99]).all()
+    assert (np.quantile(ratio, [0.01, 0.5, 0.99]) < [1.01, 1.01, 1.4]).all()
+
+
+@pytest.mark.parametrize("kind", [POINT_TRIANGLE, EDGE_EDGE])
+def test_pairs_that_touch_do_not_move_and_pairs_that_part_do(kind):
+    x = np.array([[0.2, 0.2, 0.0], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    if kind == EDGE_EDGE:
+        x = np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 1.0, 0.0]])
+    first = slice(0, 1) if kind == POINT_TRIANGLE else slice(0, 2)
+    way = np.zeros((4, 3))
+    way[first, 2] = -1.0
+    assert times(kind, x[None], way[None])[0] == 0.0
+    apart = x.copy()
+    apart[first, 2] = 1e-9
+    assert times(kind, apart[None], -way[None])[0] > 1.0
+    assert times(kind, apart[None], np.zeros((1, 4, 3)))[0] > 1.0
+    assert times(kind, apart[None], way[None])[0] == pytest.approx(0.9e-9, rel=1e-3)
+
+
+@pytest.mark.parametrize("kind", [POINT_TRIANGLE, EDGE_EDGE])
+def test_a_common_motion_changes_nothing(kind):
+    x, way, _ = configurations(kind, 800)
+    x, way = x / np.abs(x).max(axis=(1, 2))[:, None, None], way / np.abs(x).max(axis=(1, 2))[:, None, None]
+    alone = times(kind, x, way)
+    limited = alone <= 1.0
+    carried = times(kind, x, way + np.array([3.0, -2.0, 1.0]))
+    np.testing.assert_allclose(carried[limited], alone[limited], rtol=2e-3)
