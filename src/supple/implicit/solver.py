@@ -15,7 +15,7 @@ from supple.implicit.contact.scales import smallest_diagonal
 from supple.implicit.contact.settings import IPCContact
 from supple.implicit.details import ImplicitDetails
 from supple.implicit.energies.damping import viscosity_of
-from supple.implicit.energies.elasticity import elasticity_of
+from supple.implicit.energies.elasticity import SERIAL_TETS, elasticity_of
 from supple.implicit.energies.potential import HessianBlocks
 from supple.implicit.energies.regularization import regularization_of
 from supple.implicit.energies.stitch_damping import StitchViscosity
@@ -32,6 +32,7 @@ from supple.implicit.stepping.substep import StepSettings, Substep, take_substep
 from supple.implicit.stepping.substepping import Substepping
 from supple.implicit.stepping.workspace import Workspace
 from supple.implicit.timings import PARTS
+from supple.numerics.threads import threads_for
 from supple.state import State, Status, StepReport
 from supple.system import Solver, System
 
@@ -206,7 +207,9 @@ class Implicit(Solver):
         worst, message = Status.CONVERGED, ""
         last: Substep | None = None
         while not substepping.over:
-            taken = take_substep(now, substepping.end, substepping.length, settings, workspace)
+            # For a small scene all at once: changing the number of threads takes longer than its kernels.
+            with threads_for(len(system.tets), SERIAL_TETS):
+                taken = take_substep(now, substepping.end, substepping.length, settings, workspace)
             rows += [replace(row, substep=substeps) for row in taken.outcome.rows]
             if taken.outcome.status is not Status.CONVERGED:
                 logger.debug("step of %g s: %s", substepping.length, taken.outcome.status)

@@ -92,7 +92,7 @@ class ContactModel:
         return Friction(self.mesh.points, slips, reach) if len(slips.forces) else None
 
     def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, str]:
-        """How far along `direction` (n, 3), at most 1, nothing touches, and the names of the pair that allows no more."""
+        """How far along `direction` (n, 3), at most 1, nothing touches, and the names of what would touch."""
         step, row = self.planes.largest_step(x, direction)
         names = "" if row < 0 else self._names(self._plane_owners(row))
         if step == 0.0:

@@ -63,7 +63,9 @@ class ContactStep:
         """The objective with barriers, and with friction whose normal forces are those at x (n, 3)."""
         if self.model is None:
             return objective
-        self.model.collisions.forget_weights()
+        if self.barriers is None:
+            # Weights stay during the step: with those of every minimum in turn, the minima can alternate.
+            self.model.collisions.forget_weights()
         self.barriers = self.model.barriers(self.stiffness)
         self.frictions = self.model.frictions(self.barriers, x, self.start, self.times)
         if self.model.coefficients.any():
