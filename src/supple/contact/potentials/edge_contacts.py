@@ -21,8 +21,8 @@ from supple.numerics.mat3 import cross, dot, row, subtract
 # Squared sine of the angle between two edges from which they count in full. Parallel edges do not count: their ends do.
 _CROSSING = 1e-3
 
-# Of the sum of the areas of two edges. In a regular mesh, two edges then stand for as much as a vertex.
-_SHARE = 0.75
+# Of the smaller area of two edges. In a regular mesh, two edges then stand for as much as a vertex.
+_SHARE = 1.5
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
@@ -58,7 +58,7 @@ def edge_weights(x, pairs, mesh, areas, dhat, known_codes, known_values):
         protruding = min(1.0, max(0.0, max(one, other) / h))
         nearest = min(1.0, max(0.0, 1.0 + min(one, other) / h))
         angle = min(1.0, crossing / _CROSSING)
-        full = _SHARE * (areas[e] + areas[f])
+        full = _SHARE * min(areas[e], areas[f])
         now = full * protruding * nearest * angle * (2.0 - angle)
         # Below zero: the codes of vertices are not.
         keys[k] = -1 - np.int64(e) * len(edges) - f

@@ -1,0 +1,222 @@
+"""Which parts of surfaces repel each other: faces whatever their meshes, edges and vertices only where they protrude."""
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.contact.closest.pair_geometry import EDGE_EDGE
+from supple.contact.potentials.barrier_function import barrier_slopes
+from supple.implicit.contact.build import contact_model
+from supple.system import build_system, initial_state
+
+DHAT = 1e-4
+KAPPA = 1e5
+SIDE = 0.1
+RUBBER = sp.StableNeoHookean(youngs=1e5, poisson=0.3, density=1000.0)
+
+
+def model_of(bodies, obstacles=()):
+    scene = sp.Scene(bodies, obstacles=list(obstacles))
+    system = build_system(scene)
+    settings = sp.IPCContact(dhat=DHAT, stiffness=KAPPA)
+    model = contact_model(system, settings, np.full(len(system.tets), 1e5))
+    return model, np.concatenate([initial_state(scene).positions, *(part.anchors for part in model.obstacles)])
+
+
+def boxes(lower, upper, gap=0.5 * DHAT, lift=SIDE):
+    """Two boxes above each other, made of meshes; the rows of the upper one."""
+    model, x = model_of([sp.Body("lower", lower, RUBBER), sp.Body("upper", upper, RUBBER, position=(0, lift + gap, 0))])
+    return model, x, slice(len(lower.vertices), None)
+
+
+def cube(cells, mirrored=False):
+    mesh = sp.shapes.box((SIDE,) * 3, (cells,) * 3)
+    return sp.TetMesh(mesh.vertices * (-1, 1, 1), mesh.tets) if mirrored else mesh
+
+
+def force_on(model, x, rows):
+    """(3,) with the weights of where things are."""
+    model.collisions.forget_weights()
+    gradient = np.zeros_like(x)
+    for term in model.barriers(KAPPA).terms:
+        term.add_gradient(x, gradient)
+    return -gradient[rows].sum(axis=0)
+
+
+def pressure(gap):
+    return -KAPPA * barrier_slopes(gap, DHAT)[0]
+
+
+@pytest.mark.parametrize("cells", [(1, 1), (2, 2), (3, 3), (4, 4), (8, 8), (3, 4), (2, 5)])
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_aligned_boxes_do_not_push_each_other_sideways(cells, mirrored):
+    model, x, rows = boxes(cube(cells[0]), cube(cells[1], mirrored))
+    for shift in (0.0, 1e-9, 1e-7, 1e-6, 1e-5, 5e-5, DHAT, 1e-3):
+        for way in ([1, 0, 0], [0.8, 0, 0.6], [-0.6, 0, 0.8]):
+            moved = x.copy()
+            moved[rows] += shift * np.array(way)
+            force = force_on(model, moved, rows)
+            assert force[1] > 0.0
+            # While the weights of outlines fade, within 1 um; farther there is no force at all.
+            assert np.abs(force[[0, 2]]).max() < (1e-4 if shift < 1e-6 else 1e-9) * force[1]
+            if shift >= 1e-5 and way[2] != 0.0:
+                # No vertex is above an outline: the areas of the faces' vertices make up the face.
+                assert force[1] == pytest.approx(SIDE**2 * pressure(0.5 * DHAT), rel=0.4 / min(cells))
+                assert not (model.collisions.at(moved).kinds == EDGE_EDGE).any()
+
+
+def test_flat_contact_has_the_pressure_of_the_barrier_whatever_the_meshes():
+    plate = sp.shapes.box((0.3, 0.05, 0.3), (13, 1, 13))
+    for gap in (0.1 * DHAT, 0.5 * DHAT, 0.9 * DHAT):
+        model, x, rows = boxes(plate, sp.shapes.box((0.2, 0.05, 0.2), (9, 1, 9)), gap, 0.05)
+        assert force_on(model, x, rows)[1] == pytest.approx(0.04 * pressure(gap), rel=0.2)
+
+
+def wedge(length):
+    """A ridge along z at the height 0, below it a body of tets."""
+    half = 0.5 * length
+    points = [[0, 0, -half], [0, 0, half], [0.03, 0.05, -half], [0.03, 0.05, half], [-0.03, 0.05, -half], [-0.03, 0.05, half]]
+    return sp.TetMesh(np.array(points), np.array([[0, 2, 4, 1], [2, 4, 1, 3], [4, 1, 3, 5]]))
+
+
+@pytest.mark.parametrize("shift", [(0.0, 0.0), (0.011, 0.007), (-0.03, 0.02)])
+def test_a_ridge_far_from_all_vertices_is_held_by_edges(shift):
+    """Its ends hang over the plate, and the plate's vertices are at its corners."""
+    plate = sp.shapes.box((0.2, 0.05, 0.2), (1, 1, 1))
+    model, x, rows = boxes(plate, wedge(0.3), lift=0.025)
+    x[rows] += (shift[0], 0.0, shift[1])
+    force = force_on(model, x, rows)
+    assert force[1] > 0.0
+    assert np.abs(force[[0, 2]]).max() < 1e-9 * force[1]
+    assert (model.collisions.at(x).kinds == EDGE_EDGE).any()
+    # Without a bound.
+    lowered = x - 0.499 * DHAT * np.array([0, 1, 0]) * (np.arange(len(x)) >= len(plate.vertices))[:, None]
+    assert force_on(model, lowered, rows)[1] > 100 * force[1]
+
+
+@pytest.mark.parametrize("angle", [0.2, 0.7, np.pi / 2])
+def test_crossing_ridges_repel_each_other(angle):
+    below = sp.Body("below", sp.TetMesh(wedge(0.1).vertices * (1, -1, 1), wedge(0.1).tets), RUBBER)
+    above = sp.Body("above", wedge(0.1), RUBBER, position=(0, 0.5 * DHAT, 0), rotation=(0, angle, 0))
+    model, x = model_of([below, above])
+    contacts = model.collisions.at(x)
+    (row,) = np.flatnonzero(contacts.kinds == EDGE_EDGE)
+    assert contacts.distances[row] == pytest.approx(0.5 * DHAT)
+    assert contacts.weights[row] == pytest.approx(1.5 * 0.1 * np.hypot(0.03, 0.05) / 3)
+    force = force_on(model, x, slice(6, 12))
+    assert force[1] > 0.0
+    assert np.abs(force[[0, 2]]).max() < 1e-9 * force[1]
+
+
+def test_the_energy_along_a_ridge_is_constant():
+    """A ridge of several edges slides along a ridge across it: edges, vertices and edges again carry it."""
+    mesh = sp.shapes.box((0.02, 0.02, 0.2), (1, 1, 10))
+    turned = mesh.vertices @ np.array([[1, 1, 0], [-1, 1, 0], [0, 0, np.sqrt(2)]]) / np.sqrt(2)
+    lower = sp.TetMesh(turned, mesh.tets)
+    upper = wedge(0.1)
+    height = float(turned[:, 1].max())
+    model, x = model_of(
+        [
+            sp.Body("lower", lower, RUBBER),
+            sp.Body("upper", upper, RUBBER, position=(0, height + 0.3 * DHAT, 0), rotation=(0, np.pi / 2, 0)),
+        ]
+    )
+    rows = slice(len(turned), None)
+    energies = []
+    for z in np.linspace(-0.03, 0.03, 61):
+        moved = x.copy()
+        moved[rows, 2] += z
+        model.collisions.forget_weights()
+        energies.append(model.barriers(KAPPA).triangles.value(moved))
+    assert min(energies) > 0.5 * max(energies)
+
+
+def test_vertices_on_vertices_repel_each_other():
+    tip = np.array([[0, 0, 0], [0.03, 0.1, 0.02], [-0.04, 0.1, 0.03], [0.01, 0.1, -0.05]])
+    tets = np.array([[0, 1, 2, 3]])
+    below = sp.Body("below", sp.TetMesh(tip * (1, -1, 1), tets), RUBBER)
+    above = sp.Body("above", sp.TetMesh(tip, tets), RUBBER, position=(0, 0.5 * DHAT, 0))
+    model, x = model_of([below, above])
+    force = force_on(model, x, slice(4, 8))
+    area = model.mesh.areas[model.collisions.at(x).points[0, 0]]
+    assert force[1] == pytest.approx(area * pressure(0.5 * DHAT), rel=1e-9)
+
+
+def test_a_box_in_the_corner_of_a_room_is_pushed_by_every_wall():
+    room = sp.Box(center=(0, 0, 0), size=(0.3, 0.3, 0.3), inside=True, name="room")
+    near, far = 0.15 - 0.5 * SIDE - 0.5 * DHAT, 0.0
+    at = {}
+    for place in ((near, far, far), (far, near, far), (near, near, far), (near, near, near)):
+        model, x = model_of([sp.Body("box", cube(3), RUBBER, position=place)], [room])
+        at[place] = force_on(model, x, slice(0, len(cube(3).vertices)))
+    alone = at[near, far, far][0]
+    assert alone < 0.0
+    assert at[far, near, far][1] == pytest.approx(alone, rel=1e-6)
+    assert np.abs(at[near, far, far][1:]).max() < 1e-9 * abs(alone)
+    # Both walls push as much as alone, but for the edge between them, which counts once less.
+    assert at[near, near, far][:2] == pytest.approx([alone, alone], rel=0.1)
+    assert at[near, near, near] == pytest.approx([alone] * 3, rel=0.2)
+
+
+def bumpy(seed):
+    """A sheet of triangles with valleys and ridges, as an obstacle."""
+    rng = np.random.default_rng(seed)
+    grid = np.stack(np.meshgrid(*[np.linspace(-1e-3, 1e-3, 9)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
+    heights = 1e-4 * rng.uniform(-1, 1, len(grid))
+    points = np.column_stack([grid[:, 0], heights, grid[:, 1]])
+    corner = (np.arange(8)[:, None] * 9 + np.arange(8)).ravel()
+    faces = np.concatenate(
+        [np.column_stack([corner, corner + 1, corner + 10]), np.column_stack([corner, corner + 10, corner + 9])]
+    )
+    return sp.TriangleObstacle(surface=sp.SurfaceMesh(points, faces), name="sheet")
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_with_kept_weights_the_energy_is_the_integral_of_the_force(seed):
+    """A tip goes over valleys, edges and peaks: the energy has no jump, and its gradient none."""
+    tip = np.array([[0, 0, 0], [0.03, 0.1, 0.02], [-0.04, 0.1, 0.03], [0.01, 0.1, -0.05]])
+    body = sp.Body("tip", sp.TetMesh(tip, np.array([[0, 1, 2, 3]])), RUBBER, position=(0, 0.01, 0))
+    model, x = model_of([body], [bumpy(seed)])
+    rng = np.random.default_rng(seed)
+    x[:4] += (*rng.uniform(-5e-4, 5e-4, 1), 0.0, -9e-4)
+    barrier = model.barriers(KAPPA).triangles
+    start = x.copy()
+    # Just above the highest place on the way.
+    count, width = 4000, 1.8e-3
+    low, high = 0.0, 0.01
+    for _ in range(30):
+        middle = 0.5 * (low + high)
+        placed = start - (0.0, 0.01 - middle, 0.0) * (np.arange(len(x)) < 4)[:, None]
+        touching = any(
+            model.collisions.smallest_distance(placed + (0, 0, z) * (np.arange(len(x)) < 4)[:, None]) < 0.3 * DHAT
+            for z in np.linspace(0, width, 40)
+        )
+        low, high = (middle, high) if touching else (low, middle)
+    x = start - (0.0, 0.01 - high, 0.0) * (np.arange(len(x)) < 4)[:, None]
+    model.collisions.forget_weights()
+    energies, forces = [], []
+    path = [x + (0, 0, z) * (np.arange(len(x)) < 4)[:, None] for z in np.linspace(0, width, count + 1)]
+    for at in path:
+        model.collisions.keep_weights(at)  # weights grow on the first way
+    for at in path:
+        gradient = np.zeros_like(at)
+        barrier.add_gradient(at, gradient)
+        energies.append(barrier.value(at))
+        forces.append(gradient[:4, 2].sum())
+    energies, forces = np.array(energies), np.array(forces)
+    steps = 0.5 * (forces[1:] + forces[:-1]) * width / count
+    assert energies.max() > 0.0
+    assert np.abs(np.diff(energies) - steps).max() < 1e-3 * energies.max()
+
+
+def test_weights_do_not_change_while_they_are_kept():
+    model, x, rows = boxes(cube(2), cube(2))
+    model.collisions.keep_weights(x)
+    before = model.barriers(KAPPA).triangles.value(x)
+    moved = x.copy()
+    moved[rows] += (1e-6, 0, 1e-6)
+    kept = model.barriers(KAPPA).triangles.value(moved)
+    model.collisions.forget_weights()
+    fresh = model.barriers(KAPPA).triangles.value(moved.copy())
+    assert kept == pytest.approx(before, rel=1e-3)
+    assert fresh < 0.7 * kept  # no vertex of an outline is left
