@@ -16,7 +16,12 @@ from supple.contact.potentials.contacts import Contacts
 
 COUNT = 2500  # pairs of each kind
 STIFFNESS = 3.0
-KINDS = {"vertex-vertex": VERTEX_VERTEX, "vertex-edge": VERTEX_EDGE, "vertex-triangle": VERTEX_TRIANGLE, "edge-edge": EDGE_EDGE}
+KINDS = {
+    "vertex-vertex": VERTEX_VERTEX,
+    "vertex-edge": VERTEX_EDGE,
+    "vertex-triangle": VERTEX_TRIANGLE,
+    "edge-edge": EDGE_EDGE,
+}
 LIBRARY = {
     VERTEX_VERTEX: ipctk.VertexVertexNormalCollision(0, 1),
     VERTEX_EDGE: ipctk.EdgeVertexNormalCollision(0, 0),
@@ -52,7 +57,10 @@ def pairs_of(kind, count, seed):
         c[:, 0], c[:, 1], c[:, 2] = 1.0, t - 1, -t
     elif kind == VERTEX_TRIANGLE:
         u = rng.dirichlet([0.5, 0.5, 0.5], count)
-        corners = q[:, None] * rng.normal(size=(count, 3, 1)) + (thin[:, None] * rng.normal(size=(count, 3)))[:, :, None] * p[:, None]
+        corners = (
+            q[:, None] * rng.normal(size=(count, 3, 1))
+            + (thin[:, None] * rng.normal(size=(count, 3)))[:, :, None] * p[:, None]
+        )
         x[:, 1:] = corners - np.einsum("ki,kij->kj", u, corners)[:, None]
         c[:, 0], c[:, 1:] = 1.0, -u
     else:
@@ -123,7 +131,11 @@ def test_pairs_have_the_librarys_energy_gradient_and_hessian(kind):
         hessian = potential.hessian(LIBRARY[kind], flat)
         lost = 1e-13 * (np.ptp(x[k], axis=0).max() / d[k]) ** 2 + 1e-9
         if kind >= VERTEX_TRIANGLE:
-            first, second = (x[k, 2] - x[k, 1], x[k, 3] - x[k, 1]) if kind == VERTEX_TRIANGLE else (x[k, 1] - x[k, 0], x[k, 3] - x[k, 2])
+            first, second = (
+                (x[k, 2] - x[k, 1], x[k, 3] - x[k, 1])
+                if kind == VERTEX_TRIANGLE
+                else (x[k, 1] - x[k, 0], x[k, 3] - x[k, 2])
+            )
             area = np.linalg.norm(np.cross(first, second)) / (np.linalg.norm(first) * np.linalg.norm(second))
             lost /= area**2
         worst = max(worst, abs(energies[k] - value) / (abs(value) + 1e-9 * STIFFNESS * dhat[k]) / lost)
@@ -144,7 +156,7 @@ def test_the_projected_hessian_is_positive_and_above_the_exact_one(kind):
     assert np.abs(exact - exact.transpose(0, 2, 1)).max(axis=(1, 2)).max() == 0.0
     assert (np.linalg.eigvalsh(projected)[:, 0] > -1e-12 * size).all()
     assert (np.linalg.eigvalsh(projected - exact)[:, 0] > -1e-9 * size).all()
-    print(np.percentile(np.linalg.norm(projected - clamped, axis=(1, 2)) / size, [50,90,99,100]))
+    print(np.percentile(np.linalg.norm(projected - clamped, axis=(1, 2)) / size, [50, 90, 99, 100]))
     assert (np.linalg.norm(projected - clamped, axis=(1, 2)) < 0.3 * size).all()
     assert np.median(np.linalg.norm(projected - clamped, axis=(1, 2)) / size) < 0.02
 

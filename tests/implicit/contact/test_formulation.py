@@ -1,4 +1,4 @@
-"""Which parts of surfaces repel each other: faces whatever their meshes, edges and vertices only where they protrude."""
+"""Which parts of surfaces repel each other: faces whatever their meshes, edges and vertices where they protrude."""
 
 import numpy as np
 import pytest
@@ -75,7 +75,14 @@ def test_flat_contact_has_the_pressure_of_the_barrier_whatever_the_meshes():
 def wedge(length):
     """A ridge along z at the height 0, below it a body of tets."""
     half = 0.5 * length
-    points = [[0, 0, -half], [0, 0, half], [0.03, 0.05, -half], [0.03, 0.05, half], [-0.03, 0.05, -half], [-0.03, 0.05, half]]
+    points = [
+        [0, 0, -half],
+        [0, 0, half],
+        [0.03, 0.05, -half],
+        [0.03, 0.05, half],
+        [-0.03, 0.05, -half],
+        [-0.03, 0.05, half],
+    ]
     return sp.TetMesh(np.array(points), np.array([[0, 2, 4, 1], [2, 4, 1, 3], [4, 1, 3, 5]]))
 
 

@@ -2,8 +2,7 @@
 
     E = kappa sum_k a_k e(d_k)
 
-with the areas a_k, and e as in `barrier_function`. Areas, and which parts of surfaces are closest to each other, are not
-differentiated.
+with the areas a_k, and e as in `barrier_function`. Areas are not differentiated.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ def barrier_value(d, dhat):
 
 @njit(error_model="numpy")
 def barrier_slopes(d, dhat):
-    """First and second derivative of e by d [1, 1/m] for d > 0: the first is never positive, the second never negative."""
+    """First and second derivative of e by d [1, 1/m] for d > 0: not above and not below zero."""
     if d >= dhat:
         return 0.0, 0.0
     r = d / dhat

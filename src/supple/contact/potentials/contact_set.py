@@ -70,9 +70,7 @@ class ContactSet:
         mesh, dhat = self._mesh, self.dhat
         triangles, edges = mesh.triangles, mesh.edges
         with threads_for(len(vertex_triangle) + len(edge_edge), _PARALLEL_FROM):
-            features, squares = near_features(
-                x, vertex_triangle, triangles, mesh.triangle_edges, len(edges), dhat
-            )
+            features, squares = near_features(x, vertex_triangle, triangles, mesh.triangle_edges, len(edges), dhat)
             areas, edge_squares, edge_keys, edges_grown = edge_weights(
                 x, edge_edge, self._of_edges, mesh.edge_areas, dhat, *known
             )

@@ -1,11 +1,11 @@
 """Contacts of edges that cross each other, where at least one of them protrudes from its surface.
 
-The energy of a pair is that of the distance of the two edges, minus that of the smallest distance of an end from the other
-edge: it is zero where the closest point is an end, because vertices have contacts of their own, and along a ridge of
-several edges the sum with the energy of its vertices is constant.
+The energy of a pair is that of the distance of the two edges, minus that of the smallest distance of an end from the
+other edge: it is zero where the closest point is an end, because vertices have contacts of their own, and along a ridge
+of several edges the sum with the energy of its vertices is nearly constant.
 
-Where two flat faces lie on each other, no edge protrudes, and none counts. The ridge of a knife has a contact with every
-edge that it crosses; so have two ridges that cross.
+Where two flat faces lie on each other, no edge protrudes, and none counts. The ridge of a knife has a contact with
+every edge that it crosses; so have two ridges that cross.
 """
 
 import math

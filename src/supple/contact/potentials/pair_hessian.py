@@ -33,14 +33,15 @@ def mode_matrix(slope, d, cc, w, project):
     if not project:
         return 0.0, -slope, -slope * d
     # In the basis of the unit vectors of beta and delta, of lengths |c| and sqrt(w), the matrix is
-    # (-E' / d) ((0, |c| g), (|c| g, g^2)) with g = d sqrt(w). Its positive eigenvalue -sqrt(w) E' l belongs to (|c|, l).
+    # (-E' / d) ((0, |c| g), (|c| g, g^2)) with g = d sqrt(w). Its positive eigenvalue, -sqrt(w) E' x,
+    # belongs to (|c|, x).
     root = math.sqrt(w)
     g = d * root
-    l = 0.5 * (g + math.sqrt(g * g + 4.0 * cc))
+    x = 0.5 * (g + math.sqrt(g * g + 4.0 * cc))
     if slope > 0.0:  # of a pair that attracts it is the other one
-        l = -cc / l
-    s00 = -slope * root * l / (cc + l * l)
-    ratio = l / root
+        x = -cc / x
+    s00 = -slope * root * x / (cc + x * x)
+    ratio = x / root
     return s00, s00 * ratio, s00 * ratio * ratio
 
 

@@ -1,7 +1,7 @@
 """Kernels of contact with half-spaces: one contact for each point near a plane.
 
-A plane is two points, c and the tip c + L n of its normal. The distance of a point x is d = (x - c) . n; its derivatives
-by c and the tip couple what touches the plane to a plane that moves.
+A plane is two points, c and the tip c + L n of its normal. The distance of a point x is d = (x - c) . n; its
+derivatives by c and the tip couple what touches the plane to a plane that moves.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def plane_hessian(x, pairs, near, areas, dhat, stiffness):
 
     Exact for the points; the coupling with the planes omits the rotation of the normal.
     """
-    rows, heights, _, _ = near
+    rows = near[0]
     one, two = np.empty(3 * len(rows), dtype=np.int32), np.empty(3 * len(rows), dtype=np.int32)
     blocks = np.empty((3 * len(rows), 3, 3))
     for m in range(len(rows)):

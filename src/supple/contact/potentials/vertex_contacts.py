@@ -1,14 +1,14 @@
 """Contacts of vertices with the triangles, edges and vertices around them.
 
-The energy of a vertex in front of a surface is that of its distances from the triangles, minus that of its distances from
-the edges between them, plus that of its distances from the vertices between those: all terms cancel but one where the
-surface is flat or convex, whatever its triangles. In a valley both sides count. The sum has a continuous gradient.
+The energy of a vertex in front of a surface is that of its distances from the triangles, minus that of its distances
+from the edges between them, plus that of its distances from the vertices between those: all terms cancel but one where
+the surface is flat or convex, whatever its triangles. In a valley both sides count. The gradient is continuous.
 
 A vertex stands for half of its area: the vertices of the other surface stand for the other half, so that faces that lie
 on each other press on each other with the pressure of the barrier, whatever their meshes.
 
-A vertex that hangs over an edge or a corner, while its own surface comes nearer to that beside it, gets less weight, down
-to none: what is in contact there are vertices of the other surface with the faces of this one, or two edges.
+A vertex that hangs over an edge or a corner, while its own surface comes nearer to that beside it, gets less weight,
+down to none: what is in contact there are vertices of the other surface with the faces of this one, or two edges.
 
 Source of the alternating sum: Li et al., "Convergent Incremental Potential Contact" (2023), section 4.
 """
@@ -23,7 +23,7 @@ from supple.numerics.geometry.closest_point import closest_on_triangle
 from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import dot, row, subtract
 
-# A vertex counts in full while none of its neighbors is nearer, and not at all where one is nearer by this share of dhat.
+# A vertex counts in full while none of its neighbors is nearer, and not at all where one is, by this share of dhat.
 NEARER_SHARE = 0.25
 
 # Most parts of one triangle: itself, its edges, its corners.
@@ -40,8 +40,8 @@ def near_features(x, pairs, triangles, triangle_edges, edge_count, dhat):
 
     Returns
     -------
-    features : (k,) number of the triangle, f + number of the edge or f + e + number of the vertex; -1 where the triangle
-        is not nearer than dhat
+    features : (k,) number of the triangle, f + number of the edge or f + e + number of the vertex; -1 where the
+        triangle is not nearer than dhat
     squares : (k,) squared distances [m^2], infinite where not below dhat
     """
     features = np.full(len(pairs), -1, dtype=np.int32)

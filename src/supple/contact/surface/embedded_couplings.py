@@ -13,7 +13,9 @@ def vertex_couplings(points: EmbeddedPoints, between: Couplings) -> Couplings:
     """The couplings of vertices, from those `between` points."""
     if points.are_vertices:
         return Couplings(points.vertices[between.rows], points.vertices[between.columns], between.blocks)
-    return Couplings(*_spread(between.rows, between.columns, between.blocks, points.start, points.vertices, points.weights))
+    return Couplings(
+        *_spread(between.rows, between.columns, between.blocks, points.start, points.vertices, points.weights)
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -28,14 +30,14 @@ def _spread(rows, columns, blocks, start, vertices, weights):
     for t in range(len(rows)):
         for k in range(start[rows[t]], start[rows[t] + 1]):
             # Each unordered pair of the vertices of one point is given once.
-            for l in range(k if rows[t] == columns[t] else start[columns[t]], start[columns[t] + 1]):
-                i, j, size = vertices[k], vertices[l], weights[k] * weights[l]
+            for m in range(k if rows[t] == columns[t] else start[columns[t]], start[columns[t] + 1]):
+                i, j, size = vertices[k], vertices[m], weights[k] * weights[m]
                 new_rows[b], new_columns[b] = i, j
                 for p in range(3):
                     for q in range(3):
                         out[b, p, q] = size * blocks[t, p, q]
                         # Two points on one vertex: its block contains the pair in both orders.
-                        if i == j and (rows[t] != columns[t] or k != l):
+                        if i == j and (rows[t] != columns[t] or k != m):
                             out[b, p, q] += size * blocks[t, q, p]
                 b += 1
     return new_rows, new_columns, out
