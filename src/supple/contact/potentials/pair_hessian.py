@@ -8,10 +8,10 @@ A second-order expansion of the least distance over the free parameters gives
 
     H = E'' alpha alpha^T + sum_k (s00 beta beta^T + s01 (beta delta^T + delta beta^T) + s11 delta delta^T)
 
-with s00, s01, s11 = 0, -E', -E' d for a mode with a parameter and E' / d, 0, 0 for one without. The vectors of different
-modes are perpendicular, so that each mode is a matrix of two rows whose eigenvalues are known. Where D_k . c = 0, they
-are the eigenvalues of H; the projected Hessian leaves the negative ones of each mode out. It is positive semi-definite,
-and larger than H by a positive semi-definite matrix.
+with s00, s01, s11 = 0, -E', -E' d for a mode with a parameter and E' / d, 0, 0 for one without. The vectors of
+different modes are perpendicular, so that each mode is a matrix of two rows whose eigenvalues are known. Where
+D_k . c = 0, they are the eigenvalues of H; the projected Hessian leaves the negative ones of each mode out. It is
+positive semi-definite, and larger than H by a positive semi-definite matrix.
 """
 
 import math
