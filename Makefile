@@ -1,5 +1,6 @@
 # Every target sets itself up: it creates .venv from the lock files and reuses it.
 PYTHON ?= python3
+EXAMPLES ?= 500
 UV_VERSION := 0.13.8
 ifeq ($(OS),Windows_NT)
   BIN := .venv/Scripts
@@ -12,18 +13,22 @@ endif
 # Bytecode is compiled now, so that no later start has to (it is 1.3 s of one).
 install = ($(BIN)/python -m uv pip install -q --compile-bytecode --python $(BIN)/python $(1) || $(BIN)/python -m pip install -q $(1))
 
-.PHONY: demo test test-all bench lint format lock clean
+.PHONY: demo test test-all fuzz bench lint format lock clean
 .DELETE_ON_ERROR:
 
 demo: .venv/.base
-	$(BIN)/supple demo squash --output out/squash
-	$(BIN)/supple demo bears --output out/bears
+	$(BIN)/supple demo squash --overwrite --output out/squash
+	$(BIN)/supple demo bears --overwrite --output out/bears
 
 test: .venv/.dev
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"
 
 test-all: .venv/.dev
 	$(BIN)/python -m pytest -n 2 --dist worksteal
+
+# Every reader on many thousands of damaged files.
+fuzz: .venv/.dev
+	SUPPLE_FUZZ_EXAMPLES=$(EXAMPLES) $(BIN)/python -m pytest -n 2 tests/fuzz
 
 bench: .venv/.dev .venv-peers/.made
 	$(BIN)/python -m benchmarks

@@ -1,6 +1,15 @@
 """All benchmarks in sequence: `make bench`, or `python -m benchmarks`."""
 
-from benchmarks import contact_scenes, hanging_beam, implicit_scaling, live, projections, startup, work_precision
+from benchmarks import (
+    candidate_search,
+    contact_scenes,
+    hanging_beam,
+    implicit_scaling,
+    live,
+    projections,
+    startup,
+    work_precision,
+)
 
 if __name__ == "__main__":
     startup.main()
@@ -9,5 +18,6 @@ if __name__ == "__main__":
     hanging_beam.main(busy=True)
     work_precision.main()
     implicit_scaling.main()
+    candidate_search.main()
     contact_scenes.main()
     live.main()

@@ -73,3 +73,12 @@ def test_times_of_the_parts_of_steps_with_contact():
     assert result["iterations"] >= 1.0
     assert all(0.0 < result[part] < 1.0 for part in PARTS)
     assert sum(result[part] for part in PARTS) <= 1.0
+
+
+def test_the_search_for_contact_is_measured_in_piles_of_bears(capsys):
+    from benchmarks import candidate_search
+
+    exponent = candidate_search.main((1, 3))
+    lines = capsys.readouterr().out.splitlines()
+    assert [int(line.split()[0]) for line in lines[3:5]] == [1, 3]
+    assert np.isfinite(exponent)

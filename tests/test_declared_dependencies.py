@@ -14,6 +14,8 @@ SOURCES = Path(supple.__file__).parent
 TESTS = Path(__file__).parent
 # Packages that are imported under another name than they are installed with.
 IMPORT_NAMES = {
+    "arro3-core": "arro3",
+    "arro3-io": "arro3",
     "imageio-ffmpeg": "imageio_ffmpeg",
     "lazy-loader": "lazy_loader",
     "mapbox-earcut": "mapbox_earcut",

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+import supple as sp
 from supple.scene_file.loader import load_run
 from supple.simulate import simulate
 
@@ -67,3 +68,11 @@ def test_the_patch_stays_on_the_swinging_bar():
 @pytest.mark.parametrize("path", sorted((EXAMPLES / "scenes").glob("*.yaml")), ids=lambda path: path.stem)
 def test_every_scene_file_loads(path):
     assert load_run(path).steps > 0
+
+
+def test_the_study_of_the_slope_follows_coulomb_s_law(tmp_path):
+    table = sp.load_study(EXAMPLES / "studies" / "slope.yaml").run(tmp_path, workers=2)
+    # s = (g sin 30 - mu g cos 30) t^2 / 2 after one second, and nothing where tan 30 is less than mu
+    expected = [max(0.0, 0.5 * (4.905 - mu * 8.495709)) for mu in table["obstacles.slope.friction"]]
+    assert table["slid"] == pytest.approx(expected, rel=0.03, abs=2e-3)
+    assert table.units == {"obstacles.slope.friction": "", "slid": "m"}

@@ -16,6 +16,8 @@ LAYERS = (
     ("cli",),
     ("demos",),
     ("viewer",),
+    ("studies",),
+    ("runs",),
     ("output", "scene_file"),
     ("simulate",),
     ("xpbd", "implicit"),

@@ -11,7 +11,7 @@ import supple as sp
 
 HEAVY = [
     "numba", "scipy", "h5py", "meshio", "viser", "matplotlib", "pyvista", "vtk", "skimage", "tetgen", "ipctk",
-    "pydantic", "yaml", "cyclopts", "rich", "pxr", "trimesh",
+    "pydantic", "yaml", "cyclopts", "rich", "pxr", "trimesh", "distributed",
 ]  # fmt: skip
 
 

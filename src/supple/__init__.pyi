@@ -6,6 +6,7 @@ from .errors import MeshingError as MeshingError
 from .errors import OutputError as OutputError
 from .errors import SceneError as SceneError
 from .errors import SolverError as SolverError
+from .errors import StudyError as StudyError
 from .errors import SuppleError as SuppleError
 from .implicit.contact.settings import IPCContact as IPCContact
 from .implicit.limits.step_filter import largest_noninverting_step as largest_noninverting_step
@@ -39,6 +40,8 @@ from .output.progress import ProgressBar as ProgressBar
 from .output.recording.reader import Recording as Recording
 from .output.recording.reader import read_recording as read_recording
 from .output.recording.recorder import Recorder as Recorder
+from .runs.resume import resume as resume
+from .runs.run_folder import RunFolder as RunFolder
 from .scene.body import Body as Body
 from .scene.contact_pairs import ContactPair as ContactPair
 from .scene.forces import Force as Force
@@ -56,6 +59,7 @@ from .scene.selection import InBox as InBox
 from .scene.stitches.vertex_edge import VertexEdgeStitch as VertexEdgeStitch
 from .scene.stitches.vertex_triangle import SoftVertexTriangleStitch as SoftVertexTriangleStitch
 from .scene.stitches.vertex_vertex import VertexVertexStitch as VertexVertexStitch
+from .scene_file.loader import Run as Run
 from .scene_file.loader import load_run as load_run
 from .scene_file.loader import load_scene as load_scene
 from .simulate import Frame as Frame
@@ -65,6 +69,18 @@ from .simulate import simulate as simulate
 from .state import ContactPoints as ContactPoints
 from .state import State as State
 from .state import Status as Status
+from .studies.designs import Grid as Grid
+from .studies.designs import LatinHypercube as LatinHypercube
+from .studies.designs import OneAtATime as OneAtATime
+from .studies.designs import Paired as Paired
+from .studies.designs import Sobol as Sobol
+from .studies.factors import loguniform as loguniform
+from .studies.factors import uniform as uniform
+from .studies.plots import plot_study as plot_study
+from .studies.runner import StudyProgress as StudyProgress
+from .studies.study_file import load_study as load_study
+from .studies.sweep import sweep as sweep
+from .studies.table import StudyTable as StudyTable
 from .xpbd.contact.settings import XPBDContact as XPBDContact
 from .xpbd.solver import XPBD as XPBD
 

@@ -25,5 +25,9 @@ class OutputError(SuppleError):
     """A recording, export or plot cannot be read or written."""
 
 
+class StudyError(SuppleError):
+    """A study, or the file that describes it, cannot be carried out."""
+
+
 class CommandError(SuppleError):
     """A command to a running simulation is malformed, or asks for more than a live page allows."""

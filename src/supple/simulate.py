@@ -17,6 +17,7 @@ from supple.errors import SceneError, SolverError
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.material import Elastic
 from supple.numerics.deformation import deformation_gradients, determinants
+from supple.numerics.memory import require_memory
 from supple.scene.scene import Scene
 from supple.scene.stitches.measures import largest_stitch_stretch, stitch_energy
 from supple.state import ContactPoints, SolverDetails, State, Status, StepReport
@@ -76,6 +77,7 @@ class Frame:
     ----------
     index : number of steps since the start; time : [s]
     report : see `Report`; state : flat arrays of all bodies; system : what they belong to
+    solver : which made it; None where that is not known
     """
 
     index: int
@@ -83,6 +85,7 @@ class Frame:
     system: System
     report: Report
     find_contacts: Callable[[], ContactPoints] | None = None
+    solver: Solver | None = None
 
     @property
     def time(self) -> float:
@@ -168,6 +171,7 @@ def simulate(
     steps : number of frames.
     initial_positions, initial_velocities : by body name, (n, 3) [m], [m/s]; the others start as the scene describes.
     start : a frame or state of this scene to continue from, of any solver or from a recording; excludes the two above.
+        From a `Frame` of the same scene object and an equal solver, the frames have the bits of an uninterrupted run.
     sinks : receive the start, every frame, and the end.
 
     Raises
@@ -186,9 +190,12 @@ def simulate(
         raise SolverError(f"simulate: steps is {steps!r}; give a whole number of zero or more")
     if start is not None and (initial_positions is not None or initial_velocities is not None):
         raise SceneError("simulate: give `start`, or initial positions and velocities, not both")
+    tets = sum(len(body.mesh.tets) for body in scene.bodies)
+    what = f"simulate: the scene of {tets} tets"
+    require_memory(solver.bytes_needed(scene), what, "make the meshes coarser, or use XPBD")
     if start is None:
         start = initial_state(scene, initial_positions, initial_velocities)
-    first = first_frame(scene, start)
+    first = first_frame(scene, start, solver)
     workspace = solver.prepare(first.system)
     solver.check(first.system, first.state, workspace)
     details = solver.initial_details(first.system, workspace)
@@ -196,8 +203,8 @@ def simulate(
     return _steps(first, solver, float(dt), int(steps), workspace, sinks)
 
 
-def first_frame(scene: Scene, start: StartFrame | State) -> Frame:
-    """The frame at the start: number 0 (or that of `start`), before any step."""
+def first_frame(scene: Scene, start: StartFrame | State, solver: Solver | None = None) -> Frame:
+    """The frame at the start: number 0 (or that of `start`), before any step by `solver`."""
     state = start if isinstance(start, State) else getattr(start, "state", None)
     if not isinstance(state, State):
         raise SceneError(f"simulate: start is a {type(start).__name__}; give a Frame, a recorded frame, or a State")
@@ -211,10 +218,19 @@ def first_frame(scene: Scene, start: StartFrame | State) -> Frame:
         )
     # A frame of this scene has the pins' anchors; computing them again would give them only up to round-off.
     if isinstance(start, Frame) and start.system.scene is scene:
-        system = replace(start.system, start_states=(start.system.start_states[0], state))
+        system = start.system
+        # Solvers derive constants from the starts. The same solver keeps them; another one must accept this start.
+        if solver is None or start.solver != solver:
+            system = replace(system, start_states=(system.start_states[0], state))
     else:
         system = build_system(scene, state)
-    return Frame(index, state, system, _report(system, state, StepReport(Status.CONVERGED, 0), 0.0))
+    return start_frame(system, state, index, solver)
+
+
+def start_frame(system: System, state: State, index: int, solver: Solver | None) -> Frame:
+    """A frame without a step that led to it."""
+    report = _report(system, state, StepReport(Status.CONVERGED, 0), 0.0)
+    return Frame(index, state, system, report, solver=solver)
 
 
 def _steps(
@@ -229,7 +245,7 @@ def _steps(
             began = time.perf_counter()
             state, step = solver.step(system, state, dt, workspace)
             seconds = time.perf_counter() - began
-            frame = Frame(index, state, system, _report(system, state, step, seconds), step.contacts)
+            frame = Frame(index, state, system, _report(system, state, step, seconds), step.contacts, solver)
             for sink in sinks:
                 sink.write(frame)
             yield frame

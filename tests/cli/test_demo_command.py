@@ -42,7 +42,8 @@ def test_quiet_prints_only_the_claims(tmp_path, capfd):
     out, err = capfd.readouterr()
     assert all(line.startswith(("holds: ", "does not hold: ")) for line in out.splitlines())
     assert err == ""
-    assert [path.name for path in (tmp_path / "here").iterdir()] == ["recording.vtkhdf"]
+    written = sorted(path.name for path in (tmp_path / "here").iterdir())
+    assert written == ["recording.vtkhdf", "report.csv", "report.parquet", "run"]
 
 
 def test_a_demo_whose_claims_all_hold_exits_0(tmp_path, monkeypatch, capfd):

@@ -22,7 +22,7 @@ def _text(bodies):
 
 
 def _contents(folder):
-    return {path.name: (path.read_bytes(), path.stat().st_mtime_ns) for path in folder.iterdir()}
+    return {path.name: (path.read_bytes(), path.stat().st_mtime_ns) for path in folder.rglob("*") if path.is_file()}
 
 
 @pytest.fixture
@@ -35,11 +35,13 @@ def good_run(tmp_path, monkeypatch):
 
 def test_the_files_of_an_earlier_run_stay_as_they_are(good_run, capfd):
     before = _contents(good_run / "out")
-    assert set(before) == {"recording.vtkhdf", "index.html", "plot.png", "newton.csv"}
+    assert set(before) > {"recording.vtkhdf", "index.html", "plot.png", "newton.csv", "run.json", "00000002.checkpoint"}
     for name, second in REFUSED.items():
         (good_run / "bad.yaml").write_text(_text(["{name: first, position: [0, 0.6, 0], " + CUBE + "}", second]))
         capfd.readouterr()
-        assert main(["run", "bad.yaml", "-o", "out", "--trace", "out/newton.csv"]) == ExitCode.INPUT, name
+        assert main(["run", "bad.yaml", "-o", "out", "--overwrite", "--trace", "out/newton.csv"]) == ExitCode.INPUT, (
+            name
+        )
         out, err = capfd.readouterr()
         assert out == ""
         assert err.startswith("supple: ")
@@ -51,6 +53,6 @@ def test_they_stay_where_bodies_cannot_be_separated(good_run, capfd):
     before = _contents(good_run / "out")
     body = "{name: %s, position: [0, 0.6, 0], " + CUBE + "}"
     (good_run / "bad.yaml").write_text(_text([body % "first", body % "second"]))
-    assert main(["run", "bad.yaml", "-o", "out", "--separate"]) == ExitCode.INPUT
+    assert main(["run", "bad.yaml", "-o", "out", "--overwrite", "--separate"]) == ExitCode.INPUT
     assert "cannot be separated" in capfd.readouterr().err
     assert _contents(good_run / "out") == before

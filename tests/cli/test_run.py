@@ -36,15 +36,19 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
+ALWAYS = ["recording.vtkhdf", "report.csv", "report.parquet", "run"]
+
+
 def listing(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
 def test_writes_recording_page_and_plot_and_prints_their_paths(folder, capfd):
     assert main(["run", "scene.yaml", "-o", "out/first"]) == ExitCode.OK
-    assert listing(folder / "out" / "first") == ["index.html", "plot.png", "recording.vtkhdf"]
+    products = ["index.html", "plot.png", "recording.vtkhdf"]
+    assert listing(folder / "out" / "first") == sorted({*products, *ALWAYS})
     out, err = capfd.readouterr()
-    for name in listing(folder / "out" / "first"):
+    for name in products:
         assert os.path.join("out", "first", name) in out
     assert "6 frames to t = 0.1 s (converged)" in out
     assert "supple:" not in err
@@ -62,7 +66,7 @@ def test_quiet_without_page_and_plot(folder, capfd):
     arguments = ["run", "scene.yaml", "--no-page", "--no-plot", "--quiet", "--steps", "2", "--dt", "0.25"]
     assert main([*arguments, "--solver", "xpbd"]) == ExitCode.OK
     assert capfd.readouterr() == ("", "")
-    assert listing(folder / "out") == ["recording.vtkhdf"]
+    assert listing(folder / "out") == ALWAYS
     with read_recording("out/recording.vtkhdf") as recording:
         assert recording.times.tolist() == [0.0, 0.25, 0.5]
         assert "XPBD(substeps=20" in recording.solver
@@ -71,15 +75,22 @@ def test_quiet_without_page_and_plot(folder, capfd):
 def test_options_override_page_and_plot_of_the_file(folder):
     (folder / "scene.yaml").write_text(SCENE + "output: {page: false, plot: false, compress: true}\n")
     assert main(["run", "scene.yaml", "-q", "--steps", "1", "--plot"]) == ExitCode.OK
-    assert listing(folder / "out") == ["plot.png", "recording.vtkhdf"]
+    assert listing(folder / "out") == ["plot.png", *ALWAYS]
 
 
-def test_a_second_run_replaces_the_first(folder):
+def test_a_second_run_into_a_folder_is_refused_unless_it_overwrites(folder, capfd):
     arguments = ["run", "scene.yaml", "-q", "--no-page", "--no-plot", "--steps"]
     assert main([*arguments, "3"]) == ExitCode.OK
-    assert main([*arguments, "2"]) == ExitCode.OK
+    before = {path: path.read_bytes() for path in (folder / "out").rglob("*") if path.is_file()}
+    assert main([*arguments, "2"]) == ExitCode.INPUT
+    err = capfd.readouterr().err
+    assert "out: contains a run; give another folder, continue it with `supple resume`, or replace it" in err
+    assert err.count("\n") == 1
+    assert {path: path.read_bytes() for path in (folder / "out").rglob("*") if path.is_file()} == before
+    assert main([*arguments, "2", "--overwrite"]) == ExitCode.OK
     with read_recording("out/recording.vtkhdf") as recording:
         assert len(recording) == 3
+    assert listing(folder / "out" / "run" / "checkpoints") == ["00000000.checkpoint", "00000002.checkpoint"]
 
 
 def test_a_page_of_an_earlier_run_is_a_warning(folder, caplog):
@@ -134,7 +145,7 @@ def test_ctrl_c_keeps_the_frames_before_it(folder, capfd, monkeypatch):
     assert err.count("\n") == 1
     with read_recording("out/recording.vtkhdf") as recording:
         assert len(recording) == 4
-    assert listing(folder / "out") == ["recording.vtkhdf"]
+    assert listing(folder / "out") == ALWAYS
 
 
 def test_a_full_disk_keeps_the_frames_before_it(folder, capfd, monkeypatch):
@@ -144,7 +155,7 @@ def test_a_full_disk_keeps_the_frames_before_it(folder, capfd, monkeypatch):
     assert capfd.readouterr().err.count("\n") == 1
     with read_recording("out/recording.vtkhdf") as recording:
         assert len(recording) == 3
-    assert listing(folder / "out") == ["recording.vtkhdf"]
+    assert listing(folder / "out") == ALWAYS
 
 
 @pytest.mark.parametrize(

@@ -21,8 +21,8 @@ from supple.errors import SuppleError
 app = App(
     name="supple",
     help="Tetrahedral soft bodies: a surface mesh goes in, a simulation that can be trusted comes out.",
-    help_epilogue="Exit codes: 0 done, 1 a check or a claim failed, 2 the input or an option cannot be used, "
-    "3 the solver could not go on.",
+    help_epilogue="Exit codes: 0 done, 1 a check, a claim or a --strict run failed, 2 the input or an option cannot "
+    "be used, 3 the solver could not go on.",
     version=__version__,
     console=ShellConsole(),
     suppress_keyboard_interrupt=False,
@@ -36,6 +36,8 @@ app = App(
 COMMANDS = {
     "demo": "supple.cli.commands.demo:demo",
     "run": "supple.cli.commands.run:run",
+    "resume": "supple.cli.commands.resume:resume",
+    "sweep": "supple.cli.commands.sweep:sweep",
     "view": "supple.cli.commands.view:view",
     "mesh": "supple.cli.commands.mesh:mesh",
     "export": "supple.cli.commands.export:export",

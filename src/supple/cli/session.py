@@ -1,19 +1,26 @@
-"""One simulation in the shell: recording and progress, then a page, a plot and a summary."""
+"""One simulation in the shell: run folder and progress, then a page, a plot and a summary."""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from supple.cli.exit_codes import ExitCode
+from supple.cli.interrupts import Interrupts
 from supple.cli.print_error import print_error
 from supple.errors import OutputError
+from supple.runs.contents import RunPaths
+from supple.runs.resume import resume
+from supple.runs.run_folder import RunFolder, SceneSource
 from supple.scene.scene import Scene
 from supple.simulate import Frame, Sink, simulate
 from supple.system import Solver
+
+if TYPE_CHECKING:
+    from supple.output.progress import ProgressBar
 
 logger = logging.getLogger(__name__)
 
@@ -24,10 +31,11 @@ class Products:
 
     Attributes
     ----------
-    folder : for recording.vtkhdf, index.html and plot.png
-    page, plot : whether to write the last two; compress : whether to compress the complete recording
+    folder : the run folder
+    page, plot : whether to write index.html and plot.png to it; compress : whether to compress the complete recording
     quiet : print neither progress nor summary
-    scene_text : the scene file's text, kept in the recording
+    checkpoint_every : number of frames from checkpoint to checkpoint; None: only at the start and the end
+    overwrite : replace an earlier run in the folder
     """
 
     folder: Path
@@ -35,12 +43,36 @@ class Products:
     plot: bool = True
     quiet: bool = False
     compress: bool = False
-    scene_text: str | None = None
+    checkpoint_every: int | None = None
+    overwrite: bool = False
 
     def files(self, *, wanted: bool = True) -> dict[str, Path]:
         """The page and the plot, by name: those that are written, or those that are not."""
         every = {"page": (self.page, "index.html"), "plot": (self.plot, "plot.png")}
         return {name: self.folder / file for name, (is_wanted, file) in every.items() if is_wanted is wanted}
+
+    def refuse_a_run(self) -> None:
+        """Raise `OutputError` where a new run would replace an earlier one; before the scene is read."""
+        paths = RunPaths(self.folder)
+        paths.refuse_other_kinds()
+        if not self.overwrite:
+            paths.refuse_a_run()
+
+    def refuse_folders(self) -> None:
+        """Raise `OutputError` where a folder is in the place of a file; before the simulation."""
+        for path in self.files().values():
+            if path.is_dir():
+                raise OutputError(
+                    f"{path}: this is a folder, and a file of that name must be written; choose another --output"
+                )
+
+    def progress(self) -> list[ProgressBar]:
+        """The sink that shows the progress; none where nothing is printed."""
+        if self.quiet:
+            return []
+        from supple.output.progress import ProgressBar
+
+        return [ProgressBar()]
 
 
 @dataclass
@@ -66,40 +98,59 @@ def run_session(
     steps: int,
     *,
     products: Products,
+    source: SceneSource,
     start: Mapping[str, Any] | None = None,
     sinks: Sequence[Sink] = (),
 ) -> Outcome:
-    """Simulate, record, and print a summary.
+    """Simulate into a new run folder, and print a summary.
 
     Raises
     ------
     SuppleError : where the input or the output folder cannot be used. Frames recorded before are kept.
     """
-    from supple.output.recording.recorder import Recorder
+    products.refuse_folders()
+    folder = RunFolder(
+        products.folder,
+        solver,
+        checkpoint_every=products.checkpoint_every,
+        overwrite=products.overwrite,
+        compress=products.compress,
+        source=source,
+    )
+    frames = simulate(scene, solver, dt, steps, sinks=[folder, *sinks, *products.progress()], **(start or {}))
+    return _driven(frames, products)
 
-    recording = products.folder / "recording.vtkhdf"
-    for path in products.files().values():
-        if path.is_dir():  # reported before the simulation
-            raise OutputError(
-                f"{path}: this is a folder, and a file of that name must be written; choose another --output"
-            )
-    recorder = Recorder(recording, scene_text=products.scene_text, solver=solver, compress=products.compress)
-    all_sinks: list[Sink] = [recorder, *sinks]
-    if not products.quiet:
-        from supple.output.progress import ProgressBar
 
-        all_sinks.append(ProgressBar())
+def resume_session(scene: Scene | None, solver: Solver | None, steps: int | None, *, products: Products) -> Outcome:
+    """Go on with the run in a folder, and print a summary; see `resume`.
+
+    Raises
+    ------
+    SuppleError : where the run cannot be resumed, or the folder cannot be used.
+    """
+    products.refuse_folders()
+    return _driven(resume(products.folder, scene, solver, steps=steps, sinks=products.progress()), products)
+
+
+def _driven(frames: Generator[Frame], products: Products) -> Outcome:
+    """Run the simulation until its end, or until Ctrl-C."""
     outcome = Outcome()
-    frames = simulate(scene, solver, dt, steps, sinks=all_sinks, **(start or {}))
-    try:
-        for frame in frames:
-            outcome.frames, outcome.last = outcome.frames + 1, frame
-            outcome.worst_J = min(outcome.worst_J, frame.report.min_det_F)
-    except KeyboardInterrupt:
-        frames.close()
+    recording = RunPaths(products.folder).recording
+    with Interrupts() as interrupts:
+        try:
+            for frame in frames:
+                outcome.frames, outcome.last = outcome.frames + 1, frame
+                outcome.worst_J = min(outcome.worst_J, frame.report.min_det_F)
+                if interrupts.asked:
+                    frames.close()
+                    outcome.code = ExitCode.INTERRUPTED
+        except KeyboardInterrupt:
+            frames.close()
+            outcome.code = ExitCode.INTERRUPTED
+    if outcome.code is ExitCode.INTERRUPTED:
         _warn_of_older_files(replace(products, page=False, plot=False))
-        print_error(f"interrupted; {recording} holds the {outcome.frames} frames up to here")
-        outcome.code = ExitCode.INTERRUPTED
+        last = "" if outcome.last is None else f" to frame {outcome.last.index}"
+        print_error(f"interrupted; {recording} is complete{last}; continue with: supple resume {products.folder}")
         return outcome
     if outcome.last is not None and not outcome.last.report.status.can_go_on:
         report = outcome.last.report

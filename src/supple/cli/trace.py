@@ -23,16 +23,16 @@ class NewtonTrace:
 
     Raises
     ------
-    OutputError : at the end, where the file cannot be written; at once, where its folder cannot be made.
+    OutputError : at the end, where the file cannot be written; at the begin, where its folder cannot be made.
     """
 
     def __init__(self, path: Path) -> None:
-        parent_folder(path)
         self.path = path
         self.frames: list[tuple[float, Sequence[NewtonRow]]] = []
 
     def begin(self, first: Frame, dt: float, steps: int) -> None:
-        """Forget the frames of an earlier run."""
+        """Make the folder, and forget the frames of an earlier run."""
+        parent_folder(self.path)
         self.frames.clear()
 
     def write(self, frame: Frame) -> None:

@@ -33,12 +33,19 @@ from supple.implicit.stepping.substepping import Substepping
 from supple.implicit.stepping.workspace import Workspace
 from supple.implicit.timings import PARTS
 from supple.numerics.threads import threads_for
+from supple.scene.scene import Scene
 from supple.state import State, Status, StepReport
 from supple.system import Solver, System
 
 logger = logging.getLogger(__name__)
 
 _LINEAR_SOLVERS = ("auto", "pcg", "direct")
+
+
+# Measured on cubes: 2900 bytes per tet; for a factorization 870 bytes times the number of vertices to the power 4/3, as
+# the factor of a solid body grows. The margin is for contact.
+_BYTES_PER_TET = 5000
+_BYTES_OF_FACTOR = 1200
 
 
 @dataclass(frozen=True)
@@ -104,6 +111,13 @@ class Implicit(Solver):
             raise SolverError(
                 f"Implicit: there is no linear_solver {self.linear_solver!r}; there are 'auto', 'pcg' and 'direct'"
             )
+
+    def bytes_needed(self, scene: Scene) -> int:
+        """Estimate of the memory that a simulation takes beyond that of the program itself [bytes]."""
+        needed = _BYTES_PER_TET * sum(len(body.mesh.tets) for body in scene.bodies)
+        if self.linear_solver == "direct":
+            needed += int(_BYTES_OF_FACTOR * sum(len(body.mesh.vertices) ** (4.0 / 3.0) for body in scene.bodies))
+        return needed
 
     def prepare(self, system: System) -> Workspace:
         """Compute the patterns, groups and memory for a system.

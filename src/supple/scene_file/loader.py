@@ -20,7 +20,7 @@ from supple.scene.scene import Scene
 from supple.scene_file.document import OutputModel, SceneFileModel
 from supple.scene_file.entries.mesh_sources import MeshStore
 from supple.scene_file.validation_errors import scene_error
-from supple.scene_file.yaml_reader import Key, read_yaml
+from supple.scene_file.yaml_reader import Key, YamlDocument, read_yaml
 from supple.system import Solver
 
 logger = logging.getLogger(__name__)
@@ -37,6 +37,7 @@ class Run:
     initial_positions : by body name, (n, 3) [m], of bodies that start deformed
     output : what to write beside the recording
     text : of the file, stored in the recording
+    description : the content of the file, with all defaults; folder : that paths in it are relative to
     """
 
     scene: Scene
@@ -46,6 +47,8 @@ class Run:
     initial_positions: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     output: OutputModel = field(default_factory=OutputModel)
     text: str | None = None
+    description: SceneFileModel | None = None
+    folder: Path = Path()
 
     @property
     def start(self) -> dict[str, dict[str, NDArray[np.float64]]]:
@@ -80,14 +83,25 @@ def load_run(path: str | Path, meshes: Callable[[Path], MeshStore] = MeshStore) 
     SceneError : where the file cannot be read or is not a valid scene; one line that begins with `file:line:`.
     """
     document = read_yaml(path)
+    model = validated(document)
     try:
-        model = SceneFileModel.model_validate(document.data)
-    except ValidationError as error:
-        raise scene_error(document, error) from None
-    try:
-        return replace(_built(model, meshes(Path(path).parent)), text=document.text)
+        built = _built(model, meshes(Path(path).parent))
+        return replace(built, text=document.text, description=model, folder=Path(path).parent)
     except LocatedError as error:
         raise document.error(_keys_of_message(document.data, error.keys, str(error)), str(error)) from None
+
+
+def validated(document: YamlDocument) -> SceneFileModel:
+    """The contents of a scene file, of which no mesh was read or made yet.
+
+    Raises
+    ------
+    SceneError : where a value is missing, unknown or not allowed; one line that begins with `file:line:`.
+    """
+    try:
+        return SceneFileModel.model_validate(document.data)
+    except ValidationError as error:
+        raise scene_error(document, error) from None
 
 
 def _built(model: SceneFileModel, meshes: MeshStore) -> Run:

@@ -30,14 +30,14 @@ _NULL = re.compile(r"~|null|Null|NULL|")
 _PREFIX = "tag:yaml.org,2002:"
 
 
-class _Loader(yaml.SafeLoader):
+class SceneLoader(yaml.SafeLoader):
     """PyYAML's parser with the scalars of YAML 1.2."""
 
     yaml_implicit_resolvers: dict = {}  # noqa: RUF012 (a class attribute of PyYAML's)
 
 
 for _kind, _pattern in (("null", _NULL), ("bool", _BOOL), ("int", _INT), ("float", _FLOAT)):
-    _Loader.add_implicit_resolver(_PREFIX + _kind, re.compile(f"^(?:{_pattern.pattern})$"), None)
+    SceneLoader.add_implicit_resolver(_PREFIX + _kind, re.compile(f"^(?:{_pattern.pattern})$"), None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +96,7 @@ def read_yaml(path: str | Path) -> YamlDocument:
     text = _read_text(path)
     loader = None
     try:
-        loader = _Loader(text)
+        loader = SceneLoader(text)
         root = loader.get_single_node()
     except yaml.MarkedYAMLError as error:
         raise SceneError(f"{path}:{_line_of(error)}: {_explanation(error)}") from None

@@ -7,6 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from supple.cli.checkpoints import CheckpointEvery, Overwrite, interval
 from supple.cli.exit_codes import ExitCode
 from supple.cli.live import Host, Open, Port
 from supple.cli.numbers import Steps
@@ -23,6 +24,8 @@ def demo(
     trace: Path | None = None,
     page: bool = True,
     plot: bool = True,
+    checkpoint_every: CheckpointEvery = None,
+    overwrite: Overwrite = False,
     quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
     live: Annotated[bool, Parameter(name="--live", negative="")] = False,
     host: Host = "127.0.0.1",
@@ -38,7 +41,7 @@ def demo(
     list_
         List the demos.
     output
-        Folder for recording.vtkhdf, index.html and plot.png; without it, out/NAME.
+        Run folder, which may not contain an earlier run; without it, out/NAME.
     steps
         Number of frames, instead of the demo's own. Claims that need more frames do not hold then.
     solver
@@ -49,6 +52,10 @@ def demo(
         Write index.html, which plays the recording in a browser.
     plot
         Write plot.png: energies, momentum, volume ratio and smallest J over time.
+    checkpoint_every
+        Number of frames from checkpoint to checkpoint; 0: only at the start and the end. 100 without this.
+    overwrite
+        Replace an earlier run in the folder.
     quiet
         Print only the claims and what was measured.
     live
@@ -85,7 +92,17 @@ def demo(
 
     from supple.cli.session import Products, run_session
     from supple.cli.trace import traces
+    from supple.runs.run_folder import SceneSource
 
+    products = Products(
+        Path("out") / chosen.name if output is None else output,
+        page,
+        plot,
+        quiet,
+        checkpoint_every=interval(checkpoint_every),
+        overwrite=overwrite,
+    )
+    products.refuse_a_run()
     used = chosen.solver(solver)
     measurement = chosen.measurement()
     if not quiet:
@@ -95,7 +112,8 @@ def demo(
         used,
         chosen.dt,
         chosen.steps if steps is None else steps,
-        products=Products(Path("out") / chosen.name if output is None else output, page, plot, quiet),
+        products=products,
+        source=SceneSource({"kind": "demo", "name": name, "solver": solver, "page": page, "plot": plot}),
         sinks=[measurement, *traces(trace, used)],
     )
     claims = measurement.claims() if outcome.frames else []

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 SCENE_FILES = (".yaml", ".yml")
 RECORDINGS = (".vtkhdf", ".hdf", ".h5")
-PACKAGES = ("numpy", "scipy", "numba", "h5py", "tetgen", "viser", "pydantic")
+PACKAGES = ("numpy", "scipy", "numba", "h5py", "tetgen", "viser", "pydantic", "arro3-io")
 EXTRAS = ("pytetwild", "pymeshfix", "usd-core", "pyvista")
 
 
@@ -26,10 +26,15 @@ def info(file: Path | None = None, /) -> None:
     Parameters
     ----------
     file
-        A scene (.yaml), a surface, a tet mesh or a recording (.vtkhdf).
+        A scene (.yaml), a surface, a tet mesh, a recording (.vtkhdf) or a run folder.
     """
     if file is None:
         print_table(_platform(), "Supple")
+        return
+    if file.is_dir():
+        from supple.cli.run_rows import run_rows
+
+        print_table(run_rows(file), str(file))
         return
     suffix = file.suffix.lower()
     if suffix in SCENE_FILES:

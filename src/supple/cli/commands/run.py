@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
+from supple.cli.checkpoints import CheckpointEvery, Overwrite, interval
 from supple.cli.numbers import Seconds, Steps
 
 
@@ -22,18 +24,21 @@ def run(
     separate: Annotated[bool, Parameter(negative="")] = False,
     page: bool | None = None,
     plot: bool | None = None,
+    checkpoint_every: CheckpointEvery = None,
+    overwrite: Overwrite = False,
     quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
 ) -> int:
-    """Simulate a scene file and record it.
+    """Simulate a scene file into a run folder.
 
-    The recording is written while the scene runs, and is always readable up to the last complete frame.
+    The recording is written while the scene runs, and is always readable up to the last complete frame. After Ctrl-C or
+    a kill, `supple resume` goes on.
 
     Parameters
     ----------
     scene
         The scene file (.yaml); `supple schema` describes it.
     output
-        Folder for recording.vtkhdf, index.html and plot.png; it is created where it does not exist.
+        Run folder; it is created where it does not exist, and may not contain an earlier run.
     steps
         Number of frames, instead of the file's.
     dt
@@ -48,14 +53,22 @@ def run(
         Write index.html, which plays the recording in a browser; without this, as the scene file specifies.
     plot
         Write plot.png; without this, as the scene file specifies.
+    checkpoint_every
+        Number of frames from checkpoint to checkpoint; 0: only at the start and the end. 100 without this.
+    overwrite
+        Replace an earlier run in the folder.
     quiet
         Print neither progress nor summary.
     """
     from supple.cli.session import Products, run_session
     from supple.cli.trace import traces
+    from supple.runs.run_folder import SceneSource
     from supple.scene_file.entries.solvers import solver_of_kind
     from supple.scene_file.loader import load_run
+    from supple.scene_file.resolved import resolved_scene
 
+    products = Products(output, quiet=quiet, checkpoint_every=interval(checkpoint_every), overwrite=overwrite)
+    products.refuse_a_run()
     if trace is not None:
         from supple.files.replacing import refuse_to_replace
 
@@ -66,19 +79,17 @@ def run(
 
         described = moved_apart(described)
     used = described.solver if solver is None else solver_of_kind(solver)
+    dt, steps = described.dt if dt is None else dt, described.steps if steps is None else steps
+    page = described.output.page if page is None else page
+    plot = described.output.plot if plot is None else plot
+    origin = {"kind": "scene_file", "file": str(scene), "separate": separate, "page": page, "plot": plot}
     return run_session(
         described.scene,
         used,
-        described.dt if dt is None else dt,
-        described.steps if steps is None else steps,
+        dt,
+        steps,
         start=described.start,
         sinks=traces(trace, used),
-        products=Products(
-            folder=output,
-            page=described.output.page if page is None else page,
-            plot=described.output.plot if plot is None else plot,
-            quiet=quiet,
-            compress=described.output.compress,
-            scene_text=described.text,
-        ),
+        products=replace(products, page=page, plot=plot, compress=described.output.compress),
+        source=SceneSource(origin, described.text, resolved_scene(described, solver=solver, dt=dt, steps=steps)),
     ).code

@@ -105,7 +105,7 @@ class ContactSet:
         new_weights = np.concatenate([grown[new], edges_grown[new_edges]])
         counted = (out.weights != 0.0) & (out.distances < dhat)
         if not counted.all():
-            out = Contacts(*(array[counted] for array in out))
+            out = out.where(counted)
         return Found(out, float(np.sqrt(least)), new_codes, new_weights)
 
 

@@ -26,3 +26,8 @@ class Contacts(NamedTuple):
     vectors: NDArray[np.float64]
     distances: NDArray[np.float64]
     weights: NDArray[np.float64]
+
+    def where(self, chosen: NDArray[np.bool_]) -> Contacts:
+        """The chosen ones (k,)."""
+        kinds, points, coefficients = self.kinds[chosen], self.points[chosen], self.coefficients[chosen]
+        return Contacts(kinds, points, coefficients, self.vectors[chosen], self.distances[chosen], self.weights[chosen])

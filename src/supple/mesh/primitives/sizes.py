@@ -10,9 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import MeshError
+from supple.numerics.memory import require_memory
 
-# More tets or triangles than this would fill the memory; the sizes given are most likely a typing error.
+# With more tets or triangles than this, the sizes given are most likely a typing error.
 MAX_ELEMENTS = 50_000_000
+# To make a mesh, with its topology, at most; measured on a box and on a sphere.
+BYTES_PER_ELEMENT = 1000
 
 
 def positive(owner: str, **sizes: Any) -> None:
@@ -45,6 +48,7 @@ def not_too_many(owner: str, elements: float, remedy: str) -> None:
     """Raise for shapes that would not fit into memory."""
     if elements > MAX_ELEMENTS:
         raise MeshError(f"{owner}: this would be {elements:.3g} elements, more than {MAX_ELEMENTS}; {remedy}")
+    require_memory(BYTES_PER_ELEMENT * elements, f"{owner}: a mesh of {elements:.3g} elements", remedy, MeshError)
 
 
 def fits(owner: str, edge_length: float, name: str, length: float) -> None:

@@ -50,7 +50,7 @@ class JointPattern:
     @classmethod
     def of(cls, elements: BlockPattern, couplings: Couplings, row_of: NDArray[np.int32]) -> JointPattern:
         """Add blocks for couplings to the pattern of the elements."""
-        arrays = _join(
+        row_start, columns, diagonal, mirror, entry_start = _join(
             elements.row_start,
             elements.columns,
             elements.entry_start,
@@ -58,7 +58,8 @@ class JointPattern:
             couplings.columns,
             row_of,
         )
-        return cls(BlockPattern(*arrays, elements.entries), row_of)
+        pattern = BlockPattern(row_start, columns, diagonal, mirror, entry_start, elements.entries)
+        return cls(pattern, row_of)
 
     def places(self, couplings: Couplings) -> CouplingPlaces | None:
         """Where couplings add up; None where one has no block in this pattern."""

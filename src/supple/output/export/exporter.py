@@ -43,6 +43,8 @@ FORMATS = {
     "usd": Format("export.usd:write_usd", (".usdc", ".usda", ".usd")),  # with time samples (extra: usd)
     "gif": Format("export.video:write_video", (".gif",)),  # (extra: video)
     "mp4": Format("export.video:write_video", (".mp4",)),  # (extra: video)
+    "csv": Format("export.table:write_csv", (".csv",)),  # the reports of all frames
+    "parquet": Format("export.table:write_parquet", (".parquet",)),  # the same
     "html": Format("page:write_page", (".html", ".htm")),  # plays the recording in a browser
 }
 
@@ -53,7 +55,7 @@ def export(recording: Recording | str | Path, to: str, output: str | Path | None
     Parameters
     ----------
     recording : an open recording, or its path.
-    to : "glb", "obj", "pvd", "vtu", "vtkhdf", "usd", "gif", "mp4" or "html"; see `FORMATS`.
+    to : "glb", "obj", "pvd", "vtu", "vtkhdf", "usd", "gif", "mp4", "csv", "parquet" or "html"; see `FORMATS`.
     output : file, with a suffix of the format, or folder; beside the recording, under its name, where it is not given.
         What is there is replaced.
 

@@ -97,6 +97,12 @@ class RecordingFile:
             raise ValueError(f"{path}: a frame has {series.frame_bytes} bytes, not {data.nbytes}")
         self._write(place + self.written * series.frame_bytes, data.tobytes())
 
+    def get(self, path: str, number: int) -> bytes:
+        """The bytes of one frame's rows of a series."""
+        series, place = self._series[path]
+        self._file.seek(place + number * series.frame_bytes)
+        return self._file.read(series.frame_bytes)
+
     def commit(self) -> None:
         """Add the frame that was put to the count of frames."""
         self.written += 1
@@ -108,6 +114,18 @@ class RecordingFile:
         # NSteps before the lengths: VTK can read series that are shorter than the number of steps, but not longer ones.
         for place in (self._counter, self._steps, *self._lengths):
             self._write(place, number)
+
+    @property
+    def is_in_place(self) -> bool:
+        """Whether `path` still leads to this file: writing to one that was deleted is no error of the system."""
+        try:
+            return os.path.samestat(os.fstat(self._file.fileno()), self.path.stat())
+        except OSError:
+            return False
+
+    def sync(self) -> None:
+        """Bring everything that was written to the disk."""
+        os.fsync(self._file.fileno())
 
     def close(self) -> None:
         """Close the file."""

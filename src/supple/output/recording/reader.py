@@ -82,7 +82,6 @@ class RecordedFrame:
         """
         values = {name: float(self.recording.series(name)[self.number]) for name in REPORT_NUMBERS}
         vectors = {name: self.recording.series(name)[self.number] for name in REPORT_VECTORS}
-        message = self._rows(_MESSAGE).tobytes() if _MESSAGE in self.recording._file else b""
         distance, stretch = values.pop("min_distance"), values.pop("largest_stitch_stretch")
         return Report(
             **values,
@@ -91,7 +90,7 @@ class RecordedFrame:
             iterations=int(self.recording._values("supple/frames/iterations")[self.number]),
             min_distance=None if np.isnan(distance) else distance,
             largest_stitch_stretch=None if np.isnan(stretch) else stretch,
-            message=message.rstrip(b"\0").decode(errors="replace"),
+            message=self.recording._messages(self.number, self.number + 1)[0],
             details=self.recording.details.of_frame(self.number, self.recording._values),
         )
 
@@ -214,6 +213,15 @@ class Recording(Sequence[RecordedFrame]):
             return np.full(self._count, _OF_EARLIER[name])
         return self._values(path)
 
+    @property
+    def messages(self) -> list[str]:
+        """The messages of all frames' reports."""
+        return self._messages(0, self._count)
+
+    def frame_values(self, name: str) -> NDArray[Any]:
+        """All frames' values of a series of the group `supple/frames`, such as "index" or "details/contacts"."""
+        return self._values(f"supple/frames/{name}")
+
     def close(self) -> None:
         """Close the file; frames that were not read before can then not be read."""
         self._file.close()
@@ -229,6 +237,12 @@ class Recording(Sequence[RecordedFrame]):
         if path not in self._read_series:
             self._read_series[path] = self._file.rows(self._series[path], 0, self._count, path)
         return self._read_series[path]
+
+    def _messages(self, begin: int, end: int) -> list[str]:
+        if _MESSAGE not in self._file:
+            return [""] * (end - begin)
+        rows = self._file.rows(self._series[_MESSAGE], begin, end, "messages")
+        return [row.tobytes().rstrip(b"\0").decode(errors="replace") for row in rows.reshape(end - begin, -1)]
 
     def _frame_rows(self, path: str, number: int) -> NDArray[Any]:
         block = self._file.rows(self._series[path], number, number + 1, f"frame {number}")

@@ -77,7 +77,7 @@ class Recorder:
     Raises
     ------
     OutputError : from the constructor for an unusable path; from `begin` and `write` where the system reports an error
-        (no permission, no room). All complete frames stay readable.
+        (no permission, no room), or the file was removed. All complete frames stay readable.
     """
 
     def __init__(
@@ -105,7 +105,7 @@ class Recorder:
         facts["details"] = self._details.header()
         layout = frame_layout(len(system.rest_positions), len(system.tets), len(system.obstacles), self._details)
         self._wanted = steps + 1
-        capacity = min(self._wanted, _FIRST_FRAMES, max(2, _FIRST_ROOM // layout.frame_bytes))
+        capacity = self.first_capacity(layout)
         parent_folder(self.path)
         fresh = temporary_name(self.path)
         try:
@@ -130,6 +130,23 @@ class Recorder:
             self._put(frame)
         except OSError as error:
             raise output_error(self.path, error) from None
+        if not self._file.is_in_place:
+            self._file.close()
+            self._file = None
+            raise OutputError(f"{self.path}: was removed or replaced while it was written; run again, to another place")
+
+    def sync(self) -> None:
+        """Bring all frames to the disk, so that a power failure cannot lose them.
+
+        Raises
+        ------
+        OutputError : where the system refuses.
+        """
+        if self._file is not None:
+            try:
+                self._file.sync()
+            except OSError as error:
+                raise output_error(self.path, error) from None
 
     def end(self) -> None:
         """Release room that was not used, and close the file."""
@@ -148,6 +165,10 @@ class Recorder:
             logger.warning("%s: is larger than necessary: %s", self.path, " ".join(str(error).split()))
         finally:
             fresh.unlink(missing_ok=True)
+
+    def first_capacity(self, layout: Layout, written: int = 0) -> int:
+        """For how many frames there is room at first, where `written` are there before."""
+        return min(self._wanted, written + min(_FIRST_FRAMES, max(2, _FIRST_ROOM // layout.frame_bytes)))
 
     def _make_room(self, file: RecordingFile) -> RecordingFile:
         """Copy the frames to a file with more room, which replaces this one."""

@@ -93,8 +93,8 @@ SolverModel = Annotated[XPBDModel | ImplicitModel, Field(discriminator="kind")]
 _KINDS: dict[str, type[XPBDModel] | type[ImplicitModel]] = {"xpbd": XPBDModel, "implicit": ImplicitModel}
 
 
-def solver_of_kind(kind: str) -> Solver:
-    """The solver of that kind, with its default parameters.
+def model_of_kind(kind: str) -> XPBDModel | ImplicitModel:
+    """The solver of that kind, with its default parameters, as a scene file describes it.
 
     Raises
     ------
@@ -102,4 +102,14 @@ def solver_of_kind(kind: str) -> Solver:
     """
     if kind not in _KINDS:
         raise SolverError(f"there is no solver {kind!r}; {suggestion(kind, _KINDS)}")
-    return _KINDS[kind](kind=kind).build()  # pyright: ignore[reportArgumentType]
+    return _KINDS[kind](kind=kind)  # pyright: ignore[reportArgumentType]
+
+
+def solver_of_kind(kind: str) -> Solver:
+    """The solver of that kind, with its default parameters.
+
+    Raises
+    ------
+    SolverError : where there is no such kind.
+    """
+    return model_of_kind(kind).build()

@@ -1,0 +1,67 @@
+"""A number for the content of a scene: two scenes with the same one are simulated alike."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from supple.errors import SuppleError
+from supple.system import System
+
+# Functions of time cannot be read; their values at so many times of a run are taken instead.
+_TIMES = 16
+
+
+def scene_hash(system: System, begin: float, duration: float) -> str:
+    """SHA-256 of everything in a scene, in hexadecimal digits.
+
+    Parameters
+    ----------
+    system : of the scene; begin, duration : time at the start of the run, and its length [s]
+    """
+    digest = hashlib.sha256()
+    _add(digest, system.scene)
+    for time in begin + duration * np.arange(_TIMES) / (_TIMES - 1):
+        for pin in system.pins:
+            _add(digest, pin.targets(time) if callable(pin.motion) else None)
+        for force in system.forces:
+            _add(digest, force.per_vertex(time) if callable(force.force.force) else None)
+        for target in system.soft_targets:
+            _add(digest, target.targets(time) if callable(target.target.motion) else None)
+        for obstacle in system.obstacles:
+            _add(digest, obstacle.pose(time) if callable(obstacle.motion) else None)
+    return digest.hexdigest()
+
+
+def _add(digest: Any, value: Any) -> None:
+    """Add a value with its kind and its length, so that different values never give the same bytes."""
+    if is_dataclass(value) and not isinstance(value, type):
+        _add_text(digest, type(value).__name__)
+        for field in fields(value):
+            _add_text(digest, field.name)
+            _add(digest, getattr(value, field.name))
+        _add_text(digest, "end")
+    elif isinstance(value, np.ndarray):
+        _add_text(digest, f"{value.dtype.str}{value.shape}")
+        digest.update(np.ascontiguousarray(value).tobytes())
+    elif isinstance(value, Mapping):
+        _add(digest, list(value.items()))
+    elif isinstance(value, (list, tuple)):
+        _add_text(digest, f"{len(value)} of")
+        for item in value:
+            _add(digest, item)
+    elif callable(value):
+        _add_text(digest, "function")
+    elif value is None or isinstance(value, (bool, int, float, str, np.generic)):
+        _add_text(digest, repr(value))
+    else:
+        raise SuppleError(f"a {type(value).__name__} in the scene has no known content; make it a dataclass")
+
+
+def _add_text(digest: Any, text: str) -> None:
+    data = text.encode()
+    digest.update(len(data).to_bytes(8, "little") + data)

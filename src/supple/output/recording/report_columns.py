@@ -1,0 +1,46 @@
+"""The reports of all frames of a recording as columns of one table."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.output.recording.reader import Recording
+from supple.output.recording.recorder import REPORT_NUMBERS, REPORT_VECTORS
+
+_AXES = "xyz"
+
+
+def report_columns(recording: Recording) -> dict[str, NDArray[Any]]:
+    """By name, one value for each frame: what `Report` has, then the solver's details, in SI units.
+
+    A vector is three columns, `linear_momentum.x` and so on; a mapping of the details one, or three, for each of its
+    names, such as `contact_forces.ball.x`. NaN stands for None.
+    """
+    columns: dict[str, NDArray[Any]] = {
+        "frame": recording.frame_values("index"),
+        "time": recording.times,
+        "status": np.array([str(status) for status in recording.statuses]),
+        "iterations": recording.frame_values("iterations"),
+        **{name: recording.series(name) for name in REPORT_NUMBERS},
+    }
+    for name in REPORT_VECTORS:
+        _add_vectors(columns, name, recording.series(name))
+    for field in recording.details.fields:
+        values = recording.frame_values(f"details/{field.name}")
+        for k, key in enumerate(field.keys or ()):
+            if field.row_shape:
+                _add_vectors(columns, f"{field.name}.{key}", values[:, k])
+            else:
+                columns[f"{field.name}.{key}"] = values[:, k]
+        if field.keys is None:
+            columns[field.name] = values
+    columns["message"] = np.array(recording.messages)
+    return columns
+
+
+def _add_vectors(columns: dict[str, NDArray[Any]], name: str, values: NDArray[Any]) -> None:
+    for axis, column in zip(_AXES, values.T, strict=True):
+        columns[f"{name}.{axis}"] = column

@@ -1,0 +1,216 @@
+"""Every reader of files, on damaged files: it returns what it reads, or raises one clear line; never anything else.
+
+`make fuzz` runs many more examples; so does the environment variable SUPPLE_FUZZ_EXAMPLES.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import struct
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+
+import supple as sp
+from supple.mesh import shapes
+from supple.mesh.io.mesh_files import SURFACE_WRITERS
+from supple.scene_file.loader import load_run
+from supple.studies.cases import read_result
+
+EXAMPLES = int(os.environ.get("SUPPLE_FUZZ_EXAMPLES", "40"))
+# Of `make fuzz`: an example of a time out of all proportion is an error there. The suite asserts no time.
+SECONDS = 10 if "SUPPLE_FUZZ_EXAMPLES" in os.environ else None
+LARGEST_GROWTH = 1_000_000_000  # of the memory of this process, over all examples of a reader [bytes]
+
+SCENE = """\
+bodies:
+  - name: cube
+    mesh: {file: cube.vtu}
+    material: {kind: stable_neo_hookean, youngs: 1e5, poisson: 0.4}
+    copies: {grid: [2, 1, 1], spacing: [2, 2, 2]}
+  - {name: box, shape: {kind: box, divisions: [1, 2, 1]}, material: {kind: arap, youngs: 1e4, poisson: 0.1}}
+obstacles: [{kind: sphere, radius: 0.5, motion: {times: [0, 1], angles: [0, 1]}}]
+pins: [{body: box, vertices: [0, 1]}]
+solver: {kind: implicit, integrator: bdf2, contact: {dhat: 1e-3}}
+gravity: [0, -9.81, 0]
+dt: 1/60
+"""
+STUDY = """\
+scene: scene.yaml
+factors: {dt: [0.1, 0.2], bodies.box.material.youngs: {loguniform: [1e3, 1e5], count: 2}}
+design: {kind: latin_hypercube, samples: 4, seed: 1}
+measures: {tip: {quantity: position, body: box, axis: y, over: max, vertices: [0]}}
+"""
+RESULT = '{"status": "done", "measures": {"y": 1.5}, "frames": 3, "simulated": true}'
+CUBE = shapes.box_surface((1, 1, 1), (1, 1, 1))
+BODY = shapes.box((1.0, 0.1, 1 / 3), (3, 1, 2))
+
+
+@dataclass(frozen=True)
+class Reader:
+    """A reader, and how a good file for it is made in a folder; `damaged` is the file that is damaged."""
+
+    make: Callable[[Path], object]
+    damaged: str
+    read: Callable[[Path], object]
+
+
+def text_file(name: str, text: str) -> Callable[[Path], object]:
+    return lambda folder: (folder / name).write_text(text, encoding="utf-8")
+
+
+def record(folder: Path) -> None:
+    body = sp.Body("box", BODY, sp.EdgesAndVolume())
+    sinks = [sp.Recorder(folder / "r.vtkhdf")]
+    for _ in sp.simulate(sp.Scene([body]), sp.XPBD(substeps=1, contact=None), 0.01, 3, sinks=sinks):
+        pass
+
+
+def read_whole_recording(path: Path) -> None:
+    with sp.read_recording(path) as recording:
+        for frame in recording:
+            _ = frame.report, frame.positions, frame.velocities, frame.det_F, frame.poses, frame.index
+
+
+def make_scene(folder: Path) -> None:
+    BODY.save(folder / "cube.vtu")
+    (folder / "scene.yaml").write_text(SCENE, encoding="utf-8")
+
+
+def make_study(folder: Path) -> None:
+    make_scene(folder)
+    (folder / "study.yaml").write_text(STUDY, encoding="utf-8")
+
+
+READERS = {
+    **{
+        f"surface {kind}": Reader(
+            lambda folder, kind=kind: CUBE.save(folder / f"s{kind}"), f"s{kind}", sp.SurfaceMesh.load
+        )
+        for kind in SURFACE_WRITERS
+    },
+    **{
+        f"tets {kind}": Reader(lambda folder, kind=kind: BODY.save(folder / f"t{kind}"), f"t{kind}", sp.TetMesh.load)
+        for kind in (".msh", ".vtu", ".vtk")
+    },
+    **{
+        f"TetGen's {kind}": Reader(
+            lambda folder: sp.write_tetgen(BODY, folder / "t.1.node"),
+            f"t.1{kind}",
+            lambda path: sp.TetMesh.load(path.with_suffix(".node")),
+        )
+        for kind in (".node", ".ele", ".edge", ".face")
+    },
+    "scene": Reader(make_scene, "scene.yaml", load_run),
+    "study": Reader(make_study, "study.yaml", sp.load_study),
+    "result of a case": Reader(text_file("result.json", RESULT), "result.json", lambda path: read_result(path.parent)),
+    "recording": Reader(record, "r.vtkhdf", read_whole_recording),
+}
+
+NUMBERS = [b"-1", b"0", b"1e999", b"nan", b"4000000000", b"99999999999999999999", b"1e-320", b"0x10", b".5.", b"1/0"]
+TEXTS = [
+    b"\n",
+    b"\r",
+    b"\t",
+    b" ",
+    b"\0",
+    b"\xff",
+    b"<",
+    b">",
+    b"[",
+    b"]",
+    b"{",
+    b"}",
+    b":",
+    b"- ",
+    b"&a ",
+    b"*a",
+    b'"',
+]
+BINARY = [struct.pack(form, number) for form in ("<I", ">I", "<q") for number in (0, 1, 2**31 - 1)] + [b"\xff" * 8]
+PIECES = st.one_of(st.sampled_from(NUMBERS + TEXTS + BINARY), st.binary(max_size=12))
+
+
+@st.composite
+def damages(draw, size: int):
+    """A function of the file's bytes: pieces are inserted, replaced, repeated or exchanged, or the end is cut off."""
+    place = st.integers(0, size)
+    changes = [
+        (
+            draw(st.sampled_from(["replace", "insert", "repeat", "cut", "exchange"])),
+            draw(place),
+            draw(place),
+            draw(PIECES),
+        )
+        for _ in range(draw(st.integers(1, 4)))
+    ]
+
+    def damaged(data: bytes) -> bytes:
+        for kind, first, second, piece in changes:
+            low, high = sorted((first, second))
+            if kind == "replace":
+                data = data[:first] + piece + data[first + len(piece) :]
+            elif kind == "insert":
+                data = data[:first] + piece + data[first:]
+            elif kind == "repeat":
+                data = data[:high] + data[low:high] + data[high:]
+            elif kind == "exchange":
+                data = (
+                    data[:low]
+                    + data[high : high + 16]
+                    + data[low + 16 : high]
+                    + data[low : low + 16]
+                    + data[high + 16 :]
+                )
+            elif second % 4 == 0:  # not too often, because little of the file is left
+                data = data[:first]
+        return data
+
+    return damaged
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_damaged_files_are_read_or_refused_in_one_line(name, tmp_path, capfd, caplog):
+    reader = READERS[name]
+    caplog.set_level(logging.CRITICAL)
+    reader.make(tmp_path)
+    path = tmp_path / reader.damaged
+    original = path.read_bytes()
+    reader.read(path)  # the good file
+    before = peak_memory()
+
+    @settings(
+        max_examples=EXAMPLES,
+        deadline=None if SECONDS is None else 1000 * SECONDS,
+        suppress_health_check=list(HealthCheck),
+        phases=[Phase.explicit, Phase.reuse, Phase.generate, Phase.shrink],
+    )
+    @given(damages(len(original)))
+    def read_damaged(damage):
+        path.write_bytes(damage(original))
+        try:
+            reader.read(path)
+        except sp.SuppleError as error:
+            text = str(error)
+            assert "\n" not in text
+            assert len(text) < 600
+            assert str(tmp_path) in text
+
+    read_damaged()
+    assert peak_memory() - before < LARGEST_GROWTH
+    assert capfd.readouterr().out == ""
+
+
+def peak_memory() -> int:
+    """Of this process so far [bytes]; 0 on systems that do not tell."""
+    try:
+        import resource
+    except ImportError:
+        return 0
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
