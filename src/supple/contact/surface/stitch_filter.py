@@ -87,7 +87,7 @@ def _crossings(
     each = np.repeat(np.arange(f), 3)
     corners, edges = incidence(each, sides[0].ravel(), (f, s)), incidence(each, sides[1].ravel(), (f, e))
     near = incidence(near_triangles[:, 1], near_triangles[:, 0], (f, s)) @ corners.T
-    return csr_array(near + edges @ incidence(*near_edges.T, (e, e)) @ edges.T)
+    return csr_array(near + edges @ incidence(near_edges[:, 0], near_edges[:, 1], (e, e)) @ edges.T)
 
 
 def _touching(

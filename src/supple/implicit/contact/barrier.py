@@ -30,8 +30,6 @@ class Barrier(ContactPotential):
         return barrier_energy(self.collisions.at(x), self.collisions.dhat, self.stiffness)
 
     def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-        # Gradients are computed where the search for the minimum goes on.
-        self.collisions.keep_weights(x)
         contacts = self.collisions.at(x)
         if len(contacts.kinds):
             forces = np.zeros_like(self.collisions.points(x))
@@ -43,3 +41,10 @@ class Barrier(ContactPotential):
         if len(contacts.kinds):
             between = barrier_hessian(points, contacts, self.collisions.dhat, self.stiffness, project)
             out.couplings.append(vertex_couplings(self.collisions.mesh.points, between))
+
+    def add_model(
+        self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
+    ) -> float:
+        # All at once is asked for where the search for the minimum goes on.
+        self.collisions.keep_weights(x)
+        return super().add_model(x, gradient, hessian, project)

@@ -6,25 +6,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.potentials.barrier_energy import barrier_forces
+from supple.contact.potentials.contacts import Contacts
 from supple.contact.potentials.friction_lag import sides
 from supple.implicit.contact.model import Barriers, ContactModel
 from supple.state import ContactPoints
 
 
-def contact_points(model: ContactModel, barriers: Barriers, x: NDArray[np.float64], weight: float) -> ContactPoints:
+def contact_points(
+    model: ContactModel, barriers: Barriers, x: NDArray[np.float64], between: Contacts, weight: float
+) -> ContactPoints:
     """All contacts at x (n, 3), obstacles' vertices included.
 
     Parameters
     ----------
+    between : of triangles
     weight : of the contact energies in the objective; forces are divided by it
     """
-    mesh, collisions, planes = model.mesh, model.collisions, model.planes
-    between = collisions.at(x)
+    mesh, planes = model.mesh, model.planes
     # Coefficients are positive on the first side. Points that a kind does not have have the coefficient 0.
     on_first = np.maximum(between.coefficients, 0.0)
-    middles = np.einsum("ki,kij->kj", on_first, collisions.points(x)[between.points]) - 0.5 * between.vectors
+    middles = np.einsum("ki,kij->kj", on_first, mesh.points.positions(x)[between.points]) - 0.5 * between.vectors
     normals = between.vectors / between.distances[:, None]
-    sizes = barrier_forces(between, collisions.dhat, barriers.triangles.stiffness)
+    sizes = barrier_forces(between, model.scales.dhat, barriers.triangles.stiffness)
     first, second = (mesh.owner[side] for side in sides(between))
     rows, heights, up, _ = planes.near(x)
     lowered = planes.positions(x)[planes.pairs[rows, 0]] - 0.5 * heights[:, None] * up

@@ -135,4 +135,5 @@ class ContactStep:
         )
         nearest = model.smallest_distance(x)
         nearest = nearest if np.isfinite(nearest) else None
-        return details, nearest, lambda: contact_points(model, barriers, x, self.weight)
+        between = model.collisions.at(x)
+        return details, nearest, lambda: contact_points(model, barriers, x, between, self.weight)
