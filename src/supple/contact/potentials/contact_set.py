@@ -8,7 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.potentials.contacts import Contacts
-from supple.contact.potentials.edge_contacts import edge_weights, write_edge_contacts
+from supple.contact.potentials.edge_contacts import (
+    edge_ends,
+    edge_weights,
+    saddle_weights,
+    write_edge_contacts,
+)
 from supple.contact.potentials.known_weights import KnownWeights
 from supple.contact.potentials.vertex_contacts import (
     alternating_sums,
@@ -80,7 +85,9 @@ class ContactSet:
             )
             starts = np.column_stack([start, np.append(0, np.cumsum(counts))])
             count = int(starts[-1, 1])
-            out = _empty(count + 2 * int(np.count_nonzero(areas)))
+            crossing, ends = edge_ends(x, edge_edge, areas, edges)
+            saddles = saddle_weights(edge_edge, areas, crossing, ends, edges, len(x))
+            out = _empty(count + 2 * len(crossing))
             keys, grown = np.empty(count, dtype=np.int64), np.empty(count)
             write_vertex_contacts(
                 x,
@@ -92,13 +99,14 @@ class ContactSet:
                 self._of_vertices,
                 mesh.owner,
                 mesh.areas,
+                saddles,
                 dhat,
                 *known,
                 out,
                 keys,
                 grown,
             )
-        write_edge_contacts(x, edge_edge, areas, edges, count, out)
+        write_edge_contacts(x, edge_edge, areas, crossing, ends, edges, count, out)
         least = min(squares.min(initial=np.inf), edge_squares.min(initial=np.inf))
         new, new_edges = grown >= 0.0, edges_grown >= 0.0
         new_codes = np.concatenate([keys[new], edge_keys[new_edges]])

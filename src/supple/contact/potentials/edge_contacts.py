@@ -115,47 +115,90 @@ def _inward(x, triangles, t, a, b):
 
 
 @njit(cache=True, error_model="numpy")
-def write_edge_contacts(x, pairs, weights, edges, first, out):
-    """Write two contacts for each pair with a weight into the rows of `out`, a `Contacts`, from row `first` on."""
+def edge_ends(x, pairs, weights, edges):
+    """Of the m pairs with a weight, the nearest end of one edge to the other.
+
+    Returns
+    -------
+    rows : (m,) rows of `pairs`; ends : (m,) 0, 1 for the first edge's ends, 2, 3 for the second's
+    """
+    rows = np.flatnonzero(weights)
+    ends = np.empty(len(rows), dtype=np.int8)
+    for m in range(len(rows)):
+        ids = _ids(edges, pairs[rows[m], 0], pairs[rows[m], 1])
+        least = np.inf
+        for end in range(4):
+            one, other = (ids[2], ids[3]) if end < 2 else (ids[0], ids[1])
+            _, r = nearest_of_edge(row(x, ids[end]), row(x, one), row(x, other))
+            if dot(r, r) < least:
+                least, ends[m] = dot(r, r), end
+    return rows, ends
+
+
+@njit(cache=True, error_model="numpy")
+def saddle_weights(pairs, weights, rows, ends, edges, s):
+    """Weights [m^2] that vertices (s,) need because they are ends of several edges that cross the same edge.
+
+    Every pair of edges takes the energy of its nearest end away. Where two edges of a ridge that bends away cross an
+    edge beside their common vertex, that vertex's energy must be counted once more, or nothing is left of the three.
+    """
+    out = np.zeros(s)
+    codes = np.empty(len(rows), dtype=np.int64)
+    for m in range(len(rows)):
+        e, f = pairs[rows[m], 0], pairs[rows[m], 1]
+        vertex, other = (edges[e, ends[m]], f) if ends[m] < 2 else (edges[f, ends[m] - 2], e)
+        codes[m] = np.int64(vertex) * len(edges) + other
+    order = np.argsort(codes, kind="mergesort")
+    begin = 0
+    while begin < len(order):
+        end, total, most = begin, 0.0, 0.0
+        while end < len(order) and codes[order[end]] == codes[order[begin]]:
+            weight = weights[rows[order[end]]]
+            total, most = total + weight, max(most, weight)
+            end += 1
+        vertex = codes[order[begin]] // len(edges)
+        out[vertex] = max(out[vertex], total - most)
+        begin = end
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def write_edge_contacts(x, pairs, weights, rows, ends, edges, first, out):
+    """Write two contacts for each of the pairs of `edge_ends` into the rows of `out`, a `Contacts`, from `first` on."""
     kinds, points, coefficients, vectors, distances, areas = out
-    n = first
-    for k in range(len(pairs)):
-        if weights[k] == 0.0:
-            continue
-        e, f = pairs[k, 0], pairs[k, 1]
-        ids = (edges[e, 0], edges[e, 1], edges[f, 0], edges[f, 1])
-        a, b, c, d = row(x, ids[0]), row(x, ids[1]), row(x, ids[2]), row(x, ids[3])
-        s, t, r, _ = crossing_point(a, b, c, d)
+    for m in range(len(rows)):
+        k, n = rows[m], first + 2 * m
+        ids = _ids(edges, pairs[k, 0], pairs[k, 1])
+        s, t, r, _ = crossing_point(row(x, ids[0]), row(x, ids[1]), row(x, ids[2]), row(x, ids[3]))
         kinds[n] = EDGE_EDGE
         points[n, 0], points[n, 1], points[n, 2], points[n, 3] = ids
         coefficients[n, 0], coefficients[n, 1], coefficients[n, 2], coefficients[n, 3] = 1.0 - s, s, t - 1.0, -t
         vectors[n, 0], vectors[n, 1], vectors[n, 2] = r
         distances[n] = math.sqrt(dot(r, r))
         areas[n] = weights[k]
-        _write_end(x, ids, n + 1, kinds, points, coefficients, vectors, distances)
+        _write_end(x, ids, ends[m], n + 1, kinds, points, coefficients, vectors, distances)
         areas[n + 1] = -weights[k]
-        n += 2
 
 
 @njit(error_model="numpy")
-def _write_end(x, ids, n, kinds, points, coefficients, vectors, distances):
-    """Row n: the end of two edges that is nearest to the other edge, with that edge or an end of it."""
-    least = np.inf
-    for end in range(4):
-        one, other = (ids[2], ids[3]) if end < 2 else (ids[0], ids[1])
-        w, r = nearest_of_edge(row(x, ids[end]), row(x, one), row(x, other))
-        square = dot(r, r)
-        if square < least:
-            least = square
-            points[n, 0], points[n, 3] = ids[end], -1
-            coefficients[n, 0], coefficients[n, 3] = 1.0, 0.0
-            if 0.0 < w < 1.0:
-                kinds[n] = VERTEX_EDGE
-                points[n, 1], points[n, 2] = one, other
-                coefficients[n, 1], coefficients[n, 2] = w - 1.0, -w
-            else:
-                kinds[n] = VERTEX_VERTEX
-                points[n, 1], points[n, 2] = (one if w == 0.0 else other), -1
-                coefficients[n, 1], coefficients[n, 2] = -1.0, 0.0
-            vectors[n, 0], vectors[n, 1], vectors[n, 2] = r
-    distances[n] = math.sqrt(least)
+def _ids(edges, e, f):
+    return edges[e, 0], edges[e, 1], edges[f, 0], edges[f, 1]
+
+
+@njit(error_model="numpy")
+def _write_end(x, ids, end, n, kinds, points, coefficients, vectors, distances):
+    """Row n: an end of two edges with the other edge, or with an end of that."""
+    one, other = (ids[2], ids[3]) if end < 2 else (ids[0], ids[1])
+    w, r = nearest_of_edge(row(x, ids[end]), row(x, one), row(x, other))
+    points[n, 0], points[n, 3] = ids[end], -1
+    coefficients[n, 0], coefficients[n, 3] = 1.0, 0.0
+    if 0.0 < w < 1.0:
+        kinds[n] = VERTEX_EDGE
+        points[n, 1], points[n, 2] = one, other
+        coefficients[n, 1], coefficients[n, 2] = w - 1.0, -w
+    else:
+        kinds[n] = VERTEX_VERTEX
+        points[n, 1], points[n, 2] = (one if w == 0.0 else other), -1
+        coefficients[n, 1], coefficients[n, 2] = -1.0, 0.0
+    vectors[n, 0], vectors[n, 1], vectors[n, 2] = r
+    distances[n] = math.sqrt(dot(r, r))

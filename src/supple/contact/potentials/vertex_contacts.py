@@ -209,7 +209,7 @@ def nearest_of_edge(p, a, b):
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def write_vertex_contacts(
-    x, pairs, rows, starts, codes, signs, mesh, owner, areas, dhat, known_codes, known_values, out, keys, grown
+    x, pairs, rows, starts, codes, signs, mesh, owner, areas, saddles, dhat, known_codes, known_values, out, keys, grown
 ):
     """Write the contacts of `alternating_sums` into the first rows of `out`, a `Contacts`.
 
@@ -217,6 +217,7 @@ def write_vertex_contacts(
     ----------
     starts : (groups + 1, 2) where each group begins in `rows` and in `out`
     mesh : triangles, edges, start and items of neighbors (see `ContactMesh`)
+    saddles : (s,) least weights of vertices that `saddle_weights` asks for [m^2]
     keys : (m,) a code of each contact's vertex and the owner of the other side, for `KnownWeights`
     grown : (m,) weights of the vertices that are to be known [m^2], -1 where they do not change
     """
@@ -242,7 +243,7 @@ def write_vertex_contacts(
                 if kinds[k] != VERTEX_TRIANGLE:
                     weights[k] *= _own_side(x, near_start, near_items, v, r, distances[k], height)
         for k in range(starts[g, 1], starts[g + 1, 1]):
-            best = 0.0
+            best = saddles[v]
             for other in range(starts[g, 1], starts[g + 1, 1]):
                 if keys[other] == keys[k]:
                     best = max(best, weights[other])
