@@ -129,6 +129,8 @@ def test_the_barrier_has_slope_two(kind, seed, size):
     model, x = near_pair(kind, seed, size)
     barrier = model.barriers(1e4).triangles
     assert barrier.value(x) > 0.0
+    # Contacts keep their weights while a minimum is searched; that of nearly parallel edges depends on their angle.
+    model.collisions.keep_weights(x)
     d = np.random.default_rng(seed + 100).normal(size=x.shape)
     check_derivatives(barrier, x, d, 0.02 * GAP * size)
 
