@@ -16,6 +16,7 @@ from supple.contact.potentials.edge_contacts import (
 )
 from supple.contact.potentials.known_weights import KnownWeights
 from supple.contact.potentials.vertex_contacts import (
+    REACH,
     alternating_sums,
     grouped_by_vertex,
     near_features,
@@ -34,7 +35,7 @@ class Found(NamedTuple):
     Attributes
     ----------
     contacts : those with a weight
-    least : the smallest distance of the pairs, infinite where none is below dhat [m]
+    least : the smallest distance of the pairs, infinite where none is below `REACH` dhat [m]
     codes, weights : what is to be known where the search goes on, for `KnownWeights`
     """
 
@@ -55,7 +56,8 @@ class ContactSet:
     def __init__(self, mesh: ContactMesh, dhat: float) -> None:
         self.dhat = dhat
         self._mesh = mesh
-        self._of_vertices = (mesh.triangles, mesh.edges, *mesh.neighbors)
+        self._of_vertices = (mesh.triangles, mesh.edges, *mesh.neighbors, *mesh.vertex_triangles)
+        self._of_sums = (mesh.triangles, mesh.edges, mesh.triangle_edges, *mesh.vertex_triangles)
         self._of_edges = (mesh.triangles, mesh.edges, *mesh.edge_triangles)
 
     def of(
@@ -69,20 +71,18 @@ class ContactSet:
 
         Parameters
         ----------
-        vertex_triangle, edge_edge : (k, 2), (l, 2) all pairs that may be nearer than dhat
+        vertex_triangle, edge_edge : (k, 2), (l, 2) all pairs that may be nearer than `REACH` dhat
         known : the weights that do not depend on x
         """
-        mesh, dhat = self._mesh, self.dhat
+        mesh, dhat, reach = self._mesh, self.dhat, REACH * self.dhat
         triangles, edges = mesh.triangles, mesh.edges
         with threads_for(len(vertex_triangle) + len(edge_edge), _PARALLEL_FROM):
-            features, squares = near_features(x, vertex_triangle, triangles, mesh.triangle_edges, len(edges), dhat)
+            features, squares = near_features(x, vertex_triangle, triangles, mesh.triangle_edges, len(edges), reach)
             areas, edge_squares, edge_keys, edges_grown = edge_weights(
                 x, edge_edge, self._of_edges, mesh.edge_areas, dhat, *known
             )
             rows, start = grouped_by_vertex(vertex_triangle, features, len(x))
-            codes, signs, counts = alternating_sums(
-                x, vertex_triangle, features, rows, start, triangles, edges, mesh.triangle_edges, dhat
-            )
+            codes, signs, counts = alternating_sums(x, vertex_triangle, features, rows, start, self._of_sums, reach)
             starts = np.column_stack([start, np.append(0, np.cumsum(counts))])
             count = int(starts[-1, 1])
             crossing, ends = edge_ends(x, edge_edge, areas, edges)

@@ -8,7 +8,10 @@ A vertex stands for half of its area: the vertices of the other surface stand fo
 on each other press on each other with the pressure of the barrier, whatever their meshes.
 
 A vertex that hangs over an edge or a corner, while its own surface comes nearer to that beside it, gets less weight,
-down to none: what is in contact there are vertices of the other surface with the faces of this one, or two edges.
+down to none: what is in contact there are vertices of the other surface with the faces of this one, or two edges. Where
+its own surface lies flat on the face beside the edge, it keeps a weight, and its distance is that from the plane of the
+face: faces whose outlines are nearly aligned are held at all of their vertices, and nothing pushes along them. That
+weight fades with the distance from the outline.
 
 Source of the alternating sum: Li et al., "Convergent Incremental Potential Contact" (2023), section 4.
 """
@@ -21,17 +24,27 @@ from supple.contact.closest.pair_geometry import VERTEX_EDGE, VERTEX_TRIANGLE, V
 from supple.contact.potentials.known_weights import has_grown, known_weight
 from supple.numerics.geometry.closest_point import closest_on_triangle
 from supple.numerics.kernel_cache import njit, prange
-from supple.numerics.mat3 import dot, row, subtract
+from supple.numerics.mat3 import cross, dot, row, subtract
 
 # A vertex counts in full while none of its neighbors is nearer, and not at all where one is, by this share of dhat.
 NEARER_SHARE = 0.25
+
+# A vertex that hangs beyond the outline of a face counts with its plane: in full up to the first of these shares of
+# dhat, not at all from the second on.
+_FULL, _NONE = 0.25, 0.75
+
+# So much farther than dhat are vertices that hang beyond an outline.
+REACH = math.sqrt(1.0 + _NONE**2)
+
+# Cosines of the angle between two faces that lie on each other, from none of the weight to all of it.
+_LEANING, _FLAT = 0.9, 0.98
 
 # Most parts of one triangle: itself, its edges, its corners.
 _PARTS = 7
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def near_features(x, pairs, triangles, triangle_edges, edge_count, dhat):
+def near_features(x, pairs, triangles, triangle_edges, edge_count, reach):
     """The parts of triangles that are closest to vertices.
 
     Parameters
@@ -41,8 +54,8 @@ def near_features(x, pairs, triangles, triangle_edges, edge_count, dhat):
     Returns
     -------
     features : (k,) number of the triangle, f + number of the edge or f + e + number of the vertex; -1 where the
-        triangle is not nearer than dhat
-    squares : (k,) squared distances [m^2], infinite where not below dhat
+        triangle is not nearer than `reach` [m]
+    squares : (k,) squared distances [m^2], infinite where not below `reach`
     """
     features = np.full(len(pairs), -1, dtype=np.int32)
     squares = np.full(len(pairs), np.inf)
@@ -55,7 +68,7 @@ def near_features(x, pairs, triangles, triangle_edges, edge_count, dhat):
         for j in range(3):
             # Differences of points are as small as triangles.
             square += (f[j] - u[1] * g[j] - u[2] * h[j]) ** 2
-        if not square < dhat * dhat:
+        if not square < reach * reach:
             continue
         squares[k] = square
         inside = (u[0] > 0.0) + (u[1] > 0.0) + (u[2] > 0.0)
@@ -95,8 +108,14 @@ def grouped_by_vertex(pairs, features, s):
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def alternating_sums(x, pairs, features, rows, start, triangles, edges, triangle_edges, dhat):
+def alternating_sums(x, pairs, features, rows, start, mesh, reach):
     """The features that are left of each vertex's alternating sum, and how often each counts.
+
+    Where an edge or a vertex alone is left, a triangle at it follows, with the number 0: its plane may count instead.
+
+    Parameters
+    ----------
+    mesh : triangles, edges, triangle_edges, start and items of vertex_triangles (see `ContactMesh`)
 
     Returns
     -------
@@ -105,15 +124,49 @@ def alternating_sums(x, pairs, features, rows, start, triangles, edges, triangle
     codes = np.empty(_PARTS * len(rows), dtype=np.int32)
     signs = np.empty(_PARTS * len(rows), dtype=np.int32)
     counts = np.empty(len(start) - 1, dtype=np.int32)
+    triangles, edges, triangle_edges, own_start, own_items = mesh
     for g in prange(len(start) - 1):
+        begin, end = start[g], start[g + 1]
+        first = _PARTS * begin
         counts[g] = _alternating_sum(
-            x, pairs, features, rows, start[g], start[g + 1], triangles, edges, triangle_edges, dhat, codes, signs
+            x, pairs, features, rows, begin, end, triangles, edges, triangle_edges, reach, codes, signs
         )
+        if counts[g] == 1 and codes[first] >= len(triangles):
+            codes[first + 1], signs[first + 1] = -1, 0
+            best = _LEANING
+            for k in range(begin, end):
+                if features[rows[k]] == codes[first]:
+                    v, t = pairs[rows[k]]
+                    cosine = _facing(x, v, triangles, t, own_start, own_items)
+                    if cosine > best:
+                        best, codes[first + 1] = cosine, t
+            counts[g] += codes[first + 1] >= 0
     return codes, signs, counts
 
 
 @njit(error_model="numpy")
-def _alternating_sum(x, pairs, features, rows, begin, end, triangles, edges, triangle_edges, dhat, codes, signs):
+def _normal(x, triangles, t):
+    """Unit normal of a triangle; zero without area."""
+    a = row(x, triangles[t, 0])
+    n = cross(subtract(row(x, triangles[t, 1]), a), subtract(row(x, triangles[t, 2]), a))
+    length = math.sqrt(dot(n, n))
+    if length == 0.0:
+        return (0.0, 0.0, 0.0)
+    return (n[0] / length, n[1] / length, n[2] / length)
+
+
+@njit(error_model="numpy")
+def _facing(x, v, triangles, t, own_start, own_items):
+    """The cosine of the angle at which the side of triangle t towards vertex v looks at one of v's own triangles."""
+    n, best = _normal(x, triangles, t), 0.0
+    sign = 1.0 if dot(n, subtract(row(x, v), row(x, triangles[t, 0]))) < 0.0 else -1.0
+    for k in range(own_start[v], own_start[v + 1]):
+        best = max(best, sign * dot(n, _normal(x, triangles, own_items[k])))
+    return best
+
+
+@njit(error_model="numpy")
+def _alternating_sum(x, pairs, features, rows, begin, end, triangles, edges, triangle_edges, reach, codes, signs):
     first, n = _PARTS * begin, 0
     p = row(x, pairs[rows[begin], 0])
     for k in range(begin, end):
@@ -126,12 +179,12 @@ def _alternating_sum(x, pairs, features, rows, begin, end, triangles, edges, tri
                 shared = _sharing_edge(pairs, rows, k, begin, end, triangle_edges, e)
                 if shared > 1:
                     feature, square = _closest_on_edge(x, p, edges, e, len(triangles))
-                    if square < dhat * dhat:
+                    if square < reach * reach:
                         n = _add(codes, signs, first, n, feature, 1 - shared)
                 around, sides = _sharing_vertex(pairs, rows, k, begin, end, triangles, triangle_edges, edges, q)
                 away = subtract(p, row(x, q))
                 # The triangles and edges of a closed fan cancel, those of an open one leave one.
-                if around > 1 and around >= sides and dot(away, away) < dhat * dhat:
+                if around > 1 and around >= sides and dot(away, away) < reach * reach:
                     n = _add(codes, signs, first, n, len(triangles) + len(edges) + q, 1 + around - sides)
     left = 0
     for i in range(first, first + n):
@@ -216,19 +269,22 @@ def write_vertex_contacts(
     Parameters
     ----------
     starts : (groups + 1, 2) where each group begins in `rows` and in `out`
-    mesh : triangles, edges, start and items of neighbors (see `ContactMesh`)
+    mesh : triangles, edges, start and items of neighbors and of vertex_triangles (see `ContactMesh`)
     saddles : (s,) least weights of vertices that `saddle_weights` asks for [m^2]
     keys : (m,) a code of each contact's vertex and the owner of the other side, for `KnownWeights`
     grown : (m,) weights of the vertices that are to be known [m^2], -1 where they do not change
     """
-    triangles, edges, near_start, near_items = mesh
+    triangles, edges, near_start, near_items, own_start, own_items = mesh
     kinds, points, coefficients, vectors, distances, weights = out
     height = NEARER_SHARE * dhat
     for g in prange(len(starts) - 1):
         v = pairs[rows[starts[g, 0]], 0]
-        offset = _PARTS * starts[g, 0] - starts[g, 1]
-        for k in range(starts[g, 1], starts[g + 1, 1]):
-            _write_contact(x, v, codes[offset + k], triangles, edges, kinds, points, coefficients, k)
+        first, last = starts[g, 1], starts[g + 1, 1]
+        offset = _PARTS * starts[g, 0] - first
+        full = 0.5 * areas[v]
+        for k in range(first, last):
+            sign = signs[offset + k]
+            _write_contact(x, v, codes[offset + k], sign == 0, triangles, edges, kinds, points, coefficients, k)
             for j in range(3):
                 vectors[k, j] = 0.0
                 for i in range(1, 4):
@@ -238,27 +294,55 @@ def write_vertex_contacts(
             distances[k] = math.sqrt(dot(r, r))
             keys[k] = np.int64(v) * len(x) + owner[points[k, 1]]
             weights[k] = 0.0
-            if signs[offset + k] > 0:
-                weights[k] = 0.5 * areas[v]
+            if sign > 0:
+                weights[k] = full
                 if kinds[k] != VERTEX_TRIANGLE:
                     weights[k] *= _own_side(x, near_start, near_items, v, r, distances[k], height)
-        for k in range(starts[g, 1], starts[g + 1, 1]):
+        hanging = last == first + 2 and signs[offset + first + 1] == 0
+        last -= hanging
+        for k in range(first, last):
             best = saddles[v]
-            for other in range(starts[g, 1], starts[g + 1, 1]):
+            for other in range(first, last):
                 if keys[other] == keys[k]:
                     best = max(best, weights[other])
             grown[k] = best
-        for k in range(starts[g, 1], starts[g + 1, 1]):
+        for k in range(first, last):
             known = known_weight(known_codes, known_values, keys[k])
+            # Where the vertex comes over the face, both of its weights are those of the face.
+            beyond = 0.0
+            if not hanging:
+                beyond = max(0.0, known_weight(known_codes, known_values, _beyond(keys[k], len(x))))
+                known = max(known, 0.0) + beyond if known >= 0.0 or beyond > 0.0 else -1.0
             now = grown[k]
-            if not has_grown(known, now, 0.5 * areas[v]):
-                grown[k] = -1.0
+            grown[k] = now - beyond if has_grown(known, now, full) else -1.0
             weights[k] = signs[offset + k] * (now if known < 0.0 else known)
+        if hanging:
+            keys[last] = _beyond(keys[last], len(x))
+            t = codes[offset + last]
+            facing = _facing(x, v, triangles, t, own_start, own_items)
+            side = math.sqrt(max(0.0, distances[first] ** 2 - distances[last] ** 2))
+            now = full * _between(facing, _LEANING, _FLAT) * (1.0 - _between(side / dhat, _FULL, _NONE))
+            now = min(now, max(0.0, full - weights[first]))
+            known = known_weight(known_codes, known_values, keys[last])
+            grown[last] = now if has_grown(known, now, full) else -1.0
+            weights[last] = now if known < 0.0 else known
 
 
 @njit(error_model="numpy")
-def _write_contact(x, v, code, triangles, edges, kinds, points, coefficients, k):
-    """Kind, points and coefficients of contact k: of vertex v with the feature that a code names."""
+def _between(x, low, high):
+    """0 up to `low`, 1 from `high` on, linear between them."""
+    return min(1.0, max(0.0, (x - low) / (high - low)))
+
+
+@njit(error_model="numpy")
+def _beyond(key, s):
+    """The code of a vertex that hangs beyond an outline; `key` is that of the vertex and the other side's owner."""
+    return key + np.int64(s) * s
+
+
+@njit(error_model="numpy")
+def _write_contact(x, v, code, plane, triangles, edges, kinds, points, coefficients, k):
+    """Kind, points and coefficients of contact k: of vertex v with the feature that a code names, or with its plane."""
     p = row(x, v)
     points[k, 0], coefficients[k, 0] = v, 1.0
     for i in range(1, 4):
@@ -266,7 +350,8 @@ def _write_contact(x, v, code, triangles, edges, kinds, points, coefficients, k)
     if code < len(triangles):
         kinds[k] = VERTEX_TRIANGLE
         t = code
-        u = closest_on_triangle(p, row(x, triangles[t, 0]), row(x, triangles[t, 1]), row(x, triangles[t, 2]))
+        a, b, c = row(x, triangles[t, 0]), row(x, triangles[t, 1]), row(x, triangles[t, 2])
+        u = _foot(p, a, b, c) if plane else closest_on_triangle(p, a, b, c)
         for i in range(3):
             points[k, i + 1], coefficients[k, i + 1] = triangles[t, i], -u[i]
     elif code < len(triangles) + len(edges):
@@ -278,6 +363,16 @@ def _write_contact(x, v, code, triangles, edges, kinds, points, coefficients, k)
     else:
         kinds[k] = VERTEX_VERTEX
         points[k, 1], coefficients[k, 1] = code - len(triangles) - len(edges), -1.0
+
+
+@njit(error_model="numpy")
+def _foot(p, a, b, c):
+    """Barycentric coordinates of the point of a triangle's plane that is closest to p."""
+    g, h, r = subtract(b, a), subtract(c, a), subtract(p, a)
+    n = cross(g, h)
+    nn = dot(n, n)
+    u, v = dot(cross(r, h), n) / nn, dot(cross(g, r), n) / nn
+    return 1.0 - u - v, u, v
 
 
 @njit(error_model="numpy")

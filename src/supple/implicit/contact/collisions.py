@@ -10,6 +10,7 @@ from supple.contact.ccd.largest_step import Limit, largest_step_in_pieces
 from supple.contact.potentials.contact_set import ContactSet, Found
 from supple.contact.potentials.contacts import Contacts
 from supple.contact.potentials.known_weights import KnownWeights
+from supple.contact.potentials.vertex_contacts import REACH
 from supple.contact.search.finder import CandidateFinder
 from supple.contact.surface.contact_mesh import ContactMesh
 
@@ -25,7 +26,7 @@ class Collisions:
     def __init__(self, mesh: ContactMesh, dhat: float) -> None:
         self.mesh = mesh
         self.dhat = dhat
-        self._finder = CandidateFinder(mesh, dhat)
+        self._finder = CandidateFinder(mesh, REACH * dhat)
         self._set = ContactSet(mesh, dhat)
         self._x: NDArray[np.float64] | None = None
         self._points = np.zeros((0, 3))
@@ -43,7 +44,7 @@ class Collisions:
         return self._at(x).contacts
 
     def smallest_distance(self, x: NDArray[np.float64]) -> float:
-        """Between surfaces [m]; infinite where nothing is nearer than dhat."""
+        """Between surfaces [m]; infinite where nothing is near."""
         return self._at(x).least
 
     def forget_weights(self) -> None:
