@@ -169,38 +169,40 @@ def _edges_of_run(r, shape, motion, rule, tree, reach, first, last, out):
     return count
 
 
-def _search(name, of_run):
-    """The kernel that does all runs of a search; both kinds of pairs have the same arguments."""
-
-    def search(shape, motion, rule, tree, reach, room, counts, out):
-        begin, simplices, owner = shape
-        way, lengths = motion
-        allowed, label, same, partners, owner_boxes, excluded = rule
-        queries, nodes, labels, order = tree
-        partner_start, partner_items = partners
-        excluded_start, excluded_items = excluded
-        for r in prange(RUNS):
-            # Numba takes no tuples of tuples into a parallel loop.
-            its_rule = (
-                allowed,
-                label,
-                same,
-                (partner_start, partner_items),
-                owner_boxes,
-                (excluded_start, excluded_items),
-            )
-            its_tree = (queries, nodes, labels, order)
-            counts[r] = of_run(
-                r, (begin, simplices, owner), (way, lengths), its_rule, its_tree, reach, room[r], room[r + 1], out
-            )
-
-    search.__name__ = name
-    search.__qualname__ = name
-    return njit(search, cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True, error_model="numpy")
+def find_points(shape, motion, rule, tree, reach, room, counts, out):
+    """All runs of the search for pairs of points and triangles."""
+    begin, simplices, owner = shape
+    way, lengths = motion
+    allowed, label, same, partners, owner_boxes, excluded = rule
+    queries, nodes, labels, order = tree
+    partner_start, partner_items = partners
+    excluded_start, excluded_items = excluded
+    for r in prange(RUNS):
+        # Numba takes no tuples of tuples into a parallel loop.
+        its_rule = allowed, label, same, (partner_start, partner_items), owner_boxes, (excluded_start, excluded_items)
+        its_tree = queries, nodes, labels, order
+        counts[r] = _points_of_run(
+            r, (begin, simplices, owner), (way, lengths), its_rule, its_tree, reach, room[r], room[r + 1], out
+        )
 
 
-find_points = _search("find_points", _points_of_run)
-find_edges = _search("find_edges", _edges_of_run)
+@njit(cache=True, parallel=True, error_model="numpy")
+def find_edges(shape, motion, rule, tree, reach, room, counts, out):
+    """All runs of the search for pairs of edges."""
+    begin, simplices, owner = shape
+    way, lengths = motion
+    allowed, label, same, partners, owner_boxes, excluded = rule
+    queries, nodes, labels, order = tree
+    partner_start, partner_items = partners
+    excluded_start, excluded_items = excluded
+    for r in prange(RUNS):
+        # Numba takes no tuples of tuples into a parallel loop.
+        its_rule = allowed, label, same, (partner_start, partner_items), owner_boxes, (excluded_start, excluded_items)
+        its_tree = queries, nodes, labels, order
+        counts[r] = _edges_of_run(
+            r, (begin, simplices, owner), (way, lengths), its_rule, its_tree, reach, room[r], room[r + 1], out
+        )
 
 
 @njit(cache=True, error_model="numpy")
