@@ -1,6 +1,8 @@
 """The step along a Newton direction: at most what filters allow, halved until the energy decreases enough.
 
-Source: Nocedal, Wright, "Numerical Optimization" (2006), section 3.1 (Armijo's condition).
+Sources: Nocedal, Wright, "Numerical Optimization" (2006), section 3.1 (Armijo's condition); Hager, Zhang, "A New
+Conjugate Gradient Method with Guaranteed Descent and an Efficient Line Search" (2005), section 4, for slopes in the
+place of energies near round-off.
 """
 
 from __future__ import annotations
@@ -20,6 +22,12 @@ _MOST_CUTS = 40
 
 # Energies are sums of many terms: differences below this share of the terms' size are round-off, and count as none.
 _ROUND_OFF = 1e-13
+
+# Decreases below this share of the terms' size are too near to round-off to tell whether a step went beyond the minimum:
+# its end then has to be no steeper uphill than this share of the slope at its start. Without it, steps go to and fro
+# across the kinks of a mesh that a frictionless vertex lies on.
+_UNCLEAR = 1e-10
+_STEEPEST = 0.5
 
 # Where a body buckles, the projected Hessian is far too stiff, and steps that shrink by less than this factor crawl:
 # directions are then made longer, twice at a time, up to so many times. A step of .25 s of a twisted bar took 97
@@ -69,6 +77,12 @@ def search(
         energy, size = objective.value_and_size(moved)
         enough = energy <= start.energy + _SUFFICIENT * step * slope + _ROUND_OFF * max(size, start.size)
         if enough and limits.allows(moved):
-            return moved, step, cuts
-        step *= _SHRINK
+            uphill = 0.0
+            if -step * slope < _UNCLEAR * max(size, start.size):
+                uphill = float(np.vdot(objective.gradient(moved), direction)) / -slope
+            if uphill <= _STEEPEST:
+                return moved, step, cuts
+            step /= 1.0 + uphill
+        else:
+            step *= _SHRINK
     return start.positions, 0.0, _MOST_CUTS
