@@ -8,10 +8,11 @@ A vertex stands for half of its area: the vertices of the other surface stand fo
 on each other press on each other with the pressure of the barrier, whatever their meshes.
 
 A vertex that hangs over an edge or a corner, while its own surface comes nearer to that beside it, gets less weight,
-down to none: what is in contact there are vertices of the other surface with the faces of this one, or two edges. Where
-its own surface lies flat on the face beside the edge, it keeps a weight, and its distance is that from the plane of the
-face: faces whose outlines are nearly aligned are held at all of their vertices, and nothing pushes along them. That
-weight fades with the distance from the outline.
+down to none: what is in contact there are vertices of the other surface with the faces of this one, or two edges.
+
+Where a vertex is beside the outline of a face and its own surface lies flat on that face, its distance is that from the
+plane of the face: faces whose outlines are nearly aligned are held at all of their vertices, and nothing pushes along
+them. Its weight fades with the distance from the outline.
 
 Source of the alternating sum: Li et al., "Convergent Incremental Potential Contact" (2023), section 4.
 """
@@ -38,6 +39,9 @@ REACH = math.sqrt(1.0 + _NONE**2)
 
 # Cosines of the angle between two faces that lie on each other, from none of the weight to all of it.
 _LEANING, _FLAT = 0.9, 0.98
+
+# An edge or a vertex is part of an outline where one of its faces leans by more than this cosine.
+_SHARP = 0.8
 
 # Most parts of one triangle: itself, its edges, its corners.
 _PARTS = 7
@@ -111,7 +115,8 @@ def grouped_by_vertex(pairs, features, s):
 def alternating_sums(x, pairs, features, rows, start, mesh, reach):
     """The features that are left of each vertex's alternating sum, and how often each counts.
 
-    Where an edge or a vertex alone is left, a triangle at it follows, with the number 0: its plane may count instead.
+    Where an edge or a vertex of an outline alone is left, a triangle at it follows, with the number 0, if one of the
+    vertex's own lies flat on it: its plane may count instead.
 
     Parameters
     ----------
@@ -133,14 +138,15 @@ def alternating_sums(x, pairs, features, rows, start, mesh, reach):
         )
         if counts[g] == 1 and codes[first] >= len(triangles):
             codes[first + 1], signs[first + 1] = -1, 0
-            best = _LEANING
+            best, least = _LEANING, _SHARP
             for k in range(begin, end):
                 if features[rows[k]] == codes[first]:
                     v, t = pairs[rows[k]]
                     cosine = _facing(x, v, triangles, t, own_start, own_items)
+                    least = min(least, cosine)
                     if cosine > best:
                         best, codes[first + 1] = cosine, t
-            counts[g] += codes[first + 1] >= 0
+            counts[g] += codes[first + 1] >= 0 and least < _SHARP
     return codes, signs, counts
 
 
@@ -298,31 +304,32 @@ def write_vertex_contacts(
                 weights[k] = full
                 if kinds[k] != VERTEX_TRIANGLE:
                     weights[k] *= _own_side(x, near_start, near_items, v, r, distances[k], height)
-        hanging = last == first + 2 and signs[offset + first + 1] == 0
-        last -= hanging
+        beside = last == first + 2 and signs[offset + first + 1] == 0
+        last -= beside
+        share = 0.0
+        if beside:
+            facing = _facing(x, v, triangles, codes[offset + last], own_start, own_items)
+            side = math.sqrt(max(0.0, distances[first] ** 2 - distances[last] ** 2))
+            share = _between(facing, _LEANING, _FLAT) * (1.0 - _between(side / dhat, _FULL, _NONE))
         for k in range(first, last):
             best = saddles[v]
             for other in range(first, last):
                 if keys[other] == keys[k]:
                     best = max(best, weights[other])
-            grown[k] = best
+            grown[k] = (1.0 - share) * best
         for k in range(first, last):
             known = known_weight(known_codes, known_values, keys[k])
             # Where the vertex comes over the face, both of its weights are those of the face.
             beyond = 0.0
-            if not hanging:
+            if not beside:
                 beyond = max(0.0, known_weight(known_codes, known_values, _beyond(keys[k], len(x))))
                 known = max(known, 0.0) + beyond if known >= 0.0 or beyond > 0.0 else -1.0
             now = grown[k]
             grown[k] = now - beyond if has_grown(known, now, full) else -1.0
             weights[k] = signs[offset + k] * (now if known < 0.0 else known)
-        if hanging:
+        if beside:
             keys[last] = _beyond(keys[last], len(x))
-            t = codes[offset + last]
-            facing = _facing(x, v, triangles, t, own_start, own_items)
-            side = math.sqrt(max(0.0, distances[first] ** 2 - distances[last] ** 2))
-            now = full * _between(facing, _LEANING, _FLAT) * (1.0 - _between(side / dhat, _FULL, _NONE))
-            now = min(now, max(0.0, full - weights[first]))
+            now = min(share * full, max(0.0, full - weights[first]))
             known = known_weight(known_codes, known_values, keys[last])
             grown[last] = now if has_grown(known, now, full) else -1.0
             weights[last] = now if known < 0.0 else known

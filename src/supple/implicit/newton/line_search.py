@@ -23,9 +23,9 @@ _MOST_CUTS = 40
 # Energies are sums of many terms: differences below this share of the terms' size are round-off, and count as none.
 _ROUND_OFF = 1e-13
 
-# Decreases below this share of the terms' size are too near to round-off to tell whether a step went beyond the minimum:
-# its end then has to be no steeper uphill than this share of the slope at its start. Without it, steps go to and fro
-# across the kinks of a mesh that a frictionless vertex lies on.
+# Decreases below this share of the terms' size are too near to round-off to tell whether a step went beyond the
+# minimum: its end then has to be no steeper uphill than this share of the slope at its start. Without it, steps go to
+# and fro across the kinks of a mesh that a frictionless vertex lies on.
 _UNCLEAR = 1e-10
 _STEEPEST = 0.5
 
