@@ -163,11 +163,13 @@ def _normal(x, triangles, t):
 
 @njit(error_model="numpy")
 def _facing(x, v, triangles, t, own_start, own_items):
-    """The cosine of the angle at which the side of triangle t towards vertex v looks at one of v's own triangles."""
+    """The largest cosine of the angle at which triangle t and one of vertex v's own look at each other.
+
+    The sides that look are those of the normals, also of a sheet, which has no inside.
+    """
     n, best = _normal(x, triangles, t), 0.0
-    sign = 1.0 if dot(n, subtract(row(x, v), row(x, triangles[t, 0]))) < 0.0 else -1.0
     for k in range(own_start[v], own_start[v + 1]):
-        best = max(best, sign * dot(n, _normal(x, triangles, own_items[k])))
+        best = max(best, -dot(n, _normal(x, triangles, own_items[k])))
     return best
 
 
