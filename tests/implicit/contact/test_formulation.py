@@ -5,6 +5,7 @@ import pytest
 
 import supple as sp
 from supple.contact.closest.pair_geometry import EDGE_EDGE
+from supple.contact.potentials.barrier_energy import barrier_hessian
 from supple.contact.potentials.barrier_function import barrier_slopes
 from supple.implicit.contact.build import contact_model
 from supple.system import build_system, initial_state
@@ -136,6 +137,49 @@ def test_the_energy_along_a_ridge_is_constant():
         model.collisions.forget_weights()
         energies.append(model.barriers(KAPPA).triangles.value(moved))
     assert min(energies) > 0.5 * max(energies)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.1, 1.0, 3.0])
+def test_a_ridge_that_bends_away_repels_an_edge_across_its_bend(offset):
+    """At no offset, times the gap, both edges cross the other one beside their vertex, which is nearest to nothing."""
+    ridge = np.array([[-0.05, 0.01, 0], [0, 0, 0], [0.05, 0.01, 0]])
+    points = np.concatenate([ridge, ridge + np.array([0, -0.05, 0.05]), ridge + np.array([0, -0.05, -0.05])])
+    faces = [[0, 3, 1], [1, 3, 4], [1, 4, 2], [2, 4, 5], [0, 1, 6], [1, 7, 6], [1, 2, 7], [2, 8, 7]]
+    sheet = sp.TriangleObstacle(surface=sp.SurfaceMesh(points, np.array(faces)), name="ridge")
+    for gap in (0.5, 0.1, 0.01, 1e-3):
+        body = sp.Body("above", wedge(0.06), RUBBER, position=(offset * gap * DHAT, gap * DHAT, 0))
+        model, x = model_of([body], [sheet])
+        contacts = model.collisions.at(x)
+        between = contacts.kinds == EDGE_EDGE
+        assert np.count_nonzero(between) == 2 if offset == 0.0 else between.any()
+        force = force_on(model, x, slice(0, 6))
+        alone = contacts.weights[between].min() * pressure(contacts.distances[between].min())
+        assert force[1] > 0.5 * alone
+
+
+def test_two_edges_and_their_nearest_end_are_projected_together():
+    """Most of both cancels; the sum of their own projections would be too stiff."""
+    below = sp.Body("below", sp.TetMesh(wedge(0.1).vertices * (1, -1, 1), wedge(0.1).tets), RUBBER)
+    for away in (5e-5, 5e-7):
+        across = sp.Body(
+            "above", wedge(0.1), RUBBER, position=(0.05 - away, 0.5 * DHAT, 0), rotation=(0, 0.5 * np.pi, 0)
+        )
+        model, x = model_of([below, across])
+        contacts = model.collisions.at(x)
+        pair = np.flatnonzero(contacts.kinds == EDGE_EDGE)[0] + np.arange(2)
+        both = contacts.where(np.isin(np.arange(len(contacts.kinds)), pair))
+        points = model.mesh.points.positions(x)
+        dense = {}
+        for project in (False, True):
+            between = barrier_hessian(points, both, DHAT, KAPPA, project)
+            dense[project] = np.zeros((3 * len(points), 3 * len(points)))
+            for i, j, block in zip(between.rows, between.columns, between.blocks, strict=True):
+                dense[project][3 * i : 3 * i + 3, 3 * j : 3 * j + 3] += block
+                if i != j:
+                    dense[project][3 * j : 3 * j + 3, 3 * i : 3 * i + 3] += block.T
+        values, modes = np.linalg.eigh(dense[False])
+        positive = (modes * np.maximum(values, 0.0)) @ modes.T
+        assert np.abs(dense[True] - positive).max() < 1e-9 * np.abs(dense[False]).max()
 
 
 def test_vertices_on_vertices_repel_each_other():
