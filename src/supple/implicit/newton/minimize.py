@@ -34,6 +34,12 @@ _LINEAR_RATE = 0.2
 _NEARLY = 3e-3
 
 
+# After so many steps in a row that change the energy by less than this share of its terms, and with balanced forces, no
+# minimum below can be told from round-off: what is left are steps to and fro across the kinks of frictionless contact.
+_SETTLED = 6
+_NOTHING = 1e-12
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """The function to minimize, and the conditions at its minimum.
@@ -76,6 +82,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
     if not np.isfinite(here.energy):
         return Outcome(Status.NOT_FINITE, here, "the energy at the start of Newton's method is not finite", rows)
     last_length = 0.0
+    settled = 0
     for iteration in range(problem.max_iterations):
         interruption_point()
         found = directions.find(here)
@@ -94,6 +101,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
         # Where the step is shorter, the duals of the whole direction are those that the next matrix needs, too.
         objective.renew(here.positions, vector)
         policy.note(rate > _LINEAR_RATE and largest == 1.0, found.touching)
+        before = here.energy
         if step > 0.0:
             # A last step most often needs no Hessian at its end.
             here = objective.model(end, None if last else hessian, policy.now)
@@ -112,13 +120,17 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
             projected=found.projected is ProjectedTerms.ALL,
         )
         rows.append(row)
+        settled = settled + 1 if step > 0.0 and abs(before - here.energy) <= _NOTHING * here.size else 0
         logger.debug("%s", row)
         limits.widen(here.positions)
         if last:
             if step == 0.0 or _is_converged(problem, found.length, here, tools, found.touching):
                 return Outcome(Status.CONVERGED, here, "", rows)
             here = objective.model(here.positions, hessian, policy.now)
-        elif found.touching and step == 1.0 and _is_outdated(problem, here, tools):
+        elif found.touching and (
+            (settled >= _SETTLED and _is_balanced(problem, here, tools))
+            or (step == 1.0 and _is_outdated(problem, here, tools))
+        ):
             return Outcome(Status.CONVERGED, here, "", rows)
         if step == 0.0:
             text = (
@@ -139,6 +151,11 @@ def _is_outdated(problem: Problem, here: Model, tools: Tools) -> bool:
         return False
     contact = _free_norm(problem.objective.contact_gradient(here.positions), tools)
     return _free_norm(here.gradient.copy(), tools) <= _NEARLY * contact and problem.outdated(here.positions)
+
+
+def _is_balanced(problem: Problem, here: Model, tools: Tools) -> bool:
+    contact = _free_norm(problem.objective.contact_gradient(here.positions), tools)
+    return _free_norm(here.gradient.copy(), tools) <= problem.convergence.force * contact
 
 
 def _is_converged(problem: Problem, length: float, here: Model, tools: Tools, touching: bool) -> bool:
