@@ -82,7 +82,9 @@ class ContactSet:
                 x, edge_edge, self._of_edges, mesh.edge_areas, dhat, *known
             )
             rows, start = grouped_by_vertex(vertex_triangle, features, len(x))
-            codes, signs, counts = alternating_sums(x, vertex_triangle, features, rows, start, self._of_sums, reach)
+            codes, signs, counts = alternating_sums(
+                x, vertex_triangle, features, squares, rows, start, self._of_sums, reach
+            )
             starts = np.column_stack([start, np.append(0, np.cumsum(counts))])
             count = int(starts[-1, 1])
             crossing, ends = edge_ends(x, edge_edge, areas, edges)

@@ -112,11 +112,11 @@ def grouped_by_vertex(pairs, features, s):
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def alternating_sums(x, pairs, features, rows, start, mesh, reach):
+def alternating_sums(x, pairs, features, squares, rows, start, mesh, reach):
     """The features that are left of each vertex's alternating sum, and how often each counts.
 
-    Where an edge or a vertex of an outline alone is left, a triangle at it follows, with the number 0, if one of the
-    vertex's own lies flat on it: its plane may count instead.
+    Where only edges and vertices of an outline are left, the nearest one remains and a triangle at it follows, with the
+    number 0, if one of the vertex's own lies flat on it: its plane may count instead.
 
     Parameters
     ----------
@@ -136,17 +136,28 @@ def alternating_sums(x, pairs, features, rows, start, mesh, reach):
         counts[g] = _alternating_sum(
             x, pairs, features, rows, begin, end, triangles, edges, triangle_edges, reach, codes, signs
         )
-        if counts[g] == 1 and codes[first] >= len(triangles):
-            codes[first + 1], signs[first + 1] = -1, 0
-            best, least = _LEANING, _SHARP
-            for k in range(begin, end):
-                if features[rows[k]] == codes[first]:
-                    v, t = pairs[rows[k]]
-                    cosine = _facing(x, v, triangles, t, own_start, own_items)
-                    least = min(least, cosine)
-                    if cosine > best:
-                        best, codes[first + 1] = cosine, t
-            counts[g] += codes[first + 1] >= 0 and least < _SHARP
+        on_outlines = counts[g] > 0
+        for k in range(first, first + counts[g]):
+            on_outlines = on_outlines and codes[k] >= len(triangles)
+        if not on_outlines:
+            continue
+        # Along an outline that is nearly straight, the nearest feature stands for all.
+        nearest = begin
+        for k in range(begin, end):
+            if squares[rows[k]] < squares[rows[nearest]]:
+                nearest = k
+        least, facing = _SHARP, -1
+        for k in range(begin, end):
+            if features[rows[k]] == features[rows[nearest]]:
+                v, t = pairs[rows[k]]
+                cosine = _facing(x, v, triangles, t, own_start, own_items)
+                least = min(least, cosine)
+                if cosine > _LEANING and facing < 0:  # triangles of one face are nearly in one plane
+                    facing = t
+        if facing >= 0 and least < _SHARP:
+            codes[first], signs[first] = features[rows[nearest]], 1
+            codes[first + 1], signs[first + 1] = facing, 0
+            counts[g] = 2
     return codes, signs, counts
 
 
