@@ -57,7 +57,7 @@ class ContactSet:
         self.dhat = dhat
         self._mesh = mesh
         self._of_vertices = (mesh.triangles, mesh.edges, *mesh.neighbors, *mesh.vertex_triangles)
-        self._of_sums = (mesh.triangles, mesh.edges, mesh.triangle_edges, *mesh.vertex_triangles)
+        self._of_sums = (mesh.triangles, mesh.edges, mesh.triangle_edges, *mesh.vertex_triangles, mesh.owner)
         self._of_edges = (mesh.triangles, mesh.edges, *mesh.edge_triangles)
 
     def of(

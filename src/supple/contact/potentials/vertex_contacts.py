@@ -120,7 +120,7 @@ def alternating_sums(x, pairs, features, squares, rows, start, mesh, reach):
 
     Parameters
     ----------
-    mesh : triangles, edges, triangle_edges, start and items of vertex_triangles (see `ContactMesh`)
+    mesh : triangles, edges, triangle_edges, start and items of vertex_triangles, owner (see `ContactMesh`)
 
     Returns
     -------
@@ -129,7 +129,7 @@ def alternating_sums(x, pairs, features, squares, rows, start, mesh, reach):
     codes = np.empty(_PARTS * len(rows), dtype=np.int32)
     signs = np.empty(_PARTS * len(rows), dtype=np.int32)
     counts = np.empty(len(start) - 1, dtype=np.int32)
-    triangles, edges, triangle_edges, own_start, own_items = mesh
+    triangles, edges, triangle_edges, own_start, own_items, owner = mesh
     for g in prange(len(start) - 1):
         begin, end = start[g], start[g + 1]
         first = _PARTS * begin
@@ -139,6 +139,9 @@ def alternating_sums(x, pairs, features, squares, rows, start, mesh, reach):
         on_outlines = counts[g] > 0
         for k in range(first, first + counts[g]):
             on_outlines = on_outlines and codes[k] >= len(triangles)
+        other = owner[triangles[pairs[rows[begin], 1], 0]]
+        for k in range(begin, end):
+            on_outlines = on_outlines and owner[triangles[pairs[rows[k], 1], 0]] == other
         if not on_outlines:
             continue
         # Along an outline that is nearly straight, the nearest feature stands for all.
