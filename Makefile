@@ -1,6 +1,7 @@
 # Every target sets itself up: it creates .venv from the lock files and reuses it.
 PYTHON ?= python3
 EXAMPLES ?= 500
+STEPS ?= 100000
 UV_VERSION := 0.13.8
 ifeq ($(OS),Windows_NT)
   BIN := .venv/Scripts
@@ -13,15 +14,16 @@ endif
 # Bytecode is compiled now, so that no later start has to (it is 1.3 s of one).
 install = ($(BIN)/python -m uv pip install -q --compile-bytecode --python $(BIN)/python $(1) || $(BIN)/python -m pip install -q $(1))
 
-.PHONY: demo test test-all fuzz bench lint format lock clean
+.PHONY: demo test test-all fuzz soak bench lint format lock clean
 .DELETE_ON_ERROR:
 
 demo: .venv/.base
 	$(BIN)/supple demo squash --overwrite --output out/squash
 	$(BIN)/supple demo bears --overwrite --output out/bears
 
+# Three processes on two cores: tests of the page and of other processes wait much of their time.
 test: .venv/.dev
-	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow"
+	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not slow"
 
 test-all: .venv/.dev
 	$(BIN)/python -m pytest -n 2 --dist worksteal
@@ -29,6 +31,10 @@ test-all: .venv/.dev
 # Every reader on many thousands of damaged files.
 fuzz: .venv/.dev
 	SUPPLE_FUZZ_EXAMPLES=$(EXAMPLES) $(BIN)/python -m pytest -n 2 tests/fuzz
+
+# A hundred thousand steps of small scenes with every solver.
+soak: .venv/.dev
+	SUPPLE_SOAK_STEPS=$(STEPS) $(BIN)/python -m pytest -n 2 tests/soak
 
 bench: .venv/.dev .venv-peers/.made
 	$(BIN)/python -m benchmarks

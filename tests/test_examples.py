@@ -6,18 +6,19 @@ from pathlib import Path
 import pytest
 
 import supple as sp
+from supple.learning.reaching import Reaching
 from supple.scene_file.loader import load_run
 from supple.simulate import simulate
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
-def run_example(name):
+def run_example(name, *arguments):
     (path,) = EXAMPLES.glob(f"{name}_*.py")
     spec = importlib.util.spec_from_file_location(path.stem, path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    return module.main()
+    return module.main(*arguments)
 
 
 def test_01_a_ball_falls_freely_is_squashed_and_springs_back():
@@ -44,6 +45,13 @@ def test_05_a_cantilever_bends_as_beam_theory_predicts():
     assert found["theory"] == pytest.approx(4.031e-4, rel=1e-4)
     assert found["coarse"] < 0.85 * found["theory"] < 0.92 * found["theory"] < found["fine"] < found["theory"]
     assert found["limit"] == pytest.approx(found["theory"], rel=0.03)
+
+
+def test_06_random_search_improves_the_reward_of_a_controller():
+    rewards = run_example("06", 3, Reaching(solver=sp.XPBD(substeps=4, contact=None), episode_steps=25))
+    assert rewards == sorted(rewards), "the best one is kept"
+    assert rewards[0] < -0.2, "without forces, the tip hangs beside the goal"
+    assert rewards[-1] > 0.7 * rewards[0], "on the average of the way, it is much nearer"
 
 
 def test_every_example_is_run_by_a_test_of_this_file():

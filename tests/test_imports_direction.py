@@ -18,6 +18,7 @@ LAYERS = (
     ("viewer",),
     ("studies",),
     ("runs",),
+    ("learning",),
     ("output", "scene_file"),
     ("simulate",),
     ("xpbd", "implicit"),

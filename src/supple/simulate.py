@@ -16,8 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError, SolverError
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.material import Elastic
+from supple.materials.patches.energy import patch_energies
+from supple.materials.per_tet import NO_REGION
 from supple.numerics.deformation import deformation_gradients, determinants
 from supple.numerics.memory import require_memory
+from supple.scene.inputs import checked_values, drive_inputs, hold_inputs
 from supple.scene.scene import Scene
 from supple.scene.stitches.measures import largest_stitch_stretch, stitch_energy
 from supple.state import ContactPoints, SolverDetails, State, Status, StepReport
@@ -138,6 +141,10 @@ class Sink(Protocol):
         ...
 
 
+Control = Callable[[Frame], "Mapping[str, ArrayLike] | None"]
+Frames = Generator[Frame, "Mapping[str, ArrayLike] | None", None]
+
+
 class NullSink:
     """A sink that keeps nothing."""
 
@@ -157,8 +164,9 @@ def simulate(
     initial_positions: Mapping[str, ArrayLike] | None = None,
     initial_velocities: Mapping[str, ArrayLike] | None = None,
     start: StartFrame | State | None = None,
+    control: Control | None = None,
     sinks: Sequence[Sink] = (),
-) -> Generator[Frame]:
+) -> Frames:
     """Advance a scene and yield a frame after each step.
 
     Where the solver cannot continue, ends early; the report of the last frame gives the reason.
@@ -172,22 +180,20 @@ def simulate(
     initial_positions, initial_velocities : by body name, (n, 3) [m], [m/s]; the others start as the scene describes.
     start : a frame or state of this scene to continue from, of any solver or from a recording; excludes the two above.
         From a `Frame` of the same scene object and an equal solver, the frames have the bits of an uninterrupted run.
+    control : called before each step with the latest frame; returns values of the scene's inputs that they shall have
+        at the end of the step, by name, or None. Others stay as they are. `send` of the generator does the same.
     sinks : receive the start, every frame, and the end.
 
     Raises
     ------
-    SceneError, SolverError : before the first step, where the input cannot be simulated.
+    SceneError, SolverError : before the first step, where the input cannot be simulated; later, where an input is set
+        to what it cannot have.
     """
     if not isinstance(scene, Scene):
         raise SceneError(f"simulate: the scene is a {type(scene).__name__}; give a Scene")
     if not isinstance(solver, Solver):
         raise SolverError(f"simulate: the solver is {solver!r}; give XPBD(...) or Implicit(...)")
-    if isinstance(dt, bool) or not isinstance(dt, (int, float, np.number)) or not math.isfinite(dt) or dt <= 0.0:
-        raise SolverError(f"simulate: dt is {dt!r}; it must be finite and above zero [s]")
-    if not _DT_RANGE[0] <= dt <= _DT_RANGE[1]:
-        raise SolverError(f"simulate: dt is {dt!r}; it must be between {_DT_RANGE[0]:g} and {_DT_RANGE[1]:g} s")
-    if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 0:
-        raise SolverError(f"simulate: steps is {steps!r}; give a whole number of zero or more")
+    check_timing("simulate", dt, steps)
     if start is not None and (initial_positions is not None or initial_velocities is not None):
         raise SceneError("simulate: give `start`, or initial positions and velocities, not both")
     tets = sum(len(body.mesh.tets) for body in scene.bodies)
@@ -200,7 +206,17 @@ def simulate(
     solver.check(first.system, first.state, workspace)
     details = solver.initial_details(first.system, workspace)
     first = replace(first, report=replace(first.report, details=details))
-    return _steps(first, solver, float(dt), int(steps), workspace, sinks)
+    return _steps(first, solver, float(dt), int(steps), workspace, control, sinks)
+
+
+def check_timing(caller: str, dt: object, steps: object) -> None:
+    """Raise `SolverError` unless dt is a length of time [s] and steps a number; the text begins with `caller`."""
+    if isinstance(dt, bool) or not isinstance(dt, (int, float, np.number)) or not math.isfinite(dt) or dt <= 0.0:
+        raise SolverError(f"{caller}: dt is {dt!r}; it must be finite and above zero [s]")
+    if not _DT_RANGE[0] <= dt <= _DT_RANGE[1]:
+        raise SolverError(f"{caller}: dt is {dt!r}; it must be between {_DT_RANGE[0]:g} and {_DT_RANGE[1]:g} s")
+    if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 0:
+        raise SolverError(f"{caller}: steps is {steps!r}; give a whole number of zero or more")
 
 
 def first_frame(scene: Scene, start: StartFrame | State, solver: Solver | None = None) -> Frame:
@@ -216,6 +232,7 @@ def first_frame(scene: Scene, start: StartFrame | State, solver: Solver | None =
         raise SceneError(
             f"simulate: start has {len(state.positions)} vertices, the scene has {count}; give one of this scene"
         )
+    state = _with_inputs(scene, state)
     # A frame of this scene has the pins' anchors; computing them again would give them only up to round-off.
     if isinstance(start, Frame) and start.system.scene is scene:
         system = start.system
@@ -229,31 +246,66 @@ def first_frame(scene: Scene, start: StartFrame | State, solver: Solver | None =
 
 def start_frame(system: System, state: State, index: int, solver: Solver | None) -> Frame:
     """A frame without a step that led to it."""
-    report = _report(system, state, StepReport(Status.CONVERGED, 0), 0.0)
+    report = completed_report(system, state, StepReport(Status.CONVERGED, 0), 0.0)
     return Frame(index, state, system, report, solver=solver)
 
 
+def _with_inputs(scene: Scene, state: State) -> State:
+    """The state with a value of every input, which the inputs have from now on."""
+    if not scene.inputs:
+        return state
+    given = checked_values(scene.inputs, {name: state.inputs[name] for name in scene.inputs.keys() & state.inputs})
+    values = {name: given.get(name, one.value) for name, one in scene.inputs.items()}
+    hold_inputs(scene.inputs, values, state.time)
+    return replace(state, inputs=values)
+
+
+def advance(
+    solver: Solver, system: System, state: State, dt: float, workspace: Any, wanted: Mapping[str, NDArray[np.float64]]
+) -> tuple[State, StepReport]:
+    """A step of the solver in which the scene's inputs go to the values that are `wanted` at its end, by name."""
+    inputs = system.scene.inputs
+    if not inputs:
+        return solver.step(system, state, dt, workspace)
+    drive_inputs(inputs, state.inputs, wanted, state.time, state.time + dt)
+    after, step = solver.step(system, state, dt, workspace)
+    # A solver may stop within the step; the inputs are then where they were at that time.
+    return replace(after, inputs={name: given(after.time) for name, given in inputs.items()}), step
+
+
 def _steps(
-    first: Frame, solver: Solver, dt: float, steps: int, workspace: Any, sinks: Sequence[Sink]
-) -> Generator[Frame]:
-    system, state = first.system, first.state
+    first: Frame,
+    solver: Solver,
+    dt: float,
+    steps: int,
+    workspace: Any,
+    control: Control | None,
+    sinks: Sequence[Sink],
+) -> Frames:
+    system, state, frame = first.system, first.state, first
+    inputs = system.scene.inputs
+    wanted = dict(state.inputs)
     with ExitStack() as ends:  # ends every sink, also where another sink fails
         for sink in sinks:
             ends.callback(sink.end)
             sink.begin(first, dt, steps)
         for index in range(first.index + 1, first.index + steps + 1):
+            if control is not None:
+                wanted |= checked_values(inputs, control(frame))
             began = time.perf_counter()
-            state, step = solver.step(system, state, dt, workspace)
+            state, step = advance(solver, system, state, dt, workspace, wanted)
             seconds = time.perf_counter() - began
-            frame = Frame(index, state, system, _report(system, state, step, seconds), step.contacts, solver)
+            frame = Frame(index, state, system, completed_report(system, state, step, seconds), step.contacts, solver)
             for sink in sinks:
                 sink.write(frame)
-            yield frame
+            sent = yield frame
+            wanted |= checked_values(inputs, sent)
             if not step.status.can_go_on:
                 break
 
 
-def _report(system: System, state: State, step: StepReport, seconds: float) -> Report:
+def completed_report(system: System, state: State, step: StepReport, seconds: float) -> Report:
+    """The report of a step that took so many seconds, with what is measured on its state."""
     values = vars(measure(system, state)) | vars(step)
     del values["contacts"]  # made when they are asked for: `Frame.contacts`
     return Report(**values, wall_seconds=seconds)
@@ -272,13 +324,20 @@ def measure(system: System, state: State) -> Diagnostics:
     return Diagnostics(
         min_det_F=float(J.min()),
         kinetic_energy=0.5 * float(m @ np.einsum("ij,ij->i", v, v)),
-        elastic_energy=sum(_elastic_energy(system, part, x, F[part.tets], J[part.tets]) for part in system.bodies),
+        elastic_energy=sum(_elastic_energy(system, part, x, F[part.tets], J[part.tets]) for part in system.bodies)
+        + _energy_of_patches(system, x),
         potential_energy=-float((m @ x) @ system.gravity),
         stitch_energy=stitch_energy(stitching, points) if len(stitching) else 0.0,
         largest_stitch_stretch=largest_stitch_stretch(stitching, points) if len(stitching) else None,
         linear_momentum=momentum,
         angular_momentum=m @ np.cross(x - center, v - momentum / m.sum()),
     )
+
+
+def _energy_of_patches(system: System, x: NDArray) -> float:
+    if system.patches is None:
+        return 0.0
+    return sum(float(energies.sum()) for energies in patch_energies(system.patches, x))
 
 
 def _elastic_energy(system: System, part: BodyRange, x: NDArray, F: NDArray, J: NDArray) -> float:
@@ -295,5 +354,8 @@ def _elastic_energy(system: System, part: BodyRange, x: NDArray, F: NDArray, J: 
             energy += 0.5 * float(C @ C) / material.volume_compliance
         return energy
     if isinstance(material, Elastic):
-        return float(material.energy_density(F) @ volumes)
+        densities = material.energy_density(F)
+        if system.patches is not None:
+            densities[material.per_tet(len(volumes)).region != NO_REGION] = 0.0
+        return float(densities @ volumes)
     return 0.0

@@ -68,12 +68,14 @@ class State:
     time : [s]
     positions, velocities : (n_vertices, 3) float64 [m], [m/s]
     memory : what a solver must know of earlier steps (BDF2, contact of XPBD); None for a state that comes from outside.
+    inputs : values of the scene's inputs at that time, by name, see `supple.scene.inputs`
     """
 
     time: float
     positions: NDArray[np.float64]
     velocities: NDArray[np.float64]
     memory: Any = None
+    inputs: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.materials.patches.domains import Patches, patches_of
+from supple.materials.per_tet import NO_REGION, TetMaterial
 from supple.mesh.topology import graph_components
 from supple.scene.body import Body
 from supple.scene.forces import Force, SoftTarget
@@ -143,6 +145,16 @@ class System:
     def elements(self) -> NDArray[np.int32]:
         """(m + k, 4) the tets, then the stitches: all elements that couple vertices; -1 for a node without a vertex."""
         return np.concatenate([self.tets, self.stitching.elements()]) if len(self.stitching) else self.tets
+
+    @cached_property
+    def patches(self) -> Patches | None:
+        """The patches of the tets whose material is averaged over such; None where there is none."""
+        rows = [part.body.material.per_tet(part.tets.stop - part.tets.start) for part in self.bodies]
+        if not any((row.region != NO_REGION).any() for row in rows):
+            return None
+        names = ("density", "damping", "kind", "mu", "lam", "region")
+        material = TetMaterial(*(np.concatenate([getattr(row, name) for row in rows]) for name in names))
+        return patches_of(self.tets, self.rest_shape_inverse, self.rest_volumes, material)
 
     @cached_property
     def joined_components(self) -> NDArray[np.int32]:

@@ -35,6 +35,30 @@ def test_every_kind_of_output_reads_back(ball: Path, name: str, capsys: pytest.C
     assert {p.name for p in ball.parent.iterdir()} == {ball.name} | (quartet if ".1." in name else {name})
 
 
+@pytest.mark.parametrize(("options", "count"), [([], 10_000), (["--tets", "3000"], 3000)])
+def test_the_number_of_tets_is_as_asked_or_ten_thousand(ball: Path, options: list[str], count: int) -> None:
+    assert main(["mesh", str(ball), "-o", str(ball.with_name("b.vtu")), *options]) == 0
+    assert len(TetMesh.load(ball.with_name("b.vtu")).tets) == pytest.approx(count, rel=0.1)
+
+
+def test_tets_have_edges_of_the_length_asked(ball: Path) -> None:
+    assert main(["mesh", str(ball), "-o", str(ball.with_name("b.vtu")), "--edge", "0.1"]) == 0
+    mesh = TetMesh.load(ball.with_name("b.vtu"))
+    assert mesh.volumes.max() <= 1e-3 / (6 * 2**0.5) * (1 + 1e-6)
+    edges = mesh.vertices[mesh.edges]
+    assert 0.07 < np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1).mean() < 0.11
+
+
+def test_a_file_in_millimetres_is_named_and_scaled(ball: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    SurfaceMesh(30 * BALL.vertices, BALL.triangles).save(ball)
+    command = ["mesh", str(ball), "-o", str(ball.with_name("b.vtu")), "--tets", "500"]
+    assert main(command) == 0
+    assert " m long; where it is in millimetres, use --scale 0.001" in " ".join(capsys.readouterr().err.split())
+    assert main([*command, "--scale", "0.001"]) == 0
+    assert "millimetres" not in capsys.readouterr().err
+    assert np.ptp(TetMesh.load(ball.with_name("b.vtu")).vertices) == pytest.approx(0.03, rel=0.05)
+
+
 def test_base_index_and_options_reach_the_mesher(ball: Path) -> None:
     options = ["--base-index", "0", "--keep-surface", "--quality", "1.2", "--min-dihedral", "10"]
     assert main(["mesh", str(ball), "--output", str(ball.with_name("b.node")), *options]) == 0
@@ -61,6 +85,10 @@ def test_repair_is_reported(ball: Path, capsys: pytest.CaptureFixture[str]) -> N
         (["ball.stl", "-o", "used.1.node"], "used.1.face: is a folder"),
         (["ball.stl", "-o", "b.node", "--quality", "0.9"], "ball.stl: quality must be"),
         (["ball.stl", "-o", "b.node", "--max-volume", "-1"], "max_volume must be"),
+        (["ball.stl", "-o", "b.node", "--tets", "0"], "tets must be"),
+        (["ball.stl", "-o", "b.node", "--edge", "nan"], "edge must be"),
+        (["ball.stl", "-o", "b.node", "--edge", "0.1", "--tets", "9"], "give only one of max_volume, edge and tets"),
+        (["ball.stl", "-o", "b.node", "--scale", "0"], "scale must be"),
         (["ball.stl", "-o", "b.node", "--memory-limit", "0"], "memory limit must be"),
         (["ball.stl", "-o", "b.node", "--time-limit", "nan"], "time_limit must be"),
         (["ball.stl", "-o", "b.node", "--max-volume", "1e-9", "--time-limit", "0.5"], "time limit of 0.5 s"),

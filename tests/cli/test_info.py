@@ -91,3 +91,31 @@ def test_stitches_of_a_scene(rows_of, tmp_path):
     soft, thread = rows["stitch of 'b' to 'a'"], rows["stitch 'thread'"]
     assert soft == "SoftVertexTriangleStitch, 4 pairs, 0.25 to 0.25 m apart, 4 rest vertices offset"
     assert thread.startswith("VertexVertexStitch, 2 pairs, 1.25 to ")
+
+
+def scene_of(divisions, poisson, more=""):
+    return (
+        f"bodies: [{{name: bar, shape: {{kind: box, size: [4, 1, 0.1], divisions: {divisions}}}, "
+        f"material: {{kind: stable_neo_hookean, youngs: 1e4, poisson: {poisson}{more}}}}}]\n"
+        "solver: {kind: implicit}\ndt: 0.5\nsteps: 4\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("divisions", "poisson", "more", "warned"),
+    [
+        ([4, 4, 2], 0.45, "", True),
+        ([4, 4, 3], 0.45, "", False),  # flat cells, but three across
+        ([4, 4, 2], 0.4, "", False),
+        ([4, 4, 2], 0.45, ", integration: patches", False),
+    ],
+)
+def test_a_thin_scene_that_locks(rows_of, tmp_path, divisions, poisson, more, warned):
+    (tmp_path / "s.yaml").write_text(scene_of(divisions, poisson, more))
+    rows = rows_of("s.yaml")
+    assert ("warning bar" in rows) == warned
+    if warned:
+        # The two large sides.
+        share = 100 * 8 / (8 + 2 * 0.5)
+        assert rows["warning bar"].startswith(f"{share:.0f} % of the surface has fewer than three tets across")
+        assert "Poisson's ratio up to 0.45" in rows["warning bar"]

@@ -55,6 +55,13 @@ def test_schema_is_printed_or_written_to_a_file(tmp_path, capsys):
     assert json.loads((tmp_path / "new" / "scene.json").read_text(encoding="utf-8")) == schema
 
 
+def test_the_schema_of_studies_is_printed_too(capsys):
+    assert main(["schema", "study"]) == ExitCode.OK
+    schema = json.loads(capsys.readouterr().out)
+    Draft202012Validator.check_schema(schema)
+    assert "supple_study" in schema["properties"]
+
+
 def test_a_misspelt_command_gets_a_suggestion(capsys):
     assert main(["shema"]) == ExitCode.INPUT
     assert "schema" in capsys.readouterr().err

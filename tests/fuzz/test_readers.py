@@ -5,11 +5,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import logging
 import os
+import shutil
 import struct
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +23,10 @@ from hypothesis import strategies as st
 import supple as sp
 from supple.mesh import shapes
 from supple.mesh.io.mesh_files import SURFACE_WRITERS
+from supple.output.checkpoint.file import read_checkpoint
+from supple.runs.checkpoints import frame_of
+from supple.runs.contents import RunPaths
+from supple.runs.journal import read_journal
 from supple.scene_file.loader import load_run
 from supple.studies.cases import read_result
 
@@ -88,6 +95,44 @@ def make_study(folder: Path) -> None:
     (folder / "study.yaml").write_text(STUDY, encoding="utf-8")
 
 
+SOLVER = sp.XPBD(substeps=1)
+
+
+def small_scene() -> sp.Scene:
+    """Two cubes that touch, so that a checkpoint has a memory of contact."""
+    cube = shapes.box((1, 1, 1), (1, 1, 1))
+    soft = sp.StableNeoHookean(youngs=1e4, poisson=0.3)
+    bodies = [sp.Body(name, cube, soft, position=(0, y, 0)) for name, y in (("low", 0.5), ("high", 1.5))]
+    return sp.Scene(bodies, obstacles=[sp.HalfSpace()], pins=[sp.Pin("high", [0], sp.MotionInput("hand"))])
+
+
+def keep_run(folder: Path) -> None:
+    """A run with two checkpoints; the latest one, and what its checksum is of, beside it."""
+    kept = sp.RunFolder(folder / "run", SOLVER, checkpoint_every=2)
+    list(sp.simulate(small_scene(), SOLVER, 0.01, 2, sinks=[kept]))
+    latest = RunPaths(folder / "run").checkpoints()[0]
+    shutil.copy(latest, folder / "latest.checkpoint")
+    (folder / "content").write_bytes(latest.read_bytes().split(b"\n", 2)[2])
+
+
+def read_checkpoint_and_go_on(path: Path) -> None:
+    """Where the file is accepted, it does not describe the scene, or the run goes on, or is refused."""
+    checkpoint = read_checkpoint(path)
+    with suppress(sp.SceneError):
+        frame = frame_of(checkpoint, small_scene(), SOLVER)
+        if frame is not None:
+            list(sp.simulate(frame.system.scene, SOLVER, 0.01, 1, start=frame))
+
+
+def read_content(path: Path) -> None:
+    """A checkpoint whose checksum is right for whatever its content is."""
+    content = path.read_bytes()
+    first = (path.parent / "latest.checkpoint").read_bytes().split(b"\n", 1)[0]
+    made = path.parent / "made.checkpoint"
+    made.write_bytes(first + b"\n" + hashlib.sha256(content).hexdigest().encode() + b"\n" + content)
+    read_checkpoint_and_go_on(made)
+
+
 READERS = {
     **{
         f"surface {kind}": Reader(
@@ -111,6 +156,9 @@ READERS = {
     "study": Reader(make_study, "study.yaml", sp.load_study),
     "result of a case": Reader(text_file("result.json", RESULT), "result.json", lambda path: read_result(path.parent)),
     "recording": Reader(record, "r.vtkhdf", read_whole_recording),
+    "journal": Reader(keep_run, "run/run/run.json", read_journal),
+    "checkpoint": Reader(keep_run, "latest.checkpoint", read_checkpoint_and_go_on),
+    "content of a checkpoint": Reader(keep_run, "content", read_content),
 }
 
 NUMBERS = [b"-1", b"0", b"1e999", b"nan", b"4000000000", b"99999999999999999999", b"1e-320", b"0x10", b".5.", b"1/0"]

@@ -44,7 +44,9 @@ def cluster(tmp_path_factory):
     pytest.importorskip("distributed")
     folder = tmp_path_factory.mktemp("cluster")
     contact, log = folder / "scheduler.json", (folder / "log.txt").open("wb")
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    # A case that kills its workers is given up after the second one, not the fourth: starting one takes seconds.
+    failures = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1"}
+    environment = os.environ | failures | {"PYTHONPATH": os.pathsep.join(sys.path)}
 
     def start(module, *options):
         command = [sys.executable, "-m", f"distributed.cli.{module}", "--scheduler-file", str(contact), *options]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import supple as sp
-from supple.studies.factors import Levels, as_factor, plain
+from supple.studies.sampling.factors import Levels, as_factor, plain
 
 FACTORS = {"a": Levels((1, 2, 3)), "b": Levels(("x", "y"))}
 

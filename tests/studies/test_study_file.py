@@ -1,9 +1,12 @@
 """Study files: what they mean, and errors with file, line and key."""
 
 import pytest
+import yaml
+from jsonschema import Draft202012Validator
 
 import supple as sp
-from supple.studies.factors import Levels, LogUniform
+from supple.studies.sampling.factors import Levels, LogUniform
+from supple.studies.study_file import study_schema
 
 from .conftest import SCENE
 
@@ -38,6 +41,27 @@ def test_the_contents_of_a_study_file(write):
     assert study.design == sp.Grid()
     assert study.units == {"drop": "m", "energy": "J"}
     assert len(study.design.points(study.factors)) == 4
+    assert Draft202012Validator(study_schema()).is_valid(yaml.safe_load(STUDY))
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("scene: fall.yaml", "scenes: fall.yaml"),
+        ("[-1.0, -2.0]", "[]"),
+        ("loguniform: [0.1, 1]", "loguniform: [0.1]"),
+        ("count: 2", "counts: 2"),
+        ("kind: grid", "kind: grids"),
+        ("quantity: kinetic_energy", "quantity: heat"),
+        ("axis: y", "axis: w"),
+    ],
+)
+def test_the_schema_rejects_what_the_loader_rejects(write, old, new):
+    assert old in STUDY
+    text = STUDY.replace(old, new)
+    assert not Draft202012Validator(study_schema()).is_valid(yaml.safe_load(text))
+    with pytest.raises(sp.SuppleError):
+        sp.load_study(write(text))
 
 
 @pytest.mark.parametrize(

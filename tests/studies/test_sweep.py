@@ -1,13 +1,8 @@
 """Studies on real worker processes: results, resumption, failures, and workers that are killed."""
 
 import csv
-import json
 import os
 import signal
-import subprocess
-import sys
-import textwrap
-import time
 from pathlib import Path
 
 import numpy as np
@@ -185,7 +180,6 @@ def killing(marks: Path, victims: str):
 
     def make(case):
         import os
-        import signal
 
         import supple as sp
 
@@ -202,17 +196,148 @@ def killing(marks: Path, victims: str):
     return make
 
 
-@pytest.mark.parametrize("victims", ["once", "supervisor too"])
 @pytest.mark.skipif(os.name != "posix", reason="kills processes by signals")
-def test_a_killed_worker_loses_no_case(tmp_path, victims):
+def test_a_worker_killed_with_its_supervisor_loses_no_case(tmp_path):
     marks = tmp_path / "marks"
     marks.mkdir()
     cases = [1, 2, 3, 4, 5, 6]
-    make = killing(marks, victims)
+    make = killing(marks, "supervisor too")
     table = sp.sweep(make, {"case": cases}, measure=DROP, folder=tmp_path / "s", workers=2, **SETTINGS)
     assert table.done.all(), table.reasons
     np.testing.assert_allclose(table["drop"], [fallen(g) for g in cases], rtol=1e-9)
     assert (marks / "case-3").stat().st_size >= 2
+
+
+def killing_in_mid_run(marks: Path):
+    """A function whose solver marks each step, and kills its worker at the seventh step of case 2, the first time."""
+
+    def make(case):
+        import os
+        from dataclasses import dataclass
+
+        import supple as sp
+
+        mark = marks / f"case-{case}"
+
+        @dataclass(frozen=True)
+        class Marking(sp.XPBD):
+            def step(self, system, state, dt, workspace):
+                with mark.open("a") as file:
+                    file.write("x")
+                if case == 2 and mark.stat().st_size == 7:
+                    os.kill(os.getpid(), signal.SIGKILL)
+                return super().step(system, state, dt, workspace)
+
+        cube = sp.Body("cube", sp.shapes.box((1, 1, 1), (1, 1, 1)), sp.EdgesAndVolume())
+        solver = Marking(substeps=1, contact=None)
+        return sp.Run(sp.Scene([cube], gravity=(0, -1.0 * case, 0)), solver, FALL_DT, FALL_STEPS)
+
+    return make
+
+
+@pytest.mark.skipif(os.name != "posix", reason="kills processes by signals")
+def test_a_killed_worker_loses_no_case_and_its_own_goes_on_from_the_checkpoint(tmp_path):
+    marks = tmp_path / "marks"
+    marks.mkdir()
+    make = killing_in_mid_run(marks)
+    cases = [1, 2, 3, 4]
+    table = sp.sweep(make, {"case": cases}, measure=DROP, folder=tmp_path / "s", workers=2, checkpoint_seconds=0)
+    assert table.done.all(), table.reasons
+    np.testing.assert_allclose(table["drop"], [fallen(g) for g in cases], rtol=1e-9)
+    steps = [(marks / f"case-{case}").stat().st_size for case in cases]
+    assert sum(steps) <= 4 * FALL_STEPS + 2, "what was recorded is not simulated again"
+    assert steps[1] == FALL_STEPS + 1, "only the step in which the worker was killed is taken again"
+    for folder in (tmp_path / "s" / "cases").iterdir():
+        assert {path.name for path in folder.iterdir()} == {"recording.vtkhdf", "result.json"}
+        with sp.read_recording(folder / "recording.vtkhdf") as recording:
+            assert [frame.index for frame in recording] == list(range(FALL_STEPS + 1))
+
+
+def simulate_in(run, folder, seconds):
+    from supple.runs.recorded import simulate_recorded
+
+    return simulate_recorded(run, folder / "recording.vtkhdf", folder / "checkpoint", seconds)
+
+
+def begun_case(folder, seconds=0.0):
+    """A case that was interrupted after its sixth frame, as a killed worker leaves it; the whole case beside it."""
+    from supple.runs import recorded as module
+
+    run = sp.Run(make_fall(10.0), SETTINGS["solver"], FALL_DT, FALL_STEPS)
+    whole, half = folder / "whole", folder / "half"
+    for path in (whole, half):
+        path.mkdir(parents=True)
+    simulate_in(run, whole, seconds)
+
+    class Killed(BaseException):
+        pass
+
+    def killed(self, frame):
+        write(self, frame)
+        if frame.index == 6:
+            raise Killed
+
+    write = module.CheckpointSink.write
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module.CheckpointSink, "write", killed)
+        with pytest.raises(Killed):
+            simulate_in(run, half, seconds)
+    return run, whole, half
+
+
+@pytest.mark.parametrize("fault", ["none", "damaged", "another case", "no recording"])
+def test_a_begun_case_has_the_bits_of_an_uninterrupted_one_or_begins_again(tmp_path, caplog, fault):
+    run, whole, half = begun_case(tmp_path)
+    checkpoint = half / "checkpoint"
+    if fault == "damaged":
+        checkpoint.write_bytes(checkpoint.read_bytes()[:-1])
+    if fault == "another case":
+        run = sp.Run(make_fall(5.0), run.solver, run.dt, run.steps)
+        simulate_in(run, whole, 30.0)
+    if fault == "no recording":
+        (half / "recording.vtkhdf").unlink()
+    assert simulate_in(run, half, 0.0) == (FALL_STEPS, "")
+    assert not checkpoint.exists()
+    with sp.read_recording(whole / "recording.vtkhdf") as one, sp.read_recording(half / "recording.vtkhdf") as two:
+        assert len(one) == len(two) == FALL_STEPS + 1
+        for first, second in zip(one, two, strict=True):
+            assert np.array_equal(first.state.positions, second.state.positions)
+    assert ("begins again" in caplog.text) == (fault == "another case")
+    assert ("is damaged" in caplog.text) == (fault == "damaged")
+
+
+def test_a_short_case_has_no_checkpoint(tmp_path):
+    _, _, half = begun_case(tmp_path, seconds=30.0)
+    assert not (half / "checkpoint").exists()
+
+
+def test_two_studies_in_one_folder_are_refused(tmp_path):
+    from supple.files.lock import FolderLock
+
+    folder = tmp_path / "s"
+    folder.mkdir()
+    held = FolderLock(folder)
+    with pytest.raises(sp.OutputError, match=rf"another run is writing to it \(process {os.getpid()}\)"):
+        sp.sweep(make_fall, {"gravity": [1.0]}, measure=DROP, folder=folder, workers=1, **SETTINGS)
+    assert [path.name for path in folder.iterdir()] == [".supple.lock"]
+    held.release()
+
+
+def test_a_case_that_another_worker_is_busy_with_is_lost_and_not_damaged(tmp_path):
+    from supple.files.lock import FolderLock
+    from supple.studies.run_case import run_case
+    from supple.studies.sources import FunctionJob
+
+    job = FunctionJob(make_fall, {"gravity": 1.0}, SETTINGS["solver"], FALL_DT, FALL_STEPS)
+    held = FolderLock(tmp_path)
+    result = run_case(job, tmp_path, DROP, "", 30.0)
+    assert (result.status, result.lost) == ("failed", True)
+    assert "another run is writing to it" in result.reason
+    assert [path.name for path in tmp_path.iterdir()] == [".supple.lock"]
+    held.release()
+    assert run_case(job, tmp_path, DROP, "", 30.0).status == "done"
+    with pytest.raises(sp.StudyError, match="checkpoint_seconds is -1; give a number of zero or more"):
+        sp.sweep(make_fall, {"gravity": [1.0]}, measure=DROP, folder=tmp_path, checkpoint_seconds=-1, **SETTINGS)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="kills processes by signals")
@@ -224,118 +349,10 @@ def test_a_case_that_always_kills_its_worker_fails_and_the_others_do_not(cluster
     options = {"measure": DROP, "folder": tmp_path / "s", "scheduler": cluster, **SETTINGS}
     table = sp.sweep(make, {"case": cases}, **options)
     assert table.done.tolist() == [True, True, False, True]
-    assert "workers were lost" in table.reasons[2]
+    assert table.reasons[2].startswith("2 workers were lost")
     tried = (marks / "case-3").stat().st_size
     sp.sweep(make, {"case": cases}, **options)  # lost workers are worth another try
     assert (marks / "case-3").stat().st_size > tried
-
-
-def test_a_case_too_large_for_its_share_of_the_memory_runs_on_fewer_workers(tmp_path, monkeypatch):
-    from supple.studies import workers as module
-
-    def make(tets):
-        class Large(sp.XPBD):
-            def bytes_needed(self, scene):
-                return tets
-
-        cube = sp.Body("cube", sp.shapes.box((1, 1, 1), (1, 1, 1)), sp.EdgesAndVolume())
-        return sp.Run(sp.Scene([cube]), Large(substeps=1, contact=None), 0.01, 2)
-
-    def limit(recording):
-        from distributed import get_worker
-
-        return get_worker().memory_manager.memory_limit
-
-    monkeypatch.setattr(module, "available_bytes", lambda: 4_000_000_000)
-    values = [0, int(2e9), int(5e9)]
-    table = sp.sweep(make, {"tets": values}, measure=limit, folder=tmp_path / "s", workers=3)
-    assert table.done.tolist() == [True, True, False]
-    np.testing.assert_allclose(table["measure"][:2], [1.2e9, 3.6e9], rtol=1e-3)
-    assert table.reasons[2] == "needs about 5.3 GB of memory; 3.6 GB can be used here"
-
-
-def test_a_cluster_without_a_worker_large_enough(cluster, tmp_path):
-    def make(tets):
-        class Large(sp.XPBD):
-            def bytes_needed(self, scene):
-                return tets
-
-        cube = sp.Body("cube", sp.shapes.box((1, 1, 1), (1, 1, 1)), sp.EdgesAndVolume())
-        return sp.Run(sp.Scene([cube]), Large(substeps=1, contact=None), 0.01, 2)
-
-    def frames(recording):
-        return len(recording)
-
-    table = sp.sweep(make, {"tets": [0, int(9e9)]}, measure=frames, folder=tmp_path / "s", scheduler=cluster)
-    assert table["measure"].tolist()[0] == 3
-    assert table.reasons[1] == "needs about 9.3 GB of memory; the largest worker has 2 GB"
-
-
-SCRIPT = """
-import sys, time
-import supple as sp
-
-folder = sys.argv[1]
-
-def make(case):
-    if case > 2:
-        open(folder + "/slow", "w").close()
-        time.sleep(600)
-    cube = sp.Body("cube", sp.shapes.box((1, 1, 1), (1, 1, 1)), sp.EdgesAndVolume())
-    return sp.Scene([cube], gravity=(0, -case, 0))
-
-def low(recording):
-    return recording[-1].positions["cube"][:, 1].min()
-
-sp.sweep(make, {"case": [1, 2, 3, 4]}, measure=low, folder=folder + "/s", workers=1,
-         solver=sp.XPBD(substeps=1, contact=None), dt=0.01, steps=2)
-"""
-
-
-@pytest.mark.skipif(os.name != "posix", reason="interrupts a process by a signal")
-def test_an_interrupted_study_keeps_what_has_ended_and_leaves_no_process(tmp_path):
-    """The script has no `if __name__ == "__main__"`: workers do not import it."""
-    script = tmp_path / "script.py"
-    script.write_text(SCRIPT, encoding="utf-8")
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-    process = subprocess.Popen(
-        [sys.executable, str(script), str(tmp_path)],
-        env=environment,
-        stderr=subprocess.PIPE,
-        # Whoever runs the tests in the background may have had SIGINT ignored; a person at a terminal has not.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )
-    end = time.monotonic() + 120
-    while not (tmp_path / "slow").exists() and time.monotonic() < end:
-        time.sleep(0.1)
-    workers = json.loads(subprocess.check_output(["python3", "-c", CHILDREN, str(process.pid)]))
-    assert workers
-    process.send_signal(signal.SIGINT)
-    _, error = process.communicate(timeout=300)
-    assert b"KeyboardInterrupt" in error
-    with (tmp_path / "s" / "table.csv").open(encoding="utf-8", newline="") as file:
-        assert [row["status"] for row in csv.DictReader(file)] == ["done", "done"]
-    end = time.monotonic() + 30
-    while any(Path(f"/proc/{pid}").exists() for pid in workers) and time.monotonic() < end:
-        time.sleep(0.1)
-    assert [pid for pid in workers if Path(f"/proc/{pid}").exists()] == []
-
-
-CHILDREN = textwrap.dedent("""
-    import json, pathlib, sys
-    parents = {}
-    for stat in pathlib.Path("/proc").glob("[0-9]*/stat"):
-        try:
-            text = stat.read_text()
-        except OSError:
-            continue
-        parents[int(stat.parent.name)] = int(text.rpartition(")")[2].split()[1])
-    found, new = set(), {int(sys.argv[1])}
-    while new:
-        new = {pid for pid, parent in parents.items() if parent in new}
-        found |= new
-    print(json.dumps(sorted(found)))
-""")
 
 
 @pytest.mark.parametrize(

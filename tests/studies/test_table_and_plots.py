@@ -9,8 +9,8 @@ import pytest
 import supple as sp
 from supple.studies.cases import Case, CaseResult, read_result, write_result
 from supple.studies.effects import main_effects, varying_factors
-from supple.studies.factors import Levels
 from supple.studies.plots import plot_one_factor, plot_two_factors
+from supple.studies.sampling.factors import Levels
 from supple.studies.table import StudyTable
 
 

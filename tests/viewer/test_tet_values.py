@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.simulate import measure
+from supple.state import State
 from supple.system import build_system
 from supple.viewer.engine.measurement.contact_points import contact_points
 from supple.viewer.engine.measurement.tet_values import QUANTITIES, tet_values
@@ -29,6 +31,13 @@ def test_von_mises_stress_of_a_small_uniaxial_stretch():
     x = system.rest_positions * [1.0 + e, 1.0 - nu * e, 1.0 - nu * e]
     assert tet_values(system, x, "von_mises") == pytest.approx(np.full(48, 1e5 * e), rel=1e-3)
     assert tet_values(system, x, "energy") == pytest.approx(np.full(48, 0.5 * 1e5 * e**2), rel=1e-3)
+
+
+def test_the_energy_of_patches_adds_up_to_that_of_the_report():
+    system = cube_system(sp.StableNeoHookean(youngs=1e5, poisson=0.49, integration="patches"))
+    x = system.rest_positions + 0.02 * np.random.default_rng(0).normal(size=system.rest_positions.shape)
+    total = measure(system, State(0.0, x, np.zeros_like(x))).elastic_energy
+    assert tet_values(system, x, "energy") @ system.rest_volumes == pytest.approx(total, rel=1e-12)
 
 
 def test_pressure_has_no_von_mises_stress():

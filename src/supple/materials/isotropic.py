@@ -33,6 +33,7 @@ density = dispatch("density", [energy.density for energy in STRETCH_ENERGIES], U
 gradient = dispatch("gradient", [energy.gradient for energy in STRETCH_ENERGIES], UNKNOWN_THREE)
 curvature = dispatch("curvature", [energy.curvature for energy in STRETCH_ENERGIES], UNKNOWN_SIX)
 quotients = dispatch("quotients", [energy.quotients for energy in STRETCH_ENERGIES], UNKNOWN_SIX)
+volume_term = dispatch("volume_term", [energy.volume_term for energy in STRETCH_ENERGIES], UNKNOWN_THREE)
 _OF_STRETCHES = np.array([energy.density_of_stretches for energy in STRETCH_ENERGIES])
 
 
@@ -69,7 +70,7 @@ def first_piola(F, kind, mu, lam):
 
 
 @njit(error_model="numpy")
-def _nearest_semidefinite(A):
+def nearest_semidefinite(A):
     """A symmetric 3x3 matrix (a00, a11, a22, a12, a02, a01) with its negative eigenvalues set to zero."""
     a00, a11, a22, a12, a02, a01 = A
     scale = abs(a00) + abs(a11) + abs(a22)
@@ -102,7 +103,7 @@ def principal_hessian(s, kind, mu, lam, project):
     A = curvature(kind, s, mu, lam)
     q = quotients(kind, s, mu, lam)
     if project:
-        A = _nearest_semidefinite(A)
+        A = nearest_semidefinite(A)
         q = (max(q[0], 0.0), max(q[1], 0.0), max(q[2], 0.0), max(q[3], 0.0), max(q[4], 0.0), max(q[5], 0.0))
     alpha = (0.5 * (q[0] + q[3]), 0.5 * (q[1] + q[4]), 0.5 * (q[2] + q[5]))
     beta = (0.5 * (q[0] - q[3]), 0.5 * (q[1] - q[4]), 0.5 * (q[2] - q[5]))

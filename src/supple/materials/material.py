@@ -14,8 +14,8 @@ from supple.errors import SceneError
 from supple.materials.isotropic import densities, hessians, piolas
 from supple.materials.kinds import STRETCH_ENERGIES
 from supple.materials.lame import lame_from_engineering
-from supple.materials.per_tet import TetMaterial, one_per_tet
-from supple.materials.stretch_energies.stretches import StretchFunctions
+from supple.materials.per_tet import NO_REGION, TetMaterial, one_per_tet
+from supple.materials.stretch_energies.stretches import StretchFunctions, no_volume_term
 from supple.numerics.threads import threads_for
 
 
@@ -67,7 +67,9 @@ class Material(ABC):
         SceneError : where a parameter is given per tet, for another number of tets.
         """
 
-    def _tet_material(self, n_tets: int, kind: int, mu: ArrayLike, lam: ArrayLike) -> TetMaterial:
+    def _tet_material(
+        self, n_tets: int, kind: int, mu: ArrayLike, lam: ArrayLike, region: int = NO_REGION
+    ) -> TetMaterial:
         name = type(self).__name__
         return TetMaterial(
             density=one_per_tet(self.density, n_tets, f"{name}: density"),
@@ -75,6 +77,7 @@ class Material(ABC):
             kind=np.full(n_tets, kind, dtype=np.int32),
             mu=one_per_tet(mu, n_tets, f"{name}: mu"),
             lam=one_per_tet(lam, n_tets, f"{name}: lam"),
+            region=np.full(n_tets, region, dtype=np.int32),
         )
 
 
@@ -87,6 +90,9 @@ class Elastic(Material):
     youngs : Young's modulus E of small strains [Pa]; one number, or one per tetrahedron of the body.
     poisson : Poisson's ratio nu [-], above -1 and below 0.5; one number, or one per tetrahedron. Below 0
         (auxetic), some energies have no lower bound at large strains; see docs/materials.md.
+    integration : "tets", the energy of each tet from its own F; or "patches", from the mean F around each edge and
+        the mean J around each vertex, with which tets bend, twist and keep their volume without locking (`Implicit`
+        only; energies with a volume term lam U(J)). See docs/locking.md.
 
     Raises
     ------
@@ -97,9 +103,11 @@ class Elastic(Material):
 
     youngs: float | NDArray[np.float64]
     poisson: float | NDArray[np.float64]
+    integration: str = "tets"
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        self._check_integration()
         self._require_finite("youngs", positive=True, unit="Pa")
         kind = type(self).__name__
         try:
@@ -110,6 +118,16 @@ class Elastic(Material):
         if bad.any():
             raise SceneError(
                 f"{kind}: poisson is {nu[bad][0]:g}; it must be above -1 and below 0.5 (0.49 is nearly incompressible)"
+            )
+
+    def _check_integration(self) -> None:
+        kind = type(self).__name__
+        if self.integration not in ("tets", "patches"):
+            raise SceneError(f"{kind}: integration is {self.integration!r}; give 'tets' or 'patches'")
+        if self.integration == "patches" and self.stretch_functions.volume_term is no_volume_term:
+            raise SceneError(
+                f"{kind}: integration='patches' needs an energy with a volume term of J; give integration='tets', or "
+                "use StableNeoHookean, NeoHookean or FixedCorotated"
             )
 
     @classmethod
@@ -135,7 +153,8 @@ class Elastic(Material):
         name = type(self).__name__
         one_per_tet(self.youngs, n_tets, f"{name}: youngs")
         one_per_tet(self.poisson, n_tets, f"{name}: poisson")
-        return self._tet_material(n_tets, self.kind(), *self.lame_parameters())
+        region = 0 if self.integration == "patches" else NO_REGION
+        return self._tet_material(n_tets, self.kind(), *self.lame_parameters(), region)
 
     def energy_density(self, F: ArrayLike) -> NDArray[np.float64]:
         """Strain energy per rest volume, zero at rest.

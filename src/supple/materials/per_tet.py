@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError
 
 NOT_ELASTIC = -1
+NO_REGION = -1
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,6 +22,7 @@ class TetMaterial:
     density : (m,) [kg/m^3]; damping : (m,) Kelvin-Voigt time [s]
     kind : (m,) int32, the row of `kinds.STRETCH_ENERGIES`, or `NOT_ELASTIC`
     mu, lam : (m,) parameters of each material's energy density [Pa]
+    region : (m,) int32, the region over whose patches the energy of a tet is averaged, or `NO_REGION`
     """
 
     density: NDArray[np.float64]
@@ -28,6 +30,7 @@ class TetMaterial:
     kind: NDArray[np.int32]
     mu: NDArray[np.float64]
     lam: NDArray[np.float64]
+    region: NDArray[np.int32]
 
 
 def one_per_tet(value: ArrayLike, n_tets: int, what: str) -> NDArray[np.float64]:

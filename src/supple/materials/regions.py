@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.materials.material import Elastic
-from supple.materials.per_tet import TetMaterial
+from supple.materials.per_tet import NO_REGION, TetMaterial
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -25,6 +25,7 @@ class Regions(Elastic):
     Attributes
     ----------
     youngs, poisson, density, damping : (n_tets,) of each tet's material, as for any material.
+    integration : that of each material counts, not this one; patches do not reach into another material.
 
     Raises
     ------
@@ -35,6 +36,7 @@ class Regions(Elastic):
     index: ArrayLike
     youngs: NDArray[np.float64] = field(init=False)
     poisson: NDArray[np.float64] = field(init=False)
+    integration: str = field(init=False, default="tets")
     density: NDArray[np.float64] = field(init=False)  # pyright: ignore[reportIncompatibleVariableOverride]
     damping: NDArray[np.float64] = field(init=False)  # pyright: ignore[reportIncompatibleVariableOverride]
 
@@ -85,4 +87,6 @@ class Regions(Elastic):
             raise SceneError(f"Regions: index has {len(index)} values for {n_tets} tets; give one per tet")
         kinds = np.array([material.kind() for material in self.materials], dtype=np.int32)
         mu, lam = self.lame_parameters()
-        return TetMaterial(density=self.density, damping=self.damping, kind=kinds[index], mu=mu, lam=lam)
+        averaged = [material.integration == "patches" for material in self.materials]
+        region = np.where(averaged, np.arange(len(averaged)), NO_REGION).astype(np.int32)[index]
+        return TetMaterial(density=self.density, damping=self.damping, kind=kinds[index], mu=mu, lam=lam, region=region)

@@ -83,10 +83,9 @@ def _minus_sum(A, B, C):
 
 
 @njit(error_model="numpy")
-def _put_hessian(U, s, V, B, volume, kind, mu, lam, project, out, e):
-    """The 12x12 Hessian of one tet into out[e], for F = U diag(s) V^T; B = Dm^-1, whose rows are the shape gradients of
-    nodes 1, 2, 3."""
-    A, alpha, beta = principal_hessian(s, kind, mu, lam, project)
+def put_hessian(U, A, alpha, beta, V, B, volume, out, e):
+    """The 12x12 Hessian of one tet into out[e], for F = U diag(s) V^T and the result of `principal_hessian`; B = Dm^-1,
+    whose rows are the shape gradients of nodes 1, 2, 3."""
     v = volume
     A = (v * A[0], v * A[1], v * A[2], v * A[3], v * A[4], v * A[5])
     alpha = (v * alpha[0], v * alpha[1], v * alpha[2])
@@ -133,7 +132,8 @@ def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, ene
         energies[e] = volumes[e] * density(kind[e], F, s, mu[e], lam[e])
         put_gradient(stress(U, s, V, kind[e], mu[e], lam[e]), B, volumes[e], gradients, e)
         if second:
-            _put_hessian(U, s, V, B, volumes[e], kind[e], mu[e], lam[e], project, hessians, e)
+            A, alpha, beta = principal_hessian(s, kind[e], mu[e], lam[e], project)
+            put_hessian(U, A, alpha, beta, V, B, volumes[e], hessians, e)
 
 
 @njit(parallel=True, cache=True, error_model="numpy")

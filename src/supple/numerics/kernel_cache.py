@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import pickle
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cached_property, partial
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
@@ -20,23 +21,61 @@ from numba import prange
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
 
+from supple.numerics.parallel_kernel import ParallelKernel
+
 __all__ = ["KernelCache", "njit", "prange", "reached_code"]
 
 
-def njit(function: FunctionType | None = None, *, cache: bool = False, **options: Any) -> Any:
+def njit(function: FunctionType | None = None, *, cache: bool = False, parallel: bool = False, **options: Any) -> Any:
     """Compile a function in Numba's nopython mode: `numba.njit`, with the cache of this module.
+
+    A kernel runs without Python's global lock, so that threads of one process can simulate at the same time. It must
+    not be called by two threads with the same arrays.
 
     Parameters
     ----------
     cache : whether the machine code is kept on disk, see `KernelCache`.
-    options : as of `numba.njit`.
+    parallel : whether loops over `prange` may use several threads. The kernel is then a `ParallelKernel`, as is every
+        kernel that calls one.
+    options : as of `numba.njit`; `nogil=False` for a kernel with parts in Python.
     """
     if function is None:
-        return partial(njit, cache=cache, **options)
+        return partial(njit, cache=cache, parallel=parallel, **options)
+    if not parallel and not _called_kernels(function):
+        return _compiled(function, cache, options)
+    serial = _compiled(_form(function, "serial"), cache, options)
+    several = _compiled(_form(function, "parallel"), cache, {**options, "parallel": True} if parallel else options)
+    # Where NUMBA_DISABLE_JIT is set, both are plain functions.
+    return ParallelKernel(function, serial, several) if isinstance(several, Dispatcher) else several
+
+
+def _compiled(function: FunctionType, cache: bool, options: dict[str, Any]) -> Any:
+    options = {"nogil": True, **options}
     compiled: Any = numba.njit(**options)(function)
-    if cache and isinstance(compiled, Dispatcher):  # a plain function where NUMBA_DISABLE_JIT is set
+    if cache and isinstance(compiled, Dispatcher):
         compiled._cache = KernelCache(function)  # pyright: ignore[reportAttributeAccessIssue]
     return compiled
+
+
+def _called_kernels(function: FunctionType) -> dict[str, ParallelKernel]:
+    """The parallel kernels that a function calls, by the names that they have in its file; they stand above it."""
+    known = ((name, function.__globals__.get(name)) for name in function.__code__.co_names)
+    return {name: value for name, value in known if isinstance(value, ParallelKernel)}
+
+
+def _form(function: FunctionType, form: str) -> FunctionType:
+    """A copy of a function that calls the same form of other kernels: "serial" or "parallel".
+
+    It has a name of its own: Numba's cache distinguishes kernels by name, not by options.
+    """
+    called = {name: getattr(kernel, form) for name, kernel in _called_kernels(function).items()}
+    names = {**function.__globals__, **called} if called else function.__globals__
+    copy = FunctionType(
+        function.__code__, names, f"{function.__name__}_{form}", function.__defaults__, function.__closure__
+    )
+    copy.__qualname__, copy.__module__ = f"{function.__qualname__}_{form}", function.__module__
+    copy.__doc__ = function.__doc__
+    return copy
 
 
 class KernelCache(FunctionCache):
@@ -52,8 +91,14 @@ class KernelCache(FunctionCache):
         try:
             return super().load_overload(sig, target_context)
         except Exception:  # the files name a module that has moved since, or are damaged: unpickling may raise anything
-            self.flush()
+            with suppress(OSError):
+                self.flush()
             return None
+
+    def save_overload(self, sig, data):
+        # A kernel that is not kept is compiled again next time: a full disk is no reason to end a run.
+        with suppress(OSError):
+            super().save_overload(sig, data)
 
     @cached_property
     def _stamp(self) -> tuple[Any, bytes]:

@@ -5,16 +5,13 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
-
-import numpy as np
 
 from supple.errors import OutputError
-from supple.output.checkpoint.file import Checkpoint, RunFacts, write_checkpoint
+from supple.output.checkpoint.file import RunFacts, write_checkpoint
 from supple.output.export.exporter import export
 from supple.output.recording.recorder import Recorder
+from supple.runs.checkpoints import checkpoint_of
 from supple.runs.contents import RunPaths
-from supple.runs.facts import versions
 from supple.runs.journal import Journal, Session, now, write_journal
 from supple.runs.log import RunLog
 from supple.simulate import Frame
@@ -128,15 +125,7 @@ class Keeper:
     def _write_checkpoint(self, frame: Frame) -> None:
         """Write a frame that was recorded."""
         self.recorder.sync()  # a power failure must not leave a checkpoint without its frame
-        checkpoint = Checkpoint(
-            run=self.run,
-            index=frame.index,
-            state=frame.state,
-            start_states=tuple(replace(state, memory=None) for state in frame.system.start_states),
-            anchors=tuple(np.asarray(pin.anchors) for pin in frame.system.pins),
-            versions=versions(),
-        )
-        write_checkpoint(self.paths.checkpoint(frame.index), checkpoint)
+        write_checkpoint(self.paths.checkpoint(frame.index), checkpoint_of(frame, self.run))
         self._checkpointed = frame.index
         self.paths.remove_old_checkpoints()
         self.log.note(f"frame {frame.index}: checkpoint")

@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from supple.errors import OutputError, SceneError
 from supple.files.lock import FolderLock, in_use, is_locked
 from supple.output.checkpoint.file import Checkpoint, read_checkpoint
-from supple.output.checkpoint.scene_hash import scene_hash
 from supple.output.recording.continued import ContinuedRecorder
 from supple.output.recording.reader import read_recording
 from supple.output.recording.recorder import Recorder
+from supple.runs.checkpoints import frame_of
 from supple.runs.contents import RunPaths
 from supple.runs.facts import differences, versions
 from supple.runs.journal import Journal, read_journal
 from supple.runs.keeper import Keeper
 from supple.runs.run_folder import FolderSink
 from supple.scene.scene import Scene
-from supple.simulate import Frame, Sink, simulate, start_frame
-from supple.system import Solver, rebuilt_system
+from supple.simulate import Control, Frame, Frames, Sink, simulate
+from supple.system import Solver
 
 logger = logging.getLogger(__name__)
 
@@ -61,8 +61,9 @@ def resume(
     solver: Solver | None = None,
     *,
     steps: int | None = None,
+    control: Control | None = None,
     sinks: Sequence[Sink] = (),
-) -> Generator[Frame]:
+) -> Frames:
     """Go on with a run from its last checkpoint, in the same folder; yields the frames after it.
 
     They have the bits that an uninterrupted run would have given, with the same versions of all packages on the same
@@ -73,6 +74,7 @@ def resume(
     folder : of a run that `RunFolder` or `supple run` has kept
     scene, solver : those of the run, where its scene did not come from a scene file
     steps : number of frames of the whole run from now on; None: as before
+    control : see `simulate`; the inputs of the scene have the values of the checkpoint
     sinks : in addition to the folder; they receive the frames from the checkpoint on
 
     Raises
@@ -100,7 +102,7 @@ def resume(
     if changed:
         logger.warning("%s: the last bits may differ, since versions did: %s", paths.folder, changed)
     sink = ResumedFolder(paths.folder, replace(journal, run=replace(run, steps=total)))
-    return simulate(scene, solver, run.dt, total - done, start=start, sinks=[sink, *sinks])
+    return simulate(scene, solver, run.dt, total - done, start=start, control=control, sinks=[sink, *sinks])
 
 
 def last_checkpoint(paths: RunPaths) -> Checkpoint:
@@ -144,9 +146,7 @@ def _of_scene_file(paths: RunPaths, journal: Journal) -> tuple[Scene, Solver]:
 
 def _start(paths: RunPaths, checkpoint: Checkpoint, scene: Scene, solver: Solver) -> Frame:
     """The frame of a checkpoint."""
-    count = sum(len(body.mesh.vertices) for body in scene.bodies)
-    if len(checkpoint.state.positions) == count and len(checkpoint.anchors) == len(scene.pins):
-        system = rebuilt_system(scene, checkpoint.start_states, checkpoint.anchors)
-        if scene_hash(system, *checkpoint.run.span) == checkpoint.run.scene:
-            return start_frame(system, checkpoint.state, checkpoint.index, solver)
-    raise SceneError(f"{paths.folder}: the scene is not the one that was run; give that one, or start another run")
+    frame = frame_of(checkpoint, scene, solver)
+    if frame is None:
+        raise SceneError(f"{paths.folder}: the scene is not the one that was run; give that one, or start another run")
+    return frame

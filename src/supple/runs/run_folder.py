@@ -13,9 +13,8 @@ import numpy as np
 from supple.errors import OutputError
 from supple.files.lock import FolderLock
 from supple.files.replacing import output_error, whole_file
-from supple.output.checkpoint.file import RunFacts
-from supple.output.checkpoint.scene_hash import scene_hash
 from supple.output.recording.recorder import Recorder
+from supple.runs.checkpoints import facts_of
 from supple.runs.contents import RunPaths
 from supple.runs.journal import Journal
 from supple.runs.keeper import Keeper
@@ -113,10 +112,8 @@ class RunFolder(FolderSink):
 
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         """Lock the folder and write the start to it."""
-        span = (float(first.time), float(steps * dt))
-        run = RunFacts(first.index, int(steps), float(dt), scene_hash(first.system, *span), span, str(self._solver))
         journal = Journal(
-            run=run,
+            run=facts_of(first.system, (first.index, first.time), dt, steps, self._solver),
             origin=dict(self._source.origin),
             seed=self._seed,
             checkpoint_every=None if self._every is None else int(self._every),

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +15,7 @@ from supple.errors import SceneError
 from supple.scene.body import Body
 from supple.scene.contact_pairs import ContactPair, pair_table
 from supple.scene.forces import Force, SoftTarget
+from supple.scene.inputs import Input, inputs_among
 from supple.scene.located import at
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.pins import Pin
@@ -91,6 +93,7 @@ class Scene:
                     self._check_selection(item, pinned)
         if self.contact_pairs:
             pair_table(self)
+        self.inputs  # noqa: B018 - raises where two have the same name
         check_names(self.stitches, list(pinned), [str(obstacle.name) for obstacle in self.obstacles])
 
     def _check_selection(self, item: Pin | Force | SoftTarget, pinned: dict[str, NDArray[np.bool_]]) -> None:
@@ -118,6 +121,34 @@ class Scene:
         SceneError : where a pair does not exist, or none is within reach.
         """
         return stitch_together(self.bodies, self.obstacles, self.stitches)
+
+    @cached_property
+    def inputs(self) -> dict[str, Input]:
+        """The inputs that move pins, soft targets and obstacles, and that are forces, by name.
+
+        Raises
+        ------
+        SceneError : where two of them have the same name.
+        """
+        moving = (*self.pins, *self.soft_targets, *self.obstacles)
+        return inputs_among([*(item.motion for item in moving), *(item.force for item in self.forces)])
+
+    def with_own_inputs(self) -> Scene:
+        """The same scene with copies of its inputs, or itself where it has none."""
+        if not self.inputs:
+            return self
+        own = {name: given.copy() for name, given in self.inputs.items()}
+
+        def owned(function: Any) -> Any:
+            return own[function.name] if isinstance(function, Input) else function
+
+        return replace(
+            self,
+            pins=[replace(pin, motion=owned(pin.motion)) for pin in self.pins],
+            obstacles=[replace(one, motion=owned(one.motion)) for one in self.obstacles],
+            forces=[replace(force, force=owned(force.force)) for force in self.forces],
+            soft_targets=[replace(target, motion=owned(target.motion)) for target in self.soft_targets],
+        )
 
     def body(self, name: str) -> Body:
         """The body of that name.

@@ -12,7 +12,7 @@ from typing import Any, Literal
 from supple import __version__
 from supple.files.replacing import whole_file
 
-CASES, RESULT, RECORDING, LOG = "cases", "result.json", "recording.vtkhdf", "log.txt"
+CASES, RESULT, RECORDING, LOG, CHECKPOINT = "cases", "result.json", "recording.vtkhdf", "log.txt", "checkpoint"
 _DIGITS = 16  # of the hash in a folder's name: a chance of 1e-8 that two of a million cases have the same
 
 

@@ -17,49 +17,62 @@ import numpy as np
 from numba.core import config
 
 from supple.errors import StudyError, SuppleError
+from supple.files.lock import FolderLock
 from supple.numerics.threads import numba_threads
 from supple.output.recording.reader import Recording, read_recording
-from supple.output.recording.recorder import Recorder
-from supple.scene_file.loader import Run
-from supple.simulate import simulate
-from supple.studies.cases import LOG, RECORDING, CaseResult, read_result, write_result
+from supple.runs.recorded import simulate_recorded
+from supple.studies.cases import CHECKPOINT, LOG, RECORDING, CaseResult, read_result, write_result
 from supple.studies.sources import Job
 
 Measure = Callable[[Recording], "float | Mapping[str, float]"]
 
-# Numba's kernels may use a layer that allows no two threads at once: a process simulates one case at a time.
+# A worker has cores and memory for one case.
 _ONE_CASE = threading.Lock()
 _LONGEST_REASON = 500
 # The memory of a worker that has simulated a small scene: Python, NumPy, Numba, compiled kernels [bytes].
 _PROGRAM = 300_000_000
 
 
-def run_case(job: Job, folder: Path, measure: Measure, measured_by: str) -> CaseResult:
+def run_case(job: Job, folder: Path, measure: Measure, measured_by: str, checkpoint_seconds: float) -> CaseResult:
     """Simulate, record and measure a case, and keep the result in its folder. Nothing is raised: a failure is a result.
 
-    A case that is finished is not simulated again; where other measures were taken, its recording is measured.
+    A case that is finished is not simulated again; where other measures were taken, its recording is measured. One that
+    another worker is still busy with counts as lost: the scheduler has given it up, and it may be there later.
     """
     with _ONE_CASE, numba_threads(_threads()):
-        began = time.perf_counter()
-        result = CaseResult("failed")
         try:
-            result = _earlier(folder) or _simulated(job, folder)
-            if result.simulated:
-                result = replace(result, status="failed", reason="", measures={})
-                result = replace(result, status="done", measures=_measured(folder / RECORDING, measure))
-        # Of any kind: the function that makes the scene, and the measure, are the user's.
-        except (Exception, SystemExit) as error:
-            with contextlib.suppress(OSError):
-                (folder / LOG).write_text(traceback.format_exc(), encoding="utf-8")
-            result = replace(result, reason=_reason(error))
-        if result.status == "deferred":
-            return result
-        result = replace(result, measured_by=measured_by, wall_seconds=result.wall_seconds or _since(began))
-        try:
-            write_result(folder, result)
+            folder.mkdir(parents=True, exist_ok=True)
+            lock = FolderLock(folder)
         except (SuppleError, OSError) as error:
-            return CaseResult("failed", reason=_reason(error))
+            return CaseResult("failed", reason=_reason(error), lost=True)
+        try:
+            return _kept(job, folder, measure, measured_by, checkpoint_seconds)
+        finally:
+            lock.release()
+
+
+def _kept(job: Job, folder: Path, measure: Measure, measured_by: str, checkpoint_seconds: float) -> CaseResult:
+    """The result of a case in a folder that no other worker uses; it is kept there."""
+    began = time.perf_counter()
+    result = CaseResult("failed")
+    try:
+        result = _earlier(folder) or _simulated(job, folder, checkpoint_seconds)
+        if result.simulated:
+            result = replace(result, status="failed", reason="", measures={})
+            result = replace(result, status="done", measures=_measured(folder / RECORDING, measure))
+    # Of any kind: the function that makes the scene, and the measure, are the user's.
+    except (Exception, SystemExit) as error:
+        with contextlib.suppress(OSError):
+            (folder / LOG).write_text(traceback.format_exc(), encoding="utf-8")
+        result = replace(result, reason=_reason(error))
+    if result.status == "deferred":
         return result
+    result = replace(result, measured_by=measured_by, wall_seconds=result.wall_seconds or _since(began))
+    try:
+        write_result(folder, result)
+    except (SuppleError, OSError) as error:
+        return CaseResult("failed", reason=_reason(error))
+    return result
 
 
 def _earlier(folder: Path) -> CaseResult | None:
@@ -68,30 +81,15 @@ def _earlier(folder: Path) -> CaseResult | None:
     return result if result is not None and result.simulated and (folder / RECORDING).exists() else None
 
 
-def _simulated(job: Job, folder: Path) -> CaseResult:
-    folder.mkdir(parents=True, exist_ok=True)
+def _simulated(job: Job, folder: Path, checkpoint_seconds: float) -> CaseResult:
     run = job.load(folder)
     needed, allowed = _PROGRAM + run.solver.bytes_needed(run.scene), _memory_limit()
     if allowed is not None and needed > allowed:
         return CaseResult("deferred", bytes_needed=needed)
-    frames, problem = _simulate(run, folder / RECORDING)
+    frames, problem = simulate_recorded(run, folder / RECORDING, folder / CHECKPOINT, checkpoint_seconds)
     status = "failed" if problem else "done"
-    return CaseResult(status, reason=problem, frames=frames, simulated=not problem, bytes_needed=needed)
-
-
-def _simulate(run: Run, recording: Path) -> tuple[int, str]:
-    """Simulate and record a case; the number of frames, and why it stopped early.
-
-    This is the one place that begins or continues a run. A case whose worker was lost begins again.
-    """
-    recorder = Recorder(recording, scene_text=run.text, solver=run.solver, compress=run.output.compress)
-    frames, problem = 0, ""
-    positions = run.initial_positions or None
-    for frame in simulate(run.scene, run.solver, run.dt, run.steps, initial_positions=positions, sinks=[recorder]):
-        frames += 1
-        if not frame.report.status.can_go_on:
-            problem = f"frame {frame.index}: {frame.report.status}: {frame.report.message}"
-    return frames, problem[:_LONGEST_REASON]
+    reason = problem[:_LONGEST_REASON]
+    return CaseResult(status, reason=reason, frames=frames, simulated=not problem, bytes_needed=needed)
 
 
 def _measured(path: Path, measure: Measure) -> dict[str, float]:

@@ -74,7 +74,16 @@ class Task:
     folder: Path
 
 
-def run_tasks(tasks: list[Task], opener: Opener, measure: Measure, measured_by: str, tally: Tally) -> None:
+@dataclass(frozen=True)
+class Measuring:
+    """What workers do with each case: the measure and its identity, and the time from checkpoint to checkpoint [s]."""
+
+    measure: Measure
+    measured_by: str
+    checkpoint_seconds: float
+
+
+def run_tasks(tasks: list[Task], opener: Opener, measuring: Measuring, tally: Tally) -> None:
     """Simulate cases. Those that need more memory than a worker has come last, on fewer workers with more each.
 
     Raises
@@ -85,27 +94,26 @@ def run_tasks(tasks: list[Task], opener: Opener, measure: Measure, measured_by: 
         return
     tally.start()
     with opener(0) as workers:
-        deferred = _run_on(workers, tasks, {}, measure, measured_by, tally)
+        deferred = _run_on(workers, tasks, {}, measuring, tally)
     while deferred:
         largest = max(deferred.values())
         waiting = [task for task in tasks if task.case.key in deferred]
         try:
             with opener(largest) as workers:
                 logger.warning("%d cases need more memory than a worker has; they run on fewer workers", len(waiting))
-                deferred = _run_on(workers, waiting, deferred, measure, measured_by, tally)
+                deferred = _run_on(workers, waiting, deferred, measuring, tally)
         except StudyError as error:  # no machine is large enough for the largest of them
             for task in waiting:
                 if deferred[task.case.key] == largest:
                     del deferred[task.case.key]
-                    _keep(task, CaseResult("failed", reason=str(error), measured_by=measured_by), tally)
+                    _keep(task, CaseResult("failed", reason=str(error), measured_by=measuring.measured_by), tally)
 
 
 def _run_on(
     workers: Workers,
     tasks: list[Task],
     needs: Mapping[str, int],
-    measure: Measure,
-    measured_by: str,
+    measuring: Measuring,
     tally: Tally,
 ) -> dict[str, int]:
     """Simulate cases; the bytes that those need which no worker could take, by key."""
@@ -116,14 +124,15 @@ def _run_on(
         try:
             able = workers.able(needs.get(task.case.key, 0))
         except StudyError as error:
-            _keep(task, CaseResult("failed", reason=str(error), measured_by=measured_by), tally)
+            _keep(task, CaseResult("failed", reason=str(error), measured_by=measuring.measured_by), tally)
             continue
         future = workers.client.submit(
             run_case,
             task.job,
             task.folder,
-            measure,
-            measured_by,
+            measuring.measure,
+            measuring.measured_by,
+            measuring.checkpoint_seconds,
             key=f"case-{task.case.key}-{uuid4().hex[:8]}",
             workers=able,
             pure=False,
@@ -138,7 +147,7 @@ def _run_on(
             tally.report()
             continue
         _, task = running.pop(future.key)
-        result = _result_of(future, measured_by)
+        result = _result_of(future, measuring.measured_by)
         if result.status == "deferred":
             # A worker of a cluster knows its limit only while it runs; the next round chooses among all workers.
             if needs.get(task.case.key, 0) >= result.bytes_needed:

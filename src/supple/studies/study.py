@@ -11,18 +11,21 @@ from pathlib import Path
 from typing import Any
 
 from supple.errors import StudyError, SuppleError
-from supple.files.replacing import whole_file
+from supple.files.lock import FolderLock
+from supple.files.replacing import output_error, whole_file
 from supple.studies.cases import Case, CaseResult, case_key, read_result, write_result
-from supple.studies.designs import Design
-from supple.studies.factors import Factor
 from supple.studies.measures import Measures
 from supple.studies.run_case import Measure
-from supple.studies.runner import StudyProgress, Tally, Task, run_tasks
+from supple.studies.runner import Measuring, StudyProgress, Tally, Task, run_tasks
+from supple.studies.sampling.designs import Design
+from supple.studies.sampling.factors import Factor
 from supple.studies.sources import Source
 from supple.studies.table import StudyTable
-from supple.studies.workers import cluster_workers, local_workers
+from supple.studies.workers import Opener, cluster_workers, local_workers
 
 TABLE, DESCRIPTION, LOGS = "table.csv", "study.json", "workers"
+# A checkpoint takes some hundredths of a second, most of which is the wait for the disk.
+CHECKPOINT_SECONDS = 30.0
 
 
 def ignore_progress(progress: StudyProgress) -> None:
@@ -62,14 +65,37 @@ class Study:
         workers: int | None = None,
         scheduler: str | None = None,
         retry_failed: bool = False,
+        checkpoint_seconds: float = CHECKPOINT_SECONDS,
         progress: Callable[[StudyProgress], None] = ignore_progress,
     ) -> StudyTable:
         """Simulate the cases that have not ended yet; the table of all. See `supple.sweep`."""
         if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
             raise StudyError(f"workers is {workers!r}; give a whole number above zero")
         folder = Path(folder).absolute()
+        if not isinstance(checkpoint_seconds, int | float) or not checkpoint_seconds >= 0.0:
+            raise StudyError(f"checkpoint_seconds is {checkpoint_seconds!r}; give a number of zero or more [s]")
         plan = self._plan(folder, retry_failed)
         opener = local_workers(workers, folder / LOGS) if scheduler is None else cluster_workers(scheduler)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise output_error(folder, error) from None
+        lock = FolderLock(folder)
+        try:
+            measuring = Measuring(self.measure, plan.measured_by, float(checkpoint_seconds))
+            return self._carried_out(plan, folder, opener, measuring, progress)
+        finally:
+            lock.release()
+
+    def _carried_out(
+        self,
+        plan: _Plan,
+        folder: Path,
+        opener: Opener,
+        measuring: Measuring,
+        progress: Callable[[StudyProgress], None],
+    ) -> StudyTable:
+        """The table, after all cases have ended, in a folder that no other study uses."""
         self._describe(folder)
         for case, result in plan.refused:
             case.folder(folder).mkdir(parents=True, exist_ok=True)
@@ -82,7 +108,7 @@ class Study:
 
         try:
             tally = Tally(len(plan.cases), progress, plan.results)
-            run_tasks(plan.tasks, opener, self.measure, plan.measured_by, tally)
+            run_tasks(plan.tasks, opener, measuring, tally)
         finally:  # also after Ctrl-C: the cases that have ended are in the table
             table().write_csv(folder / TABLE)
         return table()

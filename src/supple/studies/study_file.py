@@ -13,9 +13,9 @@ from supple.errors import StudyError
 from supple.scene_file.model import FilePath, Model, Name, Number
 from supple.scene_file.validation_errors import scene_error
 from supple.scene_file.yaml_reader import YamlDocument, read_yaml
-from supple.studies import designs
-from supple.studies.factors import MOST_LEVELS, Factor, Levels, LogUniform, Uniform
 from supple.studies.measures import BodyMeasure, Measures, SeriesMeasure
+from supple.studies.sampling import designs
+from supple.studies.sampling.factors import MOST_LEVELS, Factor, Levels, LogUniform, Uniform
 from supple.studies.sources import FileSource
 from supple.studies.study import Study
 
@@ -164,6 +164,15 @@ class StudyFileModel(Model):
     )
     design: DesignModel = Field(default_factory=lambda: GridModel(kind="grid"))
     measures: dict[Name, MeasureModel] = Field(min_length=1, max_length=1000)
+
+
+def study_schema() -> dict[str, Any]:
+    """The JSON Schema (draft 2020-12) of study files, for editors and other programs."""
+    schema = StudyFileModel.model_json_schema()
+    factors = schema["properties"]["factors"]
+    levels = {"type": "array", "minItems": 1, "maxItems": MOST_LEVELS, "description": "values"}
+    factors["additionalProperties"] = {"anyOf": [levels, factors["additionalProperties"]]}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "Supple study"}
 
 
 def load_study(path: str | Path) -> Study:

@@ -8,12 +8,12 @@ from typing import Any
 
 from supple.scene.scene import Scene
 from supple.scene_file.loader import Run
-from supple.studies.designs import Design, Grid
-from supple.studies.factors import Factor, as_factor
 from supple.studies.run_case import Measure
 from supple.studies.runner import StudyProgress
+from supple.studies.sampling.designs import Design, Grid
+from supple.studies.sampling.factors import Factor, as_factor
 from supple.studies.sources import FileSource, FunctionSource, Source
-from supple.studies.study import Study, ignore_progress
+from supple.studies.study import CHECKPOINT_SECONDS, Study, ignore_progress
 from supple.studies.table import StudyTable
 from supple.system import Solver
 
@@ -32,12 +32,13 @@ def sweep(
     workers: int | None = None,
     scheduler: str | None = None,
     retry_failed: bool = False,
+    checkpoint_seconds: float = CHECKPOINT_SECONDS,
     progress: Callable[[StudyProgress], None] = ignore_progress,
 ) -> StudyTable:
     """Simulate every case of a study, and return the table of results, which is also in `folder/table.csv`.
 
     A case that has ended is not simulated again, so that an interrupted study goes on where it was. A case that fails
-    is in the table with its reason. A case whose worker is lost is simulated again by another one.
+    is in the table with its reason. A case whose worker is lost goes on in another one, from its last checkpoint.
 
     Parameters
     ----------
@@ -52,15 +53,24 @@ def sweep(
     workers : number of processes on this machine; None: one per core. Fewer are used where the memory requires it.
     scheduler : address of a scheduler of dask.distributed, such as "tcp://node1:8786", instead of `workers`.
     retry_failed : simulate cases again that failed in an earlier run.
+    checkpoint_seconds : time from checkpoint to checkpoint of a case [s]; shorter cases have none
     progress : called whenever a case has ended.
 
     Raises
     ------
     StudyError, SceneError : before anything is written, where the study cannot be carried out: a factor that does not
         exist, or no case that is allowed; and where no worker can be reached.
+    OutputError : where another study is writing to the folder, or it cannot be written.
     """
     chosen: Source = FunctionSource(source, solver, dt, steps) if callable(source) else FileSource(source)
     named = {name: as_factor(name, given) for name, given in factors.items()}
     paths = {name: (name,) for name in named}
     study = Study(chosen, named, paths, Grid() if design is None else design, measure, dict(units or {}))
-    return study.run(folder, workers=workers, scheduler=scheduler, retry_failed=retry_failed, progress=progress)
+    return study.run(
+        folder,
+        workers=workers,
+        scheduler=scheduler,
+        retry_failed=retry_failed,
+        checkpoint_seconds=checkpoint_seconds,
+        progress=progress,
+    )

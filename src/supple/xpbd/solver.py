@@ -57,6 +57,7 @@ class XPBDWorkspace:
         of the anchors (inverse mass 0); extended_previous : (n + a, 3) positions at the beginning of the substep
     points, previous : the rows of the vertices
     velocities, origins : (n, 3); world, world_previous : (n, 3) positions in world coordinates, for contacts
+    threads : that Numba may use; None for all
     """
 
     system: System
@@ -64,6 +65,7 @@ class XPBDWorkspace:
     sets: list[ConstraintSet]
     momentum: MomentumRestore | None
     collisions: Collisions
+    threads: int | None
     pace: ThreadTuner
     anchors: StitchAnchors
     extended: NDArray[np.float64]
@@ -141,6 +143,7 @@ class XPBD(Solver):
             sets=sets,
             momentum=MomentumRestore(inner) if self.momentum_restore else None,
             collisions=Collisions(inner, self.contact),
+            threads=self.threads or (None if large else 1),
             pace=ThreadTuner(choice=parallel and self.threads is None, parallel=parallel),
             anchors=StitchAnchors(inner),
             extended=extended,
@@ -148,30 +151,33 @@ class XPBD(Solver):
 
     def step(self, system: System, state: State, dt: float, workspace: XPBDWorkspace) -> tuple[State, StepReport]:
         """Advance by `dt` [s] in `substeps` substeps. The returned state has its own arrays."""
-        ws, h = workspace, dt / self.substeps
+        with numba_threads(workspace.threads):
+            return self._step(state, dt, workspace)
+
+    def _step(self, state: State, dt: float, ws: XPBDWorkspace) -> tuple[State, StepReport]:
+        h = dt / self.substeps
         _load(ws, state)
         targets = _pin_targets(ws.system, state.time, h, self.substeps)
         if ws.collisions:
             memory = state.memory if isinstance(state.memory, ContactMemory) else None
             ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt, memory)
-        with numba_threads(self.threads):
-            for k in range(self.substeps):
-                interruption_point()
-                started = perf_counter()
-                parallel = ws.pace.choose()
-                end = state.time + (k + 1) * h
-                _begin_substep(ws, targets[k], end, h, parallel)
-                add_forces(ws.system, ws.points, ws.velocities, end, h)
-                for constraints in ws.sets:
-                    constraints.project(ws.extended, h, parallel)
-                if ws.momentum is not None:
-                    ws.momentum.apply(ws.points, ws.previous, ws.velocities, h, parallel)
-                else:
-                    update_velocities(ws.points, ws.previous, ws.velocities, h)
-                ws.pace.note(parallel, perf_counter() - started)
-                pull_to_targets(ws.system, ws.points, ws.velocities, ws.origins, end, h)
-                if ws.collisions and not _collide(ws, end, h):
-                    break
+        for k in range(self.substeps):
+            interruption_point()
+            started = perf_counter()
+            parallel = ws.pace.choose()
+            end = state.time + (k + 1) * h
+            _begin_substep(ws, targets[k], end, h, parallel)
+            add_forces(ws.system, ws.points, ws.velocities, end, h)
+            for constraints in ws.sets:
+                constraints.project(ws.extended, h, parallel)
+            if ws.momentum is not None:
+                ws.momentum.apply(ws.points, ws.previous, ws.velocities, h, parallel)
+            else:
+                update_velocities(ws.points, ws.previous, ws.velocities, h)
+            ws.pace.note(parallel, perf_counter() - started)
+            pull_to_targets(ws.system, ws.points, ws.velocities, ws.origins, end, h)
+            if ws.collisions and not _collide(ws, end, h):
+                break
         lost = first_lost(ws.points, ws.velocities)
         if lost >= 0:
             message = _lost_position_message(ws, lost, state.time + dt)

@@ -25,7 +25,9 @@ def energy(report):
     return report.kinetic_energy + report.elastic_energy + report.stitch_energy
 
 
-@pytest.mark.parametrize(("mu", "rate", "steps"), [(1e6, 60, 300), (1e6, 240, 360), (1e7, 60, 300)])
+@pytest.mark.parametrize(
+    ("mu", "rate", "steps"), [(1e6, 60, 300), pytest.param(1e6, 240, 360, marks=pytest.mark.slow), (1e7, 60, 300)]
+)
 def test_stiff_stitches_that_start_loaded_make_neither_energy_nor_spin(mu, rate, steps):
     scene = stitched_cubes(mu)
     start = first_frame(scene, initial_state(scene)).report

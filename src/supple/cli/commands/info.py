@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
     from supple.mesh.surface import SurfaceMesh
     from supple.mesh.tetmesh import TetMesh
+    from supple.scene.body import Body
     from supple.scene.stitches.stitching import Stitching
 
 SCENE_FILES = (".yaml", ".yml")
@@ -150,8 +151,41 @@ def _scene(file: Path) -> None:
         mesh = part.body.mesh
         text = f"{type(part.body.material).__name__}, {len(mesh.tets)} tets, {mesh.volume:.6g} m^3, {mass:.6g} kg"
         rows.append((f"body {part.name}", text))
+        rows += _locking_rows(part.body)
     rows += _stitch_rows(system.stitching)
     print_table(rows, str(file))
+
+
+# Of the surface: below it, a few thin parts such as edges of a wedge are not worth a warning.
+_THIN_SHARE = 0.1
+
+
+def _locking_rows(body: Body) -> list[tuple[str, str]]:
+    """A warning where nearly incompressible tets are too few across to deform (docs/locking.md)."""
+    import numpy as np
+
+    from supple.materials.material import Elastic
+    from supple.materials.per_tet import NO_REGION
+    from supple.mesh.quality import thickness
+
+    material, mesh = body.material, body.mesh
+    if not isinstance(material, Elastic):
+        return []
+    poisson = np.broadcast_to(np.asarray(material.poisson, dtype=np.float64), len(mesh.tets))
+    locking = (poisson > 0.4) & (material.per_tet(len(mesh.tets)).region == NO_REGION)
+    if not locking.any():
+        return []
+    lines = thickness(mesh.vertices, mesh.tets, limit=9)
+    thin = (lines.crossed < 9) & locking[lines.tets]
+    share = lines.areas[thin].sum() / lines.areas.sum()
+    if share <= _THIN_SHARE:
+        return []
+    text = (
+        f"{100 * share:.0f} % of the surface has fewer than three tets across behind it, with Poisson's ratio up to "
+        f"{poisson[locking].max():g}: linear tets are too stiff there; give integration='patches' (Implicit only), or "
+        "smaller tets"
+    )
+    return [(f"warning {body.name}", text)]
 
 
 def _stitch_rows(stitching: Stitching) -> list[tuple[str, str]]:

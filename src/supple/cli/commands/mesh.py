@@ -12,7 +12,13 @@ from supple.errors import MeshError, MeshingError
 
 if TYPE_CHECKING:
     from supple.mesh.meshing.tetrahedralize import MeshingReport
+    from supple.mesh.surface import SurfaceMesh
     from supple.mesh.tetmesh import TetMesh
+
+# Fine enough that a body bends, coarse enough for a laptop.
+DEFAULT_TETS = 10_000
+# Few soft bodies are longer; many files are in millimetres [m].
+LARGE = 10.0
 
 
 def mesh(
@@ -20,6 +26,9 @@ def mesh(
     /,
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
+    scale: float = 1.0,
+    tets: int | None = None,
+    edge: float | None = None,
     max_volume: float | None = None,
     quality: float = 1.4,
     min_dihedral: float | None = None,
@@ -39,6 +48,12 @@ def mesh(
         STL, OBJ, PLY, OFF, VTP, VTK or VTU file.
     output
         One of TetGen's names (bear.1.node writes .node, .ele, .edge and .face), or a .msh, .vtu or .vtk file.
+    scale
+        Factor of all coordinates: 0.001 for a surface in millimetres.
+    tets
+        Number of tets, within 10 %: 10,000 where no other size and no --keep-surface is given.
+    edge
+        Length of the tets' edges [m], instead of a number of tets.
     max_volume
         No tet is larger than this [m^3].
     quality
@@ -81,12 +96,16 @@ def mesh(
         if target.is_dir():
             raise MeshError(f"{target}: is a folder; give another name")
         refuse_to_replace(surface, target)
-    loaded = SurfaceMesh.load(surface)
+    if tets is edge is max_volume is None and not keep_surface:
+        tets = DEFAULT_TETS
+    loaded = _scaled(SurfaceMesh.load(surface), scale, surface)
     with Console(stderr=True).status(f"meshing {len(loaded.triangles)} triangles"):
         try:
-            tets, report = tetrahedralize_reported(
+            filled, report = tetrahedralize_reported(
                 loaded,
                 max_volume=max_volume,
+                edge=edge,
+                tets=tets,
                 quality=quality,
                 min_dihedral=min_dihedral,
                 keep_surface=keep_surface,
@@ -99,10 +118,26 @@ def mesh(
         except MeshingError as error:
             raise MeshingError(f"{surface}: {error}") from None
     if is_tetgen_path(output):
-        write_tetgen(tets, output, base_index)
+        write_tetgen(filled, output, base_index)
     else:
-        tets.save(output)
-    _summarize(tets, report, targets)
+        filled.save(output)
+    _summarize(filled, report, targets)
+
+
+def _scaled(surface: SurfaceMesh, scale: float, path: Path) -> SurfaceMesh:
+    import sys
+
+    import numpy as np
+
+    from supple.mesh.surface import SurfaceMesh
+
+    if not 0.0 < scale < np.inf:
+        raise MeshError(f"scale must be a number above 0 and finite, not {scale:g}")
+    size = scale * float(np.ptp(surface.vertices, axis=0).max())
+    if size > LARGE and scale == 1.0:
+        hint = f"{path} is {size:.4g} m long; where it is in millimetres, use --scale 0.001"
+        print(f"warning: {hint}", file=sys.stderr)
+    return surface if scale == 1.0 else SurfaceMesh(scale * surface.vertices, surface.triangles)
 
 
 def _bytes(gibibytes: float) -> int:

@@ -4,16 +4,23 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
 
-def schema(*, output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None) -> None:
-    """Write the JSON Schema of scene files, for editors with completion and validation.
+def schema(
+    of: Literal["scene", "study"] = "scene",
+    /,
+    *,
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+) -> None:
+    """Write the JSON Schema of scene files or of study files, for editors with completion and validation.
 
     Parameters
     ----------
+    of
+        Which files: scene or study.
     output
         File to write; without it, the schema is printed.
     """
@@ -21,8 +28,9 @@ def schema(*, output: Annotated[Path | None, Parameter(name=["--output", "-o"])]
 
     from supple.files.replacing import whole_file
     from supple.scene_file.document import json_schema
+    from supple.studies.study_file import study_schema
 
-    text = json.dumps(json_schema(), indent=2) + "\n"
+    text = json.dumps(json_schema() if of == "scene" else study_schema(), indent=2) + "\n"
     if output is None:
         sys.stdout.write(text)
         return

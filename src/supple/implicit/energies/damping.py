@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from supple.implicit.energies.elasticity import SERIAL_TETS, Elasticity, gather_gradients
 from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
 from supple.materials.isotropic import rest_lame_parameters
+from supple.materials.per_tet import NO_REGION
 from supple.materials.stretch_energies.stretches import green_strain
 from supple.materials.tet_energies import deformation_gradient, edge_matrix, put_gradient
 from supple.numerics.kernel_cache import njit, prange
@@ -69,6 +70,8 @@ def viscosity_of(elasticity: Elasticity) -> Viscosity | None:
     if not tau.any():
         return None
     mu, lam = rest_lame_parameters(elasticity.material)
+    # Viscosity acts tet by tet. With a bulk viscosity far above that of shear, tets would lock.
+    lam = np.where(elasticity.material.region == NO_REGION, lam, np.minimum(lam, mu))
     return Viscosity(elasticity, tau * mu, tau * lam)
 
 

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SolverError
+from supple.implicit.energies.patch_elasticity import PatchElasticity
 from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
 from supple.materials.material import Elastic
-from supple.materials.per_tet import TetMaterial
+from supple.materials.patches.energy import tet_shares
+from supple.materials.per_tet import NO_REGION, TetMaterial
+from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.materials.tet_energies import element_energies, element_models
 from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.sparse.block_csr import incidences
@@ -29,24 +33,32 @@ class Elasticity(Potential):
     ----------
     material : one row per tet
     start, incidence : for every vertex the (tet, node) pairs that name it, coded 4 tet + node
+    patches : the energy of the tets that are averaged over patches, or None
     """
 
     system: System
     material: TetMaterial
     start: NDArray[np.int32]
     incidence: NDArray[np.int32]
+    patches: PatchElasticity | None = None
     label = "elasticity"
     projection = Projection.RELEASED_FIRST
 
     def value(self, x: NDArray[np.float64]) -> float:
-        return float(self.energies(x).sum())
+        return float(self._own_energies(x).sum()) + (self.patches.value(x) if self.patches is not None else 0.0)
 
     def energies(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(m,) of each tet [J]."""
+        """(m,) of each tet [J]; those of patches are divided among their tets."""
+        energies = self._own_energies(x)
+        if self.patches is not None:
+            energies[self.patches.patches.rows] += tet_shares(self.patches.patches, x)
+        return energies
+
+    def _own_energies(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         s = self.system
         energies = np.empty(len(s.tets))
         with threads_for(len(s.tets), SERIAL_TETS):
-            element_energies(x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters(), energies)
+            element_energies(x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters, energies)
         return energies
 
     def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
@@ -61,17 +73,25 @@ class Elasticity(Potential):
         s = self.system
         energies = np.empty(len(s.tets))
         gradients = np.empty((len(s.tets), 4, 3))
-        tets = x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters()
+        tets = x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters
         with threads_for(len(s.tets), SERIAL_TETS):
             if hessian is None:
                 element_models(*tets, False, project, energies, gradients, _NO_HESSIANS)
             else:
                 hessian.add_tets(lambda blocks: element_models(*tets, True, project, energies, gradients, blocks))
             gather_gradients(self.start, self.incidence, gradients, gradient)
-        return float(energies.sum())
+        total = float(energies.sum())
+        return total if self.patches is None else total + self.patches.add_model(x, gradient, hessian, project)
 
+    @cached_property
     def _parameters(self) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
-        return self.material.kind, self.material.mu, self.material.lam
+        """Kind, mu and lam (m,) of each tet's own energy, which is zero where patches have it."""
+        material = self.material
+        if self.patches is None:
+            return material.kind, material.mu, material.lam
+        own = material.region == NO_REGION
+        zero = np.int32(StableNeoHookean.kind())  # with mu = lam = 0, an energy that is zero for every F
+        return np.where(own, material.kind, zero), np.where(own, material.mu, 0.0), np.where(own, material.lam, 0.0)
 
 
 _NO_HESSIANS = np.zeros((0, 12, 12))
@@ -93,10 +113,14 @@ def elasticity_of(system: System) -> Elasticity:
             )
         rows.append(part.body.material.per_tet(part.tets.stop - part.tets.start))
     material = TetMaterial(
-        *(np.concatenate([getattr(row, key) for row in rows]) for key in ("density", "damping", "kind", "mu", "lam"))
+        *(
+            np.concatenate([getattr(row, key) for row in rows])
+            for key in ("density", "damping", "kind", "mu", "lam", "region")
+        )
     )
     start, incidence = incidences(system.tets, len(system.rest_positions))
-    return Elasticity(system, material, start, incidence)
+    patches = None if system.patches is None else PatchElasticity.of(system.patches)
+    return Elasticity(system, material, start, incidence, patches)
 
 
 @njit(cache=True, parallel=True, error_model="numpy")

@@ -31,7 +31,8 @@ class HessianBlocks:
     memory : (m + k, 12, 12) of `elements`
     vertices : (n, 3, 3) one matrix for each vertex with itself [N/m]
     tet_count : m
-    couplings : matrices between vertices that no element joins [N/m]
+    couplings : matrices of contacts, between vertices that no element joins [N/m]
+    patches : matrices of patches of tets, likewise [N/m]
     blank : whether nothing has been added to `elements`; the memory may then hold an earlier sum
     """
 
@@ -39,13 +40,20 @@ class HessianBlocks:
     vertices: NDArray[np.float64]
     tet_count: int
     couplings: list[Couplings] = field(default_factory=list)
+    patches: list[Couplings] = field(default_factory=list)
     blank: bool = False
 
     def clear(self) -> None:
         """Start a new sum."""
         self.vertices[:] = 0.0
         self.couplings.clear()
+        self.patches.clear()
         self.blank = True
+
+    @property
+    def beyond_elements(self) -> list[Couplings]:
+        """The matrices of patches, then those of contacts."""
+        return [*self.patches, *self.couplings]
 
     @property
     def elements(self) -> NDArray[np.float64]:

@@ -101,8 +101,8 @@ class LinearSolver:
         self.parallel = self.pace.choose()
         with one_thread(not self.parallel):
             diagonal = hessian.vertices[self.order.vertices]
-            if hessian.couplings:
-                self._assemble_joint(hessian.elements, diagonal, Couplings.joined(hessian.couplings))
+            if couplings := hessian.beyond_elements:
+                self._assemble_joint(hessian.elements, diagonal, Couplings.joined(couplings))
             else:
                 if self.joint is not None:
                     self.joint, self.age = None, -1

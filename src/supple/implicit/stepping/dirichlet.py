@@ -57,7 +57,7 @@ def move_pins(
         moved = np.einsum("eij,ej->ei", tools.hessian.elements[near], extended[nodes].reshape(-1, 12))
         np.add.at(pull, nodes, moved.reshape(-1, 4, 3))
         pull = pull[:-1]
-        for coupling in tools.hessian.couplings:
+        for coupling in tools.hessian.beyond_elements:
             coupling.add_product(displacement, pull)
         with tools.clock.of("linear_solve"):
             direction, report = tools.linear_solver.solve(-(gradient + pull), _TOLERANCE)

@@ -7,6 +7,7 @@ from supple.materials.stretch_energies.stretches import (
     StretchFunctions,
     distance_from_rotations,
     rotation_quotients,
+    squared_volume_change,
     volume_change,
 )
 from supple.numerics.kernel_cache import njit
@@ -59,4 +60,6 @@ def _quotients(s, mu, lam):
     )
 
 
-FUNCTIONS = StretchFunctions(_density, _gradient, _curvature, _quotients, density_of_stretches=True)
+FUNCTIONS = StretchFunctions(
+    _density, _gradient, _curvature, _quotients, density_of_stretches=True, volume_term=squared_volume_change
+)

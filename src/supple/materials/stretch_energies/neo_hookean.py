@@ -67,4 +67,15 @@ def _quotients(s, mu, lam):
     return (mu - p, mu - q, mu - r, mu + p, mu + q, mu + r)
 
 
-FUNCTIONS = StretchFunctions(_density, _gradient, _curvature, _quotients, needs_positive_volume=True)
+@njit(error_model="numpy")
+def _volume_term(J):
+    """(ln J)^2 / 2 and its derivatives."""
+    if not J > 0.0:
+        return (np.inf, np.nan, np.nan)
+    log = math.log(J)
+    return (0.5 * log * log, log / J, (1.0 - log) / (J * J))
+
+
+FUNCTIONS = StretchFunctions(
+    _density, _gradient, _curvature, _quotients, needs_positive_volume=True, volume_term=_volume_term
+)

@@ -3,7 +3,12 @@
 Source: Smith, de Goes, Kim, "Stable Neo-Hookean Flesh Simulation" (2018), without the logarithmic barrier.
 """
 
-from supple.materials.stretch_energies.stretches import StretchFunctions, shape_and_volume, volume_change
+from supple.materials.stretch_energies.stretches import (
+    StretchFunctions,
+    shape_and_volume,
+    squared_volume_change,
+    volume_change,
+)
 from supple.numerics.kernel_cache import njit
 
 
@@ -48,4 +53,4 @@ def _quotients(s, mu, lam):
     return (mu - c * s[0], mu - c * s[1], mu - c * s[2], mu + c * s[0], mu + c * s[1], mu + c * s[2])
 
 
-FUNCTIONS = StretchFunctions(_density, _gradient, _curvature, _quotients)
+FUNCTIONS = StretchFunctions(_density, _gradient, _curvature, _quotients, volume_term=squared_volume_change)

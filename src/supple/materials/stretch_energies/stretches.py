@@ -10,6 +10,18 @@ from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import det
 
 
+@njit(error_model="numpy")
+def no_volume_term(J):
+    return (0.0, 0.0, 0.0)
+
+
+@njit(error_model="numpy")
+def squared_volume_change(J):
+    """(J - 1)^2 / 2 and its derivatives."""
+    j = J - 1.0
+    return (0.5 * j * j, j, 1.0)
+
+
 class StretchFunctions(NamedTuple):
     """An elastic energy as four compiled functions of (s, mu, lam), the first also of F.
 
@@ -26,6 +38,8 @@ class StretchFunctions(NamedTuple):
     quotients : -> (d_12, d_02, d_01, t_12, t_02, t_01) with d_ij = (psi_i - psi_j) / (s_i - s_j), the stiffness against
         a symmetric in-plane change, and t_ij = (psi_i + psi_j) / (s_i + s_j), the stiffness against an in-plane twist
     needs_positive_volume : whether the energy is infinite for J <= 0
+    volume_term : J -> (U, U', U''), where lam stands in the energy as the factor of U(J) alone; `no_volume_term` of
+        other energies, whose tets cannot be averaged over patches
     density_of_stretches : whether `density` reads s. False for energies of the invariants of F^T F, which need no
         decomposition of F.
     """
@@ -35,6 +49,7 @@ class StretchFunctions(NamedTuple):
     curvature: Any
     quotients: Any
     needs_positive_volume: bool = False
+    volume_term: Any = no_volume_term
     density_of_stretches: bool = False
 
 

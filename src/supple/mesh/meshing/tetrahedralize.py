@@ -12,6 +12,7 @@ from supple.errors import MeshError, MeshingError
 from supple.mesh.meshing.child_process import Limits
 from supple.mesh.meshing.ftetwild import INSTALL, ftetwild_installed, mesh_with_ftetwild
 from supple.mesh.meshing.repair import RepairReport, repair_surface
+from supple.mesh.meshing.sizes import mesh_with_count, volume_of_edge
 from supple.mesh.meshing.tetgen_mesher import mesh_with_tetgen
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.surface_checks import SurfaceReport
@@ -39,6 +40,8 @@ def tetrahedralize(
     surface: SurfaceMesh,
     *,
     max_volume: float | None = None,
+    edge: float | None = None,
+    tets: int | None = None,
     quality: float | None = DEFAULT_QUALITY,
     min_dihedral: float | None = None,
     keep_surface: bool = False,
@@ -59,6 +62,11 @@ def tetrahedralize(
         For TetGen watertight, oriented and free of self-intersections.
     max_volume : float [m^3], optional
         Upper bound on the volume of each tet.
+    edge : float [m], optional
+        Length of edges, instead of `max_volume`: no tet is larger than a regular one with such edges.
+    tets : int, optional
+        Number of tets, instead of `max_volume`: it is reached within 10 % by at most six meshings. Where the surface
+        needs more, its coarsest mesh is returned, with a warning in the log.
     quality : float, optional
         TetGen's upper bound on circumradius over shortest edge of each tet, above 1. A smaller bound gives more tets of
         better shape. Tets at small angles of the surface may exceed it. None: no bound.
@@ -90,6 +98,8 @@ def tetrahedralize_reported(
     surface: SurfaceMesh,
     *,
     max_volume: float | None = None,
+    edge: float | None = None,
+    tets: int | None = None,
     quality: float | None = DEFAULT_QUALITY,
     min_dihedral: float | None = None,
     keep_surface: bool = False,
@@ -103,6 +113,12 @@ def tetrahedralize_reported(
     if not isinstance(surface, SurfaceMesh):
         raise MeshingError(f"tetrahedralize needs a SurfaceMesh, not {type(surface).__name__}")
     _in_range("max_volume", max_volume, 0.0, np.inf)
+    _in_range("edge", edge, 0.0, np.inf)
+    _in_range("tets", tets, 0.0, np.inf)
+    if sum(size is not None for size in (max_volume, edge, tets)) > 1:
+        raise MeshingError("give only one of max_volume, edge and tets")
+    if edge is not None:
+        max_volume = volume_of_edge(edge)
     _in_range("quality", quality, 1.0, np.inf)
     _in_range("min_dihedral", min_dihedral, 0.0, 70.0)
     _in_range("envelope", envelope, 0.0, 1.0)
@@ -123,27 +139,41 @@ def tetrahedralize_reported(
         else:
             surface, report = _facing_outward(fixed)
     chosen = _choose(mesher, report, repair)
-    if chosen == "tetgen":
-        options = {
-            "max_volume": max_volume,
-            "quality": quality,
-            "min_dihedral": min_dihedral,
-            "keep_surface": keep_surface,
-        }
-        result = mesh_with_tetgen(surface, options, limits)
-    else:
+    if chosen == "ftetwild":
         _check_ftetwild_options(quality, min_dihedral, keep_surface)
-        result = mesh_with_ftetwild(surface, max_volume, envelope, limits)
-    try:
-        mesh = TetMesh.dropping_unused(result.vertices, result.elements)
-    except MeshError as error:
-        raise MeshingError(
-            f"{chosen} returned an unusable mesh: {str(error).removeprefix('TetMesh: ')}; the surface has triangles "
-            'that are too thin or too close to each other: remesh it more evenly, or use mesher="ftetwild"'
-        ) from None
-    _check_result(mesh, surface, chosen, max_volume, keep_surface)
-    logger.info("%s: %d vertices, %d tets in %.2f s", chosen, len(mesh.vertices), len(mesh.tets), result.seconds)
-    return mesh, MeshingReport(chosen, result.seconds, repaired)
+    seconds = 0.0
+
+    def make(max_volume: float | None) -> TetMesh:
+        nonlocal seconds
+        if chosen == "tetgen":
+            options = {
+                "max_volume": max_volume,
+                "quality": quality,
+                "min_dihedral": min_dihedral,
+                "keep_surface": keep_surface,
+            }
+            result = mesh_with_tetgen(surface, options, limits)
+        else:
+            result = mesh_with_ftetwild(surface, max_volume, envelope, limits)
+        seconds += result.seconds
+        try:
+            mesh = TetMesh.dropping_unused(result.vertices, result.elements)
+        except MeshError as error:
+            raise MeshingError(
+                f"{chosen} returned an unusable mesh: {str(error).removeprefix('TetMesh: ')}; the surface has "
+                'triangles that are too thin or too close to each other: remesh it evenly, or use mesher="ftetwild"'
+            ) from None
+        _check_result(mesh, surface, chosen, max_volume if tets is None else None, keep_surface)
+        return mesh
+
+    if tets is None:
+        mesh = make(max_volume)
+    else:
+        low, high = surface.bounds  # an open surface has no volume
+        enclosed = surface.volume if report.watertight else 0.5 * float(np.prod(high - low))
+        mesh = mesh_with_count(make, tets, max(enclosed, 1e-3 * float(np.prod(high - low))))
+    logger.info("%s: %d vertices, %d tets in %.2f s", chosen, len(mesh.vertices), len(mesh.tets), seconds)
+    return mesh, MeshingReport(chosen, seconds, repaired)
 
 
 def _in_range(name: str, value: float | None, low: float, high: float) -> None:

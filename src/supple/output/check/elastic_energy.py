@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
+from supple.materials.isotropic import densities, rest_lame_parameters
+from supple.materials.kinds import needs_positive_volume
+from supple.materials.per_tet import NO_REGION, TetMaterial
 from supple.materials.tet_energies import element_energies
 from supple.numerics.threads import threads_for
 from supple.output.recording.reader import Recording
@@ -40,7 +44,13 @@ def elastic_energy(
             laws = physics.kind[body.tets].astype(np.int32), physics.mu[body.tets], physics.lam[body.tets]
             with threads_for(len(tets), _TETS_PER_THREAD):
                 element_energies(x, tets, rest_inverse[body.tets], volumes, *laws, out)
-            total += float(out.sum())
+            region = physics.region[body.tets]
+            total += float(out[region == NO_REGION].sum())
+            for number in np.unique(region[region != NO_REGION]):
+                of = region == number
+                total += _averaged(
+                    x, tets[of], rest_inverse[body.tets][of], volumes[of], J[body.tets][of], [law[of] for law in laws]
+                )
             continue
         if pair[0] > 0.0:
             edges = np.unique(np.sort(tets[:, _EDGES].reshape(-1, 2), axis=1), axis=0)
@@ -51,6 +61,32 @@ def elastic_energy(
             change = (J[body.tets] - 1.0) * volumes
             total += 0.5 * float(change @ change) / pair[1]
     return total
+
+
+def _averaged(x, tets, rest_inverse, volumes, J, laws) -> float:
+    """The energy of one region's tets, averaged over edges and vertices (see `materials.patches`)."""
+    kind, mu, lam = laws
+    mu_L, lam_L = rest_lame_parameters(TetMaterial(mu, mu, kind, mu, lam, kind))
+    rest = np.maximum(lam_L - mu_L, 0.0)
+    x_of = x[tets]
+    F = np.einsum("eki,ekj->eij", x_of[:, 1:] - x_of[:, :1], rest_inverse)
+    ends = np.sort(tets[:, _EDGES], axis=2).reshape(-1, 2)
+    _, first, edge = np.unique(ends, axis=0, return_index=True, return_inverse=True)
+    shares = sparse.coo_array((np.repeat(volumes / 6.0, 6), (edge.ravel(), np.repeat(np.arange(len(tets)), 6)))).tocsr()
+    around = shares.sum(axis=1)
+    means = (shares @ np.column_stack([F.reshape(-1, 9), mu, lam - rest])) / around[:, None]
+    out = np.empty(len(means))
+    densities(means[:, :9].reshape(-1, 3, 3).copy(), kind[first // 6], means[:, 9].copy(), means[:, 10].copy(), out)
+    total = float(out @ around)
+    quarters = np.repeat(volumes / 4.0, 4)
+    _, first, vertex = np.unique(tets.ravel(), return_index=True, return_inverse=True)
+    around = np.bincount(vertex, weights=quarters)
+    J_mean = np.bincount(vertex, weights=quarters * np.repeat(J, 4)) / around
+    factor = np.bincount(vertex, weights=quarters * np.repeat(rest, 4)) / around
+    logarithmic = needs_positive_volume(kind)[first // 4]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        change = np.where(logarithmic, np.log(J_mean), J_mean - 1.0)
+    return total + 0.5 * float((around * factor) @ change**2)
 
 
 def stiffness_scale(recording: Recording) -> float:

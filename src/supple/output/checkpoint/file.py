@@ -146,11 +146,13 @@ def _is_a_state(state: object, like: State) -> bool:
     return (
         isinstance(state, State)
         and isinstance(state.time, float)
+        and isinstance(state.inputs, dict)
         and all(
             isinstance(rows, np.ndarray)
             and rows.dtype == np.float64
             and rows.ndim == 2
             and rows.shape == (len(like.positions), 3)
+            and bool(np.isfinite(rows).all())
             for rows in (state.positions, state.velocities)
         )
     )

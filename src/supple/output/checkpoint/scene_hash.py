@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from supple.errors import SuppleError
+from supple.scene.inputs import Input
 from supple.system import System
 
 # Functions of time cannot be read; their values at so many times of a run are taken instead.
@@ -27,14 +28,19 @@ def scene_hash(system: System, begin: float, duration: float) -> str:
     _add(digest, system.scene)
     for time in begin + duration * np.arange(_TIMES) / (_TIMES - 1):
         for pin in system.pins:
-            _add(digest, pin.targets(time) if callable(pin.motion) else None)
+            _add(digest, pin.targets(time) if _is_script(pin.motion) else None)
         for force in system.forces:
-            _add(digest, force.per_vertex(time) if callable(force.force.force) else None)
+            _add(digest, force.per_vertex(time) if _is_script(force.force.force) else None)
         for target in system.soft_targets:
-            _add(digest, target.targets(time) if callable(target.target.motion) else None)
+            _add(digest, target.targets(time) if _is_script(target.target.motion) else None)
         for obstacle in system.obstacles:
-            _add(digest, obstacle.pose(time) if callable(obstacle.motion) else None)
+            _add(digest, obstacle.pose(time) if _is_script(obstacle.motion) else None)
     return digest.hexdigest()
+
+
+def _is_script(function: object) -> bool:
+    """Whether it is a function of time that the scene determines; the values of inputs are in the State."""
+    return callable(function) and not isinstance(function, Input)
 
 
 def _add(digest: Any, value: Any) -> None:
@@ -54,6 +60,8 @@ def _add(digest: Any, value: Any) -> None:
         _add_text(digest, f"{len(value)} of")
         for item in value:
             _add(digest, item)
+    elif isinstance(value, Input):
+        _add(digest, [type(value).__name__, value.name, value.value])
     elif callable(value):
         _add_text(digest, "function")
     elif value is None or isinstance(value, (bool, int, float, str, np.generic)):

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.material import Elastic
+from supple.materials.per_tet import NO_REGION
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.output.recording.checked_hdf5 import CheckedFile
 from supple.scene.contact_pairs import pair_table
@@ -29,6 +30,7 @@ class RecordedPhysics:
 
     Attributes
     ----------
+    region : (m,) the region over whose patches the energy of a tet is averaged, or `NO_REGION`
     kind : (m,) row of `registry.ELASTIC_MATERIALS` of each tet, or `NOT_KNOWN`; mu, lam : (m,) [Pa]
     compliances : for each body those of its edges [m/N] and volumes [m^5/N], or None for a body of another law
     forces, soft_targets, scripted_pins, stitches : numbers of them in the scene
@@ -42,6 +44,7 @@ class RecordedPhysics:
     soft_targets: int
     scripted_pins: int
     stitches: int
+    region: NDArray[np.int32]
 
     def knows_law(self, body: int, tets: slice) -> bool:
         """Whether the elastic energy of a body can be computed."""
@@ -52,6 +55,7 @@ def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
     """Write the arrays to the group of the recording; returns the part that belongs in its header."""
     m = len(system.tets)
     kind, mu, lam = np.full(m, NOT_KNOWN, dtype=np.uint8), np.zeros(m), np.zeros(m)
+    region = np.full(m, NO_REGION, dtype=np.int32)
     compliances: list[list[float] | None] = []
     for part in system.bodies:
         material = part.body.material
@@ -61,8 +65,11 @@ def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
         elif isinstance(material, Elastic):
             rows = material.per_tet(part.tets.stop - part.tets.start)
             kind[part.tets], mu[part.tets], lam[part.tets] = rows.kind, rows.mu, rows.lam
+            region[part.tets] = rows.region
     group = own.create_group("physics")
     group["kind"], group["mu"], group["lam"] = kind, mu, lam
+    if (region != NO_REGION).any():
+        group["region"] = region
     return {
         "laws": [law.__name__ for law in ELASTIC_MATERIALS],
         "compliances": compliances,
@@ -70,6 +77,7 @@ def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
         "soft_targets": len(system.soft_targets),
         "scripted_pins": sum(part.pin.motion is not None for part in system.pins),
         "stitches": len(system.stitching),
+        "patches": bool((region != NO_REGION).any()),
         "untouching": _untouching(system),
     }
 
@@ -108,7 +116,10 @@ def read_physics(file: CheckedFile, header: dict[str, Any], m: int) -> RecordedP
         number[k] = here.index(law) if law in here else NOT_KNOWN
     kind = number[file.array(f"{_GROUP}/kind", "u", (m,)).astype(np.uint8)]
     mu, lam = file.array(f"{_GROUP}/mu", "f", (m,)), file.array(f"{_GROUP}/lam", "f", (m,))
-    return RecordedPhysics(kind, mu, lam, compliances, *counts)
+    region = np.full(m, NO_REGION, dtype=np.int32)
+    if physics.get("patches", False):
+        region = file.array(f"{_GROUP}/region", "i", (m,)).astype(np.int32)
+    return RecordedPhysics(kind, mu, lam, compliances, *counts, region=region)
 
 
 def read_untouching(file: CheckedFile, header: dict[str, Any]) -> tuple[tuple[int, int], ...]:

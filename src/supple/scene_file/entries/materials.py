@@ -43,6 +43,9 @@ class ElasticModel(_MaterialModel):
     kind: str
     youngs: Positive = Field(description="Young's modulus [Pa]")
     poisson: float = Field(gt=-1.0, lt=0.5, description="Poisson's ratio, above -1 and below 0.5")
+    integration: Literal["tets", "patches"] = Field(
+        default="tets", description="strains of each tet, or means over patches, which do not lock (Implicit only)"
+    )
 
     def build(self) -> Elastic:
         return ELASTIC_KINDS[self.kind](**self.model_dump(exclude={"kind"}))

@@ -17,7 +17,17 @@ from supple.scene_file.model import FilePath, Model, Positive, Vector
 
 SURFACE_FILES = (".stl", ".obj", ".ply", ".off", ".vtp")
 TET_FILES = (".node", ".ele", ".edge", ".face", ".msh")
-MESHING_OPTIONS = ("max_volume", "quality", "min_dihedral", "keep_surface", "mesher", "repair", "time_limit")
+MESHING_OPTIONS = (
+    "tets",
+    "edge",
+    "max_volume",
+    "quality",
+    "min_dihedral",
+    "keep_surface",
+    "mesher",
+    "repair",
+    "time_limit",
+)
 
 
 class MeshFileModel(Model):
@@ -25,6 +35,8 @@ class MeshFileModel(Model):
 
     file: FilePath = Field(description="relative to the scene file")
     scale: Positive = Field(default=1.0, description="of all coordinates: 0.001 for a file in millimetres")
+    tets: int | None = Field(default=None, gt=0, le=10**8, description="number of tetrahedra, within 10 %")
+    edge: Positive | None = Field(default=None, description="length of the tetrahedra's edges [m], after scaling")
     max_volume: Positive | None = Field(default=None, description="of a tetrahedron [m^3], after scaling")
     quality: float | None = Field(
         default=None, ge=1.0, le=100.0, description="largest ratio of circumradius to shortest edge"

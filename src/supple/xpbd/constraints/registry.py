@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from supple.errors import SolverError
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.material import Elastic, Material
+from supple.materials.per_tet import NO_REGION
 from supple.materials.regions import Regions
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.system import BodyRange, System
@@ -90,6 +91,11 @@ def build_constraint_sets(system: System, layout: Layout) -> list[ConstraintSet]
         material = part.body.material
         if not any(entry.takes(material) for entry in CONSTRAINT_SETS):
             raise SolverError(f"XPBD: {_why_not(part.name, material)}, or simulate with Implicit")
+        if (material.per_tet(part.tets.stop - part.tets.start).region != NO_REGION).any():
+            raise SolverError(
+                f"XPBD: body {part.name!r} has integration='patches', which XPBD cannot simulate; give "
+                "integration='tets', or simulate with Implicit"
+            )
     sets = []
     for entry in CONSTRAINT_SETS:
         parts = [part for part in system.bodies if entry.takes(part.body.material)]

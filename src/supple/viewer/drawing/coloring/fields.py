@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.material import Elastic
+from supple.materials.per_tet import NO_REGION
 from supple.numerics.deformation import determinants
 from supple.viewer.drawing.moments.model import Moment
 from supple.viewer.engine.measurement.tet_values import von_mises
@@ -48,8 +49,12 @@ def von_mises_stress(moment: Moment) -> NDArray[np.float64]:
 
 
 def energy_density(moment: Moment) -> NDArray[np.float64]:
-    """Elastic energy per rest volume of every tet (m,) [J/m^3]."""
-    return _of_materials(moment, lambda material, F: material.energy_density(F))
+    """Elastic energy per rest volume of every tet (m,) [J/m^3]; not known for those that are averaged over patches."""
+    return _of_materials(moment, _own_energy_density)
+
+
+def _own_energy_density(material: Elastic, F: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.where(material.per_tet(len(F)).region == NO_REGION, material.energy_density(F), np.nan)
 
 
 @np.errstate(all="ignore")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from typing import Any
 
 import numpy as np
 
@@ -49,7 +50,7 @@ def moment_of_frame(model: Model, frame: RecordedFrame) -> Moment:
 def material_from_text(text: str) -> Material | None:
     """The material of a text such as "StableNeoHookean(youngs=1e4, ...)"; None where the text has another form.
 
-    Only names of materials and plain numbers are accepted: nothing in the text is executed.
+    Only names of materials, plain numbers and the name of an integration are accepted: nothing in the text is executed.
     """
     try:
         call = ast.parse(text, mode="eval").body
@@ -58,13 +59,16 @@ def material_from_text(text: str) -> Material | None:
         kind = _MATERIALS.get(call.func.id)
         if kind is None:
             return None
-        return kind(**{str(item.arg): _number(item.value) for item in call.keywords})
+        values: dict[str, Any] = {str(item.arg): _value(str(item.arg), item.value) for item in call.keywords}
+        return kind(**values)
     except (SyntaxError, ValueError, TypeError, RecursionError, MemoryError, SuppleError):
         return None
 
 
-def _number(node: ast.expr) -> float:
-    """A number, plain or as NumPy writes it: `np.float64(1.0)`."""
+def _value(name: str, node: ast.expr) -> float | str:
+    """A number, plain or as NumPy writes it: `np.float64(1.0)`; of `integration` a text."""
+    if name == "integration":
+        return str(ast.literal_eval(node))
     if isinstance(node, ast.Call) and len(node.args) == 1 and not node.keywords:
         node = node.args[0]
     value = ast.literal_eval(node)

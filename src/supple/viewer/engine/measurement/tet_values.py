@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.material import Elastic
+from supple.materials.patches.energy import tet_shares
 from supple.numerics.deformation import deformation_gradients, determinants
 from supple.system import System
 
@@ -35,6 +36,8 @@ def tet_values(system: System, positions: NDArray[np.float64], quantity: str) ->
                 values[rows] = material.energy_density(F[rows])
             else:
                 values[rows] = von_mises(material.first_piola(F[rows]), F[rows], J[rows])
+    if quantity == "energy" and system.patches is not None:
+        values[system.patches.rows] = tet_shares(system.patches, positions) / system.patches.tet_volumes
     return np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0)
 
 

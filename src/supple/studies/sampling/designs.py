@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import StudyError
-from supple.studies.factors import Factor
+from supple.studies.sampling.factors import Factor
 
 MOST_CASES = 1_000_000
 

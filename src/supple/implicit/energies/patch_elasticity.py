@@ -1,0 +1,108 @@
+"""Elastic energy of tets that are averaged over patches; the formulas are in `materials.patches`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
+from supple.materials.patches.domains import Patches
+from supple.materials.patches.edge_kernels import FRAME, edge_models
+from supple.materials.patches.energy import SERIAL_TETS, patch_energies, vertex_states
+from supple.materials.patches.pair_kernel import pair_blocks
+from supple.materials.patches.pairs import Pairs
+from supple.materials.patches.vertex_kernels import (
+    pressure_hessians,
+    slot_gradients,
+    tet_pressures,
+    volume_gradients,
+)
+from supple.numerics.sparse.couplings import Couplings
+from supple.numerics.threads import threads_for
+
+
+@dataclass(frozen=True, eq=False)
+class PatchElasticity(Potential):
+    """The sum of the energies of all patches.
+
+    Attributes
+    ----------
+    pairs : the pairs of vertices that have a block in the Hessian
+    """
+
+    patches: Patches
+    pairs: Pairs
+    label = "elasticity"
+    projection = Projection.RELEASED_FIRST
+
+    @classmethod
+    def of(cls, patches: Patches) -> PatchElasticity:
+        return cls(patches, patches.pairs())
+
+    def value(self, x: NDArray[np.float64]) -> float:
+        of_edges, of_vertices = patch_energies(self.patches, x)
+        return float(of_edges.sum() + of_vertices.sum())
+
+    def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+        self.add_model(x, out, None, project=False)
+
+    def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
+        """With `project`, the sum of the projections of the edges' energies, of the pressures' second derivatives and
+        of the products of volume gradients."""
+        self.add_model(x, np.zeros_like(x), out, project)
+
+    def add_model(
+        self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
+    ) -> float:
+        patches, edges, vertices = self.patches, self.patches.edges, self.patches.vertices
+        second = hessian is not None
+        energies, forces = np.empty(len(edges.volumes)), np.empty((len(edges.vertices), 3))
+        frames = np.empty((len(energies) if second else 0, FRAME))
+        turned = np.empty_like(forces) if second else forces[:0]
+        of_tets, pressure = np.empty((len(patches.tets), 4, 3)), np.empty(len(patches.tets))
+        law = edges.kind, edges.mu, edges.lam
+        with threads_for(len(patches.tets), SERIAL_TETS):
+            edge_models(
+                x, edges.start, edges.vertices, edges.gradients, edges.volumes, *law, second, project, energies,
+                forces, frames, turned,
+            )  # fmt: skip
+            of_vertices, pressures, stiffness = vertex_states(patches, x)
+            tet_pressures(vertices.of_tet, pressures, pressure)
+            volume_gradients(x, patches.tets, patches.Dm_inv, patches.tet_volumes, of_tets)
+            if hessian is not None:
+                if project:
+                    stiffness = np.maximum(stiffness, 0.0)
+                self._add_hessian(x, (frames, turned), (pressure, stiffness, of_tets), hessian, project)
+        _add_by_vertex(edges.vertices, forces, gradient)
+        _add_by_vertex(patches.tets.ravel(), (pressure[:, None, None] * of_tets).reshape(-1, 3), gradient)
+        return float(energies.sum() + of_vertices.sum())
+
+    def _add_hessian(
+        self,
+        x: NDArray[np.float64],
+        of_edges: tuple[NDArray[np.float64], NDArray[np.float64]],
+        of_vertices: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+        out: HessianBlocks,
+        project: bool,
+    ) -> None:
+        patches, vertices, pairs = self.patches, self.patches.vertices, self.pairs
+        pressure, stiffness, of_tets = of_vertices
+        blocks = np.empty((len(patches.tets), 12, 12))
+        pressure_hessians(x, patches.tets, patches.Dm_inv, patches.tet_volumes, pressure, project, blocks)
+        out.tets[patches.rows] += blocks
+        directions = np.empty((len(vertices.vertices), 3))
+        slot_gradients(vertices.tet_start, vertices.tet_nodes, vertices.start, vertices.slots, of_tets, directions)
+        sums = np.empty((len(pairs.rows), 3, 3))
+        pair_blocks(
+            pairs.rows, pairs.columns, pairs.edge_start, pairs.edge_slots, pairs.vertex_start, pairs.vertex_slots,
+            patches.edges.owner, *of_edges, vertices.owner, stiffness, directions, sums,
+        )  # fmt: skip
+        out.patches.append(Couplings(pairs.rows, pairs.columns, sums))
+
+
+def _add_by_vertex(vertices: NDArray[np.int32], values: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+    """Add the rows of `values` (s, 3) to those of their vertices, in their order."""
+    for k in range(3):
+        out[:, k] += np.bincount(vertices, weights=values[:, k], minlength=len(out))

@@ -1,0 +1,73 @@
+"""The energies of edge patches, and their derivatives by the vertices of each patch."""
+
+from __future__ import annotations
+
+from supple.materials.isotropic import density, energy_density, principal_hessian, stress
+from supple.numerics.kernel_cache import njit, prange
+from supple.numerics.svd3 import svd3 as decompose
+
+# Numbers of a patch's frame: U (9), psi_ij (6), alpha (3) and beta (3) times its volume, see `isotropic`.
+FRAME = 21
+
+
+@njit(error_model="numpy")
+def _mean_gradient(x, start, vertices, gradients, k):
+    """F of patch k, from differences to its first vertex: far from the origin they keep their accuracy."""
+    begin = start[k]
+    o = vertices[begin]
+    a, b, c = x[o, 0], x[o, 1], x[o, 2]
+    f0 = f1 = f2 = f3 = f4 = f5 = f6 = f7 = f8 = 0.0
+    for s in range(begin + 1, start[k + 1]):
+        v = vertices[s]
+        p, q, r = x[v, 0] - a, x[v, 1] - b, x[v, 2] - c
+        g, h, i = gradients[s, 0], gradients[s, 1], gradients[s, 2]
+        f0 += p * g
+        f1 += p * h
+        f2 += p * i
+        f3 += q * g
+        f4 += q * h
+        f5 += q * i
+        f6 += r * g
+        f7 += r * h
+        f8 += r * i
+    return (f0, f1, f2, f3, f4, f5, f6, f7, f8)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def edge_energies(x, start, vertices, gradients, volumes, kind, mu, lam, out):
+    """Energy of every patch [J] into out (k,)."""
+    for k in prange(len(volumes)):
+        F = _mean_gradient(x, start, vertices, gradients, k)
+        out[k] = volumes[k] * energy_density(F, kind[k], mu[k], lam[k])
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def edge_models(
+    x, start, vertices, gradients, volumes, kind, mu, lam, second, project, energies, forces, frames, turned
+):
+    """Energies (k,), gradients by the slots (s, 3) and, with `second`, what `pair_blocks` needs: the frames (k, 21) of
+    the patches and the slots' gradients V^T g (s, 3)."""
+    for k in prange(len(volumes)):
+        F = _mean_gradient(x, start, vertices, gradients, k)
+        U, s, V = decompose(F)
+        v = volumes[k]
+        energies[k] = v * density(kind[k], F, s, mu[k], lam[k])
+        P = stress(U, s, V, kind[k], mu[k], lam[k])
+        for t in range(start[k], start[k + 1]):
+            g, h, i = gradients[t, 0], gradients[t, 1], gradients[t, 2]
+            forces[t, 0] = v * (P[0] * g + P[1] * h + P[2] * i)
+            forces[t, 1] = v * (P[3] * g + P[4] * h + P[5] * i)
+            forces[t, 2] = v * (P[6] * g + P[7] * h + P[8] * i)
+            if second:
+                turned[t, 0] = V[0] * g + V[3] * h + V[6] * i
+                turned[t, 1] = V[1] * g + V[4] * h + V[7] * i
+                turned[t, 2] = V[2] * g + V[5] * h + V[8] * i
+        if second:
+            A, alpha, beta = principal_hessian(s, kind[k], mu[k], lam[k], project)
+            for c in range(9):
+                frames[k, c] = U[c]
+            for c in range(6):
+                frames[k, 9 + c] = v * A[c]
+            for c in range(3):
+                frames[k, 15 + c] = v * alpha[c]
+                frames[k, 18 + c] = v * beta[c]

@@ -1,0 +1,43 @@
+"""The energy of patches at given positions."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.materials.patches.domains import Patches
+from supple.materials.patches.edge_kernels import edge_energies
+from supple.materials.patches.vertex_kernels import vertex_pressures
+from supple.numerics.threads import threads_for
+
+# Fewer tets than this are processed by one thread.
+SERIAL_TETS = 1_000
+
+
+def patch_energies(patches: Patches, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(k,) of the patches of edges and (v,) of vertices [J], for positions x (n, 3) [m]."""
+    p = patches.edges
+    of_edges = np.empty(len(p.volumes))
+    with threads_for(len(patches.tets), SERIAL_TETS):
+        edge_energies(x, p.start, p.vertices, p.gradients, p.volumes, p.kind, p.mu, p.lam, of_edges)
+        return of_edges, vertex_states(patches, x)[0]
+
+
+def tet_shares(patches: Patches, x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m,) the patches' energy [J], of each patch in proportion to the volumes of its tets."""
+    of_edges, of_vertices = patch_energies(patches, x)
+    edges = (of_edges / patches.edges.volumes)[patches.edges.of_tet].mean(axis=1)
+    vertices = (of_vertices / patches.vertices.volumes)[patches.vertices.of_tet].mean(axis=1)
+    return patches.tet_volumes * (edges + vertices)
+
+
+def vertex_states(
+    patches: Patches, x: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """(v,) energies [J], pressures [Pa] and stiffnesses [Pa/m^3] of the patches of vertices (`vertex_pressures`)."""
+    p = patches.vertices
+    energies, pressures, stiffness = (np.empty(len(p.volumes)) for _ in range(3))
+    vertex_pressures(
+        x, patches.tets, p.tet_start, p.tet_nodes, p.volumes, p.kind, p.lam, energies, pressures, stiffness
+    )
+    return energies, pressures, stiffness

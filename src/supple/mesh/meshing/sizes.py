@@ -1,0 +1,58 @@
+"""How large tets become: a bound on their volume from the length of edges, or from the number of tets."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable
+
+from supple.mesh.tetmesh import TetMesh
+
+logger = logging.getLogger(__name__)
+
+COUNT_TOLERANCE = 0.1
+MOST_TRIES = 6
+
+
+def volume_of_edge(edge: float) -> float:
+    """The volume of a regular tetrahedron with edges of this length [m^3]."""
+    return edge**3 / (6.0 * math.sqrt(2.0))
+
+
+def mesh_with_count(make: Callable[[float], TetMesh], count: int, volume: float) -> TetMesh:
+    """The mesh whose number of tets is nearest to `count`, of at most six that are made.
+
+    Parameters
+    ----------
+    make : makes a mesh whose tets are at most as large as the number given [m^3]
+    count : the number of tets to reach within 10 %
+    volume : of the whole mesh, about [m^3]
+
+    The number of tets is about inversely proportional to the bound on their volume. Where the surface alone rules (its
+    triangles are smaller than such tets), no bound reaches the number: the coarsest mesh is returned, with a warning.
+    """
+    bound = 2.0 * volume / count  # a mean tet is about half as large as the largest
+    too_fine, too_coarse = 0.0, math.inf
+    best: TetMesh | None = None
+    for _ in range(MOST_TRIES):
+        mesh = make(bound)
+        made = len(mesh.tets)
+        if best is None or abs(made - count) < abs(len(best.tets) - count):
+            best = mesh
+        if abs(made - count) <= COUNT_TOLERANCE * count or bound > volume:
+            break
+        if made > count:
+            too_fine = max(too_fine, bound)
+        else:
+            too_coarse = min(too_coarse, bound)
+        bound *= made / count
+        if not too_fine < bound < too_coarse:
+            bound = math.sqrt(too_fine * too_coarse)
+    assert best is not None
+    if len(best.tets) > (1.0 + COUNT_TOLERANCE) * count:
+        logger.warning(
+            "%d tets instead of %d: the triangles of the surface need so many; decimate the surface first",
+            len(best.tets),
+            count,
+        )
+    return best
