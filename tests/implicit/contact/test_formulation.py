@@ -271,4 +271,54 @@ def test_weights_do_not_change_while_they_are_kept():
     kept = model.barriers(KAPPA).triangles.value(moved.copy())
     model.collisions.forget_weights()
     fresh = model.barriers(KAPPA).triangles.value(moved.copy())
-    assert fresh < 0.7 * kept  # no vertex of an outline is left
+    assert fresh < 0.8 * kept  # no vertex of an outline is left
+
+
+@pytest.mark.parametrize("met", [-2e-6, 0.0, 2e-6])
+def test_known_vertices_cross_an_outline_without_a_jump_or_a_force_along_the_face(met):
+    """Within a step: met over the face or beyond its outline, with lower faces that are not quite plane."""
+    bent = cube(2)
+    vertices = bent.vertices.copy()
+    vertices[:, 1] -= 1e-3 * vertices[:, 0] ** 2 + 2e-3 * vertices[:, 2] ** 2
+    model, x, rows = boxes(sp.TetMesh(vertices, bent.tets), cube(3))
+    barrier = model.barriers(KAPPA).triangles
+
+    def at(shift):
+        moved = x.copy()
+        moved[rows] += shift * np.array([0.6, 0.0, 0.8])
+        return moved
+
+    model.collisions.forget_weights()
+    model.collisions.keep_weights(at(met))
+    shifts = np.linspace(-1e-5, 1e-5, 81)
+    energies, forces = [], []
+    for shift in shifts:
+        moved = at(shift)
+        gradient = np.zeros_like(x)
+        barrier.add_gradient(moved, gradient)
+        energies.append(barrier.value(moved))
+        forces.append(gradient[rows].sum(axis=0))
+    along = np.array(forces)[:, [0, 2]] @ (0.6, 0.8)
+    assert np.abs(along).max() < 2e-3 * np.abs(np.array(forces)[:, 1]).max()
+    # The energy is that of these forces.
+    work = np.diff(shifts) * 0.5 * (along[1:] + along[:-1])
+    assert np.abs(np.diff(energies) - work).max() < 3e-9 * max(energies)
+
+
+def test_a_vertex_on_a_diagonal_counts_once_whatever_the_round_off():
+    """The closest point may have a barycentric coordinate that is a rounding error below zero."""
+    floor = sp.Box(center=(0, -0.05, 0), size=(0.2, 0.1, 0.2))
+    model, x = model_of([sp.Body("cube", cube(1), RUBBER)], [floor])
+    rng = np.random.default_rng(0)
+    corners = np.flatnonzero(x[:8, 1] < 0.0)
+    for _ in range(500):
+        vertex = rng.choice(corners)
+        moved, gap = x.copy(), DHAT * rng.uniform(0.1, 0.9)
+        place = np.sign(x[vertex]) * rng.uniform(0.01, 0.09)
+        moved[:8] += [place[0] - x[vertex, 0], gap - x[vertex, 1], place[2] - x[vertex, 2]]
+        moved[vertex, 2] += rng.choice([0.0, 1e-17, -1e-17, 1e-16])
+        model.collisions.forget_weights()
+        contacts = model.collisions.at(moved)
+        mine = contacts.points[:, 0] == vertex
+        assert contacts.weights[mine].sum() == pytest.approx(0.5 * model.mesh.areas[vertex])
+        assert contacts.distances[mine] == pytest.approx(gap)

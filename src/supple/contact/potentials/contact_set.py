@@ -36,13 +36,12 @@ class Found(NamedTuple):
     ----------
     contacts : those with a weight
     least : the smallest distance of the pairs, infinite where none is below `REACH` dhat [m]
-    codes, weights : what is to be known where the search goes on, for `KnownWeights`
+    new : what is to be known where the search goes on, in any order
     """
 
     contacts: Contacts
     least: float
-    codes: NDArray[np.int64]
-    weights: NDArray[np.float64]
+    new: KnownWeights
 
 
 class ContactSet:
@@ -79,18 +78,18 @@ class ContactSet:
         with threads_for(len(vertex_triangle) + len(edge_edge), _PARALLEL_FROM):
             features, squares = near_features(x, vertex_triangle, triangles, mesh.triangle_edges, len(edges), reach)
             areas, edge_squares, edge_keys, edges_grown = edge_weights(
-                x, edge_edge, self._of_edges, mesh.edge_areas, dhat, *known
+                x, edge_edge, self._of_edges, mesh.edge_areas, dhat, known
             )
             rows, start = grouped_by_vertex(vertex_triangle, features, len(x))
             codes, signs, counts = alternating_sums(
-                x, vertex_triangle, features, squares, rows, start, self._of_sums, reach
+                x, vertex_triangle, features, squares, rows, start, self._of_sums, known, reach
             )
             starts = np.column_stack([start, np.append(0, np.cumsum(counts))])
             count = int(starts[-1, 1])
             crossing, ends = edge_ends(x, edge_edge, areas, edges)
             saddles = saddle_weights(edge_edge, areas, crossing, ends, edges, len(x))
             out = _empty(count + 2 * len(crossing))
-            keys, grown = np.empty(count, dtype=np.int64), np.empty(count)
+            keys, planes, grown = np.empty(count, np.int64), np.empty(count, np.int32), np.empty(count)
             write_vertex_contacts(
                 x,
                 vertex_triangle,
@@ -103,20 +102,25 @@ class ContactSet:
                 mesh.areas,
                 saddles,
                 dhat,
-                *known,
+                known,
                 out,
                 keys,
+                planes,
                 grown,
             )
         write_edge_contacts(x, edge_edge, areas, crossing, ends, edges, count, out)
         least = min(squares.min(initial=np.inf), edge_squares.min(initial=np.inf))
-        new, new_edges = grown >= 0.0, edges_grown >= 0.0
-        new_codes = np.concatenate([keys[new], edge_keys[new_edges]])
-        new_weights = np.concatenate([grown[new], edges_grown[new_edges]])
+        new = _new(keys, grown, planes).with_more(_new(edge_keys, edges_grown, np.full(len(edge_keys), -1, np.int32)))
         counted = (out.weights != 0.0) & (out.distances < dhat)
         if not counted.all():
             out = out.where(counted)
-        return Found(out, float(np.sqrt(least)), new_codes, new_weights)
+        return Found(out, float(np.sqrt(least)), new)
+
+
+def _new(keys: NDArray[np.int64], grown: NDArray[np.float64], planes: NDArray[np.int32]) -> KnownWeights:
+    """Of the pairs that are to be known, those with `grown` zero or more."""
+    chosen = grown >= 0.0
+    return KnownWeights(keys[chosen], grown[chosen], planes[chosen])
 
 
 def _empty(count: int) -> Contacts:

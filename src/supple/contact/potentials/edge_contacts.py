@@ -26,13 +26,14 @@ _SHARE = 1.5
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def edge_weights(x, pairs, mesh, areas, dhat, known_codes, known_values):
+def edge_weights(x, pairs, mesh, areas, dhat, known):
     """Areas of the contacts of pairs of edges.
 
     Parameters
     ----------
     x : (s, 3) [m]; pairs : (l, 2); mesh : triangles, edges, start and items of edge_triangles (see `ContactMesh`)
     areas : (e,) a third of each edge's triangles at rest [m^2]
+    known : the weights that do not depend on x, a `KnownWeights`
 
     Returns
     -------
@@ -62,10 +63,10 @@ def edge_weights(x, pairs, mesh, areas, dhat, known_codes, known_values):
         now = full * protruding * nearest * angle * (2.0 - angle)
         # Below zero: the codes of vertices are not.
         keys[k] = -1 - np.int64(e) * len(edges) - f
-        known = known_weight(known_codes, known_values, keys[k])
-        if has_grown(known, now, full):
+        before = known_weight(known, keys[k])
+        if has_grown(before, now, full):
             grown[k] = now
-        weights[k] = now if known < 0.0 else known
+        weights[k] = now if before < 0.0 else before
     return weights, squares, keys, grown
 
 

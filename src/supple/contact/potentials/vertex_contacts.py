@@ -22,7 +22,7 @@ import math
 import numpy as np
 
 from supple.contact.closest.pair_geometry import VERTEX_EDGE, VERTEX_TRIANGLE, VERTEX_VERTEX
-from supple.contact.potentials.known_weights import has_grown, known_weight
+from supple.contact.potentials.known_weights import has_grown, known_row, known_weight
 from supple.numerics.geometry.closest_point import closest_on_triangle
 from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import cross, dot, row, subtract
@@ -79,7 +79,7 @@ def near_features(x, pairs, triangles, triangle_edges, edge_count, reach):
         if inside == 3:
             features[k] = t
         elif inside == 2:
-            features[k] = len(triangles) + triangle_edges[t, 1 if u[0] == 0.0 else (2 if u[1] == 0.0 else 0)]
+            features[k] = len(triangles) + triangle_edges[t, 1 if u[0] <= 0.0 else (2 if u[1] <= 0.0 else 0)]
         else:
             features[k] = len(triangles) + edge_count + triangles[t, 0 if u[0] > 0.0 else (1 if u[1] > 0.0 else 2)]
     return features, squares
@@ -112,15 +112,16 @@ def grouped_by_vertex(pairs, features, s):
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def alternating_sums(x, pairs, features, squares, rows, start, mesh, reach):
+def alternating_sums(x, pairs, features, squares, rows, start, mesh, known, reach):
     """The features that are left of each vertex's alternating sum, and how often each counts.
 
     Where only edges and vertices of an outline are left, the nearest one remains and a triangle at it follows, with the
-    number 0, if one of the vertex's own lies flat on it: its plane may count instead.
+    number 0, if one of the vertex's own lies flat on it: its plane may count instead. A known one stays.
 
     Parameters
     ----------
     mesh : triangles, edges, triangle_edges, start and items of vertex_triangles, owner (see `ContactMesh`)
+    known : a `KnownWeights`
 
     Returns
     -------
@@ -149,14 +150,19 @@ def alternating_sums(x, pairs, features, squares, rows, start, mesh, reach):
         for k in range(begin, end):
             if squares[rows[k]] < squares[rows[nearest]]:
                 nearest = k
+        v = pairs[rows[begin], 0]
+        kept = known_row(known, _beyond(np.int64(v) * len(x) + other, len(x)))
         least, facing = _SHARP, -1
-        for k in range(begin, end):
-            if features[rows[k]] == features[rows[nearest]]:
-                v, t = pairs[rows[k]]
-                cosine = _facing(x, v, triangles, t, own_start, own_items)
-                least = min(least, cosine)
-                if cosine > _LEANING and facing < 0:  # triangles of one face are nearly in one plane
-                    facing = t
+        if kept >= 0:
+            least, facing = -1.0, known.triangles[kept]
+        else:
+            for k in range(begin, end):
+                if features[rows[k]] == features[rows[nearest]]:
+                    t = pairs[rows[k], 1]
+                    cosine = _facing(x, v, triangles, t, own_start, own_items)
+                    least = min(least, cosine)
+                    if cosine > _LEANING and facing < 0:  # triangles of one face are nearly in one plane
+                        facing = t
         if facing >= 0 and least < _SHARP:
             codes[first], signs[first] = features[rows[nearest]], 1
             codes[first + 1], signs[first + 1] = facing, 0
@@ -284,7 +290,7 @@ def nearest_of_edge(p, a, b):
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def write_vertex_contacts(
-    x, pairs, rows, starts, codes, signs, mesh, owner, areas, saddles, dhat, known_codes, known_values, out, keys, grown
+    x, pairs, rows, starts, codes, signs, mesh, owner, areas, saddles, dhat, known, out, keys, planes, grown
 ):
     """Write the contacts of `alternating_sums` into the first rows of `out`, a `Contacts`.
 
@@ -293,7 +299,9 @@ def write_vertex_contacts(
     starts : (groups + 1, 2) where each group begins in `rows` and in `out`
     mesh : triangles, edges, start and items of neighbors and of vertex_triangles (see `ContactMesh`)
     saddles : (s,) least weights of vertices that `saddle_weights` asks for [m^2]
+    known : the weights that do not depend on x, a `KnownWeights`
     keys : (m,) a code of each contact's vertex and the owner of the other side, for `KnownWeights`
+    planes : (m,) triangles whose planes count, -1 for other contacts
     grown : (m,) weights of the vertices that are to be known [m^2], -1 where they do not change
     """
     triangles, edges, near_start, near_items, own_start, own_items = mesh
@@ -334,21 +342,27 @@ def write_vertex_contacts(
                     best = max(best, weights[other])
             grown[k] = (1.0 - share) * best
         for k in range(first, last):
-            known = known_weight(known_codes, known_values, keys[k])
+            before = known_weight(known, keys[k])
+            planes[k] = -1
             # Where the vertex comes over the face, both of its weights are those of the face.
             beyond = 0.0
             if not beside:
-                beyond = max(0.0, known_weight(known_codes, known_values, _beyond(keys[k], len(x))))
-                known = max(known, 0.0) + beyond if known >= 0.0 or beyond > 0.0 else -1.0
+                beyond = max(0.0, known_weight(known, _beyond(keys[k], len(x))))
+                before = max(before, 0.0) + beyond if before >= 0.0 or beyond > 0.0 else -1.0
             now = grown[k]
-            grown[k] = now - beyond if has_grown(known, now, full) else -1.0
-            weights[k] = signs[offset + k] * (now if known < 0.0 else known)
+            grown[k] = now - beyond if has_grown(before, now, full) else -1.0
+            weights[k] = signs[offset + k] * (now if before < 0.0 else before)
         if beside:
-            keys[last] = _beyond(keys[last], len(x))
-            now = min(share * full, max(0.0, full - weights[first]))
-            known = known_weight(known_codes, known_values, keys[last])
-            grown[last] = now if has_grown(known, now, full) else -1.0
-            weights[last] = now if known < 0.0 else known
+            keys[last], planes[last] = _beyond(keys[last], len(x)), codes[offset + last]
+            before = known_weight(known, keys[last])
+            if before < 0.0 <= known_weight(known, keys[first]):
+                # The vertex was over the face: its weight stays as a whole.
+                now = share * weights[first]
+                grown[first] = weights[first] = weights[first] - now
+            else:
+                now = min(share * full, max(0.0, full - weights[first]))
+            grown[last] = now if has_grown(before, now, full) else -1.0
+            weights[last] = now if before < 0.0 else before
 
 
 @njit(error_model="numpy")

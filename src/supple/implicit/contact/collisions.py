@@ -54,8 +54,8 @@ class Collisions:
     def keep_weights(self, x: NDArray[np.float64]) -> None:
         """Contacts at x (n, 3) keep their weights wherever they go (see `KnownWeights`)."""
         found = self._at(x)
-        if len(found.codes):
-            self._known, self._found = self._known.grown(found.codes, found.weights), None
+        if len(found.new.codes):
+            self._known, self._found = self._known.with_more(found.new), None
 
     def _at(self, x: NDArray[np.float64]) -> Found:
         points = self.points(x)

@@ -20,9 +20,8 @@ _SUFFICIENT = 1e-4
 _SHRINK = 0.5
 _MOST_CUTS = 40
 
-# Energies are sums of many terms: differences below this share of the terms' size count as none. They are round-off, or
-# the jumps of contacts beside an outline where their face changes from one triangle to the next, nearly in its plane.
-_ROUND_OFF = 1e-11
+# Energies are sums of many terms: differences below this share of the terms' size count as none.
+_ROUND_OFF = 1e-13
 
 # Decreases below this share of the terms' size are too near to round-off to tell whether a step went beyond the
 # minimum: its end then has to be no steeper uphill than this share of the slope at its start. Without it, steps go to
