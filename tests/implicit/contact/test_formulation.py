@@ -322,3 +322,18 @@ def test_a_vertex_on_a_diagonal_counts_once_whatever_the_round_off():
         mine = contacts.points[:, 0] == vertex
         assert contacts.weights[mine].sum() == pytest.approx(0.5 * model.mesh.areas[vertex])
         assert contacts.distances[mine] == pytest.approx(gap)
+
+
+def test_edges_in_a_crease_repel_each_other_where_their_surface_comes_nearer_beside_them():
+    """Two faces that meet at an edge A B, nearly closed; their diagonals cross."""
+    height = 0.25 * DHAT
+    a, b, p, beside_p, q, beside_q = (0, 0, 0), (0, 0, 1), (1, 1, 1), (1, 1, 0), (1, -1, 0), (1, -1, 1)
+    points = np.array([a, b, p, beside_p, q, beside_q, (0.5, 0, 0.5), (0.5, 0, 0.5)]) * (0.01, height, 0.01)
+    points[6:, 1] = 0.01, -0.01
+    tets = np.array([[0, 2, 1, 6], [0, 2, 3, 6], [1, 4, 0, 7], [1, 4, 5, 7], [0, 1, 6, 7]])
+    model, x = model_of([sp.Body("crease", sp.TetMesh(points, tets), RUBBER)])
+    contacts = model.collisions.at(x)
+    (row,) = np.flatnonzero((np.sort(contacts.points) == [0, 1, 2, 4]).all(axis=1))
+    assert contacts.kinds[row] == EDGE_EDGE
+    assert contacts.distances[row] == pytest.approx(height, rel=1e-3)
+    assert contacts.weights[row] > 0.0

@@ -54,8 +54,8 @@ def edge_weights(x, pairs, mesh, areas, dhat, known):
         if not (crossing > 0.0 and 0.0 < s < 1.0 and 0.0 < t < 1.0 and square < dhat * dhat):
             continue
         squares[k] = square
-        one = _height(x, triangles, edges, edge_start, edge_items, e, r, -1.0)
-        other = _height(x, triangles, edges, edge_start, edge_items, f, r, 1.0)
+        one = _height(x, triangles, edges, edge_start, edge_items, e, f, r, -1.0)
+        other = _height(x, triangles, edges, edge_start, edge_items, f, e, r, 1.0)
         protruding = min(1.0, max(0.0, max(one, other) / h))
         nearest = min(1.0, max(0.0, 1.0 + min(one, other) / h))
         angle = min(1.0, crossing / _CROSSING)
@@ -90,17 +90,26 @@ def crossing_point(a, b, c, d):
 
 
 @njit(error_model="numpy")
-def _height(x, triangles, edges, edge_start, edge_items, e, r, sign):
+def _height(x, triangles, edges, edge_start, edge_items, e, other, r, sign):
     """How far the surface recedes beside edge e, against the direction sign * r, over the edge's length [m].
 
-    Negative where it comes nearer.
+    Negative where it comes nearer. Triangles that end at the other edge have no contacts with it, and do not count: in
+    a crease, the surface always comes nearer there. Infinite where there are no others.
     """
     length = math.sqrt(dot(r, r))
     least = np.inf
     for k in range(edge_start[e], edge_start[e + 1]):
-        least = min(least, -sign * dot(r, _inward(x, triangles, edge_items[k], edges[e, 0], edges[e, 1])) / length)
+        t = edge_items[k]
+        if _ends_at(triangles, t, edges[other, 0]) or _ends_at(triangles, t, edges[other, 1]):
+            continue
+        least = min(least, -sign * dot(r, _inward(x, triangles, t, edges[e, 0], edges[e, 1])) / length)
     along = subtract(row(x, edges[e, 1]), row(x, edges[e, 0]))
     return least * math.sqrt(dot(along, along))
+
+
+@njit(error_model="numpy")
+def _ends_at(triangles, t, v):
+    return triangles[t, 0] == v or triangles[t, 1] == v or triangles[t, 2] == v
 
 
 @njit(error_model="numpy")

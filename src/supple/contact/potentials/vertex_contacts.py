@@ -327,7 +327,9 @@ def write_vertex_contacts(
             if sign > 0:
                 weights[k] = full
                 if kinds[k] != VERTEX_TRIANGLE:
-                    weights[k] *= _own_side(x, near_start, near_items, v, r, distances[k], height)
+                    weights[k] *= _own_side(
+                        x, near_start, near_items, v, points[k, 1], points[k, 2], r, distances[k], height
+                    )
         beside = last == first + 2 and signs[offset + first + 1] == 0
         last -= beside
         share = 0.0
@@ -413,9 +415,13 @@ def _foot(p, a, b, c):
 
 
 @njit(error_model="numpy")
-def _own_side(x, near_start, near_items, v, r, d, height):
-    """1 where no neighbor of vertex v is nearer to what lies at -r, 0 where one is nearer by `height`."""
+def _own_side(x, near_start, near_items, v, a, b, r, d, height):
+    """1 where no neighbor of vertex v is nearer to what lies at -r, 0 where one is nearer by `height`.
+
+    The points a and b that lie there do not count: in a crease, they may be neighbors.
+    """
     nearer = 0.0
     for k in range(near_start[v], near_start[v + 1]):
-        nearer = min(nearer, dot(r, subtract(row(x, near_items[k]), row(x, v))) / d)
+        if near_items[k] != a and near_items[k] != b:
+            nearer = min(nearer, dot(r, subtract(row(x, near_items[k]), row(x, v))) / d)
     return max(0.0, 1.0 + nearer / height)
