@@ -15,13 +15,8 @@ from supple.contact.potentials.edge_contacts import (
     write_edge_contacts,
 )
 from supple.contact.potentials.known_weights import KnownWeights
-from supple.contact.potentials.vertex_contacts import (
-    REACH,
-    alternating_sums,
-    grouped_by_vertex,
-    near_features,
-    write_vertex_contacts,
-)
+from supple.contact.potentials.vertex_contacts import REACH, write_vertex_contacts
+from supple.contact.potentials.vertex_features import alternating_sums, grouped, near_features
 from supple.contact.surface.contact_mesh import ContactMesh
 from supple.numerics.threads import threads_for
 
@@ -37,11 +32,13 @@ class Found(NamedTuple):
     contacts : those with a weight
     least : the smallest distance of the pairs, infinite where none is below `REACH` dhat [m]
     new : what is to be known where the search goes on, in any order
+    near : codes of the pairs that may count with a plane, for `KnownWeights`
     """
 
     contacts: Contacts
     least: float
     new: KnownWeights
+    near: NDArray[np.int64]
 
 
 class ContactSet:
@@ -80,7 +77,7 @@ class ContactSet:
             areas, edge_squares, edge_keys, edges_grown = edge_weights(
                 x, edge_edge, self._of_edges, mesh.edge_areas, dhat, known
             )
-            rows, start = grouped_by_vertex(vertex_triangle, features, len(x))
+            rows, start = grouped(vertex_triangle, features, triangles, mesh.owner)
             codes, signs, counts = alternating_sums(
                 x, vertex_triangle, features, squares, rows, start, self._of_sums, known, reach
             )
@@ -114,7 +111,8 @@ class ContactSet:
         counted = (out.weights != 0.0) & (out.distances < dhat)
         if not counted.all():
             out = out.where(counted)
-        return Found(out, float(np.sqrt(least)), new)
+        near = np.where(planes < 0, keys + len(x) ** 2, keys)  # as of `beyond`
+        return Found(out, float(np.sqrt(least)), new, near)
 
 
 def _new(keys: NDArray[np.int64], grown: NDArray[np.float64], planes: NDArray[np.int32]) -> KnownWeights:

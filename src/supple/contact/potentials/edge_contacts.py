@@ -14,7 +14,8 @@ import numpy as np
 
 from supple.contact.closest.pair_geometry import EDGE_EDGE, VERTEX_EDGE, VERTEX_VERTEX
 from supple.contact.potentials.known_weights import has_grown, known_weight
-from supple.contact.potentials.vertex_contacts import NEARER_SHARE, nearest_of_edge
+from supple.contact.potentials.vertex_contacts import NEARER_SHARE
+from supple.contact.potentials.vertex_features import nearest_of_edge
 from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import cross, dot, row, subtract
 

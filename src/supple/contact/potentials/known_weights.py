@@ -3,7 +3,8 @@
 A weight depends on directions, and its derivatives are no forces. While the minimum of an energy is searched, contacts
 keep the weights with which the search first met them: the energy is then a function of the positions. Weights may grow
 where the search goes on, so that nothing comes near without a force; they cannot grow without end. A vertex that counts
-with the plane of a triangle beside an outline keeps the triangle, too: another one would have another plane.
+with the plane of a triangle beside an outline keeps the triangle, too: another one would have another plane. Where it
+goes too far away from the outline to count, it loses the weight, and does not get it back at once.
 """
 
 from __future__ import annotations
@@ -43,6 +44,16 @@ class KnownWeights(NamedTuple):
         both = [np.concatenate(pair) for pair in zip(more, self, strict=True)]
         _, first = np.unique(both[0], return_index=True)
         return KnownWeights(*(part[first] for part in both))
+
+    def without_planes(self, near: NDArray[np.int64]) -> KnownWeights:
+        """With no weight for pairs that count with a plane, but those with the codes `near` (m,)."""
+        lost = np.flatnonzero((self.triangles >= 0) & (self.weights > 0.0))
+        lost = lost[~np.isin(self.codes[lost], near)] if len(lost) else lost
+        if not len(lost):
+            return self
+        weights = self.weights.copy()
+        weights[lost] = 0.0
+        return self._replace(weights=weights)
 
 
 @njit(error_model="numpy")

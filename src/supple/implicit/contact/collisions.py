@@ -54,8 +54,9 @@ class Collisions:
     def keep_weights(self, x: NDArray[np.float64]) -> None:
         """Contacts at x (n, 3) keep their weights wherever they go (see `KnownWeights`)."""
         found = self._at(x)
-        if len(found.new.codes):
-            self._known, self._found = self._known.with_more(found.new), None
+        known = self._known.with_more(found.new).without_planes(found.near)
+        if known is not self._known:
+            self._known, self._found = known, None
 
     def _at(self, x: NDArray[np.float64]) -> Found:
         points = self.points(x)
