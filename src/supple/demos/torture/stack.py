@@ -1,8 +1,7 @@
 """Five equal cubes, one per cent of their size apart, fall on each other and rest, without friction.
 
-Nothing but the tilt of loaded faces pushes them sideways. With less than four cells along an edge, every cube is one per
-cent smaller than the one below it, so that there is a scene with outlines above faces as well as one with outlines above
-each other.
+Nothing but the tilt of loaded faces pushes them sideways. With less than four cells along an edge, every cube is one
+per cent smaller than the one below it: outlines are above faces there, and above each other in finer stacks.
 """
 
 from __future__ import annotations
