@@ -41,9 +41,9 @@ class KnownWeights(NamedTuple):
         if not len(more.codes):
             return self
         # The first of equal codes counts.
-        both = [np.concatenate(pair) for pair in zip(more, self, strict=True)]
-        _, first = np.unique(both[0], return_index=True)
-        return KnownWeights(*(part[first] for part in both))
+        codes, first = np.unique(np.concatenate([more.codes, self.codes]), return_index=True)
+        weights = np.concatenate([more.weights, self.weights])[first]
+        return KnownWeights(codes, weights, np.concatenate([more.triangles, self.triangles])[first])
 
     def without_planes(self, near: NDArray[np.int64]) -> KnownWeights:
         """With no weight for pairs that count with a plane, but those with the codes `near` (m,)."""

@@ -13,6 +13,7 @@ import numpy as np
 from supple.demos.demo import Claim
 from supple.demos.torture.meshes import mirrored_box
 from supple.demos.torture.watch import ContactMeasurement, Size, mass, push, torture
+from supple.implicit.details import ImplicitDetails
 from supple.implicit.solver import Implicit
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.scene.body import Body
@@ -46,7 +47,9 @@ def scene(cells: int, scale: float = 1.0) -> Scene:
 
 class _Measurement(ContactMeasurement):
     def values(self, frame: Frame) -> dict[str, Any]:
-        forces = frame.report.details.contact_forces
+        details = frame.report.details
+        assert isinstance(details, ImplicitDetails)
+        forces = details.contact_forces
         aside = [np.hypot(*forces[name][[0, 2]]) / (GRAVITY * mass(frame, name)) for name in frame.positions]
         return {**super().values(frame), "aside": (frame.time, max(aside))}
 

@@ -86,10 +86,10 @@ class Planes:
 
     def near(self, x: NDArray[np.float64]) -> Near:
         """The pairs nearer than dhat at x (n, 3)."""
-        positions = self.positions(x)
-        if self._near is None:
-            self._near = near_planes(positions, self.pairs, self.dhat)
-        return self._near
+        positions, near = self.positions(x), self._near
+        if near is None:
+            self._near = near = near_planes(positions, self.pairs, self.dhat)
+        return near
 
     def heights(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(k,) signed distances of all pairs [m]."""
