@@ -32,13 +32,13 @@ class Found(NamedTuple):
     contacts : those with a weight
     least : the smallest distance of the pairs, infinite where none is below `REACH` dhat [m]
     new : what is to be known where the search goes on, in any order
-    near : codes of the pairs that may count with a plane, for `KnownWeights`
+    planes : codes of the pairs that may count with a plane, for `KnownWeights`
     """
 
     contacts: Contacts
     least: float
     new: KnownWeights
-    near: NDArray[np.int64]
+    planes: NDArray[np.int64]
 
 
 class ContactSet:
@@ -52,7 +52,7 @@ class ContactSet:
     def __init__(self, mesh: ContactMesh, dhat: float) -> None:
         self.dhat = dhat
         self._mesh = mesh
-        self._of_vertices = (mesh.triangles, mesh.edges, *mesh.neighbors, *mesh.vertex_triangles)
+        self._of_vertices = (mesh.triangles, mesh.edges, *mesh.neighbors)
         self._of_sums = (mesh.triangles, mesh.edges, mesh.triangle_edges, *mesh.vertex_triangles, mesh.owner)
         self._of_edges = (mesh.triangles, mesh.edges, *mesh.edge_triangles)
 
@@ -78,7 +78,7 @@ class ContactSet:
                 x, edge_edge, self._of_edges, mesh.edge_areas, dhat, known
             )
             rows, start = grouped(vertex_triangle, features, triangles, mesh.owner)
-            codes, signs, counts = alternating_sums(
+            codes, signs, counts, shares = alternating_sums(
                 x, vertex_triangle, features, squares, rows, start, self._of_sums, known, reach
             )
             starts = np.column_stack([start, np.append(0, np.cumsum(counts))])
@@ -94,6 +94,7 @@ class ContactSet:
                 starts,
                 codes,
                 signs,
+                shares,
                 self._of_vertices,
                 mesh.owner,
                 mesh.areas,
@@ -111,8 +112,7 @@ class ContactSet:
         counted = (out.weights != 0.0) & (out.distances < dhat)
         if not counted.all():
             out = out.where(counted)
-        near = np.where(planes < 0, keys + len(x) ** 2, keys)  # as of `beyond`
-        return Found(out, float(np.sqrt(least)), new, near)
+        return Found(out, float(np.sqrt(least)), new, keys[planes >= 0])
 
 
 def _new(keys: NDArray[np.int64], grown: NDArray[np.float64], planes: NDArray[np.int32]) -> KnownWeights:

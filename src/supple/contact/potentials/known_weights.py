@@ -4,7 +4,7 @@ A weight depends on directions, and its derivatives are no forces. While the min
 keep the weights with which the search first met them: the energy is then a function of the positions. Weights may grow
 where the search goes on, so that nothing comes near without a force; they cannot grow without end. A vertex that counts
 with the plane of a triangle beside an outline keeps the triangle, too: another one would have another plane. Where it
-goes too far away from the outline to count, it loses the weight, and does not get it back at once.
+goes over the face, or too far away from the outline to count, the plane loses the weight.
 """
 
 from __future__ import annotations
@@ -45,10 +45,10 @@ class KnownWeights(NamedTuple):
         weights = np.concatenate([more.weights, self.weights])[first]
         return KnownWeights(codes, weights, np.concatenate([more.triangles, self.triangles])[first])
 
-    def without_planes(self, near: NDArray[np.int64]) -> KnownWeights:
-        """With no weight for pairs that count with a plane, but those with the codes `near` (m,)."""
+    def with_planes(self, codes: NDArray[np.int64]) -> KnownWeights:
+        """With no weight for pairs that count with a plane, but for those with these codes (m,)."""
         lost = np.flatnonzero((self.triangles >= 0) & (self.weights > 0.0))
-        lost = lost[~np.isin(self.codes[lost], near)] if len(lost) else lost
+        lost = lost[~np.isin(self.codes[lost], codes)] if len(lost) else lost
         if not len(lost):
             return self
         weights = self.weights.copy()

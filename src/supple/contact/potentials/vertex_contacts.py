@@ -17,7 +17,7 @@ import numpy as np
 
 from supple.contact.closest.pair_geometry import VERTEX_EDGE, VERTEX_TRIANGLE, VERTEX_VERTEX
 from supple.contact.potentials.known_weights import has_grown, known_weight
-from supple.contact.potentials.vertex_features import LEANING, PARTS, beyond, facing_cosine, nearest_of_edge
+from supple.contact.potentials.vertex_features import PARTS, beyond, nearest_of_edge, share_between
 from supple.numerics.geometry.closest_point import closest_on_triangle
 from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import cross, dot, row, subtract
@@ -32,27 +32,24 @@ _FULL, _NONE = 0.25, 0.75
 # So much farther than dhat are vertices that hang beyond an outline.
 REACH = math.sqrt(1.0 + _NONE**2)
 
-# Cosine of the angle between two faces that lie on each other, above which all of the weight counts; see `LEANING`.
-_FLAT = 0.98
-
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def write_vertex_contacts(
-    x, pairs, rows, starts, codes, signs, mesh, owner, areas, saddles, dhat, known, out, keys, planes, grown
+    x, pairs, rows, starts, codes, signs, shares, mesh, owner, areas, saddles, dhat, known, out, keys, planes, grown
 ):
     """Write the contacts of `alternating_sums` into the first rows of `out`, a `Contacts`.
 
     Parameters
     ----------
     starts : (groups + 1, 2) where each group begins in `rows` and in `out`
-    mesh : triangles, edges, start and items of neighbors and of vertex_triangles (see `ContactMesh`)
+    mesh : triangles, edges, start and items of neighbors (see `ContactMesh`)
     saddles : (s,) least weights of vertices that `saddle_weights` asks for [m^2]
     known : the weights that do not depend on x, a `KnownWeights`
     keys : (m,) codes for `KnownWeights`
     planes : (m,) triangles whose planes count, -1 for other contacts
     grown : (m,) weights of the vertices that are to be known [m^2], -1 where they do not change
     """
-    triangles, edges, near_start, near_items, own_start, own_items = mesh
+    triangles, edges, near_start, near_items = mesh
     kinds, points, coefficients, vectors, distances, weights = out
     height = NEARER_SHARE * dhat
     for g in prange(len(starts) - 1):
@@ -87,18 +84,20 @@ def write_vertex_contacts(
             # Where the vertex comes over the face, both of its weights are those of the face.
             before = max(face, 0.0) + max(outside, 0.0) if face >= 0.0 or outside >= 0.0 else -1.0
             if has_grown(before, best, full):
-                grown[first] = best - max(outside, 0.0)
+                grown[first] = best
+            elif outside > 0.0:
+                grown[first] = before
             for k in range(first, last):
                 weights[k] = signs[offset + k] * (best if before < 0.0 else before)
             continue
         keys[last], planes[last], grown[last] = beyond(key, len(x)), codes[offset + last], -1.0
-        facing = facing_cosine(x, v, triangles, planes[last], own_start, own_items)
         side = math.sqrt(max(0.0, distances[first] ** 2 - distances[last] ** 2))
-        share = _between(facing, LEANING, _FLAT) * (1.0 - _between(side / dhat, _FULL, _NONE))
-        if face >= 0.0 and outside < 0.0:
+        share = shares[g] * (1.0 - share_between(side / dhat, _FULL, _NONE))
+        if face >= 0.0 and outside <= 0.0:
             # The vertex was over the face: its weight stays as a whole.
             weights[first], weights[last] = (1.0 - share) * face, share * face
-            grown[first], grown[last] = weights[first], weights[last]
+            if share > 0.0:
+                grown[first], grown[last] = weights[first], weights[last]
             continue
         now = (1.0 - share) * best
         weights[first] = now if face < 0.0 else face
@@ -108,12 +107,6 @@ def write_vertex_contacts(
         weights[last] = now if outside < 0.0 else outside
         if has_grown(outside, now, full):
             grown[last] = now
-
-
-@njit(error_model="numpy")
-def _between(x, low, high):
-    """0 up to `low`, 1 from `high` on, linear between them."""
-    return min(1.0, max(0.0, (x - low) / (high - low)))
 
 
 @njit(error_model="numpy")

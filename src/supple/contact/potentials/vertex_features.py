@@ -19,11 +19,12 @@ from supple.numerics.geometry.closest_point import closest_on_triangle
 from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import cross, dot, row, subtract
 
-# Cosine of the angle between two faces above which they may lie on each other.
-LEANING = 0.9
+# Cosines of the angle between two faces that lie on each other, from none of the weight to all of it.
+_LEANING, _FLAT = 0.9, 0.98
 
-# An edge or a vertex is part of an outline where one of its faces leans by more than this cosine.
-_SHARP = 0.8
+# Cosines of the angle of the most leaning face at an edge or a vertex, from none of the weight to all of it: others are
+# no part of an outline.
+_BENT, _SHARP = 0.8, 0.6
 
 # Most parts of one triangle: itself, its edges, its corners.
 PARTS = 7
@@ -141,10 +142,11 @@ def alternating_sums(x, pairs, features, squares, rows, start, mesh, known, reac
     Returns
     -------
     codes, signs : (7 m,), those of a group from 7 * start on; counts : (groups,) how many there are
+    shares : (groups,) of the weight of a vertex beside an outline that may count with the plane
     """
     codes = np.empty(PARTS * len(rows), dtype=np.int32)
     signs = np.empty(PARTS * len(rows), dtype=np.int32)
-    counts = np.empty(len(start) - 1, dtype=np.int32)
+    counts, shares = np.empty(len(start) - 1, dtype=np.int32), np.zeros(len(start) - 1)
     triangles, edges, triangle_edges, own_start, own_items, owner = mesh
     for g in prange(len(start) - 1):
         begin, end = start[g], start[g + 1]
@@ -164,22 +166,22 @@ def alternating_sums(x, pairs, features, squares, rows, start, mesh, known, reac
                 nearest = k
         v, other = pairs[rows[begin], 0], _owner(pairs, rows[begin], triangles, owner)
         kept = known_row(known, beyond(np.int64(v) * len(x) + other, len(x)))
-        least, facing = _SHARP, -1
-        if kept >= 0:
-            least, facing = -1.0, known.triangles[kept]
-        else:
-            for k in range(begin, end):
-                if features[rows[k]] == features[rows[nearest]]:
-                    t = pairs[rows[k], 1]
-                    cosine = facing_cosine(x, v, triangles, t, own_start, own_items)
-                    least = min(least, cosine)
-                    if cosine > LEANING and facing < 0:  # triangles of one face are nearly in one plane
-                        facing = t
-        if facing >= 0 and least < _SHARP:
+        stays, facing, flattest, least = -1, -1, _LEANING, _BENT
+        for k in range(begin, end):
+            t = pairs[rows[k], 1]
+            if kept >= 0 and known.weights[kept] > 0.0 and known.triangles[kept] == t:
+                stays = t
+            if features[rows[k]] == features[rows[nearest]]:
+                cosine = _facing_cosine(x, v, triangles, t, own_start, own_items)
+                least = min(least, cosine)
+                if cosine > flattest and facing < 0:  # triangles of one face are nearly in one plane
+                    facing, flattest = t, cosine
+        if stays >= 0 or (facing >= 0 and least < _BENT):
             codes[first], signs[first] = features[rows[nearest]], 1
-            codes[first + 1], signs[first + 1] = facing, 0
+            codes[first + 1], signs[first + 1] = stays if stays >= 0 else facing, 0
             counts[g] = 2
-    return codes, signs, counts
+            shares[g] = share_between(flattest, _LEANING, _FLAT) * (1.0 - share_between(least, _SHARP, _BENT))
+    return codes, signs, counts, shares
 
 
 @njit(error_model="numpy")
@@ -194,7 +196,7 @@ def _normal(x, triangles, t):
 
 
 @njit(error_model="numpy")
-def facing_cosine(x, v, triangles, t, own_start, own_items):
+def _facing_cosine(x, v, triangles, t, own_start, own_items):
     """The largest cosine of the angle at which triangle t and one of vertex v's own look at each other.
 
     The sides that look are those of the normals, also of a sheet, which has no inside.
@@ -304,3 +306,9 @@ def nearest_of_edge(p, a, b):
 def beyond(key, s):
     """The code of a vertex that hangs beyond an outline; `key` is that of the vertex and the other side's owner."""
     return key + np.int64(s) * s
+
+
+@njit(error_model="numpy")
+def share_between(x, low, high):
+    """0 up to `low`, 1 from `high` on, linear between them."""
+    return min(1.0, max(0.0, (x - low) / (high - low)))

@@ -54,7 +54,7 @@ class Collisions:
     def keep_weights(self, x: NDArray[np.float64]) -> None:
         """Contacts at x (n, 3) keep their weights wherever they go (see `KnownWeights`)."""
         found = self._at(x)
-        known = self._known.with_more(found.new).without_planes(found.near)
+        known = self._known.with_more(found.new).with_planes(found.planes)
         if known is not self._known:
             self._known, self._found = known, None
 
