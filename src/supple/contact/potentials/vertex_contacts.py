@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from supple.contact.closest.pair_geometry import VERTEX_EDGE, VERTEX_TRIANGLE, VERTEX_VERTEX
-from supple.contact.potentials.known_weights import has_grown, known_weight
+from supple.contact.potentials.known_weights import has_grown, known_row, known_weight
 from supple.contact.potentials.vertex_features import PARTS, beyond, nearest_of_edge, share_between
 from supple.numerics.geometry.closest_point import closest_on_triangle
 from supple.numerics.kernel_cache import njit, prange
@@ -77,7 +77,8 @@ def write_vertex_contacts(
         last -= beside
         # Of the vertex and the owner of the other side: the same for all.
         key = np.int64(v) * len(x) + owner[points[first, 1]]
-        face, outside = known_weight(known, key), known_weight(known, beyond(key, len(x)))
+        face, of_plane = known_weight(known, key), known_row(known, beyond(key, len(x)))
+        outside = known.weights[of_plane] if of_plane >= 0 else -1.0
         for k in range(first, last):
             keys[k], planes[k], grown[k] = key, -1, -1.0
         if not beside:
@@ -93,10 +94,11 @@ def write_vertex_contacts(
         keys[last], planes[last], grown[last] = beyond(key, len(x)), codes[offset + last], -1.0
         side = math.sqrt(max(0.0, distances[first] ** 2 - distances[last] ** 2))
         share = shares[g] * (1.0 - share_between(side / dhat, _FULL, _NONE))
-        if face >= 0.0 and outside <= 0.0:
-            # The vertex was over the face: its weight stays as a whole.
+        other = of_plane >= 0 and known.triangles[of_plane] != planes[last]
+        if face >= 0.0 and (other or outside <= 0.0):
+            # The vertex was over the face, or beside another one: its weight stays as a whole.
             weights[first], weights[last] = (1.0 - share) * face, share * face
-            if share > 0.0:
+            if share > 0.0 or outside > 0.0:
                 grown[first], grown[last] = weights[first], weights[last]
             continue
         now = (1.0 - share) * best

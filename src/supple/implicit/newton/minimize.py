@@ -18,7 +18,7 @@ from supple.implicit.limits.step_limits import StepLimits
 from supple.implicit.newton.convergence import Convergence
 from supple.implicit.newton.direction import DirectionFinder, Tools
 from supple.implicit.newton.hessian_projection import ProjectedTerms
-from supple.implicit.newton.line_search import Extension, search
+from supple.implicit.newton.line_search import Extension, Jumps, search
 from supple.implicit.newton.objective import Model, Objective
 from supple.implicit.newton.trace import NewtonRow
 from supple.numerics.interruption import interruption_point
@@ -76,7 +76,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
     """Minimize over the free vertices from x, whose guarded tets all have positive volume."""
     objective, convergence, hessian = problem.objective, problem.convergence, tools.hessian
     directions = DirectionFinder(objective, tools, problem.scale, convergence.step, problem.longest)
-    policy, extension = directions.policy, Extension()
+    policy, extension, jumps = directions.policy, Extension(), Jumps()
     here = objective.model(x, hessian, policy.now)
     rows: list[NewtonRow] = []
     if not np.isfinite(here.energy):
@@ -96,7 +96,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
         vector = extension.factor * found.vector
         largest, _, reason = limits.largest_step(here.positions, vector)
         slope = extension.factor * found.slope
-        end, step, cuts = search(objective, here, vector, slope, largest, limits)
+        end, step, cuts = search(objective, here, vector, slope, largest, limits, jumps)
         extension.note(step, rate)
         # Where the step is shorter, the duals of the whole direction are those that the next matrix needs, too.
         objective.renew(here.positions, vector)
