@@ -1,37 +1,85 @@
-"""Cost of a step with contact, and of its parts: the torture scenes, and some of them with about 20,000 tets.
+"""Cost of a step with contact, and of its parts: the torture scenes, some of them with about 20,000 tets, and cubes.
 
-usage: python -m benchmarks.contact_scenes [SCENE ...] [--quick]
+usage: python -m benchmarks.contact_scenes [SCENE ...] [--quick] [--steps N] [--against PATH]
 
-SCENE is a name such as `stack`, or `stack:small`, `stack:full`, `stack:large`; without any, all full and large ones are
-run. A scene is run for at most 100 steps. Means are over the steps that have contacts, without the first of them, which
-loads compiled kernels.
+SCENE is a name such as `stack`, or `stack:small`, `stack:full`, `stack:large`, or `tumbling`, 27 cubes that fall on
+each other; without any, all full and large ones and `tumbling` are run. Means are over the steps that have contacts,
+without the first of them, which loads compiled kernels.
+
+With --against, every scene also runs on the package of another checkout, whose folder `src` is PATH. The two run one
+after the other in processes of their own, and ratios are given: other / this.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
+import subprocess
+import sys
 from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
 
 import supple as sp
-from supple.demos.demo import Demo
 from supple.demos.torture.registry import TORTURE
 from supple.implicit.details import ImplicitDetails
 
+ROOT = Path(__file__).resolve().parents[1]
 MAX_STEPS = 100
 PARTS = ("contact", "elasticity", "linear_solve")
+TUMBLING = "tumbling"
 
 
-def measured(demo: Demo) -> dict[str, float]:
-    """Run a demo: tets, most contacts in a frame, and means over the steps with contacts."""
+class Case(NamedTuple):
+    """A scene, its solver, the length of a step [s] and their number."""
+
+    scene: sp.Scene
+    solver: sp.Implicit
+    dt: float
+    steps: int
+
+
+def tumbling() -> Case:
+    """27 cubes of 10 cm (48 tets each), mu = .4, in three layers that fall on each other and on a floor."""
+    rng = np.random.default_rng(3)
+    cube = sp.shapes.box((0.1, 0.1, 0.1), (2, 2, 2))
+    rubber = sp.StableNeoHookean(youngs=1e5, poisson=0.4, density=1000.0)
+    bodies = []
+    for k in range(27):
+        i, j, layer = k % 3, (k // 3) % 3, k // 9
+        shift, velocity = 0.01 * rng.normal(size=2), 0.5 * rng.normal(size=3)
+        place = (0.19 * (i - 1) + shift[0], 0.12 + 0.19 * layer, 0.19 * (j - 1) + shift[1])
+        bodies.append(sp.Body(f"cube {k}", cube, rubber, position=place, velocity=tuple(velocity), friction=0.4))
+    return Case(sp.Scene(bodies, [sp.HalfSpace(friction=0.4)]), sp.Implicit(), 1 / 60, 60)
+
+
+def case(item: str) -> Case:
+    """The scene of a name such as `stack:small`."""
+    if item == TUMBLING:
+        return tumbling()
+    name, _, size = item.partition(":")
+    demo = getattr(TORTURE.get(name), size or "full", None)
+    if demo is None:
+        raise SystemExit(
+            f"there is no scene {item!r}; there are {TUMBLING}, {', '.join(TORTURE)}, with :small, :full, some :large"
+        )
+    return Case(demo.scene(), demo.solver(), demo.dt, demo.steps)
+
+
+def measured(run: Case, most_steps: int = MAX_STEPS) -> dict[str, float]:
+    """Run a case: tets, most contacts in a frame, the smallest distance, and means over the steps with contacts."""
     tets = most = touching = iterations = 0
-    seconds, parts = 0.0, dict.fromkeys(PARTS, 0.0)
+    seconds, parts, nearest = 0.0, dict.fromkeys(PARTS, 0.0), float("inf")
     converged, loaded = True, False
-    for frame in sp.simulate(demo.scene(), demo.solver(), demo.dt, min(demo.steps, MAX_STEPS)):
+    for frame in sp.simulate(run.scene, run.solver, run.dt, min(run.steps, most_steps)):
         report, details = frame.report, frame.report.details
         assert isinstance(details, ImplicitDetails)
         tets = len(frame.system.tets)
         converged &= report.status == "converged"
+        nearest = min(nearest, report.min_distance or float("inf"))
         count = details.contacts
         if count == 0 or not loaded:
             loaded = count > 0
@@ -48,37 +96,68 @@ def measured(demo: Demo) -> dict[str, float]:
         "iterations": iterations / steps,
         "seconds": seconds / steps,
         **{name: value / max(seconds, 1e-300) for name, value in parts.items()},
+        "nearest": nearest,
         "converged": converged,
     }
 
 
-def main(names: Sequence[str] = (), quick: bool = False) -> None:
+def in_process(item: str, package: Path, steps: int) -> dict[str, float]:
+    """`measured` in a new process that imports supple from the folder `package`."""
+    code = (
+        "import json, sys; from benchmarks.contact_scenes import case, measured; "
+        "print(json.dumps(measured(case(sys.argv[1]), int(sys.argv[2]))))"
+    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(package), str(ROOT)])}
+    arguments = [sys.executable, "-c", code, item, str(steps)]
+    done = subprocess.run(arguments, capture_output=True, text=True, env=environment, cwd=package)
+    if done.returncode != 0:
+        raise SystemExit(f"{item} failed on {package}:\n{done.stderr[-2000:]}")
+    return json.loads(done.stdout.strip().splitlines()[-1])
+
+
+def main(
+    names: Sequence[str] = (), quick: bool = False, steps: int = MAX_STEPS, against: str | Path | None = None
+) -> None:
     chosen: list[str] = list(names)
     if not chosen:
         sizes = ("small",) if quick else ("full", "large")
         chosen = [f"{name}:{size}" for size in sizes for name, scene in TORTURE.items() if getattr(scene, size)]
+        chosen += [] if quick else [TUMBLING]
+    other = Path(against).resolve() if against is not None else None
+    if other is not None and not (other / "supple" / "__init__.py").exists():
+        raise SystemExit(f"--against {against}: there is no package supple in it; give the folder src of a checkout")
     load = f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
     print(f"\nSteps with contact; load of the machine at the start: {load}")
     print(f"{'scene':<16}{'tets':>7}{'contacts':>10}{'Newton':>8}{'s/step':>9}{'contact':>9}{'elastic':>9}{'solve':>7}")
     for item in chosen:
-        name, _, size = item.partition(":")
-        demo = getattr(TORTURE.get(name), size or "full", None)
-        if demo is None:
-            raise SystemExit(
-                f"there is no scene {item!r}; there are {', '.join(TORTURE)}, with :small, :full, some :large"
-            )
-        result = measured(demo)
+        if other is None:
+            _print_row(item, measured(case(item), steps))
+            continue
+        this, that = in_process(item, ROOT / "src", steps), in_process(item, other, steps)
+        _print_row(item, this)
+        _print_row("  other", that)
         print(
-            f"{item:<16}{result['tets']:7.0f}{result['contacts']:10.0f}{result['iterations']:8.1f}{result['seconds']:9.3f}"
-            f"{result['contact']:9.0%}{result['elasticity']:9.0%}{result['linear_solve']:7.0%}"
-            f"{'' if result['converged'] else '  not every step converged'}",
+            f"{'  other / this':<16}{'':17}{that['iterations'] / max(this['iterations'], 1e-300):8.2f}"
+            f"{that['seconds'] / max(this['seconds'], 1e-300):9.2f}",
             flush=True,
         )
+
+
+def _print_row(item: str, result: dict[str, float]) -> None:
+    print(
+        f"{item:<16}{result['tets']:7.0f}{result['contacts']:10.0f}{result['iterations']:8.1f}{result['seconds']:9.3f}"
+        f"{result['contact']:9.0%}{result['elasticity']:9.0%}{result['linear_solve']:7.0%}"
+        f"{'' if result['converged'] else '  not every step converged'}"
+        f"{'' if result['nearest'] > 0.0 else '  surfaces touch'}",
+        flush=True,
+    )
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", nargs="*", metavar="SCENE")
     parser.add_argument("--quick", action="store_true", help="the small scenes")
+    parser.add_argument("--steps", type=int, default=MAX_STEPS, metavar="N", help="of each scene at most")
+    parser.add_argument("--against", metavar="PATH", help="the folder src of another checkout")
     given = parser.parse_args()
-    main(given.scenes, given.quick)
+    main(given.scenes, given.quick, given.steps, given.against)

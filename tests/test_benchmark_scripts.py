@@ -60,13 +60,9 @@ def test_the_live_ball_is_simulated_with_and_without_its_page(capsys):
 
 
 def test_times_of_the_parts_of_steps_with_contact():
-    from dataclasses import replace
+    from benchmarks.contact_scenes import PARTS, case, measured
 
-    from benchmarks.contact_scenes import PARTS, measured
-
-    from supple.demos.torture.registry import TORTURE
-
-    result = measured(replace(TORTURE["knives"].small, steps=14))
+    result = measured(case("knives:small"), 14)
     assert result["tets"] == 300
     assert result["contacts"] > 0
     assert result["converged"]
@@ -82,3 +78,23 @@ def test_the_search_for_contact_is_measured_in_piles_of_bears(capsys):
     lines = capsys.readouterr().out.splitlines()
     assert [int(line.split()[0]) for line in lines[3:5]] == [1, 3]
     assert np.isfinite(exponent)
+
+
+def test_contact_scenes_are_measured_against_another_checkout(capsys):
+    from benchmarks import contact_scenes
+
+    contact_scenes.main(["slope:small"], steps=4, against=ROOT / "src")
+    lines = capsys.readouterr().out.strip().splitlines()
+    this, other, ratio = (line.split() for line in lines[-3:])
+    assert this[:2] == ["slope:small", other[1]]
+    assert other[0] == "other"
+    assert this[3] == other[3]  # iterations: both are the same package
+    assert float(ratio[-2]) == 1.0
+    assert float(ratio[-1]) > 0.0
+
+
+def test_a_checkout_without_the_package_is_refused(tmp_path):
+    from benchmarks import contact_scenes
+
+    with pytest.raises(SystemExit, match="there is no package supple in it"):
+        contact_scenes.main(["slope:small"], against=tmp_path)

@@ -91,6 +91,9 @@ def test_every_cached_kernel_of_the_package_uses_this_cache():
                 for form in kernel.forms if isinstance(kernel, ParallelKernel) else (kernel,):
                     if isinstance(form, Dispatcher) and not isinstance(form._cache, NullCache):
                         assert isinstance(form._cache, KernelCache), form
+                        # Numba names a cached closure by what it holds; a kernel has another name in each process.
+                        held = form.py_func.__closure__ or ()
+                        assert not any(isinstance(cell.cell_contents, Dispatcher) for cell in held), form
                         kernels += 1
     assert kernels > 50
 

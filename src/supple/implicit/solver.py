@@ -13,10 +13,9 @@ from supple.implicit.contact.build import contact_model
 from supple.implicit.contact.points import forces_on_owners
 from supple.implicit.contact.scales import smallest_diagonal
 from supple.implicit.contact.settings import IPCContact
-from supple.implicit.contact.threads import one_contact_thread
 from supple.implicit.details import ImplicitDetails
 from supple.implicit.energies.damping import viscosity_of
-from supple.implicit.energies.elasticity import elasticity_of
+from supple.implicit.energies.elasticity import SERIAL_TETS, elasticity_of
 from supple.implicit.energies.potential import HessianBlocks
 from supple.implicit.energies.regularization import regularization_of
 from supple.implicit.energies.stitch_damping import StitchViscosity
@@ -34,6 +33,7 @@ from supple.implicit.stepping.workspace import Workspace
 from supple.implicit.timings import PARTS
 from supple.materials.per_tet import NO_REGION
 from supple.numerics.noninverting_step import KEEP
+from supple.numerics.threads import threads_for
 from supple.scene.scene import Scene
 from supple.state import State, Status, StepReport
 from supple.system import Solver, System
@@ -173,7 +173,6 @@ class Implicit(Solver):
             damped,
         )
 
-    @one_contact_thread()
     def check(self, system: System, state: State, workspace: Workspace) -> None:
         """Raise where a step cannot start from `state`; see `Solver.check`.
 
@@ -198,7 +197,6 @@ class Implicit(Solver):
             seconds=dict.fromkeys((*PARTS, "other"), 0.0),
         )
 
-    @one_contact_thread()
     def step(self, system: System, state: State, dt: float, workspace: Workspace) -> tuple[State, StepReport]:
         """Advance by dt in one or more substeps; see `Solver.step`.
 
@@ -228,7 +226,9 @@ class Implicit(Solver):
         worst, message = Status.CONVERGED, ""
         last: Substep | None = None
         while not substepping.over:
-            taken = take_substep(now, substepping.end, substepping.length, settings, workspace)
+            # For a small scene all at once: changing the number of threads takes longer than its kernels.
+            with threads_for(len(system.tets), SERIAL_TETS):
+                taken = take_substep(now, substepping.end, substepping.length, settings, workspace)
             rows += [replace(row, substep=substeps) for row in taken.outcome.rows]
             if taken.outcome.status is not Status.CONVERGED:
                 logger.debug("step of %g s: %s", substepping.length, taken.outcome.status)

@@ -10,7 +10,7 @@ from typing import Any
 import numba
 
 # What may change the last bits of a result.
-_PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "ipctk", "pypardiso", "h5py", "tetgen")
+_PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "pypardiso", "h5py", "tetgen")
 
 
 def versions() -> dict[str, str]:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
-from supple.implicit.newton.line_search import Extension, search
+from supple.implicit.newton.line_search import Extension, Jumps, search
 from supple.implicit.newton.objective import Objective
 
 
@@ -48,7 +48,7 @@ def take(start: float, direction: float, largest: float = 1.0, states: Where = A
     vector = np.array([[direction, 0.0, 0.0]])
     along = float((here.gradient * vector).sum()) if slope is None else slope
     before = hessian.vertices.copy()
-    end, step, cuts = search(objective, here, vector, along, largest, states)
+    end, step, cuts = search(objective, here, vector, along, largest, states, Jumps())
     assert np.array_equal(hessian.vertices, before)  # trials need energies alone
     return end[0, 0], step, cuts
 
@@ -84,6 +84,26 @@ def test_nothing_is_taken_where_no_state_is_admissible():
 def test_nothing_is_taken_uphill_or_where_no_length_is_allowed(largest: float, slope: float):
     end, step, cuts = take(0.5, 0.5, largest=largest, slope=slope)
     assert (end, step, cuts) == (0.5, 0.0, 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Cliff(Quartic):
+    """The same, and higher by a tenth from u = 0.5 on."""
+
+    def value(self, x):
+        return super().value(x) + (0.1 if x[0, 0] > 0.5 else 0.0)
+
+
+def test_a_jump_is_crossed_by_a_tiny_step_a_few_times():
+    objective = Objective([Cliff()])
+    here = objective.model(np.array([[0.5, 0.0, 0.0]]), None)
+    vector = np.array([[0.1, 0.0, 0.0]])
+    slope, jumps = float((here.gradient * vector).sum()), Jumps()
+    taken = [search(objective, here, vector, slope, 1.0, ANYWHERE, jumps) for _ in range(6)]
+    for end, step, _ in taken[:5]:
+        assert 0.0 < step < 1e-5
+        assert end[0, 0] > 0.5
+    assert taken[5][1] == 0.0
 
 
 def test_directions_that_crawl_are_made_longer_and_cut_ones_shorter():

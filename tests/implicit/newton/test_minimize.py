@@ -8,7 +8,8 @@ import pytest
 import supple as sp
 from supple.contact.closest.pair_geometry import VERTEX_VERTEX
 from supple.contact.potentials.friction_energy import Slips
-from supple.implicit.contact.half_spaces import PlaneFriction
+from supple.contact.surface.embedded_points import EmbeddedPoints
+from supple.implicit.contact.friction import Friction
 from supple.implicit.energies.inertia import Inertia
 from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
 from supple.implicit.limits.inversion_guard import InversionGuard
@@ -93,7 +94,7 @@ def test_vertices_that_stick_beside_vertices_that_slide_are_found_in_few_iterati
         offsets=system.rest_positions[:4] - system.rest_positions[4],
         forces=np.array([0.3, 0.6, 3.0, 5.0]) * load,
     )
-    friction = PlaneFriction(slips, reach)
+    friction = Friction(EmbeddedPoints.at_vertices(np.arange(n, dtype=np.int32)), slips, reach)
     terms: list[Potential] = [Inertia(masses, system.rest_positions + pull, H * H), springs, friction]
     outcome = minimum(system, terms, 1e-2 * reach, system.rest_positions + pull)
     assert outcome.status is Status.CONVERGED

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 SCENE_FILES = (".yaml", ".yml")
 RECORDINGS = (".vtkhdf", ".hdf", ".h5")
-PACKAGES = ("numpy", "scipy", "numba", "h5py", "tetgen", "ipctk", "viser", "pydantic", "arro3-io")
+PACKAGES = ("numpy", "scipy", "numba", "h5py", "tetgen", "viser", "pydantic", "arro3-io")
 EXTRAS = ("pytetwild", "pymeshfix", "usd-core", "pyvista")
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.closest.pair_geometry import point_count
+from supple.contact.closest.pair_geometry import EDGE_EDGE, point_count
 from supple.contact.potentials.barrier_function import barrier_slopes, barrier_value
 from supple.contact.potentials.contacts import Contacts
 from supple.contact.potentials.pair_hessian import write_pair_hessian
@@ -93,12 +93,72 @@ def block_points(kinds, points, start):
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def _write_hessians(x, contacts, start, dhat, stiffness, project, out):
-    kinds, points, coefficients, vectors, distances, weights = contacts
+    kinds, _, _, _, _, weights = contacts
     for k in prange(len(kinds)):
-        c = (coefficients[k, 0], coefficients[k, 1], coefficients[k, 2], coefficients[k, 3])
-        # Points that the kind does not have are ignored; any row may stand for them.
-        stencil = (row(x, points[k, 0]), row(x, points[k, 1]), row(x, points[k, 2]), row(x, points[k, 3]))
-        first, second = barrier_slopes(distances[k], dhat)
-        size = stiffness * weights[k]
-        slopes = (size * first, size * second)
-        write_pair_hessian(kinds[k], c, row(vectors, k), distances[k], stencil, slopes, project, out, start[k])
+        follows = k > 0 and kinds[k - 1] == EDGE_EDGE and weights[k] < 0.0
+        followed = k + 1 < len(kinds) and kinds[k] == EDGE_EDGE and weights[k + 1] < 0.0
+        if project and follows:
+            out[start[k] : start[k + 1]] = 0.0  # part of the matrix of the one before
+        elif project and followed:
+            _write_joint_hessian(x, contacts, k, dhat, stiffness, out[start[k] : start[k + 1]])
+        else:
+            _write_hessian(x, contacts, k, dhat, stiffness, project, out, start[k])
+
+
+@njit(error_model="numpy")
+def _write_hessian(x, contacts, k, dhat, stiffness, project, out, first):
+    """The blocks (i, j), i <= j, of contact k."""
+    kinds, points, coefficients, vectors, distances, weights = contacts
+    c = (coefficients[k, 0], coefficients[k, 1], coefficients[k, 2], coefficients[k, 3])
+    # Points that the kind does not have are ignored; any row may stand for them.
+    stencil = (row(x, points[k, 0]), row(x, points[k, 1]), row(x, points[k, 2]), row(x, points[k, 3]))
+    slope, curvature = barrier_slopes(distances[k], dhat)
+    size = stiffness * weights[k]
+    slopes = (size * slope, size * curvature)
+    write_pair_hessian(kinds[k], c, row(vectors, k), distances[k], stencil, slopes, project, out, first)
+
+
+@njit(error_model="numpy")
+def _write_joint_hessian(x, contacts, k, dhat, stiffness, out):
+    """The positive part of the sum of two edges and of their nearest end, contact k + 1, whose energy is taken away.
+
+    Most of both cancels where the closest points are near that end. The positive parts of each would remain, and be
+    many times too stiff.
+    """
+    kinds, points, _, _, _, _ = contacts
+    blocks = np.empty((10, 3, 3))
+    dense = np.zeros((12, 12))
+    for m in range(k, k + 2):
+        _write_hessian(x, contacts, m, dhat, stiffness, False, blocks, 0)
+        b = 0
+        for i in range(point_count(kinds[m])):
+            p = _place(points, k, points[m, i])
+            for j in range(i, point_count(kinds[m])):
+                q = _place(points, k, points[m, j])
+                for u in range(3):
+                    for v in range(3):
+                        dense[3 * p + u, 3 * q + v] += blocks[b, u, v]
+                        if p != q:
+                            dense[3 * q + v, 3 * p + u] += blocks[b, u, v]
+                b += 1
+    values, modes = np.linalg.eigh(dense)
+    b = 0
+    for i in range(4):
+        for j in range(i, 4):
+            for u in range(3):
+                for v in range(3):
+                    total = 0.0
+                    for m in range(12):
+                        if values[m] > 0.0:
+                            total += modes[3 * i + u, m] * values[m] * modes[3 * j + v, m]
+                    out[b, u, v] = total
+            b += 1
+
+
+@njit(error_model="numpy")
+def _place(points, k, point):
+    """Which of the points of contact k a point is."""
+    for i in range(4):
+        if points[k, i] == point:
+            return i
+    return -1

@@ -8,14 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.potentials.contacts import Contacts
-from supple.contact.potentials.edge_contacts import edge_weights, write_edge_contacts
-from supple.contact.potentials.known_weights import KnownWeights
-from supple.contact.potentials.vertex_contacts import (
-    alternating_sums,
-    grouped_by_vertex,
-    near_features,
-    write_vertex_contacts,
+from supple.contact.potentials.edge_contacts import (
+    edge_ends,
+    edge_weights,
+    saddle_weights,
+    write_edge_contacts,
 )
+from supple.contact.potentials.known_weights import KnownWeights
+from supple.contact.potentials.vertex_contacts import REACH, write_vertex_contacts
+from supple.contact.potentials.vertex_features import alternating_sums, grouped, near_features
 from supple.contact.surface.contact_mesh import ContactMesh
 from supple.numerics.threads import threads_for
 
@@ -29,14 +30,15 @@ class Found(NamedTuple):
     Attributes
     ----------
     contacts : those with a weight
-    least : the smallest distance of the pairs, infinite where none is below dhat [m]
-    codes, weights : what is to be known where the search goes on, for `KnownWeights`
+    least : the smallest distance of the pairs, infinite where none is below `REACH` dhat [m]
+    new : what is to be known where the search goes on, in any order
+    planes : codes of the pairs that may count with a plane, for `KnownWeights`
     """
 
     contacts: Contacts
     least: float
-    codes: NDArray[np.int64]
-    weights: NDArray[np.float64]
+    new: KnownWeights
+    planes: NDArray[np.int64]
 
 
 class ContactSet:
@@ -51,6 +53,7 @@ class ContactSet:
         self.dhat = dhat
         self._mesh = mesh
         self._of_vertices = (mesh.triangles, mesh.edges, *mesh.neighbors)
+        self._of_sums = (mesh.triangles, mesh.edges, mesh.triangle_edges, *mesh.vertex_triangles, mesh.owner)
         self._of_edges = (mesh.triangles, mesh.edges, *mesh.edge_triangles)
 
     def of(
@@ -64,24 +67,26 @@ class ContactSet:
 
         Parameters
         ----------
-        vertex_triangle, edge_edge : (k, 2), (l, 2) all pairs that may be nearer than dhat
+        vertex_triangle, edge_edge : (k, 2), (l, 2) all pairs that may be nearer than `REACH` dhat
         known : the weights that do not depend on x
         """
-        mesh, dhat = self._mesh, self.dhat
+        mesh, dhat, reach = self._mesh, self.dhat, REACH * self.dhat
         triangles, edges = mesh.triangles, mesh.edges
         with threads_for(len(vertex_triangle) + len(edge_edge), _PARALLEL_FROM):
-            features, squares = near_features(x, vertex_triangle, triangles, mesh.triangle_edges, len(edges), dhat)
+            features, squares = near_features(x, vertex_triangle, triangles, mesh.triangle_edges, len(edges), reach)
             areas, edge_squares, edge_keys, edges_grown = edge_weights(
-                x, edge_edge, self._of_edges, mesh.edge_areas, dhat, *known
+                x, edge_edge, self._of_edges, mesh.edge_areas, dhat, known
             )
-            rows, start = grouped_by_vertex(vertex_triangle, features, len(x))
-            codes, signs, counts = alternating_sums(
-                x, vertex_triangle, features, rows, start, triangles, edges, mesh.triangle_edges, dhat
+            rows, start = grouped(vertex_triangle, features, triangles, mesh.owner)
+            codes, signs, counts, shares = alternating_sums(
+                x, vertex_triangle, features, squares, rows, start, self._of_sums, known, reach
             )
             starts = np.column_stack([start, np.append(0, np.cumsum(counts))])
             count = int(starts[-1, 1])
-            out = _empty(count + 2 * int(np.count_nonzero(areas)))
-            keys, grown = np.empty(count, dtype=np.int64), np.empty(count)
+            crossing, ends = edge_ends(x, edge_edge, areas, edges)
+            saddles = saddle_weights(edge_edge, areas, crossing, ends, edges, len(x))
+            out = _empty(count + 2 * len(crossing))
+            keys, planes, grown = np.empty(count, np.int64), np.empty(count, np.int32), np.empty(count)
             write_vertex_contacts(
                 x,
                 vertex_triangle,
@@ -89,24 +94,31 @@ class ContactSet:
                 starts,
                 codes,
                 signs,
+                shares,
                 self._of_vertices,
                 mesh.owner,
                 mesh.areas,
+                saddles,
                 dhat,
-                *known,
+                known,
                 out,
                 keys,
+                planes,
                 grown,
             )
-        write_edge_contacts(x, edge_edge, areas, edges, count, out)
+        write_edge_contacts(x, edge_edge, areas, crossing, ends, edges, count, out)
         least = min(squares.min(initial=np.inf), edge_squares.min(initial=np.inf))
-        new, new_edges = grown >= 0.0, edges_grown >= 0.0
-        new_codes = np.concatenate([keys[new], edge_keys[new_edges]])
-        new_weights = np.concatenate([grown[new], edges_grown[new_edges]])
+        new = _new(keys, grown, planes).with_more(_new(edge_keys, edges_grown, np.full(len(edge_keys), -1, np.int32)))
         counted = (out.weights != 0.0) & (out.distances < dhat)
         if not counted.all():
             out = out.where(counted)
-        return Found(out, float(np.sqrt(least)), new_codes, new_weights)
+        return Found(out, float(np.sqrt(least)), new, keys[planes >= 0])
+
+
+def _new(keys: NDArray[np.int64], grown: NDArray[np.float64], planes: NDArray[np.int32]) -> KnownWeights:
+    """Of the pairs that are to be known, those with `grown` zero or more."""
+    chosen = grown >= 0.0
+    return KnownWeights(keys[chosen], grown[chosen], planes[chosen])
 
 
 def _empty(count: int) -> Contacts:

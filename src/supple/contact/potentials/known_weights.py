@@ -1,8 +1,10 @@
-"""Weights that contacts keep while the positions change.
+"""Weights that contacts keep while the positions change, and the triangles beside outlines.
 
 A weight depends on directions, and its derivatives are no forces. While the minimum of an energy is searched, contacts
 keep the weights with which the search first met them: the energy is then a function of the positions. Weights may grow
-where the search goes on, so that nothing comes near without a force; they cannot grow without end.
+where the search goes on, so that nothing comes near without a force; they cannot grow without end. A vertex that counts
+with the plane of a triangle beside an outline keeps the triangle, too: another one would have another plane. Where it
+goes over the face, or too far away from the outline to count, the plane loses the weight.
 """
 
 from __future__ import annotations
@@ -19,22 +21,39 @@ _LEAST_GROWTH = 0.1
 
 
 class KnownWeights(NamedTuple):
-    """Weights [m^2] of pairs with ascending codes, both (k,)."""
+    """Of pairs with ascending codes.
+
+    Attributes
+    ----------
+    codes, weights : (k,), (k,) [m^2]; triangles : (k,) whose planes count, -1 for other pairs
+    """
 
     codes: NDArray[np.int64]
     weights: NDArray[np.float64]
+    triangles: NDArray[np.int32]
 
     @classmethod
     def none(cls) -> KnownWeights:
-        return cls(np.zeros(0, dtype=np.int64), np.zeros(0))
+        return cls(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0, dtype=np.int32))
 
-    def grown(self, codes: NDArray[np.int64], weights: NDArray[np.float64]) -> KnownWeights:
-        """With the weights of further pairs, or larger ones of known pairs."""
-        if not len(codes):
+    def with_more(self, more: KnownWeights) -> KnownWeights:
+        """With further pairs, and the others' weights where both have one; `more` is in any order."""
+        if not len(more.codes):
             return self
         # The first of equal codes counts.
-        every, first = np.unique(np.concatenate([codes, self.codes]), return_index=True)
-        return KnownWeights(every, np.concatenate([weights, self.weights])[first])
+        codes, first = np.unique(np.concatenate([more.codes, self.codes]), return_index=True)
+        weights = np.concatenate([more.weights, self.weights])[first]
+        return KnownWeights(codes, weights, np.concatenate([more.triangles, self.triangles])[first])
+
+    def with_planes(self, codes: NDArray[np.int64]) -> KnownWeights:
+        """With no weight for pairs that count with a plane, but for those with these codes (m,)."""
+        lost = np.flatnonzero((self.triangles >= 0) & (self.weights > 0.0))
+        lost = lost[~np.isin(self.codes[lost], codes)] if len(lost) else lost
+        if not len(lost):
+            return self
+        weights = self.weights.copy()
+        weights[lost] = 0.0
+        return self._replace(weights=weights)
 
 
 @njit(error_model="numpy")
@@ -44,8 +63,16 @@ def has_grown(known, now, full):
 
 
 @njit(error_model="numpy")
-def known_weight(codes, weights, code):
+def known_weight(known, code):
     """The weight of a pair, or -1 where it is not known."""
+    k = known_row(known, code)
+    return known.weights[k] if k >= 0 else -1.0
+
+
+@njit(error_model="numpy")
+def known_row(known, code):
+    """Where a pair is in `known`, a `KnownWeights`, or -1."""
+    codes = known.codes
     low, high = 0, len(codes)
     while low < high:
         middle = (low + high) // 2
@@ -53,4 +80,4 @@ def known_weight(codes, weights, code):
             low = middle + 1
         else:
             high = middle
-    return weights[low] if low < len(codes) and codes[low] == code else -1.0
+    return low if low < len(codes) and codes[low] == code else -1

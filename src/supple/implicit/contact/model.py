@@ -8,14 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.collision_mesh.collisions import Collisions
-from supple.contact.collision_mesh.contact_surface import ContactSurface
+from supple.contact.ccd.largest_step import Limit
 from supple.contact.obstacle_vertices import ObstacleRange
+from supple.contact.potentials.barrier_energy import barrier_forces
+from supple.contact.potentials.friction_lag import lagged_slips, sides
 from supple.contact.start.start_error import raise_if_intersecting
+from supple.contact.surface.contact_mesh import ContactMesh
 from supple.errors import SolverError
 from supple.implicit.contact.barrier import Barrier
-from supple.implicit.contact.friction import Friction, friction
-from supple.implicit.contact.half_spaces import PlaneBarrier, PlaneFriction, Planes, plane_friction
+from supple.implicit.contact.collisions import Collisions
+from supple.implicit.contact.friction import Friction
+from supple.implicit.contact.half_spaces import PlaneBarrier, Planes, plane_friction
 from supple.implicit.contact.scales import Scales
 from supple.scene.contact_pairs import PairTable
 from supple.system import System
@@ -32,7 +35,7 @@ class Barriers:
 
     @property
     def terms(self) -> list[Barrier | PlaneBarrier]:
-        return [self.triangles, self.planes] if len(self.planes.planes.vertices) else [self.triangles]
+        return [self.triangles, self.planes] if len(self.planes.planes) else [self.triangles]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +49,7 @@ class ContactModel:
 
     system: System
     obstacles: tuple[ObstacleRange, ...]
-    surface: ContactSurface
+    mesh: ContactMesh
     collisions: Collisions
     planes: Planes
     table: PairTable
@@ -68,29 +71,34 @@ class ContactModel:
         lagged: NDArray[np.float64],
         start: NDArray[np.float64],
         times: tuple[float, float],
-    ) -> list[Friction | PlaneFriction]:
+    ) -> list[Friction]:
         """Friction with the normal forces at `lagged` (n, 3), of a step from `start` between two times [s]."""
         if not self.coefficients.any():
             return []
-        h = times[1] - times[0]
-        slow = self.scales.friction_velocity
-        terms: list[Friction | PlaneFriction] = []
-        between = friction(barriers.triangles, lagged, start, self.coefficients, slow * h)
-        if between is not None:
-            terms.append(between)
-        bodies = self.surface.body_count
-        on_planes = self.coefficients[:bodies, bodies:]
-        with_planes = plane_friction(barriers.planes, lagged, start, times, on_planes, slow * h)
-        if with_planes is not None:
-            terms.append(with_planes)
-        return terms
+        reach = self.scales.friction_velocity * (times[1] - times[0])
+        between = self._friction_between(barriers.triangles, lagged, start, reach)
+        bodies = self.mesh.body_count
+        with_planes = plane_friction(barriers.planes, lagged, start, times, self.coefficients[:bodies, bodies:], reach)
+        return [term for term in (between, with_planes) if term is not None]
 
-    def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> float:
-        """How far along `direction` (n, 3), at most 1, nothing touches."""
-        step = self.planes.largest_step(x, direction)
+    def _friction_between(
+        self, barrier: Barrier, lagged: NDArray[np.float64], start: NDArray[np.float64], reach: float
+    ) -> Friction | None:
+        """Of triangles; None where there is none."""
+        contacts = self.collisions.at(lagged)
+        forces = barrier_forces(contacts, self.collisions.dhat, barrier.stiffness)
+        began = self.mesh.points.positions(start)
+        slips = lagged_slips(contacts, forces, began, self.mesh.owner, self.coefficients)
+        return Friction(self.mesh.points, slips, reach) if len(slips.forces) else None
+
+    def largest_step(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[float, str]:
+        """How far along `direction` (n, 3), at most 1, nothing touches, and the names of what would touch."""
+        step, row = self.planes.largest_step(x, direction)
+        names = "" if row < 0 else self._names(self._plane_owners(row))
         if step == 0.0:
-            return 0.0
-        return step * self.collisions.largest_step(x, step * direction)
+            return 0.0, names
+        limit = self.collisions.largest_step(x, step * direction)
+        return step * limit.step, self._names(self._owners(limit)) if limit.kind else names
 
     def allows(self, x: NDArray[np.float64]) -> bool:
         """Whether every vertex is in front of every plane."""
@@ -117,27 +125,32 @@ class ContactModel:
             raise SolverError("the scene starts with surfaces that touch; move them apart, or give contact=None")
 
     def count(self, x: NDArray[np.float64]) -> int:
-        """Number of contacts at x (n, 3): pairs nearer than dhat."""
-        return len(self.collisions.at(x)) + int((self.planes.distances(x)[0] < self.scales.dhat).sum())
+        """Number of contacts at x (n, 3)."""
+        return len(self.collisions.at(x).distances) + len(self.planes.near(x)[0])
 
     def nearest(self, x: NDArray[np.float64]) -> str:
         """The names of the two things that are nearest to each other."""
-        best, names = np.inf, "two surfaces"
-        found = self.collisions.at(x)
-        mesh, points = self.surface.mesh, self.collisions.points(x)
-        for k in range(len(found)):
-            contact = found[k]
-            squared = contact.compute_distance(points, mesh.edges, mesh.faces)
-            if squared < best:
-                owners = {int(self.surface.owner[v]) for v in contact.vertex_ids(mesh.edges, mesh.faces) if v >= 0}
-                best, names = squared, self._names(sorted(owners))
-        if len(self.planes.vertices):
-            distances, _ = self.planes.distances(x)
-            k = int(distances.argmin())
-            if distances[k] ** 2 < best:
-                names = self._names([self.planes.owner[k], self.surface.body_count + self.planes.obstacle[k]])
-        return names
+        contacts, heights = self.collisions.at(x), self.planes.heights(x)
+        between, above = contacts.distances.min(initial=np.inf), heights.min(initial=np.inf)
+        if np.isinf(min(between, above)):
+            return "two surfaces"
+        if above < between:
+            k = int(heights.argmin())
+            return self._names(self._plane_owners(k))
+        k = int(contacts.distances.argmin())
+        return self._names(sorted({int(self.mesh.owner[side[k]]) for side in sides(contacts)}))
+
+    def _owners(self, limit: Limit) -> list[int]:
+        """Of the pair that limits a step."""
+        mesh, (i, j) = self.mesh, limit.pair
+        edges = limit.kind == "edge-edge"
+        points = (mesh.edges[i, 0], mesh.edges[j, 0]) if edges else (i, mesh.triangles[j, 0])
+        return sorted({int(mesh.owner[p]) for p in points})
+
+    def _plane_owners(self, row: int) -> list[int]:
+        """Of a pair of a point and a half-space."""
+        return [int(self.planes.owner[row]), self.mesh.body_count + int(self.planes.obstacle[row])]
 
     def _names(self, owners: list[int]) -> str:
-        kinds = [f"{'body' if k < self.surface.body_count else 'obstacle'} {self.surface.names[k]!r}" for k in owners]
+        kinds = [f"{'body' if k < self.mesh.body_count else 'obstacle'} {self.mesh.names[k]!r}" for k in owners]
         return kinds[0] + " and itself" if len(kinds) == 1 else " and ".join(kinds)

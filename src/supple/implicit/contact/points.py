@@ -5,58 +5,41 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.contact.half_spaces import barrier_terms
+from supple.contact.potentials.barrier_energy import barrier_forces
+from supple.contact.potentials.contacts import Contacts
+from supple.contact.potentials.friction_lag import sides
 from supple.implicit.contact.model import Barriers, ContactModel
-from supple.implicit.contact.threads import one_contact_thread
 from supple.state import ContactPoints
 
 
-@one_contact_thread()
-def contact_points(model: ContactModel, barriers: Barriers, x: NDArray[np.float64], weight: float) -> ContactPoints:
+def contact_points(
+    model: ContactModel, barriers: Barriers, x: NDArray[np.float64], between: Contacts, weight: float
+) -> ContactPoints:
     """All contacts at x (n, 3), obstacles' vertices included.
 
     Parameters
     ----------
+    between : of triangles
     weight : of the contact energies in the objective; forces are divided by it
     """
-    surface, collisions = model.surface, model.collisions
-    mesh, points = surface.mesh, collisions.points(x)
-    found = collisions.at(x)
-    edges, faces = mesh.edges, mesh.faces
-    rows: list[tuple[NDArray, NDArray, NDArray, float, int, int]] = []
-    for k in range(len(found)):
-        contact = found[k]
-        ids = [v for v in contact.vertex_ids(edges, faces) if v >= 0]
-        stencil = points[ids]
-        flat = stencil.ravel()
-        gap, coefficients = contact.compute_distance_vector_with_coefficients(flat)
-        coefficients = np.asarray(coefficients)
-        distance = float(np.linalg.norm(gap))
-        gradient = barriers.triangles.potential.gradient(contact, flat).reshape(-1, 3) / weight
-        # Coefficients are positive on the first primitive and negative on the second; an end of an edge that is not the
-        # nearest point has zero, of either sign.
-        one = np.arange(len(ids)) < (2 if found.is_edge_edge(k) else 1)
-        near_first = coefficients[one] @ stencil[one]
-        near_second = -coefficients[~one] @ stencil[~one]
-        first, second = (int(surface.owner[np.asarray(ids)[side][0]]) for side in (one, ~one))
-        normal = (near_first - near_second) / distance
-        rows.append((0.5 * (near_first + near_second), normal, -gradient[one].sum(axis=0), distance, first, second))
-    planes = model.planes
-    d, normals = planes.distances(x)
-    near = np.flatnonzero(d < planes.dhat)
-    size = barriers.planes.stiffness / weight * planes.areas[near] * np.abs(barrier_terms(d[near], planes.dhat)[1])
-    for k, force in zip(near, size, strict=True):
-        where = x[planes.vertices[k]] - 0.5 * d[k] * normals[k]
-        other = surface.body_count + int(planes.obstacle[k])
-        rows.append((where, normals[k], force * normals[k], float(d[k]), int(planes.owner[k]), other))
+    mesh, planes = model.mesh, model.planes
+    # Coefficients are positive on the first side. Points that a kind does not have have the coefficient 0.
+    on_first = np.maximum(between.coefficients, 0.0)
+    middles = np.einsum("ki,kij->kj", on_first, mesh.points.positions(x)[between.points]) - 0.5 * between.vectors
+    normals = between.vectors / between.distances[:, None]
+    sizes = barrier_forces(between, model.scales.dhat, barriers.triangles.stiffness)
+    first, second = (mesh.owner[side] for side in sides(between))
+    rows, heights, up, _ = planes.near(x)
+    lowered = planes.positions(x)[planes.pairs[rows, 0]] - 0.5 * heights[:, None] * up
+    pushes = barriers.planes.forces(x)
     return ContactPoints(
-        points=np.array([row[0] for row in rows]).reshape(-1, 3),
-        normals=np.array([row[1] for row in rows]).reshape(-1, 3),
-        forces=np.array([row[2] for row in rows]).reshape(-1, 3),
-        distances=np.array([row[3] for row in rows]),
-        first=np.array([row[4] for row in rows], dtype=np.int32),
-        second=np.array([row[5] for row in rows], dtype=np.int32),
-        names=surface.names,
+        points=np.concatenate([middles, lowered]),
+        normals=np.concatenate([normals, up]),
+        forces=np.concatenate([sizes[:, None] * normals, pushes[:, None] * up]) / weight,
+        distances=np.concatenate([between.distances, heights]),
+        first=np.concatenate([first, planes.owner[rows]]).astype(np.int32),
+        second=np.concatenate([second, mesh.body_count + planes.obstacle[rows]]).astype(np.int32),
+        names=mesh.names,
     )
 
 

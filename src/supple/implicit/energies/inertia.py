@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
+from supple.numerics.kernel_cache import njit
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,12 +30,34 @@ class Inertia(Potential):
     projection = Projection.UNNEEDED
 
     def value(self, x: NDArray[np.float64]) -> float:
-        d = x - self.predicted
-        return 0.5 * float(np.einsum("i,ij,ij->", self.masses, d, d)) / self.scale
+        return _energy(x, self.masses, self.predicted, self.scale)
 
     def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-        out += (self.masses / self.scale)[:, None] * (x - self.predicted)
+        _add_gradient(x, self.masses, self.predicted, self.scale, out)
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
+        _add_hessian(self.masses, self.scale, out.vertices)
+
+
+@njit(cache=True, error_model="numpy")
+def _energy(x, masses, predicted, scale):
+    total = 0.0
+    for i in range(len(x)):
         for k in range(3):
-            out.vertices[:, k, k] += self.masses / self.scale
+            d = x[i, k] - predicted[i, k]
+            total += masses[i] * d * d
+    return 0.5 * total / scale
+
+
+@njit(cache=True, error_model="numpy")
+def _add_gradient(x, masses, predicted, scale, out):
+    for i in range(len(x)):
+        for k in range(3):
+            out[i, k] += masses[i] / scale * (x[i, k] - predicted[i, k])
+
+
+@njit(cache=True, error_model="numpy")
+def _add_hessian(masses, scale, out):
+    for i in range(len(masses)):
+        for k in range(3):
+            out[i, k, k] += masses[i] / scale

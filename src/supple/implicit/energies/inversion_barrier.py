@@ -54,8 +54,6 @@ class InversionBarrier(Potential):
 
     def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
         s = self.elasticity.system
-        if not self.value(x):
-            return
         gradients = np.empty((len(s.tets), 4, 3))
         with threads_for(len(s.tets), SERIAL_TETS):
             _gradients(x, s.tets, s.rest_shape_inverse, self.stiffness, self.onset, gradients)
@@ -66,6 +64,17 @@ class InversionBarrier(Potential):
         s = self.elasticity.system
         with threads_for(len(s.tets), SERIAL_TETS):
             _hessians(x, s.tets, s.rest_shape_inverse, self.stiffness, self.onset, project, out.tets)
+
+    def add_model(
+        self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
+    ) -> float:
+        """See `Potential.add_model`; most often no tet is below the onset, and the energy alone tells that."""
+        energy = self.value(x)
+        if energy:
+            self.add_gradient(x, gradient)
+            if hessian is not None:
+                self.add_hessian(x, hessian, project)
+        return energy
 
 
 def inversion_barrier(elasticity: Elasticity, guarded: NDArray[np.bool_], onset: float) -> InversionBarrier | None:

@@ -50,6 +50,13 @@ class InversionGuard:
             step, tet = noninverting_step(x, direction, self.system.tets, self.guarded, self.keep)
         return float(step), int(tet)
 
+    def name(self, tet: int) -> str:
+        """Of a tet, by its number in its body."""
+        for part in self.system.bodies:
+            if part.tets.start <= tet < part.tets.stop:
+                return f"tet {tet - part.tets.start} of body {part.name!r}"
+        return f"tet {tet}"
+
     def allows(self, x: NDArray[np.float64]) -> bool:
         """Whether every guarded tet has a positive volume at x."""
         with threads_for(len(self.system.tets), SERIAL_TETS):

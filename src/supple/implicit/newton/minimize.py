@@ -18,7 +18,7 @@ from supple.implicit.limits.step_limits import StepLimits
 from supple.implicit.newton.convergence import Convergence
 from supple.implicit.newton.direction import DirectionFinder, Tools
 from supple.implicit.newton.hessian_projection import ProjectedTerms
-from supple.implicit.newton.line_search import Extension, search
+from supple.implicit.newton.line_search import Extension, Jumps, search
 from supple.implicit.newton.objective import Model, Objective
 from supple.implicit.newton.trace import NewtonRow
 from supple.numerics.interruption import interruption_point
@@ -32,6 +32,12 @@ _LINEAR_RATE = 0.2
 # Forces are nearly balanced where their sum is below this share of contact's. Larger ones leave errors in friction that
 # a block shows that just sticks on its slope.
 _NEARLY = 3e-3
+
+
+# After so many steps in a row that change the energy by less than this share of its terms, and with balanced forces, no
+# minimum below can be told from round-off: what is left are steps to and fro across the kinks of frictionless contact.
+_SETTLED = 6
+_NOTHING = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,12 +76,13 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
     """Minimize over the free vertices from x, whose guarded tets all have positive volume."""
     objective, convergence, hessian = problem.objective, problem.convergence, tools.hessian
     directions = DirectionFinder(objective, tools, problem.scale, convergence.step, problem.longest)
-    policy, extension = directions.policy, Extension()
+    policy, extension, jumps = directions.policy, Extension(), Jumps()
     here = objective.model(x, hessian, policy.now)
     rows: list[NewtonRow] = []
     if not np.isfinite(here.energy):
         return Outcome(Status.NOT_FINITE, here, "the energy at the start of Newton's method is not finite", rows)
     last_length = 0.0
+    settled = 0
     for iteration in range(problem.max_iterations):
         interruption_point()
         found = directions.find(here)
@@ -87,13 +94,14 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
         if (last and not found.touching) or found.projected is not ProjectedTerms.ALL or not limits.guard.complete:
             extension.factor = 1.0
         vector = extension.factor * found.vector
-        largest, _ = limits.largest_step(here.positions, vector)
+        largest, _, reason = limits.largest_step(here.positions, vector)
         slope = extension.factor * found.slope
-        end, step, cuts = search(objective, here, vector, slope, largest, limits)
+        end, step, cuts = search(objective, here, vector, slope, largest, limits, jumps)
         extension.note(step, rate)
         # Where the step is shorter, the duals of the whole direction are those that the next matrix needs, too.
         objective.renew(here.positions, vector)
         policy.note(rate > _LINEAR_RATE and largest == 1.0, found.touching)
+        before = here.energy
         if step > 0.0:
             # A last step most often needs no Hessian at its end.
             here = objective.model(end, None if last else hessian, policy.now)
@@ -108,16 +116,21 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
             filter=largest,
             step=step,
             cuts=cuts,
+            limit="; ".join(([reason] if reason else []) + (["energy"] if cuts else [])),
             projected=found.projected is ProjectedTerms.ALL,
         )
         rows.append(row)
+        settled = settled + 1 if step > 0.0 and abs(before - here.energy) <= _NOTHING * here.size else 0
         logger.debug("%s", row)
         limits.widen(here.positions)
         if last:
             if step == 0.0 or _is_converged(problem, found.length, here, tools, found.touching):
                 return Outcome(Status.CONVERGED, here, "", rows)
             here = objective.model(here.positions, hessian, policy.now)
-        elif found.touching and step == 1.0 and _is_outdated(problem, here, tools):
+        elif found.touching and (
+            (settled >= _SETTLED and _is_balanced(problem, here, tools))
+            or (step == 1.0 and _is_outdated(problem, here, tools))
+        ):
             return Outcome(Status.CONVERGED, here, "", rows)
         if step == 0.0:
             text = (
@@ -138,6 +151,11 @@ def _is_outdated(problem: Problem, here: Model, tools: Tools) -> bool:
         return False
     contact = _free_norm(problem.objective.contact_gradient(here.positions), tools)
     return _free_norm(here.gradient.copy(), tools) <= _NEARLY * contact and problem.outdated(here.positions)
+
+
+def _is_balanced(problem: Problem, here: Model, tools: Tools) -> bool:
+    contact = _free_norm(problem.objective.contact_gradient(here.positions), tools)
+    return _free_norm(here.gradient.copy(), tools) <= problem.convergence.force * contact
 
 
 def _is_converged(problem: Problem, length: float, here: Model, tools: Tools, touching: bool) -> bool:

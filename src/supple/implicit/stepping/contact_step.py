@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.implicit.contact.friction import Friction
-from supple.implicit.contact.half_spaces import PlaneFriction
 from supple.implicit.contact.model import Barriers, ContactModel
 from supple.implicit.contact.points import contact_points, forces_on_owners
 from supple.implicit.details import ImplicitDetails
@@ -54,7 +53,7 @@ class ContactStep:
     nearest: float = 0.0
     friction_updates: int = 0
     barriers: Barriers | None = None
-    frictions: list[Friction | PlaneFriction] | None = None
+    frictions: list[Friction] | None = None
     normal_gradient: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
@@ -64,6 +63,9 @@ class ContactStep:
         """The objective with barriers, and with friction whose normal forces are those at x (n, 3)."""
         if self.model is None:
             return objective
+        if self.barriers is None:
+            # Weights stay during the step: with those of every minimum in turn, the minima can alternate.
+            self.model.collisions.forget_weights()
         self.barriers = self.model.barriers(self.stiffness)
         self.frictions = self.model.frictions(self.barriers, x, self.start, self.times)
         if self.model.coefficients.any():
@@ -133,4 +135,5 @@ class ContactStep:
         )
         nearest = model.smallest_distance(x)
         nearest = nearest if np.isfinite(nearest) else None
-        return details, nearest, lambda: contact_points(model, barriers, x, self.weight)
+        between = model.collisions.at(x)
+        return details, nearest, lambda: contact_points(model, barriers, x, between, self.weight)

@@ -65,7 +65,7 @@ def move_pins(
             text = "the linear system that moves the pins could not be solved"
             return x, Outcome(Status.NOT_FINITE, here, text, rows)
         direction[pinned] = displacement[pinned]
-        step, tet = limits.largest_step(x, direction)
+        step, tet, reason = limits.largest_step(x, direction)
         rows.append(
             NewtonRow(
                 iteration=iteration,
@@ -78,6 +78,7 @@ def move_pins(
                 filter=step,
                 step=step,
                 cuts=0,
+                limit=reason,
                 kind="extension",
             )
         )
@@ -111,11 +112,4 @@ def _blocked_message(
     assert best is not None
     if tet < 0 and limits.contact is not None:
         return f"{best.label} is blocked: any farther, it would press {limits.contact.nearest(x)} into each other"
-    return f"{best.label} is blocked: any farther, it would invert tet {tet} of {_owner(system, tet)}"
-
-
-def _owner(system: System, tet: int) -> str:
-    for part in system.bodies:
-        if part.tets.start <= tet < part.tets.stop:
-            return f"body {part.name!r} (its tet {tet - part.tets.start})"
-    return "a body"
+    return f"{best.label} is blocked: any farther, it would invert {limits.guard.name(tet)}"

@@ -158,7 +158,7 @@ def _first_guess(
         return x
     ahead = plan.predicted + plan.scale / plan.place * forces / system.masses[:, None]
     ahead[pinned] = x[pinned]
-    step, _ = limits.largest_step(x, ahead - x)
+    step = limits.largest_step(x, ahead - x).step
     if step < 1.0:
         ahead = x + step * (ahead - x)
     if not limits.allows(ahead):
