@@ -1,6 +1,7 @@
 """All benchmarks in sequence: `make bench`, or `python -m benchmarks`."""
 
 from benchmarks import (
+    automatic_substeps,
     candidate_search,
     contact_scenes,
     hanging_beam,
@@ -14,6 +15,7 @@ from benchmarks import (
 if __name__ == "__main__":
     startup.main()
     projections.main()
+    automatic_substeps.main()
     hanging_beam.main()
     hanging_beam.main(busy=True)
     work_precision.main()

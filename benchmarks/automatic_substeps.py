@@ -51,6 +51,7 @@ def case(youngs: float, poisson: float, size: float, dt: float, reference: float
 
 
 def main(quick: bool = False) -> None:
+    """Print a row for each nu."""
     logging.disable(logging.WARNING)
     print("nu | cases | errors of converged ones: median, largest | substeps | softened, median error | too slow")
     for poisson in POISSON:

@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import supple as sp
+
 ROOT = Path(__file__).parents[1]
 
 
@@ -48,6 +50,19 @@ def test_errors_are_relative_to_the_tip():
     assert relative_error(reference, reference) == 0.0
     off = np.hstack([rest, end + np.array([0, 0.05, 0])])
     assert relative_error(off, reference) == pytest.approx(0.1)
+
+
+def test_the_sag_at_the_automatic_number_of_substeps_has_the_accuracy_asked_for():
+    from benchmarks import automatic_substeps as sag
+
+    *_, still = sp.simulate(sag.scene(1e5, 0.45, 0.1), sp.Implicit(integrator="static", contact=None), 1 / 60, 2)
+    reference = sag.sag(still, 0.1)
+    for youngs, size, dt in ((1e5, 0.1, 1 / 60), (1e7, 1.0, 1 / 60), (1e4, 0.01, 1 / 240)):
+        status, substeps, error = sag.case(youngs, 0.45, size, dt, reference)
+        assert status == "converged"
+        assert substeps > 10
+        assert abs(error) < 0.022
+    assert sag.case(1e3, 0.45, 10.0, 1 / 240, reference) is None
 
 
 def test_the_live_ball_is_simulated_with_and_without_its_page(capsys):

@@ -120,7 +120,7 @@ MEASURE = """
         return scene
 
     solver = sp.XPBD(substeps=2) if sys.argv[1] == "xpbd" else sp.Implicit()
-    run(3, solver)  # compiles
+    run(3, solver)  # loads
     open("/proc/self/clear_refs", "w").write("5")  # the peak begins here
     before = kilobytes("VmRSS")
     scene = run(22, solver)
@@ -131,6 +131,9 @@ MEASURE = """
 @pytest.mark.skipif(sys.platform != "linux", reason="reads Linux's files")
 @pytest.mark.parametrize("solver", ["xpbd", "implicit"])
 def test_the_estimate_is_at_least_what_is_used_and_at_most_six_times_as_much(solver):
-    answer = subprocess.check_output([sys.executable, "-c", textwrap.dedent(MEASURE), solver], text=True, timeout=500)
+    # The first run compiles what such a large scene needs, which takes memory of its own.
+    for _ in range(2):
+        program = [sys.executable, "-c", textwrap.dedent(MEASURE), solver]
+        answer = subprocess.check_output(program, text=True, timeout=500)
     used, estimated = map(int, re.findall(r"\d+", answer))
     assert used <= estimated <= 6 * used

@@ -141,9 +141,10 @@ def test_a_small_soft_ball_dropped_ten_centimetres():
     check(sp.Scene([ball], [sp.HalfSpace(friction=0.5)]), 30)
 
 
-def test_eight_small_soft_balls_in_a_heap():
+@pytest.mark.parametrize("side", [2, pytest.param(3, marks=pytest.mark.slow)])
+def test_small_soft_balls_in_a_heap(side):
     mesh = sp.shapes.sphere(radius=0.02, edge_length=0.01)
     jelly = sp.StableNeoHookean(youngs=3e4, poisson=0.4)
-    places = [(0.042 * i, 0.03 + 0.042 * j, 0.042 * k) for i in range(2) for j in range(2) for k in range(2)]
+    places = [(0.042 * i, 0.03 + 0.042 * j, 0.042 * k) for i in range(side) for j in range(side) for k in range(side)]
     bodies = [sp.Body(f"ball {n}", mesh, jelly, position=place, friction=0.3) for n, place in enumerate(places)]
     check(sp.Scene(bodies, [sp.HalfSpace(friction=0.3)]), 30)

@@ -97,3 +97,50 @@ def test_flat_edges_take_part_and_so_do_those_of_bodies_that_may_touch_themselve
     assert edges([box, other]) == edges([box, other], self_collision=False) == 108 * 3 // 2 + 12 * 3 // 2
     assert edges([box]) == 108 * 3 // 2
     assert edges([box], self_collision=False) == 0
+
+
+def bears(seed, speed, count):
+    """Soft bodies with dents that collide: their faces do not tell which side of an edge is free."""
+    generator = np.random.default_rng(seed)
+    mesh = sp.shapes.gummy_bear(height=0.1, edge_length=0.014)
+    soft = sp.StableNeoHookean(youngs=2e4, poisson=0.45, density=1100)
+    bodies = []
+    for k in range(count):
+        place = (0.02 * generator.normal(), 0.13 * k, 0.01 * generator.normal())
+        turned, velocity = 0.4 * generator.normal(size=3), (0, -speed * (k - 0.5), 0)
+        bodies.append(sp.Body(f"bear {k}", mesh, soft, position=place, rotation=turned, velocity=velocity))
+    return sp.Scene(bodies, gravity=(0, 0, 0))
+
+
+@pytest.mark.parametrize(("seed", "speed"), [(1, 6.0), (1, 10.0), (5, 6.0), (8, 10.0)])
+def test_bodies_with_dents_do_not_cross_at_a_fixed_number_of_substeps(seed, speed):
+    for frame in sp.simulate(bears(seed, speed, 2), XPBD(substeps=40), 1 / 60, 10):
+        assert not surfaces_meet(frame)
+        assert frame.report.min_det_F > 0.0
+        assert frame.report.details.held_back <= 1
+
+
+def test_frames_in_which_bodies_had_to_be_held_back_are_reported():
+    """Bears that meet at 20 m/s, with far too few substeps."""
+    frames = list(sp.simulate(bears(2, 10.0, 3), XPBD(substeps=5), 1 / 60, 3))
+    assert frames[0].report.status == "held_back"
+    assert "bodies were held back in 60 % of the substeps" in frames[0].report.message
+    assert not any(surfaces_meet(frame) for frame in frames)
+
+
+def test_a_body_that_is_crushed_does_not_pass_through_itself():
+    for frame in sp.simulate(bears(2, 10.0, 2), XPBD(substeps=40), 1 / 60, 10):
+        assert not surfaces_meet(frame)
+
+
+def test_bars_that_begin_through_each_other_are_parted():
+    """There, what passes through something is on its way out."""
+    scene = crossing(0.0)
+    low, high = scene.bodies
+    inside = sp.Body("high", high.mesh, STUFF, position=(0.013, 0.066, 0.007), rotation=(0, 0, np.pi / 4))
+    system = build_system(sp.Scene([low, inside]))
+    assert meet(system, system.rest_positions)
+    frames = list(sp.simulate(sp.Scene([low, inside], gravity=(0, 0, 0)), XPBD(start="push_out"), 1 / 60, 40))
+    assert frames[0].report.status != "converged"
+    assert not surfaces_meet(frames[-1])
+    assert frames[-1].report.status == "converged"

@@ -81,7 +81,7 @@ class SurfaceCollisions:
         self._slack = widest + SLACK * edge_length
         self._near_pairs = np.zeros(0, dtype=np.int64)
         self._near_triangles, self._swept = np.zeros((0, 3), dtype=np.int64), np.zeros((len(s.triangles), 6))
-        self._edges = EdgePairs(surface_edges(s), s, self._stitched)
+        self._edges = EdgePairs(surface_edges(s), s, rest, self._stitched)
         self._finder = PairFinder(n)
         self._x, self._before, self._gathered = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
         self._shapes = (self._x, s.point_piece, s.triangles, s.triangle_piece)

@@ -12,6 +12,7 @@ from supple.contact.surface.distances import edge_edge_square
 from supple.numerics.adjacency import in_list
 from supple.numerics.geometry.box_tree import STACK, BoxTree, after_leaf, next_leaf, overlap
 from supple.numerics.kernel_cache import njit, prange
+from supple.numerics.mat3 import dot, row, subtract
 from supple.xpbd.contact.detection.edge_contacts import boxes_of_motion, overlapping
 from supple.xpbd.contact.detection.piece_runs import EDGE_EDGE, key_of
 from supple.xpbd.contact.detection.surface_edges import SurfaceEdges
@@ -25,6 +26,11 @@ def keys_of_edges(first, second):
     for i in range(len(first)):
         out[i] = key_of(EDGE_EDGE, first[i], second[i])
     return out
+
+
+# Edges of one piece are compared only where the surface is compressed: there it can cross itself within one fold. Folds
+# that meet are held apart by points and triangles.
+SQUEEZED = 0.75
 
 
 @njit
@@ -45,8 +51,25 @@ def _share_an_end(ends, e, f):
 
 
 @njit(cache=True)
+def squeezed_edges(x, ends, lengths, pieces, together):
+    """The edges (e,) that have an end where an edge is shorter than `SQUEEZED` of its length at rest (e,) [m].
+
+    Only edges of pieces that may touch themselves; for the arguments see `boxes_of_edges`.
+    """
+    marked = np.zeros(len(x), dtype=np.bool_)
+    for e in range(len(ends)):
+        d = subtract(row(x, ends[e, 0]), row(x, ends[e, 1]))
+        if together[pieces[e], pieces[e]] and dot(d, d) < (SQUEEZED * lengths[e]) ** 2:
+            marked[ends[e, 0]] = marked[ends[e, 1]] = True
+    found = np.zeros(len(ends), dtype=np.bool_)
+    for e in range(len(ends)):
+        found[e] = marked[ends[e, 0]] or marked[ends[e, 1]]
+    return found
+
+
+@njit(cache=True)
 def boxes_of_edges(x, ends, margin, pieces, together, boxes, piece_boxes):
-    """Write the boxes of edges, with their margins. Returns which of them meet the box of a piece they may touch.
+    """Write the boxes of edges, with their margins. Returns which of them meet the box of another piece they may touch.
 
     Parameters
     ----------
@@ -66,7 +89,8 @@ def boxes_of_edges(x, ends, margin, pieces, together, boxes, piece_boxes):
     meets = np.zeros(len(ends), dtype=np.bool_)
     for e in range(len(ends)):
         for k in range(len(together)):
-            meets[e] = meets[e] or (together[pieces[e], k] and overlap(piece_boxes, k, boxes[e]))
+            other = k != pieces[e] and together[pieces[e], k]
+            meets[e] = meets[e] or (other and overlap(piece_boxes, k, boxes[e]))
     return meets
 
 
@@ -76,6 +100,7 @@ def pairs_within_margins(
     margin,
     own_margin,
     boxes,
+    squeezed,
     near,
     nodes,
     labels,
@@ -95,6 +120,7 @@ def pairs_within_margins(
     Parameters
     ----------
     x, margin, boxes, pieces, together, ends : see `boxes_of_edges`; own_margin : (e,) for pairs of one piece [m]
+    squeezed : (e,) those that are also compared with edges of their own piece
     near : (k,) the edges of the tree; nodes, labels, order : of the tree over their boxes, labelled with pieces
     triangles : (e, 2) beside each edge, -1 for none; starts (t + 1,), points : those stitched to each triangle
     """
@@ -104,7 +130,7 @@ def pairs_within_margins(
         for q in range(r, len(order), RUNS):
             e = near[order[q]]
             for same in (False, True):
-                if same and not together[pieces[e], pieces[e]]:
+                if same and not squeezed[e]:
                     continue
                 top = after_leaf(nodes, q, boxes[e], stack)
                 while top > 0:
@@ -115,6 +141,7 @@ def pairs_within_margins(
                     reach = own_margin[e] + own_margin[f] if same else margin[e] + margin[f]
                     if (
                         not together[pieces[e], pieces[f]]
+                        or (same and not squeezed[f])
                         or _share_an_end(ends, e, f)
                         or edge_edge_square(x, ends, e, f) > reach * reach
                         or _is_stitched(ends, f, triangles, e, (starts, points))
@@ -131,6 +158,11 @@ def pairs_within_margins(
 class EdgePairs:
     """Pairs of edges that may touch.
 
+    Parameters
+    ----------
+    rest : (n, 3) points at rest [m]
+    stitched : starts (t + 1,) and points: those stitched to each triangle
+
     Attributes
     ----------
     keys : (k,) of the pairs, ascending
@@ -140,6 +172,7 @@ class EdgePairs:
         self,
         edges: SurfaceEdges,
         surfaces: ContactSurfaces,
+        rest: NDArray[np.float64],
         stitched: tuple[NDArray[np.int64], NDArray[np.int32]],
     ) -> None:
         e, p = len(edges.ends), len(surfaces.closed)
@@ -149,6 +182,7 @@ class EdgePairs:
         self._pieces = surfaces.point_piece[edges.ends[:, 0]]
         self._together = surfaces.allowed | surfaces.allowed.T
         self._stitched = stitched
+        self._lengths = np.linalg.norm(rest[edges.ends[:, 0]] - rest[edges.ends[:, 1]], axis=1)
         self._boxes, self._piece_boxes = np.zeros((e, 6)), np.zeros((p, 6))
         self._room = Room()
         self._swept = np.zeros((e, 6))
@@ -162,12 +196,14 @@ class EdgePairs:
 
         Parameters
         ----------
-        x : (n, 3); motions : (n,) how far each point may move; gaps : (n,) the largest gap that it keeps [m]
+        x : (n, 3) [m]; motions : two (n,), how far each point may move, absolutely and relative to its piece [m]
+        gaps : (n,) the largest gap that each point keeps [m]; parallel : whether several threads search
         """
         a, b = self.edges.ends.T
         margin, own = (np.maximum(each[a], each[b]) + 0.5 * gaps[a] for each in motions)
         meets = boxes_of_edges(x, self.edges.ends, margin, self._pieces, self._together, self._boxes, self._piece_boxes)
-        near = np.flatnonzero(meets & np.isfinite(self._boxes).all(axis=1))
+        squeezed = squeezed_edges(x, self.edges.ends, self._lengths, self._pieces, self._together)
+        near = np.flatnonzero((meets | squeezed) & np.isfinite(self._boxes).all(axis=1))
         pairs = np.zeros((0, 2), dtype=np.int32)
         if len(near):
             tree = BoxTree.over(self._boxes[near], self._pieces[near])
@@ -176,7 +212,7 @@ class EdgePairs:
             room = self._room
             while True:
                 pairs_within_margins[parallel](
-                    x, margin, own, self._boxes, *nodes, *rules, room.start, room.counts, room.pairs
+                    x, margin, own, self._boxes, squeezed, *nodes, *rules, room.start, room.counts, room.pairs
                 )
                 if not room.is_too_small():
                     break
