@@ -60,7 +60,7 @@ def test_a_kernel_is_compiled_again_when_a_function_of_another_file_changes(copi
     assert run().endswith(" 1")
 
 
-@pytest.mark.parametrize("content", [b"cmoved.module\nkernel\n.", b"\x80\x05"])
+@pytest.mark.parametrize("content", [b"cmoved.module\nkernel\n.", pytest.param(b"\x80\x05", marks=pytest.mark.slow)])
 def test_a_cache_that_cannot_be_read_is_made_anew(copied_package, content):
     package, run = copied_package
     run()

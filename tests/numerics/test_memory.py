@@ -129,7 +129,7 @@ MEASURE = """
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads Linux's files")
-@pytest.mark.parametrize("solver", ["xpbd", "implicit"])
+@pytest.mark.parametrize("solver", ["xpbd", pytest.param("implicit", marks=pytest.mark.slow)])
 def test_the_estimate_is_at_least_what_is_used_and_at_most_six_times_as_much(solver):
     # The first run compiles what such a large scene needs, which takes memory of its own.
     for _ in range(2):

@@ -70,7 +70,7 @@ def test_a_static_run_resumes(out):
     assert all(map(same_bits, whole[3:], sp.resume(out, scene, solver)))
 
 
-@pytest.mark.parametrize("stop_after", [1, 5])
+@pytest.mark.parametrize("stop_after", [5, pytest.param(1, marks=pytest.mark.slow)])
 def test_a_run_may_be_resumed_many_times(out, stop_after):
     solver = SOLVERS["bdf2"]
     whole = list(sp.simulate(contact_scene(), solver, DT, STEPS))

@@ -55,11 +55,11 @@ def squashed(material, height, position, mesh=SPHERE):
 @pytest.mark.parametrize(
     ("material", "height", "substeps"),
     [
-        pytest.param(JELLY, 0.95, 80, id="neo-hookean .95"),
+        pytest.param(JELLY, 0.95, 80, id="neo-hookean .95", marks=pytest.mark.slow),
         pytest.param(JELLY, 0.5, 20, id="neo-hookean .5"),
         pytest.param(JELLY, 0.02, 5, id="neo-hookean pancake"),
         pytest.param(CLASSIC, 0.95, 5, id="edges+volume .95"),
-        pytest.param(CLASSIC, 0.8, 40, id="edges+volume .8"),
+        pytest.param(CLASSIC, 0.8, 40, id="edges+volume .8", marks=pytest.mark.slow),
         pytest.param(CLASSIC, 0.5, 20, id="edges+volume .5"),
         pytest.param(CLASSIC, 0.02, 20, id="edges+volume pancake"),
     ],
@@ -79,7 +79,9 @@ def test_a_sphere_spins_without_momentum_restore():
 
 
 @pytest.mark.parametrize(
-    ("substeps", "seed", "seconds"), [(5, None, 60), (20, 1, 20), (80, 2, 3)], ids=["5 substeps", "20", "80"]
+    ("substeps", "seed", "seconds"),
+    [pytest.param(5, None, 60, marks=pytest.mark.slow), (20, 1, 20), (80, 2, 3)],
+    ids=["5 substeps", "20", "80"],
 )
 def test_frictionless_plates_cause_no_spin(substeps, seed, seconds):
     """With the constraints in the mesh's order and in random ones."""

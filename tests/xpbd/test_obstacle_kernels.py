@@ -47,6 +47,7 @@ def push(tmp_path):
     return push
 
 
+@pytest.mark.slow
 def test_cached_kernels_of_several_processes_do_not_interfere(push):
     for name in ("Sphere", "Box"):
         assert push(name) == [PUSHED[name]]

@@ -38,24 +38,17 @@ from supple.xpbd.integration import (
     origins_of_components,
     predict,
     to_world,
-    update_velocities,
 )
-from supple.xpbd.limits.rigid_fallback import RigidFallback, united
-from supple.xpbd.limits.volume_guard import ENOUGH, VolumeGuard
+from supple.xpbd.limits.rigid_fallback import RigidFallback
+from supple.xpbd.limits.volume_guard import VolumeGuard
 from supple.xpbd.memory import XPBDMemory
 from supple.xpbd.momentum import MomentumRestore
 from supple.xpbd.start import raise_if_inside
+from supple.xpbd.substep_limits import collide, keep_volumes, restore
 from supple.xpbd.substeps import FALL, SubstepChoice, Substeps
 from supple.xpbd.sweeps.ordering import make_layout, reordered
 from supple.xpbd.workspace import XPBDWorkspace
 
-# How often tets that are compressed too fast are projected in a substep, in turn with the contacts, before the motion
-# of their body is shortened.
-MOST_PROJECTIONS = 10
-# After how many of these projections contacts of surfaces are searched, which costs about ten times as much.
-SEARCH_EACH = 3
-# Of the motion of components that have passed through each other in spite of that: the shares that are tried.
-SHARES = (0.5, 0.25, 0.1, 0.0, 0.0)
 # How often a bad frame is repeated with twice as many substeps. What crosses with twice as many crosses with more, too.
 MOST_REPEATS, MOST_FOR_CROSSINGS = 2, 1
 # Below this much work, in edges or volumes, a sweep ends before a second thread has started.
@@ -285,12 +278,12 @@ class XPBD(Solver):
                 _push_contacts(ws, h)
             for constraints in ws.sets:
                 constraints.project(ws.extended, h, parallel)
-            _restore(ws, h, parallel)
+            restore(ws, h, parallel)
             ws.pace.note(parallel, perf_counter() - started)
             pull_to_targets(ws.system, ws.points, ws.velocities, ws.origins, end, h)
-            if ws.collisions and not _collide(ws, end, h, parallel):
+            if ws.collisions and not collide(ws, end, h, parallel):
                 break
-            held_back += _keep_volumes(ws, end, h, parallel)
+            held_back += keep_volumes(ws, end, h, parallel)
             if ws.collisions:
                 ws.collisions.end_substep()
             balance.note_loads(ws.points, ws.previous, ws.origins, end, h)
@@ -343,71 +336,6 @@ def _push_contacts(ws: XPBDWorkspace, h: float) -> None:
         to_world(ws.previous, ws.origins, ws.world_previous)
         if ws.collisions.begin_substep(ws.world, ws.world_previous, h):
             apply_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
-
-
-def _collide(ws: XPBDWorkspace, time: float, h: float, parallel: bool, search: bool = True) -> bool:
-    """Project the contacts of a substep, in the world. Returns False, without effect, where a position is lost."""
-    if not to_world(ws.points, ws.origins, ws.world):
-        return False
-    to_world(ws.previous, ws.origins, ws.world_previous)
-    if search:
-        ws.collisions.project(ws.world, ws.world_previous, time, h, parallel)
-    else:
-        ws.collisions.project_again(ws.world, ws.world_previous, time, h)
-    apply_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
-    return True
-
-
-def _keep_volumes(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
-    """Project tets that lose too much volume, in turn with contacts. Returns whether that was not enough."""
-    searched = True  # whether the contacts that were projected last had been searched anew
-    for k in range(MOST_PROJECTIONS):
-        low = ws.guard.measure(ws.points, parallel, ENOUGH if k else 1.0)
-        if not low and searched and ws.collisions.parted:
-            ws.guard.accept()
-            return False
-        if low:
-            ws.guard.project(ws.points)
-            _restore(ws, h, parallel)
-        searched = not low or k % SEARCH_EACH == 0
-        if ws.collisions and not _collide(ws, time, h, parallel, searched):
-            return True
-    return _shorten(ws, h, parallel)
-
-
-def _shorten(ws: XPBDWorkspace, h: float, parallel: bool) -> bool:
-    """Shorten the motion of what has still turned over or passed through something. Returns whether there was any."""
-    ws.guard.measure(ws.points, parallel)
-    failures = ws.guard.failures()
-    arrays = (ws.points, ws.velocities, ws.previous, ws.begun, ws.origins, h, ws.guard.bounds)
-    failed = bool(failures.any())
-    if failed:
-        ws.fallback.apply(*arrays, [[label] for label in np.unique(ws.fallback.tet_labels[failures])])
-    groups: list[set[int]] = []
-    for share in SHARES:
-        passed = _passed(ws)
-        if not len(passed):
-            break
-        failed, groups = True, united(groups, passed.tolist())
-        ws.fallback.apply(*arrays, [sorted(group) for group in groups], share)
-    ws.guard.measure(ws.points, parallel)
-    ws.guard.accept()
-    return failed
-
-
-def _passed(ws: XPBDWorkspace) -> NDArray[np.int64]:
-    """(k, 2) the components that passed through each other in this substep; see `SurfaceCollisions.passed`."""
-    to_world(ws.points, ws.origins, ws.world)
-    to_world(ws.begun, ws.origins, ws.world_previous)
-    return ws.collisions.passed(ws.world, ws.world_previous, ws.fallback.labels)
-
-
-def _restore(ws: XPBDWorkspace, h: float, parallel: bool) -> None:
-    """The velocities of changed positions, with the momentum of the velocities before."""
-    if ws.momentum is not None:
-        ws.momentum.apply(ws.points, ws.previous, ws.velocities, h, parallel)
-    else:
-        update_velocities(ws.points, ws.previous, ws.velocities, h)
 
 
 def _unload(ws: XPBDWorkspace, time: float, damping: Damping | None) -> tuple[State, ViscousMemory | None]:

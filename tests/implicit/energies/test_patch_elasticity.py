@@ -137,6 +137,7 @@ def test_a_tet_of_a_patch_has_a_barrier_against_inversion():
         assert barrier.value(x) == np.inf
 
 
+@pytest.mark.slow
 def test_the_same_bits_on_any_number_of_threads():
     mesh = sp.shapes.box((1, 1, 1), (7, 7, 7))
     energy = energy_of(patched(sp.StableNeoHookean, 0.49), mesh)

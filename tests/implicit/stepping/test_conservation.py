@@ -26,7 +26,8 @@ def energy(report):
 
 
 @pytest.mark.parametrize(
-    ("mu", "rate", "steps"), [(1e6, 60, 300), pytest.param(1e6, 240, 360, marks=pytest.mark.slow), (1e7, 60, 300)]
+    ("mu", "rate", "steps"),
+    [(1e6, 60, 300), *(pytest.param(*case, marks=pytest.mark.slow) for case in ((1e6, 240, 360), (1e7, 60, 300)))],
 )
 def test_stiff_stitches_that_start_loaded_make_neither_energy_nor_spin(mu, rate, steps):
     scene = stitched_cubes(mu)

@@ -237,6 +237,7 @@ def upload_two_files(resting, spot, tmp_path):
     screen.tab.get_by_text("Add a body").click()
 
 
+@pytest.mark.slow
 def test_the_pusher_pushes_a_body(resting):
     screen, controls = resting.screen, resting.panel.mouse_controls
     screen.choose(controls.mode, "push")

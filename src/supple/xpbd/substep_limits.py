@@ -1,0 +1,84 @@
+"""The end of a substep: contacts, then volumes and contacts in turn, and the last resort where that is not enough."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.xpbd.integration import apply_changes, to_world, update_velocities
+from supple.xpbd.limits.rigid_fallback import united
+from supple.xpbd.limits.volume_guard import ENOUGH
+from supple.xpbd.workspace import XPBDWorkspace
+
+# How often tets that are compressed too fast are projected in a substep, in turn with the contacts, before the motion
+# of their body is shortened.
+MOST_PROJECTIONS = 10
+# After how many of these projections contacts of surfaces are searched, which costs about ten times as much.
+SEARCH_EACH = 3
+# Of the motion of components that have passed through each other in spite of that: the shares that are tried.
+SHARES = (0.5, 0.25, 0.1, 0.0, 0.0)
+
+
+def collide(ws: XPBDWorkspace, time: float, h: float, parallel: bool, search: bool = True) -> bool:
+    """Project the contacts of a substep, in the world. Returns False, without effect, where a position is lost."""
+    if not to_world(ws.points, ws.origins, ws.world):
+        return False
+    to_world(ws.previous, ws.origins, ws.world_previous)
+    if search:
+        ws.collisions.project(ws.world, ws.world_previous, time, h, parallel)
+    else:
+        ws.collisions.project_again(ws.world, ws.world_previous, time, h)
+    apply_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
+    return True
+
+
+def keep_volumes(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
+    """Project tets that lose too much volume, in turn with contacts. Returns whether that was not enough."""
+    searched = True  # whether the contacts that were projected last had been searched anew
+    for k in range(MOST_PROJECTIONS):
+        low = ws.guard.measure(ws.points, parallel, ENOUGH if k else 1.0)
+        if not low and searched and ws.collisions.parted:
+            ws.guard.accept()
+            return False
+        if low:
+            ws.guard.project(ws.points)
+            restore(ws, h, parallel)
+        searched = not low or k % SEARCH_EACH == 0
+        if ws.collisions and not collide(ws, time, h, parallel, searched):
+            return True
+    return _shorten(ws, h, parallel)
+
+
+def _shorten(ws: XPBDWorkspace, h: float, parallel: bool) -> bool:
+    """Shorten the motion of what has still turned over or passed through something. Returns whether there was any."""
+    ws.guard.measure(ws.points, parallel)
+    failures = ws.guard.failures()
+    arrays = (ws.points, ws.velocities, ws.previous, ws.begun, ws.origins, h, ws.guard.bounds)
+    failed = bool(failures.any())
+    if failed:
+        ws.fallback.apply(*arrays, [[label] for label in np.unique(ws.fallback.tet_labels[failures])])
+    groups: list[set[int]] = []
+    for share in SHARES:
+        passed = _passed(ws)
+        if not len(passed):
+            break
+        failed, groups = True, united(groups, passed.tolist())
+        ws.fallback.apply(*arrays, [sorted(group) for group in groups], share)
+    ws.guard.measure(ws.points, parallel)
+    ws.guard.accept()
+    return failed
+
+
+def _passed(ws: XPBDWorkspace) -> NDArray[np.int64]:
+    """(k, 2) the components that passed through each other in this substep; see `SurfaceCollisions.passed`."""
+    to_world(ws.points, ws.origins, ws.world)
+    to_world(ws.begun, ws.origins, ws.world_previous)
+    return ws.collisions.passed(ws.world, ws.world_previous, ws.fallback.labels)
+
+
+def restore(ws: XPBDWorkspace, h: float, parallel: bool) -> None:
+    """The velocities of changed positions, with the momentum of the velocities before."""
+    if ws.momentum is not None:
+        ws.momentum.apply(ws.points, ws.previous, ws.velocities, h, parallel)
+    else:
+        update_velocities(ws.points, ws.previous, ws.velocities, h)
