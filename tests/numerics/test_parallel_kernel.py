@@ -85,7 +85,7 @@ def test_the_number_of_threads_belongs_to_the_python_thread():
 
 # Simulates in threads, after a fork, and in a pool of forked processes; all must give the bits of the first simulation.
 PROGRAM = """
-import os, threading, zlib
+import os, threading, time, zlib
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 import numba, numpy as np
@@ -114,6 +114,9 @@ threads = [threading.Thread(target=lambda k=k: got.update({k: bits(RUNS[k % 2])}
 [thread.start() for thread in threads]
 [thread.join() for thread in threads]
 assert [got.get(k) for k in range(4)] == expected * 2, "threads"
+# OpenMP's threads of the threads above end now. Meanwhile they may hold a lock of the compiler's run-time library that a
+# forked process would never get, and that it needs to load a kernel.
+time.sleep(1.0)
 child = os.fork()
 if child == 0:
     os._exit([bits(run) for run in RUNS] != expected)
