@@ -114,8 +114,8 @@ threads = [threading.Thread(target=lambda k=k: got.update({k: bits(RUNS[k % 2])}
 [thread.start() for thread in threads]
 [thread.join() for thread in threads]
 assert [got.get(k) for k in range(4)] == expected * 2, "threads"
-# OpenMP's threads of the threads above end now. Meanwhile they may hold a lock of the compiler's run-time library that a
-# forked process would never get, and that it needs to load a kernel.
+# OpenMP's threads of the threads above end now. Meanwhile they may hold a lock of the compiler's library that a forked
+# process would never get, and that it needs to load a kernel.
 time.sleep(1.0)
 child = os.fork()
 if child == 0:
