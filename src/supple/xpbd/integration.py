@@ -111,4 +111,5 @@ def apply_changes(points, velocities, h, origins, previous, world, world_previou
             change = world[i, j] - (origins[i, j] + points[i, j])
             change_before = world_previous[i, j] - (origins[i, j] + previous[i, j])
             points[i, j] += change
+            previous[i, j] += change_before
             velocities[i, j] += (change - change_before) / h

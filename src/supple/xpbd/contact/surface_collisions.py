@@ -311,7 +311,8 @@ class SurfaceCollisions:
         self._finder.gather(self._shapes, (self._far, self._near), self._rules)
         self._gathered[:] = self._x
         self._runs.renew()
-        self._edges.renew(self._x, (self._far[:, 1], self._near[:, 1]), self._gap, parallel)
+        near = (self._finder.starts, self._finder.triangles)
+        self._edges.renew(self._x, (self._far[:, 1], self._near[:, 1]), self._gap, near, parallel)
         # Keys of points come before keys of edges.
         self._rows.renew(np.concatenate([self._runs.keys, self._edges.keys]))
         self._lists = self._runs.lists(np.searchsorted(self._rows.keys, self._runs.keys))

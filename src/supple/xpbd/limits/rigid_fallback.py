@@ -69,11 +69,17 @@ class RigidFallback:
             rows = np.flatnonzero(np.isin(self.labels, group))
             shift = origins[rows] - origins[rows[0]]
             held = -1 in group or bool(self.pinned[rows].any())
-            base = begun.copy()
-            base[rows] = self._rigid(points[rows, :3] + shift, begun[rows] + shift, rows, held) - shift
+            mine = guarded & np.isin(self.tet_labels, group)
+            tets = self.system.tets[mine]
+            start = begun.copy()
+            start[rows] = previous[rows]
+            # Contacts part what was too near at the beginning; without that, it would be held back for ever.
+            if not (volume_signs(start, tets) > 0.0).all():
+                start[rows] = begun[rows]
+            base = start.copy()
+            base[rows] = self._rigid(points[rows, :3] + shift, start[rows] + shift, rows, held) - shift
             motion = np.zeros_like(base)
             motion[rows] = points[rows, :3] - base[rows]
-            mine = guarded & np.isin(self.tet_labels, group)
             step = min(
                 most,
                 *(
@@ -82,20 +88,19 @@ class RigidFallback:
                 ),
             )
             # Positions are rounded, so that the volumes of slivers may differ from what the cubics promise.
-            tets = self.system.tets[mine]
             while step > 0.0 and not (volume_signs(base + step * motion, tets) > 0.0).all():
                 step *= 0.5
             points[rows, :3] = base[rows] + step * motion[rows]
-            v = (points[rows, :3] - begun[rows]) / h
+            v = (points[rows, :3] - start[rows]) / h
             if not held:
-                change = self._excess(begun[rows] + shift, v, previous[rows] + shift, velocities[rows], rows)
+                change = self._excess(start[rows] + shift, v, previous[rows] + shift, velocities[rows], rows)
                 v -= change
                 # Not where the body turned so far in the substep that this field would turn tets over.
                 moved = base + step * motion
                 moved[rows] -= h * change
                 if (volume_signs(moved, tets) > 0.0).all():
                     points[rows, :3] = moved[rows]
-            velocities[rows], previous[rows] = v, begun[rows]
+            velocities[rows], previous[rows] = v, start[rows]
 
     def _rigid(self, x: NDArray, before: NDArray, rows: NDArray[np.intp], held: bool) -> NDArray[np.float64]:
         if held:

@@ -28,8 +28,8 @@ def keys_of_edges(first, second):
     return out
 
 
-# Edges of one piece are compared only where the surface is compressed: there it can cross itself within one fold. Folds
-# that meet are held apart by points and triangles.
+# Edges of one piece are compared only where the surface is compressed, where it can cross itself within one fold, and
+# where folds meet: where a point is near a triangle that it is not near at rest.
 SQUEEZED = 0.75
 
 
@@ -51,12 +51,27 @@ def _share_an_end(ends, e, f):
 
 
 @njit(cache=True)
-def squeezed_edges(x, ends, lengths, pieces, together):
-    """The edges (e,) that have an end where an edge is shorter than `SQUEEZED` of its length at rest (e,) [m].
+def folded_edges(x, ends, lengths, pieces, together, near, surfaces):
+    """The edges (e,) that have an end where the surface may cross itself; see `SQUEEZED`.
 
-    Only edges of pieces that may touch themselves; for the arguments see `boxes_of_edges`.
+    Only edges of pieces that may touch themselves; for the other arguments see `boxes_of_edges`.
+
+    Parameters
+    ----------
+    lengths : (e,) of the edges at rest [m]
+    near : starts (n + 1,) and triangles: those near each point, see `PairFinder`
+    surfaces : point_piece (n,), triangles (t, 3), triangle_piece (t,)
     """
     marked = np.zeros(len(x), dtype=np.bool_)
+    starts, listed = near
+    point_piece, triangles, triangle_piece = surfaces
+    for p in range(len(x)):
+        for i in range(starts[p], starts[p + 1]):
+            t = listed[i]
+            if triangle_piece[t] == point_piece[p]:
+                marked[p] = True
+                for j in range(3):
+                    marked[triangles[t, j]] = True
     for e in range(len(ends)):
         d = subtract(row(x, ends[e, 0]), row(x, ends[e, 1]))
         if together[pieces[e], pieces[e]] and dot(d, d) < (SQUEEZED * lengths[e]) ** 2:
@@ -100,7 +115,7 @@ def pairs_within_margins(
     margin,
     own_margin,
     boxes,
-    squeezed,
+    folded,
     near,
     nodes,
     labels,
@@ -120,7 +135,7 @@ def pairs_within_margins(
     Parameters
     ----------
     x, margin, boxes, pieces, together, ends : see `boxes_of_edges`; own_margin : (e,) for pairs of one piece [m]
-    squeezed : (e,) those that are also compared with edges of their own piece
+    folded : (e,) those that are also compared with edges of their own piece
     near : (k,) the edges of the tree; nodes, labels, order : of the tree over their boxes, labelled with pieces
     triangles : (e, 2) beside each edge, -1 for none; starts (t + 1,), points : those stitched to each triangle
     """
@@ -130,7 +145,7 @@ def pairs_within_margins(
         for q in range(r, len(order), RUNS):
             e = near[order[q]]
             for same in (False, True):
-                if same and not squeezed[e]:
+                if same and not folded[e]:
                     continue
                 top = after_leaf(nodes, q, boxes[e], stack)
                 while top > 0:
@@ -141,7 +156,7 @@ def pairs_within_margins(
                     reach = own_margin[e] + own_margin[f] if same else margin[e] + margin[f]
                     if (
                         not together[pieces[e], pieces[f]]
-                        or (same and not squeezed[f])
+                        or (same and not folded[f])
                         or _share_an_end(ends, e, f)
                         or edge_edge_square(x, ends, e, f) > reach * reach
                         or _is_stitched(ends, f, triangles, e, (starts, points))
@@ -179,6 +194,7 @@ class EdgePairs:
         self.edges = edges
         self.arrays = (edges.ends, edges.opposite)
         self.keys = np.zeros(0, dtype=np.int64)
+        self._surfaces = (surfaces.point_piece, surfaces.triangles, surfaces.triangle_piece)
         self._pieces = surfaces.point_piece[edges.ends[:, 0]]
         self._together = surfaces.allowed | surfaces.allowed.T
         self._stitched = stitched
@@ -191,28 +207,32 @@ class EdgePairs:
     def __len__(self) -> int:
         return len(self.edges.ends)
 
-    def renew(self, x: NDArray[np.float64], motions: tuple, gaps: NDArray[np.float64], parallel: bool) -> None:
+    def renew(
+        self, x: NDArray[np.float64], motions: tuple, gaps: NDArray[np.float64], near: tuple, parallel: bool
+    ) -> None:
         """List the pairs that may touch before a point has moved too far.
 
         Parameters
         ----------
         x : (n, 3) [m]; motions : two (n,), how far each point may move, absolutely and relative to its piece [m]
-        gaps : (n,) the largest gap that each point keeps [m]; parallel : whether several threads search
+        gaps : (n,) the largest gap that each point keeps [m]; near : see `folded_edges`
+        parallel : whether several threads search
         """
         a, b = self.edges.ends.T
         margin, own = (np.maximum(each[a], each[b]) + 0.5 * gaps[a] for each in motions)
         meets = boxes_of_edges(x, self.edges.ends, margin, self._pieces, self._together, self._boxes, self._piece_boxes)
-        squeezed = squeezed_edges(x, self.edges.ends, self._lengths, self._pieces, self._together)
-        near = np.flatnonzero((meets | squeezed) & np.isfinite(self._boxes).all(axis=1))
+        rest = (self._lengths, self._pieces, self._together)
+        folded = folded_edges(x, self.edges.ends, *rest, near, self._surfaces)
+        taking_part = np.flatnonzero((meets | folded) & np.isfinite(self._boxes).all(axis=1))
         pairs = np.zeros((0, 2), dtype=np.int32)
-        if len(near):
-            tree = BoxTree.over(self._boxes[near], self._pieces[near])
-            nodes = (near, tree.nodes, tree.labels, tree.order)
+        if len(taking_part):
+            tree = BoxTree.over(self._boxes[taking_part], self._pieces[taking_part])
+            nodes = (taking_part, tree.nodes, tree.labels, tree.order)
             rules = (self._pieces, self._together, self.edges.ends, self.edges.triangles, *self._stitched)
             room = self._room
             while True:
                 pairs_within_margins[parallel](
-                    x, margin, own, self._boxes, squeezed, *nodes, *rules, room.start, room.counts, room.pairs
+                    x, margin, own, self._boxes, folded, *nodes, *rules, room.start, room.counts, room.pairs
                 )
                 if not room.is_too_small():
                     break
