@@ -20,7 +20,6 @@ class XPBDMemory:
     ledger : of the assessment of frames; None at the start
     substeps : what the last frame asks of the next one, where repetitions helped; falls back to zero
     futile : the statuses that the last frame had in spite of repetitions
-    crossings : number of pairs of triangles that are through each other
     """
 
     contact: ContactMemory | None = None
@@ -28,4 +27,3 @@ class XPBDMemory:
     ledger: Ledger | None = None
     substeps: float = 0.0
     futile: frozenset[str] = frozenset()
-    crossings: int = 0

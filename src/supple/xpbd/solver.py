@@ -23,6 +23,7 @@ from supple.state import State, Status, StepReport
 from supple.system import Solver, System
 from supple.xpbd.assessment.assessment import Assessment
 from supple.xpbd.assessment.findings import Findings
+from supple.xpbd.assessment.surfaces import Overlap, crossings
 from supple.xpbd.constraints.registry import build_constraint_sets
 from supple.xpbd.constraints.stitch_anchors import StitchAnchors
 from supple.xpbd.constraints.stitches import stitch_constraints
@@ -133,7 +134,7 @@ class XPBD(Solver):
             momentum=MomentumRestore(inner) if self.momentum_restore else None,
             collisions=collisions,
             guard=VolumeGuard(inner),
-            fallback=RigidFallback(inner),
+            fallback=RigidFallback(inner, collisions.skin),
             assessment=assessment,
             choice=SubstepChoice(inner, assessment.softening, bool(collisions)),
             threads=self.threads or (None if large else 1),
@@ -164,12 +165,14 @@ class XPBD(Solver):
     def _step(self, system: System, state: State, dt: float, ws: XPBDWorkspace) -> tuple[State, StepReport]:
         time = state.time + dt
         memory = state.memory if isinstance(state.memory, XPBDMemory) else XPBDMemory()
+        _load(ws, state)
         used, repeats = self._first_choice(ws, state, dt, memory), 0
+        overlaps = ws.assessment.overlaps(ws.world, state.time) if ws.collisions else []
         while True:
-            held_back = self._advance(ws, state, dt, used.count, memory)
+            held_back = self._advance(ws, state, dt, used.count, memory, overlaps)
             lost = first_lost(ws.points, ws.velocities)
             if lost < 0:
-                new, report, problem = self._reported(ws, time, dt, held_back, used, repeats, memory)
+                new, report, problem = self._reported(ws, time, dt, held_back, used, repeats, memory, overlaps)
             else:
                 problem = Status.NOT_FINITE
             most = MOST_FOR_CROSSINGS if problem is Status.INTERSECTING else MOST_REPEATS
@@ -188,7 +191,6 @@ class XPBD(Solver):
         """How many substeps the frame is simulated with at first."""
         if self.substeps != "auto":
             return Substeps(self.substeps, "the user")
-        _load(ws, state)
         wanted = ws.choice.choose(ws.moment(state.time), dt, self.accuracy, memory.substeps)
         if wanted.count > self.max_substeps:
             return Substeps(self.max_substeps, f"max_substeps; {wanted.reason} asks for {wanted.count}")
@@ -203,6 +205,7 @@ class XPBD(Solver):
         used: Substeps,
         repeats: int,
         before: XPBDMemory,
+        overlaps: list[Overlap],
     ) -> tuple[State, StepReport, Status | None]:
         """The state at the end of a frame, what is wrong with it, and the status that more substeps might cure."""
         h = dt / used.count
@@ -213,7 +216,7 @@ class XPBD(Solver):
         )
         status = findings.status
         problem = status if status in (Status.INVERTED, Status.ENERGY_GAINED) else None
-        if findings.crossings > before.crossings:
+        if crossings(findings.overlaps) > crossings(overlaps):
             problem = Status.INTERSECTING
         elif problem is None and held_back:
             problem = Status.INVERTED
@@ -223,7 +226,6 @@ class XPBD(Solver):
             ledger=ledger,
             substeps=float(used.count) if repeats and problem is None else FALL * before.substeps,
             futile=frozenset() if problem is None else before.futile | ({problem} if repeats else set()),
-            crossings=findings.crossings,
         )
         details = XPBDDetails(
             contacts=ws.collisions.contacts,
@@ -246,13 +248,15 @@ class XPBD(Solver):
             enough = max(enough, 2 * used)
         return f"take {'max_substeps' if self.substeps == 'auto' else 'substeps'}={enough}"
 
-    def _advance(self, ws: XPBDWorkspace, state: State, dt: float, substeps: int, memory: XPBDMemory) -> int:
+    def _advance(
+        self, ws: XPBDWorkspace, state: State, dt: float, substeps: int, memory: XPBDMemory, overlaps: list[Overlap]
+    ) -> int:
         """Simulate the substeps of a frame from a state; returns in how many the motion of a body was shortened."""
         h, held_back = dt / substeps, 0
         _load(ws, state)
         targets = _pin_targets(ws.system, state.time, h, substeps)
         if ws.collisions:
-            crossing = ws.assessment.crossing(ws.world, state.time).tolist()
+            crossing = [each.numbers for each in overlaps if each.pairs]
             ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt, memory.contact, crossing)
         ws.guard.measure(ws.points, False)
         ws.guard.guarded[:] = ws.assessment.begin(ws.moment(state.time), ws.guard.J, h, memory.ledger)

@@ -19,17 +19,27 @@ SEARCH_EACH = 3
 SHARES = (0.5, 0.25, 0.1, 0.0, 0.0)
 
 
-def collide(ws: XPBDWorkspace, time: float, h: float, parallel: bool, search: bool = True) -> bool:
+def collide(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
     """Project the contacts of a substep, in the world. Returns False, without effect, where a position is lost."""
-    if not to_world(ws.points, ws.origins, ws.world):
+    if not _to_world(ws):
         return False
-    to_world(ws.previous, ws.origins, ws.world_previous)
-    if search:
-        ws.collisions.project(ws.world, ws.world_previous, time, h, parallel)
-    else:
-        ws.collisions.project_again(ws.world, ws.world_previous, time, h)
+    ws.collisions.project(ws.world, ws.world_previous, time, h, parallel)
     apply_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
     return True
+
+
+def collide_again(ws: XPBDWorkspace, time: float, h: float) -> bool:
+    """`collide` with the contacts of surfaces that were found last."""
+    if not _to_world(ws):
+        return False
+    ws.collisions.project_again(ws.world, ws.world_previous, time, h)
+    apply_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
+    return True
+
+
+def _to_world(ws: XPBDWorkspace) -> bool:
+    to_world(ws.previous, ws.origins, ws.world_previous)
+    return to_world(ws.points, ws.origins, ws.world)
 
 
 def keep_volumes(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
@@ -44,16 +54,18 @@ def keep_volumes(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bo
             ws.guard.project(ws.points)
             restore(ws, h, parallel)
         searched = not low or k % SEARCH_EACH == 0
-        if ws.collisions and not collide(ws, time, h, parallel, searched):
-            return True
-    return _shorten(ws, h, parallel)
+        if ws.collisions:
+            found = collide(ws, time, h, parallel) if searched else collide_again(ws, time, h)
+            if not found:
+                return True
+    return _shorten(ws, time, h, parallel)
 
 
-def _shorten(ws: XPBDWorkspace, h: float, parallel: bool) -> bool:
+def _shorten(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
     """Shorten the motion of what has still turned over or passed through something. Returns whether there was any."""
     ws.guard.measure(ws.points, parallel)
     failures = ws.guard.failures()
-    arrays = (ws.points, ws.velocities, ws.previous, ws.begun, ws.origins, h, ws.guard.bounds)
+    arrays = (ws.points, ws.velocities, ws.previous, ws.begun, ws.origins, h, ws.guard.bounds, time)
     failed = bool(failures.any())
     if failed:
         ws.fallback.apply(*arrays, [[label] for label in np.unique(ws.fallback.tet_labels[failures])])

@@ -88,7 +88,9 @@ def test_the_last_resort_leaves_every_tet_positive_from_any_motion(pinned):
         points, velocities = points_of(system, system.rest_positions + motion), motion / 1e-3
         momenta = momenta_of(system, rest, velocities)
         bounds = np.full(len(system.tets), 0.5)
-        RigidFallback(system).apply(points, velocities, rest.copy(), rest, np.zeros_like(rest), 1e-3, bounds, [[0]])
+        RigidFallback(system, 0.0).apply(
+            points, velocities, rest.copy(), rest, np.zeros_like(rest), 1e-3, bounds, 1e-3, [[0]]
+        )
         assert (volume_signs(np.ascontiguousarray(points[:, :3]), system.tets) > 0.0).all()
         if not pinned:
             np.testing.assert_allclose(momenta_of(system, rest, velocities), momenta, atol=1e-9 * abs(momenta).max())
@@ -99,7 +101,7 @@ def test_bodies_that_are_stopped_together_keep_both_momenta_and_the_third_moves_
     places = [(0, 0, 0), (0.06, 0.01, 0), (1, 0, 0)]
     bodies = [sp.Body(f"cube {k}", CUBE, material, position=place) for k, place in enumerate(places)]
     system = build_system(sp.Scene(bodies))
-    fallback, rest = RigidFallback(system), system.rest_positions
+    fallback, rest = RigidFallback(system, 0.0), system.rest_positions
     velocities = np.repeat([[3.0, 1, 0], [-2, 0, 1], [0, 5, 0]], len(CUBE.vertices), axis=0)
     velocities += np.random.default_rng(3).normal(size=rest.shape)
     origins = np.round(rest)  # another one for the third body
@@ -107,7 +109,7 @@ def test_bodies_that_are_stopped_together_keep_both_momenta_and_the_third_moves_
     old, points = velocities.copy(), points_of(system, begun + h * velocities)
     labels = [fallback.labels[part.vertices.start] for part in system.bodies]
     bounds = np.full(len(system.tets), -np.inf)
-    fallback.apply(points, velocities, begun.copy(), begun, origins, h, bounds, [labels[:2]], 0.0)
+    fallback.apply(points, velocities, begun.copy(), begun, origins, h, bounds, h, [labels[:2]], 0.0)
     two = slice(0, 2 * len(CUBE.vertices))
     now, before = momenta_of(system, rest, velocities), momenta_of(system, rest, old)
     np.testing.assert_allclose(now, before, atol=1e-12 * abs(before).max())

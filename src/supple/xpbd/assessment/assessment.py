@@ -12,7 +12,7 @@ from supple.xpbd.assessment.energy_balance import EnergyBalance
 from supple.xpbd.assessment.findings import Findings, count_inverted, tangled_bodies
 from supple.xpbd.assessment.moment import Moment
 from supple.xpbd.assessment.softening import Softening
-from supple.xpbd.assessment.surfaces import SurfaceCheck
+from supple.xpbd.assessment.surfaces import Overlap, SurfaceCheck
 from supple.xpbd.contact.settings import XPBDContact
 
 # A frame in which less than this share of the energy appears does not add to what appeared before.
@@ -65,10 +65,9 @@ class Assessment:
             sound[part.tets] = part.name not in tangled
         return sound
 
-    def crossing(self, world: NDArray[np.float64], time: float) -> NDArray[np.int64]:
-        """(k, 2) the bodies, and obstacles after them, whose surfaces cross at world (n, 3) [m] and a time [s]."""
-        overlaps = self._surfaces.find(world, time)
-        return np.array([each.numbers for each in overlaps if each.pairs], dtype=np.int64).reshape(-1, 2)
+    def overlaps(self, world: NDArray[np.float64], time: float) -> list[Overlap]:
+        """What is through what at world positions (n, 3) [m] and a time [s]."""
+        return self._surfaces.find(world, time)
 
     def end(
         self,

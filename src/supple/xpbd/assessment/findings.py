@@ -38,11 +38,6 @@ class Findings:
     softened: list[tuple[float, str]] = field(default_factory=list)
 
     @property
-    def crossings(self) -> int:
-        """Number of pairs of triangles that are through each other."""
-        return sum(overlap.pairs for overlap in self.overlaps)
-
-    @property
     def status(self) -> Status:
         """The first that holds of those in `Status`."""
         return next((status for status, _ in self._problems()), Status.CONVERGED)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.obstacle_poses import ObstaclePoses
+from supple.numerics.geometry.box_tree import overlap
 from supple.numerics.geometry.triangle_crossings import CROSSING, crossing_triangles
+from supple.numerics.kernel_cache import njit
 from supple.scene.contact_pairs import pair_table
 from supple.system import System
 from supple.xpbd.contact.settings import XPBDContact
@@ -41,6 +44,11 @@ class Overlap:
             return f"{self.first} is {self.depth:.2g} m deep in {self.second}"
         other = "itself" if self.first == self.second else self.second
         return f"{self.first} passes through {other} ({self.pairs} pairs of triangles)"
+
+
+def crossings(overlaps: Iterable[Overlap]) -> int:
+    """Number of pairs of triangles that are through each other."""
+    return sum(overlap.pairs for overlap in overlaps)
 
 
 class SurfaceCheck:
@@ -106,15 +114,8 @@ class SurfaceCheck:
     def _near(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.bool_]:
         """(t,) the triangles that reach into the box of another thing that they collide with, or of their own."""
         count = len(self._names)
-        boxes = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
-        owners, starts = np.unique(self._owner, return_index=True)  # ascending: triangles are sorted by their owner
-        boxes[0][owners], boxes[1][owners] = np.minimum.reduceat(low, starts), np.maximum.reduceat(high, starts)
-        chosen = np.diagonal(self._collide)[self._owner].copy()
-        for a, b in np.argwhere(np.triu(self._collide, 1)):
-            lower, upper = np.maximum(boxes[0][a], boxes[0][b]), np.minimum(boxes[1][a], boxes[1][b])
-            if (lower <= upper).all():
-                mine = (self._owner == a) | (self._owner == b)
-                chosen |= mine & (low <= upper).all(axis=1) & (high >= lower).all(axis=1)
+        boxes, chosen = np.empty((count, 6)), np.zeros(len(low), dtype=np.bool_)
+        _note_near(low, high, self._owner, self._collide, boxes, chosen)
         return chosen
 
     def depths(self, x: NDArray[np.float64], time: float) -> list[Overlap]:
@@ -130,6 +131,23 @@ class SurfaceCheck:
                 if deepest > self.tolerated:
                     found.append(Overlap(self._names[number], self._names[bodies + k], depth=deepest))
         return found
+
+
+@njit(cache=True)
+def _note_near(low, high, owner, collide, boxes, chosen):
+    """Set chosen (t,); boxes (p, 6) of all things are scratch memory. See `SurfaceCheck._near`."""
+    boxes[:, :3] = np.inf
+    boxes[:, 3:] = -np.inf
+    box = np.empty(6)
+    for t in range(len(owner)):
+        for j in range(3):
+            boxes[owner[t], j] = min(boxes[owner[t], j], low[t, j])
+            boxes[owner[t], 3 + j] = max(boxes[owner[t], 3 + j], high[t, j])
+    for t in range(len(owner)):
+        for j in range(3):
+            box[j], box[3 + j] = low[t, j], high[t, j]
+        for k in range(len(boxes)):
+            chosen[t] = chosen[t] or (collide[owner[t], k] and (k == owner[t] or overlap(boxes, k, box)))
 
 
 def colliding_pairs(system: System, settings: XPBDContact | None) -> NDArray[np.bool_]:

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from supple.contact.obstacle_poses import ObstaclePoses
 from supple.contact.search.reach import any_beyond_reach
 from supple.contact.search.surfaces import build_surfaces
+from supple.numerics.kernel_cache import njit
+from supple.numerics.mat3 import dot, row, subtract
 from supple.scene.contact_pairs import pair_table
 from supple.system import System
 from supple.xpbd.contact.memory import ContactMemory
@@ -64,7 +66,8 @@ class Collisions:
         self._dt = self._removed = 0.0
         count = len(system.masses)
         self._reach = np.zeros(count)
-        self._gathered = np.zeros((count, 3))
+        self._gathered, self._before = np.zeros((count, 3)), np.zeros((count, 3))
+        self._limits = np.zeros(count)
 
     def __bool__(self) -> bool:
         """Whether any contact is possible."""
@@ -139,25 +142,28 @@ class Collisions:
         """
         self.contacts = 0
         limit, self._removed = self._removed, 0.0
+        self._limits[:] = limit
         if self.surfaces is not None:
+            self._before[:] = x_prev
             self._count(self.surfaces.project(x, x_prev, (time - h, time), limit, parallel))
-        self._project_obstacles(x, x_prev, time, h, limit)
+            # What other bodies moved into an obstacle is no old overlap.
+            add_distances(self._before, x_prev, self._limits)
+        self._project_obstacles(x, x_prev, time, h)
         return self.contacts
 
     def project_again(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], time: float, h: float) -> int:
         """`project` for positions that have changed since, without a new search for contacts of surfaces."""
         self.contacts = 0 if self.surfaces is None else self.surfaces.project_again(x, x_prev, h)
-        self._project_obstacles(x, x_prev, time, h, 0.0)
+        self._limits[:] = 0.0
+        self._project_obstacles(x, x_prev, time, h)
         return self.contacts
 
-    def _project_obstacles(
-        self, x: NDArray[np.float64], x_prev: NDArray[np.float64], time: float, h: float, limit: float
-    ) -> None:
+    def _project_obstacles(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], time: float, h: float) -> None:
         if self.obstacles:
             if any_beyond_reach(x, self._gathered, self._reach):
                 self._gather_obstacles(x, (x - x_prev) / h, time)
-            scales = (limit, self.skin, NEAR * self.edge_length)
-            self._count(self.obstacles.project(x, x_prev, (time - h, time), scales))
+            scales = (self.skin, NEAR * self.edge_length)
+            self._count(self.obstacles.project(x, x_prev, (time - h, time), self._limits, scales))
 
     @property
     def parted(self) -> bool:
@@ -197,6 +203,14 @@ class Collisions:
     def _count(self, found: tuple[int, float]) -> None:
         self.contacts += found[0]
         self._smallest = min(self._smallest, found[1])
+
+
+@njit(cache=True)
+def add_distances(x, y, out):
+    """Add the distances of points x and y (n, 3) to out (n,)."""
+    for i in range(len(x)):
+        d = subtract(row(x, i), row(y, i))
+        out[i] += math.sqrt(dot(d, d))
 
 
 def mean_edge_length(system: System) -> float:

@@ -70,6 +70,7 @@ class ContactRows:
     keys : (k,) what identifies the pair of each row, ascending
     vertices : (k, 4); weights : (k, 4); normals : (k, 3); offsets : (k,) gap that is kept [m]; friction : (k,)
     forces : (k, 3) [N] on the first side, the mean over the substep; shares : (k,) what the next substep keeps of them
+    loads : whether any row may hold a force
     active : (k,) whether the pair is near in this substep: it touches, or holds a force
     deep : (k,) whether the first vertex may be inside the piece of the others
     """
@@ -80,7 +81,7 @@ class ContactRows:
     def resize(self, keys: NDArray[np.int64]) -> None:
         """Rows without forces, for these pairs."""
         k = len(keys)
-        self.keys = keys
+        self.keys, self.loads = keys, False
         self.vertices, self.weights = np.zeros((k, 4), dtype=np.int32), np.zeros((k, 4))
         self.normals, self.offsets, self.friction = np.zeros((k, 3)), np.zeros(k), np.zeros(k)
         self.forces, self.shares = np.zeros((k, 3)), np.zeros(k)
@@ -109,14 +110,15 @@ class ContactRows:
         place = np.searchsorted(self.keys, loaded.keys)
         for name in ("vertices", "weights", "normals", "offsets", "friction", "forces"):
             getattr(self, name)[place] = getattr(loaded, name)
+        self.loads = len(place) > 0
 
     def keep(self) -> None:
         """End a substep: the next one begins with a share of the forces."""
-        self.forces *= self.shares[:, None]
+        self.loads = keep_shares(self.forces, self.shares)
 
     def loaded(self) -> LoadedRows:
         """Copies of all rows that hold a force."""
-        k = np.flatnonzero(self.forces.any(axis=1))
+        k = loaded_rows(self.forces)
         return LoadedRows(
             self.keys[k],
             self.vertices[k],
@@ -133,6 +135,29 @@ def _among(few: NDArray[np.int64], keys: NDArray[np.int64]) -> NDArray[np.bool_]
     if not len(keys):
         return np.zeros(len(few), dtype=np.bool_)
     return keys[np.minimum(np.searchsorted(keys, few), len(keys) - 1)] == few
+
+
+@njit(cache=True)
+def keep_shares(forces, shares):
+    """Multiply forces (k, 3) with their shares (k,); returns whether any is left."""
+    left = False
+    for e in range(len(forces)):
+        for j in range(3):
+            if forces[e, j] != 0.0:
+                forces[e, j] *= shares[e]
+                left = left or forces[e, j] != 0.0
+    return left
+
+
+@njit(cache=True)
+def loaded_rows(forces):
+    """The rows that hold a force (k, 3), ascending."""
+    out = np.empty(len(forces), dtype=np.int64)
+    count = 0
+    for e in range(len(forces)):
+        out[count] = e
+        count += forces[e, 0] != 0.0 or forces[e, 1] != 0.0 or forces[e, 2] != 0.0
+    return out[:count].copy()
 
 
 @njit(cache=True)

@@ -85,11 +85,13 @@ def _find_candidates(x, reach, masses_inverse, shapes, rules, frames, starts, ve
     return count
 
 
-def _project_shapes(x, x_prev, points, candidates, shapes, rules, frames, frames_before, first, last, h, scales):
+def _project_shapes(
+    x, x_prev, points, candidates, shapes, rules, frames, frames_before, first, last, h, limits, scales
+):
     """Push vertices out of the shapes [first, last), in place. Returns the number of contacts and the smallest gap.
 
     The gap is that before the substep, or inf. An overlap that existed when the substep began is removed at both ends
-    of the substep alike, by at most the limit; the push only prevents the gap from becoming smaller than it was then.
+    of the substep alike, by at most the limits; the push only prevents the gap from becoming smaller than it was then.
 
     Parameters
     ----------
@@ -100,14 +102,14 @@ def _project_shapes(x, x_prev, points, candidates, shapes, rules, frames, frames
     rules : owner (n,), the body of a vertex; collide (b, k), friction (b, k), of each body with each shape
     frames, frames_before : (k, 4, 3) at the end and at the beginning of the substep
     h : length of the substep [s]
-    scales : limit, the largest part of an old overlap that one substep removes; skin, the gap that is kept; near, gaps
-        above this are not reported [m]
+    limits : (n,) the largest part of an old overlap that is removed at each vertex [m]
+    scales : skin, the gap that is kept; near, gaps above this are not reported [m]
     """
     predicted, rates = points
     starts, vertices, loads, shares = candidates
     parameters, moving = shapes
     owner, _, friction = rules
-    limit, skin, near = scales
+    skin, near = scales
     contacts, smallest, h2 = 0, math.inf, h * h
     for k in range(first, last):
         numbers = parameters[k]
@@ -126,7 +128,7 @@ def _project_shapes(x, x_prev, points, candidates, shapes, rules, frames, frames
             load = (h2 * load[0], h2 * load[1], h2 * load[2])
             pushed, held = max(0.0, dot(load, n)), along_surface(load, n)
             old = max(0.0, skin - gap_before)
-            shift = min(old, limit)
+            shift = min(old, limits[i])
             push = max(0.0, pushed + skin - gap - old)
             carried = p  # position, at the beginning, of the obstacle's point that is now at p
             if moving[k]:
@@ -282,20 +284,20 @@ class ObstacleContacts:
         x: NDArray[np.float64],
         x_prev: NDArray[np.float64],
         times: tuple[float, float],
-        scales: tuple[float, float, float],
+        limits: NDArray[np.float64],
+        scales: tuple[float, float],
     ) -> tuple[int, float]:
         """Push vertices out at the end of the substep `times` = (beginning, end) [s]: contacts, smallest gap [m].
 
-        For `scales` see `_project_shapes`.
+        For `limits` and `scales` see `_project_shapes`.
         """
         frames = tuple(self.shapes.placed(self.poses, time) for time in reversed(times))
         candidates = (self._starts, self._vertices, self._loads, self._shares)
         described = (candidates, self._arrays, self._rules, *frames)
         contacts, smallest = 0, math.inf
         for _, push, first, last in self._groups:
-            found, gap = push(
-                x, x_prev, (self._predicted, self._rates), *described, first, last, times[1] - times[0], scales
-            )
+            points, h = (self._predicted, self._rates), times[1] - times[0]
+            found, gap = push(x, x_prev, points, *described, first, last, h, limits, scales)
             contacts += found
             smallest = min(smallest, gap)
         return contacts, smallest

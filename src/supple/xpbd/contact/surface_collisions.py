@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from supple.contact.obstacle_poses import ObstaclePoses
 from supple.contact.search.boxes import boxes_of_pieces
 from supple.contact.search.excluded_pairs import excluded_pairs
+from supple.contact.search.pair_kernels import swept_boxes
 from supple.contact.search.point_inside import depths_inside
 from supple.contact.search.point_lists import PairFinder
 from supple.contact.search.reach import any_beyond_radii, mean_motions, search_radii
@@ -33,7 +34,6 @@ from supple.xpbd.contact.detection.edge_contacts import (
 from supple.xpbd.contact.detection.edge_pairs import EdgePairs
 from supple.xpbd.contact.detection.piece_runs import PieceRuns
 from supple.xpbd.contact.detection.surface_contacts import (
-    boxes_of_triangles,
     find_contacts,
     find_point_passages,
     near_triangles,
@@ -41,6 +41,7 @@ from supple.xpbd.contact.detection.surface_contacts import (
 )
 from supple.xpbd.contact.detection.surface_edges import surface_edges
 from supple.xpbd.contact.memory import SurfaceMemory
+from supple.xpbd.contact.rows_of_points import give_rows, take_rows
 
 # Of the mean surface edge: the least and the largest motion of a point that lists of candidates allow for, and the
 # largest gap that is reported.
@@ -78,12 +79,15 @@ class SurfaceCollisions:
         excluded = excluded_pairs(s, rest, 2.0 * min(widest, 0.5 * edge_length))
         self._stitched = stitched_points(system, s, poses)
         self._rules = (s.allowed, *excluded)
+        self._apart = np.ones((pieces, pieces), dtype=np.bool_)
+        self._edge_rules = (s.point_piece, s.closed, s.gaps, s.friction, self._apart)
         self._slack = widest + SLACK * edge_length
         self._near_pairs = np.zeros(0, dtype=np.int64)
         self._near_triangles, self._swept = np.zeros((0, 3), dtype=np.int64), np.zeros((len(s.triangles), 6))
         self._edges = EdgePairs(surface_edges(s), s, rest, self._stitched)
         self._finder = PairFinder(n)
         self._x, self._before, self._gathered = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
+        self._way = np.zeros((n, 3))
         self._shapes = (self._x, s.point_piece, s.triangles, s.triangle_piece)
         self._pieces = (s.point_piece, s.triangles, s.triangle_piece, s.closed, s.gaps, s.friction)
         self._predicted = np.zeros((n, 3))
@@ -91,7 +95,6 @@ class SurfaceCollisions:
         self._runs = PieceRuns(self._finder, n, s.triangle_piece)
         self._rows = ContactRows()
         self._smallest = np.zeros(n)
-        self._apart = np.ones((pieces, pieces), dtype=np.bool_)
         # Whether nothing had passed through anything after the last projection.
         self.parted = True
         # Of the last search: the rows of each kind that take part.
@@ -125,7 +128,7 @@ class SurfaceCollisions:
             self._apart &= ~(both | both.T)
         bodies = len(self.surfaces.rows)
         self._dt = dt
-        np.take(x, self.surfaces.rows, axis=0, out=self._x[:bodies])
+        take_rows(x, self.surfaces.rows, self._x)
         self.surfaces.place_obstacles(self.poses, time, self._x)
         motions = np.zeros_like(self._x)
         self.surfaces.place_obstacles(self.poses, time + dt, motions)
@@ -139,13 +142,12 @@ class SurfaceCollisions:
     def begin_substep(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> bool:
         """See `Collisions.begin_substep`."""
         rows = self._rows
-        pushed = bool(rows.forces.any())
-        self._predicted[: len(self.surfaces.rows)] = x[self.surfaces.rows]
-        if pushed:
+        take_rows(x, self.surfaces.rows, self._predicted)
+        if rows.loads:
             self._take(x, x_prev)
             push_rows(self._x, self._before, self.surfaces.inverse_masses, rows.described, h)
-            x[self.surfaces.rows] = self._x[: len(self.surfaces.rows)]
-        return pushed
+            give_rows(self._x, self.surfaces.rows, x)
+        return rows.loads
 
     def project(
         self,
@@ -166,9 +168,7 @@ class SurfaceCollisions:
             self._gather((self._x - self._before) * (self._dt / h), parallel)
         contacts, smallest = 0, np.inf
         self.parted = True
-        self._near_pairs = self._edges.swept(self._x, self._before, self._slack, parallel)
-        boxes_of_triangles[parallel](self._x, self._before, s.triangles, self._slack, self._swept)
-        self._near_triangles = near_triangles(self._x, self._before, self._lists, s.triangles, self._swept)
+        self._look_near()
         # Obstacles come last because they cannot be moved.
         for kind, part in enumerate(((0, s.body_triangles), (s.body_triangles, len(s.triangles)))):
             self._chosen[kind] = self._chosen[kind][:0]
@@ -194,16 +194,12 @@ class SurfaceCollisions:
 
     def passed(self, x: NDArray[np.float64], begun: NDArray[np.float64]) -> NDArray[np.int64]:
         """(k, 2) the pieces of which one has passed through the other from `begun` to x (n, 3) [m]."""
-        s = self.surfaces
         self._take(x, begun)
+        self._look_near()
         shapes = (self._x, self._before)
-        boxes_of_triangles[False](*shapes, s.triangles, 0.0, self._swept)
-        triangles = near_triangles(*shapes, self._lists, s.triangles, self._swept)
         passed = np.zeros_like(self._apart)
-        note_point_passages(*shapes, triangles, self._pieces, self._apart, self._stitched, passed)
-        edges = self._edges.swept(*shapes, 0.0, False)
-        rules = (s.point_piece, s.closed, s.gaps, s.friction, self._apart)
-        note_edge_passages(*shapes, self._pairs, edges, self._edges.arrays[0], rules, passed)
+        note_point_passages(*shapes, self._near_triangles, self._pieces, self._apart, self._stitched, passed)
+        note_edge_passages(*shapes, self._pairs, self._near_pairs, self._edges.arrays[0], self._edge_rules, passed)
         return np.argwhere(passed)
 
     def component(self, labels: NDArray[np.integer]) -> NDArray[np.int64]:
@@ -217,15 +213,20 @@ class SurfaceCollisions:
         """Keep the share of the forces with which the next substep begins."""
         self._rows.keep()
 
+    def _look_near(self) -> None:
+        """Set which listed pairs come as near in this substep that contacts may still make them meet."""
+        np.subtract(self._x, self._before, out=self._way)
+        swept_boxes(self._before, self._way, self.surfaces.triangles, self._swept)
+        self._near_triangles = near_triangles(self._x, self._before, self._lists, self._swept, self._slack)
+        self._near_pairs = self._edges.swept(self._before, self._way, self._slack)
+
     def _take(self, x: NDArray[np.float64], x_prev: NDArray[np.float64]) -> None:
-        bodies = len(self.surfaces.rows)
-        np.take(x, self.surfaces.rows, axis=0, out=self._x[:bodies])
-        np.take(x_prev, self.surfaces.rows, axis=0, out=self._before[:bodies])
+        take_rows(x, self.surfaces.rows, self._x)
+        take_rows(x_prev, self.surfaces.rows, self._before)
 
     def _give(self, x: NDArray[np.float64], x_prev: NDArray[np.float64]) -> None:
-        bodies = len(self.surfaces.rows)
-        x[self.surfaces.rows] = self._x[:bodies]
-        x_prev[self.surfaces.rows] = self._before[:bodies]
+        give_rows(self._x, self.surfaces.rows, x)
+        give_rows(self._before, self.surfaces.rows, x_prev)
 
     def _solve(self, kind: int, h: float, limit: float) -> tuple[int, float]:
         """Project the chosen rows of one kind; returns what `solve_rows` does."""
@@ -239,8 +240,7 @@ class SurfaceCollisions:
         s, described = self.surfaces, self._rows.described
         points = (self._x, self._before, self._near_triangles, self._pieces, self._apart, part, self._stitched)
         passed = find_point_passages(*points, described, self._entered)
-        rules = (s.point_piece, s.closed, s.gaps, s.friction, self._apart)
-        found = (self._x, self._before, self._pairs, self._near_pairs, self._edges.arrays[0], rules)
+        found = (self._x, self._before, self._pairs, self._near_pairs, self._edges.arrays[0], self._edge_rules)
         passed += find_edge_passages(*found, len(s.rows), kind, described)
         if passed:
             self._chosen[kind] = choose_rows(self._x, self._before, s.inverse_masses, described, len(s.rows), kind, h)
@@ -262,9 +262,8 @@ class SurfaceCollisions:
             )
             smallest = self._smallest[:n_active].min()
         if len(self._edges.keys):
-            rules = (s.point_piece, s.closed, s.gaps, s.friction, self._apart)
             which = (near, bodies, kind)
-            found = (self._x, self._before, self._pairs, self._near_pairs, self._edges.arrays, rules)
+            found = (self._x, self._before, self._pairs, self._near_pairs, self._edges.arrays, self._edge_rules)
             smallest = min(smallest, find_edge_contacts(*found, *which, described))
         self._chosen[kind] = choose_rows(self._x, self._before, s.inverse_masses, described, bodies, kind, h)
         return float(smallest)

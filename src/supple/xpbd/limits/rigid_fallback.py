@@ -9,6 +9,8 @@ Where they did not keep surfaces apart, the components that passed through each 
 one rigid motion of all of them: at a = 0 nothing moves with respect to anything else. This is a perfectly inelastic
 collision.
 
+What this moves into an obstacle that is a simple shape is moved out as a whole, which stops its approach.
+
 The kinetic energy falls: in the metric of the masses, the rigid motion is the projection of the motion.
 
 Components with pinned vertices, and those that passed through an obstacle, are held: y has the pins at their new
@@ -24,6 +26,7 @@ from numpy.typing import NDArray
 
 from supple.numerics.noninverting_step import noninverting_step, volume_signs
 from supple.system import System
+from supple.xpbd.limits.obstacle_lift import ObstacleLift
 from supple.xpbd.limits.volume_guard import FLATTEST
 
 # The share of its volume that a tet keeps at least, and one that is nearly flat.
@@ -31,13 +34,14 @@ KEEP, KEEP_FLAT = 0.1, 1.0 - 1e-6
 
 
 class RigidFallback:
-    """The components of a system and their tets."""
+    """The components of a system and their tets; for `skin` see `ObstacleLift`."""
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, skin: float) -> None:
         self.system = system
         self.labels = system.joined_components
         self.tet_labels = self.labels[system.tets[:, 0]]
         self.pinned = system.inverse_masses == 0.0
+        self._lift = ObstacleLift(system, skin)
 
     def apply(
         self,
@@ -48,6 +52,7 @@ class RigidFallback:
         origins: NDArray[np.float64],
         h: float,
         bounds: NDArray[np.float64],
+        time: float,
         groups: Sequence[Sequence[int]],
         most: float = 1.0,
     ) -> None:
@@ -61,6 +66,7 @@ class RigidFallback:
         begun : (n, 3) those at the beginning of the substep, where all guarded tets are positive [m]
         origins : (n, 3) of these positions in the world [m]; h : length of the substep [s]
         bounds : (m,) of the guard, minus infinity for tets that are not guarded
+        time : end of the substep [s]
         groups : labels of components; -1 for an obstacle
         most : the largest share a of the motion
         """
@@ -100,6 +106,10 @@ class RigidFallback:
                 moved[rows] -= h * change
                 if (volume_signs(moved, tets) > 0.0).all():
                     points[rows, :3] = moved[rows]
+                shown = (points[rows, :3] + origins[rows], start[rows] + origins[rows])
+                lift = self._lift.displacement(*shown, rows, (time - h, time))
+                points[rows, :3] += lift
+                v += lift / h
             velocities[rows], previous[rows] = v, start[rows]
 
     def _rigid(self, x: NDArray, before: NDArray, rows: NDArray[np.intp], held: bool) -> NDArray[np.float64]:

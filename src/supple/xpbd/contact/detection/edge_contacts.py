@@ -5,7 +5,8 @@ between the lines separates the pieces locally: both faces of one edge lie on on
 the other side.
 In all other cases a vertex is nearer to a face.
 
-Besides, two edges touch where they have passed through each other since the substep began, also within one piece.
+Besides, two edges touch where they have passed through each other since the substep began, also within one piece. They
+do as long as they push each other.
 
 Source: Ericson, "Real-Time Collision Detection" (2005), section 5.1.9 (nearest points of segments); Gregorius, "The
 Separating Axis Test between Convex Polyhedra" (2013), for the second condition.
@@ -16,9 +17,8 @@ import math
 import numpy as np
 
 from supple.numerics.geometry.closest_point import between
-from supple.numerics.kernel_cache import njit, prange
+from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import cross, dot, row, subtract
-from supple.xpbd.sweeps.compilation import serial_and_parallel
 
 # Edges whose sine of the angle between them is smaller are parallel: vertices and faces hold them apart.
 PARALLEL = 1e-3
@@ -50,8 +50,11 @@ def _supports(x, opposite, e, origin, n, sign):
 
 
 @njit
-def _edge_contact(x, x_prev, edges, e, f, closed_e, closed_f):
-    """Contact of the edges e and f: whether it exists, s, t, the unit normal from f to e, the signed distance [m]."""
+def _edge_contact(x, x_prev, edges, e, f, closed_e, closed_f, held):
+    """Contact of the edges e and f: whether it exists, s, t, the unit normal from f to e, the signed distance [m].
+
+    Edges that hold each other apart keep the side that they were on, whether or not their faces separate the pieces.
+    """
     ends, opposite = edges
     nothing = (False, 0.0, 0.0, (0.0, 0.0, 0.0), math.inf)
     a, b, c, d = ends[e, 0], ends[e, 1], ends[f, 0], ends[f, 1]
@@ -63,26 +66,28 @@ def _edge_contact(x, x_prev, edges, e, f, closed_e, closed_f):
     n = cross(u, v)
     length = math.sqrt(dot(n, n))
     n = (n[0] / length, n[1] / length, n[2] / length)
-    w = subtract(p, q)
-    r = (w[0] + s * u[0] - t * v[0], w[1] + s * u[1] - t * v[1], w[2] + s * u[2] - t * v[2])
     # The faces of closed pieces tell which side is free; the border of a sheet has two sides, and keeps the old one.
     side = 0.0
-    if closed_f:
-        for k in range(2):
-            side -= dot(n, subtract(row(x, opposite[f, k]), q))
-    if closed_e:
-        for k in range(2):
-            side += dot(n, subtract(row(x, opposite[e, k]), p))
-    if not (closed_e or closed_f):
-        p0, q0 = row(x_prev, a), row(x_prev, c)
-        u0, v0 = subtract(row(x_prev, b), p0), subtract(row(x_prev, d), q0)
-        w0 = subtract(p0, q0)
-        side = dot(n, (w0[0] + s * u0[0] - t * v0[0], w0[1] + s * u0[1] - t * v0[1], w0[2] + s * u0[2] - t * v0[2]))
+    if held or not (closed_e or closed_f):
+        side = dot(n, _between_lines(row(x_prev, a), row(x_prev, b), row(x_prev, c), row(x_prev, d), s, t))
+    else:
+        if closed_f:
+            for k in range(2):
+                side -= dot(n, subtract(row(x, opposite[f, k]), q))
+        if closed_e:
+            for k in range(2):
+                side += dot(n, subtract(row(x, opposite[e, k]), p))
     if side < 0.0:
         n = (-n[0], -n[1], -n[2])
-    if not (_supports(x, opposite, f, q, n, 1.0) and _supports(x, opposite, e, p, n, -1.0)):
+    if not (held or (_supports(x, opposite, f, q, n, 1.0) and _supports(x, opposite, e, p, n, -1.0))):
         return nothing
-    return True, s, t, n, dot(r, n)
+    return True, s, t, n, dot(n, _between_lines(p, row(x, b), q, row(x, d), s, t))
+
+
+@njit
+def _between_lines(a, b, c, d, s, t):
+    """From the point t of c, d to the point s of a, b."""
+    return subtract(between(a, b, s), between(c, d, t))
 
 
 @njit
@@ -113,35 +118,6 @@ def _passage(x, x_prev, ends, e, f):
     n = cross(u, v)
     length = math.copysign(math.sqrt(dot(n, n)), then)
     return True, s, t, (n[0] / length, n[1] / length, n[2] / length)
-
-
-@serial_and_parallel
-def boxes_of_motion(x, x_prev, ends, margin, out):
-    """Write the box that each edge sweeps in the substep, with a margin, to out (e, 6): its low and its high corner."""
-    for e in prange(len(ends)):
-        a, b = ends[e, 0], ends[e, 1]
-        for j in range(3):
-            out[e, j] = min(x[a, j], x[b, j], x_prev[a, j], x_prev[b, j]) - margin
-            out[e, 3 + j] = max(x[a, j], x[b, j], x_prev[a, j], x_prev[b, j]) + margin
-
-
-@njit(cache=True)
-def overlapping(first, second, boxes):
-    """The numbers of the pairs whose boxes overlap, ascending."""
-    out = np.empty(len(first), dtype=np.int64)
-    count = 0
-    for i in range(len(first)):
-        e, f = first[i], second[i]
-        out[count] = i
-        count += (
-            boxes[e, 0] <= boxes[f, 3]
-            and boxes[f, 0] <= boxes[e, 3]
-            and boxes[e, 1] <= boxes[f, 4]
-            and boxes[f, 1] <= boxes[e, 4]
-            and boxes[e, 2] <= boxes[f, 5]
-            and boxes[f, 2] <= boxes[e, 5]
-        )
-    return out[:count].copy()
 
 
 @njit
@@ -179,13 +155,14 @@ def find_edge_contacts(x, x_prev, pairs, near_pairs, edges, surfaces, near, firs
     for i in near_pairs:
         e, f, r = first[i], second[i], numbers[i]
         mine, its = point_piece[ends[e, 0]], point_piece[ends[f, 0]]
-        if (ends[f, 0] >= first_obstacle) != (kind == 1) or mine == its:
+        pushed = forces[r, 0] != 0.0 or forces[r, 1] != 0.0 or forces[r, 2] != 0.0
+        held = pushed and apart[mine, its]
+        if (ends[f, 0] >= first_obstacle) != (kind == 1) or (mine == its and not held):
             continue
         gap, mu = max(gaps[mine, its], gaps[its, mine]), friction[mine, its]
-        found, s, t, n, distance = _edge_contact(x, x_prev, edges, e, f, closed[mine], closed[its])
+        found, s, t, n, distance = _edge_contact(x, x_prev, edges, e, f, closed[mine], closed[its], held)
         if not found:
             continue
-        pushed = forces[r, 0] != 0.0 or forces[r, 1] != 0.0 or forces[r, 2] != 0.0
         if distance >= gap:
             if distance < near:
                 smallest = min(smallest, distance)

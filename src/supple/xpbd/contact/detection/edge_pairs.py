@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.search.pair_kernels import RUNS, sort_pairs
+from supple.contact.search.pair_kernels import RUNS, sort_pairs, swept_boxes
 from supple.contact.search.room import Room
 from supple.contact.search.surfaces import ContactSurfaces
 from supple.contact.surface.distances import edge_edge_square
@@ -13,7 +13,6 @@ from supple.numerics.adjacency import in_list
 from supple.numerics.geometry.box_tree import STACK, BoxTree, after_leaf, next_leaf, overlap
 from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import dot, row, subtract
-from supple.xpbd.contact.detection.edge_contacts import boxes_of_motion, overlapping
 from supple.xpbd.contact.detection.piece_runs import EDGE_EDGE, key_of
 from supple.xpbd.contact.detection.surface_edges import SurfaceEdges
 from supple.xpbd.sweeps.compilation import serial_and_parallel
@@ -170,6 +169,20 @@ def pairs_within_margins(
         counts[r] = count
 
 
+@njit(cache=True)
+def overlapping(first, second, boxes, margin):
+    """The numbers of the pairs (k,) whose boxes (e, 6) overlap, or are as near as the margin [m]; ascending."""
+    out = np.empty(len(first), dtype=np.int64)
+    box = np.empty(6)
+    count = 0
+    for i in range(len(first)):
+        for j in range(3):
+            box[j], box[3 + j] = boxes[first[i], j] - margin, boxes[first[i], 3 + j] + margin
+        out[count] = i
+        count += overlap(boxes, second[i], box)
+    return out[:count].copy()
+
+
 class EdgePairs:
     """Pairs of edges that may touch.
 
@@ -240,14 +253,12 @@ class EdgePairs:
         self._first, self._second = np.ascontiguousarray(pairs[:, 0]), np.ascontiguousarray(pairs[:, 1])
         self.keys = keys_of_edges(self._first, self._second)
 
-    def swept(
-        self, x: NDArray[np.float64], x_prev: NDArray[np.float64], margin: float, parallel: bool
-    ) -> NDArray[np.int64]:
-        """The numbers of the pairs whose ways from x_prev to x (n, 3) come as near as 2 margins [m]."""
+    def swept(self, begin: NDArray[np.float64], way: NDArray[np.float64], margin: float) -> NDArray[np.int64]:
+        """The numbers of the pairs that come as near as the margin [m] on the ways (n, 3) of their points."""
         if not len(self.keys):
             return self.keys
-        boxes_of_motion[parallel](x, x_prev, self.edges.ends, margin, self._swept)
-        return overlapping(self._first, self._second, self._swept)
+        swept_boxes(begin, way, self.edges.ends, self._swept)
+        return overlapping(self._first, self._second, self._swept, margin)
 
     def numbered(self, rows: NDArray[np.int64]) -> tuple:
         """The argument `pairs` of `find_edge_contacts`, for these rows."""

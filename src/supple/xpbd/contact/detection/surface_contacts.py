@@ -223,20 +223,14 @@ def find_contacts(x, x_prev, lists, surfaces, memory, near, part, stitched, rows
         )
 
 
-@serial_and_parallel
-def boxes_of_triangles(x, x_prev, triangles, margin, out):
-    """Write the box that each triangle sweeps in the substep, with a margin, to out (t, 6)."""
-    for t in prange(len(triangles)):
-        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        for j in range(3):
-            low, high = min(x[a, j], x[b, j], x[c, j]), max(x[a, j], x[b, j], x[c, j])
-            out[t, j] = min(low, x_prev[a, j], x_prev[b, j], x_prev[c, j]) - margin
-            out[t, 3 + j] = max(high, x_prev[a, j], x_prev[b, j], x_prev[c, j]) + margin
-
-
 @njit(cache=True)
-def near_triangles(x, x_prev, lists, triangles, boxes):
-    """The points, the rows and the triangles, (k, 3), whose boxes overlap in the substep. For `lists` see above."""
+def near_triangles(x, x_prev, lists, boxes, margin):
+    """The points, the rows and the triangles, (k, 3), that come as near as the margin [m] in the substep.
+
+    Parameters
+    ----------
+    x, x_prev, lists : see `find_contacts`; boxes : (t, 6) low and high corners of what each triangle sweeps [m]
+    """
     n_active, points, run_ranges, run_starts, run_rows, listed = lists
     out = np.empty((run_starts[run_ranges[n_active]], 3), dtype=np.int64)
     count = 0
@@ -247,8 +241,8 @@ def near_triangles(x, x_prev, lists, triangles, boxes):
                 t = listed[i]
                 overlap = True
                 for j in range(3):
-                    overlap = overlap and min(x[p, j], x_prev[p, j]) <= boxes[t, 3 + j]
-                    overlap = overlap and max(x[p, j], x_prev[p, j]) >= boxes[t, j]
+                    overlap = overlap and min(x[p, j], x_prev[p, j]) - margin <= boxes[t, 3 + j]
+                    overlap = overlap and max(x[p, j], x_prev[p, j]) + margin >= boxes[t, j]
                 if overlap:
                     out[count, 0], out[count, 1], out[count, 2] = p, run_rows[k], t
                     count += 1
