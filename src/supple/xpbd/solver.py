@@ -255,7 +255,8 @@ class XPBD(Solver):
         h, held_back = dt / substeps, 0
         _load(ws, state)
         targets = _pin_targets(ws.system, state.time, h, substeps)
-        if ws.collisions:
+        collides = bool(ws.collisions)
+        if collides:
             crossing = [each.numbers for each in overlaps if each.pairs]
             ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt, memory.contact, crossing)
         ws.guard.measure(ws.points, False)
@@ -278,17 +279,17 @@ class XPBD(Solver):
             add_forces(ws.system, ws.points, ws.velocities, end, h)
             if damping is not None:
                 damping.push(ws.points, h)
-            if ws.collisions:
+            if collides:
                 _push_contacts(ws, h)
             for constraints in ws.sets:
                 constraints.project(ws.extended, h, parallel)
             restore(ws, h, parallel)
             ws.pace.note(parallel, perf_counter() - started)
             pull_to_targets(ws.system, ws.points, ws.velocities, ws.origins, end, h)
-            if ws.collisions and not collide(ws, end, h, parallel):
+            if collides and not collide(ws, end, h, parallel):
                 break
             held_back += keep_volumes(ws, end, h, parallel)
-            if ws.collisions:
+            if collides:
                 ws.collisions.end_substep()
             balance.note_loads(ws.points, ws.previous, ws.origins, end, h)
             balance.note_contacts(ws.collisions.contacts)

@@ -35,7 +35,7 @@ from supple.files.replacing import put_in_place, temporary_name
 WRITTEN = "supple/frames_written"
 STEP_TIMES, _TIMES = "VTKHDF/Steps/Values", "supple/frames/time"
 _STEPS_MARK = 0x7375_7070_6C65_2121  # the value of NSteps until its position is known
-_COPY_BYTES = 1 << 24
+_COPY_BYTES = 1 << 20  # more would remain in the memory of the process
 _STEP_COLUMNS = 5  # different columns in VTKHDF/Steps
 _SPARE_ROOM = 1 << 16  # for what HDF5 writes beside the arrays
 

@@ -78,6 +78,8 @@ class SurfaceCheck:
             owner.append(np.full(len(mesh.triangles), bodies + k))
         self._triangles = np.ascontiguousarray(np.concatenate(triangles), dtype=np.int32)
         self._owner = np.concatenate(owner).astype(np.int32)
+        pairs = self._collide[np.ix_(owned := np.unique(self._owner), owned)]
+        self._may_cross = bool(pairs.any())
         self._fixed = np.concatenate(points) if points else np.zeros((0, 3))
         # The arguments and the result of the last search: the end of a frame is the beginning of the next one.
         self._last: tuple[NDArray[np.float64], float, list[Overlap]] = (np.zeros((0, 3)), -np.inf, [])
@@ -87,7 +89,7 @@ class SurfaceCheck:
         """What is through what, at world positions x (n, 3) [m] and a time [s]."""
         known, at, found = self._last
         if time != at or not np.array_equal(known, x):
-            found = [*self._crossings(x, time), *self.depths(x, time)]
+            found = [*(self._crossings(x, time) if self._may_cross else ()), *self.depths(x, time)]
             self._last = (x.copy(), time, found)
         return found
 

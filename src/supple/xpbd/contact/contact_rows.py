@@ -22,7 +22,7 @@ from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import dot, row, subtract
 from supple.xpbd.contact.friction import along_surface, friction_total
 from supple.xpbd.contact.impulses import apply_impulse, compliance, displace, relative, shift_both
-from supple.xpbd.contact.response_rates import kept_share
+from supple.xpbd.contact.response_rates import keep_shares, kept_share
 
 
 class LoadedRows(NamedTuple):
@@ -135,18 +135,6 @@ def _among(few: NDArray[np.int64], keys: NDArray[np.int64]) -> NDArray[np.bool_]
     if not len(keys):
         return np.zeros(len(few), dtype=np.bool_)
     return keys[np.minimum(np.searchsorted(keys, few), len(keys) - 1)] == few
-
-
-@njit(cache=True)
-def keep_shares(forces, shares):
-    """Multiply forces (k, 3) with their shares (k,); returns whether any is left."""
-    left = False
-    for e in range(len(forces)):
-        for j in range(3):
-            if forces[e, j] != 0.0:
-                forces[e, j] *= shares[e]
-                left = left or forces[e, j] != 0.0
-    return left
 
 
 @njit(cache=True)

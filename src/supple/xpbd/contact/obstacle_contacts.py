@@ -27,7 +27,7 @@ from supple.system import System
 from supple.xpbd.contact.friction import along_surface, friction_total
 from supple.xpbd.contact.memory import ObstacleMemory
 from supple.xpbd.contact.obstacle_shapes import ObstacleShapes
-from supple.xpbd.contact.response_rates import kept_share
+from supple.xpbd.contact.response_rates import keep_shares, kept_share
 
 
 @njit
@@ -202,6 +202,7 @@ class ObstacleContacts:
         self._starts = np.zeros(len(shapes.contacts) + 1, dtype=np.int64)
         self._vertices = np.zeros(1024, dtype=np.int32)
         self._loads, self._shares = np.zeros((1024, 3)), np.zeros(1024)
+        self._any_load = False
         self._rates = rates
         self._predicted = np.zeros((len(system.masses), 3))
         # Consecutive shapes with the same element function need one call.
@@ -218,6 +219,7 @@ class ObstacleContacts:
     def begin_step(self, memory: ObstacleMemory | None, x: NDArray[np.float64], tolerance: float) -> None:
         """Take over the loads of an earlier step, where it describes these shapes and positions x (n, 3) [m]."""
         self._starts[:] = 0
+        self._any_load = False
         shapes = self.shapes
         if memory is not None and memory.matches(shapes.frames, shapes.parameters, x, tolerance):
             self._enter(memory.shapes * len(self.inverse_masses) + memory.vertices, memory.loads)
@@ -256,6 +258,7 @@ class ObstacleContacts:
         self._starts[:] = np.searchsorted(keys, np.arange(len(self._starts)) * n)
         self._vertices[: len(keys)] = keys % n
         self._loads[: len(keys)] = loads
+        self._any_load = bool(loads.any())
 
     def _loaded(self) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64]]:
         """Copies of the shapes, the vertices and the loads of all contacts that push."""
@@ -266,18 +269,16 @@ class ObstacleContacts:
 
     def begin_substep(self, x: NDArray[np.float64], h: float) -> bool:
         """See `Collisions.begin_substep`."""
-        count = self._starts[-1]
-        loads = self._loads[:count]
-        pushed = bool(loads.any())
         self._predicted[:] = x
-        if pushed:
-            add_loads(x, self._vertices[:count], loads, h)
-        return pushed
+        if self._any_load:
+            count = self._starts[-1]
+            add_loads(x, self._vertices[:count], self._loads[:count], h)
+        return self._any_load
 
     def end_substep(self) -> None:
         """Keep the share of the loads with which the next substep begins."""
         count = self._starts[-1]
-        self._loads[:count] *= self._shares[:count, None]
+        self._any_load = keep_shares(self._loads[:count], self._shares[:count])
 
     def project(
         self,

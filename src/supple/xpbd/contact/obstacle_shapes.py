@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -33,9 +34,13 @@ class ObstacleShapes:
     parameters: NDArray[np.float64]
     moving: NDArray[np.bool_]
 
+    @cached_property
+    def any_moves(self) -> bool:
+        return bool(self.moving.any())
+
     def placed(self, poses: ObstaclePoses, time: float) -> NDArray[np.float64]:
         """Frames (k, 4, 3) at `time` [s]."""
-        if not self.moving.any():
+        if not self.any_moves:
             return self.frames
         R, t = poses.at(time)
         R, t = R[self.owners], t[self.owners]

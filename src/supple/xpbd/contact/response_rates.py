@@ -33,3 +33,15 @@ def response_rates(system: System) -> NDArray[np.float64]:
 def kept_share(kappa):
     """The part of a contact's force with which the next substep begins."""
     return 1.0 / (1.0 + kappa)
+
+
+@njit(cache=True)
+def keep_shares(forces, shares):
+    """Multiply forces (k, 3) with their shares (k,); returns whether any is left."""
+    left = False
+    for e in range(len(forces)):
+        for j in range(3):
+            if forces[e, j] != 0.0:
+                forces[e, j] *= shares[e]
+                left = left or forces[e, j] != 0.0
+    return left

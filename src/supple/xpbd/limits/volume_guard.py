@@ -50,12 +50,10 @@ class VolumeGuard:
         m = len(self.tets)
         self.J, self.bounds = np.zeros(m), np.full(m, -np.inf)
         self.guarded = np.zeros(m, dtype=np.bool_)
-        self._below = np.zeros((m + BLOCK - 1) // BLOCK, dtype=np.int64)
 
     def measure(self, points: NDArray[np.float64], parallel: bool, share: float = 1.0) -> bool:
         """Compute J at `points` (n, 4); returns whether a tet is below this share of its bound."""
-        _measure[parallel](points, self.tets, self.scale, self.bounds, share, self.J, self._below)
-        return bool(self._below.any())
+        return _measure[parallel](points, self.tets, self.scale, self.bounds, share, self.J) > 0
 
     def project(self, points: NDArray[np.float64]) -> None:
         """Project every tet below its bound, once forward and once backward over all tets, in place."""
@@ -95,10 +93,12 @@ def _measure_block(points, tets, scale, bounds, share, out, low, high):
 
 
 @serial_and_parallel
-def _measure(points, tets, scale, bounds, share, out, below):
-    for block in prange(len(below)):
+def _measure(points, tets, scale, bounds, share, out):
+    below = 0
+    for block in prange((len(tets) + BLOCK - 1) // BLOCK):
         low = block * BLOCK
-        below[block] = _measure_block(points, tets, scale, bounds, share, out, low, min(low + BLOCK, len(tets)))
+        below += _measure_block(points, tets, scale, bounds, share, out, low, min(low + BLOCK, len(tets)))
+    return below
 
 
 @njit(cache=True)
