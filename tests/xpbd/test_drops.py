@@ -117,7 +117,7 @@ def check_recorded(scene, path, steps):
 
 
 @pytest.mark.parametrize(
-    "seed", [0, 1, 104, pytest.param(3, marks=pytest.mark.slow), pytest.param(131, marks=pytest.mark.slow)]
+    "seed", [0, 1, 3, pytest.param(2, marks=pytest.mark.slow), pytest.param(6, marks=pytest.mark.slow)]
 )
 def test_random_drops(seed):
     check(drop(seed, smallest=0.04, stiffest=2e5), 25)
@@ -126,6 +126,12 @@ def test_random_drops(seed):
 @pytest.mark.parametrize("seed", [1, 4, 5, 6, 8, 10, 13, 15])
 def test_random_piles_converge_and_pass_the_check(seed, tmp_path):
     assert check_recorded(pile(seed), tmp_path / "pile.vtkhdf", 12) == {"converged"}
+
+
+@pytest.mark.parametrize("seed", [104, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (23, 70, 131))])
+def test_bodies_between_others_and_a_floor_are_not_pushed_through_either(seed, tmp_path):
+    """Contact with other bodies moved them into the floor, contact with the floor or the last resort through bodies."""
+    assert check_recorded(pile(seed), tmp_path / "pile.vtkhdf", 8) <= {"converged", "held_back"}
 
 
 @pytest.mark.slow

@@ -148,7 +148,11 @@ class Collisions:
             self._count(self.surfaces.project(x, x_prev, (time - h, time), limit, parallel))
             # What other bodies moved into an obstacle is no old overlap.
             add_distances(self._before, x_prev, self._limits)
+        between = self.contacts
         self._project_obstacles(x, x_prev, time, h)
+        if self.surfaces is not None and self.contacts > between:
+            # What obstacles push may have passed through other bodies.
+            self.surfaces.check_parted(x, x_prev)
         return self.contacts
 
     def project_again(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], time: float, h: float) -> int:

@@ -192,6 +192,10 @@ class SurfaceCollisions:
         self._give(x, x_prev)
         return contacts
 
+    def check_parted(self, x: NDArray[np.float64], x_prev: NDArray[np.float64]) -> None:
+        """Take notice of what has passed through something since `project`, from x_prev to x (n, 3) [m]."""
+        self.parted = self.parted and not len(self.passed(x, x_prev))
+
     def passed(self, x: NDArray[np.float64], begun: NDArray[np.float64]) -> NDArray[np.int64]:
         """(k, 2) the pieces of which one has passed through the other from `begun` to x (n, 3) [m]."""
         self._take(x, begun)
