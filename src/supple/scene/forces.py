@@ -93,3 +93,7 @@ class SoftTarget(OnVertices):
         super().__post_init__()
         check_motion(self.motion, self.label)
         object.__setattr__(self, "stiffness", positive(self.stiffness, f"{self.label}: stiffness"))
+
+    def check_rigid(self) -> None:
+        """Raise `SceneError`: the springs pull vertices of tets."""
+        raise SceneError(f"{self.label}: soft targets pull soft bodies; move a rigid one with a Pin or a Force")

@@ -24,6 +24,7 @@ from supple.implicit.stepping.contact_step import ContactStep
 from supple.implicit.stepping.dirichlet import move_pins
 from supple.implicit.stepping.integrators import Integrator, Plan, Static
 from supple.implicit.stepping.midpoint import ActingWithin
+from supple.implicit.stepping.rigid_bodies import make_rigid
 from supple.implicit.stepping.workspace import Workspace
 from supple.state import State, Status
 from supple.system import System
@@ -153,10 +154,12 @@ def _first_guess(
     limits: StepLimits,
     pinned: NDArray[np.int32],
 ) -> NDArray[np.float64]:
-    """The positions without elasticity, as far as the filters allow; x where that has less energy."""
+    """The positions without elasticity, with rigid bodies rigid, as far as the filters allow; x where that has less
+    energy."""
     if plan.scale is None:
         return x
     ahead = plan.predicted + plan.scale / plan.place * forces / system.masses[:, None]
+    make_rigid(system, ahead)
     ahead[pinned] = x[pinned]
     step = limits.largest_step(x, ahead - x).step
     if step < 1.0:
