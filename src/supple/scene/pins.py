@@ -19,7 +19,7 @@ class Pin(OnVertices):
     Parameters
     ----------
     body : name of the body.
-    vertices : indices into the body's mesh, or an `InBox`; None: the whole body, the only choice for a rigid one.
+    vertices : indices into the body's mesh, or an `InBox`; None for a rigid body.
     motion : None, `Keyframes`, or t -> displacement [m], (3,) for all or (k, 3) for each vertex of a soft body.
     name : appears in messages and in the reaction forces of a report.
     """
@@ -36,7 +36,8 @@ class Pin(OnVertices):
         super().__post_init__()
         check_motion(self.motion, self.label)
 
-    def check_rigid(self) -> None:
-        """Raise `SceneError` where only some of the vertices are selected."""
-        if self.vertices is not None:
+    def check_kind_of_body(self, rigid: bool) -> None:
+        """Raise `SceneError` unless this selects vertices of a soft body, or all of a rigid one."""
+        super().check_kind_of_body(rigid)
+        if rigid and self.vertices is not None:
             raise SceneError(f"{self.label}: a rigid body is held as a whole; leave out `vertices`")

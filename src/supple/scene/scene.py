@@ -105,8 +105,7 @@ class Scene:
             with at("body"):
                 raise SceneError(f"{item.label}: there is no body {item.body!r}; {suggestion(item.body, list(pinned))}")
         body, held = self.body(item.body), pinned[item.body]
-        if isinstance(body, RigidBody):
-            item.check_rigid()
+        item.check_kind_of_body(isinstance(body, RigidBody))
         with at("box" if isinstance(item.vertices, InBox) else "vertices"):
             chosen = item.select(body.place(body.points))
             if isinstance(item, Pin):

@@ -45,7 +45,7 @@ class OnVertices:
 
     kind: ClassVar[str]
     joint: ClassVar[str] = "of"
-    takes_all: ClassVar[bool] = False  # whether vertices=None selects all
+    takes_all: ClassVar[bool] = False  # whether vertices=None selects all of a rigid body
 
     body: str
     vertices: Selection | None
@@ -62,9 +62,12 @@ class OnVertices:
         """The name of this object in messages."""
         return f"{self.kind}{f' {self.name!r}' if self.name else ''} {self.joint} body {self.body!r}"
 
-    def check_rigid(self) -> None:
-        """Raise `SceneError` where this cannot act on a rigid body."""
-        return
+    def check_kind_of_body(self, rigid: bool) -> None:
+        """Raise `SceneError` where this cannot act on a soft, or a rigid, body."""
+        if self.vertices is None and not rigid:
+            raise SceneError(
+                f"{self.label}: give the vertices by either `vertices` or `box`; only rigid bodies need none"
+            )
 
     def select(self, placed: NDArray[np.float64]) -> NDArray[np.int32]:
         """Vertex indices (k,) of the body, given its vertices placed in the world (n, 3).

@@ -88,7 +88,7 @@ class _Glb:
         triangles = np.arange(len(x), dtype=np.int32).reshape(-1, 3)
         material = self._material(obstacle.color, obstacle.opacity)
         node = self._mesh_node(obstacle.name, x, vertex_normals(x, triangles), triangles, material, [])
-        poses = np.stack([frame.poses[obstacle.number] for frame in self.frames])
+        poses = np.stack([frame.obstacle_poses[obstacle.number] for frame in self.frames])
         rotations = _quaternions(poses[:, :, :3])
         made = self.document.nodes[node]
         made.translation, made.rotation = poses[0, :, 3].tolist(), rotations[0].tolist()
