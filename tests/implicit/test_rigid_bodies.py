@@ -49,8 +49,8 @@ def test_a_free_body_keeps_its_momenta():
     assert np.abs(P - P[0]).max() <= 1e-11 * np.linalg.norm(P[0])
     assert np.abs(L - L[0]).max() <= 1e-10 * np.linalg.norm(L[0])
     energies = np.array([f.report.kinetic_energy + f.report.elastic_energy for f in frames])
-    assert np.ptp(energies) < 1e-3 * energies[0]
-    assert error_of(frames) < 2e-4
+    assert np.ptp(energies) < 1e-4 * energies[0]
+    assert error_of(frames) < 1e-13  # the ends of steps are projected
 
 
 def flip_time(dt, steps, integrator):
@@ -62,7 +62,7 @@ def flip_time(dt, steps, integrator):
     return frames[k].time - dt * along[k] / (along[k] - along[k - 1])
 
 
-def flip_time_of_euler(spin, inertia, dt=1e-4):
+def flip_time_of_euler(spin, inertia, dt=1e-3):
     """Runge-Kutta's method of fourth order on Euler's equations."""
     a, b, c = inertia
 
@@ -81,12 +81,12 @@ def flip_time_of_euler(spin, inertia, dt=1e-4):
 
 
 def test_the_intermediate_axis_turns_over_when_eulers_equations_say():
-    """The Dzhanibekov effect; the midpoint rule is of second order: 0.5 % at 10 ms, 0.13 % at 5 ms."""
+    """The Dzhanibekov effect; the midpoint rule is of second order: 1.3 % at 20 ms, 0.33 % at 10 ms."""
     inertia = np.diag(rigid(shape=BOX).properties.inertia)
     exact = flip_time_of_euler([0.01, 10.0, 0.01], inertia)
-    coarse, fine = (flip_time(dt, int(1.7 / dt), "newmark") / exact - 1.0 for dt in (0.01, 0.005))
-    assert abs(coarse) < 0.01
-    assert abs(fine) < 0.003
+    coarse, fine = (flip_time(dt, int(1.7 / dt), "newmark") / exact - 1.0 for dt in (0.02, 0.01))
+    assert abs(coarse) < 0.02
+    assert abs(fine) < 0.005
     assert 3.0 < coarse / fine < 5.0
 
 

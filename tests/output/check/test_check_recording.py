@@ -66,7 +66,7 @@ def test_a_recording_without_physics_is_read_and_unknown_checks_are_skipped(free
     report = sp.check_recording(corrupted(free, age))
     assert report.ok
     skipped = {result.name for result in report.results if result.verdict == "skipped"}
-    assert skipped == {"obstacles", "momentum", "spin", "energy"}
+    assert skipped == {"obstacles", "rigidity", "momentum", "spin", "energy"}
     assert "older version" in report["energy"].message
 
 

@@ -24,7 +24,7 @@ from supple.implicit.stepping.contact_step import ContactStep
 from supple.implicit.stepping.dirichlet import move_pins
 from supple.implicit.stepping.integrators import Integrator, Plan, Static
 from supple.implicit.stepping.midpoint import ActingWithin
-from supple.implicit.stepping.rigid_bodies import make_rigid
+from supple.implicit.stepping.rigid_bodies import make_rigid, projected
 from supple.implicit.stepping.workspace import Workspace
 from supple.state import State, Status
 from supple.system import System
@@ -120,7 +120,10 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     outcome = contact.verified(replace(outcome, rows=rows))
     after = State(end, x, plan.velocity(x), plan.memory)
     residual = plan.place * outcome.end.gradient
-    return Substep(settings.integrator.finish(plan, state, after, residual, workspace.conservation), outcome, contact)
+    after = settings.integrator.finish(plan, state, after, residual, workspace.conservation)
+    if plan.place != 1.0 and system.rigid_bodies and outcome.status is Status.CONVERGED:
+        after = projected(system, after, limits)
+    return Substep(after, outcome, contact)
 
 
 def _objective(
