@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.numerics.kernel_cache import njit, prange
+from supple.numerics.kernel_cache import njit
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,9 +97,9 @@ class EmbeddedPoints:
             _spread(forces, self.start, self.vertices, self.weights, out)
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _combine(x, start, vertices, weights, out):
-    for i in prange(len(start) - 1):
+    for i in range(len(start) - 1):
         for j in range(3):
             total = 0.0
             for k in range(start[i], start[i + 1]):
