@@ -17,6 +17,7 @@ from supple.materials.regions import Regions
 from supple.scene.body import Body, PlacedBody
 from supple.scene.contact_pairs import ContactPair
 from supple.scene.pins import Pin
+from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.scene import Scene
 from supple.state import State
 from supple.system import BodyRange, initial_state
@@ -160,7 +161,8 @@ def _(command: commands.Pin, live: LiveScene) -> None:
     pins = dict(live.setup.page_pins)
     if len(pins) >= limits.MOST_PINS:
         raise CommandError(f"{len(pins)} vertices are pinned on the page already; unpin some first")
-    pins[command.body, command.vertex] = Pin(command.body, [command.vertex], name="page")
+    held = None if isinstance(part.body, RigidBody) else [command.vertex]  # a rigid body is held as a whole
+    pins[command.body, command.vertex] = Pin(command.body, held, name="page")
     live.adopt(replace(live.setup, page_pins=pins))
 
 
