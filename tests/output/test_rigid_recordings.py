@@ -124,3 +124,48 @@ def test_vtu_has_the_surface_in_place_of_the_control_points(recorded, tmp_path):
     corners = np.unique(mesh.cells[1].data)
     np.testing.assert_allclose(mesh.points[corners], frames[-1].positions["palm"], atol=1e-12)
     assert set(mesh.cell_data["body"][1].tolist()) == {1}
+
+
+def transformed(points, matrix):
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def test_glb_animates_the_node_of_a_rigid_body(recorded, tmp_path):
+    import pygltflib
+    from scipy.spatial.transform import Rotation
+
+    path, frames = recorded
+    document = pygltflib.GLTF2().load(str(export(path, "glb", tmp_path / "r.glb")))
+    data = document.binary_blob()
+
+    def values(number, width):
+        accessor = document.accessors[number]
+        view = document.bufferViews[accessor.bufferView]
+        return np.frombuffer(data, "<f4", accessor.count * width, view.byteOffset).reshape(-1, width).astype(float)
+
+    node = next(k for k, one in enumerate(document.nodes) if one.name == "palm")
+    (primitive,) = document.meshes[document.nodes[node].mesh].primitives
+    assert not primitive.targets
+    (animation,) = document.animations
+    paths = {c.target.path: animation.samplers[c.sampler] for c in animation.channels if c.target.node == node}
+    assert paths.keys() == {"translation", "rotation"}
+    rest = values(primitive.attributes.POSITION, 3)
+    shifts, turns = values(paths["translation"].output, 3), values(paths["rotation"].output, 4)
+    for frame in (frames[0], frames[-1]):
+        shown = rest @ Rotation.from_quat(turns[frame.index]).as_matrix().T + shifts[frame.index]
+        np.testing.assert_allclose(shown, frame.positions["palm"], atol=2e-6)
+
+
+def test_usd_animates_the_transform_of_a_rigid_body(recorded, tmp_path):
+    pytest.importorskip("pxr")
+    from pxr import Usd, UsdGeom
+
+    path, frames = recorded
+    stage = Usd.Stage.Open(str(export(path, "usd", tmp_path / "r.usda")))
+    mesh = next(UsdGeom.Mesh(p) for p in stage.Traverse() if p.GetDisplayName() == "palm")
+    points = mesh.GetPointsAttr()
+    assert points.GetNumTimeSamples() == 0
+    for frame in (frames[0], frames[-1]):
+        matrix = np.array(mesh.ComputeLocalToWorldTransform(Usd.TimeCode(frame.index))).T
+        shown = transformed(np.array(points.Get(), dtype=float), matrix)
+        np.testing.assert_allclose(shown, frame.positions["palm"], atol=2e-6)

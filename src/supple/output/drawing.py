@@ -46,6 +46,15 @@ class Picture:
     def name(self) -> str:
         return self.body.name
 
+    def rest(self, recording: Recording) -> NDArray[np.float64]:
+        """The vertices of a rigid body's surface in its own coordinates (k, 3) [m]."""
+        return self.body.points(recording.rest_positions)
+
+    def pose(self, frame: RecordedFrame) -> NDArray[np.float64]:
+        """(3, 4) rotation and translation of a rigid body."""
+        pose = frame.poses[self.name]
+        return np.column_stack([pose.rotation, pose.translation])
+
     def at(self, frame: RecordedFrame) -> NDArray[np.float64]:
         """Positions of the vertices of the drawn surface, the skin or the boundary."""
         x = frame.state.positions[self.body.vertices]
