@@ -51,12 +51,11 @@ class BodyRange:
 
 @dataclass(frozen=True, eq=False)
 class PinRange:
-    """The vertices of one pin, and their positions at time 0, before its motion; rigid : whether of a rigid body."""
+    """The vertices of one pin, and their positions at time 0, before its motion."""
 
     pin: Pin
     vertices: NDArray[np.int32]
     anchors: NDArray[np.float64]
-    rigid: bool = False
 
     @property
     def label(self) -> str:
@@ -68,7 +67,7 @@ class PinRange:
 
     def targets(self, time: float) -> NDArray[np.float64]:
         """Required positions (k, 3) of the pinned vertices at `time` [m]."""
-        if self.rigid:
+        if self.pin.vertices is None:  # of a rigid body
             R, t = rigid_pose(self.pin.motion, time, self.pin.label)
             return self.anchors @ R.T + t
         return moved_points(self.pin.motion, self.anchors, time, self.pin.label)
@@ -229,7 +228,7 @@ def build_system(scene: Scene, start: State | None = None) -> System:
     return System(
         scene=scene,
         bodies=tuple(ranges),
-        pins=tuple(_pin_range(pin, ranges, start) for pin in scene.pins),
+        pins=tuple(PinRange(pin, *_anchored(pin, ranges, start)) for pin in scene.pins),
         rest_positions=np.ascontiguousarray(rest_positions),
         masses=np.concatenate(masses),
         tets=np.ascontiguousarray(np.concatenate(tets), dtype=np.int32),
@@ -269,11 +268,6 @@ def _lumped_masses(body: PlacedBody) -> NDArray[np.float64]:
     quarters = np.broadcast_to(np.asarray(body.material.density, dtype=np.float64), len(mesh.tets)) * mesh.volumes / 4.0
     masses = np.bincount(mesh.tets.ravel(), weights=np.repeat(quarters, 4), minlength=len(mesh.vertices))
     return masses.astype(np.float64, copy=False)
-
-
-def _pin_range(pin: Pin, ranges: list[BodyRange], start: State | None) -> PinRange:
-    rigid = any(isinstance(part.body, RigidBody) for part in ranges if part.name == pin.body)
-    return PinRange(pin, *_anchored(pin, ranges, start), rigid=rigid)
 
 
 def _force_range(force: Force, ranges: list[BodyRange], start: State | None) -> ForceRange:

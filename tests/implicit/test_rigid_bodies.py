@@ -183,6 +183,36 @@ def test_a_pile_of_rigid_and_soft_bodies_rests_without_intersecting():
     assert run(scene, 1 / 60, 1, start=frames[-1].state)[0].report.min_distance > 0.0
 
 
+@pytest.mark.parametrize("other", ["rigid", "soft"])
+def test_a_collision_keeps_momentum(other):
+    """Off the center, with friction. Contact acts where bodies are at the end of a step: L is not kept exactly."""
+    hit = {"position": (0.13, 0.03, 0.02), "velocity": (-1.0, 0.0, 0.0), "friction": 0.5}
+    bodies = [rigid("a", friction=0.5), rigid("b", **hit) if other == "rigid" else soft("b", **hit)]
+    frames = run(sp.Scene(bodies, gravity=(0, 0, 0)), 0.005, 24, "newmark")
+    P, L = (np.array([getattr(f.report, key) for f in frames]) for key in ("linear_momentum", "angular_momentum"))
+    pushes = [np.linalg.norm(f.report.details.contact_forces["a"]) for f in frames]
+    assert max(pushes) > 10.0
+    assert np.abs(P - P[0]).max() <= 1e-10 * np.linalg.norm(P[0])
+    assert np.abs(L - L[0]).max() <= 5e-3 * np.linalg.norm(L[0])
+    assert frames[-1].poses["a"].velocity[0] < -0.2
+
+
+@pytest.mark.slow
+def test_a_heap_of_boxes_never_intersects(tmp_path):
+    rng, places = np.random.default_rng(0), [(i, j, k) for i in range(3) for j in range(3) for k in range(3)]
+    bodies = [
+        rigid(
+            f"{i}{j}{k}", position=(0.16 * i, 0.1 + 0.17 * k, 0.16 * j), rotation=0.3 * rng.normal(size=3), friction=0.4
+        )
+        for i, j, k in places
+    ]
+    path = tmp_path / "heap.vtkhdf"
+    frames = run(sp.Scene(bodies, obstacles=[FLOOR]), 1 / 60, 60, sinks=[sp.Recorder(path, solver=sp.Implicit())])
+    assert error_of(frames) < 1e-3
+    assert frames[-1].report.kinetic_energy < 1e-4
+    assert sp.check_recording(path).ok
+
+
 def test_a_ring_hangs_on_a_bar():
     """Neither surface is replaced by its convex hull, in which the bar would be inside of the ring from the start."""
     ring = rigid("ring", sp.shapes.torus_surface(0.1, 0.03, 0.03), position=(0, -0.048, 0), rotation=(np.pi / 2, 0, 0))

@@ -1,5 +1,7 @@
 """Recordings, checks, checkpoints and exports of scenes with rigid bodies."""
 
+import json
+
 import h5py
 import numpy as np
 import pytest
@@ -91,6 +93,26 @@ def test_good_recordings_pass(recorded, tmp_path):
     assert {name: str(report[name].verdict) for name in ("momentum", "spin", "energy")} == dict.fromkeys(
         ("momentum", "spin", "energy"), "pass"
     )
+
+
+@pytest.mark.parametrize("integrator", ["backward_euler", "bdf2"])
+def test_the_error_of_an_integrator_is_no_failure(tmp_path, integrator):
+    body = sp.RigidBody("free", sp.shapes.torus_surface(0.5, 0.2, 0.2), density=100.0, angular_velocity=(1, 5, 3))
+    solver, path = sp.Implicit(integrator=integrator), tmp_path / "free.vtkhdf"
+    list(sp.simulate(sp.Scene([body]), solver, 0.01, 20, sinks=[sp.Recorder(path, solver=solver)]))
+    assert sp.check_recording(path).ok
+
+
+def test_a_soft_body_that_calls_itself_rigid_is_an_error(recorded, tmp_path):
+    copy = tmp_path / "wrong.vtkhdf"
+    copy.write_bytes(recorded[0].read_bytes())
+    with h5py.File(copy, "r+") as file:
+        header = json.loads(file["supple/header"][()])
+        header["bodies"][0]["rigid"] = True
+        del file["supple/header"]
+        file["supple/header"] = json.dumps(header)
+    with pytest.raises(sp.OutputError, match="rigid body 'soft' does not have four vertices and a surface"):
+        sp.read_recording(copy)
 
 
 def test_a_deformed_body_is_found(corrupted):

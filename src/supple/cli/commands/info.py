@@ -223,6 +223,7 @@ def _recording(file: Path) -> None:
 
     with read_recording(file) as recording:
         J = recording.series("min_det_F")
+        soft = [body for body in recording.bodies if not body.rigid]
         rows = [
             ("kind", "recording"),
             ("frames", f"{len(recording)} to t = {recording.times[-1]:.6g} s, dt = {recording.dt:.6g} s"),
@@ -230,7 +231,7 @@ def _recording(file: Path) -> None:
             ("obstacles", ", ".join(f"{o.name} ({o.kind})" for o in recording.obstacles) or "none"),
             ("vertices", str(len(recording.masses))),
             ("tets", str(len(recording.tets))),
-            ("volume", f"{recording.rest_volumes.sum():.6g} m^3 at rest"),
+            ("volume", f"{sum(recording.rest_volumes[b.tets].sum() for b in soft):.6g} m^3 of soft bodies at rest"),
             ("mass", f"{recording.masses.sum():.6g} kg"),
             ("solver", recording.solver or "unknown"),
             ("smallest J", f"{J.min():.6g} at t = {recording.times[int(np.argmin(J))]:.6g} s"),
