@@ -24,7 +24,7 @@ from supple.implicit.stepping.contact_step import ContactStep
 from supple.implicit.stepping.dirichlet import move_pins
 from supple.implicit.stepping.integrators import Integrator, Plan, Static
 from supple.implicit.stepping.midpoint import ActingWithin
-from supple.implicit.stepping.rigid_bodies import make_rigid, projected
+from supple.implicit.stepping.rigid_bodies import rigid_ends, with_rigid_bodies
 from supple.implicit.stepping.workspace import Workspace
 from supple.state import State, Status
 from supple.system import System
@@ -122,7 +122,7 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     residual = plan.place * outcome.end.gradient
     after = settings.integrator.finish(plan, state, after, residual, workspace.conservation)
     if plan.place != 1.0 and system.rigid_bodies and outcome.status is Status.CONVERGED:
-        after = projected(system, after, limits)
+        after = rigid_ends(system, state, after, limits)
     return Substep(after, outcome, contact)
 
 
@@ -162,7 +162,7 @@ def _first_guess(
     if plan.scale is None:
         return x
     ahead = plan.predicted + plan.scale / plan.place * forces / system.masses[:, None]
-    make_rigid(system, ahead)
+    ahead = with_rigid_bodies(system, x, ahead, plan.place)
     ahead[pinned] = x[pinned]
     step = limits.largest_step(x, ahead - x).step
     if step < 1.0:

@@ -51,6 +51,12 @@ class RecordedBody:
     skin: SkinnedSurface | None
     rigid: bool = False
 
+    @property
+    def point_count(self) -> int:
+        """How many points a frame has of it."""
+        own = self.vertices.stop - self.vertices.start
+        return len(self.skin.corners) if self.rigid and self.skin is not None else own
+
     def points(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Positions or velocities (k, 3) as a frame has them, of values x (n, 3) of all vertices of the recording."""
         own = x[self.vertices]
