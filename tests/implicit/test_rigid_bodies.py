@@ -270,3 +270,19 @@ def test_bodies_that_intersect_at_the_start_are_refused_and_separated():
     apart = separate(scene)
     assert [move.body for move in apart.moves] == ["b"]
     assert run(apart.scene, 0.01, 1)[0].report.status == "converged"
+
+
+def test_a_plate_pressed_on_a_soft_cube_in_equilibrium():
+    """Forces of both pins balance; the cube carries about E A times its strain, more as its ends cannot widen."""
+    cube = soft(position=(0, 0.05, 0))
+    bottom = np.flatnonzero(cube.mesh.vertices[:, 1] == cube.mesh.vertices[:, 1].min())
+    plate = rigid("plate", sp.shapes.box_surface((0.14, 0.02, 0.14), (1, 1, 1)), position=(0, 0.1105, 0))
+    press = sp.Pin("plate", motion=lambda t: (0, -0.005 * t, 0), name="press")
+    scene = sp.Scene([cube, plate], pins=[sp.Pin("soft", bottom), press], gravity=(0, 0, 0))
+    (frame,) = run(scene, 1.0, 1, "static")
+    details = frame.report.details
+    up, down = details.reaction_forces["pin of body 'soft'"], details.reaction_forces["pin 'press' of body 'plate'"]
+    np.testing.assert_allclose(up, -down, atol=1e-6 * up[1])
+    np.testing.assert_allclose(details.contact_forces["plate"], up, atol=1e-6 * up[1])
+    strain = (0.1 - np.ptp(frame.positions["soft"][:, 1])) / 0.1
+    assert 1.0 < up[1] / (1e5 * 0.01 * strain) < 1.3
