@@ -20,7 +20,7 @@ import supple as sp
 from supple.contact.ccd.largest_step import largest_step
 from supple.contact.search.finder import CandidateFinder
 from supple.contact.surface.contact_mesh import ContactMesh, mesh_of_triangles
-from supple.contact.surface.embedded_points import EmbeddedPoints
+from supple.numerics.geometry.embedded_points import EmbeddedPoints
 
 COUNTS = (5, 10, 20, 50, 100)
 DHAT = 5e-3  # of a bear's height, about 1 m

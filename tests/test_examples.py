@@ -54,6 +54,10 @@ def test_06_random_search_improves_the_reward_of_a_controller():
     assert rewards[-1] > 0.7 * rewards[0], "on the average of the way, it is much nearer"
 
 
+def test_07_rigid_jaws_carry_a_soft_cube_by_friction():
+    assert run_example("07") == pytest.approx(1.0, rel=0.01)
+
+
 def test_every_example_is_run_by_a_test_of_this_file():
     numbers = {path.name[:2] for path in EXAMPLES.glob("[0-9]*.py")}
     tested = {name[5:7] for name in globals() if name.startswith("test_0")}

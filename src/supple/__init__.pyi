@@ -58,6 +58,8 @@ from .scene.obstacles.half_space import HalfSpace as HalfSpace
 from .scene.obstacles.sphere import Sphere as Sphere
 from .scene.obstacles.triangle_obstacle import TriangleObstacle as TriangleObstacle
 from .scene.pins import Pin as Pin
+from .scene.rigid.pose import Pose as Pose
+from .scene.rigid.rigid_body import RigidBody as RigidBody
 from .scene.scene import Scene as Scene
 from .scene.selection import InBox as InBox
 from .scene.stitches.vertex_edge import VertexEdgeStitch as VertexEdgeStitch

@@ -22,6 +22,7 @@ from supple.materials.per_tet import NO_REGION
 from supple.numerics.deformation import deformation_gradients, determinants
 from supple.numerics.memory import require_memory
 from supple.scene.inputs import checked_values, drive_inputs, hold_inputs
+from supple.scene.rigid.pose import Pose, pose_of
 from supple.scene.scene import Scene
 from supple.scene.stitches.measures import largest_stitch_stretch, stitch_energy
 from supple.state import ContactPoints, SolverDetails, State, Status, StepReport
@@ -104,13 +105,20 @@ class Frame:
 
     @cached_property
     def positions(self) -> dict[str, NDArray[np.float64]]:
-        """By body name, (n, 3) [m]."""
+        """By body name, (n, 3) [m]; of a rigid body, of its surface's vertices."""
         return self.system.split(self.state.positions)
 
     @cached_property
     def velocities(self) -> dict[str, NDArray[np.float64]]:
         """By body name, (n, 3) [m/s]."""
         return self.system.split(self.state.velocities)
+
+    @cached_property
+    def poses(self) -> dict[str, Pose]:
+        """Of the rigid bodies, by name."""
+        x, v, rest = self.state.positions, self.state.velocities, self.system.rest_positions
+        rows = {part.name: part.vertices for part in self.system.rigid_bodies}
+        return {name: pose_of(rest[part], x[part], v[part]) for name, part in rows.items()}
 
     @cached_property
     def contacts(self) -> ContactPoints | None:
@@ -186,7 +194,8 @@ def simulate(
     solver : `XPBD(...)` or `Implicit(...)`.
     dt : time from frame to frame [s].
     steps : number of frames.
-    initial_positions, initial_velocities : by body name, (n, 3) [m], [m/s]; the others start as the scene describes.
+    initial_positions, initial_velocities : by body name, (n, 3) [m], [m/s], as in a frame; the others start as the
+        scene describes.
     start : a frame or state of this scene to continue from, of any solver or from a recording; excludes the two above.
         From a `Frame` of the same scene object and an equal solver, the frames have the bits of an uninterrupted run.
     control : called before each step with the latest frame; returns values of the scene's inputs that they shall have

@@ -1,7 +1,8 @@
 """A scene as flat arrays, the input of solvers, and the interface of solvers.
 
-The bodies' vertices, tets, edges and surface triangles are concatenated; a `BodyRange` has the rows of one body. This
-file does not depend on solvers, files or viewers.
+The bodies' vertices, tets, edges, points and surface triangles are concatenated; a `BodyRange` has the rows of one.
+Vertices are what moves. Points are what touches and is drawn, combinations of vertices; those of a soft body are its
+vertices. This file does not depend on solvers, files or viewers.
 """
 
 from __future__ import annotations
@@ -19,11 +20,13 @@ from supple.errors import SceneError
 from supple.materials.patches.domains import Patches, patches_of
 from supple.materials.per_tet import NO_REGION, TetMaterial
 from supple.mesh.topology import graph_components
-from supple.scene.body import Body
+from supple.numerics.geometry.embedded_points import EmbeddedPoints
+from supple.scene.body import PlacedBody
 from supple.scene.forces import Force, SoftTarget
-from supple.scene.motion import Motion, moved_points, points_at_origin
+from supple.scene.motion import Motion, moved_points, points_at_origin, rigid_pose
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.pins import Pin
+from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.scene import Scene
 from supple.scene.stitches.stitching import Stitching, no_stitching
 from supple.scene.values import float_array
@@ -34,11 +37,12 @@ from supple.state import SolverDetails, State, StepReport
 class BodyRange:
     """The rows of the System's arrays that belong to one body."""
 
-    body: Body
+    body: PlacedBody
     vertices: slice
     tets: slice
     edges: slice
     triangles: slice
+    points: slice
 
     @property
     def name(self) -> str:
@@ -63,19 +67,26 @@ class PinRange:
 
     def targets(self, time: float) -> NDArray[np.float64]:
         """Required positions (k, 3) of the pinned vertices at `time` [m]."""
+        if self.pin.vertices is None:  # of a rigid body
+            R, t = rigid_pose(self.pin.motion, time, self.pin.label)
+            return self.anchors @ R.T + t
         return moved_points(self.pin.motion, self.anchors, time, self.pin.label)
 
 
 @dataclass(frozen=True, eq=False)
 class ForceRange:
-    """The vertices that one force acts on."""
+    """The vertices (k,) that one force acts on; weights : (p, k) of the p points that it is given for, or None where
+    these are the vertices."""
 
     force: Force
     vertices: NDArray[np.int32]
+    weights: NDArray[np.float64] | None = None
 
     def per_vertex(self, time: float) -> NDArray[np.float64]:
         """The force (k, 3) on each of the vertices at `time` [N]."""
-        return self.force.per_vertex(time, len(self.vertices))
+        if self.weights is None:
+            return self.force.per_vertex(time, len(self.vertices))
+        return self.weights.T @ self.force.per_vertex(time, len(self.weights))
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +112,8 @@ class System:
     masses : (n,) lumped, rho V / 4 to each node of a tet [kg]
     tets : (m, 4); rest_shape_inverse : (m, 3, 3) Dm^-1 [1/m]; rest_volumes : (m,) [m^3]
     edges : (e, 2); rest_lengths : (e,) [m]
-    triangles : (t, 3) surfaces, counter-clockwise from outside
+    points : combinations of vertices that touch and are drawn; those of a soft body are its vertices
+    triangles : (t, 3) surfaces, rows of `points`, counter-clockwise from outside
     components : (n,) the connected piece of a mesh that a vertex belongs to
     gravity : (3,) [m/s^2]
     stitching : tets and springs that join bodies to each other, and to obstacles
@@ -121,6 +133,7 @@ class System:
     triangles: NDArray[np.int32]
     components: NDArray[np.int32]
     gravity: NDArray[np.float64]
+    points: EmbeddedPoints = field(default_factory=EmbeddedPoints.none)
     forces: tuple[ForceRange, ...] = ()
     soft_targets: tuple[SoftTargetRange, ...] = ()
     stitching: Stitching = field(default_factory=lambda: no_stitching(0))
@@ -168,9 +181,22 @@ class System:
         w[self.pinned_vertices] = 0.0
         return w
 
+    @cached_property
+    def rest_points(self) -> NDArray[np.float64]:
+        """(p, 3) the points at rest, each in its body's own coordinates [m]."""
+        return self.points.positions(self.rest_positions)
+
+    @cached_property
+    def rigid_bodies(self) -> tuple[BodyRange, ...]:
+        """The rigid ones among the bodies."""
+        return tuple(part for part in self.bodies if isinstance(part.body, RigidBody))
+
     def split(self, values: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-        """Per-vertex values (n, ...) as one array per body, by name."""
-        return {part.name: values[part.vertices] for part in self.bodies}
+        """Positions or velocities of the points, of vectors (n, 3) of the vertices: one array per body, by name."""
+        if not self.rigid_bodies:
+            return {part.name: values[part.vertices] for part in self.bodies}
+        points = self.points.positions(values)
+        return {part.name: points[part.points] for part in self.bodies}
 
 
 def build_system(scene: Scene, start: State | None = None) -> System:
@@ -180,12 +206,12 @@ def build_system(scene: Scene, start: State | None = None) -> System:
     ----------
     start : the state that the simulation begins from; pins fix its vertices at their positions there.
     """
-    ranges, rest, masses, tets, Dm_inv, volumes, edges, triangles = [], [], [], [], [], [], [], []
-    n = m = e = t = 0
+    ranges, rest, masses, tets, Dm_inv, volumes, edges, triangles, points = [], [], [], [], [], [], [], [], []
+    n = m = e = t = p = 0
     for body in scene.bodies:
         mesh = body.mesh
-        counts = len(mesh.vertices), len(mesh.tets), len(mesh.edges), len(mesh.surface.triangles)
-        rows = [slice(begin, begin + count) for begin, count in zip((n, m, e, t), counts, strict=True)]
+        counts = len(mesh.vertices), len(mesh.tets), len(mesh.edges), len(body.triangles), len(body.points)
+        rows = [slice(begin, begin + count) for begin, count in zip((n, m, e, t, p), counts, strict=True)]
         ranges.append(BodyRange(body, *rows))
         rest.append(mesh.vertices)
         masses.append(_lumped_masses(body))
@@ -193,8 +219,9 @@ def build_system(scene: Scene, start: State | None = None) -> System:
         Dm_inv.append(mesh.rest_shape_inverse)
         volumes.append(mesh.volumes)
         edges.append(mesh.edges + n)
-        triangles.append(mesh.surface.triangles + n)
-        n, m, e, t = n + counts[0], m + counts[1], e + counts[2], t + counts[3]
+        triangles.append(body.triangles + p)
+        points.append(body.embedded.shifted(n))
+        n, m, e, t, p = (begin + count for begin, count in zip((n, m, e, t, p), counts, strict=True))
     rest_positions = np.concatenate(rest)
     all_edges = np.concatenate(edges).astype(np.int32)
     lengths = np.linalg.norm(rest_positions[all_edges[:, 0]] - rest_positions[all_edges[:, 1]], axis=1)
@@ -212,7 +239,8 @@ def build_system(scene: Scene, start: State | None = None) -> System:
         triangles=np.ascontiguousarray(np.concatenate(triangles), dtype=np.int32),
         components=graph_components(n, all_edges[:, 0], all_edges[:, 1]),
         gravity=np.asarray(scene.gravity, dtype=np.float64),
-        forces=tuple(ForceRange(force, _anchored(force, ranges, start)[0]) for force in scene.forces),
+        points=EmbeddedPoints.joined(points),
+        forces=tuple(_force_range(force, ranges, start) for force in scene.forces),
         soft_targets=tuple(SoftTargetRange(item, *_anchored(item, ranges, start)) for item in scene.soft_targets),
         stitching=scene.stitching,
         start_states=_start_states(scene, start),
@@ -234,12 +262,22 @@ def _start_states(scene: Scene, start: State | None) -> tuple[State, ...]:
     return (begun,) if start is None else (begun, start)
 
 
-def _lumped_masses(body: Body) -> NDArray[np.float64]:
+def _lumped_masses(body: PlacedBody) -> NDArray[np.float64]:
     """(n,) [kg]: of each tet's mass rho V, a quarter to each of its vertices."""
     mesh = body.mesh
     quarters = np.broadcast_to(np.asarray(body.material.density, dtype=np.float64), len(mesh.tets)) * mesh.volumes / 4.0
     masses = np.bincount(mesh.tets.ravel(), weights=np.repeat(quarters, 4), minlength=len(mesh.vertices))
     return masses.astype(np.float64, copy=False)
+
+
+def _force_range(force: Force, ranges: list[BodyRange], start: State | None) -> ForceRange:
+    part = next(r for r in ranges if r.name == force.body)
+    if not isinstance(part.body, RigidBody):
+        return ForceRange(force, _anchored(force, ranges, start)[0])
+    chosen = force.select(part.body.place(part.body.points))
+    return ForceRange(
+        force, np.arange(part.vertices.start, part.vertices.stop, dtype=np.int32), part.body.weights[chosen]
+    )
 
 
 def _anchored(
@@ -252,7 +290,7 @@ def _anchored(
     """
     part = next(r for r in ranges if r.name == item.body)
     placed = part.body.place(part.body.mesh.vertices)
-    local = item.select(placed)
+    local = item.select(placed)  # of a rigid body, only all: the control points
     vertices = (local + part.vertices.start).astype(np.int32)
     anchors = placed[local]
     if start is not None and start.time == 0.0:
@@ -271,7 +309,8 @@ def initial_state(
 
     Parameters
     ----------
-    positions, velocities : by body name, (n, 3) [m] and [m/s]; others start as in the scene.
+    positions, velocities : by body name, (n, 3) [m] and [m/s], of a rigid body those of its surface's vertices; others
+        start as in the scene.
 
     Raises
     ------
@@ -284,13 +323,12 @@ def initial_state(
                 raise SceneError(f"{what}: there is no body {name!r}; there are {', '.join(map(repr, sorted(names)))}")
     x, v = [], []
     for body in scene.bodies:
-        count = len(body.mesh.vertices)
         if positions is not None and body.name in positions:
-            placed = _given(positions[body.name], count, f"initial_positions[{body.name!r}]")
+            placed = _given(positions[body.name], body, f"initial_positions[{body.name!r}]", places=True)
         else:
             placed = body.place(body.mesh.vertices)
         if velocities is not None and body.name in velocities:
-            moving = _given(velocities[body.name], count, f"initial_velocities[{body.name!r}]")
+            moving = _given(velocities[body.name], body, f"initial_velocities[{body.name!r}]", places=False)
         else:
             moving = _rigid_velocity(body, placed)
         x.append(placed)
@@ -298,17 +336,18 @@ def initial_state(
     return State(0.0, np.ascontiguousarray(np.concatenate(x)), np.ascontiguousarray(np.concatenate(v)))
 
 
-def _given(value: ArrayLike, count: int, what: str) -> NDArray[np.float64]:
-    array = float_array(value, what)
+def _given(value: ArrayLike, body: PlacedBody, what: str, *, places: bool) -> NDArray[np.float64]:
+    """Of the mesh's vertices, from values of the body's points: positions or velocities."""
+    array, count = float_array(value, what), len(body.points)
     if array.shape != (count, 3):
         raise SceneError(f"{what} has shape {array.shape}; the body's mesh needs ({count}, 3)")
     if not np.isfinite(array).all():
         row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
         raise SceneError(f"{what}: row {row} is not finite")
-    return array
+    return body.control_values(array, what, places=places) if isinstance(body, RigidBody) else array
 
 
-def _rigid_velocity(body: Body, placed: NDArray[np.float64]) -> NDArray[np.float64]:
+def _rigid_velocity(body: PlacedBody, placed: NDArray[np.float64]) -> NDArray[np.float64]:
     masses = _lumped_masses(body)
     center = masses @ placed / masses.sum()
     return np.asarray(body.velocity) + np.cross(np.asarray(body.angular_velocity), placed - center)

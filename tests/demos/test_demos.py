@@ -7,7 +7,7 @@ import pytest
 
 from supple.cli.app import main
 from supple.cli.exit_codes import ExitCode
-from supple.demos import cantilever, quilt
+from supple.demos import cantilever, dzhanibekov, quilt
 from supple.demos.demo import Claim, Demo, Measurement
 from supple.demos.motion_measures import stitch_lengths
 from supple.demos.registry import DEMOS, find_demo
@@ -31,7 +31,7 @@ def run(demo, kind, steps=None):
 
 
 def test_the_names_and_solvers_of_the_demos():
-    names = {"squash", "stretch", "compliance", "bears", "cantilever", "twist", "stitch", "quilt"}
+    names = {"squash", "stretch", "compliance", "bears", "cantilever", "twist", "stitch", "quilt", "dzhanibekov"}
     assert {name for name, _ in EVERY} == names
     assert {kind for _, kind in EVERY} == set(SOLVERS)
     assert {("squash", "implicit"), ("stretch", "implicit"), ("squash", "xpbd"), ("stretch", "xpbd")} <= set(EVERY)
@@ -57,6 +57,15 @@ def test_two_frames_converge_and_every_claim_is_measured(name, kind):
     assert len(claims) >= 3
     assert all(claim.text and claim.measured for claim in claims)
     assert not all(claim.holds for claim in claims), "two frames are too few for all claims"
+
+
+def test_the_box_turns_over_when_it_should_and_not_by_other_equations(monkeypatch):
+    frames, claims = run(DEMOS["dzhanibekov"], "implicit")
+    assert len(frames) == 600
+    assert all(claim.holds for claim in claims), claims
+    true = dzhanibekov.spin_by_euler
+    monkeypatch.setattr(dzhanibekov, "spin_by_euler", lambda inertia, times: true(inertia * [1.0, 1.0, 1.1], times))
+    assert not run(DEMOS["dzhanibekov"], "implicit", steps=320)[1][0].holds
 
 
 def test_cantilever_on_coarser_meshes_bends_less_than_theory(monkeypatch):

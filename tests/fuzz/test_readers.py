@@ -82,7 +82,7 @@ def record(folder: Path) -> None:
 def read_whole_recording(path: Path) -> None:
     with sp.read_recording(path) as recording:
         for frame in recording:
-            _ = frame.report, frame.positions, frame.velocities, frame.det_F, frame.poses, frame.index
+            _ = frame.report, frame.positions, frame.velocities, frame.det_F, frame.obstacle_poses, frame.index
 
 
 def make_scene(folder: Path) -> None:

@@ -178,7 +178,7 @@ def test_random_bytes_give_frames_or_an_error(tmp_path, recorded):
 
 def _read_all(recording) -> None:
     for frame in (recording[0], recording[-1]):
-        _ = frame.report, frame.positions, frame.velocities, frame.det_F, frame.poses, frame.index
+        _ = frame.report, frame.positions, frame.velocities, frame.det_F, frame.obstacle_poses, frame.index
 
 
 @pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="the superuser may read everything")

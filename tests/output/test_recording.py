@@ -41,7 +41,7 @@ def test_frames_and_reports_read_back_equal(recorded, recording):
         np.testing.assert_array_equal(recorded_frame.det_F, frame.det_F)
         for key, value in vars(frame.report).items():
             np.testing.assert_array_equal(getattr(recorded_frame.report, key), value, err_msg=key)
-        for pose, obstacle in zip(recorded_frame.poses, frame.system.obstacles, strict=True):
+        for pose, obstacle in zip(recorded_frame.obstacle_poses, frame.system.obstacles, strict=True):
             np.testing.assert_array_equal(pose[:, :3], obstacle.pose(frame.time)[0])
             np.testing.assert_array_equal(pose[:, 3], obstacle.pose(frame.time)[1])
     start = recording[0]

@@ -65,14 +65,14 @@ def test_reports_and_recordings_agree(recorded):
             assert kept.report.largest_stitch_stretch == frame.report.largest_stitch_stretch
         assert recording.series("stitch_energy")[0] == pytest.approx(0.0, abs=1e-15)
         for kept in (recording[0], recording[8]):
-            segments = recording.stitches.segments(kept.state.positions, kept.poses)
+            segments = recording.stitches.segments(kept.state.positions, kept.obstacle_poses)
             assert segments.shape == (8, 2, 3)
             nodes = frames[0].system.stitching.tets.vertices[:, 0]
             assert np.array_equal(segments[:4, 0], kept.state.positions[nodes])
             # The sheet rises by half a metre a second; under each corner of the box is where it was stitched.
             assert np.allclose(segments[:4, 1, 1], 0.5 * kept.time)
             assert np.allclose(np.abs(segments[:4, 1, [0, 2]]), 0.05)
-        first = recording.stitches.segments(recording[0].state.positions, recording[0].poses)
+        first = recording.stitches.segments(recording[0].state.positions, recording[0].obstacle_poses)
         assert np.allclose(np.linalg.norm(first[:, 0] - first[:, 1], axis=1), [0.01] * 4 + [0.02] * 4)
 
 

@@ -35,12 +35,20 @@ SOLVERS = {
     "newmark": sp.Implicit(integrator="newmark"),
 }
 SCENES = {"contact": contact_scene, "stitches": stitched_scene}
+PAIRS = [(solver, scene) for solver in SOLVERS for scene in SCENES]
 
 
-@pytest.mark.parametrize("scene", SCENES)
-@pytest.mark.parametrize("solver", SOLVERS)
+def rigid_scene():
+    stone = sp.RigidBody("stone", sp.shapes.sphere_surface(0.1, 0.1), density=2000, angular_velocity=(1, 2, 3))
+    soft = sp.Body("soft", MESH, SOFT)
+    top = float(MESH.vertices[:, 1].max())
+    held = sp.Pin("soft", np.flatnonzero(MESH.vertices[:, 1] == MESH.vertices[:, 1].min()))
+    return sp.Scene([soft, stone.changed(position=(0, top + 0.104, 0), velocity=(0, -0.5, 0))], pins=[held])
+
+
+@pytest.mark.parametrize(("solver", "scene"), [*PAIRS, ("bdf2", "rigid"), ("newmark", "rigid")])
 def test_a_resumed_run_has_the_bits_of_an_uninterrupted_one(out, solver, scene):
-    made, used = SCENES[scene], SOLVERS[solver]
+    made, used = (SCENES | {"rigid": rigid_scene})[scene], SOLVERS[solver]
     whole = list(sp.simulate(made(), used, DT, STEPS))
     kept(out, made(), used, stop_after=7, checkpoint_every=3)
     rest = list(sp.resume(out, made(), used))

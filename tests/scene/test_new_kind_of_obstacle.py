@@ -112,7 +112,7 @@ def test_a_recording_restores_it(recorded):
         (found,) = recording.obstacles
         assert isinstance(found.obstacle, RoundedCube)
         assert (found.obstacle.half, found.obstacle.rounding, found.obstacle.friction) == (0.5, 0.1, 0.4)
-        np.testing.assert_allclose(recording[20].poses[0, :, 3], [0, 0.1 / 3, 0], atol=1e-12)
+        np.testing.assert_allclose(recording[20].obstacle_poses[0, :, 3], [0, 0.1 / 3, 0], atol=1e-12)
         (drawn,) = obstacle_pictures(recording.obstacles, view_of(recording))
         assert drawn.vertices[:, 0].max() == pytest.approx(0.5, abs=1e-3)
     del KINDS["RoundedCube"]

@@ -229,6 +229,14 @@ def test_the_scene_of_the_manual_is_valid(load, tmp_path):
     assert list(Draft202012Validator(json_schema()).iter_errors(read_yaml(tmp_path / "scene.yaml").data)) == []
 
 
+def test_the_rigid_bodies_of_the_manual_are_valid(load, tmp_path):
+    manual = (Path(__file__).parents[2] / "docs" / "scene_files.md").read_text(encoding="utf-8")
+    sp.shapes.box_surface((200.0, 20.0, 200.0)).save(tmp_path / "tray.stl")
+    run = load(manual.split("```yaml\n")[2].split("```")[0])
+    assert [body.kappa > 0.0 for body in run.scene.bodies] == [True, True]
+    assert next(sp.simulate(run.scene, run.solver, run.dt, 1)).report.status == "converged"
+
+
 @pytest.mark.parametrize("kinds", ["material", "shape", "obstacle", "solver", "stitch"])
 def test_the_manual_lists_every_kind(kinds):
     manual = (Path(__file__).parents[2] / "docs" / "scene_files.md").read_text(encoding="utf-8")

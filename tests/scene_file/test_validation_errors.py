@@ -142,7 +142,7 @@ CASES = [
         "12: pins[0].box: pin of body 'cube': its box holds no vertex",
     ),
     ("vertices: [0]", "box: {low: [5, 5, 5], high: [4, 6, 6]}", "12: pins[0].box.low: InBox: low"),
-    (", vertices: [0]", "", "12: pins[0]: give the vertices by either `vertices` or `box`"),
+    (", vertices: [0]", "", "12: pins[0]: pin of body 'cube': give the vertices by either `vertices` or `box`"),
     (
         "vertices: [0]}",
         "vertices: [0]}\n  - {body: cube, vertices: [0]}",

@@ -24,7 +24,7 @@ class ObstacleRange:
     Attributes
     ----------
     index : among the scene's obstacles; vertices : (k,); anchors : (k, 3) at time 0 [m]
-    triangles : (t, 3) global vertex numbers; none for a half-space
+    triangles : (t, 3) rows of the vertices; none for a half-space
     """
 
     obstacle: Obstacle
@@ -55,14 +55,14 @@ class ObstacleRange:
 
 def with_obstacles(system: System) -> tuple[System, tuple[ObstacleRange, ...]]:
     """The system with the obstacles' vertices appended and pinned, and their ranges."""
-    diagonal = max(float(np.linalg.norm(np.ptp(system.rest_positions[p.vertices], axis=0))) for p in system.bodies)
+    diagonal = max(float(np.linalg.norm(np.ptp(system.rest_points[p.points], axis=0))) for p in system.bodies)
     ranges: list[ObstacleRange] = []
     n = len(system.rest_positions)
     for index, obstacle in enumerate(system.obstacles):
         points, triangles = _surface(obstacle, diagonal)
         vertices = np.arange(n, n + len(points), dtype=np.int32)
-        numbered = (triangles + n).astype(np.int32)
-        ranges.append(ObstacleRange(obstacle, index, vertices, np.ascontiguousarray(points), numbered))
+        own = triangles.astype(np.int32)
+        ranges.append(ObstacleRange(obstacle, index, vertices, np.ascontiguousarray(points), own))
         n += len(points)
     if not ranges:
         return system, ()

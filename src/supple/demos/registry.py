@@ -6,6 +6,7 @@ from supple.demos.bears import BEARS
 from supple.demos.cantilever import CANTILEVER
 from supple.demos.compliance import COMPLIANCE
 from supple.demos.demo import Demo
+from supple.demos.dzhanibekov import DZHANIBEKOV
 from supple.demos.quilt import QUILT
 from supple.demos.squash import SQUASH
 from supple.demos.stitch import STITCH
@@ -15,9 +16,8 @@ from supple.demos.twist import TWIST
 from supple.errors import SceneError
 
 _TORTURE = [torture.full for torture in TORTURE.values()]
-DEMOS: dict[str, Demo] = {
-    demo.name: demo for demo in (SQUASH, STRETCH, COMPLIANCE, BEARS, CANTILEVER, TWIST, STITCH, QUILT, *_TORTURE)
-}
+_PLAIN = (SQUASH, STRETCH, COMPLIANCE, BEARS, CANTILEVER, TWIST, STITCH, QUILT, DZHANIBEKOV)
+DEMOS: dict[str, Demo] = {demo.name: demo for demo in (*_PLAIN, *_TORTURE)}
 
 
 def find_demo(name: str) -> Demo:

@@ -34,6 +34,7 @@ class ImplicitDetails(SolverDetails):
     contact_stiffness : of the barrier at the end [Pa]; None without contact
     contact_forces, friction_forces : by name of the body or obstacle, (3,) [N]; each sum to zero
     reaction_forces : of the pins on their bodies, by label of the pin, (3,) [N]
+    orthogonality_errors : |F^T F - 1| of the rigid bodies, by name [-]
     seconds : of wall time, by part of the step; see `supple.implicit.timings`
     reaction_forces_by_vertex : by label of the pin, (k, 3) [N]
     newton : every iteration
@@ -51,6 +52,7 @@ class ImplicitDetails(SolverDetails):
     contact_forces: Forces = field(default_factory=dict)
     friction_forces: Forces = field(default_factory=dict)
     reaction_forces: Forces = field(default_factory=dict)
+    orthogonality_errors: Mapping[str, float] = field(default_factory=dict)
     seconds: Mapping[str, float] = field(default_factory=dict)
     reaction_forces_by_vertex: Forces = field(default_factory=dict, compare=False)
     newton: Sequence[NewtonRow] = field(default=(), compare=False)

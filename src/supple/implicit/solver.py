@@ -27,6 +27,7 @@ from supple.implicit.newton.linear_solver import LinearSolver
 from supple.implicit.newton.trace import NewtonRow
 from supple.implicit.stepping.integrators import Integrator, Static, integrator_of
 from supple.implicit.stepping.reactions import reaction_forces
+from supple.implicit.stepping.rigid_bodies import orthogonality_errors
 from supple.implicit.stepping.substep import StepSettings, Substep, take_substep
 from supple.implicit.stepping.substepping import Substepping
 from supple.implicit.stepping.workspace import Workspace
@@ -194,6 +195,7 @@ class Implicit(Solver):
             contact_forces=pushes,
             friction_forces=pushes,
             reaction_forces=reaction_forces(system, zero)[0],
+            orthogonality_errors=dict.fromkeys((part.name for part in system.rigid_bodies), 0.0),
             seconds=dict.fromkeys((*PARTS, "other"), 0.0),
         )
 
@@ -248,7 +250,8 @@ class Implicit(Solver):
             totals, by_vertex = reaction_forces(system, last.outcome.end.gradient / last.contact.weight)
             details = replace(details, reaction_forces=totals, reaction_forces_by_vertex=by_vertex)
             details, nearest, contacts = last.contact.measured(details, last.state.positions)
-        details = replace(details, seconds=workspace.tools.clock.shares())
+        errors = orthogonality_errors(system, now.positions)
+        details = replace(details, orthogonality_errors=errors, seconds=workspace.tools.clock.shares())
         return now, StepReport(worst, details.newton_iterations, message, nearest, details, contacts)
 
 

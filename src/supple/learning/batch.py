@@ -226,8 +226,8 @@ class Batch:
         return wanted
 
     def _by_body(self, rows: list[NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
-        stacked = np.stack(rows)
-        return {part.name: stacked[:, part.vertices] for part in self._copies[0].system.bodies}
+        split = [copy.system.split(values) for copy, values in zip(self._copies, rows, strict=True)]
+        return {name: np.stack([one[name] for one in split]) for name in split[0]}
 
     def _numbers(self, copies: ArrayLike | None) -> list[int]:
         if copies is None:

@@ -89,9 +89,9 @@ def scenes_of(
 
 def same_bodies(copies: Sequence[Copy]) -> None:
     """Raise where copies have other bodies than the first, so that their arrays cannot be put together."""
-    first = [(part.name, part.vertices) for part in copies[0].system.bodies]
+    first = [(part.name, part.vertices, part.points) for part in copies[0].system.bodies]
     for k, copy in enumerate(copies):
-        if [(part.name, part.vertices) for part in copy.system.bodies] != first:
+        if [(part.name, part.vertices, part.points) for part in copy.system.bodies] != first:
             raise SceneError(
                 f"Batch: copy {k} has other bodies, or other numbers of vertices, than copy 0; use `frame` of each copy"
             )

@@ -46,6 +46,15 @@ class Picture:
     def name(self) -> str:
         return self.body.name
 
+    def rest(self, recording: Recording) -> NDArray[np.float64]:
+        """The vertices of a rigid body's surface in its own coordinates (k, 3) [m]."""
+        return self.body.points(recording.rest_positions)
+
+    def pose(self, frame: RecordedFrame) -> NDArray[np.float64]:
+        """(3, 4) rotation and translation of a rigid body."""
+        pose = frame.poses[self.name]
+        return np.column_stack([pose.rotation, pose.translation])
+
     def at(self, frame: RecordedFrame) -> NDArray[np.float64]:
         """Positions of the vertices of the drawn surface, the skin or the boundary."""
         x = frame.state.positions[self.body.vertices]
@@ -102,7 +111,8 @@ def view_of(recording: Recording) -> View:
     """Bounds over all frames, of which at most about 200 are read."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for frame in recording[:: max(1, len(recording) // 200)]:
-        x = frame.state.positions[np.isfinite(frame.state.positions).all(axis=1)]
+        x = np.concatenate(list(frame.positions.values()))
+        x = x[np.isfinite(x).all(axis=1)]
         if len(x):
             low, high = np.minimum(low, x.min(axis=0)), np.maximum(high, x.max(axis=0))
     if not np.isfinite(low).all():
@@ -115,7 +125,7 @@ def view_of(recording: Recording) -> View:
 
 @dataclass(frozen=True, eq=False)
 class ObstaclePicture:
-    """An obstacle's triangles at time 0; `RecordedFrame.poses[number]` moves them."""
+    """An obstacle's triangles at time 0; `RecordedFrame.obstacle_poses[number]` moves them."""
 
     number: int
     name: str
@@ -127,12 +137,12 @@ class ObstaclePicture:
 
     def moves(self, frames: Iterable[RecordedFrame]) -> bool:
         """Whether its pose changes in these frames."""
-        poses = np.stack([frame.poses[self.number] for frame in frames])
+        poses = np.stack([frame.obstacle_poses[self.number] for frame in frames])
         return bool(np.any(poses != poses[0]))
 
     def at(self, frame: RecordedFrame) -> NDArray[np.float64]:
         """(k, 3) [m] in a frame."""
-        pose = frame.poses[self.number]
+        pose = frame.obstacle_poses[self.number]
         return self.vertices @ pose[:, :3].T + pose[:, 3]
 
 

@@ -75,9 +75,11 @@ def _serialize(server: Any, recording: Recording) -> str:
         for handle, picture in zip(handles, drawn, strict=True):
             handle.vertices = _rounded(picture.at(frame), quantum)
         if stitches is not None:
-            stitches.points = _rounded(recording.stitches.segments(frame.state.positions, frame.poses), quantum)
+            stitches.points = _rounded(
+                recording.stitches.segments(frame.state.positions, frame.obstacle_poses), quantum
+            )
         for number, (handle, before) in obstacles.items():
-            pose = frame.poses[number]
+            pose = frame.obstacle_poses[number]
             if not np.array_equal(pose, before):
                 handle.wxyz, handle.position = _quaternion(pose[:, :3]), pose[:, 3]
                 obstacles[number] = handle, pose
@@ -98,7 +100,7 @@ def _add_obstacles(server: Any, recording: Recording, view: View) -> dict[int, t
     """Draw the obstacles; returns their handles and poses by number."""
     handles = {}
     for obstacle in obstacle_pictures(recording.obstacles, view):
-        pose = recording[0].poses[obstacle.number]
+        pose = recording[0].obstacle_poses[obstacle.number]
         handle = server.scene.add_mesh_simple(
             f"/obstacles/{obstacle.number} {obstacle.name}",
             obstacle.vertices.astype(np.float32),
@@ -122,7 +124,7 @@ def _add_stitches(server: Any, recording: Recording, quantum: float) -> Any:
     first = recording[0]
     return server.scene.add_line_segments(
         "/stitches",
-        _rounded(recording.stitches.segments(first.state.positions, first.poses), quantum),
+        _rounded(recording.stitches.segments(first.state.positions, first.obstacle_poses), quantum),
         colors=STITCH_COLOR,
         thickness=2.0,
         thickness_units="screen",

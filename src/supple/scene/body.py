@@ -1,8 +1,10 @@
-"""A soft body: a tetrahedral mesh, its material, its placement and its initial velocity."""
+"""Bodies of a scene; the soft body: a tetrahedral mesh, its material, its placement and its initial velocity."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from abc import ABC
+from dataclasses import dataclass, field, replace
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,12 +13,78 @@ from supple.errors import SceneError
 from supple.materials.material import Material
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
+from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.scene.rotation import rotation_matrix
 from supple.scene.values import check_name, finite_vector, non_negative
 
 
+class PlacedBody(ABC):
+    """What every body of a scene has: vertices that move, and points on them that touch, are drawn and measured.
+
+    Attributes
+    ----------
+    name, position, rotation, velocity, angular_velocity, friction : see `Body`
+    mesh : the tets whose vertices move; material : of these tets
+    skin : the surface that is drawn in place of the mesh's own; None where that is drawn
+    """
+
+    name: str
+    position: ArrayLike
+    rotation: ArrayLike
+    velocity: ArrayLike
+    angular_velocity: ArrayLike
+    friction: float
+    mesh: TetMesh
+    material: Material
+    skin: SurfaceMesh | None
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """(k, 3) the points that a frame has the positions of, at rest in the body's own coordinates [m]."""
+        return self.mesh.vertices
+
+    @property
+    def triangles(self) -> NDArray[np.int32]:
+        """(t, 3) the surface that touches, rows of `points`, counter-clockwise from outside."""
+        return self.mesh.surface.triangles
+
+    @property
+    def embedded(self) -> EmbeddedPoints:
+        """`points` as combinations of the mesh's vertices."""
+        return EmbeddedPoints.at_vertices(np.arange(len(self.mesh.vertices), dtype=np.int32))
+
+    def place(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """World positions (k, 3) [m] at the start of points (k, 3) given in the body's own coordinates."""
+        return points @ rotation_matrix(self.rotation).T + np.asarray(self.position)
+
+    def changed(self, **values: Any) -> Self:
+        """The same body with other values of its parameters."""
+        this: Any = self
+        return replace(this, **values)
+
+    def _check_placement(self, owner: str, edges: NDArray[np.int32]) -> None:
+        """Make vectors of the placement and the velocities; edges (e, 2) : rows of `points`.
+
+        Raises
+        ------
+        SceneError : where a value is wrong, or the body is so far away that double precision cannot tell the ends of an
+            edge from each other.
+        """
+        for key in ("position", "rotation", "velocity", "angular_velocity"):
+            object.__setattr__(self, key, finite_vector(getattr(self, key), f"{owner}: {key}"))
+        object.__setattr__(self, "friction", non_negative(self.friction, f"{owner}: friction"))
+        ends = self.points[edges]
+        shortest = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).min())
+        reach = float(np.abs(np.asarray(self.position)).max())
+        if np.spacing(reach) > 1e-6 * shortest:
+            raise SceneError(
+                f"{owner}: position is {reach:g} m from the origin, too far for edges of {shortest:.3g} m in double "
+                "precision; move the scene nearer to the origin"
+            )
+
+
 @dataclass(frozen=True, eq=False)
-class Body:
+class Body(PlacedBody):
     """One soft body of a scene.
 
     Parameters
@@ -55,29 +123,11 @@ class Body:
             raise SceneError(f"{owner}: material is {self.material!r}; give a material such as StableNeoHookean(...)")
         if self.skin is not None and not isinstance(self.skin, SurfaceMesh):
             raise SceneError(f"{owner}: skin is a {type(self.skin).__name__}; give a SurfaceMesh")
-        for key in ("position", "rotation", "velocity", "angular_velocity"):
-            object.__setattr__(self, key, finite_vector(getattr(self, key), f"{owner}: {key}"))
-        object.__setattr__(self, "friction", non_negative(self.friction, f"{owner}: friction"))
+        self._check_placement(owner, self.mesh.edges)
         self._require_one_value_per_tet(owner)
-        self._require_fine_enough_coordinates(owner)
 
     def _require_one_value_per_tet(self, owner: str) -> None:
         try:
             self.material.per_tet(len(self.mesh.tets))
         except SceneError as error:
             raise SceneError(f"{owner}: {error}") from None
-
-    def _require_fine_enough_coordinates(self, owner: str) -> None:
-        """Far from the origin, neighbouring float64 numbers lie too far apart to tell the vertices from each other."""
-        ends = self.mesh.vertices[self.mesh.edges]
-        shortest = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).min())
-        reach = float(np.abs(np.asarray(self.position)).max())
-        if np.spacing(reach) > 1e-6 * shortest:
-            raise SceneError(
-                f"{owner}: position is {reach:g} m from the origin, too far for edges of {shortest:.3g} m in double "
-                "precision; move the scene nearer to the origin"
-            )
-
-    def place(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """World positions (k, 3) [m] at the start of points (k, 3) given in the mesh's coordinates."""
-        return points @ rotation_matrix(self.rotation).T + np.asarray(self.position)

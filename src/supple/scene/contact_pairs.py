@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
-from supple.scene.body import Body
+from supple.scene.body import PlacedBody
 from supple.scene.located import at
 from supple.scene.obstacles.obstacle import Obstacle
+from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.suggestion import suggestion
 from supple.scene.values import non_negative
 
@@ -68,7 +69,8 @@ class PairTable:
     friction : (p, p) Coulomb coefficients
     bodies : number of bodies among the p
 
-    Both arrays are symmetric. Between two obstacles there is no contact: False and 0.
+    Both arrays are symmetric. Between two obstacles there is no contact: False and 0. A rigid body does
+    not touch itself.
     """
 
     collide: NDArray[np.bool_]
@@ -80,7 +82,7 @@ class HasContactPairs(Protocol):
     """What this file uses of a scene."""
 
     @property
-    def bodies(self) -> Sequence[Body]: ...
+    def bodies(self) -> Sequence[PlacedBody]: ...
     @property
     def obstacles(self) -> Sequence[Obstacle]: ...
     @property
@@ -103,6 +105,8 @@ def pair_table(scene: HasContactPairs) -> PairTable:
     theirs = np.array([obstacle.friction for obstacle in scene.obstacles], dtype=np.float64)
     collide = np.ones((count, count), dtype=np.bool_)
     collide[bodies:, bodies:] = False
+    for k, body in enumerate(scene.bodies):
+        collide[k, k] = not isinstance(body, RigidBody)  # its parts do not move against each other
     friction = np.zeros((count, count))
     friction[:bodies, :bodies] = np.sqrt(np.outer(own, own))
     friction[:bodies, bodies:] = theirs

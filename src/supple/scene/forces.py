@@ -93,3 +93,8 @@ class SoftTarget(OnVertices):
         super().__post_init__()
         check_motion(self.motion, self.label)
         object.__setattr__(self, "stiffness", positive(self.stiffness, f"{self.label}: stiffness"))
+
+    def check_kind_of_body(self, rigid: bool) -> None:
+        """Raise `SceneError` for a rigid body: the springs pull vertices of tets."""
+        if rigid:
+            raise SceneError(f"{self.label}: soft targets pull soft bodies; move a rigid one with a Pin or a Force")

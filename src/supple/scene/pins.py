@@ -1,10 +1,11 @@
-"""Vertices that are fixed, or moved by a script."""
+"""Vertices and bodies that are fixed, or moved by a script."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import ClassVar
 
+from supple.errors import SceneError
 from supple.scene.motion import Motion, check_motion
 from supple.scene.selection import OnVertices, Selection
 
@@ -13,21 +14,30 @@ from supple.scene.selection import OnVertices, Selection
 class Pin(OnVertices):
     """Fixes vertices of one body at their start, or moves them along `motion` from there.
 
+    A rigid body is held as a whole: `Pin("palm", motion=...)`.
+
     Parameters
     ----------
     body : name of the body.
-    vertices : indices into the body's mesh, or an `InBox`.
-    motion : None, `Keyframes`, or t -> displacement [m], (3,) for all or (k, 3) for each vertex.
+    vertices : indices into the body's mesh, or an `InBox`; None for a rigid body.
+    motion : None, `Keyframes`, or t -> displacement [m], (3,) for all or (k, 3) for each vertex of a soft body.
     name : appears in messages and in the reaction forces of a report.
     """
 
     kind: ClassVar[str] = "pin"
+    takes_all: ClassVar[bool] = True
 
     body: str
-    vertices: Selection
+    vertices: Selection | None = None
     motion: Motion = None
     name: str | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
         check_motion(self.motion, self.label)
+
+    def check_kind_of_body(self, rigid: bool) -> None:
+        """Raise `SceneError` unless this selects vertices of a soft body, or all of a rigid one."""
+        super().check_kind_of_body(rigid)
+        if rigid and self.vertices is not None:
+            raise SceneError(f"{self.label}: a rigid body is held as a whole; leave out `vertices`")

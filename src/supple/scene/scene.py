@@ -12,13 +12,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.scene.body import Body
+from supple.scene.body import PlacedBody
 from supple.scene.contact_pairs import ContactPair, pair_table
 from supple.scene.forces import Force, SoftTarget
 from supple.scene.inputs import Input, inputs_among
 from supple.scene.located import at
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.pins import Pin
+from supple.scene.rigid.rigid_body import RigidBody
+from supple.scene.rigid.stiffness import with_stiffness
 from supple.scene.selection import InBox
 from supple.scene.stitches.stitch import Stitch
 from supple.scene.stitches.stitching import Stitching, check_names, stitch_together
@@ -26,7 +28,7 @@ from supple.scene.suggestion import suggestion
 from supple.scene.values import finite_vector
 
 _PARTS = (
-    ("bodies", Body),
+    ("bodies", PlacedBody),
     ("obstacles", Obstacle),
     ("pins", Pin),
     ("forces", Force),
@@ -42,7 +44,7 @@ class Scene:
 
     Parameters
     ----------
-    bodies : at least one.
+    bodies : soft (`Body`) and rigid (`RigidBody`); at least one.
     obstacles : rigid things that bodies collide with. No two bodies or obstacles have the same name.
     pins : fixed or scripted vertices.
     gravity : (3,) acceleration [m/s^2].
@@ -55,7 +57,7 @@ class Scene:
     SceneError : where the parts contradict each other.
     """
 
-    bodies: Sequence[Body]
+    bodies: Sequence[PlacedBody]
     obstacles: Sequence[Obstacle] = ()
     pins: Sequence[Pin] = ()
     gravity: ArrayLike = (0.0, -9.81, 0.0)
@@ -72,11 +74,12 @@ class Scene:
                 raise SceneError(f"scene: {key} is {getattr(self, key)!r}; give a list") from None
             for i, item in enumerate(items):
                 if not isinstance(item, kind):
-                    raise SceneError(f"scene: {key}[{i}] is a {type(item).__name__}; give a {kind.__name__}")
+                    raise SceneError(f"scene: {key}[{i}] is a {type(item).__name__}; give a {_name(kind)}")
             object.__setattr__(self, key, items)
         if not self.bodies:
             raise SceneError("scene: there is no body; give at least one")
         object.__setattr__(self, "gravity", finite_vector(self.gravity, "scene: gravity"))
+        object.__setattr__(self, "bodies", with_stiffness(self.bodies, np.asarray(self.gravity)))
         object.__setattr__(self, "obstacles", _all_named(self.obstacles, [body.name for body in self.bodies]))
         named: dict[str | None, str] = {}
         for key, thing, items in (("bodies", "body", self.bodies), ("obstacles", "obstacle", self.obstacles)):
@@ -86,7 +89,7 @@ class Scene:
                         things = f"{named[item.name]} {item.name!r} and {thing} {item.name!r}"
                         raise SceneError(f"{things} have the same name; give each body and obstacle a name of its own")
                 named[item.name] = thing
-        pinned = {body.name: np.zeros(len(body.mesh.vertices), dtype=bool) for body in self.bodies}
+        pinned = {body.name: np.zeros(len(body.points), dtype=bool) for body in self.bodies}
         for key in ("pins", "forces", "soft_targets"):
             for i, item in enumerate(getattr(self, key)):
                 with at(key, i):
@@ -102,8 +105,9 @@ class Scene:
             with at("body"):
                 raise SceneError(f"{item.label}: there is no body {item.body!r}; {suggestion(item.body, list(pinned))}")
         body, held = self.body(item.body), pinned[item.body]
+        item.check_kind_of_body(isinstance(body, RigidBody))
         with at("box" if isinstance(item.vertices, InBox) else "vertices"):
-            chosen = item.select(body.place(body.mesh.vertices))
+            chosen = item.select(body.place(body.points))
             if isinstance(item, Pin):
                 if held[chosen].any():
                     vertex = chosen[held[chosen]][0]
@@ -150,7 +154,7 @@ class Scene:
             soft_targets=[replace(target, motion=owned(target.motion)) for target in self.soft_targets],
         )
 
-    def body(self, name: str) -> Body:
+    def body(self, name: str) -> PlacedBody:
         """The body of that name.
 
         Raises
@@ -161,6 +165,10 @@ class Scene:
             if body.name == name:
                 return body
         raise SceneError(f"scene: there is no body {name!r}; there are {', '.join(repr(b.name) for b in self.bodies)}")
+
+
+def _name(kind: type) -> str:
+    return "Body or RigidBody" if kind is PlacedBody else kind.__name__
 
 
 def _all_named(obstacles: Sequence[Obstacle], bodies: Sequence[str]) -> tuple[Obstacle, ...]:

@@ -45,9 +45,10 @@ class OnVertices:
 
     kind: ClassVar[str]
     joint: ClassVar[str] = "of"
+    takes_all: ClassVar[bool] = False  # whether vertices=None selects all of a rigid body
 
     body: str
-    vertices: Selection
+    vertices: Selection | None
     name: str | None
 
     def __post_init__(self) -> None:
@@ -61,6 +62,13 @@ class OnVertices:
         """The name of this object in messages."""
         return f"{self.kind}{f' {self.name!r}' if self.name else ''} {self.joint} body {self.body!r}"
 
+    def check_kind_of_body(self, rigid: bool) -> None:
+        """Raise `SceneError` where this cannot act on a soft, or a rigid, body."""
+        if self.vertices is None and not rigid:
+            raise SceneError(
+                f"{self.label}: give the vertices by either `vertices` or `box`; only rigid bodies need none"
+            )
+
     def select(self, placed: NDArray[np.float64]) -> NDArray[np.int32]:
         """Vertex indices (k,) of the body, given its vertices placed in the world (n, 3).
 
@@ -68,6 +76,8 @@ class OnVertices:
         ------
         SceneError : where an index is out of range, or the box holds no vertex.
         """
+        if self.vertices is None:
+            return np.arange(len(placed), dtype=np.int32)
         if isinstance(self.vertices, InBox):
             indices = self.vertices.select(placed)
             if len(indices) == 0:
@@ -79,9 +89,9 @@ class OnVertices:
             raise SceneError(f"{self.label}: vertex {indices.max()} does not exist; the body has {len(placed)}")
         return indices
 
-    def _checked_selection(self) -> NDArray[np.int32] | InBox:
+    def _checked_selection(self) -> NDArray[np.int32] | InBox | None:
         """The selection, checked as far as possible without its body."""
-        if isinstance(self.vertices, InBox):
+        if isinstance(self.vertices, InBox) or (self.vertices is None and self.takes_all):
             return self.vertices
         try:
             indices = np.atleast_1d(np.asarray(self.vertices))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from supple.errors import SceneError
-from supple.scene.body import Body
+from supple.scene.body import PlacedBody
 from supple.scene.located import LocatedError, at
 from supple.scene.scene import Scene
 from supple.scene_file.document import OutputModel, SceneFileModel
@@ -105,7 +105,7 @@ def validated(document: YamlDocument) -> SceneFileModel:
 
 
 def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
-    bodies: dict[str, Body] = {}
+    bodies: dict[str, PlacedBody] = {}
     starts: dict[str, NDArray[np.float64]] = {}
     for i, described in enumerate(model.bodies):
         with at("bodies", i):

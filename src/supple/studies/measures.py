@@ -125,7 +125,7 @@ class BodyMeasure:
         OutputError, StudyError : where there is no such body, or no such vertex.
         """
         body = recording.body(self.body)
-        count = body.vertices.stop - body.vertices.start
+        count = body.point_count
         rows: Any = slice(None) if self.vertices is None else list(self.vertices)
         if self.vertices is not None and max(self.vertices) >= count:
             raise StudyError(f"{self.body!r} has {count} vertices; there is no vertex {max(self.vertices)}")

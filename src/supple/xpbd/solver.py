@@ -114,8 +114,12 @@ class XPBD(Solver):
 
         Raises
         ------
-        SolverError : where a body's material has no XPBD constraints; the text names the body.
+        SolverError : where a body is rigid, or its material has no XPBD constraints; the text names the body.
         """
+        if system.rigid_bodies:
+            raise SolverError(
+                f"XPBD: body {system.rigid_bodies[0].name!r} is rigid; simulate rigid bodies with Implicit"
+            )
         layout = make_layout(system)
         inner = reordered(system, layout)
         extended = np.zeros((len(system.masses) + len(inner.stitching.anchors), 4))

@@ -10,7 +10,7 @@ from supple.contact.ccd.intersections import intersects
 from supple.contact.ccd.largest_step import largest_step, largest_step_in_pieces
 from supple.contact.search.finder import CandidateFinder
 from supple.contact.surface.contact_mesh import mesh_of_triangles
-from supple.contact.surface.embedded_points import EmbeddedPoints
+from supple.numerics.geometry.embedded_points import EmbeddedPoints
 
 
 def boxes(distance, divisions=2, count=2):

@@ -9,7 +9,7 @@ import supple as sp
 from supple.contact.search.finder import CandidateFinder
 from supple.contact.surface.contact_mesh import mesh_of_triangles
 from supple.contact.surface.distances import edges_nearer, points_nearer
-from supple.contact.surface.embedded_points import EmbeddedPoints
+from supple.numerics.geometry.embedded_points import EmbeddedPoints
 
 DHAT = 0.02
 

@@ -10,7 +10,7 @@ from supple.contact.ccd.intersections import intersects
 from supple.contact.obstacle_vertices import obstacle_positions, with_obstacles
 from supple.contact.surface.contact_mesh import contact_mesh, mesh_of_triangles
 from supple.contact.surface.distances import edges_nearer, points_nearer
-from supple.contact.surface.embedded_points import EmbeddedPoints
+from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.scene.contact_pairs import pair_table
 from supple.scene.stitches.masks import stitched_edges, stitched_triangles
 from supple.system import build_system, initial_state

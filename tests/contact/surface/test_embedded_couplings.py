@@ -3,7 +3,7 @@
 import numpy as np
 
 from supple.contact.surface.embedded_couplings import vertex_couplings
-from supple.contact.surface.embedded_points import EmbeddedPoints
+from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.numerics.sparse.couplings import Couplings
 
 

@@ -8,7 +8,6 @@ import pytest
 import supple as sp
 from supple.contact.closest.pair_geometry import VERTEX_VERTEX
 from supple.contact.potentials.friction_energy import Slips
-from supple.contact.surface.embedded_points import EmbeddedPoints
 from supple.implicit.contact.friction import Friction
 from supple.implicit.energies.inertia import Inertia
 from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
@@ -20,6 +19,7 @@ from supple.implicit.newton.free_motion import FreeMotion
 from supple.implicit.newton.linear_solver import LinearSolver
 from supple.implicit.newton.minimize import Outcome, Problem, minimize
 from supple.implicit.newton.objective import Objective
+from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.state import Status
 from supple.system import System, build_system
 

@@ -24,6 +24,7 @@ def check(
     only: Names = None,
     skip: Names = None,
     max_volume_change: float | None = None,
+    max_orthogonality_error: float | None = None,
     max_energy_gain: float | None = None,
     max_momentum_change: float | None = None,
     json: Path | None = None,
@@ -44,6 +45,8 @@ def check(
     max_volume_change
         Largest relative change of a body's volume. Without it: 0.5 where Poisson's ratio is 0.45 or more, otherwise
         unlimited.
+    max_orthogonality_error
+        Largest |F^T F - 1| of a rigid body; 0.01 without it.
     max_energy_gain
         Largest relative growth of the energy where no external work is done; 0.05 without it.
     max_momentum_change
@@ -62,6 +65,7 @@ def check(
         "only": only,
         "skip": skip,
         "max_volume_change": max_volume_change,
+        "max_orthogonality_error": max_orthogonality_error,
         "max_energy_gain": max_energy_gain,
         "max_momentum_change": max_momentum_change,
     }

@@ -12,7 +12,8 @@ if TYPE_CHECKING:
 
     from supple.mesh.surface import SurfaceMesh
     from supple.mesh.tetmesh import TetMesh
-    from supple.scene.body import Body
+    from supple.scene.body import PlacedBody
+    from supple.scene.rigid.rigid_body import RigidBody
     from supple.scene.stitches.stitching import Stitching
 
 SCENE_FILES = (".yaml", ".yml")
@@ -131,6 +132,7 @@ def _mesh(file: Path, suffix: str) -> None:
 
 
 def _scene(file: Path) -> None:
+    from supple.scene.rigid.rigid_body import RigidBody
     from supple.scene_file.loader import load_run
     from supple.system import build_system
 
@@ -148,6 +150,9 @@ def _scene(file: Path) -> None:
     ]
     for part in system.bodies:
         mass = system.masses[part.vertices].sum()
+        if isinstance(part.body, RigidBody):
+            rows.append((f"body {part.name}", _rigid_text(part.body)))
+            continue
         mesh = part.body.mesh
         text = f"{type(part.body.material).__name__}, {len(mesh.tets)} tets, {mesh.volume:.6g} m^3, {mass:.6g} kg"
         rows.append((f"body {part.name}", text))
@@ -156,11 +161,22 @@ def _scene(file: Path) -> None:
     print_table(rows, str(file))
 
 
+def _rigid_text(body: RigidBody) -> str:
+    import numpy as np
+
+    p = body.properties
+    inertia = ", ".join(f"{value:.6g}" for value in np.linalg.eigvalsh(p.inertia))
+    return (
+        f"rigid, {len(body.triangles)} triangles, {p.volume:.6g} m^3, {p.mass:.6g} kg, principal moments of inertia "
+        f"{inertia} kg m^2, stiffness {body.kappa:.3g} Pa"
+    )
+
+
 # Of the surface: below it, a few thin parts such as edges of a wedge are not worth a warning.
 _THIN_SHARE = 0.1
 
 
-def _locking_rows(body: Body) -> list[tuple[str, str]]:
+def _locking_rows(body: PlacedBody) -> list[tuple[str, str]]:
     """A warning where nearly incompressible tets are too few across to deform (docs/locking.md)."""
     import numpy as np
 
@@ -207,6 +223,7 @@ def _recording(file: Path) -> None:
 
     with read_recording(file) as recording:
         J = recording.series("min_det_F")
+        soft = [body for body in recording.bodies if not body.rigid]
         rows = [
             ("kind", "recording"),
             ("frames", f"{len(recording)} to t = {recording.times[-1]:.6g} s, dt = {recording.dt:.6g} s"),
@@ -214,7 +231,7 @@ def _recording(file: Path) -> None:
             ("obstacles", ", ".join(f"{o.name} ({o.kind})" for o in recording.obstacles) or "none"),
             ("vertices", str(len(recording.masses))),
             ("tets", str(len(recording.tets))),
-            ("volume", f"{recording.rest_volumes.sum():.6g} m^3 at rest"),
+            ("volume", f"{sum(recording.rest_volumes[b.tets].sum() for b in soft):.6g} m^3 of soft bodies at rest"),
             ("mass", f"{recording.masses.sum():.6g} kg"),
             ("solver", recording.solver or "unknown"),
             ("smallest J", f"{J.min():.6g} at t = {recording.times[int(np.argmin(J))]:.6g} s"),

@@ -50,7 +50,7 @@ class Separation:
 
 def default_gap(system: System) -> float:
     """A hundredth of the mean edge of the bodies' surfaces [m]."""
-    corners = system.rest_positions[system.triangles]
+    corners = system.rest_points[system.triangles]
     return GAP * float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())
 
 
@@ -106,14 +106,14 @@ def _applied(scene: Scene, given: Mapping[str, ArrayLike], total: NDArray[np.flo
         if not shift.any():
             continue
         body = bodies[i]
-        bodies[i] = replace(body, position=np.asarray(body.position) + shift)
+        bodies[i] = body.changed(position=np.asarray(body.position) + shift)
         moves.append(Move(body.name, shift))
         if body.name in starts:
             starts[body.name] = starts[body.name] + shift
         for items in loads.values():  # loads keep their vertices, also where a box chose them
             for k, item in enumerate(items):
                 if item.body == body.name:
-                    items[k] = replace(item, vertices=item.select(body.place(body.mesh.vertices)))
+                    items[k] = replace(item, vertices=item.select(body.place(body.points)))
     if not moves:
         return Separation(scene, starts, ())
     return Separation(replace(scene, bodies=bodies, **loads), starts, tuple(moves))
@@ -122,7 +122,7 @@ def _applied(scene: Scene, given: Mapping[str, ArrayLike], total: NDArray[np.flo
 def shifted(system: System, s: StartSurfaces, body: int, shift: NDArray[np.float64]) -> StartSurfaces:
     """The surfaces with one body moved by `shift` (3,) [m]."""
     points = s.points.copy()
-    points[system.bodies[body].vertices] += shift
+    points[system.bodies[body].points] += shift
     return replace(s, points=points)
 
 
@@ -149,11 +149,11 @@ class Mover:
         members = [np.flatnonzero(self.group == group) for group in self.group]
         spans, self.masses = [], []
         for together in members:
-            rows = np.concatenate([np.arange(len(positions))[system.bodies[k].vertices] for k in together])
+            parts = [system.bodies[k] for k in together]
             # A single body has the size of its rest shape; a group has its size at the start.
-            points = system.rest_positions if len(together) == 1 else positions
-            spans.append(np.ptp(points[rows], axis=0))
-            self.masses.append(float(system.masses[rows].sum()))
+            points = system.rest_points if len(together) == 1 else system.points.positions(positions)
+            spans.append(np.ptp(np.concatenate([points[part.points] for part in parts]), axis=0))
+            self.masses.append(sum(float(system.masses[part.vertices].sum()) for part in parts))
         self.limits = FURTHEST * np.linalg.norm(spans, axis=1)
         self.free = [not self.held[together].any() for together in members]
         size = float(np.linalg.norm(system.gravity))
@@ -337,7 +337,7 @@ def _groups(system: System) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
 
 
 def _triangles(item: Intersection) -> str:
-    """Which triangles meet: a few, by their numbers in `body.mesh.surface.triangles`."""
+    """Which triangles meet: a few, by their numbers in `body.triangles`."""
     if not len(item.triangles):
         return ""
     more = f" and {len(item.triangles) - 3} more" if len(item.triangles) > 3 else ""

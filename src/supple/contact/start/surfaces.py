@@ -20,7 +20,7 @@ class StartSurfaces:
 
     Attributes
     ----------
-    points : (n, 3) [m], the system's vertices first; triangles : (t, 3), the system's first
+    points : (p, 3) [m], the system's points first; triangles : (t, 3), the system's first
     owner : (t,) the thing of each triangle; first_row : (p,) the row of each thing's first triangle
     pieces : (s, 2) for each connected part of a surface its thing and one of its vertices
     planes : half-spaces, as (thing, point (3,), normal (3,))
@@ -46,7 +46,7 @@ def start_surfaces(system: System, positions: NDArray[np.float64], time: float) 
     bodies = len(system.bodies)
     n = system.bodies[-1].vertices.stop
     count = bodies + len(system.obstacles)
-    points, triangles = [np.asarray(positions, dtype=np.float64)[:n]], [system.triangles]
+    points, triangles = [system.points.positions(np.asarray(positions, dtype=np.float64)[:n])], [system.triangles]
     owner = [np.repeat(np.arange(bodies), [part.triangles.stop - part.triangles.start for part in system.bodies])]
     planes, rooms, solid = [], [], np.ones(count, dtype=np.bool_)
     for part in with_obstacles(system)[1]:
@@ -58,7 +58,7 @@ def start_surfaces(system: System, positions: NDArray[np.float64], time: float) 
         if part.obstacle.is_room:
             rooms.append(thing)
             solid[thing] = False
-        local = part.triangles - part.vertices[0]
+        local = part.triangles
         solid[thing] &= _is_closed(local)
         triangles.append(local + sum(map(len, points)))
         points.append(corners)

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.obstacle_vertices import ObstacleRange
-from supple.contact.surface.embedded_points import EmbeddedPoints
 from supple.contact.surface.stitch_filter import StitchFilter, stitch_filter
 from supple.mesh.topology import edge_keys
 from supple.numerics.adjacency import Adjacency, adjacency
+from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.system import System
 
 
@@ -66,24 +66,31 @@ def contact_mesh(
     collide : (p, p) which owners may touch, bodies before obstacles
     start : (n, 3) where everything is at the start [m]
     """
-    triangles = np.concatenate([system.triangles] + [part.triangles for part in obstacles if not part.is_plane])
-    vertices = np.unique(triangles).astype(np.int32)
-    number = np.full(len(system.rest_positions), -1, dtype=np.int32)
-    number[vertices] = np.arange(len(vertices), dtype=np.int32)
-    owner_of = np.full(len(system.rest_positions), -1, dtype=np.int32)
-    for k, part in enumerate(system.bodies):
-        owner_of[part.vertices] = k
+    bodies = len(system.bodies)
+    points, triangles = [system.points], [system.triangles]
+    owner = [np.repeat(np.arange(bodies), [part.points.stop - part.points.start for part in system.bodies])]
     for part in obstacles:
-        owner_of[part.vertices] = len(system.bodies) + part.index
+        if not part.is_plane:
+            triangles.append(part.triangles + sum(map(len, points)))
+            points.append(EmbeddedPoints.at_vertices(part.vertices))
+            owner.append(np.full(len(part.vertices), bodies + part.index))
+    corners = np.concatenate(triangles)
+    used = np.unique(corners)
+    number = np.full(sum(map(len, points)), -1, dtype=np.int32)
+    number[used] = np.arange(len(used), dtype=np.int32)
+    surface = EmbeddedPoints.joined(points).taken(used)
+    of_vertex = np.full(len(system.rest_positions) + 1, -1, dtype=np.int32)  # the last one for nodes without a vertex
+    alone = np.flatnonzero(surface.single >= 0)
+    of_vertex[surface.single[alone]] = alone
     return mesh_of_triangles(
-        EmbeddedPoints.at_vertices(vertices),
-        number[triangles],
-        owner_of[vertices],
-        system.rest_positions[vertices],
-        body_count=len(system.bodies),
+        surface,
+        number[corners],
+        np.concatenate(owner)[used].astype(np.int32),
+        surface.positions(system.rest_positions),
+        body_count=bodies,
         names=tuple(part.name for part in system.bodies) + tuple(str(o.name) for o in system.obstacles),
         collide=collide,
-        stitches=(np.append(number, -1)[system.stitching.nodes()], start[vertices]),
+        stitches=(of_vertex[system.stitching.nodes()], surface.positions(start)),
     )
 
 

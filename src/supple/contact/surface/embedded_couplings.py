@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from supple.contact.surface.embedded_points import EmbeddedPoints
+from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.numerics.kernel_cache import njit
 from supple.numerics.sparse.couplings import Couplings
 

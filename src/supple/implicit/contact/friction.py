@@ -22,8 +22,8 @@ from supple.contact.potentials.friction_energy import (
     renew_duals,
 )
 from supple.contact.surface.embedded_couplings import vertex_couplings
-from supple.contact.surface.embedded_points import EmbeddedPoints
 from supple.implicit.energies.potential import FrictionPotential, HessianBlocks
+from supple.numerics.geometry.embedded_points import EmbeddedPoints
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,9 +23,9 @@ from supple.contact.potentials.plane_contacts import (
 )
 from supple.contact.surface.contact_mesh import ContactMesh
 from supple.contact.surface.embedded_couplings import vertex_couplings
-from supple.contact.surface.embedded_points import EmbeddedPoints
 from supple.implicit.contact.friction import Friction
 from supple.implicit.energies.potential import ContactPotential, HessianBlocks
+from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.numerics.sparse.couplings import Couplings
 
 # A step keeps at least this share of every distance; the bound for triangles is conservative in the same way.

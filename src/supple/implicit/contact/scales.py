@@ -11,13 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.implicit.contact.settings import IPCContact
-from supple.system import System
+from supple.scene.rigid.rigid_body import RigidBody
+from supple.system import BodyRange, System
 
 _DHAT_SHARE = 1e-3  # of the smallest body's diagonal
 _EDGE_SHARE = 0.25  # of the short surface edges: a surface at rest then has no contacts with itself
 _SHORT_EDGES = 2.0  # [%] percentile of the edge lengths that counts as short
 _SMALLEST_SHARE = 1e-5  # of the diagonal: gaps at the start do not reduce dhat below it
 _STIFFNESS_SHARE = 1.0  # of the softest body's modulus
+_RIGID_SHARE = 0.04  # of the stiffness of a rigid body: ten times the stress that makes an error of 1e-3
 _SLOW_SHARE = 1e-3  # of the diagonal, per second
 
 
@@ -45,7 +47,7 @@ def scales_of(settings: IPCContact, system: System, shear_moduli: NDArray[np.flo
     shear_moduli : (m,) of the tets [Pa]; gap : smallest distance at the start [m], or infinity
     """
     smallest = smallest_diagonal(system)
-    moduli = [3.0 * float(np.mean(shear_moduli[p.tets])) for p in system.bodies]
+    moduli = [_modulus(part, shear_moduli[part.tets]) for part in system.bodies]
     dhat = settings.dhat
     if dhat is None:
         dhat = min(largest_dhat(system), max(gap, _SMALLEST_SHARE * smallest))
@@ -55,14 +57,21 @@ def scales_of(settings: IPCContact, system: System, shear_moduli: NDArray[np.flo
     return Scales(dhat, stiffness, _SLOW_SHARE * smallest if slow is None else slow, adaptive)
 
 
+def _modulus(part: BodyRange, shear_moduli: NDArray[np.float64]) -> float:
+    """Of one body [Pa]; of a rigid body, ten times the stress that its default stiffness is made for."""
+    if isinstance(part.body, RigidBody):
+        return _RIGID_SHARE * part.body.kappa
+    return 3.0 * float(np.mean(shear_moduli))
+
+
 def smallest_diagonal(system: System) -> float:
     """The diagonal of the smallest body's bounding box at rest [m]."""
-    return min(float(np.linalg.norm(np.ptp(system.rest_positions[part.vertices], axis=0))) for part in system.bodies)
+    return min(float(np.linalg.norm(np.ptp(system.rest_points[part.points], axis=0))) for part in system.bodies)
 
 
 def largest_dhat(system: System) -> float:
     """The default of dhat where no surfaces are near each other at the start [m]."""
-    a, b, c = system.rest_positions[system.triangles].transpose(1, 0, 2)
+    a, b, c = system.rest_points[system.triangles].transpose(1, 0, 2)
     edges = np.concatenate(
         [np.linalg.norm(b - a, axis=1), np.linalg.norm(c - b, axis=1), np.linalg.norm(a - c, axis=1)]
     )

@@ -24,6 +24,7 @@ from supple.implicit.stepping.contact_step import ContactStep
 from supple.implicit.stepping.dirichlet import move_pins
 from supple.implicit.stepping.integrators import Integrator, Plan, Static
 from supple.implicit.stepping.midpoint import ActingWithin
+from supple.implicit.stepping.rigid_bodies import rigid_ends, with_rigid_bodies
 from supple.implicit.stepping.workspace import Workspace
 from supple.state import State, Status
 from supple.system import System
@@ -119,7 +120,10 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     outcome = contact.verified(replace(outcome, rows=rows))
     after = State(end, x, plan.velocity(x), plan.memory)
     residual = plan.place * outcome.end.gradient
-    return Substep(settings.integrator.finish(plan, state, after, residual, workspace.conservation), outcome, contact)
+    after = settings.integrator.finish(plan, state, after, residual, workspace.conservation)
+    if plan.place != 1.0 and system.rigid_bodies and outcome.status is Status.CONVERGED:
+        after = rigid_ends(system, state, after, limits)
+    return Substep(after, outcome, contact)
 
 
 def _objective(
@@ -153,10 +157,12 @@ def _first_guess(
     limits: StepLimits,
     pinned: NDArray[np.int32],
 ) -> NDArray[np.float64]:
-    """The positions without elasticity, as far as the filters allow; x where that has less energy."""
+    """The positions without elasticity, with rigid bodies rigid, as far as the filters allow; x where that has less
+    energy."""
     if plan.scale is None:
         return x
     ahead = plan.predicted + plan.scale / plan.place * forces / system.masses[:, None]
+    ahead = with_rigid_bodies(system, x, ahead, plan.place)
     ahead[pinned] = x[pinned]
     step = limits.largest_step(x, ahead - x).step
     if step < 1.0:

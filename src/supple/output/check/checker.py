@@ -11,6 +11,7 @@ from supple.output.check.checks.budgets import Energy, Momentum, Spin
 from supple.output.check.checks.contact import Containment, Distance, Intersection, Obstacles
 from supple.output.check.checks.plain_values import CONSTANTS, Converged, Finite, Sequence
 from supple.output.check.checks.records import Records
+from supple.output.check.checks.rigidity import Rigidity
 from supple.output.check.checks.tets import Inversion, RestShape, Volume
 from supple.output.check.frame_check import FrameCheck
 from supple.output.check.report import CheckReport, CheckResult
@@ -29,6 +30,7 @@ CHECKS: tuple[type[FrameCheck], ...] = (
     Obstacles,
     Containment,
     Distance,
+    Rigidity,
     Volume,
     Momentum,
     Spin,

@@ -16,9 +16,13 @@ def seam_keys(recording: Recording, surfaces: Surfaces) -> NDArray[np.int64]:
     are stitched to each other, and have a stitched corner."""
     stitched = surfaces.stitched
     frame = recording[0]
-    if not len(stitched) or not np.isfinite(frame.state.positions).all() or not np.isfinite(frame.poses).all():
+    if not len(stitched) or not np.isfinite(frame.state.positions).all() or not np.isfinite(frame.obstacle_poses).all():
         return np.zeros(0, dtype=np.int64)
-    x, triangles, owners = surfaces.place(frame.state.positions, frame.poses), surfaces.triangles, surfaces.owners
+    x, triangles, owners = (
+        surfaces.place(frame.state.positions, frame.obstacle_poses),
+        surfaces.triangles,
+        surfaces.owners,
+    )
     thing = np.full(len(x), -1)
     thing[triangles] = owners[:, None]
     joined = np.zeros_like(surfaces.allowed)

@@ -38,10 +38,13 @@ class Scene:
     def size(self) -> float:
         """Longest extent of the largest body at rest [m]."""
         rest = self.recording.rest_positions
-        return max(float(np.ptp(rest[body.vertices], axis=0).max()) for body in self.recording.bodies)
+        return max(float(np.ptp(body.points(rest), axis=0).max()) for body in self.recording.bodies)
 
     def name(self, kind: Literal["vertex", "tet"], row: int) -> str:
-        """A vertex or tet as messages call it: its number within its body."""
+        """A vertex or tet as messages call it: its number within its body; of a rigid one, within its surface."""
+        for body, first in self.surfaces.rigid if kind == "vertex" else ():
+            if body.skin is not None and first <= row < first + len(body.skin.corners):
+                return f"vertex {row - first} of {body.name}"
         for body in self.recording.bodies:
             rows = body.vertices if kind == "vertex" else body.tets
             if rows.start <= row < rows.stop:
@@ -70,7 +73,7 @@ class Snapshot:
     @classmethod
     def of(cls, scene: Scene, frame: RecordedFrame) -> Snapshot:
         x, v = frame.state.positions, frame.state.velocities
-        return cls(scene, frame.number, frame.time, np.ascontiguousarray(x), v, frame.det_F, frame.poses)
+        return cls(scene, frame.number, frame.time, np.ascontiguousarray(x), v, frame.det_F, frame.obstacle_poses)
 
     @cached_property
     def finite(self) -> bool:

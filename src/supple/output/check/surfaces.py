@@ -10,6 +10,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from supple.output.recording.reader import Recording
+from supple.output.recording.scene import RecordedBody
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +38,7 @@ class Surfaces:
     triangles : (t, 3) those of bodies first; owners : (t,); first_triangle : (p,) the first one of each owner
     allowed : (p, p) which owners' surfaces must stay apart; ignored : sorted keys of pairs of triangles that may meet
     stitched : (k, 4) points of each stitch, some of them twice where it has fewer
+    rigid : (body, its first row) of rigid bodies, whose surfaces' points follow their control points
     fixed : (obstacle, its points at time 0, its first row) of obstacles made of triangles; points : number of all rows
     pieces : see `Piece`
     """
@@ -44,10 +46,18 @@ class Surfaces:
     def __init__(self, recording: Recording) -> None:
         self.bodies = len(recording.bodies)
         self.names = tuple(thing.name for thing in (*recording.bodies, *recording.obstacles))
-        triangles = [body.triangles.astype(np.int64) + body.vertices.start for body in recording.bodies]
-        counts = [len(body.triangles) for body in recording.bodies]
+        triangles: list[NDArray[np.int64]] = []
         self.fixed: list[tuple[int, NDArray[np.float64], int]] = []
+        self.rigid: list[tuple[RecordedBody, int]] = []
         row = len(recording.rest_positions)
+        for body in recording.bodies:
+            if body.rigid and body.skin is not None:
+                self.rigid.append((body, row))
+                triangles.append(body.skin.triangles.astype(np.int64) + row)
+                row += len(body.skin.corners)
+            else:
+                triangles.append(body.triangles.astype(np.int64) + body.vertices.start)
+        counts = [len(part) for part in triangles]
         for j, obstacle in enumerate(recording.obstacles):
             points, faces = np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
             if obstacle.obstacle.has_exact_triangles:  # others are checked by their formula
@@ -66,9 +76,13 @@ class Surfaces:
         self.pieces = _pieces(recording, self.triangles, self.owners, row)
 
     def place(self, positions: NDArray[np.float64], poses: NDArray[np.float64]) -> NDArray[np.float64]:
-        """All points (n + obstacles' + 2, 3) of a frame; the last two rows are room for a ray."""
+        """All points (n + rigid bodies' + obstacles' + 2, 3) of a frame; the last two rows are room for a ray."""
         x = np.zeros((self.points + 2, 3))
         x[: len(positions)] = positions
+        for body, row in self.rigid:
+            assert body.skin is not None
+            corners = positions[body.vertices][body.skin.corners]
+            x[row : row + len(corners)] = np.einsum("kw,kwi->ki", body.skin.weights, corners)
         for obstacle, points, row in self.fixed:
             x[row : row + len(points)] = moved(points, poses[obstacle])
         return x

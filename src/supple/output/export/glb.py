@@ -1,4 +1,5 @@
-"""Binary glTF 2.0: one mesh for each body, a morph target for each frame, and their weights animated.
+"""Binary glTF 2.0: one mesh for each body, a morph target for each frame, and their weights animated. Rigid bodies and
+obstacles have animated nodes.
 
 Source: Khronos, "glTF 2.0 Specification", sections 3.7.2.2 (morph targets) and 3.11 (animations). glTF is y up, in
 metres, as in Supple.
@@ -41,7 +42,10 @@ def write_glb(recording: Recording, output: Path) -> None:
         logger.warning("%s: holds %d of %d frames, evenly spaced", output, len(frames), len(recording))
     glb = _Glb(frames)
     for picture in pictures(recording):
-        glb.add_body(picture)
+        if picture.body.rigid:
+            glb.add_rigid_body(picture, picture.rest(recording))
+        else:
+            glb.add_body(picture)
     for obstacle in obstacle_pictures(recording.obstacles, view_of(recording)):
         glb.add_obstacle(obstacle)
     with whole_file(output) as fresh:
@@ -81,6 +85,13 @@ class _Glb:
         if targets:
             self._animate(node, "weights", self._weights)
 
+    def add_rigid_body(self, picture: Picture, x: NDArray[np.float64]) -> None:
+        """Add a mesh of its surface x (k, 3) at rest, whose poses are animated."""
+        material = self._material(picture.color, 1.0)
+        poses = np.stack([picture.pose(frame) for frame in self.frames])
+        node = self._mesh_node(picture.name, x, vertex_normals(x, picture.triangles), picture.triangles, material, [])
+        self._place(node, poses)
+
     def add_obstacle(self, obstacle: ObstaclePicture) -> None:
         """Add a rigid mesh; its poses are animated where it moves."""
         # Triangles share no corners, so that edges stay sharp.
@@ -88,13 +99,7 @@ class _Glb:
         triangles = np.arange(len(x), dtype=np.int32).reshape(-1, 3)
         material = self._material(obstacle.color, obstacle.opacity)
         node = self._mesh_node(obstacle.name, x, vertex_normals(x, triangles), triangles, material, [])
-        poses = np.stack([frame.poses[obstacle.number] for frame in self.frames])
-        rotations = _quaternions(poses[:, :, :3])
-        made = self.document.nodes[node]
-        made.translation, made.rotation = poses[0, :, 3].tolist(), rotations[0].tolist()
-        if obstacle.moves(self.frames):
-            self._animate(node, "translation", self._vectors(poses[:, :, 3]))
-            self._animate(node, "rotation", self._accessor(rotations, "VEC4"))
+        self._place(node, np.stack([frame.obstacle_poses[obstacle.number] for frame in self.frames]))
 
     def to_bytes(self) -> bytes:
         """The whole file."""
@@ -126,6 +131,15 @@ class _Glb:
         document.nodes.append(kinds.Node(name=name, mesh=len(document.meshes) - 1))
         self.roots.append(len(document.nodes) - 1)
         return len(document.nodes) - 1
+
+    def _place(self, node: int, poses: NDArray[np.float64]) -> None:
+        """Place a node by the first of its poses (frames, 3, 4), and animate it where they change."""
+        rotations = _quaternions(poses[:, :, :3])
+        made = self.document.nodes[node]
+        made.translation, made.rotation = poses[0, :, 3].tolist(), rotations[0].tolist()
+        if np.any(poses != poses[0]):
+            self._animate(node, "translation", self._vectors(poses[:, :, 3]))
+            self._animate(node, "rotation", self._accessor(rotations, "VEC4"))
 
     def _animate(self, node: int, path: str, values: int) -> None:
         kinds, animation = self.kinds, self.animation

@@ -11,7 +11,10 @@ from supple.output.recording.reader import RecordedFrame, Recording
 
 
 def write_pvd(recording: Recording, output: Path) -> None:
-    """Write a folder with recording.pvd and frame_00000.vtu, ...: with tets, velocities, J and body numbers."""
+    """Write a folder with recording.pvd and frame_00000.vtu, ...: with tets, velocities, J and body numbers.
+
+    Rigid bodies are written as their surfaces.
+    """
     digits = max(5, len(str(len(recording) - 1)))
     with whole_folder(output) as folder:
         lines = ['<?xml version="1.0"?>', '<VTKFile type="Collection" version="0.1">', "  <Collection>"]
@@ -32,14 +35,32 @@ def write_last_vtu(recording: Recording, output: Path) -> None:
 def _write_vtu(recording: Recording, frame: RecordedFrame, path: Path) -> None:
     import meshio
 
-    of_point = np.zeros(len(recording.rest_positions), dtype=np.int32)
-    of_tet = np.zeros(len(recording.tets), dtype=np.int32)
+    positions, velocities = list(frame.positions.values()), list(frame.velocities.values())
+    starts = np.cumsum([0, *map(len, positions)])
+    tets, triangles = [np.zeros((0, 4), np.int32)], [np.zeros((0, 3), np.int32)]
+    of_point, of_tet, of_triangle = np.zeros(starts[-1], np.int32), [], []
     for i, body in enumerate(recording.bodies):
-        of_point[body.vertices], of_tet[body.tets] = i, i
+        of_point[starts[i] : starts[i + 1]] = i
+        if body.rigid and body.skin is not None:
+            triangles.append(body.skin.triangles + starts[i])
+            of_triangle += [i] * len(body.skin.triangles)
+        else:
+            tets.append(recording.tets[body.tets] - body.vertices.start + starts[i])
+            of_tet += [i] * (body.tets.stop - body.tets.start)
+    soft = np.concatenate([np.arange(b.tets.start, b.tets.stop) for b in recording.bodies if not b.rigid] or [[]])
+    rigid = np.array([frame.det_F[body.tets.start] if body.rigid else 1.0 for body in recording.bodies])
+    parts = [
+        ("tetra", np.concatenate(tets), frame.det_F[soft.astype(int)], of_tet),
+        ("triangle", np.concatenate(triangles), rigid[of_triangle], of_triangle),
+    ]
+    parts = [part for part in parts if len(part[1])]
     mesh = meshio.Mesh(
-        frame.state.positions,
-        [("tetra", recording.tets)],
-        point_data={"velocities": frame.state.velocities, "body": of_point},
-        cell_data={"det_F": [frame.det_F], "body": [of_tet]},
+        np.concatenate(positions),
+        [(kind, cells) for kind, cells, _, _ in parts],
+        point_data={"velocities": np.concatenate(velocities), "body": of_point},
+        cell_data={
+            "det_F": [values for _, _, values, _ in parts],
+            "body": [np.array(numbers, dtype=np.int32) for _, _, _, numbers in parts],
+        },
     )
     mesh.write(path, file_format="vtu")

@@ -1,4 +1,4 @@
-"""Universal Scene Description: meshes with a time sample of their points for each frame."""
+"""Universal Scene Description: meshes with a time sample for each frame, of their points or of a rigid body's pose."""
 
 # pyright: reportAttributeAccessIssue=false
 # (OpenUSD comes without types.)
@@ -14,7 +14,7 @@ import numpy as np
 
 from supple.errors import OutputError
 from supple.files.replacing import whole_file
-from supple.output.drawing import ObstaclePicture, obstacle_pictures, pictures, view_of
+from supple.output.drawing import ObstaclePicture, Picture, obstacle_pictures, pictures, view_of
 from supple.output.recording.reader import Recording
 
 
@@ -43,6 +43,10 @@ def write_usd(recording: Recording, output: Path) -> None:
             folder = UsdGeom.Scope.Define(stage, f"/recording/{group}").GetPath()
             for i, picture in enumerate(drawn):
                 mesh = _define(stage, f"{folder}/{_identifier(picture.name, i)}", picture)
+                if isinstance(picture, Picture) and picture.body.rigid:
+                    _set_points(mesh, picture.rest(recording), None)
+                    _set_poses(mesh, [picture.pose(frame) for frame in recording])
+                    continue
                 if isinstance(picture, ObstaclePicture) and not picture.moves(recording):
                     _set_points(mesh, picture.at(recording[0]), None)
                     continue
@@ -68,6 +72,16 @@ def _define(stage, path: str, picture):
     color = np.array(picture.color) / 255.0
     mesh.CreateDisplayColorAttr([Gf.Vec3f(*(float(c) for c in color**2.2))])
     return mesh
+
+
+def _set_poses(mesh, poses) -> None:
+    """A time sample of the transform for each pose (3, 4)."""
+    from pxr import Gf, Usd
+
+    operation = mesh.AddTransformOp()
+    for k, pose in enumerate(poses):
+        matrix = np.vstack([pose, [0.0, 0.0, 0.0, 1.0]]).T  # USD multiplies rows from the left
+        operation.Set(Gf.Matrix4d(*matrix.ravel().tolist()), Usd.TimeCode(k))
 
 
 def _set_points(mesh, x, time: int | None) -> None:

@@ -19,6 +19,7 @@ from supple.output.recording.physics import RecordedPhysics, read_physics, read_
 from supple.output.recording.recorder import REPORT_NUMBERS, REPORT_VECTORS, frame_layout
 from supple.output.recording.scene import RecordedBody, RecordedObstacle, read_bodies, read_header, read_obstacles
 from supple.output.recording.stitches import RecordedStitches, read_stitches
+from supple.scene.rigid.pose import Pose, pose_of
 from supple.simulate import Report
 from supple.state import State, Status
 
@@ -55,13 +56,13 @@ class RecordedFrame:
 
     @cached_property
     def positions(self) -> dict[str, NDArray[np.float64]]:
-        """By body name, (n, 3) [m]."""
-        return {body.name: self.state.positions[body.vertices] for body in self.recording.bodies}
+        """By body name, (n, 3) [m]; of a rigid body, of its surface's vertices."""
+        return {body.name: body.points(self.state.positions) for body in self.recording.bodies}
 
     @cached_property
     def velocities(self) -> dict[str, NDArray[np.float64]]:
         """By body name, (n, 3) [m/s]."""
-        return {body.name: self.state.velocities[body.vertices] for body in self.recording.bodies}
+        return {body.name: body.points(self.state.velocities) for body in self.recording.bodies}
 
     @cached_property
     def det_F(self) -> NDArray[np.float64]:
@@ -69,7 +70,14 @@ class RecordedFrame:
         return self._rows("VTKHDF/CellData/det_F")
 
     @cached_property
-    def poses(self) -> NDArray[np.float64]:
+    def poses(self) -> dict[str, Pose]:
+        """Of the rigid bodies, by name."""
+        values = self.recording.rest_positions, self.state.positions, self.state.velocities
+        rigid = [body for body in self.recording.bodies if body.rigid]
+        return {body.name: pose_of(*(rows[body.vertices] for rows in values)) for body in rigid}
+
+    @cached_property
+    def obstacle_poses(self) -> NDArray[np.float64]:
         """(obstacles, 3, 4) rotation and translation of each obstacle from its place at time 0 to this frame."""
         return self._rows("supple/frames/poses")
 

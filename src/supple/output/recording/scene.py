@@ -18,11 +18,13 @@ from supple.output.recording.checked_hdf5 import CheckedFile
 from supple.output.recording.physics import write_physics
 from supple.output.recording.skinned_surface import SkinnedSurface
 from supple.output.recording.stitches import write_stitches
+from supple.scene.body import PlacedBody
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.obstacles.registry import KINDS, restored_obstacle
+from supple.scene.rigid.rigid_body import RigidBody
 from supple.simulate import Frame
 from supple.state import Status
-from supple.system import BodyRange
+from supple.system import System
 
 FORMAT_VERSION = 2
 VTK_TETRA = 10
@@ -38,6 +40,7 @@ class RecordedBody:
     vertices, tets : rows of the recording's arrays that belong to it
     triangles : (t, 3) its boundary, counter-clockwise from outside, rows of its own vertices
     skin : a finer surface that it carries, or None; its corners are rows of its own vertices
+    rigid : whether its vertices are the control points of a rigid body, whose surface is the skin
     """
 
     name: str
@@ -46,6 +49,18 @@ class RecordedBody:
     tets: slice
     triangles: NDArray[np.int32]
     skin: SkinnedSurface | None
+    rigid: bool = False
+
+    @property
+    def point_count(self) -> int:
+        """How many points a frame has of it."""
+        own = self.vertices.stop - self.vertices.start
+        return len(self.skin.corners) if self.rigid and self.skin is not None else own
+
+    def points(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Positions or velocities (k, 3) as a frame has them, of values x (n, 3) of all vertices of the recording."""
+        own = x[self.vertices]
+        return self.skin.positions(own) if self.rigid and self.skin is not None else own
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +103,7 @@ def write_scene(file: h5py.File, first: Frame, facts: dict[str, Any], scene_text
     own.attrs["format_version"] = FORMAT_VERSION
     header = facts | {
         "statuses": [str(status) for status in Status],
-        "bodies": [_describe_body(part) for part in system.bodies],
+        "bodies": _described_bodies(system),
         "obstacles": [_describe_obstacle(obstacle) for obstacle in system.obstacles],
         "physics": write_physics(own, system),
     }
@@ -100,22 +115,29 @@ def write_scene(file: h5py.File, first: Frame, facts: dict[str, Any], scene_text
     own["masses"] = system.masses
     own["gravity"] = system.gravity
     own["tets"] = system.tets
-    own["triangles"] = system.triangles
+    own["triangles"] = np.concatenate([p.body.mesh.surface.triangles + p.vertices.start for p in system.bodies])
     own["pinned_vertices"] = system.pinned_vertices
     write_stitches(own, system)
     for i, part in enumerate(system.bodies):
         body = part.body
         if body.skin is not None:
             skin = body.skin.compact()
-            attached = Embedding.of(body.mesh, skin.vertices)
             group = own.create_group(f"skins/{i}")
-            group["corners"], group["weights"] = attached.corners, attached.weights
+            group["corners"], group["weights"] = _attached(body, skin)
             group["triangles"] = skin.triangles
     for i, obstacle in enumerate(system.obstacles):
         if obstacle.surface_mesh is not None:
             surface = obstacle.surface_mesh.compact()
             group = own.create_group(f"obstacles/{i}")
             group["vertices"], group["triangles"] = surface.vertices, surface.triangles
+
+
+def _attached(body: PlacedBody, skin: SurfaceMesh) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """Corners and weights (k, 4) of the skin's vertices; of a rigid body those that the simulation has."""
+    if isinstance(body, RigidBody):
+        return np.tile(np.arange(4, dtype=np.int32), (len(body.weights), 1)), body.weights
+    attached = Embedding.of(body.mesh, skin.vertices)
+    return attached.corners, attached.weights
 
 
 def _write_grid(grid: h5py.Group, first: Frame, n: int, m: int) -> None:
@@ -133,18 +155,25 @@ def _write_grid(grid: h5py.Group, first: Frame, n: int, m: int) -> None:
     grid["PointData/body"], grid["CellData/body"] = of_point, of_cell
 
 
-def _describe_body(part: BodyRange) -> dict[str, Any]:
-    def ends(rows: slice) -> list[int]:
-        return [int(rows.start), int(rows.stop)]
-
-    return {
-        "name": part.name,
-        "material": _one_line(part.body.material),
-        "vertices": ends(part.vertices),
-        "tets": ends(part.tets),
-        "triangles": ends(part.triangles),
-        "skin": part.body.skin is not None,
-    }
+def _described_bodies(system: System) -> list[dict[str, Any]]:
+    """The bodies with their rows; those of triangles are of the boundaries of the tets."""
+    described, t = [], 0
+    for part in system.bodies:
+        body, count = part.body, len(part.body.mesh.surface.triangles)
+        rigid = isinstance(body, RigidBody)
+        described.append(
+            {
+                "name": part.name,
+                "material": f"rigid, {body.properties.mass:.6g} kg" if rigid else _one_line(body.material),
+                "vertices": [int(part.vertices.start), int(part.vertices.stop)],
+                "tets": [int(part.tets.start), int(part.tets.stop)],
+                "triangles": [t, t + count],
+                "skin": body.skin is not None,
+                "rigid": rigid,
+            }
+        )
+        t += count
+    return described
 
 
 def _one_line(thing: object) -> str:
@@ -203,9 +232,11 @@ def read_bodies(
                 raise file.broken(f"body {described['name']!r} has triangles on vertices of another")
             skin = _read_skin(file, f"supple/skins/{i}", v1 - v0) if described["skin"] else None
             rows = slice(v0, v1), slice(t0, t1)
-            bodies.append(
-                RecordedBody(str(described["name"]), str(described["material"]), *rows, np.ascontiguousarray(own), skin)
-            )
+            names = str(described["name"]), str(described["material"])
+            rigid = bool(described.get("rigid", False))
+            if rigid and (skin is None or v1 - v0 != 4 or t1 - t0 != 1):
+                raise file.broken(f"rigid body {described['name']!r} does not have four vertices and a surface")
+            bodies.append(RecordedBody(*names, *rows, np.ascontiguousarray(own), skin, rigid))
     except (KeyError, TypeError, ValueError):
         raise file.broken("the bodies in its header are not described as they should be") from None
     return tuple(bodies)

@@ -54,7 +54,7 @@ class RecordedStitches:
 
         Parameters
         ----------
-        x : (n, 3) vertices of bodies [m]; poses : (obstacles, 3, 4) as of `RecordedFrame.poses`
+        x : (n, 3) vertices of bodies [m]; poses : (obstacles, 3, 4) as of `RecordedFrame.obstacle_poses`
         """
         pose = poses[self.anchor_owners]
         there = np.einsum("aij,aj->ai", pose[:, :, :3], self.anchors) + pose[:, :, 3]

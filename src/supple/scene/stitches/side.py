@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
-from supple.scene.body import Body
+from supple.scene.body import PlacedBody
 from supple.scene.obstacles.obstacle import Obstacle
+from supple.scene.rigid.rigid_body import RigidBody
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,14 +48,16 @@ class Side:
         return np.where(counts > 0, sums, np.inf) / np.maximum(counts, 1)
 
 
-def side_of(thing: Body | Obstacle, stitch: str) -> Side:
+def side_of(thing: PlacedBody | Obstacle, stitch: str) -> Side:
     """A body as the scene places it, or a triangle obstacle at time 0; `stitch` begins the message.
 
     Raises
     ------
     SceneError : for other obstacles.
     """
-    if isinstance(thing, Body):
+    if isinstance(thing, RigidBody):
+        raise SceneError(f"{stitch}: {thing.label} cannot be stitched to; stitches join soft bodies and obstacles")
+    if isinstance(thing, PlacedBody):
         label, surface, points = f"body {thing.name!r}", thing.mesh.surface, thing.place(thing.mesh.vertices)
     elif thing.surface_mesh is not None:
         R, t = thing.pose(0.0)

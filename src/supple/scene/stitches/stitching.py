@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from supple.errors import SceneError
 from supple.mesh.topology import graph_components
-from supple.scene.body import Body
+from supple.scene.body import PlacedBody
 from supple.scene.located import at
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.stitches.elements import Pairs, Springs, StitchTets
@@ -146,7 +146,9 @@ def no_stitching(body_vertices: int) -> Stitching:
     return Stitching(body_vertices, (), StitchTets.none(), Springs.none(), _anchors((), {}))
 
 
-def stitch_together(bodies: Sequence[Body], obstacles: Sequence[Obstacle], stitches: Sequence[Stitch]) -> Stitching:
+def stitch_together(
+    bodies: Sequence[PlacedBody], obstacles: Sequence[Obstacle], stitches: Sequence[Stitch]
+) -> Stitching:
     """Find the pairs of all stitches, and number them. All names must exist, see `check_names`.
 
     Raises
@@ -156,7 +158,7 @@ def stitch_together(bodies: Sequence[Body], obstacles: Sequence[Obstacle], stitc
     starts = np.concatenate([[0], np.cumsum([len(body.mesh.vertices) for body in bodies])])
     n = int(starts[-1])
     first_of = {body.name: int(start) for body, start in zip(bodies, starts, strict=False)}
-    things: dict[str, Body | Obstacle] = {
+    things: dict[str, PlacedBody | Obstacle] = {
         **{obstacle.name: obstacle for obstacle in obstacles if obstacle.name},
         **{body.name: body for body in bodies},
     }

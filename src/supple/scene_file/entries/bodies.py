@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from supple.scene.body import Body
+from supple.scene.body import Body, PlacedBody
 from supple.scene.located import at
+from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene_file.entries.materials import MaterialModel
 from supple.scene_file.entries.mesh_sources import MeshFileModel, MeshStore, SurfaceModel
 from supple.scene_file.entries.regions import RegionModel, with_regions
 from supple.scene_file.entries.shapes import ShapeModel
-from supple.scene_file.model import Count, Extents, Model, Name, NonNegative, Vector
+from supple.scene_file.model import Count, Extents, Model, Name, NonNegative, Positive, Vector
 
 MAX_COPIES = 10_000
 
@@ -63,23 +64,39 @@ class InitialModel(Model):
     )
 
 
+class RigidModel(Model):
+    """What makes a body rigid (implicit solver). A surface file is used as it is; it must be closed."""
+
+    alternatives = ("density", "mass", "a rigid body needs either `density` or `mass`; give one of them")
+
+    density: Positive | None = Field(default=None, description="[kg/m^3]")
+    mass: Positive | None = Field(default=None, description="instead of `density` [kg]")
+    inertia: Annotated[list[Vector], Field(min_length=3, max_length=3)] | None = Field(
+        default=None, description="rows of the tensor about the center of mass, with `mass` [kg m^2]"
+    )
+    stiffness: Positive | None = Field(
+        default=None, description="of the energy that keeps it rigid [Pa]; default: from the heaviest load of the scene"
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class BuiltBody:
     """A body, and its vertices (n, 3) [m] at the start if it starts deformed."""
 
-    body: Body
+    body: PlacedBody
     initial_positions: NDArray[np.float64] | None
 
 
 class BodyModel(Model):
-    """One soft body. Give `mesh` (a file) or `shape`."""
+    """One body. Give `mesh` (a file) or `shape`, and `material` for a soft body or `rigid` for a rigid one."""
 
     alternatives = ("mesh", "shape", "a body needs either `mesh` or `shape`; give one of them")
 
     name: Name = Field(description="unique in the scene")
     mesh: MeshFileModel | None = Field(default=None, description="of tetrahedra, or a surface to fill with them")
     shape: ShapeModel | None = Field(default=None, description="instead of `mesh`: a ready-made shape")
-    material: MaterialModel
+    material: MaterialModel | None = Field(default=None, description="of a soft body")
+    rigid: RigidModel | None = Field(default=None, description="instead of `material`: the body is rigid")
     regions: list[RegionModel] | None = Field(
         default=None,
         min_length=1,
@@ -99,8 +116,58 @@ class BodyModel(Model):
     copies: CopiesModel | None = Field(default=None, description="copies of the body")
     initial: InitialModel | None = Field(default=None, description="a deformed start")
 
+    @model_validator(mode="after")
+    def _soft_or_rigid(self) -> BodyModel:
+        if (self.material is None) == (self.rigid is None):
+            raise ValueError("a body needs either `material` or `rigid`; give one of them")
+        if self.rigid is not None:
+            for key in ("regions", "skin", "initial"):
+                if getattr(self, key) is not None:
+                    raise ValueError(f"a rigid body has no `{key}`; remove it")
+        return self
+
     def build(self, meshes: MeshStore) -> list[BuiltBody]:
         """The body, or all its copies."""
+        alone = self._rigid(self.rigid, meshes) if self.rigid is not None else self._soft(meshes)
+        copies = list(self.copies.placements()) if self.copies is not None else [(np.zeros(3), None)]
+        digits = max(2, len(str(len(copies))))
+        built = []
+        for i, (offset, rotation) in enumerate(copies):
+            body = alone.changed(
+                name=self.name if self.copies is None else f"{self.name}{i + 1:0{digits}d}",
+                position=np.array(self.position) + offset,
+                rotation=self.rotation if rotation is None else rotation,
+            )
+            built.append(BuiltBody(body, _scaled(body, self.initial.scale) if self.initial else None))
+        return built
+
+    def _placement(self) -> dict[str, Any]:
+        keys = ("position", "rotation", "velocity", "angular_velocity", "friction")
+        return {key: getattr(self, key) for key in keys}
+
+    def _rigid(self, rigid: RigidModel, meshes: MeshStore) -> RigidBody:
+        """Without copies."""
+        if self.mesh is not None:
+            with at("mesh"):
+                shape = meshes.solid(self.mesh)
+        else:
+            assert self.shape is not None
+            with at("shape"):
+                shape = meshes.solid_shape(self.shape)
+        with at("rigid"):
+            return RigidBody(
+                self.name,
+                shape,
+                density=rigid.density,
+                mass=rigid.mass,
+                inertia=rigid.inertia,
+                stiffness=rigid.stiffness,
+                **self._placement(),
+            )
+
+    def _soft(self, meshes: MeshStore) -> Body:
+        """Without copies."""
+        assert self.material is not None
         if self.mesh is not None:
             with at("mesh"):
                 mesh = meshes.tets(self.mesh)
@@ -115,26 +182,10 @@ class BodyModel(Model):
         if self.regions is not None:
             with at("regions"):
                 material = with_regions(material, self.regions, mesh)
-        copies = list(self.copies.placements()) if self.copies is not None else [(np.zeros(3), None)]
-        digits = max(2, len(str(len(copies))))
-        built = []
-        for i, (offset, rotation) in enumerate(copies):
-            body = Body(
-                self.name if self.copies is None else f"{self.name}{i + 1:0{digits}d}",
-                mesh,
-                material,
-                position=np.array(self.position) + offset,
-                rotation=self.rotation if rotation is None else rotation,
-                velocity=self.velocity,
-                angular_velocity=self.angular_velocity,
-                friction=self.friction,
-                skin=skin,
-            )
-            built.append(BuiltBody(body, _scaled(body, self.initial.scale) if self.initial else None))
-        return built
+        return Body(self.name, mesh, material, skin=skin, **self._placement())
 
 
-def _scaled(body: Body, scale: list[float]) -> NDArray[np.float64]:
+def _scaled(body: PlacedBody, scale: list[float]) -> NDArray[np.float64]:
     placed = body.place(body.mesh.vertices)
     corners = placed[body.mesh.tets].mean(axis=1)
     center = body.mesh.volumes @ corners / body.mesh.volume

@@ -12,7 +12,7 @@ from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.scene.located import at
 from supple.scene.rotation import rotation_matrix
-from supple.scene_file.entries.shapes import ShapeModel, SurfaceShapeModel
+from supple.scene_file.entries.shapes import GummyBearShapeModel, ShapeModel, SurfaceShapeModel
 from supple.scene_file.model import FilePath, Model, Positive, Vector
 
 SURFACE_FILES = (".stl", ".obj", ".ply", ".off", ".vtp")
@@ -85,8 +85,8 @@ class MeshStore:
         self.folder = folder
         self._made: dict[str, Any] = {}
 
-    def _once(self, description: BaseModel, make: Any) -> Any:
-        key = f"{type(description).__name__}{description.model_dump_json()}"
+    def _once(self, description: BaseModel, make: Any, kind: str = "") -> Any:
+        key = f"{kind}{type(description).__name__}{description.model_dump_json()}"
         if key not in self._made:
             self._made[key] = make()
         return self._made[key]
@@ -98,6 +98,18 @@ class MeshStore:
     def shape(self, shape: ShapeModel) -> TetMesh:
         """The tet mesh of a shape."""
         return self._once(shape, shape.build)
+
+    def solid(self, source: MeshFileModel) -> SurfaceMesh | TetMesh:
+        """The surface in a file as it is, without meshing options; otherwise its tet mesh."""
+        if not source.is_surface() or source.meshing:
+            return self.tets(source)
+        return self._once(source, lambda: self._read_surface(source), "solid ")
+
+    def solid_shape(self, shape: ShapeModel) -> SurfaceMesh | TetMesh:
+        """The surface of a shape, or its tet mesh where the surface has no other description."""
+        if isinstance(shape, GummyBearShapeModel):
+            return self.shape(shape)
+        return self._once(shape, shape.build_surface, "solid ")
 
     def surface(self, source: SurfaceModel) -> SurfaceMesh:
         """The surface of a file or a shape, placed."""
@@ -116,14 +128,15 @@ class MeshStore:
         if source.is_surface():
             from supple.mesh.meshing.tetrahedralize import tetrahedralize
 
-            with at("file"):
-                surface = SurfaceMesh.load(self.located(source.file))
-            if source.scale != 1.0:
-                surface = surface.transformed(source.scale)
-            return tetrahedralize(surface, **source.meshing)
+            return tetrahedralize(self._read_surface(source), **source.meshing)
         with at("file"):
             mesh = TetMesh.load(self.located(source.file))
         return mesh if source.scale == 1.0 else mesh.transformed(source.scale)
+
+    def _read_surface(self, source: MeshFileModel) -> SurfaceMesh:
+        with at("file"):
+            surface = SurfaceMesh.load(self.located(source.file))
+        return surface if source.scale == 1.0 else surface.transformed(source.scale)
 
     def _surface(self, source: SurfaceModel) -> SurfaceMesh:
         if source.file is not None:

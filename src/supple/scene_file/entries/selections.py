@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from supple.scene.forces import Force, SoftTarget
 from supple.scene.located import at
@@ -36,12 +36,21 @@ class _SelectionModel(Model):
 
 
 class PinModel(_SelectionModel):
-    """Vertices of one body that are held, or moved by keyframes."""
+    """Vertices of a soft body that are held, or moved by keyframes; or a rigid body, without `vertices` and `box`."""
+
+    alternatives = None
 
     motion: KeyframesModel | None = Field(default=None, description="from the start; without it the vertices are held")
 
+    @model_validator(mode="after")
+    def _one_selection(self) -> PinModel:
+        if self.vertices is not None and self.box is not None:
+            raise ValueError("give the vertices by either `vertices` or `box`")
+        return self
+
     def build(self) -> Pin:
-        return Pin(self.body, self.selection(), built_motion(self.motion), name=self.name)
+        whole = self.vertices is None and self.box is None
+        return Pin(self.body, None if whole else self.selection(), built_motion(self.motion), name=self.name)
 
 
 class ForceModel(_SelectionModel):

@@ -42,7 +42,7 @@ def moment_of_frame(model: Model, frame: RecordedFrame) -> Moment:
         frame.time,
         frame.state.positions,
         frame.state.velocities,
-        frame.poses,
+        frame.obstacle_poses,
         pinned=frame.recording.pinned_vertices.astype(np.int64),
     )
 

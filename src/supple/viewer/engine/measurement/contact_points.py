@@ -25,6 +25,7 @@ def contact_points(system: System, positions: NDArray[np.float64], time: float) 
     """
     near = NEAR * _mean_edge(system)
     skin = np.unique(system.triangles)
+    positions = system.points.positions(positions)
     points = [_between_surfaces(system, positions, time, near)]
     for obstacle in system.obstacles:
         if obstacle.surface_mesh is None:
@@ -35,13 +36,13 @@ def contact_points(system: System, positions: NDArray[np.float64], time: float) 
 
 
 def _mean_edge(system: System) -> float:
-    a, b = system.rest_positions[system.triangles[:, :2]].transpose(1, 0, 2)
+    a, b = system.rest_points[system.triangles[:, :2]].transpose(1, 0, 2)
     return float(np.linalg.norm(a - b, axis=1).mean())
 
 
 def _between_surfaces(system: System, positions: NDArray[np.float64], time: float, near: float) -> NDArray[np.float64]:
-    """(c, 3) middles of the pairs of things that may touch and are nearer than `near` [m]."""
-    points, triangles, owner = [positions], [system.triangles], [_body_of_vertices(system)]
+    """(c, 3) middles of the pairs of things that may touch and are nearer than `near` [m]; of points (p, 3)."""
+    points, triangles, owner = [positions], [system.triangles], [_body_of_points(system)]
     count = len(positions)
     for k, obstacle in enumerate(system.obstacles):
         mesh = obstacle.surface_mesh
@@ -61,9 +62,9 @@ def _between_surfaces(system: System, positions: NDArray[np.float64], time: floa
     return np.concatenate([middles_of_points(x, faces, of_points), middles_of_edges(x, edges, of_edges)])
 
 
-def _body_of_vertices(system: System) -> NDArray[np.int32]:
-    """(n,) the number of each vertex's body."""
-    owner = np.empty(len(system.rest_positions), dtype=np.int32)
+def _body_of_points(system: System) -> NDArray[np.int32]:
+    """(p,) the number of each point's body."""
+    owner = np.empty(len(system.points), dtype=np.int32)
     for k, part in enumerate(system.bodies):
-        owner[part.vertices] = k
+        owner[part.points] = k
     return owner

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from supple.output.recording.scene import RecordedObstacle
 from supple.scene.obstacles.obstacle import Obstacle
+from supple.scene.rigid.rigid_body import RigidBody
 from supple.simulate import measure
 from supple.state import State
 from supple.system import BodyRange, System
@@ -24,7 +25,7 @@ def describe(live: LiveScene) -> SceneDescription:
     """All properties of the scene that do not change from frame to frame."""
     system, setup = live.system, live.setup
     gravity = -float(np.asarray(setup.scene.gravity) @ live.up)
-    positions = live.state.positions
+    positions = system.points.positions(live.state.positions)
     return SceneDescription(
         generation=live.generation,
         revision=live.revision,
@@ -36,7 +37,7 @@ def describe(live: LiveScene) -> SceneDescription:
         low=positions.min(axis=0),
         high=positions.max(axis=0),
         stitches=np.asarray(system.stitching.elements(), dtype=np.int32).reshape(-1, 4),
-        n_vertices=len(positions),
+        n_vertices=len(live.state.positions),
         n_tets=len(system.tets),
         n_constraints=sum(int(made.count) for made in getattr(live.workspace, "sets", ())),
     )
@@ -53,8 +54,8 @@ def _body(part: BodyRange, masses: NDArray[np.float64], added: frozenset[str]) -
         triangles=body.mesh.surface.triangles.astype(np.int32),
         tets=body.mesh.tets.astype(np.int32),
         skin=None if skin is None else (skin.vertices, skin.triangles.astype(np.int32)),
-        material=type(body.material).__name__,
-        values={"friction": body.friction, **_material_values(body.material)},
+        material="rigid" if isinstance(body, RigidBody) else type(body.material).__name__,
+        values={"friction": body.friction, **({} if isinstance(body, RigidBody) else _material_values(body.material))},
         mass=float(masses[part.vertices].sum()),
         added=body.name in added,
     )

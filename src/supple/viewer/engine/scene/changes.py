@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from supple.errors import CommandError
 from supple.materials.material import Material
 from supple.materials.regions import Regions
-from supple.scene.body import Body
+from supple.scene.body import Body, PlacedBody
 from supple.scene.contact_pairs import ContactPair
 from supple.scene.pins import Pin
+from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.scene import Scene
 from supple.state import State
 from supple.system import BodyRange, initial_state
@@ -109,12 +110,12 @@ def _with_body_value(live: LiveScene, command: commands.SetParameter) -> Scene:
     )
 
 
-def _with_value(body: Body, name: str, value: Value) -> Body | None:
+def _with_value(body: PlacedBody, name: str, value: Value) -> PlacedBody | None:
     """The body with this value, or None where it has no such parameter."""
     if name == "friction":
-        return replace(body, friction=float(value))
-    material = _material_with_value(body.material, name, float(value))
-    return None if material is None else replace(body, material=material)
+        return body.changed(friction=float(value))
+    material = _material_with_value(body.material, name, float(value)) if isinstance(body, Body) else None
+    return None if material is None else body.changed(material=material)
 
 
 def _material_with_value(material: Material, name: str, value: float) -> Material | None:
@@ -160,7 +161,8 @@ def _(command: commands.Pin, live: LiveScene) -> None:
     pins = dict(live.setup.page_pins)
     if len(pins) >= limits.MOST_PINS:
         raise CommandError(f"{len(pins)} vertices are pinned on the page already; unpin some first")
-    pins[command.body, command.vertex] = Pin(command.body, [command.vertex], name="page")
+    held = None if isinstance(part.body, RigidBody) else [command.vertex]  # a rigid body is held as a whole
+    pins[command.body, command.vertex] = Pin(command.body, held, name="page")
     live.adopt(replace(live.setup, page_pins=pins))
 
 
@@ -252,8 +254,7 @@ def _(command: commands.CopyBody, live: LiveScene) -> None:
     place = place_for(body.mesh, command.position, live.state.positions, live.up)
     _add(
         live,
-        replace(
-            body,
+        body.changed(
             name=unused_name(live.setup.scene, re.sub(r" \d+$", "", body.name)),  # a copy of "ball 1" is named "ball 2"
             position=place,
             rotation=np.zeros(3),
@@ -263,7 +264,7 @@ def _(command: commands.CopyBody, live: LiveScene) -> None:
     )
 
 
-def _add(live: LiveScene, body: Body) -> None:
+def _add(live: LiveScene, body: PlacedBody) -> None:
     scene = live.setup.scene
     check_size(scene, body.mesh)
     grown = replace(scene, bodies=(*scene.bodies, body))

@@ -106,7 +106,7 @@ def moved_apart(
         if body.name in added:
             place = body.place(body.mesh.vertices)
             if any(_boxes_meet(place, other) for other in places):
-                body = replace(body, position=place_for(body.mesh, None, np.concatenate(places), up))
+                body = body.changed(position=place_for(body.mesh, None, np.concatenate(places), up))
                 place = body.place(body.mesh.vertices)
             places.append(place)
         bodies.append(body)

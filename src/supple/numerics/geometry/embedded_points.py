@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.numerics.kernel_cache import njit, prange
+from supple.numerics.kernel_cache import njit
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,8 +32,49 @@ class EmbeddedPoints:
         start = np.arange(len(vertices) + 1, dtype=np.int32)
         return cls(start, np.ascontiguousarray(vertices, dtype=np.int32), np.ones(len(vertices)))
 
+    @classmethod
+    def none(cls) -> EmbeddedPoints:
+        """No points."""
+        return cls.at_vertices(np.zeros(0, dtype=np.int32))
+
+    @classmethod
+    def in_rows(cls, vertices: NDArray[np.int32], weights: NDArray[np.float64]) -> EmbeddedPoints:
+        """Points that are all combinations of as many vertices: vertices and weights (s, w)."""
+        s, width = vertices.shape
+        start = np.arange(0, s * width + 1, width, dtype=np.int32)
+        return cls(start, np.ascontiguousarray(vertices.ravel(), dtype=np.int32), np.ascontiguousarray(weights.ravel()))
+
+    @classmethod
+    def joined(cls, parts: Sequence[EmbeddedPoints]) -> EmbeddedPoints:
+        """All points of the parts, which name vertices of the same system."""
+        counts = np.concatenate([np.zeros(1, np.int64), *(np.diff(part.start) for part in parts)])
+        return cls(
+            np.cumsum(counts).astype(np.int32),
+            np.concatenate([np.zeros(0, np.int32), *(part.vertices for part in parts)]),
+            np.concatenate([np.zeros(0), *(part.weights for part in parts)]),
+        )
+
     def __len__(self) -> int:
         return len(self.start) - 1
+
+    def shifted(self, offset: int) -> EmbeddedPoints:
+        """The same points of vertices whose numbers are larger by `offset`."""
+        return EmbeddedPoints(self.start, self.vertices + np.int32(offset), self.weights)
+
+    def taken(self, rows: NDArray[np.integer]) -> EmbeddedPoints:
+        """Some of the points (k,)."""
+        counts = np.diff(self.start)[rows]
+        start = np.concatenate([np.zeros(1, np.int64), np.cumsum(counts)])
+        entries = np.repeat(self.start[:-1][rows] - start[:-1], counts) + np.arange(start[-1])
+        return EmbeddedPoints(start.astype(np.int32), self.vertices[entries], self.weights[entries])
+
+    @cached_property
+    def single(self) -> NDArray[np.int32]:
+        """(s,) the vertex that each point is, -1 for a combination of several."""
+        alone = np.diff(self.start) == 1
+        out = np.full(len(self), -1, dtype=np.int32)
+        out[alone] = self.vertices[self.start[:-1][alone]]
+        return out
 
     @cached_property
     def are_vertices(self) -> bool:
@@ -55,9 +97,9 @@ class EmbeddedPoints:
             _spread(forces, self.start, self.vertices, self.weights, out)
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _combine(x, start, vertices, weights, out):
-    for i in prange(len(start) - 1):
+    for i in range(len(start) - 1):
         for j in range(3):
             total = 0.0
             for k in range(start[i], start[i + 1]):

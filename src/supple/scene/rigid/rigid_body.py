@@ -1,0 +1,173 @@
+"""A rigid body: a solid with a mass, its placement and its initial velocity.
+
+What moves are its four control points, the vertices of one tet (see `control_points`). The energy
+
+    kappa V |F^T F - 1|^2
+
+of that tet, with the body's volume V, keeps it rigid. With the Green strain E = (F^T F - 1) / 2 this is
+4 kappa V |E|^2, which is St. Venant-Kirchhoff's energy of the tet's volume V_t for mu = 4 kappa V / V_t and lam = 0.
+What touches, is drawn and has positions in a frame are the points of its surface, combinations of the control points.
+
+Source: Lan et al., "Affine Body Dynamics" (2022), section 3.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from supple.errors import SceneError
+from supple.materials.material import Material
+from supple.materials.st_venant_kirchhoff import StVenantKirchhoff
+from supple.mesh.surface import SurfaceMesh
+from supple.mesh.tetmesh import TetMesh
+from supple.numerics.geometry.embedded_points import EmbeddedPoints
+from supple.scene.body import PlacedBody
+from supple.scene.rigid.control_points import control_points
+from supple.scene.rigid.mass_properties import MassProperties, of_solid, with_inertia, with_mass
+from supple.scene.rigid.pose import deformation_of
+from supple.scene.values import check_name, positive
+
+# Positions that are given for the surface must be a rigid motion of it, up to round-off in what a user computed and the
+# orthogonality error of a solver.
+_MISFIT = 1e-6
+_STRAIN = 1e-2
+
+
+@dataclass(frozen=True, eq=False)
+class RigidBody(PlacedBody):
+    """One rigid body of a scene; simulated by `Implicit`.
+
+    Parameters
+    ----------
+    name : unique in its scene; frames and recordings are indexed by it.
+    shape : a closed surface that faces outwards, or a tet mesh, whose surface is then used; in the body's own
+        coordinates [m].
+    density, mass : one of the two [kg/m^3], [kg]; above zero.
+    inertia : about the center of mass, in the body's own coordinates, (3, 3) or its diagonal (3,) [kg m^2]; needs
+        `mass`. None: that of a homogeneous solid, exact for the given triangles or tets.
+    position : (3,) of the shape's origin [m].
+    rotation : (3,) rotation vector that turns the shape about its origin before it is placed [rad].
+    velocity : (3,) initial velocity of the center of mass [m/s].
+    angular_velocity : (3,) initial spin about the center of mass [rad/s].
+    friction : Coulomb coefficient against other bodies; a pair uses the geometric mean of its two.
+    stiffness : kappa [Pa] of the energy that keeps the body rigid. None: from the heaviest load of the scene, see
+        `supple.scene.rigid.stiffness` and docs/rigid_bodies.md.
+
+    Attributes
+    ----------
+    kappa : `stiffness`, or that of its scene [Pa]
+    surface : the shape's surface, without vertices that no triangle uses
+    properties : mass, center of mass and second moment
+    mesh, material : the tet of the control points, and the energy that keeps it rigid
+
+    Raises
+    ------
+    SceneError : where a value is of the wrong kind or out of range, a surface is open, inside out or flat, or no body
+        has the inertia; the text names the body.
+    """
+
+    name: str
+    shape: SurfaceMesh | TetMesh
+    density: float | None = None
+    mass: float | None = None
+    inertia: ArrayLike | None = None
+    position: ArrayLike = (0.0, 0.0, 0.0)
+    rotation: ArrayLike = (0.0, 0.0, 0.0)
+    velocity: ArrayLike = (0.0, 0.0, 0.0)
+    angular_velocity: ArrayLike = (0.0, 0.0, 0.0)
+    friction: float = 0.0
+    stiffness: float | None = None
+    kappa: float = field(init=False, repr=False)
+    surface: SurfaceMesh = field(init=False, repr=False)
+    properties: MassProperties = field(init=False, repr=False)
+    mesh: TetMesh = field(init=False, repr=False)
+    material: Material = field(init=False, repr=False)
+    skin: SurfaceMesh = field(init=False, repr=False)
+    weights: NDArray[np.float64] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        check_name(self.name, "rigid body")
+        owner = self.label
+        if not isinstance(self.shape, (SurfaceMesh, TetMesh)):
+            raise SceneError(f"{owner}: shape is a {type(self.shape).__name__}; give a SurfaceMesh or a TetMesh")
+        properties = self._properties(owner)
+        surface = (self.shape.surface if isinstance(self.shape, TetMesh) else self.shape).compact()
+        control = control_points(properties, surface.vertices)
+        # What is drawn is what touches.
+        derived = {"surface": surface, "skin": surface, "properties": properties}
+        for key, value in (derived | {"mesh": control.mesh, "weights": control.weights}).items():
+            object.__setattr__(self, key, value)
+        self._check_placement(owner, surface.edges)
+        if self.stiffness is not None:
+            self._set_stiffness(positive(self.stiffness, f"{owner}: stiffness"))
+        else:
+            self._set_stiffness(1.0)  # a scene sets it, from its heaviest load
+
+    @property
+    def label(self) -> str:
+        """The name of this body in messages."""
+        return f"rigid body {self.name!r}"
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """(s, 3) the surface's vertices, in the body's own coordinates [m]."""
+        return self.surface.vertices
+
+    @property
+    def triangles(self) -> NDArray[np.int32]:
+        """(t, 3) the surface's triangles."""
+        return self.surface.triangles
+
+    @property
+    def embedded(self) -> EmbeddedPoints:
+        """The surface's vertices as combinations of the control points."""
+        corners = np.broadcast_to(np.arange(4, dtype=np.int32), (len(self.weights), 4))
+        return EmbeddedPoints.in_rows(corners, self.weights)
+
+    def with_stiffness(self, kappa: float) -> RigidBody:
+        """The same body, kept rigid by another kappa [Pa]."""
+        other = copy(self)
+        other._set_stiffness(kappa)
+        return other
+
+    def control_values(self, values: NDArray[np.float64], what: str, *, places: bool) -> NDArray[np.float64]:
+        """The control points' positions, or velocities, (4, 3) from those of the surface's vertices (s, 3).
+
+        Parameters
+        ----------
+        places : whether the values are positions, which must be those of a rigid motion
+
+        Raises
+        ------
+        SceneError : where the values are not those of one rigid body; the text begins with `what`.
+        """
+        found = np.linalg.lstsq(self.weights, values, rcond=None)[0].astype(np.float64)
+        misfit = float(np.abs(self.weights @ found - values).max())
+        F = deformation_of(self.mesh.vertices, found)
+        deformed = places and (np.abs(F.T @ F - np.eye(3)).max() > _STRAIN or np.linalg.det(F) < 0.0)
+        size = float(np.ptp(values, axis=0).max() if places else np.abs(values).max())
+        if misfit > _MISFIT * size or deformed:
+            raise SceneError(f"{what} is not a rigid motion of its surface; give those of all its vertices in one")
+        return found
+
+    def _properties(self, owner: str) -> MassProperties:
+        if (self.density is None) == (self.mass is None):
+            raise SceneError(f"{owner}: give its density [kg/m^3] or its mass [kg], one of the two")
+        solid = of_solid(self.shape, owner)
+        if self.mass is None:
+            if self.inertia is not None:
+                raise SceneError(f"{owner}: inertia needs a mass [kg] in place of the density; give mass=...")
+            return with_mass(solid, solid.volume * positive(self.density, f"{owner}: density"))
+        mass = positive(self.mass, f"{owner}: mass")
+        return with_mass(solid, mass) if self.inertia is None else with_inertia(solid, mass, self.inertia, owner)
+
+    def _set_stiffness(self, kappa: float) -> None:
+        object.__setattr__(self, "kappa", kappa)
+        volume = self.mesh.volume
+        youngs = 8.0 * kappa * self.properties.volume / volume  # E = 2 mu where nu = 0
+        material = StVenantKirchhoff(youngs=youngs, poisson=0.0, density=self.properties.mass / volume)
+        object.__setattr__(self, "material", material)

@@ -1,0 +1,288 @@
+"""Rigid bodies in `Implicit`: laws of free motion, contact with everything else, pins that hold and move them."""
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.contact.start.separation import separate
+from supple.scene.rotation import rotation_matrix
+
+G = 9.81
+FLOOR = sp.HalfSpace(point=(0, 0, 0), normal=(0, 1, 0), friction=0.5, name="floor")
+CUBE = sp.shapes.box_surface((0.1, 0.1, 0.1), (1, 1, 1))
+BOX = sp.shapes.box_surface((0.1, 0.2, 0.3), (1, 1, 1))
+
+
+def rigid(name="rigid", shape=CUBE, **values):
+    return sp.RigidBody(name, shape, **({"density": 1000.0} | values))
+
+
+def soft(name="soft", youngs=1e5, density=1000.0, **values):
+    material = sp.StableNeoHookean(youngs=youngs, poisson=0.3, density=density)
+    return sp.Body(name, sp.shapes.box((0.1, 0.1, 0.1), (2, 2, 2)), material, **values)
+
+
+def run(scene, dt, steps, integrator="backward_euler", **more):
+    frames = list(sp.simulate(scene, sp.Implicit(integrator=integrator), dt, steps, **more))
+    assert {frame.report.status for frame in frames} == {"converged"}
+    return frames
+
+
+def error_of(frames):
+    return max(max(frame.report.details.orthogonality_errors.values()) for frame in frames)
+
+
+def test_free_fall_of_backward_euler_is_exact():
+    frames = run(sp.Scene([rigid(velocity=(1.0, 0.0, 0.0))]), 0.01, 20)
+    n = 20
+    pose = frames[-1].poses["rigid"]
+    np.testing.assert_allclose(pose.translation, [0.2, -G * 1e-4 * n * (n + 1) / 2, 0.0], atol=1e-13)
+    np.testing.assert_allclose(pose.velocity, [1.0, -G * 0.2, 0.0], atol=1e-11)
+    assert error_of(frames) < 1e-12
+
+
+def test_a_free_body_keeps_its_momenta():
+    """The midpoint rule, in a motion that tumbles."""
+    scene = sp.Scene([rigid(shape=BOX, velocity=(1, 2, 3), angular_velocity=(1, 4, 2))], gravity=(0, 0, 0))
+    frames = run(scene, 2e-3, 250, "newmark")
+    P, L = (np.array([getattr(f.report, key) for f in frames]) for key in ("linear_momentum", "angular_momentum"))
+    assert np.abs(P - P[0]).max() <= 1e-11 * np.linalg.norm(P[0])
+    assert np.abs(L - L[0]).max() <= 1e-10 * np.linalg.norm(L[0])
+    energies = np.array([f.report.kinetic_energy + f.report.elastic_energy for f in frames])
+    assert np.ptp(energies) < 1e-4 * energies[0]
+    assert error_of(frames) < 1e-13  # the ends of steps are projected
+
+
+SPIN = np.array([0.5, 10.0, 0.5])
+
+
+def changes_of_sign(times, values):
+    k = np.flatnonzero(values[1:] * values[:-1] < 0.0)
+    return times[k] + (times[k + 1] - times[k]) * values[k] / (values[k] - values[k + 1])
+
+
+def flips_of_eulers_equations(inertia, end, dt=1e-3):
+    """Runge-Kutta's method of fourth order."""
+    a, b, c = inertia
+
+    def rate(w):
+        return np.array([(b - c) * w[1] * w[2] / a, (c - a) * w[2] * w[0] / b, (a - b) * w[0] * w[1] / c])
+
+    path = [SPIN]
+    for _ in range(round(end / dt)):
+        w = path[-1]
+        k1 = rate(w)
+        k2 = rate(w + 0.5 * dt * k1)
+        k3 = rate(w + 0.5 * dt * k2)
+        path.append(w + dt / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + rate(w + dt * k3)))
+    return changes_of_sign(dt * np.arange(len(path)), np.array(path)[:, 1])
+
+
+def test_the_intermediate_axis_turns_over_when_eulers_equations_say():
+    """The Dzhanibekov effect, twice. Ends of midpoint steps mirror their beginnings: the energy does not drift."""
+    body = rigid(shape=BOX, angular_velocity=SPIN)
+    exact = flips_of_eulers_equations(np.diag(body.properties.inertia), 2.8)
+    assert len(exact) == 2
+    for dt, late, drift in ((0.02, 0.02, 5e-3), (0.01, 1e-3, 1e-4)):
+        frames = run(sp.Scene([body], gravity=(0, 0, 0)), dt, round(2.8 / dt), "newmark")
+        poses = [frame.poses["rigid"] for frame in frames]
+        along = np.array([10.0, *((pose.rotation.T @ pose.angular_velocity)[1] for pose in poses)])
+        found = changes_of_sign(dt * np.arange(len(along)), along)
+        np.testing.assert_allclose(found, exact, rtol=late)
+        energies = np.array([frame.report.kinetic_energy for frame in frames])
+        assert np.abs(energies / energies[0] - 1.0).max() < drift
+        assert error_of(frames) < 1e-13
+
+
+def test_a_dropped_cube_comes_to_rest_and_presses_with_its_weight():
+    scene = sp.Scene([rigid(position=(0, 0.12, 0), rotation=(0.3, 0.2, 0), friction=0.5)], obstacles=[FLOOR])
+    frames = run(scene, 1 / 60, 60)
+    assert min(frame.positions["rigid"][:, 1].min() for frame in frames) > 0.0
+    assert error_of(frames) < 1e-3
+    last = frames[-1]
+    assert last.report.kinetic_energy < 1e-10
+    np.testing.assert_allclose(last.report.details.contact_forces["rigid"], [0, G, 0], atol=1e-4 * G)
+    # One face is on the floor.
+    assert np.sort(last.positions["rigid"][:, 1])[:4].max() < 1e-3
+
+
+@pytest.mark.parametrize(("friction", "slides"), [(0.5, False), (0.3, True)])
+def test_a_cube_on_a_slope_sticks_or_slides_with_coulombs_acceleration(friction, slides):
+    slope = np.arctan(0.4)
+    normal, down = np.array([np.sin(slope), np.cos(slope), 0.0]), np.array([np.cos(slope), -np.sin(slope), 0.0])
+    plane = sp.HalfSpace(point=(0, 0, 0), normal=normal, friction=friction)
+    scene = sp.Scene([rigid(position=0.0501 * normal, rotation=(0, 0, -slope))], obstacles=[plane])
+    frames = run(scene, 0.01, 50)
+    way = frames[-1].poses["rigid"].translation @ down
+    expected = 0.5 * G * (np.sin(slope) - friction * np.cos(slope)) * 0.5 * 0.51  # backward Euler: n (n + 1) h^2 / 2
+    assert way == pytest.approx(expected, rel=0.01) if slides else way < 1e-3
+
+
+def acceleration_of_a_ball(edge, friction, dt=0.01, steps=50):
+    """Down a slope of 15 degrees, as a share of g sin a; and the share that its spin has of rolling."""
+    slope, radius = np.radians(15.0), 0.1
+    normal, down = np.array([np.sin(slope), np.cos(slope), 0.0]), np.array([np.cos(slope), -np.sin(slope), 0.0])
+    plane = sp.HalfSpace(point=(0, 0, 0), normal=normal, friction=friction)
+    ball = rigid(shape=sp.shapes.sphere_surface(radius, edge), position=(radius + 2e-4) * normal)
+    poses = [f.poses["rigid"] for f in run(sp.Scene([ball], obstacles=[plane]), dt, steps, "bdf2")]
+    times = dt * np.arange(1, steps + 1)
+    rate, spin = (
+        np.polyfit(times[5:], values[5:], 1)[0]
+        for values in (np.array([p.velocity @ down for p in poses]), np.array([-p.angular_velocity[2] for p in poses]))
+    )
+    return rate / (G * np.sin(slope)), spin * radius / rate
+
+
+def test_a_ball_slides_on_a_smooth_slope_and_rolls_on_a_rough_one():
+    """A polyhedron loses energy from facet to facet, in proportion to its edges: 5/7 is its limit from below."""
+    sliding, spin = acceleration_of_a_ball(0.025, 0.03)
+    assert sliding == pytest.approx(1.0 - 0.03 / np.tan(np.radians(15.0)), rel=2e-3)
+    assert abs(spin) < 0.1  # it stays on one facet
+    rolling, spin = acceleration_of_a_ball(0.025, 0.3)
+    assert spin == pytest.approx(1.0, rel=0.05)
+    assert 0.92 * 5.0 / 7.0 < rolling < 5.0 / 7.0
+
+
+@pytest.mark.slow
+def test_a_finer_ball_rolls_closer_to_five_sevenths():
+    errors = [
+        1.4 * acceleration_of_a_ball(edge, 0.3, dt, int(1.0 / dt))[0] - 1.0
+        for edge, dt in ((0.025, 0.01), (0.0125, 0.005))
+    ]
+    assert errors[0] < errors[1] < 0.0
+    assert abs(errors[1]) < 0.03
+
+
+@pytest.mark.parametrize(("under", "above", "masses"), [("soft", "rigid", (1e-3, 1e3)), ("rigid", "soft", (1e-3, 1.0))])
+def test_heavy_on_light(under, above, masses):
+    """A million times, and a thousand times as heavy as what carries it, in kilograms."""
+    made = {}
+    for name, mass, height in ((under, masses[0], 0.0502), (above, masses[1], 0.1505)):
+        values = {"density": 1e3 * mass, "position": (0, height, 0)}
+        made[name] = soft(youngs=1e8 if mass < 1.0 else 1e4, **values) if name == "soft" else rigid(**values)
+    frames = run(sp.Scene(list(made.values()), obstacles=[FLOOR]), 1 / 60, 60)
+    forces = frames[-1].report.details.contact_forces
+    total = sum(masses) * G
+    assert -forces["floor"][1] == pytest.approx(total, rel=1e-3)
+    assert forces[above][1] == pytest.approx(masses[1] * G, rel=1e-3)
+    assert error_of(frames) < 1e-2
+    bottom, top = (frames[-1].positions[name][:, 1] for name in (under, above))
+    assert bottom.min() > 0.0
+    assert top.min() > 0.099 - 0.01 * (above == "soft")
+
+
+def test_a_pile_of_rigid_and_soft_bodies_rests_without_intersecting():
+    bodies = [
+        rigid("a", position=(0, 0.0505, 0), friction=0.5),
+        soft("b", position=(0.02, 0.152, 0), friction=0.5),
+        rigid("c", position=(0, 0.254, 0.02), rotation=(0, 0.4, 0), friction=0.5),
+    ]
+    scene = sp.Scene(bodies, obstacles=[FLOOR])
+    frames = run(scene, 1 / 60, 30)
+    forces = frames[-1].report.details.contact_forces
+    assert -forces["floor"][1] == pytest.approx(3.0 * G, rel=0.02)
+    assert sum(forces.values()) == pytest.approx(np.zeros(3), abs=1e-9)
+    assert frames[-1].report.kinetic_energy < 1e-4
+    # The next run starts from there, which raises where surfaces intersect.
+    assert run(scene, 1 / 60, 1, start=frames[-1].state)[0].report.min_distance > 0.0
+
+
+@pytest.mark.parametrize("other", ["rigid", "soft"])
+def test_a_collision_keeps_momentum(other):
+    """Off the center, with friction. Contact acts where bodies are at the end of a step: L is not kept exactly."""
+    hit = {"position": (0.13, 0.03, 0.02), "velocity": (-1.0, 0.0, 0.0), "friction": 0.5}
+    bodies = [rigid("a", friction=0.5), rigid("b", **hit) if other == "rigid" else soft("b", **hit)]
+    frames = run(sp.Scene(bodies, gravity=(0, 0, 0)), 0.005, 24, "newmark")
+    P, L = (np.array([getattr(f.report, key) for f in frames]) for key in ("linear_momentum", "angular_momentum"))
+    pushes = [np.linalg.norm(f.report.details.contact_forces["a"]) for f in frames]
+    assert max(pushes) > 10.0
+    assert np.abs(P - P[0]).max() <= 1e-10 * np.linalg.norm(P[0])
+    assert np.abs(L - L[0]).max() <= 5e-3 * np.linalg.norm(L[0])
+    assert frames[-1].poses["a"].velocity[0] < -0.2
+
+
+@pytest.mark.slow
+def test_a_heap_of_boxes_never_intersects(tmp_path):
+    rng, places = np.random.default_rng(0), [(i, j, k) for i in range(3) for j in range(3) for k in range(3)]
+    bodies = [
+        rigid(
+            f"{i}{j}{k}", position=(0.16 * i, 0.1 + 0.17 * k, 0.16 * j), rotation=0.3 * rng.normal(size=3), friction=0.4
+        )
+        for i, j, k in places
+    ]
+    path = tmp_path / "heap.vtkhdf"
+    frames = run(sp.Scene(bodies, obstacles=[FLOOR]), 1 / 60, 60, sinks=[sp.Recorder(path, solver=sp.Implicit())])
+    assert error_of(frames) < 1e-3
+    assert frames[-1].report.kinetic_energy < 1e-4
+    assert sp.check_recording(path).ok
+
+
+def test_a_ring_hangs_on_a_bar():
+    """Neither surface is replaced by its convex hull, in which the bar would be inside of the ring from the start."""
+    ring = rigid("ring", sp.shapes.torus_surface(0.1, 0.03, 0.03), position=(0, -0.048, 0), rotation=(np.pi / 2, 0, 0))
+    bar = rigid("bar", sp.shapes.box_surface((0.03, 0.03, 0.5), (1, 1, 1)))
+    scene = sp.Scene([ring, bar], pins=[sp.Pin("bar")])
+    frames = run(scene, 1 / 60, 40)
+    weight = ring.properties.mass * G
+    details = frames[-1].report.details
+    assert details.contact_forces["ring"][1] == pytest.approx(weight, rel=0.02)
+    np.testing.assert_array_equal(frames[-1].positions["bar"], frames[0].positions["bar"])
+    held = details.reaction_forces["pin of body 'bar'"]
+    np.testing.assert_allclose(held, [0.0, weight + bar.properties.mass * G, 0.0], atol=0.03 * weight)
+    assert frames[-1].poses["ring"].translation[1] > -0.06
+
+
+def test_a_pin_moves_and_turns_a_body_exactly_and_others_with_it():
+    path = sp.Keyframes([0.0, 1.0], displacements=[[0, 0, 0], [0, 0.2, 0]], angles=[0.0, np.pi], axis=(0, 1, 0))
+    tray = rigid("tray", sp.shapes.box_surface((0.3, 0.02, 0.3), (2, 1, 2)), friction=0.8)
+    cube = soft("cube", position=(0.0, 0.0605, 0.0), friction=0.8)
+    scene = sp.Scene([tray, cube], pins=[sp.Pin("tray", motion=path)])
+    frames = run(scene, 1 / 60, 60)
+    for frame in (frames[29], frames[-1]):
+        pose, turn = frame.poses["tray"], rotation_matrix((0, np.pi * frame.time, 0))
+        np.testing.assert_allclose(pose.rotation, turn, atol=1e-12)
+        np.testing.assert_allclose(pose.translation, [0, 0.2 * frame.time, 0], atol=1e-12)
+    x = frames[-1].positions["cube"]
+    assert x[:, 1].min() > 0.2
+    # Friction has turned the cube as well: its corners have changed sides.
+    first = x[np.argmin(cube.mesh.vertices.sum(axis=1))]
+    assert first[0] > 0.03
+    assert first[2] > 0.03
+
+
+def test_a_run_goes_on_from_a_frame_with_the_same_bits():
+    scene = sp.Scene(
+        [rigid(position=(0, 0.07, 0), rotation=(0.2, 0, 0)), soft(position=(0.2, 0.06, 0))], obstacles=[FLOOR]
+    )
+    whole = run(scene, 1 / 60, 12)
+    rest = run(scene, 1 / 60, 6, start=whole[5])
+    np.testing.assert_array_equal(rest[-1].state.positions, whole[-1].state.positions)
+    np.testing.assert_array_equal(rest[-1].positions["rigid"], whole[-1].positions["rigid"])
+    # Also by the surface's positions and velocities, up to round-off.
+    given = run(scene, 1 / 60, 1, initial_positions=whole[0].positions, initial_velocities=whole[0].velocities)
+    np.testing.assert_allclose(given[0].positions["rigid"], whole[1].positions["rigid"], atol=1e-9)
+
+
+def test_bodies_that_intersect_at_the_start_are_refused_and_separated():
+    scene = sp.Scene([rigid("a"), rigid("b", position=(0.0, 0.09, 0.0))])
+    with pytest.raises(sp.SceneError, match=r"body 'a' overlaps body 'b' at the start .* move body 'b' by"):
+        sp.simulate(scene, sp.Implicit(), 0.01, 1)
+    apart = separate(scene)
+    assert [move.body for move in apart.moves] == ["b"]
+    assert run(apart.scene, 0.01, 1)[0].report.status == "converged"
+
+
+def test_a_plate_pressed_on_a_soft_cube_in_equilibrium():
+    """Forces of both pins balance; the cube carries about E A times its strain, more as its ends cannot widen."""
+    cube = soft(position=(0, 0.05, 0))
+    bottom = np.flatnonzero(cube.mesh.vertices[:, 1] == cube.mesh.vertices[:, 1].min())
+    plate = rigid("plate", sp.shapes.box_surface((0.14, 0.02, 0.14), (1, 1, 1)), position=(0, 0.1105, 0))
+    press = sp.Pin("plate", motion=lambda t: (0, -0.005 * t, 0), name="press")
+    scene = sp.Scene([cube, plate], pins=[sp.Pin("soft", bottom), press], gravity=(0, 0, 0))
+    (frame,) = run(scene, 1.0, 1, "static")
+    details = frame.report.details
+    up, down = details.reaction_forces["pin of body 'soft'"], details.reaction_forces["pin 'press' of body 'plate'"]
+    np.testing.assert_allclose(up, -down, atol=1e-6 * up[1])
+    np.testing.assert_allclose(details.contact_forces["plate"], up, atol=1e-6 * up[1])
+    strain = (0.1 - np.ptp(frame.positions["soft"][:, 1])) / 0.1
+    assert 1.0 < up[1] / (1e5 * 0.01 * strain) < 1.3
