@@ -22,7 +22,7 @@ LAYERS = (
     ("output", "scene_file"),
     ("simulate",),
     ("xpbd", "implicit"),
-    ("contact",),
+    ("contact", "readings"),
     ("system",),
     ("scene",),
     ("mesh", "materials"),

@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.materials.patches.domains import Patches, patches_of
-from supple.materials.per_tet import NO_REGION, TetMaterial
+from supple.materials.edges_and_volume import EdgesAndVolume
+from supple.materials.elastic_tets.edge_springs import EdgeSprings
+from supple.materials.elastic_tets.laws import TetLaws, joined_materials
 from supple.mesh.topology import graph_components
 from supple.scene.body import Body
 from supple.scene.forces import Force, SoftTarget
@@ -147,14 +148,18 @@ class System:
         return np.concatenate([self.tets, self.stitching.elements()]) if len(self.stitching) else self.tets
 
     @cached_property
-    def patches(self) -> Patches | None:
-        """The patches of the tets whose material is averaged over such; None where there is none."""
-        rows = [part.body.material.per_tet(part.tets.stop - part.tets.start) for part in self.bodies]
-        if not any((row.region != NO_REGION).any() for row in rows):
-            return None
-        names = ("density", "damping", "kind", "mu", "lam", "region")
-        material = TetMaterial(*(np.concatenate([getattr(row, name) for row in rows]) for name in names))
-        return patches_of(self.tets, self.rest_shape_inverse, self.rest_volumes, material)
+    def laws(self) -> TetLaws:
+        """The elastic laws of all tets."""
+        materials = [part.body.material.per_tet(part.tets.stop - part.tets.start) for part in self.bodies]
+        springs = []
+        for part in self.bodies:
+            law, rows = part.body.material, part.tets
+            if isinstance(law, EdgesAndVolume):
+                own = law.edge_compliance, law.volume_compliance
+                of_tets = self.rest_positions, self.tets[rows], self.rest_volumes[rows]
+                springs.append(EdgeSprings.of(own, rows, *of_tets))
+        joined = joined_materials(materials)
+        return TetLaws(self.tets, self.rest_shape_inverse, self.rest_volumes, joined, tuple(springs))
 
     @cached_property
     def joined_components(self) -> NDArray[np.int32]:

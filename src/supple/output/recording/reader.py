@@ -12,13 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import OutputError
+from supple.materials.elastic_tets.laws import TetLaws
 from supple.output.recording.checked_hdf5 import CheckedFile
 from supple.output.recording.details import RecordedDetails
 from supple.output.recording.file import WRITTEN
+from supple.output.recording.laws import recorded_laws
 from supple.output.recording.physics import RecordedPhysics, read_physics, read_untouching
 from supple.output.recording.recorder import REPORT_NUMBERS, REPORT_VECTORS, frame_layout
 from supple.output.recording.scene import RecordedBody, RecordedObstacle, read_bodies, read_header, read_obstacles
 from supple.output.recording.stitches import RecordedStitches, read_stitches
+from supple.readings.tet_readings import TetReadings
 from supple.simulate import Report
 from supple.state import State, Status
 
@@ -29,8 +32,8 @@ _READ_BY_FRAME = ("VTKHDF/Points", "VTKHDF/PointData/velocities", "VTKHDF/CellDa
 
 
 @dataclass(frozen=True, eq=False)
-class RecordedFrame:
-    """One frame, read when it is asked for. Names are those of `supple.Frame`.
+class RecordedFrame(TetReadings):
+    """One frame, read when it is asked for. Names are those of `supple.Frame`; see also `TetReadings`.
 
     `simulate(..., start=recording[-1])` continues from a frame, with either solver.
     """
@@ -67,6 +70,18 @@ class RecordedFrame:
     def det_F(self) -> NDArray[np.float64]:
         """(m,) J of every tet, in the order of the bodies."""
         return self._rows("VTKHDF/CellData/det_F")
+
+    @property
+    def _x(self) -> NDArray[np.float64]:
+        return self.state.positions
+
+    @property
+    def _laws(self) -> TetLaws:
+        return self.recording.laws
+
+    @property
+    def _bodies(self) -> tuple[RecordedBody, ...]:
+        return self.recording.bodies
 
     @cached_property
     def poses(self) -> NDArray[np.float64]:
@@ -185,6 +200,11 @@ class Recording(Sequence[RecordedFrame]):
     def __repr__(self) -> str:
         names = ", ".join(body.name for body in self.bodies)
         return f"Recording({str(self.path)!r}: {self._count} frames to {self.times[-1]:g} s of {names})"
+
+    @cached_property
+    def laws(self) -> TetLaws:
+        """The elastic laws of all tets; unknown where an earlier version wrote the recording."""
+        return recorded_laws(self.physics, self.bodies, self.rest_positions, self.tets, self.rest_volumes)
 
     @property
     def frames(self) -> Recording:
