@@ -19,6 +19,8 @@ from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.elastic_tets.stress import energy_densities
 from supple.numerics.deformation import deformation_gradients, determinants
 from supple.numerics.memory import require_memory
+from supple.readings.by_body import ByBody
+from supple.readings.contact_readings import contact_forces, contact_pressures
 from supple.readings.tet_readings import TetReadings
 from supple.scene.inputs import checked_values, drive_inputs, hold_inputs
 from supple.scene.scene import Scene
@@ -113,8 +115,21 @@ class Frame(TetReadings):
 
     @cached_property
     def contacts(self) -> ContactPoints | None:
-        """All contacts, one by one, where the solver knows them (`Implicit`); otherwise None."""
+        """All contacts, one by one; None where no step led to the frame, or `Implicit` has contact=None."""
         return None if self.find_contacts is None else self.find_contacts()
+
+    @cached_property
+    def contact_force(self) -> ByBody:
+        """Force of all contacts on each vertex, friction included: by body name, (n, 3) [N]."""
+        return self._by_vertex(contact_forces(self.contacts, len(self._x)))
+
+    @cached_property
+    def contact_pressure(self) -> ByBody:
+        """Normal force of contacts per area at each vertex: by body name, (n,) [Pa]; 0 where nothing touches."""
+        return self._by_vertex(contact_pressures(self.contacts, self._x, self.system.triangles))
+
+    def _by_vertex(self, values: NDArray[np.float64]) -> ByBody:
+        return ByBody(values, {part.name: part.vertices for part in self.system.bodies}, {})
 
     @property
     def _x(self) -> NDArray[np.float64]:

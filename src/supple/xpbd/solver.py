@@ -225,6 +225,8 @@ class XPBD(Solver):
             futile=frozenset() if problem is None else before.futile | ({problem} if repeats else set()),
             crossings=findings.crossings,
         )
+        forces, old_from_new = ws.collisions.forces, ws.layout.old_from_new
+        pushes, friction = forces.by_name()
         details = XPBDDetails(
             contacts=ws.collisions.contacts,
             smallest_gap=ws.collisions.smallest_gap,
@@ -234,9 +236,18 @@ class XPBD(Solver):
             softening=ws.assessment.softening.by_body(h),
             energy_gained=findings.gained,
             held_back=held_back,
+            contact_forces=pushes,
+            friction_forces=friction,
         )
+        world, surfaces = ws.world.copy(), ws.collisions.positions
         message = findings.message(time, self._remedy(ws, dt, findings, used.count))
-        report = StepReport(status, used.count, message, details=details)
+        report = StepReport(
+            status,
+            used.count,
+            message,
+            details=details,
+            contacts=lambda: forces.points(world, surfaces, old_from_new),
+        )
         return replace(new, memory=memory), report, problem
 
     def _remedy(self, ws: XPBDWorkspace, dt: float, findings: Findings, used: int) -> str:
@@ -297,7 +308,12 @@ class XPBD(Solver):
 
     def initial_details(self, system: System, workspace: XPBDWorkspace) -> XPBDDetails:
         """No contacts; see `Solver.initial_details`."""
-        return XPBDDetails(softening=dict.fromkeys((part.name for part in system.bodies), 0.0))
+        pushes, friction = workspace.collisions.forces.by_name()
+        return XPBDDetails(
+            softening=dict.fromkeys((part.name for part in system.bodies), 0.0),
+            contact_forces=pushes,
+            friction_forces=friction,
+        )
 
 
 def _check_count(name: str, value: object, otherwise: str = "") -> None:
