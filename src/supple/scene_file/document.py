@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
+from supple.readings.fields import FIELDS
 from supple.scene_file.entries.bodies import BodyModel
 from supple.scene_file.entries.contact_pairs import ContactPairModel
 from supple.scene_file.entries.obstacles import ObstacleModel
@@ -43,11 +44,17 @@ Seconds = Annotated[
 ]
 
 
+FieldName = Literal[tuple(FIELDS)]  # pyright: ignore[reportInvalidTypeForm]
+
+
 class OutputModel(Model):
     """Files that `supple run` writes in addition to the recording."""
 
     page: bool = Field(default=True, description="index.html, which plays the recording in a browser")
     compress: bool = Field(default=False, description="store the recording compressed: smaller, and slower to write")
+    fields: list[FieldName] = Field(  # pyright: ignore[reportInvalidTypeForm]
+        default=[], description="recorded in addition, for ParaView: see the documentation"
+    )
     plot: bool = Field(default=True, description="plot.png: energies, momentum, volume ratio and smallest J over time")
 
 

@@ -18,9 +18,11 @@ from supple.output.recording.details import RecordedDetails
 from supple.output.recording.file import WRITTEN
 from supple.output.recording.laws import recorded_laws
 from supple.output.recording.physics import RecordedPhysics, read_physics, read_untouching
-from supple.output.recording.recorder import REPORT_NUMBERS, REPORT_VECTORS, frame_layout
+from supple.output.recording.recorder import REPORT_NUMBERS, REPORT_VECTORS, field_series, frame_layout
 from supple.output.recording.scene import RecordedBody, RecordedObstacle, read_bodies, read_header, read_obstacles
 from supple.output.recording.stitches import RecordedStitches, read_stitches
+from supple.readings.by_body import ByBody
+from supple.readings.fields import FIELDS, Field
 from supple.readings.tet_readings import TetReadings
 from supple.simulate import Report
 from supple.state import State, Status
@@ -88,6 +90,31 @@ class RecordedFrame(TetReadings):
         """(obstacles, 3, 4) rotation and translation of each obstacle from its place at time 0 to this frame."""
         return self._rows("supple/frames/poses")
 
+    @property
+    def contact_force(self) -> ByBody:
+        """By body name, (n, 3) [N], in single precision; an error where the field was not recorded."""
+        return self.field("contact_force")
+
+    @property
+    def contact_pressure(self) -> ByBody:
+        """By body name, (n,) [Pa], in single precision; an error where the field was not recorded."""
+        return self.field("contact_pressure")
+
+    def field(self, name: str) -> ByBody:
+        """A recorded field by body name, in single precision; NaN where a body has no such values.
+
+        Raises
+        ------
+        OutputError : where it was not recorded.
+        """
+        for field in self.recording.fields:
+            if field.name == name:
+                path = field_series(field, 0, 0).path
+                values = self._rows(path).reshape(-1, *field.shape).astype(np.float64)
+                rows = {body.name: body.tets if field.at == "tets" else body.vertices for body in self._bodies}
+                return ByBody(values, rows, {})
+        raise OutputError(f"{self.recording.path}: {name} was not recorded; record it with Recorder(fields=[{name!r}])")
+
     @cached_property
     def report(self) -> Report:
         """How the step ended, and what was measured on its state.
@@ -123,7 +150,7 @@ class Recording(Sequence[RecordedFrame]):
     rest_positions : (n, 3) [m]; masses : (n,) [kg]; tets : (m, 4); triangles : (t, 3); rest_volumes : (m,) [m^3]
     gravity : (3,) [m/s^2]; dt : time from frame to frame [s]
     physics : the bodies' laws and what acts on them, or None where an older version wrote the recording
-    details : which fields of the solver's details are kept
+    details : which fields of the solver's details are kept; fields : of tets and vertices that were recorded
     untouching : pairs that may pass through each other: numbers of bodies, then obstacles
     scene_text : the scene file's text, or None; solver : its description, or None; supple_version : of the writer
     """
@@ -165,8 +192,11 @@ class Recording(Sequence[RecordedFrame]):
         self._count = int(file.array(WRITTEN, "i", ()))
         if self._count < 1:
             raise file.broken(f"its number of frames is {self._count}")
-        self._series = {series.path: series for series in frame_layout(n, m, len(self.obstacles), self.details).series}
-        for path in (*_READ_BY_FRAME, *([_MESSAGE] if _MESSAGE in file else [])):
+        self.fields: tuple[Field, ...] = _recorded_fields(file, header)
+        layout = frame_layout(n, m, len(self.obstacles), self.details, self.fields)
+        self._series = {series.path: series for series in layout.series}
+        own = [field_series(field, n, m).path for field in self.fields]
+        for path in (*_READ_BY_FRAME, *own, *([_MESSAGE] if _MESSAGE in file else [])):
             file.check_series(self._series[path], self._count)
         self.times: NDArray[np.float64] = self._values("supple/frames/time")
         if not np.isfinite(self.times).all():
@@ -267,6 +297,15 @@ class Recording(Sequence[RecordedFrame]):
     def _frame_rows(self, path: str, number: int) -> NDArray[Any]:
         block = self._file.rows(self._series[path], number, number + 1, f"frame {number}")
         return block[0] if path == "supple/frames/poses" else block
+
+
+def _recorded_fields(file: CheckedFile, header: dict[str, Any]) -> tuple[Field, ...]:
+    names = header.get("fields", [])
+    if not isinstance(names, list):
+        raise file.broken("its header does not list its fields")
+    if not set(map(str, names)) <= FIELDS.keys():
+        raise file.newer("it has a field that this version does not know")
+    return tuple(FIELDS[name] for name in names)
 
 
 def read_recording(path: str | Path) -> Recording:
