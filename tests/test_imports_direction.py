@@ -24,6 +24,7 @@ LAYERS = (
     ("xpbd", "implicit"),
     ("contact", "readings"),
     ("system",),
+    ("loads",),
     ("scene",),
     ("mesh", "materials"),
     ("numerics", "files", "state", "errors"),

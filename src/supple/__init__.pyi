@@ -50,6 +50,11 @@ from .scene.forces import Force as Force
 from .scene.forces import SoftTarget as SoftTarget
 from .scene.inputs import ForceInput as ForceInput
 from .scene.inputs import MotionInput as MotionInput
+from .scene.loads.body_force import BodyForce as BodyForce
+from .scene.loads.over_time import Curve as Curve
+from .scene.loads.spring import Spring as Spring
+from .scene.loads.surface_loads import Pressure as Pressure
+from .scene.loads.surface_loads import Traction as Traction
 from .scene.motion import Keyframes as Keyframes
 from .scene.obstacles.box import Box as Box
 from .scene.obstacles.capsule import Capsule as Capsule

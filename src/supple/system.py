@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.loads.applied import AppliedLoad
+from supple.loads.build import applied, applied_force
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.elastic_tets.edge_springs import EdgeSprings
 from supple.materials.elastic_tets.laws import TetLaws, joined_materials
@@ -68,18 +70,6 @@ class PinRange:
 
 
 @dataclass(frozen=True, eq=False)
-class ForceRange:
-    """The vertices that one force acts on."""
-
-    force: Force
-    vertices: NDArray[np.int32]
-
-    def per_vertex(self, time: float) -> NDArray[np.float64]:
-        """The force (k, 3) on each of the vertices at `time` [N]."""
-        return self.force.per_vertex(time, len(self.vertices))
-
-
-@dataclass(frozen=True, eq=False)
 class SoftTargetRange:
     """The vertices of one soft target, and the targets of their springs at time 0, before its motion."""
 
@@ -105,6 +95,7 @@ class System:
     triangles : (t, 3) surfaces, counter-clockwise from outside
     components : (n,) the connected piece of a mesh that a vertex belongs to
     gravity : (3,) [m/s^2]
+    loads : those of the scene's forces, then of its loads
     stitching : tets and springs that join bodies to each other, and to obstacles
     start_states : where a simulation began, then where it continues; vertices in the scene's order
     """
@@ -122,7 +113,7 @@ class System:
     triangles: NDArray[np.int32]
     components: NDArray[np.int32]
     gravity: NDArray[np.float64]
-    forces: tuple[ForceRange, ...] = ()
+    loads: tuple[AppliedLoad, ...] = ()
     soft_targets: tuple[SoftTargetRange, ...] = ()
     stitching: Stitching = field(default_factory=lambda: no_stitching(0))
     start_states: tuple[State, ...] = ()
@@ -203,12 +194,16 @@ def build_system(scene: Scene, start: State | None = None) -> System:
     rest_positions = np.concatenate(rest)
     all_edges = np.concatenate(edges).astype(np.int32)
     lengths = np.linalg.norm(rest_positions[all_edges[:, 0]] - rest_positions[all_edges[:, 1]], axis=1)
+    all_masses, start_states = np.concatenate(masses), _start_states(scene, start)
+    begins = {part.name: part.vertices.start for part in ranges}
+    forces = [applied_force(force, _anchored(force, ranges, start)[0]) for force in scene.forces]
+    loads = [applied(load, scene.bodies, begins, all_masses, start_states[0].positions) for load in scene.loads]
     return System(
         scene=scene,
         bodies=tuple(ranges),
         pins=tuple(PinRange(pin, *_anchored(pin, ranges, start)) for pin in scene.pins),
         rest_positions=np.ascontiguousarray(rest_positions),
-        masses=np.concatenate(masses),
+        masses=all_masses,
         tets=np.ascontiguousarray(np.concatenate(tets), dtype=np.int32),
         rest_shape_inverse=np.ascontiguousarray(np.concatenate(Dm_inv)),
         rest_volumes=np.concatenate(volumes),
@@ -217,10 +212,10 @@ def build_system(scene: Scene, start: State | None = None) -> System:
         triangles=np.ascontiguousarray(np.concatenate(triangles), dtype=np.int32),
         components=graph_components(n, all_edges[:, 0], all_edges[:, 1]),
         gravity=np.asarray(scene.gravity, dtype=np.float64),
-        forces=tuple(ForceRange(force, _anchored(force, ranges, start)[0]) for force in scene.forces),
+        loads=(*forces, *loads),
         soft_targets=tuple(SoftTargetRange(item, *_anchored(item, ranges, start)) for item in scene.soft_targets),
         stitching=scene.stitching,
-        start_states=_start_states(scene, start),
+        start_states=start_states,
     )
 
 

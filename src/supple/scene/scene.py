@@ -16,6 +16,7 @@ from supple.scene.body import Body
 from supple.scene.contact_pairs import ContactPair, pair_table
 from supple.scene.forces import Force, SoftTarget
 from supple.scene.inputs import Input, inputs_among
+from supple.scene.loads.load import Load
 from supple.scene.located import at
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.pins import Pin
@@ -33,6 +34,7 @@ _PARTS = (
     ("soft_targets", SoftTarget),
     ("stitches", Stitch),
     ("contact_pairs", ContactPair),
+    ("loads", Load),
 )
 
 
@@ -48,6 +50,7 @@ class Scene:
     gravity : (3,) acceleration [m/s^2].
     forces : loads on vertices; soft_targets : springs to places.
     stitches : joints of bodies with each other, and with triangle obstacles.
+    loads : tractions, pressures, forces per mass and springs between points.
     contact_pairs : friction of some pairs of bodies and obstacles, and which of them pass through each other.
 
     Raises
@@ -63,6 +66,7 @@ class Scene:
     soft_targets: Sequence[SoftTarget] = ()
     stitches: Sequence[Stitch] = ()
     contact_pairs: Sequence[ContactPair] = ()
+    loads: Sequence[Load] = ()
 
     def __post_init__(self) -> None:
         for key, kind in _PARTS:
@@ -91,6 +95,9 @@ class Scene:
             for i, item in enumerate(getattr(self, key)):
                 with at(key, i):
                     self._check_selection(item, pinned)
+        for i, load in enumerate(self.loads):
+            with at("loads", i):
+                load.check(self.bodies)
         if self.contact_pairs:
             pair_table(self)
         self.inputs  # noqa: B018 - raises where two have the same name

@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema
 from supple.readings.fields import FIELDS
 from supple.scene_file.entries.bodies import BodyModel
 from supple.scene_file.entries.contact_pairs import ContactPairModel
+from supple.scene_file.entries.loads import LoadModel
 from supple.scene_file.entries.obstacles import ObstacleModel
 from supple.scene_file.entries.selections import ForceModel, PinModel, SoftTargetModel
 from supple.scene_file.entries.solvers import SolverModel, XPBDModel
@@ -66,6 +67,7 @@ class SceneFileModel(Model):
     obstacles: list[ObstacleModel] = Field(default=[], max_length=10_000)
     pins: list[PinModel] = Field(default=[], max_length=10_000)
     forces: list[ForceModel] = Field(default=[], max_length=10_000)
+    loads: list[LoadModel] = Field(default=[], max_length=10_000)
     soft_targets: list[SoftTargetModel] = Field(default=[], max_length=10_000)
     contact_pairs: list[ContactPairModel] = Field(default=[], max_length=10_000)
     stitches: list[StitchModel] = Field(default=[], max_length=10_000)

@@ -30,7 +30,7 @@ from supple.xpbd.contact.collisions import Collisions
 from supple.xpbd.contact.settings import XPBDContact
 from supple.xpbd.damping.kelvin_voigt import Damping, ViscousMemory, cycle_lengths, make_damping
 from supple.xpbd.details import XPBDDetails
-from supple.xpbd.external_forces import add_forces, pull_to_targets
+from supple.xpbd.external_forces import add_forces, pull_springs, pull_to_targets
 from supple.xpbd.integration import (
     apply_changes,
     first_lost,
@@ -282,7 +282,7 @@ class XPBD(Solver):
                 moving = ws.anchors.velocities(end - h, h)
                 damping.begin_cycle(ws.extended, ws.velocities, moving, cycles[k], h, parallel)
             _begin_substep(ws, targets[k], end, h, parallel)
-            add_forces(ws.system, ws.points, ws.velocities, end, h)
+            add_forces(ws.system, ws.points, ws.velocities, ws.origins, end, h)
             if damping is not None:
                 damping.push(ws.points, h)
             if ws.collisions:
@@ -292,6 +292,7 @@ class XPBD(Solver):
             restore(ws, h, parallel)
             ws.pace.note(parallel, perf_counter() - started)
             pull_to_targets(ws.system, ws.points, ws.velocities, ws.origins, end, h)
+            pull_springs(ws.system, ws.points, ws.velocities, ws.origins, end, h)
             if ws.collisions and not collide(ws, end, h, parallel):
                 break
             held_back += keep_volumes(ws, end, h, parallel)
