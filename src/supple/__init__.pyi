@@ -65,6 +65,8 @@ from .scene.obstacles.triangle_obstacle import TriangleObstacle as TriangleObsta
 from .scene.pins import Pin as Pin
 from .scene.scene import Scene as Scene
 from .scene.selection import InBox as InBox
+from .scene.sensors import ForceSensor as ForceSensor
+from .scene.sensors import Taxels as Taxels
 from .scene.stitches.vertex_edge import VertexEdgeStitch as VertexEdgeStitch
 from .scene.stitches.vertex_triangle import SoftVertexTriangleStitch as SoftVertexTriangleStitch
 from .scene.stitches.vertex_vertex import VertexVertexStitch as VertexVertexStitch

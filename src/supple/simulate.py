@@ -21,6 +21,7 @@ from supple.numerics.deformation import deformation_gradients, determinants
 from supple.numerics.memory import require_memory
 from supple.readings.by_body import ByBody
 from supple.readings.contact_readings import contact_forces, contact_pressures
+from supple.readings.sensor_readings import Reading, sensor_readings
 from supple.readings.tet_readings import TetReadings
 from supple.scene.inputs import checked_values, drive_inputs, hold_inputs
 from supple.scene.scene import Scene
@@ -127,6 +128,11 @@ class Frame(TetReadings):
     def contact_pressure(self) -> ByBody:
         """Normal force of contacts per area at each vertex: by body name, (n,) [Pa]; 0 where nothing touches."""
         return self._by_vertex(contact_pressures(self.contacts, self._x, self.system.triangles))
+
+    @cached_property
+    def sensors(self) -> dict[str, Reading]:
+        """By name, what the scene's sensors feel: `ForceReading` or `TaxelReading`."""
+        return sensor_readings(self.system, self._x, self.contacts)
 
     def _by_vertex(self, values: NDArray[np.float64]) -> ByBody:
         return ByBody(values, {part.name: part.vertices for part in self.system.bodies}, {})

@@ -229,7 +229,7 @@ def test_the_scene_of_the_manual_is_valid(load, tmp_path):
     assert list(Draft202012Validator(json_schema()).iter_errors(read_yaml(tmp_path / "scene.yaml").data)) == []
 
 
-@pytest.mark.parametrize("kinds", ["material", "shape", "obstacle", "solver", "stitch", "load"])
+@pytest.mark.parametrize("kinds", ["material", "shape", "obstacle", "solver", "stitch", "load", "sensor"])
 def test_the_manual_lists_every_kind(kinds):
     manual = (Path(__file__).parents[2] / "docs" / "scene_files.md").read_text(encoding="utf-8")
     row = next(line for line in manual.splitlines() if line.startswith(f"| {kinds} |"))
@@ -244,6 +244,8 @@ def test_the_manual_lists_every_kind(kinds):
 def _family(name):
     if name in ("TractionModel", "PressureModel", "BodyForceModel", "SpringModel"):
         return "load"
+    if name in ("ForceSensorModel", "TaxelsModel"):
+        return "sensor"
     if name.endswith("ShapeModel") or name == "GummyBearSurfaceModel":
         return "shape"
     if name in ("XPBDModel", "ImplicitModel"):

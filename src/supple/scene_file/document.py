@@ -12,6 +12,7 @@ from supple.scene_file.entries.contact_pairs import ContactPairModel
 from supple.scene_file.entries.loads import LoadModel
 from supple.scene_file.entries.obstacles import ObstacleModel
 from supple.scene_file.entries.selections import ForceModel, PinModel, SoftTargetModel
+from supple.scene_file.entries.sensors import SensorModel
 from supple.scene_file.entries.solvers import SolverModel, XPBDModel
 from supple.scene_file.entries.stitches import StitchModel
 from supple.scene_file.fraction import number_or_fraction
@@ -68,6 +69,7 @@ class SceneFileModel(Model):
     pins: list[PinModel] = Field(default=[], max_length=10_000)
     forces: list[ForceModel] = Field(default=[], max_length=10_000)
     loads: list[LoadModel] = Field(default=[], max_length=10_000)
+    sensors: list[SensorModel] = Field(default=[], max_length=10_000)
     soft_targets: list[SoftTargetModel] = Field(default=[], max_length=10_000)
     contact_pairs: list[ContactPairModel] = Field(default=[], max_length=10_000)
     stitches: list[StitchModel] = Field(default=[], max_length=10_000)

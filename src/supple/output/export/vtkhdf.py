@@ -24,6 +24,7 @@ def write_vtkhdf(recording: Recording, output: Path) -> None:
         len(recording.obstacles),
         recording.details,
         recording.fields,
+        recording.sensors,
     )
     with whole_file(output) as fresh:
         try:

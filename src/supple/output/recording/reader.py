@@ -20,9 +20,11 @@ from supple.output.recording.laws import recorded_laws
 from supple.output.recording.physics import RecordedPhysics, read_physics, read_untouching
 from supple.output.recording.recorder import REPORT_NUMBERS, REPORT_VECTORS, field_series, frame_layout
 from supple.output.recording.scene import RecordedBody, RecordedObstacle, read_bodies, read_header, read_obstacles
+from supple.output.recording.sensors import RecordedSensor, sensors_of_header
 from supple.output.recording.stitches import RecordedStitches, read_stitches
 from supple.readings.by_body import ByBody
 from supple.readings.fields import FIELDS, Field
+from supple.readings.sensor_readings import ForceReading, Reading, TaxelReading
 from supple.readings.tet_readings import TetReadings
 from supple.simulate import Report
 from supple.state import State, Status
@@ -116,6 +118,15 @@ class RecordedFrame(TetReadings):
         raise OutputError(f"{self.recording.path}: {name} was not recorded; record it with Recorder(fields=[{name!r}])")
 
     @cached_property
+    def sensors(self) -> dict[str, Reading]:
+        """By name, what the sensors felt."""
+        found: dict[str, Reading] = {}
+        for sensor in self.recording.sensors:
+            numbers = self.recording._values(sensor.series.path)[self.number]
+            found[sensor.name] = (TaxelReading if sensor.is_grid else ForceReading).of_numbers(numbers)
+        return found
+
+    @cached_property
     def report(self) -> Report:
         """How the step ended, and what was measured on its state.
 
@@ -151,6 +162,7 @@ class Recording(Sequence[RecordedFrame]):
     gravity : (3,) [m/s^2]; dt : time from frame to frame [s]
     physics : the bodies' laws and what acts on them, or None where an older version wrote the recording
     details : which fields of the solver's details are kept; fields : of tets and vertices that were recorded
+    sensors : of the scene
     untouching : pairs that may pass through each other: numbers of bodies, then obstacles
     scene_text : the scene file's text, or None; solver : its description, or None; supple_version : of the writer
     """
@@ -193,7 +205,8 @@ class Recording(Sequence[RecordedFrame]):
         if self._count < 1:
             raise file.broken(f"its number of frames is {self._count}")
         self.fields: tuple[Field, ...] = _recorded_fields(file, header)
-        layout = frame_layout(n, m, len(self.obstacles), self.details, self.fields)
+        self.sensors: tuple[RecordedSensor, ...] = sensors_of_header(file, header)
+        layout = frame_layout(n, m, len(self.obstacles), self.details, self.fields, self.sensors)
         self._series = {series.path: series for series in layout.series}
         own = [field_series(field, n, m).path for field in self.fields]
         for path in (*_READ_BY_FRAME, *own, *([_MESSAGE] if _MESSAGE in file else [])):

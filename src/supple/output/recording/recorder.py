@@ -18,6 +18,7 @@ from supple.files.replacing import output_error, parent_folder, put_in_place, re
 from supple.output.recording.details import RecordedDetails
 from supple.output.recording.file import STEP_TIMES, Layout, RecordingFile, Series, create, rewrite
 from supple.output.recording.scene import write_scene
+from supple.output.recording.sensors import RecordedSensor, recorded_sensors
 from supple.readings.fields import Field, checked_fields, cost
 from supple.simulate import Frame
 from supple.state import Status
@@ -43,9 +44,14 @@ _FIRST_FRAMES, _FIRST_ROOM = 1 << 16, 1 << 30
 
 
 def frame_layout(
-    points: int, tets: int, obstacles: int, details: RecordedDetails, fields: Sequence[Field] = ()
+    points: int,
+    tets: int,
+    obstacles: int,
+    details: RecordedDetails,
+    fields: Sequence[Field] = (),
+    sensors: Sequence[RecordedSensor] = (),
 ) -> Layout:
-    """The series of a recording with these details and chosen fields."""
+    """The series of a recording with these details, chosen fields and sensors."""
     numbers = (Series(f"supple/frames/{name}", 1) for name in REPORT_NUMBERS)
     vectors = (Series(f"supple/frames/{name}", 1, (3,)) for name in REPORT_VECTORS)
     series = (
@@ -63,6 +69,7 @@ def frame_layout(
         Series("supple/frames/message", 1, (MESSAGE_BYTES,), "|u1"),
         *(field.series for field in details.fields),
         *(field_series(field, points, tets) for field in fields),
+        *(sensor.series for sensor in sensors),
     )
     return Layout(points, tets, series)
 
@@ -126,6 +133,7 @@ class Recorder:
         facts = {"supple_version": __version__, "dt": float(dt), "steps": int(steps), "solver": self._solver}
         facts["details"] = self._details.header()
         facts["fields"] = [field.name for field in self._fields]
+        facts["sensors"] = [sensor.described() for sensor in recorded_sensors(system.scene)]
         layout = self._layout(system)
         if self._fields:
             sizes = len(system.rest_positions), len(system.tets)
@@ -150,7 +158,7 @@ class Recorder:
 
     def _layout(self, system: System) -> Layout:
         sizes = len(system.rest_positions), len(system.tets), len(system.obstacles)
-        return frame_layout(*sizes, self._details, self._fields)
+        return frame_layout(*sizes, self._details, self._fields, recorded_sensors(system.scene))
 
     def write(self, frame: Frame) -> None:
         """Add one frame."""
@@ -244,6 +252,8 @@ class Recorder:
             file.put("supple/frames/message", _message_bytes(report.message))
         for field in self._details.fields:
             file.put(field.series.path, field.stored(getattr(report.details, field.name)))
+        for sensor in recorded_sensors(frame.system.scene):
+            file.put(sensor.series.path, frame.sensors[sensor.name].numbers())
         for field in self._fields:
             series = field_series(field, len(frame.state.positions), len(frame.system.tets))
             with np.errstate(over="ignore"):  # beyond single precision, a value is infinite

@@ -67,8 +67,7 @@ class OnSurface(Load):
         check_name(self.body, f"{self.kind}: body")
         if self.name is not None:
             check_name(self.name, self.kind)
-        if self.region is not None and not isinstance(self.region, InBox):
-            object.__setattr__(self, "region", _indices(self.region, self.label))
+        object.__setattr__(self, "region", checked_region(self.region, self.label))
 
     @property
     def label(self) -> str:
@@ -114,7 +113,15 @@ def surface_region(region: Region, body: Body, label: str) -> NDArray[np.int64]:
     return rows
 
 
-def _indices(region: ArrayLike, label: str) -> NDArray[np.int64]:
+def checked_region(region: Region, label: str) -> Region:
+    """A region, checked as far as possible without its body.
+
+    Raises
+    ------
+    SceneError : where it is neither None, nor an `InBox`, nor a list of different numbers.
+    """
+    if region is None or isinstance(region, InBox):
+        return region
     try:
         rows = np.atleast_1d(np.asarray(region))
     except (TypeError, ValueError):

@@ -31,7 +31,9 @@ def _over_time(value: Any, key: str) -> Any:
     return value
 
 
-class _OnSurfaceModel(Model):
+class OnSurfaceModel(Model):
+    """What acts on, or feels, a part of the surface of a body."""
+
     body: Name = Field(description="name of the body")
     box: InBoxModel | None = Field(default=None, description="triangles of the surface inside; without it, all")
     triangles: list[Index] | None = Field(default=None, min_length=1, description="instead of `box`: their numbers")
@@ -44,7 +46,7 @@ class _OnSurfaceModel(Model):
             return InBox(self.box.low, self.box.high)
 
 
-class TractionModel(_OnSurfaceModel):
+class TractionModel(OnSurfaceModel):
     """A force per area at rest that keeps its direction."""
 
     kind: Literal["traction"]
@@ -54,7 +56,7 @@ class TractionModel(_OnSurfaceModel):
         return Traction(self.body, _over_time(self.traction, "traction"), self.region(), self.name)
 
 
-class PressureModel(_OnSurfaceModel):
+class PressureModel(OnSurfaceModel):
     """A force per present area along the inward normal."""
 
     kind: Literal["pressure"]
