@@ -8,7 +8,10 @@ import pytest
 DOCS = Path(__file__).parents[1] / "docs"
 
 
-@pytest.mark.parametrize("page", ["contact.md", "implicit.md", "learning.md", "locking.md", "rigid_bodies.md"])
+@pytest.mark.parametrize(
+    "page",
+    ["contact.md", "forces_and_stresses.md", "implicit.md", "learning.md", "locking.md", "rigid_bodies.md"],
+)
 def test_the_programs_of_a_page_run(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"^```python\n(.*?)^```", (DOCS / page).read_text(encoding="utf-8"), flags=re.S | re.M)

@@ -50,6 +50,11 @@ from .scene.forces import Force as Force
 from .scene.forces import SoftTarget as SoftTarget
 from .scene.inputs import ForceInput as ForceInput
 from .scene.inputs import MotionInput as MotionInput
+from .scene.loads.body_force import BodyForce as BodyForce
+from .scene.loads.over_time import Curve as Curve
+from .scene.loads.spring import Spring as Spring
+from .scene.loads.surface_loads import Pressure as Pressure
+from .scene.loads.surface_loads import Traction as Traction
 from .scene.motion import Keyframes as Keyframes
 from .scene.obstacles.box import Box as Box
 from .scene.obstacles.capsule import Capsule as Capsule
@@ -62,6 +67,8 @@ from .scene.rigid.pose import Pose as Pose
 from .scene.rigid.rigid_body import RigidBody as RigidBody
 from .scene.scene import Scene as Scene
 from .scene.selection import InBox as InBox
+from .scene.sensors import ForceSensor as ForceSensor
+from .scene.sensors import Taxels as Taxels
 from .scene.stitches.vertex_edge import VertexEdgeStitch as VertexEdgeStitch
 from .scene.stitches.vertex_triangle import SoftVertexTriangleStitch as SoftVertexTriangleStitch
 from .scene.stitches.vertex_vertex import VertexVertexStitch as VertexVertexStitch

@@ -15,12 +15,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError, SolverError
-from supple.materials.edges_and_volume import EdgesAndVolume
-from supple.materials.material import Elastic
-from supple.materials.patches.energy import patch_energies
-from supple.materials.per_tet import NO_REGION
+from supple.materials.elastic_tets.laws import TetLaws
+from supple.materials.elastic_tets.stress import energy_densities
 from supple.numerics.deformation import deformation_gradients, determinants
 from supple.numerics.memory import require_memory
+from supple.readings.by_body import ByBody
+from supple.readings.contact_readings import contact_forces, contact_pressures
+from supple.readings.sensor_readings import Reading, sensor_readings
+from supple.readings.tet_readings import TetReadings
 from supple.scene.inputs import checked_values, drive_inputs, hold_inputs
 from supple.scene.rigid.pose import Pose, pose_of
 from supple.scene.scene import Scene
@@ -82,8 +84,8 @@ class Report(Diagnostics):
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
-    """The scene at one time.
+class Frame(TetReadings):
+    """The scene at one time. For strains and stresses, see `TetReadings`.
 
     Attributes
     ----------
@@ -122,14 +124,39 @@ class Frame:
 
     @cached_property
     def contacts(self) -> ContactPoints | None:
-        """All contacts, one by one, where the solver knows them (`Implicit`); otherwise None."""
+        """All contacts, one by one; None where no step led to the frame, or `Implicit` has contact=None."""
         return None if self.find_contacts is None else self.find_contacts()
 
     @cached_property
-    def det_F(self) -> NDArray[np.float64]:
-        """(m,) J of every tet, in the order of the bodies."""
-        F = deformation_gradients(self.state.positions, self.system.tets, self.system.rest_shape_inverse)
-        return determinants(F)
+    def contact_force(self) -> ByBody:
+        """Force of all contacts on each vertex, friction included: by body name, (n, 3) [N]."""
+        return self._by_vertex(contact_forces(self.contacts, len(self.system.points)))
+
+    @cached_property
+    def contact_pressure(self) -> ByBody:
+        """Normal force of contacts per area at each vertex: by body name, (n,) [Pa]; 0 where nothing touches."""
+        x = self.system.points.positions(self._x)
+        return self._by_vertex(contact_pressures(self.contacts, x, self.system.triangles))
+
+    @cached_property
+    def sensors(self) -> dict[str, Reading]:
+        """By name, what the scene's sensors feel: `ForceReading` or `TaxelReading`."""
+        return sensor_readings(self.system, self._x, self.contacts)
+
+    def _by_vertex(self, values: NDArray[np.float64]) -> ByBody:
+        return ByBody(values, {part.name: part.points for part in self.system.bodies}, {})
+
+    @property
+    def _x(self) -> NDArray[np.float64]:
+        return self.state.positions
+
+    @property
+    def _laws(self) -> TetLaws:
+        return self.system.laws
+
+    @property
+    def _bodies(self) -> tuple[BodyRange, ...]:
+        return self.system.bodies
 
 
 class StartFrame(Protocol):
@@ -369,44 +396,15 @@ def measure(system: System, state: State) -> Diagnostics:
     center = m @ x / m.sum()
     momentum = m @ v
     F = deformation_gradients(x, system.tets, system.rest_shape_inverse)
-    J = determinants(F)
-    stitching = system.stitching
+    laws, stitching = system.laws, system.stitching
     points = stitching.points(x, state.time)
     return Diagnostics(
-        min_det_F=float(J.min()),
+        min_det_F=float(determinants(F).min()),
         kinetic_energy=0.5 * float(m @ np.einsum("ij,ij->i", v, v)),
-        elastic_energy=sum(_elastic_energy(system, part, x, F[part.tets], J[part.tets]) for part in system.bodies)
-        + _energy_of_patches(system, x),
+        elastic_energy=float((energy_densities(laws, x, F) * laws.volumes)[laws.known].sum()),
         potential_energy=-float((m @ x) @ system.gravity),
         stitch_energy=stitch_energy(stitching, points) if len(stitching) else 0.0,
         largest_stitch_stretch=largest_stitch_stretch(stitching, points) if len(stitching) else None,
         linear_momentum=momentum,
         angular_momentum=m @ np.cross(x - center, v - momentum / m.sum()),
     )
-
-
-def _energy_of_patches(system: System, x: NDArray) -> float:
-    if system.patches is None:
-        return 0.0
-    return sum(float(energies.sum()) for energies in patch_energies(system.patches, x))
-
-
-def _elastic_energy(system: System, part: BodyRange, x: NDArray, F: NDArray, J: NDArray) -> float:
-    material = part.body.material
-    volumes = system.rest_volumes[part.tets]
-    if isinstance(material, EdgesAndVolume):
-        energy = 0.0
-        if material.edge_compliance > 0.0:
-            ends = system.edges[part.edges]
-            C = np.linalg.norm(x[ends[:, 0]] - x[ends[:, 1]], axis=1) - system.rest_lengths[part.edges]
-            energy += 0.5 * float(C @ C) / material.edge_compliance
-        if material.volume_compliance > 0.0:
-            C = (J - 1.0) * volumes
-            energy += 0.5 * float(C @ C) / material.volume_compliance
-        return energy
-    if isinstance(material, Elastic):
-        densities = material.energy_density(F)
-        if system.patches is not None:
-            densities[material.per_tet(len(volumes)).region != NO_REGION] = 0.0
-        return float(densities @ volumes)
-    return 0.0

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.errors import SceneError
+
 
 class Status(StrEnum):
     """How a step ended. It equals its name as text: `report.status == "converged"`.
@@ -55,29 +57,63 @@ class ContactPoints:
     ----------
     points : (k, 3) midpoints between the two nearest points [m]
     normals : (k, 3) unit vectors from the second to the first
-    forces : (k, 3) on the first, along the normal [N]; the force on the second is opposite
+    forces, friction : (k, 3) on the first, along the normal and perpendicular to it [N]; those on the second are
+        opposite. Of `XPBD` the means over the frame; of `Implicit` those at its end.
     distances : (k,) [m]
     first, second : (k,) the two bodies or obstacles: indices into `names`
     names : of all bodies, and after them of all obstacles
+    rows, vertices, weights : (q,) the force of contact `rows[j]` acts with the factor `weights[j]` on the row
+        `vertices[j]` of `System.points`: a vertex of a soft body, or of a rigid body's surface; obstacles have none
     """
 
     points: NDArray[np.float64]
     normals: NDArray[np.float64]
     forces: NDArray[np.float64]
+    friction: NDArray[np.float64]
     distances: NDArray[np.float64]
     first: NDArray[np.int32]
     second: NDArray[np.int32]
     names: tuple[str, ...]
+    rows: NDArray[np.int64]
+    vertices: NDArray[np.int32]
+    weights: NDArray[np.float64]
 
     def __len__(self) -> int:
         return len(self.points)
 
     def force_between(self, on: str, by: str) -> NDArray[np.float64]:
-        """(3,) the total normal force on one body or obstacle by another [N]."""
-        a, b = self.names.index(on), self.names.index(by)
-        forward = self.forces[(self.first == a) & (self.second == b)].sum(axis=0)
-        backward = self.forces[(self.first == b) & (self.second == a)].sum(axis=0)
+        """(3,) the total force on one body or obstacle by another, friction included [N].
+
+        Raises
+        ------
+        SceneError : where there is no body or obstacle of a name.
+        """
+        a, b = self._number(on), self._number(by)
+        forces = self.forces + self.friction
+        forward = forces[(self.first == a) & (self.second == b)].sum(axis=0)
+        backward = forces[(self.first == b) & (self.second == a)].sum(axis=0)
         return np.asarray(forward - backward)
+
+    def by_pair(self) -> dict[tuple[str, str], NDArray[np.float64]]:
+        """`force_between` of every two that touch, in both orders: by (on, by), (3,) [N]."""
+        low, high = np.minimum(self.first, self.second), np.maximum(self.first, self.second)
+        found = {}
+        for a, b in np.unique(np.column_stack([low, high])[low != high], axis=0):
+            on, by = self.names[a], self.names[b]
+            found[on, by] = self.force_between(on, by)
+            found[by, on] = -found[on, by]
+        return found
+
+    def on_vertices(self, forces: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+        """(count, 3) the sums on the System's points of forces (k, 3) of the contacts, such as `forces` [N]."""
+        shares = self.weights[:, None] * forces[self.rows]
+        sums = [np.bincount(self.vertices, column, count) for column in shares.T]
+        return np.stack(sums, axis=1).astype(np.float64, copy=False)
+
+    def _number(self, name: str) -> int:
+        if name not in self.names:
+            raise SceneError(f"there is no body or obstacle {name!r}; there are {', '.join(map(repr, self.names))}")
+        return self.names.index(name)
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,8 +17,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.materials.patches.domains import Patches, patches_of
-from supple.materials.per_tet import NO_REGION, TetMaterial
+from supple.loads.applied import AppliedLoad, DeadLoad
+from supple.loads.build import applied, applied_force
+from supple.materials.edges_and_volume import EdgesAndVolume
+from supple.materials.elastic_tets.edge_springs import EdgeSprings
+from supple.materials.elastic_tets.laws import TetLaws, joined_materials
 from supple.mesh.topology import graph_components
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.scene.body import PlacedBody
@@ -48,6 +51,10 @@ class BodyRange:
     def name(self) -> str:
         return self.body.name
 
+    @property
+    def rigid(self) -> bool:
+        return isinstance(self.body, RigidBody)
+
 
 @dataclass(frozen=True, eq=False)
 class PinRange:
@@ -71,22 +78,6 @@ class PinRange:
             R, t = rigid_pose(self.pin.motion, time, self.pin.label)
             return self.anchors @ R.T + t
         return moved_points(self.pin.motion, self.anchors, time, self.pin.label)
-
-
-@dataclass(frozen=True, eq=False)
-class ForceRange:
-    """The vertices (k,) that one force acts on; weights : (p, k) of the p points that it is given for, or None where
-    these are the vertices."""
-
-    force: Force
-    vertices: NDArray[np.int32]
-    weights: NDArray[np.float64] | None = None
-
-    def per_vertex(self, time: float) -> NDArray[np.float64]:
-        """The force (k, 3) on each of the vertices at `time` [N]."""
-        if self.weights is None:
-            return self.force.per_vertex(time, len(self.vertices))
-        return self.weights.T @ self.force.per_vertex(time, len(self.weights))
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +107,7 @@ class System:
     triangles : (t, 3) surfaces, rows of `points`, counter-clockwise from outside
     components : (n,) the connected piece of a mesh that a vertex belongs to
     gravity : (3,) [m/s^2]
+    loads : those of the scene's forces, then of its loads
     stitching : tets and springs that join bodies to each other, and to obstacles
     start_states : where a simulation began, then where it continues; vertices in the scene's order
     """
@@ -134,7 +126,7 @@ class System:
     components: NDArray[np.int32]
     gravity: NDArray[np.float64]
     points: EmbeddedPoints = field(default_factory=EmbeddedPoints.none)
-    forces: tuple[ForceRange, ...] = ()
+    loads: tuple[AppliedLoad, ...] = ()
     soft_targets: tuple[SoftTargetRange, ...] = ()
     stitching: Stitching = field(default_factory=lambda: no_stitching(0))
     start_states: tuple[State, ...] = ()
@@ -160,14 +152,18 @@ class System:
         return np.concatenate([self.tets, self.stitching.elements()]) if len(self.stitching) else self.tets
 
     @cached_property
-    def patches(self) -> Patches | None:
-        """The patches of the tets whose material is averaged over such; None where there is none."""
-        rows = [part.body.material.per_tet(part.tets.stop - part.tets.start) for part in self.bodies]
-        if not any((row.region != NO_REGION).any() for row in rows):
-            return None
-        names = ("density", "damping", "kind", "mu", "lam", "region")
-        material = TetMaterial(*(np.concatenate([getattr(row, name) for row in rows]) for name in names))
-        return patches_of(self.tets, self.rest_shape_inverse, self.rest_volumes, material)
+    def laws(self) -> TetLaws:
+        """The elastic laws of all tets."""
+        materials = [part.body.material.per_tet(part.tets.stop - part.tets.start) for part in self.bodies]
+        springs = []
+        for part in self.bodies:
+            law, rows = part.body.material, part.tets
+            if isinstance(law, EdgesAndVolume):
+                own = law.edge_compliance, law.volume_compliance
+                of_tets = self.rest_positions, self.tets[rows], self.rest_volumes[rows]
+                springs.append(EdgeSprings.of(own, rows, *of_tets))
+        joined = joined_materials(materials)
+        return TetLaws(self.tets, self.rest_shape_inverse, self.rest_volumes, joined, tuple(springs))
 
     @cached_property
     def joined_components(self) -> NDArray[np.int32]:
@@ -225,12 +221,16 @@ def build_system(scene: Scene, start: State | None = None) -> System:
     rest_positions = np.concatenate(rest)
     all_edges = np.concatenate(edges).astype(np.int32)
     lengths = np.linalg.norm(rest_positions[all_edges[:, 0]] - rest_positions[all_edges[:, 1]], axis=1)
+    all_masses, start_states = np.concatenate(masses), _start_states(scene, start)
+    begins = {part.name: part.vertices.start for part in ranges}
+    forces = [_applied_force(force, next(part for part in ranges if part.name == force.body)) for force in scene.forces]
+    loads = [applied(load, scene.bodies, begins, all_masses, start_states[0].positions) for load in scene.loads]
     return System(
         scene=scene,
         bodies=tuple(ranges),
         pins=tuple(PinRange(pin, *_anchored(pin, ranges, start)) for pin in scene.pins),
         rest_positions=np.ascontiguousarray(rest_positions),
-        masses=np.concatenate(masses),
+        masses=all_masses,
         tets=np.ascontiguousarray(np.concatenate(tets), dtype=np.int32),
         rest_shape_inverse=np.ascontiguousarray(np.concatenate(Dm_inv)),
         rest_volumes=np.concatenate(volumes),
@@ -240,10 +240,10 @@ def build_system(scene: Scene, start: State | None = None) -> System:
         components=graph_components(n, all_edges[:, 0], all_edges[:, 1]),
         gravity=np.asarray(scene.gravity, dtype=np.float64),
         points=EmbeddedPoints.joined(points),
-        forces=tuple(_force_range(force, ranges, start) for force in scene.forces),
+        loads=(*forces, *loads),
         soft_targets=tuple(SoftTargetRange(item, *_anchored(item, ranges, start)) for item in scene.soft_targets),
         stitching=scene.stitching,
-        start_states=_start_states(scene, start),
+        start_states=start_states,
     )
 
 
@@ -270,14 +270,9 @@ def _lumped_masses(body: PlacedBody) -> NDArray[np.float64]:
     return masses.astype(np.float64, copy=False)
 
 
-def _force_range(force: Force, ranges: list[BodyRange], start: State | None) -> ForceRange:
-    part = next(r for r in ranges if r.name == force.body)
-    if not isinstance(part.body, RigidBody):
-        return ForceRange(force, _anchored(force, ranges, start)[0])
-    chosen = force.select(part.body.place(part.body.points))
-    return ForceRange(
-        force, np.arange(part.vertices.start, part.vertices.stop, dtype=np.int32), part.body.weights[chosen]
-    )
+def _applied_force(force: Force, part: BodyRange) -> DeadLoad:
+    rows = force.select(part.body.place(part.body.points))
+    return applied_force(force, part.body, part.vertices.start, rows)
 
 
 def _anchored(

@@ -135,7 +135,7 @@ def test_pressure_of_a_compressed_block_has_no_checkerboard():
     body = sp.Body("block", mesh, rubber(0.4999))
     scene = sp.Scene([body], pins=[sp.Pin("block", ends, lambda t: t * move)], gravity=(0, 0, 0))
     system = build_system(scene)
-    patches = system.patches
+    patches = system.laws.patches
     assert patches is not None
     x = equilibrium(scene, steps=1).positions["block"]
     _, pressures, _ = vertex_states(patches, x)

@@ -237,7 +237,7 @@ def test_the_rigid_bodies_of_the_manual_are_valid(load, tmp_path):
     assert next(sp.simulate(run.scene, run.solver, run.dt, 1)).report.status == "converged"
 
 
-@pytest.mark.parametrize("kinds", ["material", "shape", "obstacle", "solver", "stitch"])
+@pytest.mark.parametrize("kinds", ["material", "shape", "obstacle", "solver", "stitch", "load", "sensor"])
 def test_the_manual_lists_every_kind(kinds):
     manual = (Path(__file__).parents[2] / "docs" / "scene_files.md").read_text(encoding="utf-8")
     row = next(line for line in manual.splitlines() if line.startswith(f"| {kinds} |"))
@@ -250,6 +250,10 @@ def test_the_manual_lists_every_kind(kinds):
 
 
 def _family(name):
+    if name in ("TractionModel", "PressureModel", "BodyForceModel", "SpringModel"):
+        return "load"
+    if name in ("ForceSensorModel", "TaxelsModel"):
+        return "sensor"
     if name.endswith("ShapeModel") or name == "GummyBearSurfaceModel":
         return "shape"
     if name in ("XPBDModel", "ImplicitModel"):

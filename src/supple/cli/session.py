@@ -34,6 +34,7 @@ class Products:
     ----------
     folder : the run folder
     page, plot : whether to write index.html and plot.png to it; compress : whether to compress the complete recording
+    fields : to record in addition
     quiet : print neither progress nor summary
     checkpoint_every : number of frames from checkpoint to checkpoint; None: only at the start and the end
     overwrite : replace an earlier run in the folder
@@ -44,6 +45,7 @@ class Products:
     plot: bool = True
     quiet: bool = False
     compress: bool = False
+    fields: tuple[str, ...] = ()
     checkpoint_every: int | None = None
     overwrite: bool = False
 
@@ -123,8 +125,11 @@ def run_session(
         checkpoint_every=products.checkpoint_every,
         overwrite=products.overwrite,
         compress=products.compress,
+        fields=products.fields,
         source=source,
     )
+    if products.fields and not products.quiet:
+        _print_cost(scene, steps, products.fields)
     frames = simulate(scene, solver, dt, steps, sinks=[folder, *sinks, *products.progress()], **(start or {}))
     return _driven(frames, products, strict)
 
@@ -174,6 +179,16 @@ def _driven(frames: Generator[Frame], products: Products, strict: bool = False) 
     if not products.quiet:
         _print_summary(outcome, recording, products)
     return outcome
+
+
+def _print_cost(scene: Scene, steps: int, names: Sequence[str]) -> None:
+    """Print what the recorded fields take on the disk, before the simulation begins."""
+    from supple.cli.console import shell_console
+    from supple.readings.fields import checked_fields, cost
+
+    vertices, tets = (sum(len(getattr(body.mesh, key)) for body in scene.bodies) for key in ("vertices", "tets"))
+    text = cost(checked_fields(names), vertices, tets, steps + 1)
+    shell_console().print(f"fields     {text}", highlight=False)
 
 
 def _warn_of_older_files(products: Products) -> None:

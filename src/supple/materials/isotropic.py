@@ -145,10 +145,10 @@ def densities(F, kind, mu, lam, out):
         out[e] = energy_density(load_mat(F, e), kind[e], mu[e], lam[e])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(parallel=True, cache=True, error_model="numpy")
 def piolas(F, kind, mu, lam, out):
     """Stresses (m, 3, 3) of F (m, 3, 3), into `out`."""
-    for e in range(len(F)):
+    for e in prange(len(F)):
         store_mat(first_piola(load_mat(F, e), kind[e], mu[e], lam[e]), out, e)
 
 

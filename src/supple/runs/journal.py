@@ -59,6 +59,7 @@ class Journal:
     checkpoint_every : number of frames from checkpoint to checkpoint; None: only at the start and the end
     compress : whether the complete recording is compressed
     sessions : in order
+    fields : recorded in addition
     """
 
     run: RunFacts
@@ -67,6 +68,7 @@ class Journal:
     checkpoint_every: int | None
     compress: bool
     sessions: tuple[Session, ...] = ()
+    fields: tuple[str, ...] = ()
 
     def with_session(self, session: Session) -> Journal:
         """With one more session, after the earlier ones."""

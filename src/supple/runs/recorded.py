@@ -62,7 +62,8 @@ def simulate_recorded(run: Run, recording: Path, checkpoint: Path, checkpoint_se
     first = _interrupted(run, recording, checkpoint)
     if first is None:
         checkpoint.unlink(missing_ok=True)
-        recorder = Recorder(recording, scene_text=run.text, solver=run.solver, compress=run.output.compress)
+        compress, fields = run.output.compress, run.output.fields
+        recorder = Recorder(recording, scene_text=run.text, solver=run.solver, compress=compress, fields=fields)
     else:
         recorder = ContinuedRecorder(recording, compress=run.output.compress)
     positions = (run.initial_positions or None) if first is None else None

@@ -52,7 +52,8 @@ class ResumedFolder(FolderSink):
         if paths.recording.exists():
             return ContinuedRecorder(paths.recording, compress=journal.compress)
         text = paths.scene.read_text(encoding="utf-8") if paths.scene.exists() else None
-        return Recorder(paths.recording, scene_text=text, solver=journal.run.solver, compress=journal.compress)
+        solver, compress, fields = journal.run.solver, journal.compress, journal.fields
+        return Recorder(paths.recording, scene_text=text, solver=solver, compress=compress, fields=fields)
 
 
 def resume(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from supple.errors import OutputError
 from supple.files.lock import FolderLock
 from supple.files.replacing import output_error, whole_file
 from supple.output.recording.recorder import Recorder
+from supple.readings.fields import checked_fields
 from supple.runs.checkpoints import facts_of
 from supple.runs.contents import RunPaths
 from supple.runs.journal import Journal
@@ -77,6 +78,7 @@ class RunFolder(FolderSink):
         the run stops early. The first checkpoint and the latest two are kept.
     overwrite : replace an earlier run in the folder; without it, a folder that contains a recording is an error
     compress : compress the recording when the run ends
+    fields : to record in addition; see `Recorder`
     seed : of the random numbers that the scene was made with; kept in the journal
     source : where the scene comes from
 
@@ -94,6 +96,7 @@ class RunFolder(FolderSink):
         checkpoint_every: int | None = CHECKPOINT_EVERY,
         overwrite: bool = False,
         compress: bool = False,
+        fields: Sequence[str] = (),
         seed: int | None = None,
         source: SceneSource | None = None,
     ) -> None:
@@ -108,6 +111,7 @@ class RunFolder(FolderSink):
             )
         self._solver, self._every, self._overwrite = solver, checkpoint_every, overwrite
         self._compress, self._seed, self._source = bool(compress), seed, source or SceneSource()
+        self._fields = tuple(field.name for field in checked_fields(fields))
         self._refuse()
 
     def begin(self, first: Frame, dt: float, steps: int) -> None:
@@ -118,9 +122,15 @@ class RunFolder(FolderSink):
             seed=self._seed,
             checkpoint_every=None if self._every is None else int(self._every),
             compress=self._compress,
+            fields=self._fields,
         )
-        text, solver = self._source.text, self._solver
-        recorder = Recorder(self.paths.recording, scene_text=text, solver=solver, compress=self._compress)
+        recorder = Recorder(
+            self.paths.recording,
+            scene_text=self._source.text,
+            solver=self._solver,
+            compress=self._compress,
+            fields=self._fields,
+        )
         try:
             self.paths.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:

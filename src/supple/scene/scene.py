@@ -16,12 +16,14 @@ from supple.scene.body import PlacedBody
 from supple.scene.contact_pairs import ContactPair, pair_table
 from supple.scene.forces import Force, SoftTarget
 from supple.scene.inputs import Input, inputs_among
+from supple.scene.loads.load import Load
 from supple.scene.located import at
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.pins import Pin
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.rigid.stiffness import with_stiffness
 from supple.scene.selection import InBox
+from supple.scene.sensors import Sensor
 from supple.scene.stitches.stitch import Stitch
 from supple.scene.stitches.stitching import Stitching, check_names, stitch_together
 from supple.scene.suggestion import suggestion
@@ -35,6 +37,8 @@ _PARTS = (
     ("soft_targets", SoftTarget),
     ("stitches", Stitch),
     ("contact_pairs", ContactPair),
+    ("loads", Load),
+    ("sensors", Sensor),
 )
 
 
@@ -50,6 +54,8 @@ class Scene:
     gravity : (3,) acceleration [m/s^2].
     forces : loads on vertices; soft_targets : springs to places.
     stitches : joints of bodies with each other, and with triangle obstacles.
+    loads : tractions, pressures, forces per mass and springs between points.
+    sensors : of contact on surfaces; no two have the same name.
     contact_pairs : friction of some pairs of bodies and obstacles, and which of them pass through each other.
 
     Raises
@@ -65,6 +71,8 @@ class Scene:
     soft_targets: Sequence[SoftTarget] = ()
     stitches: Sequence[Stitch] = ()
     contact_pairs: Sequence[ContactPair] = ()
+    loads: Sequence[Load] = ()
+    sensors: Sequence[Sensor] = ()
 
     def __post_init__(self) -> None:
         for key, kind in _PARTS:
@@ -94,6 +102,14 @@ class Scene:
             for i, item in enumerate(getattr(self, key)):
                 with at(key, i):
                     self._check_selection(item, pinned)
+        for i, load in enumerate(self.loads):
+            with at("loads", i):
+                load.check(self.bodies)
+        for i, sensor in enumerate(self.sensors):
+            with at("sensors", i):
+                sensor.triangles(self.bodies)
+                if any(other.name == sensor.name for other in self.sensors[:i]):
+                    raise SceneError(f"{sensor.label}: another sensor has this name; give each a name of its own")
         if self.contact_pairs:
             pair_table(self)
         self.inputs  # noqa: B018 - raises where two have the same name

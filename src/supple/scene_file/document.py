@@ -6,10 +6,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
+from supple.readings.fields import FIELDS
 from supple.scene_file.entries.bodies import BodyModel
 from supple.scene_file.entries.contact_pairs import ContactPairModel
+from supple.scene_file.entries.loads import LoadModel
 from supple.scene_file.entries.obstacles import ObstacleModel
 from supple.scene_file.entries.selections import ForceModel, PinModel, SoftTargetModel
+from supple.scene_file.entries.sensors import SensorModel
 from supple.scene_file.entries.solvers import SolverModel, XPBDModel
 from supple.scene_file.entries.stitches import StitchModel
 from supple.scene_file.fraction import number_or_fraction
@@ -43,11 +46,17 @@ Seconds = Annotated[
 ]
 
 
+FieldName = Literal[tuple(FIELDS)]  # pyright: ignore[reportInvalidTypeForm]
+
+
 class OutputModel(Model):
     """Files that `supple run` writes in addition to the recording."""
 
     page: bool = Field(default=True, description="index.html, which plays the recording in a browser")
     compress: bool = Field(default=False, description="store the recording compressed: smaller, and slower to write")
+    fields: list[FieldName] = Field(  # pyright: ignore[reportInvalidTypeForm]
+        default=[], description="recorded in addition, for ParaView: see the documentation"
+    )
     plot: bool = Field(default=True, description="plot.png: energies, momentum, volume ratio and smallest J over time")
 
 
@@ -59,6 +68,8 @@ class SceneFileModel(Model):
     obstacles: list[ObstacleModel] = Field(default=[], max_length=10_000)
     pins: list[PinModel] = Field(default=[], max_length=10_000)
     forces: list[ForceModel] = Field(default=[], max_length=10_000)
+    loads: list[LoadModel] = Field(default=[], max_length=10_000)
+    sensors: list[SensorModel] = Field(default=[], max_length=10_000)
     soft_targets: list[SoftTargetModel] = Field(default=[], max_length=10_000)
     contact_pairs: list[ContactPairModel] = Field(default=[], max_length=10_000)
     stitches: list[StitchModel] = Field(default=[], max_length=10_000)

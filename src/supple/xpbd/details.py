@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+from numpy.typing import NDArray
+
 from supple.state import SolverDetails
 
 
@@ -22,6 +25,7 @@ class XPBDDetails(SolverDetails):
     softening : by body, the share of its stiffness that it lacks at this length of the substep, estimated (see
         `supple.xpbd.assessment.softening`)
     energy_gained : energy that came from nowhere, and has not been lost since, over the energy of the scene [-]
+    contact_forces, friction_forces : by name of the body or obstacle, (3,) means over the frame [N]; each sum to zero
     held_back : substeps in which the motion of a body was shortened, so that no tet inverts and nothing passes
         through anything
     """
@@ -33,3 +37,5 @@ class XPBDDetails(SolverDetails):
     softening: Mapping[str, float] = field(default_factory=dict)
     energy_gained: float = 0.0
     held_back: int = 0
+    contact_forces: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    friction_forces: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)

@@ -1,25 +1,66 @@
-"""External loads beside gravity and contact: forces on vertices, and springs to target positions."""
+"""External loads beside gravity and contact: forces, and springs to target positions and between points."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.loads.applied import DeadLoad
+from supple.loads.springs import PointSpring
 from supple.numerics.kernel_cache import njit
 from supple.system import System
 
 
 def add_forces(
-    system: System, points: NDArray[np.float64], velocities: NDArray[np.float64], time: float, h: float
+    system: System,
+    points: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+    origins: NDArray[np.float64],
+    time: float,
+    h: float,
 ) -> None:
-    """Add the forces at `time` to a prediction: v += h w f, x += h^2 w f.
+    """Add the loads at `time` to a prediction: v += h w f, x += h^2 w f. Springs follow in `pull_springs`.
 
     Parameters
     ----------
     points : (n, 4) positions about the components' origins [m], and inverse masses [1/kg]; velocities : (n, 3) [m/s]
+    origins : (n, 3) [m]
     """
-    for force in system.forces:
-        _push(points, velocities, force.vertices, np.ascontiguousarray(force.per_vertex(time)), h)
+    loads = [load for load in system.loads if not isinstance(load, PointSpring)]
+    if loads:
+        forces = np.zeros_like(velocities)
+        dead = all(isinstance(load, DeadLoad) for load in loads)
+        x = points[:, :3] if dead else points[:, :3] + origins
+        for load in loads:
+            load.add_forces(x, time, forces)
+        _push(points, velocities, forces, h)
+
+
+def pull_springs(
+    system: System,
+    points: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+    origins: NDArray[np.float64],
+    time: float,
+    h: float,
+) -> None:
+    """Project the springs between points: C = l - l0 with compliance 1 / k, one after the other.
+
+    Dlam = -C / (sum w c^2 + 1 / (k h^2)), with the coefficients c of the vertices. Arguments as of `add_forces`.
+    """
+    for spring in system.loads:
+        if isinstance(spring, PointSpring):
+            rows, c = spring.vertices, spring.coefficients
+            own = points[rows, :3] + origins[rows]
+            r = c @ own + spring.offset
+            length = float(np.sqrt(r @ r))
+            weight = float(points[rows, 3] @ (c * c))
+            if length > 0.0 and weight > 0.0:
+                stretch = length - spring.rest_length(time)
+                change = -stretch / (weight + 1.0 / (spring.stiffness * h * h)) / length * r
+                moved = (points[rows, 3] * c)[:, None] * change
+                points[rows, :3] += moved
+                velocities[rows] += moved / h
 
 
 def pull_to_targets(
@@ -33,7 +74,7 @@ def pull_to_targets(
     """Project the springs to soft targets: C = x - target with compliance 1 / k, all three components at once.
 
     Dlam = -C / (w + 1 / (k h^2)), as for any XPBD constraint. These forces are external, so they act after the momentum
-    restore. `points` and `velocities` as in `add_forces`, origins (n, 3) [m].
+    restore. Arguments as of `add_forces`.
     """
     for target in system.soft_targets:
         places = np.ascontiguousarray(target.targets(time))
@@ -41,11 +82,10 @@ def pull_to_targets(
 
 
 @njit(cache=True)
-def _push(points, velocities, vertices, forces, h):
-    for k in range(len(vertices)):
-        i = vertices[k]
+def _push(points, velocities, forces, h):
+    for i in range(len(points)):
         for j in range(3):
-            change = h * points[i, 3] * forces[k, j]
+            change = h * points[i, 3] * forces[i, j]
             velocities[i, j] += change
             points[i, j] += h * change
 

@@ -31,7 +31,7 @@ from supple.xpbd.contact.collisions import Collisions
 from supple.xpbd.contact.settings import XPBDContact
 from supple.xpbd.damping.kelvin_voigt import Damping, ViscousMemory, cycle_lengths, make_damping
 from supple.xpbd.details import XPBDDetails
-from supple.xpbd.external_forces import add_forces, pull_to_targets
+from supple.xpbd.external_forces import add_forces, pull_springs, pull_to_targets
 from supple.xpbd.integration import (
     apply_changes,
     first_lost,
@@ -231,6 +231,8 @@ class XPBD(Solver):
             substeps=float(used.count) if repeats and problem is None else FALL * before.substeps,
             futile=frozenset() if problem is None else before.futile | ({problem} if repeats else set()),
         )
+        forces, old_from_new = ws.collisions.forces, ws.layout.old_from_new
+        pushes, friction = forces.by_name()
         details = XPBDDetails(
             contacts=ws.collisions.contacts,
             smallest_gap=ws.collisions.smallest_gap,
@@ -240,9 +242,18 @@ class XPBD(Solver):
             softening=ws.assessment.softening.by_body(h),
             energy_gained=findings.gained,
             held_back=held_back,
+            contact_forces=pushes,
+            friction_forces=friction,
         )
+        world, surfaces = ws.world.copy(), ws.collisions.positions
         message = findings.message(time, self._remedy(ws, dt, findings, used.count))
-        report = StepReport(status, used.count, message, details=details)
+        report = StepReport(
+            status,
+            used.count,
+            message,
+            details=details,
+            contacts=lambda: forces.points(world, surfaces, old_from_new),
+        )
         return replace(new, memory=memory), report, problem
 
     def _remedy(self, ws: XPBDWorkspace, dt: float, findings: Findings, used: int) -> str:
@@ -280,7 +291,7 @@ class XPBD(Solver):
                 moving = ws.anchors.velocities(end - h, h)
                 damping.begin_cycle(ws.extended, ws.velocities, moving, cycles[k], h, parallel)
             _begin_substep(ws, targets[k], end, h, parallel)
-            add_forces(ws.system, ws.points, ws.velocities, end, h)
+            add_forces(ws.system, ws.points, ws.velocities, ws.origins, end, h)
             if damping is not None:
                 damping.push(ws.points, h)
             if collides:
@@ -290,6 +301,7 @@ class XPBD(Solver):
             restore(ws, h, parallel)
             ws.pace.note(parallel, perf_counter() - started)
             pull_to_targets(ws.system, ws.points, ws.velocities, ws.origins, end, h)
+            pull_springs(ws.system, ws.points, ws.velocities, ws.origins, end, h)
             if collides and not collide(ws, end, h, parallel):
                 break
             held_back += keep_volumes(ws, end, h, parallel)
@@ -306,7 +318,12 @@ class XPBD(Solver):
 
     def initial_details(self, system: System, workspace: XPBDWorkspace) -> XPBDDetails:
         """No contacts; see `Solver.initial_details`."""
-        return XPBDDetails(softening=dict.fromkeys((part.name for part in system.bodies), 0.0))
+        pushes, friction = workspace.collisions.forces.by_name()
+        return XPBDDetails(
+            softening=dict.fromkeys((part.name for part in system.bodies), 0.0),
+            contact_forces=pushes,
+            friction_forces=friction,
+        )
 
 
 def _check_count(name: str, value: object, otherwise: str = "") -> None:

@@ -96,7 +96,8 @@ def test_turned_cubes_in_a_heap():
 
 def test_deformed_starts_and_chosen_vertices_move_along():
     load = sp.Force("b", sp.InBox((0.5, -1, -1), (2, 1, 1)), (0, 1, 0))
-    scene = sp.Scene([cube("a", (0, 0, 0)), cube("b", (0.9, 0, 0))], forces=[load])
+    face = sp.Pressure("b", 1.0, region=sp.InBox((1.3, -1, -1), (2, 1, 1)))
+    scene = sp.Scene([cube("a", (0, 0, 0)), cube("b", (0.9, 0, 0))], forces=[load], loads=[face])
     placed = scene.body("b").place(scene.body("b").mesh.vertices)
     chosen = load.select(placed)
     given = {"b": 0.9 * (placed - placed.mean(axis=0)) + placed.mean(axis=0)}
@@ -105,6 +106,7 @@ def test_deformed_starts_and_chosen_vertices_move_along():
     assert np.allclose(result.initial_positions["b"], given["b"] + move.shift)
     moved = result.scene.body("b")
     assert np.array_equal(result.scene.forces[0].select(moved.place(moved.mesh.vertices)), chosen)
+    assert np.array_equal(result.scene.loads[0].triangles(moved), face.triangles(scene.body("b")))
     assert apart(result.scene, result.initial_positions)
 
 

@@ -25,6 +25,7 @@ def run(
     strict: Annotated[bool, Parameter(negative="")] = False,
     page: bool | None = None,
     plot: bool | None = None,
+    fields: str | None = None,
     checkpoint_every: CheckpointEvery = None,
     overwrite: Overwrite = False,
     quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False,
@@ -56,6 +57,9 @@ def run(
         Write index.html, which plays the recording in a browser; without this, as the scene file specifies.
     plot
         Write plot.png; without this, as the scene file specifies.
+    fields
+        Fields to record in addition, separated by commas, such as von_mises,contact_force; without this, as the scene
+        file specifies. Their cost in bytes is printed before the run.
     checkpoint_every
         Number of frames from checkpoint to checkpoint; 0: only at the start and the end. 100 without this.
     overwrite
@@ -85,6 +89,7 @@ def run(
     dt, steps = described.dt if dt is None else dt, described.steps if steps is None else steps
     page = described.output.page if page is None else page
     plot = described.output.plot if plot is None else plot
+    names = described.output.fields if fields is None else [name.strip() for name in fields.split(",") if name.strip()]
     origin = {"kind": "scene_file", "file": str(scene), "separate": separate, "page": page, "plot": plot}
     return run_session(
         described.scene,
@@ -94,6 +99,6 @@ def run(
         start=described.start,
         strict=strict,
         sinks=traces(trace, used),
-        products=replace(products, page=page, plot=plot, compress=described.output.compress),
+        products=replace(products, page=page, plot=plot, compress=described.output.compress, fields=tuple(names)),
         source=SceneSource(origin, described.text, resolved_scene(described, solver=solver, dt=dt, steps=steps)),
     ).code

@@ -114,6 +114,18 @@ def add_friction_gradient(x, slips, reach, out):
                 out[points[k, i], j] += size * coefficients[k, i] * u[j]
 
 
+@njit(cache=True, error_model="numpy")
+def slip_forces(x, slips, reach):
+    """(k, 3) the force of friction on the first side of every contact [N]."""
+    out = np.empty((len(slips[0]), 3))
+    for k in range(len(out)):
+        u = slip_of(x, slips, k)
+        size = -slips[5][k] * friction_ratio((u[0] * u[0] + u[1] * u[1] + u[2] * u[2]) ** 0.5, reach)
+        for j in range(3):
+            out[k, j] = size * u[j]
+    return out
+
+
 def friction_hessian(x: NDArray[np.float64], slips: Slips, reach: float, duals: NDArray[np.float64]) -> Couplings:
     """The matrix of a primal-dual step at x (s, 3), positive semi-definite [N/m].
 

@@ -13,7 +13,9 @@ from supple.contact.start.surfaces import StartSurfaces, start_surfaces
 from supple.errors import SceneError
 from supple.mesh.topology import graph_components
 from supple.scene.contact_pairs import PairTable, pair_table
+from supple.scene.loads.surface_loads import Pressure, Traction
 from supple.scene.scene import Scene
+from supple.scene.selection import InBox
 from supple.system import PinRange, System, build_system, initial_state
 
 # How far a body may be moved, as a share of its diagonal.
@@ -102,6 +104,7 @@ def _applied(scene: Scene, given: Mapping[str, ArrayLike], total: NDArray[np.flo
     bodies, moves = list(scene.bodies), []
     starts = {name: np.asarray(x, dtype=np.float64) for name, x in given.items()}
     loads = {key: list(getattr(scene, key)) for key in ("forces", "soft_targets")}
+    on_surfaces = list(scene.loads)
     for i, shift in enumerate(total):
         if not shift.any():
             continue
@@ -114,9 +117,12 @@ def _applied(scene: Scene, given: Mapping[str, ArrayLike], total: NDArray[np.flo
             for k, item in enumerate(items):
                 if item.body == body.name:
                     items[k] = replace(item, vertices=item.select(body.place(body.points)))
+        for k, load in enumerate(on_surfaces):
+            if isinstance(load, (Pressure, Traction)) and load.body == body.name and isinstance(load.region, InBox):
+                on_surfaces[k] = replace(load, region=load.triangles(body))
     if not moves:
         return Separation(scene, starts, ())
-    return Separation(replace(scene, bodies=bodies, **loads), starts, tuple(moves))
+    return Separation(replace(scene, bodies=bodies, loads=on_surfaces, **loads), starts, tuple(moves))
 
 
 def shifted(system: System, s: StartSurfaces, body: int, shift: NDArray[np.float64]) -> StartSurfaces:

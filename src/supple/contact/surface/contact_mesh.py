@@ -51,6 +51,7 @@ class ContactMesh:
     names: tuple[str, ...]
     collide: NDArray[np.bool_]
     stitched: StitchFilter | None
+    rows: NDArray[np.int32]
 
 
 def contact_mesh(
@@ -91,6 +92,7 @@ def contact_mesh(
         names=tuple(part.name for part in system.bodies) + tuple(str(o.name) for o in system.obstacles),
         collide=collide,
         stitches=(of_vertex[system.stitching.nodes()], surface.positions(start)),
+        rows=np.where(used < len(system.points), used, -1).astype(np.int32),
     )
 
 
@@ -104,12 +106,14 @@ def mesh_of_triangles(
     names: tuple[str, ...],
     collide: NDArray[np.bool_],
     stitches: tuple[NDArray[np.int32], NDArray[np.float64]] | None = None,
+    rows: NDArray[np.int32] | None = None,
 ) -> ContactMesh:
     """The mesh of triangles (f, 3) of points with rest positions (s, 3); for the other arguments see `ContactMesh`.
 
     Parameters
     ----------
     stitches : nodes (k, 4) of stitches, -1 for none, and (s, 3) where the points are at the start
+    rows : see `ContactMesh`; None where the points belong to no system
     """
     s = len(points)
     triangles = np.ascontiguousarray(triangles, dtype=np.int32)
@@ -140,4 +144,5 @@ def mesh_of_triangles(
         names=names,
         collide=np.ascontiguousarray(collide),
         stitched=stitched,
+        rows=np.full(s, -1, dtype=np.int32) if rows is None else rows,
     )

@@ -104,23 +104,15 @@ def elasticity_of(system: System) -> Elasticity:
     ------
     SolverError : where a body's material has no elastic energy; the text names the body.
     """
-    rows = []
     for part in system.bodies:
         if not isinstance(part.body.material, Elastic):
             raise SolverError(
                 f"body {part.name!r}: {type(part.body.material).__name__} is a material for XPBD only; for Implicit, "
                 "give it an elastic one such as StableNeoHookean"
             )
-        rows.append(part.body.material.per_tet(part.tets.stop - part.tets.start))
-    material = TetMaterial(
-        *(
-            np.concatenate([getattr(row, key) for row in rows])
-            for key in ("density", "damping", "kind", "mu", "lam", "region")
-        )
-    )
     start, incidence = incidences(system.tets, len(system.rest_positions))
-    patches = None if system.patches is None else PatchElasticity.of(system.patches)
-    return Elasticity(system, material, start, incidence, patches)
+    patches = None if system.laws.patches is None else PatchElasticity.of(system.laws.patches)
+    return Elasticity(system, system.laws.material, start, incidence, patches)
 
 
 @njit(cache=True, parallel=True, error_model="numpy")

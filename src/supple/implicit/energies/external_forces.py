@@ -1,4 +1,4 @@
-"""Dead loads on vertices, gravity among them, as a potential: -f . x."""
+"""Loads that do not change within a step, gravity among them, as a potential: -f . x."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
+from supple.loads.applied import DeadLoad, MassLoad
 from supple.system import System
 
 
@@ -34,9 +35,13 @@ class ExternalForces(Potential):
         """Zero."""
 
 
-def total_forces(system: System, time: float) -> NDArray[np.float64]:
-    """(n, 3) weight and sum of the scene's forces on each vertex at `time` [N]."""
+def total_forces(system: System, x: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+    """(n, 3) weight and sum of the loads on each vertex at `time` [N], without those that have a potential.
+
+    Forces per mass that depend on the place are those at x (n, 3), where the step begins [m].
+    """
     total = system.masses[:, None] * system.gravity
-    for part in system.forces:
-        total[part.vertices] += part.per_vertex(time)
+    for load in system.loads:
+        if isinstance(load, (DeadLoad, MassLoad)):
+            load.add_forces(x, time, total)
     return total

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.loads.springs import PointSpring
 from supple.numerics.kernel_cache import njit
 from supple.numerics.sparse.couplings import Couplings
 from supple.system import System
@@ -19,7 +20,9 @@ from supple.system import System
 
 @dataclass(frozen=True, eq=False)
 class FreeMotion:
-    """The pieces of a system that no pin, soft target or stitch to an obstacle holds. Stitched bodies are one piece.
+    """The pieces of a system that nothing holds: no pin, soft target, spring to the world or stitch to an obstacle.
+
+    Stitched bodies are one piece.
 
     Attributes
     ----------
@@ -38,6 +41,9 @@ class FreeMotion:
         held[components[system.stitching.anchored_vertices()]] = True
         for part in system.soft_targets:
             held[components[part.vertices]] = True
+        for load in system.loads:
+            if isinstance(load, PointSpring) and load.is_anchored:
+                held[components[load.vertices]] = True
         number = np.where(held, -1, np.cumsum(~held) - 1)
         piece = number[components].astype(np.int32)
         inside = piece >= 0

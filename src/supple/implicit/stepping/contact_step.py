@@ -135,5 +135,5 @@ class ContactStep:
         )
         nearest = model.smallest_distance(x)
         nearest = nearest if np.isfinite(nearest) else None
-        between = model.collisions.at(x)
-        return details, nearest, lambda: contact_points(model, barriers, x, between, self.weight)
+        between, frictions = model.collisions.at(x), tuple(self.frictions or ())
+        return details, nearest, lambda: contact_points(model, barriers, frictions, x, between, self.weight)

@@ -12,7 +12,9 @@ from supple.implicit.energies.external_forces import ExternalForces, total_force
 from supple.implicit.energies.inertia import Inertia
 from supple.implicit.energies.inversion_barrier import inversion_barrier
 from supple.implicit.energies.potential import Potential
+from supple.implicit.energies.pressure import pressures_at
 from supple.implicit.energies.soft_targets import soft_targets_at
+from supple.implicit.energies.springs import springs_at
 from supple.implicit.energies.stitch_damping import StitchDamping
 from supple.implicit.limits.inversion_guard import InversionGuard
 from supple.implicit.limits.step_limits import StepLimits
@@ -84,7 +86,7 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
         state.velocities[workspace.bodies_end :] = (targets[-obstacles:] - state.positions[-obstacles:]) / h
     plan = settings.integrator.plan(system, state, h)
     middle = end - (1.0 - plan.place) * h
-    forces = total_forces(system, middle)
+    forces = total_forces(system, state.positions, middle)
     guard = InversionGuard.at(system, state.positions, settings.volume_kept)
     limits = StepLimits(guard, workspace.contact, tools.clock)
     base = _objective(system, state.positions, middle, plan, forces, workspace)
@@ -137,6 +139,8 @@ def _objective(
         terms.append(ExternalForces(forces, x))
     if system.soft_targets:
         terms.append(soft_targets_at(system, time))
+    terms += pressures_at(system, x, time)
+    terms += springs_at(system, time)
     if plan.scale is not None and workspace.viscosity is not None:
         terms.append(Damping(workspace.viscosity, plan.strain_rate(workspace.viscosity)))
     if plan.scale is not None and workspace.stitch_viscosity is not None:

@@ -8,8 +8,10 @@ from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from supple.errors import SuppleError
+from supple.loads.applied import AppliedLoad
 from supple.scene.inputs import Input
 from supple.system import System
 
@@ -29,13 +31,23 @@ def scene_hash(system: System, begin: float, duration: float) -> str:
     for time in begin + duration * np.arange(_TIMES) / (_TIMES - 1):
         for pin in system.pins:
             _add(digest, pin.targets(time) if _is_script(pin.motion) else None)
-        for force in system.forces:
-            _add(digest, force.per_vertex(time) if _is_script(force.force.force) else None)
+        for force, load in zip(system.scene.forces, system.loads, strict=False):
+            _add(digest, _forces_of(load, system, time) if _is_script(force.force) else None)
+        for load in system.loads[len(system.scene.forces) :]:
+            _add(digest, _forces_of(load, system, time))
         for target in system.soft_targets:
             _add(digest, target.targets(time) if _is_script(target.target.motion) else None)
         for obstacle in system.obstacles:
             _add(digest, obstacle.pose(time) if _is_script(obstacle.motion) else None)
     return digest.hexdigest()
+
+
+def _forces_of(load: AppliedLoad, system: System, time: float) -> NDArray[np.float64]:
+    """(n, 3) the forces of a load where the simulation began [N]."""
+    x = system.start_states[0].positions
+    out = np.zeros_like(x)
+    load.add_forces(x, time, out)
+    return out
 
 
 def _is_script(function: object) -> bool:

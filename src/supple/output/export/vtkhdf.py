@@ -19,7 +19,12 @@ def write_vtkhdf(recording: Recording, output: Path) -> None:
     OutputError : where the recording is damaged, or the file cannot be written.
     """
     layout = frame_layout(
-        len(recording.rest_positions), len(recording.tets), len(recording.obstacles), recording.details
+        len(recording.rest_positions),
+        len(recording.tets),
+        len(recording.obstacles),
+        recording.details,
+        recording.fields,
+        recording.sensors,
     )
     with whole_file(output) as fresh:
         try:

@@ -12,7 +12,7 @@ from supple.files.replacing import output_error, remove_abandoned, temporary_nam
 from supple.output.recording.details import RecordedDetails
 from supple.output.recording.file import RecordingFile, rewrite
 from supple.output.recording.reader import read_recording
-from supple.output.recording.recorder import Recorder, frame_layout
+from supple.output.recording.recorder import Recorder
 from supple.simulate import Frame
 from supple.state import Status
 
@@ -41,13 +41,12 @@ class ContinuedRecorder(Recorder):
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         """Make room for `steps` frames after `first`."""
         self._details = RecordedDetails.like(first.report.details)
-        system = first.system
-        layout = frame_layout(len(system.rest_positions), len(system.tets), len(system.obstacles), self._details)
         self._next = self._number_of(first, dt) + 1
         fresh = temporary_name(self.path)
         try:
             with read_recording(self.path) as recording:
-                written = len(recording)
+                written, self._fields = len(recording), recording.fields
+            layout = self._layout(first.system)
             self._wanted = max(self._next + steps, written)
             capacity = self.first_capacity(layout, written)
             rewrite(self.path, fresh, layout, capacity)

@@ -262,10 +262,15 @@ def _write_steps(file: h5py.File, layout: Layout, capacity: int) -> None:
     for name in ("CellOffsets", "ConnectivityIdOffsets"):
         steps[name] = steps["PartOffsets"]
     steps.create_group("PointDataOffsets")
-    steps["PointDataOffsets/velocities"] = steps["PointOffsets"]
     steps["PointDataOffsets/body"] = steps["PartOffsets"]
     steps["CellDataOffsets/det_F"] = index * layout.tets
     steps["CellDataOffsets/body"] = steps["PartOffsets"]
+    for series in layout.series:
+        _, group, *name = series.path.split("/")
+        if group == "PointData":
+            steps[f"PointDataOffsets/{name[0]}"] = steps["PointOffsets"]
+        elif group == "CellData" and name[0] != "det_F":
+            steps[f"CellDataOffsets/{name[0]}"] = steps["CellDataOffsets/det_F"]
 
 
 def _step_datasets(file: h5py.File) -> list[h5py.Dataset]:

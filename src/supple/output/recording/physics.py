@@ -73,7 +73,7 @@ def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
     return {
         "laws": [law.__name__ for law in ELASTIC_MATERIALS],
         "compliances": compliances,
-        "forces": len(system.forces),
+        "forces": len(system.loads),
         "soft_targets": len(system.soft_targets),
         "scripted_pins": sum(part.pin.motion is not None for part in system.pins),
         "stitches": len(system.stitching),

@@ -12,13 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import OutputError
+from supple.materials.elastic_tets.laws import TetLaws
 from supple.output.recording.checked_hdf5 import CheckedFile
 from supple.output.recording.details import RecordedDetails
 from supple.output.recording.file import WRITTEN
+from supple.output.recording.laws import recorded_laws
 from supple.output.recording.physics import RecordedPhysics, read_physics, read_untouching
-from supple.output.recording.recorder import REPORT_NUMBERS, REPORT_VECTORS, frame_layout
+from supple.output.recording.recorder import REPORT_NUMBERS, REPORT_VECTORS, field_series, frame_layout
 from supple.output.recording.scene import RecordedBody, RecordedObstacle, read_bodies, read_header, read_obstacles
+from supple.output.recording.sensors import RecordedSensor, sensors_of_header
 from supple.output.recording.stitches import RecordedStitches, read_stitches
+from supple.readings.by_body import ByBody
+from supple.readings.fields import FIELDS, Field
+from supple.readings.sensor_readings import ForceReading, Reading, TaxelReading
+from supple.readings.tet_readings import TetReadings
 from supple.scene.rigid.pose import Pose, pose_of
 from supple.simulate import Report
 from supple.state import State, Status
@@ -30,8 +37,8 @@ _READ_BY_FRAME = ("VTKHDF/Points", "VTKHDF/PointData/velocities", "VTKHDF/CellDa
 
 
 @dataclass(frozen=True, eq=False)
-class RecordedFrame:
-    """One frame, read when it is asked for. Names are those of `supple.Frame`.
+class RecordedFrame(TetReadings):
+    """One frame, read when it is asked for. Names are those of `supple.Frame`; see also `TetReadings`.
 
     `simulate(..., start=recording[-1])` continues from a frame, with either solver.
     """
@@ -69,6 +76,18 @@ class RecordedFrame:
         """(m,) J of every tet, in the order of the bodies."""
         return self._rows("VTKHDF/CellData/det_F")
 
+    @property
+    def _x(self) -> NDArray[np.float64]:
+        return self.state.positions
+
+    @property
+    def _laws(self) -> TetLaws:
+        return self.recording.laws
+
+    @property
+    def _bodies(self) -> tuple[RecordedBody, ...]:
+        return self.recording.bodies
+
     @cached_property
     def poses(self) -> dict[str, Pose]:
         """Of the rigid bodies, by name."""
@@ -80,6 +99,41 @@ class RecordedFrame:
     def obstacle_poses(self) -> NDArray[np.float64]:
         """(obstacles, 3, 4) rotation and translation of each obstacle from its place at time 0 to this frame."""
         return self._rows("supple/frames/poses")
+
+    @property
+    def contact_force(self) -> ByBody:
+        """By body name, (n, 3) [N], in single precision; an error where the field was not recorded."""
+        return self.field("contact_force")
+
+    @property
+    def contact_pressure(self) -> ByBody:
+        """By body name, (n,) [Pa], in single precision; an error where the field was not recorded."""
+        return self.field("contact_pressure")
+
+    def field(self, name: str) -> ByBody:
+        """A recorded field by body name, in single precision; NaN where a body has no such values.
+
+        Raises
+        ------
+        OutputError : where it was not recorded.
+        """
+        for field in self.recording.fields:
+            if field.name == name:
+                path = field_series(field, 0, 0).path
+                values = self._rows(path).reshape(-1, *field.shape).astype(np.float64)
+                rows = {body.name: body.tets if field.at == "tets" else body.vertices for body in self._bodies}
+                rigid = [body.name for body in self._bodies if body.rigid]
+                return ByBody(values, rows, dict.fromkeys(rigid, "is rigid: a recording has no fields of its surface"))
+        raise OutputError(f"{self.recording.path}: {name} was not recorded; record it with Recorder(fields=[{name!r}])")
+
+    @cached_property
+    def sensors(self) -> dict[str, Reading]:
+        """By name, what the sensors felt."""
+        found: dict[str, Reading] = {}
+        for sensor in self.recording.sensors:
+            numbers = self.recording._values(sensor.series.path)[self.number]
+            found[sensor.name] = (TaxelReading if sensor.is_grid else ForceReading).of_numbers(numbers)
+        return found
 
     @cached_property
     def report(self) -> Report:
@@ -116,7 +170,8 @@ class Recording(Sequence[RecordedFrame]):
     rest_positions : (n, 3) [m]; masses : (n,) [kg]; tets : (m, 4); triangles : (t, 3); rest_volumes : (m,) [m^3]
     gravity : (3,) [m/s^2]; dt : time from frame to frame [s]
     physics : the bodies' laws and what acts on them, or None where an older version wrote the recording
-    details : which fields of the solver's details are kept
+    details : which fields of the solver's details are kept; fields : of tets and vertices that were recorded
+    sensors : of the scene
     untouching : pairs that may pass through each other: numbers of bodies, then obstacles
     scene_text : the scene file's text, or None; solver : its description, or None; supple_version : of the writer
     """
@@ -158,8 +213,12 @@ class Recording(Sequence[RecordedFrame]):
         self._count = int(file.array(WRITTEN, "i", ()))
         if self._count < 1:
             raise file.broken(f"its number of frames is {self._count}")
-        self._series = {series.path: series for series in frame_layout(n, m, len(self.obstacles), self.details).series}
-        for path in (*_READ_BY_FRAME, *([_MESSAGE] if _MESSAGE in file else [])):
+        self.fields: tuple[Field, ...] = _recorded_fields(file, header)
+        self.sensors: tuple[RecordedSensor, ...] = sensors_of_header(file, header)
+        layout = frame_layout(n, m, len(self.obstacles), self.details, self.fields, self.sensors)
+        self._series = {series.path: series for series in layout.series}
+        own = [field_series(field, n, m).path for field in self.fields]
+        for path in (*_READ_BY_FRAME, *own, *([_MESSAGE] if _MESSAGE in file else [])):
             file.check_series(self._series[path], self._count)
         self.times: NDArray[np.float64] = self._values("supple/frames/time")
         if not np.isfinite(self.times).all():
@@ -193,6 +252,11 @@ class Recording(Sequence[RecordedFrame]):
     def __repr__(self) -> str:
         names = ", ".join(body.name for body in self.bodies)
         return f"Recording({str(self.path)!r}: {self._count} frames to {self.times[-1]:g} s of {names})"
+
+    @cached_property
+    def laws(self) -> TetLaws:
+        """The elastic laws of all tets; unknown where an earlier version wrote the recording."""
+        return recorded_laws(self.physics, self.bodies, self.rest_positions, self.tets, self.rest_volumes)
 
     @property
     def frames(self) -> Recording:
@@ -255,6 +319,15 @@ class Recording(Sequence[RecordedFrame]):
     def _frame_rows(self, path: str, number: int) -> NDArray[Any]:
         block = self._file.rows(self._series[path], number, number + 1, f"frame {number}")
         return block[0] if path == "supple/frames/poses" else block
+
+
+def _recorded_fields(file: CheckedFile, header: dict[str, Any]) -> tuple[Field, ...]:
+    names = header.get("fields", [])
+    if not isinstance(names, list):
+        raise file.broken("its header does not list its fields")
+    if not set(map(str, names)) <= FIELDS.keys():
+        raise file.newer("it has a field that this version does not know")
+    return tuple(FIELDS[name] for name in names)
 
 
 def read_recording(path: str | Path) -> Recording:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +18,11 @@ from supple.files.replacing import output_error, parent_folder, put_in_place, re
 from supple.output.recording.details import RecordedDetails
 from supple.output.recording.file import STEP_TIMES, Layout, RecordingFile, Series, create, rewrite
 from supple.output.recording.scene import write_scene
+from supple.output.recording.sensors import RecordedSensor, recorded_sensors
+from supple.readings.fields import Field, checked_fields, cost
 from supple.simulate import Frame
 from supple.state import Status
+from supple.system import System
 
 logger = logging.getLogger(__name__)
 
@@ -39,8 +43,15 @@ MESSAGE_BYTES = 512  # longer messages are cut
 _FIRST_FRAMES, _FIRST_ROOM = 1 << 16, 1 << 30
 
 
-def frame_layout(points: int, tets: int, obstacles: int, details: RecordedDetails) -> Layout:
-    """The series of a recording."""
+def frame_layout(
+    points: int,
+    tets: int,
+    obstacles: int,
+    details: RecordedDetails,
+    fields: Sequence[Field] = (),
+    sensors: Sequence[RecordedSensor] = (),
+) -> Layout:
+    """The series of a recording with these details, chosen fields and sensors."""
     numbers = (Series(f"supple/frames/{name}", 1) for name in REPORT_NUMBERS)
     vectors = (Series(f"supple/frames/{name}", 1, (3,)) for name in REPORT_VECTORS)
     series = (
@@ -57,8 +68,17 @@ def frame_layout(points: int, tets: int, obstacles: int, details: RecordedDetail
         Series("supple/frames/poses", 1, (obstacles, 3, 4)),
         Series("supple/frames/message", 1, (MESSAGE_BYTES,), "|u1"),
         *(field.series for field in details.fields),
+        *(field_series(field, points, tets) for field in fields),
+        *(sensor.series for sensor in sensors),
     )
     return Layout(points, tets, series)
+
+
+def field_series(field: Field, points: int, tets: int) -> Series:
+    """Where a field is: VTK takes tensors as nine numbers."""
+    shape = (9,) if field.shape == (3, 3) else field.shape
+    group, rows = ("CellData", tets) if field.at == "tets" else ("PointData", points)
+    return Series(f"VTKHDF/{group}/{field.name}", rows, shape, "<f4")
 
 
 class Recorder:
@@ -73,15 +93,23 @@ class Recorder:
     scene_text : the scene file's text, kept in the recording.
     solver : a description of the solver, kept in the recording.
     compress : compress the frames when the simulation ends. The file is smaller and takes longer to write.
+    fields : names of `supple.readings.fields.FIELDS`, such as "von_mises" and "contact_force", that every frame has in
+        addition, in single precision. Their cost in bytes is logged when the simulation begins.
 
     Raises
     ------
-    OutputError : from the constructor for an unusable path; from `begin` and `write` where the system reports an error
-        (no permission, no room), or the file was removed. All complete frames stay readable.
+    OutputError : from the constructor for an unusable path or field; from `begin` and `write` where the system reports
+        an error (no permission, no room), or the file was removed. All complete frames stay readable.
     """
 
     def __init__(
-        self, path: str | Path, *, scene_text: str | None = None, solver: object = None, compress: bool = False
+        self,
+        path: str | Path,
+        *,
+        scene_text: str | None = None,
+        solver: object = None,
+        compress: bool = False,
+        fields: Sequence[str] = (),
     ) -> None:
         self.path = Path(path)
         if self.path.suffix.lower() not in SUFFIXES:
@@ -91,6 +119,7 @@ class Recorder:
         self._scene_text = scene_text
         self._solver = None if solver is None else str(solver)
         self._compress = bool(compress)
+        self._fields = checked_fields(fields)
         self._file: RecordingFile | None = None
         self._details = RecordedDetails()
         self._wanted = 0
@@ -103,7 +132,12 @@ class Recorder:
         self._details = RecordedDetails.like(first.report.details)
         facts = {"supple_version": __version__, "dt": float(dt), "steps": int(steps), "solver": self._solver}
         facts["details"] = self._details.header()
-        layout = frame_layout(len(system.rest_positions), len(system.tets), len(system.obstacles), self._details)
+        facts["fields"] = [field.name for field in self._fields]
+        facts["sensors"] = [sensor.described() for sensor in recorded_sensors(system.scene)]
+        layout = self._layout(system)
+        if self._fields:
+            sizes = len(system.rest_positions), len(system.tets)
+            logger.info("%s: %s", self.path, cost(self._fields, *sizes, steps + 1))
         self._wanted = steps + 1
         capacity = self.first_capacity(layout)
         parent_folder(self.path)
@@ -121,6 +155,10 @@ class Recorder:
                 self._file.close()
                 self._file = None
             fresh.unlink(missing_ok=True)
+
+    def _layout(self, system: System) -> Layout:
+        sizes = len(system.rest_positions), len(system.tets), len(system.obstacles)
+        return frame_layout(*sizes, self._details, self._fields, recorded_sensors(system.scene))
 
     def write(self, frame: Frame) -> None:
         """Add one frame."""
@@ -214,7 +252,25 @@ class Recorder:
             file.put("supple/frames/message", _message_bytes(report.message))
         for field in self._details.fields:
             file.put(field.series.path, field.stored(getattr(report.details, field.name)))
+        for sensor in recorded_sensors(frame.system.scene):
+            file.put(sensor.series.path, frame.sensors[sensor.name].numbers())
+        for field in self._fields:
+            series = field_series(field, len(frame.state.positions), len(frame.system.tets))
+            with np.errstate(over="ignore"):  # beyond single precision, a value is infinite
+                file.put(series.path, _recorded(field, frame).astype(np.float32))
         file.commit()
+
+
+def _recorded(field: Field, frame: Frame) -> NDArray[np.float64]:
+    """The field's values of tets or vertices; those of points, which a rigid body has on its surface, are then NaN."""
+    values, system = field.values(frame), frame.system
+    if field.at != "points" or not system.rigid_bodies:
+        return values
+    out = np.full((len(frame.state.positions), *field.shape), np.nan)
+    for part in system.bodies:
+        if not part.rigid:
+            out[part.vertices] = values[part.points]
+    return out
 
 
 def _message_bytes(message: str) -> NDArray[np.uint8]:

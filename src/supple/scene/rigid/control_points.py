@@ -43,5 +43,4 @@ def control_points(properties: MassProperties, surface: NDArray[np.float64]) -> 
     lengths = np.sqrt(squares)
     root, inverse = (axes * lengths) @ axes.T, (axes / lengths) @ axes.T
     mesh = TetMesh(properties.center + _CORNERS @ root, [[0, 1, 2, 3]])
-    weights = 0.25 + 0.25 * (surface - properties.center) @ inverse @ _CORNERS.T
-    return ControlPoints(mesh, weights)
+    return ControlPoints(mesh, 0.25 + 0.25 * (surface - properties.center) @ inverse @ _CORNERS.T)

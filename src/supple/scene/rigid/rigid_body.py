@@ -128,6 +128,10 @@ class RigidBody(PlacedBody):
         corners = np.broadcast_to(np.arange(4, dtype=np.int32), (len(self.weights), 4))
         return EmbeddedPoints.in_rows(corners, self.weights)
 
+    def weights_of(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(k, 4) the weights of the control points in places (k, 3), given in the body's own coordinates [m]."""
+        return control_points(self.properties, places).weights
+
     def with_stiffness(self, kappa: float) -> RigidBody:
         """The same body, kept rigid by another kappa [Pa]."""
         other = copy(self)

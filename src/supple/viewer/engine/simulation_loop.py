@@ -191,7 +191,7 @@ class SimulationLoop:
         pusher = setup.pusher
         contacts = self._requested("contacts", lambda: contact_points(system, state.positions, state.time))
         quantity = self.view.tet_values or ""
-        values = self._requested("tet_values", lambda: tet_values(system, state.positions, quantity))
+        values = self._requested("tet_values", lambda: tet_values(system.laws, state.positions, quantity))
         return Snapshot(
             description=None,  # pyright: ignore[reportArgumentType]
             frame=live.frame,

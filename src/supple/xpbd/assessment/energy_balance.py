@@ -18,6 +18,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.loads.springs import PointSpring
 from supple.scene.stitches.measures import stitch_energy
 from supple.system import System
 from supple.xpbd.assessment.elastic_energy import ElasticEnergy
@@ -84,11 +85,20 @@ class EnergyBalance:
         end: float,
         h: float,
     ) -> None:
-        """Add the work of forces, and of soft targets that moved, over a substep that ends at `end` [s]."""
-        for force in self.system.forces:
-            rows = force.vertices[self.free[force.vertices]]
-            pushes = force.per_vertex(end)[self.free[force.vertices]]
-            self._work += float(np.einsum("ij,ij->", pushes, points[rows, :3] - previous[rows]))
+        """Add the work of loads, of springs whose rest length changed, and of soft targets that moved.
+
+        Over a substep of h [s] that ends at `end` [s].
+        """
+        if self.system.loads:
+            x, pushes = points[:, :3] + origins, np.zeros_like(previous)
+            for load in self.system.loads:
+                if isinstance(load, PointSpring):
+                    before = previous + origins
+                    self._work += load.energy(before, end) - load.energy(before, end - h)
+                else:
+                    load.add_forces(x, end, pushes)
+            moved = np.where(self.free[:, None], points[:, :3] - previous, 0.0)
+            self._work += float(np.einsum("ij,ij->", pushes, moved))
         for soft in self.system.soft_targets:
             x = previous[soft.vertices] + origins[soft.vertices]
             longer, shorter = soft.targets(end) - x, soft.targets(end - h) - x
@@ -124,6 +134,9 @@ class EnergyBalance:
         for soft in self.system.soft_targets:
             x = points[soft.vertices, :3] + origins[soft.vertices]
             total += 0.5 * soft.target.stiffness * float(((soft.targets(moment.time) - x) ** 2).sum())
+        for load in self.system.loads:
+            if isinstance(load, PointSpring):
+                total += load.energy(points[:, :3] + origins, moment.time)
         if len(self.system.stitching):
             total += stitch_energy(self.system.stitching, np.ascontiguousarray(moment.extended[:, :3]))
         return bodies, total

@@ -10,14 +10,15 @@ from numpy.typing import NDArray
 
 from supple.contact.obstacle_poses import ObstaclePoses
 from supple.contact.search.reach import any_beyond_reach
-from supple.contact.search.surfaces import build_surfaces
+from supple.contact.search.surfaces import ContactSurfaces, build_surfaces
 from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import dot, row, subtract
 from supple.scene.contact_pairs import pair_table
 from supple.system import System
+from supple.xpbd.contact.frame_forces import FrameForces, Owners
 from supple.xpbd.contact.memory import ContactMemory
 from supple.xpbd.contact.obstacle_contacts import ObstacleContacts
-from supple.xpbd.contact.obstacle_shapes import build_shapes
+from supple.xpbd.contact.obstacle_shapes import ObstacleShapes, build_shapes
 from supple.xpbd.contact.response_rates import response_rates
 from supple.xpbd.contact.settings import XPBDContact
 from supple.xpbd.contact.surface_collisions import SurfaceCollisions
@@ -43,6 +44,7 @@ class Collisions:
     ----------
     smallest_gap : see `XPBDDetails`
     contacts : number of contacts in the last substep.
+    forces : of the substeps since the frame began
     """
 
     def __init__(self, system: System, settings: XPBDContact | None) -> None:
@@ -62,6 +64,8 @@ class Collisions:
         )
         self.skin = SKIN * self.thickness
         self.contacts = 0
+        self._owners = _owners(system, self.obstacles.shapes, surfaces)
+        self.forces = FrameForces(self._owners)
         self._smallest = math.inf
         self._dt = self._removed = 0.0
         count = len(system.masses)
@@ -98,6 +102,7 @@ class Collisions:
         """
         self._smallest = math.inf
         self._dt = dt
+        self.forces = FrameForces(self._owners)
         if self.surfaces is not None:
             self.surfaces.begin_step(x, v, time, dt, None if memory is None else memory.surfaces, crossing)
         if self.obstacles:
@@ -120,9 +125,12 @@ class Collisions:
         return self.obstacles.begin_substep(x, h) or bodies
 
     def end_substep(self) -> None:
-        """Keep what the next substep begins with."""
+        """Take notice of the forces, and keep what the next substep begins with."""
+        self.forces.substeps += 1
         if self.surfaces is not None:
+            self.forces.surfaces.append(self.surfaces.forces())
             self.surfaces.end_substep()
+        self.forces.shapes.append(self.obstacles.forces())
         self.obstacles.end_substep()
 
     def project(
@@ -170,6 +178,11 @@ class Collisions:
             self._count(self.obstacles.project(x, x_prev, (time - h, time), self._limits, scales))
 
     @property
+    def positions(self) -> NDArray[np.float64]:
+        """(p, 3) of the points of surfaces, as they were at the latest projection; a copy [m]."""
+        return np.zeros((len(self._owners.of_points), 3)) if self.surfaces is None else self.surfaces.positions
+
+    @property
     def parted(self) -> bool:
         """Whether nothing had passed through anything after the last `project`."""
         return self.surfaces is None or self.surfaces.parted
@@ -215,6 +228,21 @@ def add_distances(x, y, out):
     for i in range(len(x)):
         d = subtract(row(x, i), row(y, i))
         out[i] += math.sqrt(dot(d, d))
+
+
+def _owners(system: System, shapes: ObstacleShapes, surfaces: ContactSurfaces) -> Owners:
+    names = tuple(part.name for part in system.bodies) + tuple(str(o.name) for o in system.obstacles)
+    of_vertices = np.zeros(len(system.masses), dtype=np.int32)
+    for k, part in enumerate(system.bodies):
+        of_vertices[part.vertices] = k
+    return Owners(
+        names=names,
+        of_points=surfaces.owner[surfaces.point_piece].astype(np.int32),
+        of_shapes=(len(system.bodies) + np.asarray(shapes.owners)).astype(np.int32),
+        of_vertices=of_vertices,
+        rows=surfaces.rows,
+        masses=system.masses,
+    )
 
 
 def mean_edge_length(system: System) -> float:

@@ -24,6 +24,7 @@ from supple.numerics.kernel_cache import njit, reached_code
 from supple.numerics.mat3 import dot, row, subtract
 from supple.scene.contact_pairs import PairTable
 from supple.system import System
+from supple.xpbd.contact.frame_forces import ShapeLoads
 from supple.xpbd.contact.friction import along_surface, friction_total
 from supple.xpbd.contact.memory import ObstacleMemory
 from supple.xpbd.contact.obstacle_shapes import ObstacleShapes
@@ -97,7 +98,8 @@ def _project_shapes(
     ----------
     points : predicted (n, 3), positions before loads and constraints [m]; rates (n,), see `response_rates` [1/s^2]
     candidates : starts (k + 1,), vertices (c,), as from `_find_candidates`; loads (c, 3), those that x contains, and
-        shares (c,) of them for the next substep; see `ObstacleContacts`
+        shares (c,) of them for the next substep; see `ObstacleContacts`; places (c, 4) are set to the normal and to the
+        gap that remains
     shapes : parameters (k, PARAMETERS), moving (k,)
     rules : owner (n,), the body of a vertex; collide (b, k), friction (b, k), of each body with each shape
     frames, frames_before : (k, 4, 3) at the end and at the beginning of the substep
@@ -106,7 +108,7 @@ def _project_shapes(
     scales : skin, the gap that is kept; near, gaps above this are not reported [m]
     """
     predicted, rates = points
-    starts, vertices, loads, shares = candidates
+    starts, vertices, loads, shares, places = candidates
     parameters, moving = shapes
     owner, _, friction = rules
     skin, near = scales
@@ -149,6 +151,8 @@ def _project_shapes(
                 x_prev[i, j] += n[j] * shift
                 predicted[i, j] += n[j] * shift
                 loads[c, j] = (n[j] * push + hold[j]) / h2
+                places[c, j] = n[j]
+            places[c, 3] = gap + (push - pushed) + shift
     return contacts, smallest
 
 
@@ -201,7 +205,7 @@ class ObstacleContacts:
         )
         self._starts = np.zeros(len(shapes.contacts) + 1, dtype=np.int64)
         self._vertices = np.zeros(1024, dtype=np.int32)
-        self._loads, self._shares = np.zeros((1024, 3)), np.zeros(1024)
+        self._loads, self._shares, self._places = np.zeros((1024, 3)), np.zeros(1024), np.zeros((1024, 4))
         self._any_load = False
         self._rates = rates
         self._predicted = np.zeros((len(system.masses), 3))
@@ -226,11 +230,12 @@ class ObstacleContacts:
 
     def memory(self, x: NDArray[np.float64]) -> ObstacleMemory:
         """What the next step needs; `x` (n, 3) are the positions at the end of this one [m]."""
-        return ObstacleMemory(self.shapes.frames, self.shapes.parameters, x.copy(), *self._loaded())
+        shapes, vertices, loads, _ = self.forces()
+        return ObstacleMemory(self.shapes.frames, self.shapes.parameters, x.copy(), shapes, vertices, loads)
 
     def gather(self, x: NDArray[np.float64], reach: NDArray[np.float64], time: float) -> None:
         """List the vertices (of n) that may touch a shape before they have moved by `reach` (n,) [m], or are loaded."""
-        shapes, vertices, loads = self._loaded()
+        shapes, vertices, loads, _ = self.forces()
         frames = self.shapes.placed(self.poses, time)
         described = (self._arrays, self._rules, frames, self._starts)
         while True:
@@ -254,18 +259,18 @@ class ObstacleContacts:
         if len(self._vertices) < len(keys):
             self._vertices = np.zeros(2 * len(keys), dtype=np.int32)
         if len(self._loads) < len(keys):
-            self._loads, self._shares = np.zeros((2 * len(keys), 3)), np.zeros(2 * len(keys))
+            size = 2 * len(keys)
+            self._loads, self._shares, self._places = np.zeros((size, 3)), np.zeros(size), np.zeros((size, 4))
         self._starts[:] = np.searchsorted(keys, np.arange(len(self._starts)) * n)
         self._vertices[: len(keys)] = keys % n
         self._loads[: len(keys)] = loads
         self._any_load = bool(loads.any())
 
-    def _loaded(self) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64]]:
-        """Copies of the shapes, the vertices and the loads of all contacts that push."""
-        count = self._starts[-1]
-        k = np.flatnonzero(self._loads[:count].any(axis=1))
+    def forces(self) -> ShapeLoads:
+        """Copies of all contacts that push, as of the substep that was projected last."""
+        k = np.flatnonzero(self._loads[: self._starts[-1]].any(axis=1))
         shapes = np.searchsorted(self._starts, k, side="right") - 1
-        return shapes.astype(np.int64), self._vertices[k], self._loads[k]
+        return ShapeLoads(shapes.astype(np.int64), self._vertices[k], self._loads[k], self._places[k])
 
     def begin_substep(self, x: NDArray[np.float64], h: float) -> bool:
         """See `Collisions.begin_substep`."""
@@ -293,7 +298,7 @@ class ObstacleContacts:
         For `limits` and `scales` see `_project_shapes`.
         """
         frames = tuple(self.shapes.placed(self.poses, time) for time in reversed(times))
-        candidates = (self._starts, self._vertices, self._loads, self._shares)
+        candidates = (self._starts, self._vertices, self._loads, self._shares, self._places)
         described = (candidates, self._arrays, self._rules, *frames)
         contacts, smallest = 0, math.inf
         for _, push, first, last in self._groups:

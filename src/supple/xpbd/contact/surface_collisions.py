@@ -213,6 +213,15 @@ class SurfaceCollisions:
         found[s.point_piece[: len(s.rows)]] = labels[s.rows]
         return found
 
+    def forces(self) -> LoadedRows:
+        """Copies of the contacts that push in the substep that was projected last."""
+        return self._rows.loaded()
+
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """(p, 3) of all points, as they were at the latest projection; a copy [m]."""
+        return self._x.copy()
+
     def end_substep(self) -> None:
         """Keep the share of the forces with which the next substep begins."""
         self._rows.keep()

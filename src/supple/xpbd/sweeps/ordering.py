@@ -92,7 +92,7 @@ def reordered(system: System, layout: Layout) -> System:
     return replace(
         system,
         pins=tuple(replace(pin, vertices=new[pin.vertices]) for pin in system.pins),
-        forces=tuple(replace(force, vertices=new[force.vertices]) for force in system.forces),
+        loads=tuple(load.renumbered(new) for load in system.loads),
         soft_targets=tuple(replace(target, vertices=new[target.vertices]) for target in system.soft_targets),
         rest_positions=np.ascontiguousarray(system.rest_positions[old]),
         masses=np.ascontiguousarray(system.masses[old]),

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.materials.elastic_tets.laws import TetLaws, joined_materials
 from supple.viewer.drawing.coloring.color_scale import BINS, Limits, bar_html, bin_of
 from supple.viewer.drawing.coloring.fields import FIELDS
 from supple.viewer.drawing.moments.from_snapshot import MomentBuilder
@@ -18,8 +19,13 @@ def stretched(fake):
     """Body 0 stretched to twice its length in x, body 1 at rest; body 0 made of StVK, body 1 of something unknown."""
     x = fake.snapshot.positions.copy()
     model = MomentBuilder().moment(fake.snapshot).model
-    first = replace(model.bodies[0], material=sp.StVenantKirchhoff(youngs=1000.0, poisson=0.0))
-    model = replace(model, bodies=(first, model.bodies[1]))
+    first = model.bodies[0]
+    count = first.tets.stop - first.tets.start
+    known = sp.StVenantKirchhoff(youngs=1000.0, poisson=0.0).per_tet(count)
+    other = sp.EdgesAndVolume().per_tet(len(model.tets) - count)
+    volumes = 1.0 / (6.0 * np.linalg.det(model.rest_shape_inverse))
+    laws = TetLaws(model.tets, model.rest_shape_inverse, volumes, joined_materials([known, other]))
+    model = replace(model, laws=laws)
     x[first.vertices] *= [2.0, 1.0, 1.0]
     moment = MomentBuilder().moment(fake.show(positions=x))
     return replace(moment, model=model)

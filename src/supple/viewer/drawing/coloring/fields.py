@@ -8,11 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.materials.material import Elastic
-from supple.materials.per_tet import NO_REGION
 from supple.numerics.deformation import determinants
 from supple.viewer.drawing.moments.model import Moment
-from supple.viewer.engine.measurement.tet_values import von_mises
+from supple.viewer.engine.measurement.tet_values import tet_values
 
 
 @dataclass(frozen=True)
@@ -45,28 +43,17 @@ def volume_ratio(moment: Moment) -> NDArray[np.float64]:
 
 def von_mises_stress(moment: Moment) -> NDArray[np.float64]:
     """Von Mises stress of every tet (m,) [Pa]."""
-    return _of_materials(moment, lambda material, F: von_mises(material.first_piola(F), F, determinants(F)))
+    return _of_laws(moment, "von_mises")
 
 
 def energy_density(moment: Moment) -> NDArray[np.float64]:
-    """Elastic energy per rest volume of every tet (m,) [J/m^3]; not known for those that are averaged over patches."""
-    return _of_materials(moment, _own_energy_density)
+    """Elastic energy per rest volume of every tet (m,) [J/m^3]."""
+    return _of_laws(moment, "energy")
 
 
-def _own_energy_density(material: Elastic, F: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.where(material.per_tet(len(F)).region == NO_REGION, material.energy_density(F), np.nan)
-
-
-@np.errstate(all="ignore")
-def _of_materials(
-    moment: Moment, compute: Callable[[Elastic, NDArray[np.float64]], NDArray[np.float64]]
-) -> NDArray[np.float64]:
-    """(m,) computed from the material of each body and its deformation gradients."""
-    out = np.full(len(moment.model.tets), np.nan)
-    for body in moment.model.bodies:
-        if isinstance(body.material, Elastic):
-            out[body.tets] = compute(body.material, moment.deformation_gradients[body.tets])
-    return out
+def _of_laws(moment: Moment, quantity: str) -> NDArray[np.float64]:
+    laws = moment.model.laws
+    return np.full(len(moment.model.tets), np.nan) if laws is None else tet_values(laws, moment.positions, quantity)
 
 
 FIELDS = {

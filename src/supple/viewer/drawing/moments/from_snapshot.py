@@ -56,7 +56,7 @@ class MomentBuilder:
 
     def _model_of(self, scene: SceneDescription) -> Model:
         bodies = tuple(
-            ModelBody(body.name, body.vertices, body.tet_rows, body.triangles, self._skin_of(body), None, i)
+            ModelBody(body.name, body.vertices, body.tet_rows, body.triangles, self._skin_of(body), i)
             for i, body in enumerate(scene.bodies)
         )
         tets = np.concatenate([body.tets + body.vertices.start for body in scene.bodies])

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.materials.material import Material
+from supple.materials.elastic_tets.laws import TetLaws
 from supple.mesh.topology import TET_FACETS, facet_keys
 from supple.numerics.deformation import deformation_gradients
 from supple.output.drawing import BODY_COLORS, View
@@ -31,7 +31,6 @@ class ModelBody:
     vertices, tets : its rows in the arrays of the model
     triangles : (t, 3) its boundary, numbered in the body, counter-clockwise from outside
     skin : a finer surface that follows its tets, or None
-    material : or None where it is not known
     number : place among the bodies, which selects the color
     """
 
@@ -40,7 +39,6 @@ class ModelBody:
     tets: slice
     triangles: NDArray[np.int32]
     skin: SkinnedSurface | None
-    material: Material | None
     number: int
 
     @property
@@ -61,6 +59,7 @@ class Model:
     view : bounds of the motion, and the up direction
     stitches : (k, 4) a vertex, and the three vertices of the triangle that it is stitched to
     recorded_stitches : stitches of a recording, of any kind
+    laws : the elastic laws of a recording's tets; None of a live simulation, which sends what follows from them
     """
 
     bodies: tuple[ModelBody, ...]
@@ -70,6 +69,7 @@ class Model:
     view: View
     stitches: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 4), dtype=np.int32))
     recorded_stitches: RecordedStitches | None = None
+    laws: TetLaws | None = None
 
     @cached_property
     def surface_vertices(self) -> NDArray[np.int64]:

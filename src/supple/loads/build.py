@@ -1,0 +1,118 @@
+"""From the loads of a scene to loads on the vertices of a system."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.errors import SceneError
+from supple.loads.applied import AppliedLoad, DeadLoad, MassLoad
+from supple.loads.pressure import FollowerPressure, area_vectors
+from supple.loads.springs import PointSpring
+from supple.scene.body import PlacedBody
+from supple.scene.forces import Force
+from supple.scene.loads.body_force import BodyForce
+from supple.scene.loads.load import Load
+from supple.scene.loads.over_time import OverTime, value_at
+from supple.scene.loads.spring import Spring
+from supple.scene.loads.surface_loads import Pressure, Traction
+from supple.scene.rigid.rigid_body import RigidBody
+
+
+def applied(
+    load: Load,
+    bodies: Sequence[PlacedBody],
+    begins: dict[str, int],
+    masses: NDArray[np.float64],
+    x: NDArray[np.float64],
+) -> AppliedLoad:
+    """A load of a scene on the vertices of all bodies.
+
+    Parameters
+    ----------
+    begins : by body name, the number of its first vertex; masses : (n,) of all vertices [kg]
+    x : (n, 3) where the simulation begins [m]
+
+    Raises
+    ------
+    SceneError : where the load is of an unknown kind.
+    """
+    named = {body.name: body for body in bodies}
+    if isinstance(load, Traction):
+        body = named[load.body]
+        triangles = body.triangles[load.triangles(body)]
+        areas = np.linalg.norm(area_vectors(body.points, triangles), axis=1) / 3.0
+        shares = np.bincount(triangles.ravel(), np.repeat(areas, 3), len(body.points))
+        touched = np.unique(triangles)
+        at = _over_time(load.traction, f"{load.label}: traction", (3,))
+        return _on_points(body, begins[load.body], touched, lambda time: shares[touched, None] * at(time))
+    if isinstance(load, Pressure):
+        body = named[load.body]
+        if isinstance(body, RigidBody):
+            raise SceneError(
+                f"{load.label}: body {load.body!r} is rigid, and pressure acts on soft ones; give a Traction"
+            )
+        triangles = body.triangles[load.triangles(body)] + begins[load.body]
+        at = _over_time(load.pressure, f"{load.label}: pressure", ())
+        return FollowerPressure(triangles.astype(np.int32), lambda time: float(at(time)))
+    if isinstance(load, BodyForce):
+        chosen = bodies if load.body is None else [named[load.body]]
+        parts = [np.arange(len(body.mesh.vertices)) + begins[body.name] for body in chosen]
+        vertices = np.concatenate(parts).astype(np.int32)
+        return MassLoad(load, vertices, masses[vertices])
+    if isinstance(load, Spring):
+        return _spring(load, bodies, begins, x)
+    raise SceneError(f"{load.label}: a {type(load).__name__} is not a load that solvers know")
+
+
+def applied_force(force: Force, body: PlacedBody, begin: int, rows: NDArray[np.integer]) -> DeadLoad:
+    """A force on some of its body's points (k,); begin : the number of the body's first vertex."""
+    return _on_points(body, begin, rows, lambda time: force.per_vertex(time, len(rows)))
+
+
+def _on_points(
+    body: PlacedBody, begin: int, rows: NDArray[np.integer], forces: Callable[[float], NDArray[np.float64]]
+) -> DeadLoad:
+    """Forces, time -> (k, 3) [N], on the points (k,) of a body."""
+    points = body.embedded.taken(rows)
+    if points.are_vertices:
+        return DeadLoad((points.vertices + begin).astype(np.int32), forces)
+    vertices, column = np.unique(points.vertices, return_inverse=True)
+    weights = np.zeros((len(rows), len(vertices)))
+    np.add.at(weights, (np.repeat(np.arange(len(rows)), np.diff(points.start)), column.ravel()), points.weights)
+    return DeadLoad((vertices + begin).astype(np.int32), lambda time: weights.T @ forces(time))
+
+
+def _spring(
+    spring: Spring, bodies: Sequence[PlacedBody], begins: dict[str, int], x: NDArray[np.float64]
+) -> PointSpring:
+    vertices, coefficients, offset = [], [], np.zeros(3)
+    for key, sign in (("first", 1.0), ("second", -1.0)):
+        name, corners, weights, fixed = spring.corners(key, bodies)
+        offset = offset + sign * fixed
+        if name is not None:
+            vertices.append(corners + begins[name])
+            coefficients.append(sign * weights)
+    together, number = np.unique(np.concatenate(vertices), return_inverse=True)
+    sums = np.bincount(number.ravel(), np.concatenate(coefficients)).astype(np.float64)
+    used = sums != 0.0
+    given, what = spring.rest_length, f"{spring.label}: rest_length"
+    made = PointSpring(together[used].astype(np.int32), sums[used], offset, spring.stiffness, lambda time: 0.0)
+    if given is None:
+        length = made.length(x)[0]
+        return PointSpring(made.vertices, made.coefficients, offset, spring.stiffness, lambda time: length)
+    at = _over_time(given, what, ())
+
+    def rest_length(time: float) -> float:
+        length = float(at(time))
+        if length < 0.0:
+            raise SceneError(f"{what}({time:g}) is {length:g}; it must be zero or more")
+        return length
+
+    return PointSpring(made.vertices, made.coefficients, offset, spring.stiffness, rest_length)
+
+
+def _over_time(value: OverTime, what: str, shape: tuple[int, ...]) -> Callable[[float], NDArray[np.float64]]:
+    return lambda time: value_at(value, time, what, shape)

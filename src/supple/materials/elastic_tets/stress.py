@@ -1,0 +1,93 @@
+"""Stresses and energy densities of all tets, from positions.
+
+The first Piola stress P of a tet is the one whose nodal forces -V P Dm^-T, added up, are the elastic forces on the
+vertices. For most materials it is d psi / dF. Where strains are averaged over patches, their virtual work is
+
+    sum_k V_k P_k : dF_k + sum_a p_a dV_a = sum_e V_e (mean_k P_k + mean_a p_a cof F) : dF_e,
+
+the means over the six edges and the four vertices of tet e (see `materials.patches`): the stress of the tet.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.materials.elastic_tets.edge_springs import cofactors
+from supple.materials.elastic_tets.laws import TetLaws
+from supple.materials.isotropic import densities, piolas
+from supple.materials.patches.domains import Patches
+from supple.materials.patches.energy import tet_shares, vertex_states
+from supple.numerics.deformation import determinants
+from supple.numerics.threads import threads_for
+
+_SERIAL_TETS = 5_000
+
+
+def energy_densities(laws: TetLaws, x: NDArray[np.float64], F: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m,) strain energy per rest volume [J/m^3], zero at rest; NaN where a tet has no law.
+
+    Their sum, weighted with rest volumes, is the elastic energy.
+
+    Parameters
+    ----------
+    x : (n, 3) positions [m]; F : (m, 3, 3) deformation gradients of the tets at x
+    """
+    material = laws.material
+    out = np.empty(len(F))
+    with threads_for(len(F), _SERIAL_TETS):
+        densities(F, material.kind, material.mu, material.lam, out)
+    if laws.patches is not None:
+        out[laws.patches.rows] = tet_shares(laws.patches, x) / laws.patches.tet_volumes
+    for springs in laws.springs:
+        volumes = laws.volumes[springs.rows]
+        out[springs.rows] = springs.energies(x, determinants(F[springs.rows]), volumes) / volumes
+    return out
+
+
+def first_piolas(laws: TetLaws, x: NDArray[np.float64], F: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m, 3, 3) first Piola stress of the elastic forces [Pa], without viscous ones.
+
+    NaN where a tet has no law, or holds something rigid. Parameters as of `energy_densities`.
+    """
+    material = laws.material
+    out = np.empty((len(F), 3, 3))
+    with threads_for(len(F), _SERIAL_TETS):
+        piolas(F, material.kind, material.mu, material.lam, out)
+    if laws.patches is not None:
+        out[laws.patches.rows] = _of_patches(laws.patches, x, F[laws.patches.rows])
+    for springs in laws.springs:
+        own = F[springs.rows]
+        out[springs.rows] = springs.first_piolas(x, own, determinants(own), laws.volumes[springs.rows])
+    return out
+
+
+def _of_patches(patches: Patches, x: NDArray[np.float64], F: NDArray[np.float64]) -> NDArray[np.float64]:
+    edges, vertices = patches.edges, patches.vertices
+    numbers = edges.of_tet.ravel()
+    shares = np.repeat(patches.tet_volumes / 6.0, 6)
+    means = np.empty((len(edges.volumes), 9))
+    for k, entry in enumerate(F.reshape(-1, 9).T):
+        means[:, k] = np.bincount(numbers, weights=shares * np.repeat(entry, 6)) / edges.volumes
+    P = np.empty((len(means), 3, 3))
+    with threads_for(len(P), _SERIAL_TETS):
+        piolas(means.reshape(-1, 3, 3), edges.kind, edges.mu, edges.lam, P)
+        pressures = vertex_states(patches, x)[1]
+    mean_pressure = pressures[vertices.of_tet].mean(axis=1)
+    return P[edges.of_tet].mean(axis=1) + mean_pressure[:, None, None] * cofactors(F)
+
+
+def cauchy_stresses(P: NDArray[np.float64], F: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m, 3, 3) P F^T / J [Pa], from P and F (m, 3, 3).
+
+    The symmetric part: with patches, P F^T of a single tet is symmetric only where the deformation is uniform.
+    """
+    cauchy = np.einsum("eij,ekj->eik", P, F) / determinants(F)[:, None, None]
+    return 0.5 * (cauchy + np.swapaxes(cauchy, 1, 2))
+
+
+def von_mises(cauchy: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m,) sqrt(3/2 s : s) [Pa] of Cauchy stresses (m, 3, 3) with the deviator s."""
+    pressure = np.trace(cauchy, axis1=1, axis2=2) / 3.0
+    deviator = cauchy - pressure[:, None, None] * np.eye(3)
+    return np.sqrt(1.5 * np.einsum("eij,eij->e", deviator, deviator))

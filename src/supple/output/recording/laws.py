@@ -1,0 +1,48 @@
+"""The elastic laws of a recording's tets, from which stresses and energies follow."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.materials.elastic_tets.edge_springs import EdgeSprings
+from supple.materials.elastic_tets.laws import TetLaws
+from supple.materials.per_tet import NO_REGION, NOT_ELASTIC, TetMaterial
+from supple.output.recording.physics import NOT_KNOWN, RecordedPhysics
+from supple.output.recording.scene import RecordedBody
+
+
+def recorded_laws(
+    physics: RecordedPhysics | None,
+    bodies: Sequence[RecordedBody],
+    rest_positions: NDArray[np.float64],
+    tets: NDArray[np.int32],
+    volumes: NDArray[np.float64],
+) -> TetLaws:
+    """The laws of `tets` (m, 4); of none, where an earlier version wrote the recording and `physics` is None.
+
+    Density and damping are not recorded: they are NaN.
+
+    Parameters
+    ----------
+    rest_positions : (n, 3) [m]; volumes : (m,) at rest [m^3]
+    """
+    m = len(tets)
+    corners = rest_positions[tets]
+    a, b, c = (corners[:, k] - corners[:, 0] for k in (1, 2, 3))
+    with np.errstate(all="ignore"):
+        Dm_inv = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1) / (6.0 * volumes)[:, None, None]
+    tets, unknown = np.ascontiguousarray(tets, dtype=np.int32), np.full(m, np.nan)
+    if physics is None:
+        kind, region = np.full(m, NOT_ELASTIC, dtype=np.int32), np.full(m, NO_REGION, dtype=np.int32)
+        return TetLaws(tets, Dm_inv, volumes, TetMaterial(unknown, unknown, kind, unknown, unknown, region))
+    kind = np.where(physics.kind == NOT_KNOWN, NOT_ELASTIC, physics.kind.astype(np.int32)).astype(np.int32)
+    material = TetMaterial(unknown, unknown, kind, physics.mu, physics.lam, physics.region)
+    springs = [
+        EdgeSprings.of(pair, body.tets, rest_positions, tets[body.tets], volumes[body.tets])
+        for body, pair in zip(bodies, physics.compliances, strict=True)
+        if pair is not None
+    ]
+    return TetLaws(tets, Dm_inv, volumes, material, tuple(springs))

@@ -1,0 +1,97 @@
+"""Strains, stresses and energies of a frame, of a simulation or of a recording, computed when they are read."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.materials.elastic_tets.laws import TetLaws
+from supple.materials.elastic_tets.stress import cauchy_stresses, energy_densities, first_piolas, von_mises
+from supple.numerics.deformation import deformation_gradients, determinants
+from supple.numerics.svd3 import rotation_variant_svd
+from supple.readings.by_body import BodyRows, TetField, vertex_means
+
+_OF_RIGID = "is rigid: it has no strain and no stress of its own"
+_NO_LAW = "has no known elastic law, so it has no {}; give it an elastic material such as StableNeoHookean"
+_RIGID = "has rigid edges or volumes, whose forces do not follow from positions; give both a compliance above 0"
+
+
+class TetReadings(ABC):
+    """Fields on tets, by body name: `frame.stress["bear"]` is (m, 3, 3), `frame.stress.at_vertices["bear"]` (n, 3, 3).
+
+    Stresses are those of the elastic forces, without the viscous ones of `damping`. A value is not finite where a tet
+    is flat, or where its energy is infinite.
+    """
+
+    @property
+    @abstractmethod
+    def _x(self) -> NDArray[np.float64]: ...
+
+    @property
+    @abstractmethod
+    def _laws(self) -> TetLaws: ...
+
+    @property
+    @abstractmethod
+    def _bodies(self) -> Sequence[BodyRows]: ...
+
+    @cached_property
+    def det_F(self) -> NDArray[np.float64]:
+        """(m,) J of every tet, in the order of the bodies."""
+        return determinants(self._F)
+
+    @cached_property
+    def first_piola(self) -> TetField:
+        """First Piola stress P (m, 3, 3) [Pa]: force per area at rest, P n for the normal n at rest.
+
+        The nodal forces -V P Dm^-T of all tets add up to the elastic forces, with any material.
+        """
+        return self._field(first_piolas(self._laws, self._x, self._F), "stress")
+
+    @cached_property
+    def stress(self) -> TetField:
+        """Cauchy stress P F^T / J (m, 3, 3) [Pa]: force per area as it is, symmetric."""
+        with np.errstate(all="ignore"):
+            return self._field(cauchy_stresses(self.first_piola.values_of_all, self._F), "stress")
+
+    @cached_property
+    def von_mises(self) -> TetField:
+        """Von Mises stress (m,) [Pa]: sqrt(3/2 s : s) with the deviator s of the Cauchy stress."""
+        with np.errstate(all="ignore"):
+            return self._field(von_mises(self.stress.values_of_all), "stress")
+
+    @cached_property
+    def principal_stretches(self) -> TetField:
+        """(m, 3) singular values of F [-], descending; the last one is negative where the tet is inverted."""
+        return TetField(rotation_variant_svd(self._F)[1], self._bodies, self._refused_of_rigid, self._to_vertices)
+
+    @cached_property
+    def energy_density(self) -> TetField:
+        """Strain energy per rest volume (m,) [J/m^3], zero at rest. Rigid edges and volumes have none."""
+        refused = {name: _NO_LAW.format("energy") for name in self._names_where(~self._laws.known)}
+        refused |= self._refused_of_rigid
+        return TetField(energy_densities(self._laws, self._x, self._F), self._bodies, refused, self._to_vertices)
+
+    @cached_property
+    def _F(self) -> NDArray[np.float64]:
+        return deformation_gradients(self._x, self._laws.tets, self._laws.Dm_inv)
+
+    def _field(self, values: NDArray[np.float64], what: str) -> TetField:
+        refused = dict.fromkeys(self._names_where(~self._laws.stressed), _RIGID)
+        refused |= {name: _NO_LAW.format(what) for name in self._names_where(~self._laws.known)}
+        refused |= self._refused_of_rigid
+        return TetField(values, self._bodies, refused, self._to_vertices)
+
+    @property
+    def _refused_of_rigid(self) -> dict[str, str]:
+        return {body.name: _OF_RIGID for body in self._bodies if body.rigid}
+
+    def _names_where(self, chosen: NDArray[np.bool_]) -> list[str]:
+        return [body.name for body in self._bodies if chosen[body.tets].any()]
+
+    def _to_vertices(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return vertex_means(values, self._laws.tets, self._laws.volumes, len(self._x))

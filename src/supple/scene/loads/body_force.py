@@ -1,0 +1,71 @@
+"""Forces per mass, as functions of place and time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from supple.errors import SceneError
+from supple.scene.body import PlacedBody
+from supple.scene.loads.load import Load, body_of
+from supple.scene.loads.over_time import Curve, checked_over_time, value_at
+from supple.scene.values import check_name, float_array
+
+
+@dataclass(frozen=True, eq=False)
+class BodyForce(Load):
+    """A force per mass on all vertices of one body, or of all bodies.
+
+    Parameters
+    ----------
+    force : [N/kg]; (3,), a `Curve` of vectors, or a function (x, t) of places (k, 3) [m] and time [s] that returns
+        (k, 3) or (3,). `Implicit` takes its value at the places where a step begins.
+    body : name of the body; None for all bodies.
+    name : appears in messages.
+
+    Raises
+    ------
+    SceneError : where a value is of the wrong kind or not finite.
+    """
+
+    kind: ClassVar[str] = "body force"
+
+    force: ArrayLike | Curve | Callable[[NDArray[np.float64], float], ArrayLike]
+    body: str | None = None
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.body is not None:
+            check_name(self.body, f"{self.kind}: body")
+        if self.name is not None:
+            check_name(self.name, self.kind)
+        if isinstance(self.force, Curve) or not callable(self.force):
+            object.__setattr__(self, "force", checked_over_time(self.force, f"{self.label}: force", (3,)))
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        return () if self.body is None else (self.body,)
+
+    def check(self, bodies: Sequence[PlacedBody]) -> None:
+        if self.body is not None:
+            body_of(self.body, bodies, self.label)
+
+    def at(self, x: NDArray[np.float64], time: float) -> NDArray[np.float64]:
+        """The force (k, 3) per mass [N/kg] at places x (k, 3) and `time`.
+
+        Raises
+        ------
+        SceneError : where the function returns what is not finite or has another shape.
+        """
+        if isinstance(self.force, Curve) or not callable(self.force):
+            return np.broadcast_to(value_at(self.force, time, f"{self.label}: force", (3,)), x.shape)
+        value = float_array(self.force(x, time), f"{self.label}: force(x, {time:g})")
+        if value.shape not in ((3,), x.shape):
+            raise SceneError(f"{self.label}: force(x, {time:g}) has shape {value.shape}; give (3,) or {x.shape}")
+        if not np.isfinite(value).all():
+            raise SceneError(f"{self.label}: force(x, {time:g}) is not finite")
+        return np.broadcast_to(value, x.shape)

@@ -1,0 +1,135 @@
+"""What loads of bodies have in common: names, and the triangles of surfaces that they act on."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from supple.errors import SceneError
+from supple.scene.body import PlacedBody
+from supple.scene.selection import InBox
+from supple.scene.suggestion import suggestion
+from supple.scene.values import check_name
+
+
+class Load(ABC):
+    """The base class of loads; those on vertices alone are `Force`."""
+
+    kind: ClassVar[str]
+    name: str | None
+
+    @property
+    def label(self) -> str:
+        """The name of this load in messages."""
+        return f"{self.kind} {self.name!r}" if self.name else self.kind
+
+    @property
+    @abstractmethod
+    def bodies(self) -> tuple[str, ...]:
+        """The names of the bodies that it acts on; none for all bodies."""
+
+    @abstractmethod
+    def check(self, bodies: Sequence[PlacedBody]) -> None:
+        """Raise `SceneError` where it does not fit these bodies."""
+
+
+def body_of(name: str, bodies: Sequence[PlacedBody], label: str) -> PlacedBody:
+    """The body of that name.
+
+    Raises
+    ------
+    SceneError : where there is none.
+    """
+    for body in bodies:
+        if body.name == name:
+            return body
+    raise SceneError(f"{label}: there is no body {name!r}; {suggestion(name, [body.name for body in bodies])}")
+
+
+Region = ArrayLike | InBox | None
+
+
+class OnSurface(Load):
+    """The base class of loads on triangles of the surface of one body.
+
+    `region` : None for the whole surface, an `InBox` that holds all three corners of a triangle at the start, or rows
+    of `mesh.surface.triangles`.
+    """
+
+    body: str
+    region: Region
+
+    def __post_init__(self) -> None:
+        check_name(self.body, f"{self.kind}: body")
+        if self.name is not None:
+            check_name(self.name, self.kind)
+        object.__setattr__(self, "region", checked_region(self.region, self.label))
+
+    @property
+    def label(self) -> str:
+        return f"{super().label} on body {self.body!r}"
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        return (self.body,)
+
+    def check(self, bodies: Sequence[PlacedBody]) -> None:
+        self.triangles(body_of(self.body, bodies, self.label))
+
+    def triangles(self, body: PlacedBody) -> NDArray[np.int64]:
+        """The rows (t,) of the surface's triangles that it acts on.
+
+        Raises
+        ------
+        SceneError : where there is none, or a row does not exist.
+        """
+        return surface_region(self.region, body, self.label)
+
+
+def surface_region(region: Region, body: PlacedBody, label: str) -> NDArray[np.int64]:
+    """The rows (t,) of the triangles of a body's surface in a region; see `OnSurface`.
+
+    Raises
+    ------
+    SceneError : where there is none, or a row does not exist.
+    """
+    triangles = body.triangles
+    if region is None:
+        return np.arange(len(triangles))
+    if isinstance(region, InBox):
+        inside = np.zeros(len(body.points), dtype=bool)
+        inside[region.select(body.place(body.points))] = True
+        rows = np.flatnonzero(inside[triangles].all(axis=1))
+        if len(rows) == 0:
+            raise SceneError(f"{label}: its box holds no triangle of the surface; make it larger, or give triangles")
+        return rows
+    rows = np.asarray(region)
+    if rows.max() >= len(triangles):
+        raise SceneError(f"{label}: triangle {rows.max()} does not exist; the surface has {len(triangles)}")
+    return rows
+
+
+def checked_region(region: Region, label: str) -> Region:
+    """A region, checked as far as possible without its body.
+
+    Raises
+    ------
+    SceneError : where it is neither None, nor an `InBox`, nor a list of different numbers.
+    """
+    if region is None or isinstance(region, InBox):
+        return region
+    try:
+        rows = np.atleast_1d(np.asarray(region))
+    except (TypeError, ValueError):
+        raise SceneError(f"{label}: region is {region!r}; give numbers of triangles, an InBox, or None") from None
+    if rows.ndim != 1 or rows.size == 0 or not np.issubdtype(rows.dtype, np.integer):
+        raise SceneError(f"{label}: region must be a non-empty list of whole numbers, an InBox, or None")
+    if rows.min() < 0:
+        raise SceneError(f"{label}: region holds {rows.min()}, which is negative; triangles are counted from 0")
+    if len(np.unique(rows)) != len(rows):
+        raise SceneError(f"{label}: region names a triangle twice; name each once")
+    return rows.astype(np.int64)

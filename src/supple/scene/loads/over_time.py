@@ -1,0 +1,87 @@
+"""Values that may change over time: constants, curves, and functions of time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from supple.errors import SceneError
+from supple.scene.values import float_array
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Piecewise linear values over time; constant before the first and after the last.
+
+    Parameters
+    ----------
+    times : (k,) strictly increasing [s]
+    values : (k,) numbers, or (k, 3) vectors, in the unit of what they are used for
+
+    Raises
+    ------
+    SceneError : where shapes disagree, times do not increase, or a value is not finite.
+    """
+
+    times: ArrayLike
+    values: ArrayLike
+
+    def __post_init__(self) -> None:
+        times, values = float_array(self.times, "Curve: times"), float_array(self.values, "Curve: values")
+        if times.ndim != 1 or len(times) == 0:
+            raise SceneError(f"Curve: times has shape {times.shape}; give one time or more")
+        if values.shape not in ((len(times),), (len(times), 3)):
+            raise SceneError(f"Curve: values has shape {values.shape}; give {len(times)} numbers or vectors")
+        if not (np.isfinite(times).all() and np.isfinite(values).all()):
+            raise SceneError("Curve: holds a number that is not finite")
+        late = np.flatnonzero(np.diff(times) <= 0.0)
+        if len(late):
+            k = int(late[0])
+            raise SceneError(f"Curve: times[{k + 1}] = {times[k + 1]:g} s does not come after {times[k]:g} s")
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "values", values)
+
+    def __call__(self, time: float) -> NDArray[np.float64]:
+        """The value at `time` [s]."""
+        times, values = np.asarray(self.times), np.asarray(self.values)
+        columns = values.reshape(len(times), -1).T
+        return np.array([np.interp(time, times, column) for column in columns]).reshape(values.shape[1:])
+
+
+OverTime = ArrayLike | Curve | Callable[[float], ArrayLike]
+
+
+def checked_over_time(value: OverTime, what: str, shape: tuple[int, ...]) -> OverTime:
+    """The value, as an array of `shape` where it is a constant; functions are checked when they are called.
+
+    Raises
+    ------
+    SceneError : where a constant or a curve is not finite or has another shape.
+    """
+    if isinstance(value, Curve):
+        value_at(value, float(np.asarray(value.times)[0]), what, shape)
+        return value
+    return value if callable(value) else _checked(value, what, shape)
+
+
+def value_at(value: OverTime, time: float, what: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """The value at `time` [s], of `shape`.
+
+    Raises
+    ------
+    SceneError : where it is not finite or has another shape.
+    """
+    return _checked(value(time), f"{what}({time:g})", shape) if callable(value) else np.asarray(value)
+
+
+def _checked(value: ArrayLike, what: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    array = float_array(value, what, "give a number" if shape == () else "give three numbers")
+    if array.shape != shape:
+        raise SceneError(f"{what} has shape {array.shape}; give {'one number' if shape == () else 'three numbers'}")
+    if not np.isfinite(array).all():
+        raise SceneError(f"{what} is {array.tolist()}; it must be finite")
+    array.flags.writeable = False
+    return array

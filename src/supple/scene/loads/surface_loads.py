@@ -1,0 +1,65 @@
+"""Loads on surfaces: tractions of fixed direction, and pressures that follow the surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from supple.scene.loads.load import OnSurface, Region
+from supple.scene.loads.over_time import OverTime, checked_over_time
+
+
+@dataclass(frozen=True, eq=False)
+class Traction(OnSurface):
+    """A force per area at rest whose direction does not follow the deformation.
+
+    Parameters
+    ----------
+    body : name of the body.
+    traction : (3,) [N/m^2], a `Curve`, or a function of time [s].
+    region : None for the whole surface, an `InBox` that holds all three corners of a triangle at the start, or rows of
+        `mesh.surface.triangles`.
+    name : appears in messages.
+
+    Raises
+    ------
+    SceneError : where a value is of the wrong kind or not finite.
+    """
+
+    kind: ClassVar[str] = "traction"
+
+    body: str
+    traction: OverTime
+    region: Region = None
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "traction", checked_over_time(self.traction, f"{self.label}: traction", (3,)))
+
+
+@dataclass(frozen=True, eq=False)
+class Pressure(OnSurface):
+    """A force per present area along the inward normal, which follows the surface.
+
+    Parameters
+    ----------
+    body : name of the body.
+    pressure : [Pa], positive where it pushes on the body; a number, a `Curve`, or a function of time [s].
+    region, name : as of `Traction`.
+
+    Raises
+    ------
+    SceneError : where a value is of the wrong kind or not finite.
+    """
+
+    kind: ClassVar[str] = "pressure"
+
+    body: str
+    pressure: OverTime
+    region: Region = None
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "pressure", checked_over_time(self.pressure, f"{self.label}: pressure", ()))

@@ -1,0 +1,211 @@
+"""The contact forces of a frame: means over its substeps, one by one and by body."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.state import ContactPoints
+from supple.xpbd.contact.contact_rows import LoadedRows
+
+
+class ShapeLoads(NamedTuple):
+    """The contacts of one substep of c vertices with simple shapes.
+
+    Attributes
+    ----------
+    shapes, vertices : (c,); loads : (c, 3) accelerations of the vertices [m/s^2]
+    places : (c, 4) normal of the shape, and gap after the contact was resolved [m]
+    """
+
+    shapes: NDArray[np.int64]
+    vertices: NDArray[np.int32]
+    loads: NDArray[np.float64]
+    places: NDArray[np.float64]
+
+    @staticmethod
+    def none() -> ShapeLoads:
+        return ShapeLoads(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int32), np.zeros((0, 3)), np.zeros((0, 4)))
+
+
+class Owners(NamedTuple):
+    """What the points and shapes of a scene belong to: bodies, then obstacles.
+
+    Attributes
+    ----------
+    names : of all; of_points : (p,) of the points of `ContactSurfaces`; of_shapes : (s,); of_vertices : (n,)
+    rows : (nb,) vertices of the system that are the bodies' points, which come first among the points
+    masses : (n,) of the vertices [kg]
+    """
+
+    names: tuple[str, ...]
+    of_points: NDArray[np.int32]
+    of_shapes: NDArray[np.int32]
+    of_vertices: NDArray[np.int32]
+    rows: NDArray[np.int32]
+    masses: NDArray[np.float64]
+
+
+class _Entries(NamedTuple):
+    """Forces (e, 3) on the first side along the normal, and along the surface [N], already divided by substeps."""
+
+    first: NDArray[np.int32]
+    second: NDArray[np.int32]
+    normal: NDArray[np.float64]
+    tangential: NDArray[np.float64]
+
+
+@dataclass
+class FrameForces:
+    """What the substeps of one frame had, in the numbering of the solver.
+
+    Attributes
+    ----------
+    surfaces, shapes : one entry for each substep that had any contact of the kind
+    substeps : their number, also of those without contact
+    """
+
+    owners: Owners
+    surfaces: list[LoadedRows] = field(default_factory=list)
+    shapes: list[ShapeLoads] = field(default_factory=list)
+    substeps: int = 0
+
+    def by_name(self) -> tuple[dict[str, NDArray[np.float64]], dict[str, NDArray[np.float64]]]:
+        """The sums along the normals, and along the surfaces, on each body and obstacle: (3,) [N]; each add up to 0."""
+        normal, tangential = np.zeros((2, len(self.owners.names), 3))
+        for part in (_of_rows(self._rows(), self), _of_shapes(self._loads(), self)):
+            for out, forces in ((normal, part.normal), (tangential, part.tangential)):
+                np.add.at(out, part.first, forces)
+                np.subtract.at(out, part.second, forces)
+        names = self.owners.names
+        return dict(zip(names, normal, strict=True)), dict(zip(names, tangential, strict=True))
+
+    def points(
+        self, x: NDArray[np.float64], at_end: NDArray[np.float64], old_from_new: NDArray[np.int32]
+    ) -> ContactPoints:
+        """All contacts of the frame, one by one. Those of the same vertices in several substeps are one.
+
+        Parameters
+        ----------
+        x : (n, 3) positions of the solver's vertices at the end of the frame; at_end : (p, 3) of the surfaces' points
+            [m]
+        old_from_new : (n,) the scene's number of each of the solver's vertices
+        """
+        return _joined(
+            self.owners.names,
+            [
+                self._surface_points(at_end, old_from_new),
+                self._shape_points(x, old_from_new),
+            ],
+        )
+
+    def _rows(self) -> LoadedRows:
+        parts = self.surfaces or [LoadedRows.none()]
+        return LoadedRows(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+    def _loads(self) -> ShapeLoads:
+        parts = self.shapes or [ShapeLoads.none()]
+        return ShapeLoads(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+    def _surface_points(self, x: NDArray[np.float64], old_from_new: NDArray[np.int32]) -> ContactPoints:
+        rows, bodies = self._rows(), len(self.owners.rows)
+        entries = _of_rows(rows, self)
+        places = np.column_stack([rows.keys, rows.vertices.astype(np.int64)])
+        chosen, contact = _same(places)
+        sizes = np.linalg.norm(rows.forces, axis=1)
+        weights = _sums(contact, sizes[:, None] * rows.weights, len(chosen))
+        weights /= _sums(contact, sizes, len(chosen))[:, None]
+        vertices = rows.vertices[chosen]
+        corners = x[vertices]
+        sides = [np.einsum("ki,kij->kj", np.maximum(sign * weights, 0.0), corners) for sign in (1.0, -1.0)]
+        forces = _sums(contact, entries.normal, len(chosen))
+        normals = _directions(forces, rows.normals[chosen])
+        k, slot = np.nonzero((vertices < bodies) & (weights != 0.0))
+        return ContactPoints(
+            points=0.5 * (sides[0] + sides[1]),
+            normals=normals,
+            forces=forces,
+            friction=_sums(contact, entries.tangential, len(chosen)),
+            distances=np.einsum("kj,kj->k", sides[0] - sides[1], normals),
+            first=entries.first[chosen],
+            second=entries.second[chosen],
+            names=self.owners.names,
+            rows=k,
+            vertices=old_from_new[self.owners.rows[vertices[k, slot]]],
+            weights=weights[k, slot],
+        )
+
+    def _shape_points(self, x: NDArray[np.float64], old_from_new: NDArray[np.int32]) -> ContactPoints:
+        loads = self._loads()
+        entries = _of_shapes(loads, self)
+        chosen, contact = _same(np.column_stack([loads.shapes, loads.vertices.astype(np.int64)]))
+        forces = _sums(contact, entries.normal, len(chosen))
+        normals = _directions(forces, loads.places[chosen, :3])
+        vertices, gaps = loads.vertices[chosen], loads.places[chosen, 3]
+        return ContactPoints(
+            points=x[vertices] - 0.5 * gaps[:, None] * normals,
+            normals=normals,
+            forces=forces,
+            friction=_sums(contact, entries.tangential, len(chosen)),
+            distances=gaps,
+            first=entries.first[chosen],
+            second=entries.second[chosen],
+            names=self.owners.names,
+            rows=np.arange(len(chosen)),
+            vertices=old_from_new[vertices],
+            weights=np.ones(len(chosen)),
+        )
+
+
+def _of_rows(rows: LoadedRows, frame: FrameForces) -> _Entries:
+    owner = frame.owners.of_points
+    return _entries(owner[rows.vertices[:, 0]], owner[rows.vertices[:, 3]], rows.forces, rows.normals, frame.substeps)
+
+
+def _of_shapes(loads: ShapeLoads, frame: FrameForces) -> _Entries:
+    owners = frame.owners
+    forces = owners.masses[loads.vertices, None] * loads.loads
+    first, second = owners.of_vertices[loads.vertices], owners.of_shapes[loads.shapes]
+    return _entries(first, second, forces, loads.places[:, :3], frame.substeps)
+
+
+def _entries(
+    first: NDArray[np.int32],
+    second: NDArray[np.int32],
+    forces: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    substeps: int,
+) -> _Entries:
+    forces = forces / max(substeps, 1)
+    normal = np.einsum("kj,kj->k", forces, normals)[:, None] * normals
+    return _Entries(first, second, normal, forces - normal)
+
+
+def _same(places: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The last row (c,) with each content, and the number of each row's content (e,)."""
+    _, first, contact = np.unique(places[::-1], axis=0, return_index=True, return_inverse=True)
+    return len(places) - 1 - first, contact.ravel()[::-1]
+
+
+def _sums(number: NDArray[np.int64], values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    out = np.zeros((count, *values.shape[1:]))
+    np.add.at(out, number, values)
+    return out
+
+
+def _directions(forces: NDArray[np.float64], otherwise: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(k, 3) unit vectors along forces (k, 3), where these are not zero."""
+    sizes = np.linalg.norm(forces, axis=1)[:, None]
+    return np.where(sizes > 0.0, forces / np.where(sizes > 0.0, sizes, 1.0), otherwise)
+
+
+def _joined(names: tuple[str, ...], parts: Sequence[ContactPoints]) -> ContactPoints:
+    begins = np.cumsum([0, *(len(part) for part in parts[:-1])])
+    fields = ("points", "normals", "forces", "friction", "distances", "first", "second", "vertices", "weights")
+    arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in fields}
+    rows = np.concatenate([part.rows + begin for part, begin in zip(parts, begins, strict=True)])
+    return ContactPoints(**arrays, names=names, rows=rows)

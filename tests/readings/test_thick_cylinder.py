@@ -1,0 +1,71 @@
+"""The stress in a thick-walled cylinder under internal pressure converges to Lamé's solution."""
+
+import numpy as np
+import pytest
+
+import supple as sp
+
+INNER, OUTER, HEIGHT, E, NU, P = 0.1, 0.2, 0.06, 1e6, 0.3, 500.0
+_TETS = np.array([[0, 1, 3, 7], [0, 1, 7, 5], [0, 5, 7, 4], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7]])
+
+
+def ring(radial, around, layers):
+    """A mesh of a ring, and the rows of the triangles of its inner surface."""
+    r = np.linspace(INNER, OUTER, radial + 1)
+    t = 2 * np.pi * np.arange(around) / around
+    z = np.linspace(0, HEIGHT, layers + 1)
+    R, T, Z = np.meshgrid(r, t, z, indexing="ij")
+    vertices = np.column_stack([(R * np.cos(T)).ravel(), (R * np.sin(T)).ravel(), Z.ravel()])
+    i, j, k = (index.ravel() for index in np.meshgrid(*map(np.arange, (radial, around, layers)), indexing="ij"))
+    corners = [
+        ((i + di) * around + (j + dj) % around) * (layers + 1) + k + dk
+        for dk in (0, 1)
+        for dj in (0, 1)
+        for di in (0, 1)
+    ]
+    cells = np.stack(corners, axis=1)
+    mesh = sp.TetMesh(vertices, cells[:, _TETS].reshape(-1, 4))
+    radii = np.linalg.norm(mesh.vertices[:, :2], axis=1)
+    inner = np.flatnonzero((radii[mesh.surface.triangles] < INNER * 1.0001).all(axis=1))
+    return mesh, inner
+
+
+def errors(radial, around, layers, integration="tets"):
+    """Of the radial and the hoop stress in the mean square over the volume, relative to the pressure: in tets, at
+    vertices."""
+    mesh, inner = ring(radial, around, layers)
+    rubber = sp.StableNeoHookean(youngs=E, poisson=NU, integration=integration)
+    scene = sp.Scene(
+        [sp.Body("ring", mesh, rubber)], loads=[sp.Pressure("ring", P, region=inner)], gravity=(0.0, 0.0, 0.0)
+    )
+    # Long steps of backward Euler end in the equilibrium.
+    *_, frame = sp.simulate(scene, sp.Implicit(contact=None, tolerance=1e-9), dt=0.05, steps=6)
+    found = []
+    shares = np.bincount(mesh.tets.ravel(), np.repeat(mesh.volumes / 4, 4))
+    centers = mesh.vertices[mesh.tets].mean(axis=1)
+    for x, stress, weights in (
+        (centers, frame.stress["ring"], mesh.volumes),
+        (mesh.vertices, frame.stress.at_vertices["ring"], shares),
+    ):
+        r = np.linalg.norm(x[:, :2], axis=1)
+        out = np.column_stack([x[:, 0] / r, x[:, 1] / r, np.zeros(len(r))])
+        along = np.column_stack([-out[:, 1], out[:, 0], out[:, 2]])
+        base, change = P * INNER**2 / (OUTER**2 - INNER**2), OUTER**2 / r**2
+        square = 0.0
+        for direction, exact in ((out, base * (1 - change)), (along, base * (1 + change))):
+            square += (np.einsum("ei,eij,ej->e", direction, stress, direction) - exact) ** 2
+        found.append(float(np.sqrt(weights @ square / weights.sum())) / P)
+    return found
+
+
+def test_stresses_converge_to_lames():
+    coarse, fine = errors(3, 20, 1), errors(6, 40, 2)
+    assert fine[0] < 0.6 * coarse[0]
+    assert fine[1] < 0.45 * coarse[1]
+    # Averages over patches are much nearer.
+    assert errors(3, 20, 1, "patches")[0] < 0.05
+
+
+@pytest.mark.slow
+def test_stresses_of_patches_are_within_a_percent_on_a_fine_mesh():
+    assert errors(12, 80, 4, "patches")[0] < 0.01
