@@ -116,7 +116,14 @@ class ContactRows:
 
     def loaded(self) -> LoadedRows:
         """Copies of all rows that hold a force."""
-        k = np.flatnonzero(self.forces.any(axis=1))
+        return self._copies(np.flatnonzero(self.forces.any(axis=1)))
+
+    def pushing(self) -> LoadedRows:
+        """`loaded` after a projection, when only active rows hold a force."""
+        k = np.flatnonzero(self.active)
+        return self._copies(k[self.forces[k].any(axis=1)])
+
+    def _copies(self, k: NDArray[np.int64]) -> LoadedRows:
         return LoadedRows(
             self.keys[k],
             self.vertices[k],

@@ -215,7 +215,7 @@ class SurfaceCollisions:
 
     def forces(self) -> LoadedRows:
         """Copies of the contacts that push in the substep that was projected last."""
-        return self._rows.loaded()
+        return self._rows.pushing()
 
     @property
     def positions(self) -> NDArray[np.float64]:
