@@ -21,6 +21,7 @@ from supple.numerics.deformation import deformation_gradients, determinants
 from supple.numerics.memory import require_memory
 from supple.readings.by_body import ByBody
 from supple.readings.contact_readings import contact_forces, contact_pressures
+from supple.readings.pin_reactions import balanced_reactions
 from supple.readings.sensor_readings import Reading, sensor_readings
 from supple.readings.tet_readings import TetReadings
 from supple.scene.inputs import checked_values, drive_inputs, hold_inputs
@@ -137,6 +138,20 @@ class Frame(TetReadings):
         """Normal force of contacts per area at each vertex: by body name, (n,) [Pa]; 0 where nothing touches."""
         x = self.system.points.positions(self._x)
         return self._by_vertex(contact_pressures(self.contacts, x, self.system.triangles))
+
+    @cached_property
+    def reactions(self) -> dict[str, NDArray[np.float64]]:
+        """The force of each pin on its body by the pin's label, (3,) [N].
+
+        Of `Implicit` the exact ones, `report.details.reaction_forces`; of `XPBD` those of `balanced_reactions`.
+        """
+        exact = getattr(self.report.details, "reaction_forces", None)
+        if exact is not None:
+            return dict(exact)
+        for pin in self.system.pins:
+            self.first_piola[pin.pin.body]  # raises where it is not defined
+        P = self.first_piola.values_of_all
+        return balanced_reactions(self.system, self._x, self.time, P, self.contacts)
 
     @cached_property
     def sensors(self) -> dict[str, Reading]:

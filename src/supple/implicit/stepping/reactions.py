@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.readings.pin_reactions import pin_labels
 from supple.system import System
 
 
@@ -22,11 +23,7 @@ def reaction_forces(system: System, gradient: NDArray[np.float64]) -> tuple[dict
     """
     totals: dict[str, NDArray] = {}
     by_vertex: dict[str, NDArray] = {}
-    for pin in system.pins:
-        label, number = pin.pin.label, 2
-        while label in totals:
-            label = f"{pin.pin.label} #{number}"
-            number += 1
+    for label, pin in zip(pin_labels(system), system.pins, strict=True):
         by_vertex[label] = gradient[pin.vertices]
         totals[label] = by_vertex[label].sum(axis=0)
     return totals, by_vertex

@@ -82,7 +82,7 @@ def cauchy_stresses(P: NDArray[np.float64], F: NDArray[np.float64]) -> NDArray[n
 
     The symmetric part: with patches, P F^T of a single tet is symmetric only where the deformation is uniform.
     """
-    cauchy = np.einsum("eij,ekj->eik", P, F) / determinants(F)[:, None, None]
+    cauchy = P @ np.swapaxes(F, 1, 2) / determinants(F)[:, None, None]
     return 0.5 * (cauchy + np.swapaxes(cauchy, 1, 2))
 
 

@@ -187,14 +187,21 @@ def _entries(
 
 def _same(places: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """The last row (c,) with each content, and the number of each row's content (e,)."""
-    _, first, contact = np.unique(places[::-1], axis=0, return_index=True, return_inverse=True)
-    return len(places) - 1 - first, contact.ravel()[::-1]
+    order = np.lexsort(places.T)
+    ordered = places[order]
+    differs = np.ones(len(places), dtype=bool)
+    differs[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    contact = np.empty(len(places), dtype=np.int64)
+    contact[order] = np.cumsum(differs) - 1
+    # Equal rows keep their order.
+    last = np.flatnonzero(np.append(differs[1:], True)) if len(places) else np.zeros(0, dtype=np.int64)
+    return order[last], contact
 
 
 def _sums(number: NDArray[np.int64], values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    out = np.zeros((count, *values.shape[1:]))
-    np.add.at(out, number, values)
-    return out
+    columns = [values] if values.ndim == 1 else values.T
+    sums = [np.bincount(number, column, count) for column in columns]
+    return np.stack(sums, axis=1).astype(np.float64, copy=False).reshape(count, *values.shape[1:])
 
 
 def _directions(forces: NDArray[np.float64], otherwise: NDArray[np.float64]) -> NDArray[np.float64]:
