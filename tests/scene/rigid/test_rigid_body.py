@@ -176,17 +176,6 @@ def test_given_positions_are_those_of_the_surface_and_must_be_rigid():
         initial_state(scene, {"palm": there[:4]})
 
 
-def test_a_force_on_some_of_its_points_acts_with_its_moment():
-    rigid = body(BOX)
-    corner = int(np.argmax(BOX.vertices.sum(axis=1)))
-    system = system_of(rigid, forces=[sp.Force("palm", [corner], (0.0, 0.0, 2.0))])
-    (part,) = system.forces
-    forces = part.per_vertex(0.0)
-    np.testing.assert_allclose(forces.sum(axis=0), (0, 0, 2.0), atol=1e-13)
-    moment = np.cross(system.rest_positions[part.vertices], forces).sum(axis=0)
-    np.testing.assert_allclose(moment, np.cross(BOX.vertices[corner], (0, 0, 2.0)), atol=1e-12)
-
-
 PIN = sp.Pin("palm")
 
 
