@@ -19,11 +19,7 @@ from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.elastic_tets.stress import energy_densities
 from supple.numerics.deformation import deformation_gradients, determinants
 from supple.numerics.memory import require_memory
-from supple.readings.by_body import ByBody
-from supple.readings.contact_readings import contact_forces, contact_pressures
-from supple.readings.pin_reactions import balanced_reactions
-from supple.readings.sensor_readings import Reading, sensor_readings
-from supple.readings.tet_readings import TetReadings
+from supple.readings.frame_readings import FrameReadings
 from supple.scene.inputs import checked_values, drive_inputs, hold_inputs
 from supple.scene.rigid.pose import Pose, pose_of
 from supple.scene.scene import Scene
@@ -85,8 +81,8 @@ class Report(Diagnostics):
 
 
 @dataclass(frozen=True, eq=False)
-class Frame(TetReadings):
-    """The scene at one time. For strains and stresses, see `TetReadings`.
+class Frame(FrameReadings):
+    """The scene at one time. For stresses and forces, see `FrameReadings`.
 
     Attributes
     ----------
@@ -127,39 +123,6 @@ class Frame(TetReadings):
     def contacts(self) -> ContactPoints | None:
         """All contacts, one by one; None where no step led to the frame, or `Implicit` has contact=None."""
         return None if self.find_contacts is None else self.find_contacts()
-
-    @cached_property
-    def contact_force(self) -> ByBody:
-        """Force of all contacts on each vertex, friction included: by body name, (n, 3) [N]."""
-        return self._by_vertex(contact_forces(self.contacts, len(self.system.points)))
-
-    @cached_property
-    def contact_pressure(self) -> ByBody:
-        """Normal force of contacts per area at each vertex: by body name, (n,) [Pa]; 0 where nothing touches."""
-        x = self.system.points.positions(self._x)
-        return self._by_vertex(contact_pressures(self.contacts, x, self.system.triangles))
-
-    @cached_property
-    def reactions(self) -> dict[str, NDArray[np.float64]]:
-        """The force of each pin on its body by the pin's label, (3,) [N].
-
-        Of `Implicit` the exact ones, `report.details.reaction_forces`; of `XPBD` those of `balanced_reactions`.
-        """
-        exact = getattr(self.report.details, "reaction_forces", None)
-        if exact is not None:
-            return dict(exact)
-        for pin in self.system.pins:
-            self.first_piola[pin.pin.body]  # raises where it is not defined
-        P = self.first_piola.values_of_all
-        return balanced_reactions(self.system, self._x, self.time, P, self.contacts)
-
-    @cached_property
-    def sensors(self) -> dict[str, Reading]:
-        """By name, what the scene's sensors feel: `ForceReading` or `TaxelReading`."""
-        return sensor_readings(self.system, self._x, self.contacts)
-
-    def _by_vertex(self, values: NDArray[np.float64]) -> ByBody:
-        return ByBody(values, {part.name: part.points for part in self.system.bodies}, {})
 
     @property
     def _x(self) -> NDArray[np.float64]:
