@@ -51,6 +51,16 @@ def test_run_writes_every_iteration(scene, tmp_path):
     assert [path.name for path in table.parent.iterdir()] == ["newton.csv"]
 
 
+def test_a_run_traces_the_motion_of_pins(scene, tmp_path):
+    motion = "motion: {times: [0, 0.06], displacements: [[0, 0, 0], [-0.05, 0, 0]]}"
+    scene.write_text(SCENE.replace("high: [-0.499, 1, 1]}}", "high: [-0.499, 1, 1]}, " + motion + "}"))
+    table = tmp_path / "newton.csv"
+    command = ["run", str(scene), "-q", "--no-page", "--no-plot", "-o", str(tmp_path / "out"), "--trace", str(table)]
+    assert main(command) == ExitCode.OK
+    assert {row["kind"] for row in rows_of(table)} == {"newton", "extension"}
+
+
+@pytest.mark.slow
 def test_demo_traces_the_motion_of_pins(tmp_path):
     table = tmp_path / "newton.csv"
     arguments = ["demo", "twist", "--steps", "1", "-q", "--no-page", "--no-plot", "-o", str(tmp_path / "out")]

@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -14,12 +15,16 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError, SolverError
 from supple.learning.copies import Copy, Moment, same_bodies, scenes_of
 from supple.numerics.memory import require_memory
+from supple.numerics.thread_tuning import ThreadTuner
 from supple.numerics.threads import numba_threads
 from supple.scene.scene import Scene
 from supple.simulate import Frame, check_timing
 from supple.state import Status
 from supple.system import Solver
 from supple.xpbd.solver import XPBD
+
+# After how many steps the slower of one thread and several is measured again.
+_MEASURED_EACH = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +46,8 @@ class Batch:
     solver : of all copies
     dt : length of a step [s]
     parameters : for a function: by name, n values, of which each copy gets its own
-    threads : number of threads that step copies; None: one per core. Each copy runs on one of them.
+    threads : number of threads that step copies; None: one, or one per core where that is measured to be faster. Each
+        copy runs on one of them.
 
     Raises
     ------
@@ -70,6 +76,8 @@ class Batch:
         needed = sum(solver.bytes_needed(one) for one in scenes)
         require_memory(needed, f"Batch: {n} copies of the scene", "give fewer copies, or make the meshes coarser")
         self.threads = min(int(n), int(threads or os.cpu_count() or 1))
+        choice = threads is None and self.threads > 1
+        self._pace = ThreadTuner(choice, parallel=self.threads > 1 and not choice, interval=_MEASURED_EACH)
         with numba_threads(1):
             self._copies = [Copy.of(one, solver) for one in scenes]
         same_bodies(self._copies)
@@ -107,7 +115,8 @@ class Batch:
                 for k in left:
                     after[k] = self._copies[k].after(self.dt, wanted[k])
 
-        if self.threads == 1:
+        several, began = self._pace.choose(), perf_counter()
+        if not several:
             work()
         else:
             pool = self._threads()
@@ -115,6 +124,7 @@ class Batch:
             for error in [one.exception() for one in running]:  # waits for all of them
                 if error is not None:
                     raise error
+        self._pace.note(several, perf_counter() - began)
         for k, moment in after.items():
             self._copies[k].now = moment
 
