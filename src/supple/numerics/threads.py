@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import AbstractContextManager, nullcontext
+from typing import Any
 
 import numba
+from numba.np.ufunc import parallel
 
 
 def threads_for(work: int, least: int) -> AbstractContextManager[None]:
@@ -43,3 +46,17 @@ class _Threads(AbstractContextManager[None]):
 
     def __exit__(self, *error: object) -> None:
         numba.set_num_threads(self.before)
+
+
+def _forget_the_inherited_lock() -> None:
+    """In a forked process: Numba takes this lock at every question for the number of threads.
+
+    It is one of processes, so that it would stay locked for the parent and for its other children where this process
+    is killed while it holds it. Numba makes another one.
+    """
+    module: Any = parallel
+    module._backend_init_process_lock = None
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget_the_inherited_lock)
