@@ -21,6 +21,10 @@ class AppliedLoad(ABC):
         """The same load where vertex i has the number new[i]."""
 
     @abstractmethod
+    def acts_on(self) -> NDArray[np.int32]:
+        """The vertices that the load acts on."""
+
+    @abstractmethod
     def add_forces(self, x: NDArray[np.float64], time: float, out: NDArray[np.float64]) -> None:
         """Add the forces on the vertices at x (n, 3) [m] and `time` [s] to `out` (n, 3) [N]."""
 
@@ -34,6 +38,9 @@ class DeadLoad(AppliedLoad):
 
     def renumbered(self, new: NDArray[np.int32]) -> DeadLoad:
         return replace(self, vertices=new[self.vertices])
+
+    def acts_on(self) -> NDArray[np.int32]:
+        return self.vertices
 
     def add_forces(self, x: NDArray[np.float64], time: float, out: NDArray[np.float64]) -> None:
         out[self.vertices] += self.per_vertex(time)
@@ -49,6 +56,9 @@ class MassLoad(AppliedLoad):
 
     def renumbered(self, new: NDArray[np.int32]) -> MassLoad:
         return replace(self, vertices=new[self.vertices])
+
+    def acts_on(self) -> NDArray[np.int32]:
+        return self.vertices
 
     def add_forces(self, x: NDArray[np.float64], time: float, out: NDArray[np.float64]) -> None:
         out[self.vertices] += self.masses[:, None] * self.load.at(x[self.vertices], time)

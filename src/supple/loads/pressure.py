@@ -31,6 +31,9 @@ class FollowerPressure(AppliedLoad):
     def renumbered(self, new: NDArray[np.int32]) -> FollowerPressure:
         return replace(self, triangles=new[self.triangles])
 
+    def acts_on(self) -> NDArray[np.int32]:
+        return np.unique(self.triangles)
+
     def add_forces(self, x: NDArray[np.float64], time: float, out: NDArray[np.float64]) -> None:
         thirds = -self.pressure(time) / 3.0 * area_vectors(x, self.triangles)
         for corner in self.triangles.T:

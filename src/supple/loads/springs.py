@@ -36,6 +36,9 @@ class PointSpring(AppliedLoad):
     def renumbered(self, new: NDArray[np.int32]) -> PointSpring:
         return replace(self, vertices=new[self.vertices])
 
+    def acts_on(self) -> NDArray[np.int32]:
+        return self.vertices
+
     def add_forces(self, x: NDArray[np.float64], time: float, out: NDArray[np.float64]) -> None:
         length, along = self.length(x)
         pull = -self.stiffness * (length - self.rest_length(time)) * along

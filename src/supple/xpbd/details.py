@@ -17,15 +17,17 @@ class XPBDDetails(SolverDetails):
 
     Attributes
     ----------
-    contacts : number of contacts that the last substep resolved
+    contacts : number of contacts that the last substep resolved, and of those between things at rest
     smallest_gap : smallest signed distance of a vertex from a surface at the beginnings of the substeps [m], below zero
-        where they overlapped; None where no gap was smaller than about one edge length. Pairs of edges are not in it.
+        where they overlapped, of bodies that do not sleep; None where no gap was smaller than about one edge length.
+        Pairs of edges are not in it.
     substeps : number of substeps; repeats : how often the frame was undone and repeated with more
     substeps_reason : what asked for this number
     softening : by body, the share of its stiffness that it lacks at this length of the substep, estimated (see
         `supple.xpbd.assessment.softening`)
     energy_gained : energy that came from nowhere, and has not been lost since, over the energy of the scene [-]
     contact_forces, friction_forces : by name of the body or obstacle, (3,) means over the frame [N]; each sum to zero
+    asleep : names of the bodies that rest, for which no substep was taken (see `supple.xpbd.sleep`)
     held_back : substeps in which the motion of a body was shortened, so that no tet inverts and nothing passes
         through anything
     """
@@ -37,5 +39,6 @@ class XPBDDetails(SolverDetails):
     softening: Mapping[str, float] = field(default_factory=dict)
     energy_gained: float = 0.0
     held_back: int = 0
+    asleep: tuple[str, ...] = ()
     contact_forces: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     friction_forces: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)

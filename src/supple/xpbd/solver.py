@@ -5,8 +5,8 @@ Source: Macklin, Müller, Chentanez, "XPBD" (2016); Macklin et al., "Small Steps
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from itertools import accumulate
+import math
+from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Literal
 
@@ -29,23 +29,18 @@ from supple.xpbd.constraints.stitch_anchors import StitchAnchors
 from supple.xpbd.constraints.stitches import stitch_constraints
 from supple.xpbd.contact.collisions import Collisions
 from supple.xpbd.contact.settings import XPBDContact
-from supple.xpbd.damping.kelvin_voigt import Damping, ViscousMemory, cycle_lengths, make_damping
+from supple.xpbd.damping.kelvin_voigt import Damping, make_damping
 from supple.xpbd.details import XPBDDetails
 from supple.xpbd.external_forces import add_forces, pull_springs, pull_to_targets
-from supple.xpbd.integration import (
-    apply_changes,
-    first_lost,
-    hold,
-    origins_of_components,
-    predict,
-    to_world,
-)
+from supple.xpbd.integration import first_lost, to_world
 from supple.xpbd.limits.rigid_fallback import RigidFallback
 from supple.xpbd.limits.volume_guard import VolumeGuard
 from supple.xpbd.memory import XPBDMemory
 from supple.xpbd.momentum import MomentumRestore
+from supple.xpbd.sleep import Sleep, SleepMemory
 from supple.xpbd.start import raise_if_inside
 from supple.xpbd.substep_limits import collide, keep_volumes, restore
+from supple.xpbd.substep_start import begin_substep, cycles, load, pin_targets, push_contacts
 from supple.xpbd.substeps import FALL, SubstepChoice, Substeps
 from supple.xpbd.sweeps.ordering import make_layout, reordered
 from supple.xpbd.workspace import XPBDWorkspace
@@ -71,6 +66,7 @@ class XPBD(Solver):
     contact : contact of bodies with each other and with themselves; None turns it off. Obstacles always act.
     accuracy : the share of its stiffness that a body may lack; beyond it, the status of a frame is `softened`.
     max_substeps : the largest automatic number.
+    sleep_after : how long a body stays at its place before it sleeps [s], see `supple.xpbd.sleep`; None: nothing sleeps
     start : what becomes of bodies that begin inside of something: an error, or they are slowly pushed out.
     threads : number of threads. None: one, or all of Numba's where the scene is large enough and several threads are
         measured to be faster. The result has the same bits for any number.
@@ -87,6 +83,7 @@ class XPBD(Solver):
     accuracy: float = 0.02
     max_substeps: int = 1000
     start: Literal["refuse", "push_out"] = "refuse"
+    sleep_after: float | None = 0.5
 
     def __post_init__(self) -> None:
         if self.substeps != "auto":
@@ -98,9 +95,12 @@ class XPBD(Solver):
             raise SolverError(f"XPBD: momentum_restore is {self.momentum_restore!r}; give True or False")
         if self.contact is not None and not isinstance(self.contact, XPBDContact):
             raise SolverError(f"XPBD: contact is {self.contact!r}; give XPBDContact(...), or None to turn it off")
-        number = isinstance(self.accuracy, (int, float, np.number)) and not isinstance(self.accuracy, bool)
-        if not number or not 0.0 < self.accuracy < 1.0:
+        if not _is_number(self.accuracy) or not 0.0 < self.accuracy < 1.0:
             raise SolverError(f"XPBD: accuracy is {self.accuracy!r}; give a number above 0 and below 1, such as 0.02")
+        if self.sleep_after is not None and not (_is_number(self.sleep_after) and self.sleep_after > 0.0):
+            raise SolverError(
+                f"XPBD: sleep_after is {self.sleep_after!r}; give a time above zero [s], or None to keep all awake"
+            )
         if self.threads is not None:
             _check_count("threads", self.threads)
             if self.threads > _MOST_THREADS:
@@ -141,6 +141,7 @@ class XPBD(Solver):
             fallback=RigidFallback(inner, collisions.skin),
             assessment=assessment,
             choice=SubstepChoice(inner, assessment.softening, bool(collisions)),
+            sleep=Sleep(inner, layout, self.sleep_after, self.accuracy),
             threads=self.threads or (None if large else 1),
             pace=ThreadTuner(choice=parallel and self.threads is None, parallel=parallel),
             anchors=StitchAnchors(inner),
@@ -169,14 +170,21 @@ class XPBD(Solver):
     def _step(self, system: System, state: State, dt: float, ws: XPBDWorkspace) -> tuple[State, StepReport]:
         time = state.time + dt
         memory = state.memory if isinstance(state.memory, XPBDMemory) else XPBDMemory()
-        _load(ws, state)
+        load(ws, state)
         used, repeats = self._first_choice(ws, state, dt, memory), 0
-        overlaps = ws.assessment.overlaps(ws.world, state.time) if ws.collisions else []
+        sleep = ws.sleep.begin(state.positions, state.velocities, state.time, dt, memory.sleep)
+        overlaps = _overlaps(ws, state.time, sleep)
         while True:
-            held_back = self._advance(ws, state, dt, used.count, memory, overlaps)
+            held_back = self._advance(ws, state, dt, used.count, memory, overlaps, sleep)
             lost = first_lost(ws.points, ws.velocities)
             if lost < 0:
-                new, report, problem = self._reported(ws, time, dt, held_back, used, repeats, memory, overlaps)
+                disturbed = _disturbed(ws, time, sleep)
+                if disturbed.any():
+                    sleep = ws.sleep.woken(sleep, disturbed)
+                    load(ws, state)
+                    overlaps = _overlaps(ws, state.time, sleep)
+                    continue
+                new, report, problem = self._reported(ws, time, dt, held_back, used, repeats, memory, overlaps, sleep)
             else:
                 problem = Status.NOT_FINITE
             most = MOST_FOR_CROSSINGS if problem is Status.INTERSECTING else MOST_REPEATS
@@ -210,13 +218,14 @@ class XPBD(Solver):
         repeats: int,
         before: XPBDMemory,
         overlaps: list[Overlap],
+        sleep: SleepMemory,
     ) -> tuple[State, StepReport, Status | None]:
         """The state at the end of a frame, what is wrong with it, and the status that more substeps might cure."""
         h = dt / used.count
-        new, viscous = _unload(ws, time, self._damping(ws, h))
+        to_world(ws.points, ws.origins, ws.world)
         ws.guard.measure(ws.points, False)
         findings, ledger = ws.assessment.end(
-            ws.moment(time), ws.world, ws.guard.J, h, self.accuracy, held_back / used.count
+            ws.moment(time), ws.world, ws.guard.J, h, self.accuracy, held_back / used.count, sleep.asleep
         )
         status = findings.status
         problem = status if status in (Status.INVERTED, Status.ENERGY_GAINED) else None
@@ -224,17 +233,22 @@ class XPBD(Solver):
             problem = Status.INTERSECTING
         elif problem is None and held_back:
             problem = Status.INVERTED
+        forces, old_from_new = ws.collisions.forces, ws.layout.old_from_new
+        x, v = ws.world[ws.layout.new_from_old], ws.velocities[ws.layout.new_from_old]
+        sound = status in (Status.CONVERGED, Status.SOFTENED) and not held_back
+        rest = ws.sleep.end(x, v, time, sleep, forces, sound)
+        damping = self._damping(ws, h)
         memory = XPBDMemory(
             contact=ws.collisions.memory(ws.world),
-            viscous=viscous,
+            viscous=None if damping is None else damping.memory(v),
             ledger=ledger,
             substeps=float(used.count) if repeats and problem is None else FALL * before.substeps,
+            sleep=rest,
             futile=frozenset() if problem is None else before.futile | ({problem} if repeats else set()),
         )
-        forces, old_from_new = ws.collisions.forces, ws.layout.old_from_new
         pushes, friction = forces.by_name()
         details = XPBDDetails(
-            contacts=ws.collisions.contacts,
+            contacts=ws.collisions.contacts + sum(len(part[0]) for part in forces.standing),
             smallest_gap=ws.collisions.smallest_gap,
             substeps=used.count,
             repeats=repeats,
@@ -242,6 +256,7 @@ class XPBD(Solver):
             softening=ws.assessment.softening.by_body(h),
             energy_gained=findings.gained,
             held_back=held_back,
+            asleep=tuple(part.name for part, rests in zip(ws.system.bodies, sleep.asleep, strict=True) if rests),
             contact_forces=pushes,
             friction_forces=friction,
         )
@@ -254,7 +269,7 @@ class XPBD(Solver):
             details=details,
             contacts=lambda: forces.points(world, surfaces, old_from_new),
         )
-        return replace(new, memory=memory), report, problem
+        return State(time, x, v, memory=memory), report, problem
 
     def _remedy(self, ws: XPBDWorkspace, dt: float, findings: Findings, used: int) -> str:
         """What helps against what was found."""
@@ -264,38 +279,47 @@ class XPBD(Solver):
         return f"take {'max_substeps' if self.substeps == 'auto' else 'substeps'}={enough}"
 
     def _advance(
-        self, ws: XPBDWorkspace, state: State, dt: float, substeps: int, memory: XPBDMemory, overlaps: list[Overlap]
+        self,
+        ws: XPBDWorkspace,
+        state: State,
+        dt: float,
+        substeps: int,
+        memory: XPBDMemory,
+        overlaps: list[Overlap],
+        sleep: SleepMemory,
     ) -> int:
         """Simulate the substeps of a frame from a state; returns in how many the motion of a body was shortened."""
         h, held_back = dt / substeps, 0
-        _load(ws, state)
-        targets = _pin_targets(ws.system, state.time, h, substeps)
+        load(ws, state)
+        ws.set_asleep(sleep.asleep)
+        targets = pin_targets(ws.system, state.time, h, substeps)
         collides = bool(ws.collisions)
         if collides:
             crossing = [each.numbers for each in overlaps if each.pairs]
-            ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt, memory.contact, crossing)
+            ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt, memory.contact, crossing, sleep.asleep)
+            ws.collisions.forces.keep_standing((sleep.contacts, sleep.loads), sleep.asleep)
         ws.guard.measure(ws.points, False)
         ws.guard.guarded[:] = ws.assessment.begin(ws.moment(state.time), ws.guard.J, h, memory.ledger)
         ws.guard.accept()
         balance = ws.assessment.balance
         damping = self._damping(ws, h)
-        cycles = _cycles(substeps)
+        lengths = cycles(substeps)
         if damping is not None:
             damping.begin_step(memory.viscous, state.velocities)
-        for k in range(substeps):
+        for k in range(0 if sleep.asleep.all() else substeps):
             interruption_point()
             started = perf_counter()
             parallel = ws.pace.choose()
             end = state.time + (k + 1) * h
-            if damping is not None and k in cycles:
+            if damping is not None and k in lengths:
                 moving = ws.anchors.velocities(end - h, h)
-                damping.begin_cycle(ws.extended, ws.velocities, moving, cycles[k], h, parallel)
-            _begin_substep(ws, targets[k], end, h, parallel)
+                damping.begin_cycle(ws.extended, ws.velocities, moving, lengths[k], h, parallel)
+            begin_substep(ws, targets[k], end, h, parallel)
             add_forces(ws.system, ws.points, ws.velocities, ws.origins, end, h)
             if damping is not None:
                 damping.push(ws.points, h)
             if collides:
-                _push_contacts(ws, h)
+                push_contacts(ws, h)
             for constraints in ws.sets:
                 constraints.project(ws.extended, h, parallel)
             restore(ws, h, parallel)
@@ -326,58 +350,27 @@ class XPBD(Solver):
         )
 
 
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and math.isfinite(value)
+
+
 def _check_count(name: str, value: object, otherwise: str = "") -> None:
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
         raise SolverError(f"XPBD: {name} is {value!r}; give a whole number of one or more{otherwise}")
 
 
-def _load(ws: XPBDWorkspace, state: State) -> None:
-    old = ws.layout.old_from_new
-    np.take(state.positions, old, axis=0, out=ws.world)
-    np.take(state.velocities, old, axis=0, out=ws.velocities)
-    origins_of_components(ws.world, ws.system.joined_components, ws.origins)
-    np.subtract(ws.world, ws.origins, out=ws.points[:, :3])
-    ws.anchors.place(ws.extended, ws.origins, state.time)
+def _overlaps(ws: XPBDWorkspace, time: float, sleep: SleepMemory) -> list[Overlap]:
+    """What is through what at the world positions of the workspace."""
+    return ws.assessment.overlaps(ws.world, time, sleep.asleep) if ws.collisions else []
 
 
-def _cycles(substeps: int) -> dict[int, int]:
-    """The first substep of each cycle of damping, and the cycle's length."""
-    lengths = cycle_lengths(substeps)
-    return dict(zip(accumulate(lengths, initial=0), lengths, strict=False))
-
-
-def _begin_substep(ws: XPBDWorkspace, targets: NDArray[np.float64], end: float, h: float, parallel: bool) -> None:
-    """Predict positions, with pinned vertices at `targets` (k, 3)."""
-    predict[parallel](ws.points, ws.previous, ws.velocities, ws.system.gravity, h)
-    ws.begun[:] = ws.previous
-    if len(targets):
-        hold(ws.points, ws.system.pinned_vertices, targets, ws.origins)
-        ws.assessment.balance.note_pins(ws.points, ws.previous, parallel)
-    ws.anchors.place(ws.extended, ws.origins, end)
-
-
-def _push_contacts(ws: XPBDWorkspace, h: float) -> None:
-    """Apply the contact forces of the substep before to the prediction."""
-    if to_world(ws.points, ws.origins, ws.world):
-        to_world(ws.previous, ws.origins, ws.world_previous)
-        if ws.collisions.begin_substep(ws.world, ws.world_previous, h):
-            apply_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
-
-
-def _unload(ws: XPBDWorkspace, time: float, damping: Damping | None) -> tuple[State, ViscousMemory | None]:
-    """The state without its memory, and what damping remembers."""
+def _disturbed(ws: XPBDWorkspace, time: float, sleep: SleepMemory) -> NDArray[np.bool_]:
+    """(b,) the sleeping bodies that something awake pushed, or is through, at the end of a frame."""
+    if not sleep.asleep.any() or sleep.asleep.all():
+        return np.zeros(len(sleep.islands), dtype=np.bool_)
     to_world(ws.points, ws.origins, ws.world)
-    new = ws.layout.new_from_old
-    velocities = ws.velocities[new]
-    viscous = None if damping is None else damping.memory(velocities)
-    return State(time, ws.world[new], velocities), viscous
-
-
-def _pin_targets(system: System, time: float, h: float, substeps: int) -> NDArray[np.float64]:
-    """(substeps, k, 3) positions of the pinned vertices at the end of each substep [m]."""
-    if all(pin.pin.motion is None for pin in system.pins):
-        return np.repeat(system.pin_targets(time)[None], substeps, axis=0)
-    return np.stack([system.pin_targets(time + (k + 1) * h) for k in range(substeps)])
+    crossing = [overlap.numbers for overlap in _overlaps(ws, time, sleep)]
+    return ws.sleep.disturbed(sleep, [*ws.collisions.forces.pairs(), *crossing])
 
 
 def _lost_position_message(ws: XPBDWorkspace, vertex: int, time: float) -> str:

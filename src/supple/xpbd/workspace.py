@@ -18,6 +18,7 @@ from supple.xpbd.damping.kelvin_voigt import Damping
 from supple.xpbd.limits.rigid_fallback import RigidFallback
 from supple.xpbd.limits.volume_guard import VolumeGuard
 from supple.xpbd.momentum import MomentumRestore
+from supple.xpbd.sleep import Sleep
 from supple.xpbd.substeps import SubstepChoice
 from supple.xpbd.sweeps.ordering import Layout
 
@@ -47,6 +48,7 @@ class XPBDWorkspace:
     fallback: RigidFallback
     assessment: Assessment
     choice: SubstepChoice
+    sleep: Sleep
     threads: int | None
     pace: ThreadTuner
     anchors: StitchAnchors
@@ -64,6 +66,16 @@ class XPBDWorkspace:
         self.points = self.extended[:n]
         for name in ("previous", "begun", "velocities", "origins", "world", "world_previous"):
             setattr(self, name, np.zeros((n, 3)))
+
+    def set_asleep(self, bodies: NDArray[np.bool_]) -> None:
+        """Let no vertex of these bodies (b,) move, and no constraint of them be projected."""
+        free = np.where(self.sleep.vertices(bodies), 0.0, self.system.inverse_masses)
+        if not np.array_equal(free, self.points[:, 3]):
+            self.points[:, 3] = free
+            for constraints in self.sets:
+                constraints.sweep.choose(self.extended[:, 3])
+            if self.damping is not None:
+                self.damping.choose(self.extended[:, 3])
 
     def moment(self, time: float) -> Moment:
         """What the assessment reads, at `time` [s]."""

@@ -31,7 +31,7 @@ def _boxes_of_triangles(points, triangles, radii, out):
 
 
 @njit(error_model="numpy")
-def _near_point(p, radius, shapes, radii, rules, same, tree, pieces, found, count):
+def _near_point(p, radius, shapes, radii, rules, same, tree, pieces, found, count, scratch):
     """Append the triangles that are near point p, of its own piece or of others; returns the number of all found.
 
     Parameters
@@ -39,14 +39,14 @@ def _near_point(p, radius, shapes, radii, rules, same, tree, pieces, found, coun
     radius : of the search [m]; for the other arguments see `_list_pairs`
     pieces : for each piece those that the search looks for, and their boxes
     found : (first, last, out): rows of `out` that may be written; where they are full, pairs are only counted
+    scratch : (STACK,) and (6,)
     """
     points, point_piece, triangles, triangle_piece = shapes
     allowed, excluded = rules
     nodes, labels, order = tree
     first, last, out = found
+    stack, box = scratch
     mine = point_piece[p]
-    stack = np.empty(STACK, dtype=np.int64)
-    box = np.empty(6)
     for j in range(3):
         box[j], box[3 + j] = points[p, j] - radius, points[p, j] + radius
     if not meets_partner(box, mine, pieces[0], pieces[1]):
@@ -92,14 +92,15 @@ def _list_pairs(shapes, radii, rules, partners, boxes, far_tree, near_tree, room
         its_shapes = (points, point_piece, triangles, triangle_piece)
         its_rules = (allowed, (excluded_starts, excluded_points))
         found = (room[r], room[r + 1], out)
+        scratch = np.empty(STACK, dtype=np.int64), np.empty(6)
         count = 0
         for p in range(r, len(points), RUNS):
             tree = (far_nodes, far_labels, far_order)
             pieces = ((other_starts, others), boxes)
-            count = _near_point(p, far[p, 0], its_shapes, far, its_rules, False, tree, pieces, found, count)
+            count = _near_point(p, far[p, 0], its_shapes, far, its_rules, False, tree, pieces, found, count, scratch)
             tree = (near_nodes, near_labels, near_order)
             pieces = ((own_starts, own), boxes)
-            count = _near_point(p, near[p, 0], its_shapes, near, its_rules, True, tree, pieces, found, count)
+            count = _near_point(p, near[p, 0], its_shapes, near, its_rules, True, tree, pieces, found, count, scratch)
         counts[r] = count
 
 

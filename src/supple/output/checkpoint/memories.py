@@ -6,9 +6,11 @@ from supple.implicit.stepping.conservation import EnergyMade
 from supple.implicit.stepping.integrators import History
 from supple.xpbd.assessment.assessment import Ledger
 from supple.xpbd.contact.contact_rows import LoadedRows
+from supple.xpbd.contact.frame_forces import ShapeLoads
 from supple.xpbd.contact.memory import ContactMemory, ObstacleMemory, SurfaceMemory
 from supple.xpbd.damping.kelvin_voigt import ViscousMemory
 from supple.xpbd.memory import XPBDMemory
+from supple.xpbd.sleep import SleepMemory
 
 MEMORIES: tuple[type, ...] = (
     ContactMemory,
@@ -17,6 +19,8 @@ MEMORIES: tuple[type, ...] = (
     Ledger,
     LoadedRows,
     ObstacleMemory,
+    ShapeLoads,
+    SleepMemory,
     SurfaceMemory,
     ViscousMemory,
     XPBDMemory,

@@ -42,6 +42,9 @@ class XPBDModel(Model):
     start: Literal["refuse", "push_out"] = Field(
         default="refuse", description="bodies that begin inside of something: an error, or slowly pushed out"
     )
+    sleep_after: Positive | None = Field(
+        default=0.5, description="how long a body stays at its place before it sleeps [s]; null keeps all awake"
+    )
 
     def build(self) -> Solver:
         from supple.xpbd.contact.settings import XPBDContact

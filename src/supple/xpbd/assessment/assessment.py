@@ -65,9 +65,9 @@ class Assessment:
             sound[part.tets] = part.name not in tangled
         return sound
 
-    def overlaps(self, world: NDArray[np.float64], time: float) -> list[Overlap]:
-        """What is through what at world positions (n, 3) [m] and a time [s]."""
-        return self._surfaces.find(world, time)
+    def overlaps(self, world: NDArray[np.float64], time: float, asleep: NDArray[np.bool_]) -> list[Overlap]:
+        """What is through what at world positions (n, 3) [m] and a time [s]; see `SurfaceCheck.find`."""
+        return self._surfaces.find(world, time, asleep)
 
     def end(
         self,
@@ -76,7 +76,8 @@ class Assessment:
         J: NDArray[np.float64],
         h: float,
         accuracy: float,
-        held: float = 0.0,
+        held: float,
+        asleep: NDArray[np.bool_],
     ) -> tuple[Findings, Ledger]:
         """Judge the end of a frame.
 
@@ -85,6 +86,7 @@ class Assessment:
         world : (n, 3) positions in the world [m]; J : (m,) of all tets
         h : length of the substeps [s]; accuracy : how much stiffness a body may lack
         held : the share of the substeps in which the motion of bodies was shortened
+        asleep : (b,) bodies that did not move
         """
         before = self._ledger
         tangled = before.tangled & tangled_bodies(self.system, J)
@@ -93,7 +95,7 @@ class Assessment:
         lacks = zip(self.softening.shares(h).tolist(), self.softening.names, strict=True)
         findings = Findings(
             inverted=count_inverted(self.system, J, tangled),
-            overlaps=self._surfaces.find(world, moment.time),
+            overlaps=self._surfaces.find(world, moment.time, asleep),
             held=held,
             gained=excess / scale if scale > 0.0 else 0.0,
             gains=gain > LEAST_GAIN * scale,

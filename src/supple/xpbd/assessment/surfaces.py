@@ -82,30 +82,38 @@ class SurfaceCheck:
         self._may_cross = bool(pairs.any())
         self._fixed = np.concatenate(points) if points else np.zeros((0, 3))
         # The arguments and the result of the last search: the end of a frame is the beginning of the next one.
-        self._last: tuple[NDArray[np.float64], float, list[Overlap]] = (np.zeros((0, 3)), -np.inf, [])
+        self._last: tuple[NDArray[np.float64], float, NDArray[np.bool_], list[Overlap]]
+        self._last = (np.zeros((0, 3)), -np.inf, np.zeros(0, dtype=np.bool_), [])
+        self._obstacles_move = bool(self._poses.moving.any())
         self._surface = [np.unique(system.triangles[part.triangles]) for part in system.bodies]
 
-    def find(self, x: NDArray[np.float64], time: float) -> list[Overlap]:
-        """What is through what, at world positions x (n, 3) [m] and a time [s]."""
-        known, at, found = self._last
-        if time != at or not np.array_equal(known, x):
-            found = [*(self._crossings(x, time) if self._may_cross else ()), *self.depths(x, time)]
-            self._last = (x.copy(), time, found)
+    def find(self, x: NDArray[np.float64], time: float, asleep: NDArray[np.bool_] | None = None) -> list[Overlap]:
+        """What is through what, at world positions x (n, 3) [m] and a time [s].
+
+        Sleeping bodies (b,) are not compared with each other and with obstacles: nothing has moved there.
+        """
+        asleep = np.zeros(len(self.system.bodies), dtype=np.bool_) if asleep is None else asleep
+        known, at, slept, found = self._last
+        moved = self._obstacles_move and time != at
+        if moved or not np.array_equal(slept, asleep) or not np.array_equal(known, x):
+            still = np.ones(len(self._names), dtype=np.bool_)
+            still[: len(asleep)] = asleep
+            collide = self._collide & ~(still[:, None] & still)
+            found = [*(self._crossings(x, time, collide) if self._may_cross else ()), *self.depths(x, time, collide)]
+            self._last = (x.copy(), time, asleep.copy(), found)
         return found
 
-    def _crossings(self, x: NDArray[np.float64], time: float) -> list[Overlap]:
+    def _crossings(self, x: NDArray[np.float64], time: float, collide: NDArray[np.bool_]) -> list[Overlap]:
         R, t = self._poses.at(time)
         rows = np.array(self._owners, dtype=np.int64)
         points = np.concatenate([x, np.einsum("kij,kj->ki", R[rows], self._fixed) + t[rows]])
         corners = points[self._triangles]
         low, high = corners.min(axis=1), corners.max(axis=1)
-        chosen = self._near(low, high)
+        chosen = self._near(low, high, collide)
         if not chosen.any():
             return []
         picked = np.flatnonzero(chosen)
-        pairs, kinds = crossing_triangles(
-            points, self._triangles[picked], self._owner[picked], self._collide, MOST_PAIRS
-        )
+        pairs, kinds = crossing_triangles(points, self._triangles[picked], self._owner[picked], collide, MOST_PAIRS)
         owners = np.sort(self._owner[picked][pairs[kinds == CROSSING]], axis=1)
         found, counts = np.unique(owners, axis=0, return_counts=True) if len(owners) else (owners, [])
         return [
@@ -113,20 +121,23 @@ class SurfaceCheck:
             for (a, b), k in zip(found, counts, strict=True)
         ]
 
-    def _near(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def _near(
+        self, low: NDArray[np.float64], high: NDArray[np.float64], collide: NDArray[np.bool_]
+    ) -> NDArray[np.bool_]:
         """(t,) the triangles that reach into the box of another thing that they collide with, or of their own."""
         count = len(self._names)
         boxes, chosen = np.empty((count, 6)), np.zeros(len(low), dtype=np.bool_)
-        _note_near(low, high, self._owner, self._collide, boxes, chosen)
+        _note_near(low, high, self._owner, collide, boxes, chosen)
         return chosen
 
-    def depths(self, x: NDArray[np.float64], time: float) -> list[Overlap]:
-        """Bodies with vertices deep inside of obstacles that have no triangles; arguments as of `find`."""
+    def depths(self, x: NDArray[np.float64], time: float, collide: NDArray[np.bool_] | None = None) -> list[Overlap]:
+        """Bodies with vertices deep inside of obstacles that have no triangles, of the pairs `collide` (p, p)."""
+        collide = self._collide if collide is None else collide
         R, t = self._poses.at(time)
         bodies, found = len(self.system.bodies), []
         for k in self._formulas:
             for number, rows in enumerate(self._surface):
-                if not self._collide[number, bodies + k]:
+                if not collide[number, bodies + k]:
                     continue
                 local = (x[rows] - t[k]) @ R[k]
                 deepest = -float(self.system.obstacles[k].signed_distance(local)[0].min())

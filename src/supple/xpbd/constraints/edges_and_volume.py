@@ -117,12 +117,12 @@ class _Constraints:
         movable = (system.inverse_masses[vertices[rows]] > 0.0).any(axis=1)
         rows, alpha = rows[movable], alpha[movable]
         constants = np.column_stack([rest[rows], alpha, system.inverse_masses[vertices[rows]]])
-        self._sweep = Sweep(project, vertices[rows], constants, make_groups(layout, vertices[rows]))
+        self.sweep = Sweep(project, vertices[rows], constants, make_groups(layout, vertices[rows]))
         self.count = self.work = len(rows)
 
     def project(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:
         """See `ConstraintSet.project`."""
-        self._sweep.run(points, h, parallel)
+        self.sweep.run(points, h, parallel)
 
 
 class EdgeConstraints(_Constraints):

@@ -22,6 +22,7 @@ from supple.system import BodyRange, System
 from supple.xpbd.constraints.edges_and_volume import EdgeConstraints, VolumeConstraints
 from supple.xpbd.constraints.stable_neo_hookean import StableNeoHookeanConstraints
 from supple.xpbd.sweeps.ordering import Layout
+from supple.xpbd.sweeps.sweep import Sweep
 
 
 class ConstraintSet(Protocol):
@@ -29,6 +30,7 @@ class ConstraintSet(Protocol):
 
     count: int
     work: int  # cost of a sweep, in edges or volumes
+    sweep: Sweep  # over all of them
 
     def project(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:
         """Project every constraint once, in place.

@@ -56,14 +56,14 @@ class BlocksOfTwo:
         self._longest = 1.0 / np.maximum(2.0 * mu * V * curvatures[:, 2], np.finfo(float).tiny)
         material = np.column_stack([mu * V, lam * V, 1.0 + mu / lam, self._longest])
         constants = np.hstack([gradients.reshape(-1, 9), material, curvatures, w])
-        self._sweep = Sweep(project_blocks_of_two, corners, constants, groups)
+        self.sweep = Sweep(project_blocks_of_two, corners, constants, groups)
         self._warned_for = 0.0
 
     def project(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:
         """See `ConstraintSet.project`."""
         if h != self._warned_for:
             self._warn_if_shortened(h)
-        self._sweep.run(points, h, parallel)
+        self.sweep.run(points, h, parallel)
 
     def _warn_if_shortened(self, h: float) -> None:
         self._warned_for = h

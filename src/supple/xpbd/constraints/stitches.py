@@ -35,7 +35,7 @@ class StitchTetConstraints(BlocksOfTwo):
             (corners, tets.rest_shape_inverse[movable], tets.rest_volumes[movable]),
             (tets.mu[movable], tets.lam[movable]),
             inverse_masses,
-            make_groups_of_one_chunk(corners, len(inverse_masses)),
+            make_groups_of_one_chunk(corners, system.joined_components, len(inverse_masses)),
         )
 
 
@@ -55,13 +55,13 @@ class StitchSpringConstraints:
         constants = np.column_stack(
             [springs.rest_lengths[movable], 1.0 / springs.stiffness[movable], t, slope, w[:, 0], moved]
         )
-        groups = make_groups_of_one_chunk(ends, len(inverse_masses))
-        self._sweep = Sweep(_project_springs, ends, constants, groups)
+        groups = make_groups_of_one_chunk(ends, system.joined_components, len(inverse_masses))
+        self.sweep = Sweep(_project_springs, ends, constants, groups)
         self.count = self.work = len(ends)
 
     def project(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:
         """See `ConstraintSet.project`."""
-        self._sweep.run(points, h, parallel)
+        self.sweep.run(points, h, parallel)
 
 
 def stitch_constraints(

@@ -89,6 +89,7 @@ class Collisions:
         dt: float,
         memory: ContactMemory | None = None,
         crossing: Iterable[tuple[int, int]] = (),
+        asleep: NDArray[np.bool_] | None = None,
     ) -> None:
         """Find what may touch within the frame.
 
@@ -99,15 +100,17 @@ class Collisions:
         memory : see `memory`, of the frame before; None where there is none.
         crossing : pairs of bodies and obstacles (counted after the bodies) whose surfaces cross at the beginning. What
             passes through what is not prevented there, because it would keep them from parting.
+        asleep : (b,) bodies that do not move; their contacts with each other and with obstacles remain as they are
         """
+        asleep = np.zeros(len(self.system.bodies), dtype=np.bool_) if asleep is None else asleep
         self._smallest = math.inf
         self._dt = dt
         self.forces = FrameForces(self._owners)
         if self.surfaces is not None:
-            self.surfaces.begin_step(x, v, time, dt, None if memory is None else memory.surfaces, crossing)
+            self.surfaces.begin_step(x, v, time, dt, None if memory is None else memory.surfaces, crossing, asleep)
         if self.obstacles:
             known = None if memory is None else memory.obstacles
-            self.obstacles.begin_step(known, x, LEAST_REACH * self.edge_length)
+            self.obstacles.begin_step(known, x, LEAST_REACH * self.edge_length, asleep[self._owners.of_vertices])
             self._gather_obstacles(x, v, time)
 
     def begin_substep(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> bool:

@@ -36,18 +36,16 @@ class LoadedRows(NamedTuple):
     friction: NDArray[np.float64]
     forces: NDArray[np.float64]
 
-    def of_points(self, count: int) -> LoadedRows:
-        """Those rows whose vertices are all below `count`."""
-        kept = (self.vertices < count).all(axis=1)
-        return LoadedRows(
-            self.keys[kept],
-            self.vertices[kept],
-            self.weights[kept],
-            self.normals[kept],
-            self.offsets[kept],
-            self.friction[kept],
-            self.forces[kept],
-        )
+    def chosen(self, kept: NDArray[np.bool_]) -> LoadedRows:
+        """Those rows (of k,) that are kept."""
+        return LoadedRows(*(values[kept] for values in self))
+
+    def joined(self, other: LoadedRows) -> LoadedRows:
+        """The rows of both, whose keys differ, in the order of the keys."""
+        if not len(other.keys):
+            return self
+        order = np.argsort(np.concatenate([self.keys, other.keys]))
+        return LoadedRows(*(np.concatenate(both)[order] for both in zip(self, other, strict=True)))
 
     @staticmethod
     def none() -> LoadedRows:

@@ -27,6 +27,10 @@ class ShapeLoads(NamedTuple):
     loads: NDArray[np.float64]
     places: NDArray[np.float64]
 
+    def chosen(self, kept: NDArray[np.bool_]) -> ShapeLoads:
+        """Those contacts (of c,) that are kept."""
+        return ShapeLoads(*(values[kept] for values in self))
+
     @staticmethod
     def none() -> ShapeLoads:
         return ShapeLoads(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int32), np.zeros((0, 3)), np.zeros((0, 4)))
@@ -67,12 +71,38 @@ class FrameForces:
     ----------
     surfaces, shapes : one entry for each substep that had any contact of the kind
     substeps : their number, also of those without contact
+    standing : the contacts of things that sleep with each other and with obstacles, which are those of every substep
     """
 
     owners: Owners
     surfaces: list[LoadedRows] = field(default_factory=list)
     shapes: list[ShapeLoads] = field(default_factory=list)
     substeps: int = 0
+    standing: tuple[LoadedRows, ShapeLoads] = field(default_factory=lambda: (LoadedRows.none(), ShapeLoads.none()))
+
+    def pairs(self) -> list[tuple[int, int]]:
+        """The pairs of bodies and obstacles (counted after the bodies) whose surfaces push each other."""
+        vertices, owner = self._rows().vertices, self.owners.of_points
+        return [tuple(pair) for pair in np.unique(owner[vertices[:, [0, 3]]], axis=0).tolist()]
+
+    def keep_standing(self, standing: tuple[LoadedRows, ShapeLoads], asleep: NDArray[np.bool_]) -> None:
+        """Set `standing` to the contacts of an earlier frame, as far as the bodies (b,) still sleep."""
+        self.standing = standing
+        self.standing = self.at_rest(asleep)
+
+    def at_rest(self, asleep: NDArray[np.bool_]) -> tuple[LoadedRows, ShapeLoads]:
+        """The contacts of sleeping bodies (b,) with each other and with obstacles, with their means over the frame."""
+        still = np.ones(len(self.owners.names), dtype=np.bool_)
+        still[: len(asleep)] = asleep
+        rows, loads, owner = self._rows(), self._loads(), self.owners.of_points
+        rows = rows.chosen(still[owner[rows.vertices[:, 0]]] & still[owner[rows.vertices[:, 3]]])
+        loads = loads.chosen(still[self.owners.of_vertices[loads.vertices]])
+        chosen, contact = _same(rows.keys[:, None])
+        forces = _sums(contact, rows.forces, len(chosen)) / max(self.substeps, 1)
+        rows = LoadedRows(*(values[chosen] for values in rows))._replace(forces=forces)
+        chosen, contact = _same(np.column_stack([loads.shapes, loads.vertices.astype(np.int64)]))
+        means = _sums(contact, loads.loads, len(chosen)) / max(self.substeps, 1)
+        return rows, ShapeLoads(*(values[chosen] for values in loads))._replace(loads=means)
 
     def by_name(self) -> tuple[dict[str, NDArray[np.float64]], dict[str, NDArray[np.float64]]]:
         """The sums along the normals, and along the surfaces, on each body and obstacle: (3,) [N]; each add up to 0."""
@@ -104,11 +134,13 @@ class FrameForces:
         )
 
     def _rows(self) -> LoadedRows:
-        parts = self.surfaces or [LoadedRows.none()]
+        standing = self.standing[0]
+        parts = [*self.surfaces, standing._replace(forces=max(self.substeps, 1) * standing.forces)]
         return LoadedRows(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
     def _loads(self) -> ShapeLoads:
-        parts = self.shapes or [ShapeLoads.none()]
+        standing = self.standing[1]
+        parts = [*self.shapes, standing._replace(loads=max(self.substeps, 1) * standing.loads)]
         return ShapeLoads(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
     def _surface_points(self, x: NDArray[np.float64], old_from_new: NDArray[np.int32]) -> ContactPoints:

@@ -180,6 +180,10 @@ def add_loads(x, vertices, loads, h):
             x[vertices[c], j] += h * h * loads[c, j]
 
 
+def _no_loads() -> tuple[NDArray, NDArray, NDArray]:
+    return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int32), np.zeros((0, 3))
+
+
 class ObstacleContacts:
     """The simple shapes of a scene and the vertices near them.
 
@@ -207,6 +211,9 @@ class ObstacleContacts:
         self._vertices = np.zeros(1024, dtype=np.int32)
         self._loads, self._shares, self._places = np.zeros((1024, 3)), np.zeros(1024), np.zeros((1024, 4))
         self._any_load = False
+        self._all_inverse_masses = self.inverse_masses.copy()
+        # Shapes, vertices and loads of the contacts of what sleeps.
+        self._standing = _no_loads()
         self._rates = rates
         self._predicted = np.zeros((len(system.masses), 3))
         # Consecutive shapes with the same element function need one call.
@@ -220,18 +227,29 @@ class ObstacleContacts:
     def __bool__(self) -> bool:
         return len(self.shapes.contacts) > 0
 
-    def begin_step(self, memory: ObstacleMemory | None, x: NDArray[np.float64], tolerance: float) -> None:
-        """Take over the loads of an earlier step, where it describes these shapes and positions x (n, 3) [m]."""
+    def begin_step(
+        self, memory: ObstacleMemory | None, x: NDArray[np.float64], tolerance: float, asleep: NDArray[np.bool_]
+    ) -> None:
+        """Take over the loads of an earlier step, where it describes these shapes and positions x (n, 3) [m].
+
+        Vertices (n,) that are asleep take no part.
+        """
         self._starts[:] = 0
         self._any_load = False
+        self.inverse_masses[:] = np.where(asleep, 0.0, self._all_inverse_masses)
+        self._standing = _no_loads()
         shapes = self.shapes
         if memory is not None and memory.matches(shapes.frames, shapes.parameters, x, tolerance):
-            self._enter(memory.shapes * len(self.inverse_masses) + memory.vertices, memory.loads)
+            known, still = (memory.shapes, memory.vertices, memory.loads), asleep[memory.vertices]
+            self._standing = tuple(values[still] for values in known)
+            touched, vertices, loads = (values[~still] for values in known)
+            self._enter(touched * len(self.inverse_masses) + vertices, loads)
 
     def memory(self, x: NDArray[np.float64]) -> ObstacleMemory:
         """What the next step needs; `x` (n, 3) are the positions at the end of this one [m]."""
-        shapes, vertices, loads, _ = self.forces()
-        return ObstacleMemory(self.shapes.frames, self.shapes.parameters, x.copy(), shapes, vertices, loads)
+        both = [np.concatenate(arrays) for arrays in zip(self.forces()[:3], self._standing, strict=True)]
+        order = np.lexsort((both[1], both[0]))
+        return ObstacleMemory(self.shapes.frames, self.shapes.parameters, x.copy(), *(each[order] for each in both))
 
     def gather(self, x: NDArray[np.float64], reach: NDArray[np.float64], time: float) -> None:
         """List the vertices (of n) that may touch a shape before they have moved by `reach` (n,) [m], or are loaded."""

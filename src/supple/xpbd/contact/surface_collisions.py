@@ -78,7 +78,8 @@ class SurfaceCollisions:
         widest = float(np.diagonal(s.gaps).max(initial=0.0))
         excluded = excluded_pairs(s, rest, 2.0 * min(widest, 0.5 * edge_length))
         self._stitched = stitched_points(system, s, poses)
-        self._rules = (s.allowed, *excluded)
+        self._allowed = s.allowed.copy()
+        self._rules = (self._allowed, *excluded)
         self._apart = np.ones((pieces, pieces), dtype=np.bool_)
         self._edge_rules = (s.point_piece, s.closed, s.gaps, s.friction, self._apart)
         self._slack = widest + SLACK * edge_length
@@ -91,9 +92,12 @@ class SurfaceCollisions:
         self._shapes = (self._x, s.point_piece, s.triangles, s.triangle_piece)
         self._pieces = (s.point_piece, s.triangles, s.triangle_piece, s.closed, s.gaps, s.friction)
         self._predicted = np.zeros((n, 3))
-        self._points = (s.inverse_masses, np.concatenate([rates[s.rows], np.zeros(len(s.fixed_points))]))
+        self._inverse_masses = s.inverse_masses.copy()
+        self._points = (self._inverse_masses, np.concatenate([rates[s.rows], np.zeros(len(s.fixed_points))]))
         self._runs = PieceRuns(self._finder, n, s.triangle_piece)
         self._rows = ContactRows()
+        # The contacts between pieces that sleep.
+        self._standing = LoadedRows.none()
         self._smallest = np.zeros(n)
         # Whether nothing had passed through anything after the last projection.
         self.parted = True
@@ -119,9 +123,14 @@ class SurfaceCollisions:
         dt: float,
         memory: SurfaceMemory | None,
         crossing: Iterable[tuple[int, int]],
+        asleep: NDArray[np.bool_],
     ) -> None:
-        """See `Collisions.begin_step`."""
-        owner = self.surfaces.owner
+        """See `Collisions.begin_step`; `asleep` are the bodies (b,) that take no part."""
+        s, owner = self.surfaces, self.surfaces.owner
+        still = np.where(owner < len(asleep), asleep[np.minimum(owner, len(asleep) - 1)], True)
+        np.logical_and(s.allowed, ~(still[:, None] & still), out=self._allowed)
+        self._edges.choose(self._allowed)
+        self._inverse_masses[:] = np.where(still[s.point_piece], 0.0, s.inverse_masses)
         self._apart[:] = True
         for a, b in crossing:
             both = (owner[:, None] == a) & (owner == b)
@@ -135,7 +144,7 @@ class SurfaceCollisions:
         motions[bodies:] -= self._x[bodies:]
         motions[:bodies] = v[self.surfaces.rows] * dt
         self._before[:] = self._x
-        self._recall(memory)
+        self._recall(memory, still[s.point_piece])
         self._gather(motions, False)
         self._excursions[:] = 0.0
 
@@ -145,7 +154,7 @@ class SurfaceCollisions:
         take_rows(x, self.surfaces.rows, self._predicted)
         if rows.loads:
             self._take(x, x_prev)
-            push_rows(self._x, self._before, self.surfaces.inverse_masses, rows.described, h)
+            push_rows(self._x, self._before, self._inverse_masses, rows.described, h)
             give_rows(self._x, self.surfaces.rows, x)
         return rows.loads
 
@@ -256,7 +265,9 @@ class SurfaceCollisions:
         found = (self._x, self._before, self._pairs, self._near_pairs, self._edges.arrays[0], self._edge_rules)
         passed += find_edge_passages(*found, len(s.rows), kind, described)
         if passed:
-            self._chosen[kind] = choose_rows(self._x, self._before, s.inverse_masses, described, len(s.rows), kind, h)
+            self._chosen[kind] = choose_rows(
+                self._x, self._before, self._inverse_masses, described, len(s.rows), kind, h
+            )
         return passed > 0
 
     def _find(self, kind: int, part: tuple[int, int], h: float, parallel: bool) -> float:
@@ -278,7 +289,7 @@ class SurfaceCollisions:
             which = (near, bodies, kind)
             found = (self._x, self._before, self._pairs, self._near_pairs, self._edges.arrays, self._edge_rules)
             smallest = min(smallest, find_edge_contacts(*found, *which, described))
-        self._chosen[kind] = choose_rows(self._x, self._before, s.inverse_masses, described, bodies, kind, h)
+        self._chosen[kind] = choose_rows(self._x, self._before, self._inverse_masses, described, bodies, kind, h)
         return float(smallest)
 
     def memory(self, x: NDArray[np.float64]) -> SurfaceMemory:
@@ -291,11 +302,14 @@ class SurfaceCollisions:
             self._depth.copy(),
             self._entered.copy(),
             self._excursions.copy(),
-            self._rows.loaded(),
+            self._rows.loaded().joined(self._standing),
         )
 
-    def _recall(self, memory: SurfaceMemory | None) -> None:
-        """Restore what `memory` holds of points that are still where they were, and find the overlaps of the others."""
+    def _recall(self, memory: SurfaceMemory | None, still: NDArray[np.bool_]) -> None:
+        """Restore what `memory` holds of points that are still where they were, and find the overlaps of the others.
+
+        Contacts between points (n,) that are `still` are standing.
+        """
         s = self.surfaces
         self._entered[:], self._excursions[:] = -1, 0.0
         known, loaded = 0, LoadedRows.none()
@@ -305,7 +319,9 @@ class SurfaceCollisions:
             self._entered[:known] = memory.entered[:known]
             self._excursions[:known] = memory.excursions[:known]
             self._depth[:, :known] = memory.depth[:, :known]
-            loaded = memory.loaded.of_points(known)
+            loaded = memory.loaded.chosen((memory.loaded.vertices < known).all(axis=1))
+        standing = still[loaded.vertices].all(axis=1)
+        self._standing, loaded = loaded.chosen(standing), loaded.chosen(~standing)
         self._rows.restore(loaded, loaded.keys)
         if known < len(self._x):
             self._find_overlaps()

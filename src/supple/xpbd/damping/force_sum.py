@@ -40,7 +40,13 @@ class ForceSum:
         self._counts, self._pointers = groups.counts, groups.pointers
         self.members = groups.members
         self.rates = np.zeros(len(self._counts))
+        self._active = np.ones(len(self._counts), dtype=np.bool_)
         self._kernels = _sum_of(forces, elements.shape[1])
+
+    def choose(self, inverse_masses: NDArray[np.float64]) -> None:
+        """Sum only the groups with a vertex that can move, of inverse masses (n,) [1/kg]."""
+        self._active[:] = (inverse_masses[self._corners] > 0.0).any(axis=(1, 2))
+        self.rates[:] = 0.0
 
     def add(self, motion: NDArray[np.float64], h: float, out: NDArray[np.float64], parallel: bool) -> None:
         """Add the forces to `out`.
@@ -50,7 +56,8 @@ class ForceSum:
         motion : (n, 6) positions [m] and velocities [m/s]; out : (n, 4) [N], and mean diagonal entries of the
             matrix [kg/s]; h : length of the substep [s]
         """
-        self._kernels[parallel](motion, self._corners, self._counts, self._data, self._pointers, h, out, self.rates)
+        elements = (self._corners, self._counts, self._active, self._data, self._pointers)
+        self._kernels[parallel](motion, *elements, h, out, self.rates)
 
 
 @cache
@@ -68,11 +75,13 @@ def forces(X, V, k, data, g, h):
     raise NotImplementedError
 
 
-def _sum_chunk(motion, corners, counts, data, first, last, h, out, rates):
+def _sum_chunk(motion, corners, counts, active, data, first, last, h, out, rates):
     X = np.zeros((3 * CORNERS, WIDTH))
     V = np.zeros((3 * CORNERS, WIDTH))
     k = np.zeros((CORNERS + 1, WIDTH))
     for g in range(first, last):
+        if not active[g]:
+            continue
         count = counts[g]
         for lane in range(count):
             for c in range(CORNERS):
@@ -96,9 +105,9 @@ def _sum_chunk(motion, corners, counts, data, first, last, h, out, rates):
         rates[g] = fastest
 
 
-def _sum(motion, corners, counts, data, pointers, h, out, rates):
+def _sum(motion, corners, counts, active, data, pointers, h, out, rates):
     n_chunks = len(pointers) - 1
     for parity in range(2):
         for k in prange((n_chunks + 1 - parity) // 2):
             c = 2 * k + parity
-            _sum_chunk(motion, corners, counts, data, pointers[c], pointers[c + 1], h, out, rates)
+            _sum_chunk(motion, corners, counts, active, data, pointers[c], pointers[c + 1], h, out, rates)

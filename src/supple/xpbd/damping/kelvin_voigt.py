@@ -33,7 +33,7 @@ from supple.xpbd.damping.element_matrices import matrices_of_springs, matrices_o
 from supple.xpbd.damping.elements import viscous_springs, viscous_tets
 from supple.xpbd.damping.force_sum import ForceSum
 from supple.xpbd.damping.forces import forces_of_springs, forces_of_tets
-from supple.xpbd.sweeps.groups import make_groups, make_groups_of_one_chunk
+from supple.xpbd.sweeps.groups import Groups, make_groups, make_groups_of_one_chunk
 from supple.xpbd.sweeps.ordering import Layout
 
 # Substeps of a cycle. The extrapolated forces need H to be short against the time in which the stiffest tets answer:
@@ -98,7 +98,9 @@ class Damping:
             return
         self._layout = layout
         self._sums = [
-            ForceSum(forces, kind.vertices, kind.constants(), _groups_of(kind.vertices, layout, len(inverse_masses)))
+            ForceSum(
+                forces, kind.vertices, kind.constants(), _groups_of(kind.vertices, layout, system, len(inverse_masses))
+            )
             for kind, forces in ((tets, forces_of_tets), (springs, forces_of_springs))
             if len(kind.tau)
         ]
@@ -137,6 +139,11 @@ class Damping:
             self._local_forces[:] = 0.0
             self._interval = 0.0
         self._forces[:] = 0.0
+
+    def choose(self, inverse_masses: NDArray[np.float64]) -> None:
+        """Damp only elements with a vertex that can move, of inverse masses (n + a,) [1/kg]."""
+        for made in self._sums:
+            made.choose(inverse_masses)
 
     def begin_cycle(
         self,
@@ -231,11 +238,11 @@ class Damping:
                 yield vertices[batch], K
 
 
-def _groups_of(vertices: NDArray[np.int32], layout: Layout, n_vertices: int):
+def _groups_of(vertices: NDArray[np.int32], layout: Layout, system: System, n_vertices: int) -> Groups:
     """Elements of bodies are summed in the layout's chunks; anchors, which have no chunk, are few."""
     if len(vertices) and vertices.max() < len(layout.rank) and n_vertices == len(layout.rank):
         return make_groups(layout, vertices)
-    return make_groups_of_one_chunk(vertices, n_vertices)
+    return make_groups_of_one_chunk(vertices, system.joined_components, n_vertices)
 
 
 def cycle_lengths(substeps: int) -> list[int]:

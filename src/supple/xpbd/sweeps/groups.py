@@ -48,10 +48,18 @@ def make_groups(layout: Layout, constraints: NDArray[np.int32]) -> Groups:
     return _grouped(constraints, order, np.append(starts, len(order)), runs_of_chunks, len(layout.rank))
 
 
-def make_groups_of_one_chunk(constraints: NDArray[np.int32], n_vertices: int) -> Groups:
-    """The groups of constraints (m, k) that one thread projects."""
-    count = len(constraints)
-    return _grouped(constraints, np.arange(count), np.array([0, count]), np.array([0, 1]), n_vertices)
+def make_groups_of_one_chunk(constraints: NDArray[np.int32], pieces: NDArray[np.int32], n_vertices: int) -> Groups:
+    """The groups of constraints (m, k) that one thread projects; no group has constraints of two pieces.
+
+    Parameters
+    ----------
+    pieces : (n,) of the vertices; those above them (up to `n_vertices`) belong to the piece that they are joined to
+    """
+    of_vertex = np.append(pieces, np.full(n_vertices - len(pieces), np.iinfo(np.int32).max, dtype=np.int32))
+    piece = of_vertex[constraints].min(axis=1, initial=np.iinfo(np.int32).max)
+    order = np.argsort(piece, kind="stable")
+    starts = np.flatnonzero(np.diff(piece[order], prepend=-1) != 0)
+    return _grouped(constraints, order, np.append(starts, len(order)), np.array([0, len(starts)]), n_vertices)
 
 
 def _grouped(

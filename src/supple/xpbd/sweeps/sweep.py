@@ -41,11 +41,16 @@ class Sweep:
         self._corners = np.ascontiguousarray(constraints[groups.members], dtype=np.uint32)
         self._data = groups.lanes(constants)
         self._counts, self._pointers = groups.counts, groups.pointers
+        self._active = np.ones(len(self._counts), dtype=np.bool_)
         self._kernels = _sweep_of(project, constraints.shape[1])
+
+    def choose(self, inverse_masses: NDArray[np.float64]) -> None:
+        """Project only the groups with a vertex that can move, of inverse masses (n,) [1/kg]."""
+        self._active[:] = (inverse_masses[self._corners] > 0.0).any(axis=(1, 2))
 
     def run(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:
         """Project every constraint once: see `ConstraintSet.project`."""
-        self._kernels[parallel](points, self._corners, self._counts, self._data, self._pointers, h)
+        self._kernels[parallel](points, self._corners, self._counts, self._active, self._data, self._pointers, h)
 
 
 @cache
@@ -63,9 +68,11 @@ def project(X, data, g, h):
     raise NotImplementedError
 
 
-def _sweep_chunk(points, corners, counts, data, first, last, h):
+def _sweep_chunk(points, corners, counts, active, data, first, last, h):
     X = np.zeros((3 * CORNERS, WIDTH))
     for g in range(first, last):
+        if not active[g]:
+            continue
         count = counts[g]
         for lane in range(count):
             for c in range(CORNERS):
@@ -82,10 +89,10 @@ def _sweep_chunk(points, corners, counts, data, first, last, h):
                 points[p, 2] = X[3 * c + 2, lane]
 
 
-def _sweep(points, corners, counts, data, pointers, h):
+def _sweep(points, corners, counts, active, data, pointers, h):
     """Project the even chunks, then the odd ones."""
     n_chunks = len(pointers) - 1
     for parity in range(2):
         for k in prange((n_chunks + 1 - parity) // 2):
             c = 2 * k + parity
-            _sweep_chunk(points, corners, counts, data, pointers[c], pointers[c + 1], h)
+            _sweep_chunk(points, corners, counts, active, data, pointers[c], pointers[c + 1], h)

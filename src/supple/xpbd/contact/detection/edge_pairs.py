@@ -220,6 +220,10 @@ class EdgePairs:
     def __len__(self) -> int:
         return len(self.edges.ends)
 
+    def choose(self, allowed: NDArray[np.bool_]) -> None:
+        """List pairs of pieces (p, p) that may touch in one direction only."""
+        self._together[:] = allowed | allowed.T
+
     def renew(
         self, x: NDArray[np.float64], motions: tuple, gaps: NDArray[np.float64], near: tuple, parallel: bool
     ) -> None:

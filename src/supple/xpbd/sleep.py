@@ -1,0 +1,224 @@
+"""Bodies at rest sleep: they keep their positions and cost no work until something wakes them.
+
+Bodies that touch each other, or are stitched, are an island; all of an island sleeps, or none. It falls asleep after a
+frame in which each of its bodies has stayed, for a time T, within
+
+    d = accuracy min(EDGES l, FALL g (T/2)^2 / 2)
+
+of one place, with l the mean length of the body's edges. What is less than that from rest is thus
+
+- slower than a share of an edge in the time T, which is at least the body's damping time: what an overdamped body has
+  still to creep is no longer than d;
+- in balance up to a share of its weight: an oscillation that turns has the displacement a (T/2)^2 / 2 to both sides.
+  Where there is no gravity, nothing sleeps.
+
+An island wakes where something awake pushes it or has passed into it (the frame is then undone and simulated with the
+island awake), where its state was changed from outside, where an obstacle moves, and where anything in the scene is
+another than in the frame before. Bodies with loads, soft targets or moving pins do not sleep.
+
+Source of the name and of islands: Catto, "Box2D" manual, "Simulation islands".
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from supple.contact.obstacle_poses import ObstaclePoses
+from supple.system import System
+from supple.xpbd.contact.contact_rows import LoadedRows
+from supple.xpbd.contact.frame_forces import FrameForces, ShapeLoads
+from supple.xpbd.sweeps.ordering import Layout
+
+EDGES, FALL = 0.5, 0.1
+AWAKE = -1
+
+
+@dataclass(frozen=True, eq=False)
+class SleepMemory:
+    """What the next frame must know of bodies at rest.
+
+    Attributes
+    ----------
+    islands : (b,) a number for each sleeping island, `AWAKE` for the other bodies
+    since : (b,) the time since which each body has stayed at its place [s]
+    places : (n, 3) where its vertices were then, in the numbering of the scene [m]
+    contacts, loads : of sleeping bodies with each other and with obstacles (see `FrameForces.at_rest`)
+    scene : digest of the scene; poses : (k, 12) of the obstacles at the end of the frame
+    """
+
+    islands: NDArray[np.int64]
+    since: NDArray[np.float64]
+    places: NDArray[np.float64]
+    contacts: LoadedRows
+    loads: ShapeLoads
+    scene: str
+    poses: NDArray[np.float64]
+
+    @property
+    def asleep(self) -> NDArray[np.bool_]:
+        """(b,) which bodies sleep."""
+        return self.islands != AWAKE
+
+
+class Sleep:
+    """Which bodies of a system sleep.
+
+    Parameters
+    ----------
+    system : in the numbering of `layout`; after : how long bodies stay before they sleep [s], None for never
+    accuracy : see `XPBD`
+    """
+
+    def __init__(self, system: System, layout: Layout, after: float | None, accuracy: float) -> None:
+        self._system, self._layout = system, layout
+        self._starts = [part.vertices.start for part in system.bodies]
+        self._poses = ObstaclePoses(system.obstacles)
+        self._components = system.joined_components
+        if after is None:
+            self._times = np.full(len(system.bodies), math.inf)
+            self._limits, self._scene = np.zeros(len(system.bodies)), ""
+            return
+        damping = [part.body.material.per_tet(part.tets.stop - part.tets.start).damping for part in system.bodies]
+        self._times = np.array([max(after, float(np.max(tau))) for tau in damping])
+        self._times[self._restless()] = math.inf
+        edges = np.array([float(system.rest_lengths[part.edges].mean()) for part in system.bodies])
+        fall = 0.5 * math.hypot(*system.gravity) * (0.5 * self._times) ** 2
+        self._limits = accuracy * np.minimum(EDGES * edges, FALL * fall)
+        self._scene = _digest(system)
+
+    def begin(
+        self, x: NDArray[np.float64], v: NDArray[np.float64], time: float, dt: float, memory: SleepMemory | None
+    ) -> SleepMemory:
+        """Which bodies sleep when a frame begins, and since when the others have stayed.
+
+        Parameters
+        ----------
+        x, v : (n, 3) of the scene's vertices [m], [m/s]; time, dt : of the frame [s]; memory : of the frame before
+        """
+        poses = self._poses_at(time)
+        if memory is None or memory.scene != self._scene or not np.array_equal(memory.poses, poses):
+            none = np.full(len(self._starts), AWAKE, dtype=np.int64)
+            nothing = LoadedRows.none(), ShapeLoads.none()
+            return SleepMemory(none, np.full(len(none), time), x, *nothing, self._scene, poses)
+        if not np.array_equal(self._poses_at(time + dt), poses):
+            return self.woken(memory, memory.asleep)
+        changed = self._largest(np.maximum(np.abs(x - memory.places), np.abs(v))) > 0.0
+        return self.woken(memory, changed)
+
+    def woken(self, memory: SleepMemory, bodies: NDArray[np.bool_]) -> SleepMemory:
+        """`memory` without the islands of these bodies (b,)."""
+        islands = np.where(np.isin(memory.islands, memory.islands[bodies]), AWAKE, memory.islands)
+        return replace(memory, islands=islands)
+
+    @staticmethod
+    def disturbed(begun: SleepMemory, pairs: Iterable[tuple[int, int]]) -> NDArray[np.bool_]:
+        """(b,) the sleeping bodies that something awake has touched in the frame, of pairs of bodies and obstacles."""
+        asleep = begun.asleep
+        found = np.zeros(len(asleep), dtype=np.bool_)
+        for a, b in pairs:
+            if max(a, b) < len(asleep) and asleep[a] != asleep[b]:
+                found[a if asleep[a] else b] = True
+        return found
+
+    def end(
+        self,
+        x: NDArray[np.float64],
+        v: NDArray[np.float64],
+        time: float,
+        begun: SleepMemory,
+        forces: FrameForces,
+        sound: bool,
+    ) -> SleepMemory:
+        """End a frame; sets the velocities of bodies that fall asleep to zero.
+
+        Parameters
+        ----------
+        x, v : as of `begin`, at the end of the frame at `time`; begun : what `begin` returned
+        forces : of contact in the frame
+        sound : whether the frame is good enough to rest in
+        """
+        # The conversion to the components' origins and back rounds.
+        still = self._vertices(begun.asleep)
+        x[still] = begun.places[still]
+        moved = self._largest(np.abs(x - begun.places)) > self._limits
+        since = np.where(moved, time, begun.since)
+        ready = begun.asleep | ((time - since >= (1.0 - 1e-9) * self._times) & sound)
+        islands = self._islands(forces.pairs())
+        ready = ~np.isin(islands, islands[~ready])
+        fallen = ready & ~begun.asleep
+        rows = self._vertices(moved | fallen)
+        places = np.where(rows[:, None], x, begun.places)
+        v[self._vertices(fallen)] = 0.0
+        rest = forces.at_rest(ready)
+        return SleepMemory(np.where(ready, islands, AWAKE), since, places, *rest, self._scene, self._poses_at(time))
+
+    def vertices(self, bodies: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(n,) the vertices of bodies (b,), in the solver's numbering, which permutes vertices within a body only."""
+        return bodies[self._layout.body]
+
+    _vertices = vertices
+
+    def _islands(self, pairs: Iterable[tuple[int, int]]) -> NDArray[np.int64]:
+        """(b,) the lowest body of those that each is connected to, by contact or stitches."""
+        count = len(self._starts)
+        links = [(a, b) for a, b in pairs if max(a, b) < count]
+        first = {}
+        for body, component in np.unique(np.stack([self._layout.body, self._components]), axis=1).T:
+            links.append((first.setdefault(component, body), body))
+        a, b = np.array(links, dtype=np.int64).reshape(-1, 2).T
+        labels = connected_components(coo_array((np.ones(len(a)), (a, b)), shape=(count, count)), directed=False)[1]
+        return np.unique(labels, return_index=True)[1][labels].astype(np.int64)
+
+    def _restless(self) -> NDArray[np.bool_]:
+        """(b,) the bodies that something may pull at any time."""
+        system, held = self._system, np.zeros(len(self._system.masses), dtype=np.bool_)
+        for each in [*(pin for pin in system.pins if pin.motion is not None), *system.soft_targets]:
+            held[each.vertices] = True
+        for load in system.loads:
+            held[load.acts_on()] = True
+        return np.logical_or.reduceat(held, self._starts)
+
+    def _largest(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(b,) the largest of the values (n, 3) of each body; NaN where one is not a number."""
+        return np.maximum.reduceat(values.max(axis=1), self._starts)
+
+    def _poses_at(self, time: float) -> NDArray[np.float64]:
+        R, t = self._poses.at(time)
+        return np.concatenate([R.reshape(len(t), 9), t], axis=1)
+
+
+def _digest(system: System) -> str:
+    """A number of all values that the motion of a system depends on; functions of time count by their names."""
+    digest = hashlib.sha256()
+
+    def add(value: Any) -> None:
+        if isinstance(value, np.ndarray):
+            digest.update(f"{value.dtype} {value.shape}".encode())
+            digest.update(np.ascontiguousarray(value).tobytes())
+        elif is_dataclass(value):
+            add(type(value).__qualname__)
+            for each in fields(value):
+                if each.name != "start_states":
+                    add(getattr(value, each.name))
+        elif isinstance(value, (tuple, list)):
+            digest.update(f"{len(value)} of".encode())
+            for each in value:
+                add(each)
+        elif value is None or isinstance(value, (str, int, float, bool, np.generic)):
+            digest.update(f"{value!r};".encode())
+        elif isinstance(value, dict):
+            add([*value.items()])
+        else:
+            digest.update(getattr(value, "__qualname__", type(value).__qualname__).encode())
+
+    add(system)
+    return digest.hexdigest()

@@ -1,0 +1,55 @@
+"""A frame's arrays, and the beginning of a substep: prediction, pins, and the contact forces of the substep before."""
+
+from __future__ import annotations
+
+from itertools import accumulate
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.state import State
+from supple.system import System
+from supple.xpbd.damping.kelvin_voigt import cycle_lengths
+from supple.xpbd.integration import apply_changes, hold, origins_of_components, predict, to_world
+from supple.xpbd.workspace import XPBDWorkspace
+
+
+def load(ws: XPBDWorkspace, state: State) -> None:
+    """Copy a state into the arrays of the workspace."""
+    old = ws.layout.old_from_new
+    np.take(state.positions, old, axis=0, out=ws.world)
+    np.take(state.velocities, old, axis=0, out=ws.velocities)
+    origins_of_components(ws.world, ws.system.joined_components, ws.origins)
+    np.subtract(ws.world, ws.origins, out=ws.points[:, :3])
+    ws.anchors.place(ws.extended, ws.origins, state.time)
+
+
+def cycles(substeps: int) -> dict[int, int]:
+    """The first substep of each cycle of damping, and the cycle's length."""
+    lengths = cycle_lengths(substeps)
+    return dict(zip(accumulate(lengths, initial=0), lengths, strict=False))
+
+
+def begin_substep(ws: XPBDWorkspace, targets: NDArray[np.float64], end: float, h: float, parallel: bool) -> None:
+    """Predict positions, with pinned vertices at `targets` (k, 3)."""
+    predict[parallel](ws.points, ws.previous, ws.velocities, ws.system.gravity, h)
+    ws.begun[:] = ws.previous
+    if len(targets):
+        hold(ws.points, ws.system.pinned_vertices, targets, ws.origins)
+        ws.assessment.balance.note_pins(ws.points, ws.previous, parallel)
+    ws.anchors.place(ws.extended, ws.origins, end)
+
+
+def push_contacts(ws: XPBDWorkspace, h: float) -> None:
+    """Apply the contact forces of the substep before to the prediction."""
+    if to_world(ws.points, ws.origins, ws.world):
+        to_world(ws.previous, ws.origins, ws.world_previous)
+        if ws.collisions.begin_substep(ws.world, ws.world_previous, h):
+            apply_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
+
+
+def pin_targets(system: System, time: float, h: float, substeps: int) -> NDArray[np.float64]:
+    """(substeps, k, 3) positions of the pinned vertices at the end of each substep [m]."""
+    if all(pin.pin.motion is None for pin in system.pins):
+        return np.repeat(system.pin_targets(time)[None], substeps, axis=0)
+    return np.stack([system.pin_targets(time + (k + 1) * h) for k in range(substeps)])
