@@ -27,7 +27,7 @@ class XPBDDetails(SolverDetails):
         `supple.xpbd.assessment.softening`)
     energy_gained : energy that came from nowhere, and has not been lost since, over the energy of the scene [-]
     contact_forces, friction_forces : by name of the body or obstacle, (3,) means over the frame [N]; each sum to zero
-    asleep : names of the bodies that rest, for which no substep was taken (see `supple.xpbd.sleep`)
+    asleep : by body, whether it rests, so that no substep was taken for it (see `supple.xpbd.sleep`)
     held_back : substeps in which the motion of a body was shortened, so that no tet inverts and nothing passes
         through anything
     """
@@ -39,6 +39,6 @@ class XPBDDetails(SolverDetails):
     softening: Mapping[str, float] = field(default_factory=dict)
     energy_gained: float = 0.0
     held_back: int = 0
-    asleep: tuple[str, ...] = ()
+    asleep: Mapping[str, bool] = field(default_factory=dict)
     contact_forces: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     friction_forces: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)

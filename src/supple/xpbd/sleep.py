@@ -89,10 +89,10 @@ class Sleep:
             return
         damping = [part.body.material.per_tet(part.tets.stop - part.tets.start).damping for part in system.bodies]
         self._times = np.array([max(after, float(np.max(tau))) for tau in damping])
-        self._times[self._restless()] = math.inf
         edges = np.array([float(system.rest_lengths[part.edges].mean()) for part in system.bodies])
         fall = 0.5 * math.hypot(*system.gravity) * (0.5 * self._times) ** 2
         self._limits = accuracy * np.minimum(EDGES * edges, FALL * fall)
+        self._times[self._restless()] = math.inf
         self._scene = _digest(system)
 
     def begin(

@@ -256,7 +256,7 @@ class XPBD(Solver):
             softening=ws.assessment.softening.by_body(h),
             energy_gained=findings.gained,
             held_back=held_back,
-            asleep=tuple(part.name for part, rests in zip(ws.system.bodies, sleep.asleep, strict=True) if rests),
+            asleep={part.name: bool(rests) for part, rests in zip(ws.system.bodies, sleep.asleep, strict=True)},
             contact_forces=pushes,
             friction_forces=friction,
         )
@@ -345,6 +345,7 @@ class XPBD(Solver):
         pushes, friction = workspace.collisions.forces.by_name()
         return XPBDDetails(
             softening=dict.fromkeys((part.name for part in system.bodies), 0.0),
+            asleep=dict.fromkeys((part.name for part in system.bodies), False),
             contact_forces=pushes,
             friction_forces=friction,
         )

@@ -96,3 +96,21 @@ def any_beyond_radii(x, x_prev, x_gathered, far, near, pieces, all_share, drifts
         if not (absolute <= far[i, 2] ** 2 and relative <= near[i, 2] ** 2):
             return True
     return False
+
+
+@njit(cache=True)
+def left_ways(begin, end, points, distance):
+    """Whether some of the points (n, 3) is farther than a distance from its way, straight from begin to end (n, 3)."""
+    for i in range(len(points)):
+        along = length = 0.0
+        for j in range(3):
+            way = end[i, j] - begin[i, j]
+            along += (points[i, j] - begin[i, j]) * way
+            length += way * way
+        share = min(1.0, max(0.0, along / length)) if length > 0.0 else 0.0
+        square = 0.0
+        for j in range(3):
+            square += (points[i, j] - begin[i, j] - share * (end[i, j] - begin[i, j])) ** 2
+        if not square <= distance * distance:
+            return True
+    return False

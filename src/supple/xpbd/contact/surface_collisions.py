@@ -13,7 +13,7 @@ from supple.contact.search.excluded_pairs import excluded_pairs
 from supple.contact.search.pair_kernels import swept_boxes
 from supple.contact.search.point_inside import depths_inside
 from supple.contact.search.point_lists import PairFinder
-from supple.contact.search.reach import any_beyond_radii, mean_motions, search_radii
+from supple.contact.search.reach import any_beyond_radii, left_ways, mean_motions, search_radii
 from supple.contact.search.stitch_masks import stitched_points
 from supple.contact.search.surfaces import ContactSurfaces
 from supple.system import System
@@ -89,6 +89,8 @@ class SurfaceCollisions:
         self._finder = PairFinder(n)
         self._x, self._before, self._gathered = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
         self._way = np.zeros((n, 3))
+        # The ways of the points in the substep, when it was seen which pairs come near on them.
+        self._looked = np.full((n, 3), np.inf), np.full((n, 3), np.inf)
         self._shapes = (self._x, s.point_piece, s.triangles, s.triangle_piece)
         self._pieces = (s.point_piece, s.triangles, s.triangle_piece, s.closed, s.gaps, s.friction)
         self._predicted = np.zeros((n, 3))
@@ -208,7 +210,8 @@ class SurfaceCollisions:
     def passed(self, x: NDArray[np.float64], begun: NDArray[np.float64]) -> NDArray[np.int64]:
         """(k, 2) the pieces of which one has passed through the other from `begun` to x (n, 3) [m]."""
         self._take(x, begun)
-        self._look_near()
+        if any(left_ways(*self._looked, points, 0.5 * self._slack) for points in (self._before, self._x)):
+            self._look_near()
         shapes = (self._x, self._before)
         passed = np.zeros_like(self._apart)
         note_point_passages(*shapes, self._near_triangles, self._pieces, self._apart, self._stitched, passed)
@@ -237,6 +240,7 @@ class SurfaceCollisions:
 
     def _look_near(self) -> None:
         """Set which listed pairs come as near in this substep that contacts may still make them meet."""
+        self._looked[0][:], self._looked[1][:] = self._before, self._x
         np.subtract(self._x, self._before, out=self._way)
         swept_boxes(self._before, self._way, self.surfaces.triangles, self._swept)
         self._near_triangles = near_triangles(self._x, self._before, self._lists, self._swept, self._slack)
@@ -336,6 +340,7 @@ class SurfaceCollisions:
         self._complete[:] = self._gap + LEAST_REACH * self.edge_length + self._depth.max(axis=0)
         self._far[:, 0] += self._complete
         self._near[:, 0] += self._complete
+        self._looked[0][:] = np.inf
         self._finder.gather(self._shapes, (self._far, self._near), self._rules)
         self._gathered[:] = self._x
         self._runs.renew()
