@@ -3,9 +3,13 @@
 import os
 import signal
 import socket
+import stat
 import subprocess
 import sys
 import urllib.request
+from pathlib import Path
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
 
 import numpy as np
 import pytest
@@ -13,6 +17,7 @@ import pytest
 import supple as sp
 from supple.cli.app import main
 from supple.cli.exit_codes import ExitCode
+from supple.viewer.app import browser_at
 from supple.viewer.protocol.live_source import LiveSource
 
 SCENE = """
@@ -51,7 +56,8 @@ def test_a_scene_file_is_served_with_solver_time_step_and_initial_positions(scen
     assert isinstance(source, LiveSource)
     assert (source.title, source.dt, source.solver) == ("cube", 0.01, sp.XPBD(substeps=3))
     assert np.ptp(source.initial_positions["cube"], axis=0) == pytest.approx([1, 0.5, 1])
-    assert (address.host, address.token) == ("127.0.0.1", None)
+    assert address.host == "127.0.0.1"
+    assert len(address.token) >= 24
     assert address.port >= 8080
     assert not open_browser
 
@@ -71,6 +77,27 @@ def test_for_other_machines_the_address_contains_a_new_token(scene, served, host
     tokens = {address.token for _, address, _ in served}
     assert len(tokens) == 2
     assert all(token is not None and len(token) >= 24 for token in tokens)
+
+
+def test_a_token_may_be_left_out_on_this_machine_only(scene, served, capsys):
+    assert main(["view", str(scene), "--no-token"]) == ExitCode.OK
+    assert served[0][1].token is None
+    assert main(["view", str(scene), "--no-token", "--host", "0.0.0.0", "--port", "0"]) == ExitCode.INPUT
+    assert "needs its token; remove --no-token" in capsys.readouterr().err
+    assert len(served) == 1
+
+
+def test_a_browser_gets_the_address_from_a_file_of_this_user_alone(monkeypatch):
+    opened = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    with browser_at("http://localhost:1/?token=a&b"):
+        [address] = opened
+        assert "token" not in address
+        path = Path(url2pathname(urlsplit(address).path))
+        assert "url=http://localhost:1/?token=a&amp;b" in path.read_text()
+        if os.name == "posix":
+            assert stat.S_IMODE(path.parent.stat().st_mode) == 0o700
+    assert not path.exists()
 
 
 def test_a_recording_is_found_by_its_file_or_folder(tmp_path, served):

@@ -36,7 +36,7 @@ def engine(page):
 
 
 def dial(page):
-    url = f"ws://127.0.0.1:{page.server.get_port()}"
+    url = page.url.replace("http", "ws", 1)
     return connect(url, subprotocols=[f"viser-v{viser.__version__}"], max_size=None, open_timeout=TIMEOUT)
 
 

@@ -17,13 +17,14 @@ DEFAULT_PORT = 8080
 Host = Annotated[str, Parameter(name="--host")]
 Port = Annotated[int | None, Parameter(name="--port", converter=whole_number)]
 Open = Annotated[bool, Parameter(name="--open")]
+UseToken = Annotated[bool, Parameter(name="--token")]
 
 
-def serve_page(source: LiveSource | Path, host: str, port: int | None, open_browser: bool) -> None:
+def serve_page(source: LiveSource | Path, host: str, port: int | None, open_browser: bool, use_token: bool) -> None:
     """Serve a live scene, or the recording at a path, until Ctrl-C.
 
-    If other machines can reach the page, its address contains a secret. A given port must be free; without one, 8080 or
-    the next free port above it is used.
+    The address of the page contains a secret, unless only this machine can reach it and the user wants none. A given
+    port must be free; without one, 8080 or the next free port above it is used.
 
     Raises
     ------
@@ -37,5 +38,6 @@ def serve_page(source: LiveSource | Path, host: str, port: int | None, open_brow
         raise OutputError(f"--port is {port}; give a number from 1 to 65535, or 0 for any free one")
     require_free_port(host, port or 0)
     chosen = first_free_port(host, DEFAULT_PORT) if port is None else port
-    token = None if is_loopback(host) else new_token()
-    serve(source, Address(host, chosen, token), open_browser=open_browser)
+    if not use_token and not is_loopback(host):
+        raise OutputError(f"a page at {host} can be reached from other machines and needs its token; remove --no-token")
+    serve(source, Address(host, chosen, new_token() if use_token else None), open_browser=open_browser)

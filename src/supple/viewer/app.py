@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import html
 import socket
 import threading
 import webbrowser
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from supple.output.recording.reader import read_recording
@@ -18,7 +20,7 @@ from supple.viewer.engine.engine import Engine
 from supple.viewer.live_page import LivePage
 from supple.viewer.protocol.live_source import LiveSource
 from supple.viewer.replay import Replay
-from supple.viewer.server.gate import gate, require_free_port
+from supple.viewer.server.gate import gate, new_token, require_free_port
 from supple.viewer.server.input_check import guard_inputs
 from supple.viewer.server.uploads.transfers import refuse_transfers
 
@@ -30,12 +32,12 @@ class Address:
     Attributes
     ----------
     host, port : of the server; port 0 selects any free port
-    token : the address must contain it (`?token=...`); None where everyone who reaches the page may use it
+    token : the address must contain it (`?token=...`); None where every program of this machine may use the page
     """
 
     host: str = "127.0.0.1"
     port: int = 8080
-    token: str | None = None
+    token: str | None = field(default_factory=new_token)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,10 +93,25 @@ def serve(source: LiveSource | str | Path, address: Address | None = None, *, op
     """
     with opened_page(source, address) as page:
         print(f"{page.url}  (press Ctrl+C to end)", flush=True)
-        if open_browser:
-            webbrowser.open(page.url)
-        with suppress(KeyboardInterrupt):
+        with browser_at(page.url) if open_browser else nullcontext(), suppress(KeyboardInterrupt):
             threading.Event().wait()
+
+
+@contextmanager
+def browser_at(url: str) -> Iterator[None]:
+    """Open a browser at an address with a secret, which the list of processes must not show.
+
+    The browser gets the name of a file that only this user can read; it leads to the address.
+    """
+    with TemporaryDirectory(prefix="supple-") as folder:
+        path = Path(folder) / "open.html"
+        path.write_text(
+            f'<!doctype html><meta name="referrer" content="no-referrer"><title>Supple</title>'
+            f'<meta http-equiv="refresh" content="0; url={html.escape(url)}">',
+            encoding="utf-8",
+        )
+        webbrowser.open(path.as_uri())
+        yield
 
 
 def configure_page(server: Any) -> None:

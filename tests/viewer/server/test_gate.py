@@ -17,6 +17,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from supple.errors import OutputError
+from supple.output.viser_server import temporary_server
 from supple.viewer.protocol import limits
 from supple.viewer.server.gate import Allowance, first_free_port, gate, is_loopback, new_token, require_free_port
 from supple.viewer.server.message_check import Malformed, is_wanted
@@ -138,6 +139,16 @@ class TestOtherSites:
         with dial(local, Origin=f"http://127.0.0.1:{port}") as connection:
             assert connection.recv(timeout=TIMEOUT)
 
+    def test_no_other_page_may_show_this_one(self, local):
+        headers = fetch(local)[1]
+        assert headers["Content-Security-Policy"] == "frame-ancestors 'none'"
+        assert headers["X-Frame-Options"] == "DENY"
+
+    def test_an_address_with_other_letters_is_refused(self, local):
+        with socket.create_connection(("127.0.0.1", local.get_port()), timeout=TIMEOUT) as raw:
+            raw.sendall("GET /bär HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
+            assert raw.recv(100).split()[1] == b"403"
+
     def test_a_foreign_host_name_is_refused(self, local):
         with pytest.raises(urllib.error.HTTPError) as caught:
             fetch(local, "/", Host="rebound.example:8080")
@@ -240,6 +251,14 @@ class TestMalformed:
                 for _ in range(60):
                     bad.send(camera())
             assert ended(bad) == 1008
+
+    def test_a_browser_that_sends_nothing_is_disconnected(self, local, monkeypatch):
+        with dial(local) as polite:
+            polite.send(camera())
+            monkeypatch.setattr(limits, "FIRST_MESSAGE", 0.3)
+            with dial(local) as silent:
+                assert ended(silent) == 1008
+            polite.ping().wait(TIMEOUT)
 
     def test_the_number_of_pages_is_limited(self, local, monkeypatch):
         with dial(local) as first:
@@ -357,3 +376,12 @@ def test_a_token_bucket_refills_with_time():
     assert not allowance.take(5.05)
     assert allowance.take(5.2)
     assert [allowance.take(99.0) for _ in range(4)] == [True, True, True, False]
+
+
+def test_a_server_that_writes_a_page_refuses_every_request():
+    with temporary_server() as server:
+        with pytest.raises(urllib.error.HTTPError) as caught:
+            fetch(server)
+        assert caught.value.code == 403
+        with pytest.raises(InvalidStatus):
+            dial(server)

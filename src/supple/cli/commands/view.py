@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from supple.cli.live import Host, Open, Port
+from supple.cli.live import Host, Open, Port, UseToken
 
 SCENE_FILES = (".yaml", ".yml")
 RECORDINGS = (".vtkhdf", ".hdf", ".h5")
@@ -18,11 +18,12 @@ def view(
     host: Host = "127.0.0.1",
     port: Port = None,
     open_: Open = True,
+    token: UseToken = True,
 ) -> None:
     """Show a recording, or a scene that is simulated live and can be dragged and tuned, in a browser.
 
-    Runs until Ctrl-C. Without --host, only this machine can open the page. With it, the address of the page contains a
-    secret, and only browsers with that address are accepted. A scene's meshes must be in the folder of its file.
+    Runs until Ctrl-C. Without --host, only this machine can open the page. Its address contains a secret, and only
+    browsers with that address are accepted. A scene's meshes must be in the folder of its file.
 
     Parameters
     ----------
@@ -36,6 +37,8 @@ def view(
         Port to serve at; without it, 8080 or the next free one.
     open_
         Open the page in a browser.
+    token
+        Let in only browsers that have the page's secret; --no-token lets in all of this machine.
     """
     from supple.cli.live import serve_page
 
@@ -45,7 +48,7 @@ def view(
             from supple.errors import OutputError
 
             raise OutputError(f"{found} is a recording, which uses no solver; remove --solver")
-        serve_page(found, host, port, open_)
+        serve_page(found, host, port, open_, token)
         return
 
     from supple.scene_file.confined import ConfinedMeshStore
@@ -56,7 +59,7 @@ def view(
     run = load_run(found, ConfinedMeshStore)
     used = run.solver if solver is None else solver_of_kind(solver)
     live = LiveSource(found.stem, run.scene, used, run.dt, run.initial_positions)
-    serve_page(live, host, port, open_)
+    serve_page(live, host, port, open_, token)
 
 
 def find_source(path: Path) -> Path:

@@ -50,6 +50,8 @@ MOST_UPLOADS, UPLOAD_TIMEOUT = 4, 60.0
 # Connections of any kind, also without a token; and browsers with an open page.
 MOST_CONNECTIONS = 256
 MOST_CLIENTS = 32
+# In which time a browser sends its first message [s]; a page sends its camera as soon as it is drawn.
+FIRST_MESSAGE = 60.0
 
 # Contact points in a snapshot.
 MOST_CONTACT_POINTS = 2_000

@@ -1,7 +1,6 @@
 """Access control and message limits in front of the server of viser, on the same port.
 
-viser serves its page and its websocket with one call of `serve` of `websockets`. While the server starts, this module
-replaces that function, and adds limits and an access check. A viser that starts its server differently is refused.
+Limits and an access check are added to the call with which viser serves (`serving_with`).
 """
 
 from __future__ import annotations
@@ -15,7 +14,6 @@ import logging
 import os
 import secrets
 import socket
-import threading
 import time
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
@@ -24,13 +22,13 @@ from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 from supple.errors import OutputError
+from supple.output.viser_server import serving_with
 from supple.viewer.protocol import limits
 from supple.viewer.server.connection_limit import bounded_connections
 from supple.viewer.server.message_check import Malformed, is_wanted
 
 logger = logging.getLogger(__name__)
 
-_one_at_a_time = threading.Lock()
 # Status codes for closing a connection, RFC 6455 section 7.4.1.
 _POLICY, _TRY_LATER, _ERROR = 1008, 1013, 1011
 
@@ -94,6 +92,8 @@ class AccessCheck:
     def denial(self, path: str, headers: Any) -> str | None:
         """Why a request is refused, or None."""
         host = headers.get("Host", "")
+        if not path.isascii():
+            return "no address of this page has such letters"
         if self.token is None and not is_loopback(_hostname(host)):
             # A page of another site whose host name resolves to this machine (DNS rebinding).
             return "this page is served on this machine only: use http://localhost"
@@ -156,30 +156,22 @@ def gate(host: str, token: str | None = None) -> Iterator[None]:
     """
     if token is None and not is_loopback(host):
         raise OutputError(f"a page at {host} can be reached from other machines; it needs a token")
-    import websockets.asyncio.server as websockets_server
-
-    access, replaced = AccessCheck(token), False
+    access = AccessCheck(token)
     clients: set[Any] = set()
 
-    def serve(handler: Any, *arguments: Any, process_request: Any = None, **options: Any) -> Any:
-        nonlocal replaced
-        replaced = True
-        # A browser that floods the server does not answer a closing handshake: the server does not wait for it.
-        options |= {"max_size": limits.LARGEST_PICTURE, "max_queue": 16, "close_timeout": 1.0}
-        options["create_connection"] = bounded_connections(limits.MOST_CONNECTIONS)
-        asyncio.get_running_loop().set_exception_handler(_log_quietly)
-        answer = _guarded(process_request, access)
-        return original(_watched(handler, clients), *arguments, process_request=answer, **options)
+    def protected(serve: Callable[..., Any]) -> Callable[..., Any]:
+        def changed(handler: Any, *arguments: Any, process_request: Any = None, **options: Any) -> Any:
+            # A browser that floods the server does not answer a closing handshake: the server does not wait for it.
+            options |= {"max_size": limits.LARGEST_PICTURE, "max_queue": 16, "close_timeout": 1.0}
+            options["create_connection"] = bounded_connections(limits.MOST_CONNECTIONS)
+            asyncio.get_running_loop().set_exception_handler(_log_quietly)
+            answer = _guarded(process_request, access)
+            return serve(_watched(handler, clients), *arguments, process_request=answer, **options)
 
-    with _one_at_a_time:
-        original = websockets_server.serve
-        websockets_server.serve = serve  # pyright: ignore[reportAttributeAccessIssue]
-        try:
-            yield
-        finally:
-            websockets_server.serve = original
-    if not replaced:
-        raise OutputError("this version of viser cannot be protected; install viser 1.1")
+        return changed
+
+    with serving_with(protected):
+        yield
 
 
 def _guarded(process_request: Any, access: AccessCheck) -> Callable[[Any, Any], Any]:
@@ -197,6 +189,9 @@ def _guarded(process_request: Any, access: AccessCheck) -> Callable[[Any, Any], 
         if response is not None:
             response.headers["Referrer-Policy"] = "no-referrer"  # the address contains a secret
             response.headers["X-Content-Type-Options"] = "nosniff"
+            # A page of another site may not show this one within itself, where clicks would be led astray.
+            response.headers["Content-Security-Policy"] = "frame-ancestors 'none'"
+            response.headers["X-Frame-Options"] = "DENY"
         return response
 
     return answer
@@ -228,19 +223,27 @@ def _watched(handler: Callable[[Any], Awaitable[None]], clients: set[Any]) -> Ca
 def _checked(receive: Callable[[], Awaitable[Any]]) -> Callable[[], Awaitable[bytes]]:
     """Receives the next well-formed message of a kind that the page uses.
 
-    Raises `Malformed` where one is malformed, or messages come faster than any page sends them.
+    Raises `Malformed` where one is malformed, messages come faster than any page sends them, or the first one, which a
+    page sends when it is open, does not come.
     """
+    first_by = time.monotonic() + limits.FIRST_MESSAGE
+    greeted = False
     allowance = Allowance(limits.MESSAGES_PER_SECOND, limits.MESSAGES_AT_ONCE)
 
     async def checked() -> bytes:
+        nonlocal greeted
         while True:
-            raw = await receive()
+            try:
+                raw = await (receive() if greeted else asyncio.wait_for(receive(), first_by - time.monotonic()))
+            except TimeoutError:
+                raise Malformed("it sent nothing") from None
             if not allowance.take(time.monotonic()):
                 raise Malformed("more messages than a page sends")
             if len(raw) > limits.LARGEST_MESSAGE:
                 # Large messages are read slowly, without effect on other browsers.
                 await asyncio.sleep(len(raw) / limits.LARGE_MESSAGES_PER_SECOND)
             if is_wanted(raw):
+                greeted = True
                 return raw
 
     return checked
