@@ -82,7 +82,7 @@ class Sleep:
         self._system, self._layout = system, layout
         self._starts = [part.vertices.start for part in system.bodies]
         self._poses = ObstaclePoses(system.obstacles)
-        self._components = system.joined_components
+        self._links = _stitched_bodies(layout.body, system.joined_components)
         if after is None:
             self._times = np.full(len(system.bodies), math.inf)
             self._limits, self._scene = np.zeros(len(system.bodies)), ""
@@ -146,6 +146,9 @@ class Sleep:
         forces : of contact in the frame
         sound : whether the frame is good enough to rest in
         """
+        if begun.asleep.all():
+            x[:], v[:] = begun.places, 0.0
+            return begun
         # The conversion to the components' origins and back rounds.
         still = self._vertices(begun.asleep)
         x[still] = begun.places[still]
@@ -170,10 +173,7 @@ class Sleep:
     def _islands(self, pairs: Iterable[tuple[int, int]]) -> NDArray[np.int64]:
         """(b,) the lowest body of those that each is connected to, by contact or stitches."""
         count = len(self._starts)
-        links = [(a, b) for a, b in pairs if max(a, b) < count]
-        first = {}
-        for body, component in np.unique(np.stack([self._layout.body, self._components]), axis=1).T:
-            links.append((first.setdefault(component, body), body))
+        links = [*self._links, *((a, b) for a, b in pairs if max(a, b) < count)]
         a, b = np.array(links, dtype=np.int64).reshape(-1, 2).T
         labels = connected_components(coo_array((np.ones(len(a)), (a, b)), shape=(count, count)), directed=False)[1]
         return np.unique(labels, return_index=True)[1][labels].astype(np.int64)
@@ -194,6 +194,13 @@ class Sleep:
     def _poses_at(self, time: float) -> NDArray[np.float64]:
         R, t = self._poses.at(time)
         return np.concatenate([R.reshape(len(t), 9), t], axis=1)
+
+
+def _stitched_bodies(bodies: NDArray[np.int32], components: NDArray[np.int32]) -> list[tuple[int, int]]:
+    """Links between the bodies of each component; both are given for every vertex (n,)."""
+    first: dict[int, int] = {}
+    pairs = np.unique(np.stack([bodies, components], axis=1), axis=0).tolist()
+    return [(first.setdefault(component, body), body) for body, component in pairs]
 
 
 def _digest(system: System) -> str:

@@ -111,7 +111,8 @@ class Collisions:
         if self.obstacles:
             known = None if memory is None else memory.obstacles
             self.obstacles.begin_step(known, x, LEAST_REACH * self.edge_length, asleep[self._owners.of_vertices])
-            self._gather_obstacles(x, v, time)
+            if not asleep.all():
+                self._gather_obstacles(x, v, time)
 
     def begin_substep(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> bool:
         """Apply the forces kept of the substep before to the prediction, in place, before all other constraints.

@@ -147,8 +147,9 @@ class SurfaceCollisions:
         motions[:bodies] = v[self.surfaces.rows] * dt
         self._before[:] = self._x
         self._recall(memory, still[s.point_piece])
-        self._gather(motions, False)
-        self._excursions[:] = 0.0
+        if not still.all():
+            self._gather(motions, False)
+            self._excursions[:] = 0.0
 
     def begin_substep(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> bool:
         """See `Collisions.begin_substep`."""
