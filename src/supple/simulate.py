@@ -88,7 +88,7 @@ class Frame(FrameReadings):
     ----------
     index : number of steps since the start; time : [s]
     report : see `Report`; state : flat arrays of all bodies; system : what they belong to
-    solver : which made it; None where that is not known
+    find_contacts : finds the contacts of `contacts`; solver : which made it; each None where it is not known
     """
 
     index: int
@@ -100,6 +100,7 @@ class Frame(FrameReadings):
 
     @property
     def time(self) -> float:
+        """[s]"""
         return self.state.time
 
     @cached_property

@@ -34,6 +34,10 @@ _RESOLUTION = 2.0**-13  # to which vertices are rounded, as a share of the size 
 def write_page(recording: Recording | str | Path, output: str | Path) -> Path:
     """Write `output` (such as index.html), which plays the recording in a loop in any browser.
 
+    Parameters
+    ----------
+    recording : an open recording, or its path; output : the page, replaced where it exists.
+
     Raises
     ------
     OutputError : where the recording cannot be read, or the page cannot be written.

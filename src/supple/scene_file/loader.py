@@ -61,6 +61,10 @@ def load_scene(path: str | Path) -> Scene:
 
     Solver, timing and deformed starts in the file are checked too, but only `load_run` returns them.
 
+    Parameters
+    ----------
+    path : of the scene file.
+
     Raises
     ------
     SceneError : where the file cannot be read or is not a valid scene; one line that begins with `file:line:`.
@@ -76,6 +80,7 @@ def load_run(path: str | Path, meshes: Callable[[Path], MeshStore] = MeshStore) 
 
     Parameters
     ----------
+    path : of the scene file (YAML).
     meshes : makes the store of meshes from the file's folder; `ConfinedMeshStore` reads only files in this folder.
 
     Raises

@@ -68,8 +68,8 @@ def tetrahedralize(
         Number of tets, instead of `max_volume`: it is reached within 10 % by at most six meshings. Where the surface
         needs more, its coarsest mesh is returned, with a warning in the log.
     quality : float, optional
-        TetGen's upper bound on circumradius over shortest edge of each tet, above 1. A smaller bound gives more tets of
-        better shape. Tets at small angles of the surface may exceed it. None: no bound.
+        TetGen's upper bound on circumradius over shortest edge of each tet [-], above 1. A smaller bound gives more
+        tets of better shape. Tets at small angles of the surface may exceed it. None: no bound.
     min_dihedral : float [degrees], optional
         TetGen's target for the smallest dihedral angle, below 70. Much above 18, TetGen may not end.
     keep_surface : bool

@@ -335,6 +335,10 @@ def read_recording(path: str | Path) -> Recording:
 
     A frame is read when it is used. Frames that are written after the recording was opened are not in it.
 
+    Parameters
+    ----------
+    path : of the recording (.vtkhdf).
+
     Raises
     ------
     OutputError : where the file is missing, a folder, cut off, of another kind, of a newer version, or contradictory;
