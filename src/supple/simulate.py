@@ -14,6 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from supple.displayed import DisplayedReport, supplied
 from supple.errors import SceneError, SolverError
 from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.elastic_tets.stress import energy_densities
@@ -57,8 +58,8 @@ class Diagnostics:
     angular_momentum: NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Report(Diagnostics):
+@dataclass(frozen=True, eq=False, repr=False)
+class Report(DisplayedReport, Diagnostics):
     """How the step of one frame ended, and what was measured on its state.
 
     Attributes
@@ -80,7 +81,7 @@ class Report(Diagnostics):
         return getattr(self.details, "softening", {})
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Frame(FrameReadings):
     """The scene at one time. For stresses and forces, see `FrameReadings`.
 
@@ -188,6 +189,7 @@ def simulate(
     start: StartFrame | State | None = None,
     control: Control | None = None,
     sinks: Sequence[Sink] = (),
+    progress: bool = False,
 ) -> Frames:
     """Advance a scene and yield a frame after each step.
 
@@ -207,6 +209,7 @@ def simulate(
     control : called before each step with the latest frame; returns values of the scene's inputs that they shall have
         at the end of the step, by name, or None. Others stay as they are. `send` of the generator does the same.
     sinks : receive the start, every frame, and the end.
+    progress : whether to show a bar, in a terminal or a notebook; see `ProgressBar`.
 
     Raises
     ------
@@ -230,7 +233,8 @@ def simulate(
     solver.check(first.system, first.state, workspace)
     details = solver.initial_details(first.system, workspace)
     first = replace(first, report=replace(first.report, details=details))
-    return _steps(first, solver, float(dt), int(steps), workspace, control, sinks)
+    shown = [supplied("progress")()] if progress else []
+    return _steps(first, solver, float(dt), int(steps), workspace, control, [*sinks, *shown])
 
 
 def check_timing(caller: str, dt: object, steps: object) -> None:
