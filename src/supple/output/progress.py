@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
 _PERIOD = 0.2  # between two lines in a notebook [s]
+_STARTING = "starting (the first run of a solver compiles it)"
 _SMOOTHING = 0.2  # weight of the newest frame in the displayed milliseconds
 
 
@@ -40,7 +41,7 @@ class ProgressBar:
 
         if self._console is None:
             self._console = Console(stderr=True)
-        self._start, self._steps, self._status = time.perf_counter(), steps, "starting"
+        self._start, self._steps, self._status = time.perf_counter(), steps, _STARTING
         self._seconds.clear()
         if self._console.is_terminal:
             columns = (
