@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+import trimesh
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
@@ -140,6 +141,11 @@ READERS = {
         )
         for kind in SURFACE_WRITERS
     },
+    "surface .glb": Reader(
+        lambda folder: trimesh.Trimesh(CUBE.vertices, CUBE.triangles).export(folder / "s.glb"),
+        "s.glb",
+        sp.SurfaceMesh.load,
+    ),
     **{
         f"tets {kind}": Reader(lambda folder, kind=kind: BODY.save(folder / f"t{kind}"), f"t{kind}", sp.TetMesh.load)
         for kind in (".msh", ".vtu", ".vtk")

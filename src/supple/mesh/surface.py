@@ -59,7 +59,7 @@ class SurfaceMesh(Displayed):
 
     @classmethod
     def load(cls, path: str | Path) -> SurfaceMesh:
-        """Read a surface from an STL, OBJ, PLY, OFF, VTP, VTK or VTU file, selected by its extension.
+        """Read a surface from an STL, OBJ, PLY, OFF, GLB, VTP, VTK or VTU file, selected by its extension.
 
         Polygons are cut into triangles. Vertices closer than 2e-7 of the bounding box's diagonal (two units in the
         last place of the single precision that most files are written in) become one; triangles that collapse by

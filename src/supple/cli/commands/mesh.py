@@ -45,7 +45,7 @@ def mesh(
     Parameters
     ----------
     surface
-        STL, OBJ, PLY, OFF, VTP, VTK or VTU file.
+        STL, OBJ, PLY, OFF, GLB, VTP, VTK or VTU file.
     output
         One of TetGen's names (bear.1.node writes .node, .ele, .edge and .face), or a .msh, .vtu or .vtk file.
     scale

@@ -15,7 +15,7 @@ from supple.scene.rotation import rotation_matrix
 from supple.scene_file.entries.shapes import GummyBearShapeModel, ShapeModel, SurfaceShapeModel
 from supple.scene_file.model import FilePath, Model, Positive, Vector
 
-SURFACE_FILES = (".stl", ".obj", ".ply", ".off", ".vtp")
+SURFACE_FILES = (".stl", ".obj", ".ply", ".off", ".glb", ".vtp")
 TET_FILES = (".node", ".ele", ".edge", ".face", ".msh")
 MESHING_OPTIONS = (
     "tets",
