@@ -63,7 +63,7 @@ def mesh(
     keep_surface
         Add no vertices on the surface.
     mesher
-        "auto" uses TetGen for a clean surface, and fTetWild (an extra) for any other.
+        "auto" uses TetGen for a clean surface, and fTetWild (an extra) for any other, and where TetGen fails.
     repair
         Repair a surface that is not clean first, and list the changes. Where that fails, fTetWild meshes it as it is.
     envelope
