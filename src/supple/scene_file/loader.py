@@ -19,6 +19,7 @@ from supple.scene.located import LocatedError, at
 from supple.scene.scene import Scene
 from supple.scene_file.document import OutputModel, SceneFileModel
 from supple.scene_file.entries.mesh_sources import MeshStore
+from supple.scene_file.mesh_sets import with_numbers
 from supple.scene_file.validation_errors import scene_error
 from supple.scene_file.yaml_reader import Key, YamlDocument, read_yaml
 from supple.system import Solver
@@ -110,6 +111,7 @@ def validated(document: YamlDocument) -> SceneFileModel:
 
 
 def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
+    model = with_numbers(model, meshes)
     bodies: dict[str, PlacedBody] = {}
     starts: dict[str, NDArray[np.float64]] = {}
     for i, described in enumerate(model.bodies):

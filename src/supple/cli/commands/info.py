@@ -116,6 +116,7 @@ def _tet_rows(mesh: TetMesh) -> list[tuple[str, str]]:
 def _mesh(file: Path, suffix: str) -> None:
     from supple.errors import MeshError
     from supple.mesh.io.mesh_files import SURFACE_READERS, TET_EXTENSIONS
+    from supple.mesh.sets import SETS_EXTENSIONS, read_sets
     from supple.mesh.surface import SurfaceMesh
     from supple.mesh.tetmesh import TetMesh
 
@@ -135,7 +136,10 @@ def _mesh(file: Path, suffix: str) -> None:
                 mesh = SurfaceMesh.load(file)
             except MeshError:
                 raise error from None
-    print_table(_tet_rows(mesh) if isinstance(mesh, TetMesh) else _surface_rows(mesh), str(file))
+    rows = _tet_rows(mesh) if isinstance(mesh, TetMesh) else _surface_rows(mesh)
+    if isinstance(mesh, TetMesh) and suffix in SETS_EXTENSIONS:
+        rows += [(f"sets of {kind}", listed) for kind, listed in read_sets(file).listed().items()]
+    print_table(rows, str(file))
 
 
 def _scene(file: Path, timed: bool) -> None:
