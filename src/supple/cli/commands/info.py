@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
@@ -202,7 +202,8 @@ def _frame_time(run: Run) -> str:
     """Time of the fastest of the first frames after the one that may compile."""
     from supple.simulate import simulate
 
-    reports = [frame.report for frame in simulate(run.scene, run.solver, run.dt, 4, **run.start)]
+    start: dict[str, Any] = {**run.start}
+    reports = [frame.report for frame in simulate(run.scene, run.solver, run.dt, 4, **start)]
     seconds = min(report.wall_seconds for report in reports[1:] or reports)
     whole = seconds * run.steps
     return f"{1e3 * seconds:.3g} ms at the start; {run.steps} steps take about {whole:.3g} s if all are like these"
