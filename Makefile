@@ -14,7 +14,7 @@ endif
 # Bytecode is compiled now, so that no later start has to (it is 1.3 s of one).
 install = ($(BIN)/python -m uv pip install -q --compile-bytecode --python $(BIN)/python $(1) || $(BIN)/python -m pip install -q $(1))
 
-.PHONY: demo test test-all fuzz soak bench lint format lock clean
+.PHONY: demo test test-all fuzz soak bench lint format docs dist lock clean
 .DELETE_ON_ERROR:
 
 demo: .venv/.base
@@ -47,6 +47,16 @@ lint: .venv/.dev
 format: .venv/.dev
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+# The documentation site in build/site; a warning, such as a broken link, is an error.
+docs: .venv/.dev
+	NO_MKDOCS_2_WARNING=1 PATH=$(CURDIR)/$(BIN):$$PATH $(BIN)/python -m mkdocs build
+
+# The wheel and the sdist in dist/, checked: their contents, their page on an index, and a demo from the wheel alone.
+dist: .venv/.base
+	$(BIN)/python -m uv build -q --clear --out-dir dist
+	$(BIN)/python -m uv tool run "twine>=6.2,<8" check --strict dist/*
+	$(BIN)/python .ci/check_dist.py dist
 
 # Run after changing dependencies in pyproject.toml.
 lock: .venv/.dev

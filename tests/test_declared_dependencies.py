@@ -26,7 +26,7 @@ IMPORT_NAMES = {
     "usd-core": "pxr",
 }
 # Development tools that are run, or loaded by pytest; no test imports them.
-TOOLS = {"pyright", "pytest-benchmark", "pytest-xdist", "ruff"}
+TOOLS = {"ipykernel", "mkdocs-material", "mkdocstrings-python", "pyright", "pytest-benchmark", "pytest-xdist", "ruff"}
 OWN = {"supple", "tests", "benchmarks"}
 
 

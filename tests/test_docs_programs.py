@@ -1,23 +1,111 @@
-"""The Python blocks of documentation pages with complete programs run, in their order."""
+"""Every program of the documentation runs: the blocks of a page one after the other, in one empty folder.
 
+Python blocks share their names. A YAML block that begins with `# name.yaml` is written to that file. Shell blocks are
+lines of `supple`, which run in this process.
+"""
+
+import importlib.util
+import json
 import re
+import shlex
 from pathlib import Path
 
 import pytest
 
+import supple as sp
+from supple.cli.app import main
+from supple.demos.registry import DEMOS
+from supple.state import Status
+
 DOCS = Path(__file__).parents[1] / "docs"
+# Pages with blocks that another test runs, or that are parts of a program.
+ELSEWHERE = {
+    "tutorial.md": "tests/test_tutorial.py",
+    "studies.md": "tests/studies/test_docs.py",
+    "scene_files.md": "tests/scene_file/test_loader.py",
+    "check.md": "lines that need a recording; tests/output/check runs the same commands",
+    "runs.md": "lines that need a run; tests/cli/test_resume.py runs the same commands",
+    "stitches.md": "two lines of the program of howto/stitching.md",
+}
+PAGES = [str(path.relative_to(DOCS).as_posix()) for path in sorted(DOCS.rglob("*.md"))]
+BLOCK = re.compile(r"^```(python|yaml|sh)\n(.*?)^```", flags=re.S | re.M)
 
 
-@pytest.mark.parametrize(
-    "page",
-    ["contact.md", "forces_and_stresses.md", "implicit.md", "learning.md", "locking.md", "rigid_bodies.md"],
-)
+def blocks_of(page):
+    return BLOCK.findall((DOCS / page).read_text(encoding="utf-8"))
+
+
+WITH_PROGRAMS = [page for page in PAGES if blocks_of(page) and page not in ELSEWHERE]
+
+
+@pytest.mark.parametrize("page", WITH_PROGRAMS)
 def test_the_programs_of_a_page_run(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    blocks = re.findall(r"^```python\n(.*?)^```", (DOCS / page).read_text(encoding="utf-8"), flags=re.S | re.M)
-    assert blocks
     names: dict[str, object] = {}
-    for block in blocks:
-        exec(compile(block, page, "exec"), names)
-    frame = names["exact" if page == "contact.md" else "frame"]
-    assert frame.report.status == "converged"  # pyright: ignore[reportAttributeAccessIssue]
+    for kind, text in blocks_of(page):
+        if kind == "python":
+            exec(compile(text, page, "exec"), names)
+        elif kind == "yaml":
+            file = re.match(r"# (\w+\.yaml)\n", text)
+            if file:  # otherwise a part of a scene file
+                Path(file[1]).write_text(text, encoding="utf-8")
+        else:
+            for line in text.splitlines():
+                program, *arguments = shlex.split(line, comments=True)
+                assert program == "supple", f"{page}: {line!r} is not run; use lines of supple"
+                assert main(arguments) == 0, line
+    frame = names.get("exact" if page == "contact.md" else "frame")
+    if frame is not None:
+        assert frame.report.status == "converged"  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_pages_that_are_run_elsewhere_exist():
+    assert set(PAGES) >= ELSEWHERE.keys()
+
+
+def test_every_block_has_a_language_and_ends():
+    for page in PAGES:
+        fences = re.findall(r"^```(.*)$", (DOCS / page).read_text(encoding="utf-8"), flags=re.M)
+        assert len(fences) % 2 == 0, page
+        assert set(fences[::2]) <= {"python", "yaml", "sh", "text"}, page
+        assert set(fences[1::2]) <= {""}, page
+
+
+def test_the_page_on_reports_lists_every_status():
+    page = (DOCS / "howto" / "reading_the_report.md").read_text(encoding="utf-8")
+    listed = re.findall(r"^\| `(\w+)` \|", page, flags=re.M)[1:]  # after the heading
+    assert set(listed) == {str(status) for status in Status}
+
+
+def test_the_gallery_has_every_demo_as_it_is():
+    """`python docs/draw_gallery.py NAME` draws a demo again."""
+    known = json.loads((DOCS / "gallery.json").read_text(encoding="utf-8"))
+    assert list(known) == list(DEMOS)
+    for name, entry in known.items():
+        assert (DOCS / "images" / "gallery" / f"{name}.png").is_file()
+        assert (entry["summary"], entry["explanation"]) == (DEMOS[name].summary, DEMOS[name].explanation), name
+
+
+def test_the_site_has_every_public_name_once():
+    spec = importlib.util.spec_from_file_location("api", DOCS / "building" / "api.py")
+    api = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(api)
+    assert set(api.public_names()) == set(sp.__all__) - {"__version__"}
+    pages = api.api_pages().values()
+    for name in api.public_names():
+        assert sum(f"::: {api.path_of(name)}\n" in text for text in pages) == 1, name
+
+
+def test_links_between_files_of_the_repository_exist():
+    """As they are seen in the repository; the build of the site checks its own links, anchors included."""
+    root = DOCS.parent
+    pages = [*root.glob("*.md"), *DOCS.rglob("*.md")]
+    links = [
+        (page, link) for page in pages for link in re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8"))
+    ]
+    assert len(links) > 100
+    for page, link in links:
+        if re.match(r"[a-z]+:", link):
+            assert link.startswith("https://"), f"{page}: {link}"
+        elif not link.startswith("#"):
+            assert (page.parent / link.partition("#")[0]).exists(), f"{page}: {link}"

@@ -27,7 +27,7 @@ LAYERS = (
     ("loads",),
     ("scene",),
     ("mesh", "materials"),
-    ("numerics", "files", "state", "errors"),
+    ("numerics", "files", "state", "displayed", "errors"),
 )
 LEVEL = {part: -k for k, layer in enumerate(LAYERS) for part in layer}
 LOWEST = LAYERS[-1]

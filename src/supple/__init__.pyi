@@ -22,6 +22,8 @@ from .materials.stable_neo_hookean import StableNeoHookean as StableNeoHookean
 from .mesh import shapes as shapes
 from .mesh.meshing.repair import repair_surface as repair_surface
 from .mesh.meshing.tetrahedralize import tetrahedralize as tetrahedralize
+from .mesh.sets import MeshSets as MeshSets
+from .mesh.sets import read_sets as read_sets
 from .mesh.skin import Embedding as Embedding
 from .mesh.surface import SurfaceMesh as SurfaceMesh
 from .mesh.surface_checks import SurfaceReport as SurfaceReport

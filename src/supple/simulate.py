@@ -14,6 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from supple.displayed import DisplayedReport, supplied
 from supple.errors import SceneError, SolverError
 from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.elastic_tets.stress import energy_densities
@@ -57,8 +58,8 @@ class Diagnostics:
     angular_momentum: NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Report(Diagnostics):
+@dataclass(frozen=True, eq=False, repr=False)
+class Report(DisplayedReport, Diagnostics):
     """How the step of one frame ended, and what was measured on its state.
 
     Attributes
@@ -80,7 +81,7 @@ class Report(Diagnostics):
         return getattr(self.details, "softening", {})
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Frame(FrameReadings):
     """The scene at one time. For stresses and forces, see `FrameReadings`.
 
@@ -88,7 +89,7 @@ class Frame(FrameReadings):
     ----------
     index : number of steps since the start; time : [s]
     report : see `Report`; state : flat arrays of all bodies; system : what they belong to
-    solver : which made it; None where that is not known
+    find_contacts : finds the contacts of `contacts`; solver : which made it; each None where it is not known
     """
 
     index: int
@@ -100,6 +101,7 @@ class Frame(FrameReadings):
 
     @property
     def time(self) -> float:
+        """[s]"""
         return self.state.time
 
     @cached_property
@@ -187,6 +189,7 @@ def simulate(
     start: StartFrame | State | None = None,
     control: Control | None = None,
     sinks: Sequence[Sink] = (),
+    progress: bool = False,
 ) -> Frames:
     """Advance a scene and yield a frame after each step.
 
@@ -206,6 +209,7 @@ def simulate(
     control : called before each step with the latest frame; returns values of the scene's inputs that they shall have
         at the end of the step, by name, or None. Others stay as they are. `send` of the generator does the same.
     sinks : receive the start, every frame, and the end.
+    progress : whether to show a bar, in a terminal or a notebook; see `ProgressBar`.
 
     Raises
     ------
@@ -229,7 +233,8 @@ def simulate(
     solver.check(first.system, first.state, workspace)
     details = solver.initial_details(first.system, workspace)
     first = replace(first, report=replace(first.report, details=details))
-    return _steps(first, solver, float(dt), int(steps), workspace, control, sinks)
+    shown = [supplied("progress")()] if progress else []
+    return _steps(first, solver, float(dt), int(steps), workspace, control, [*sinks, *shown])
 
 
 def check_timing(caller: str, dt: object, steps: object) -> None:

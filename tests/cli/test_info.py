@@ -1,5 +1,7 @@
 """`supple info` on files of every kind."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -14,8 +16,8 @@ def rows_of(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
 
-    def rows(file):
-        assert main(["info", file]) == ExitCode.OK
+    def rows(file, *options):
+        assert main(["info", file, *options]) == ExitCode.OK
         lines = capsys.readouterr().out.splitlines()[1:]
         rows = {}
         for line in lines:
@@ -62,6 +64,21 @@ def test_a_scene(rows_of, tmp_path):
     assert rows["obstacles"] == "floor (HalfSpace)"
     assert rows["pins"] == "pin of body 'cube': 2 vertices"
     assert rows["time"] == "4 steps of 0.5 s: 2 s"
+    assert rows["memory"].startswith("about ")
+    assert rows["place of cube"] == "(-0.5, -0.5, -1) to (0.5, 0.5, 1) m"
+    assert rows["intersections"].startswith("body 'cube' overlaps obstacle 'floor' at the start")
+    assert "each frame" not in rows
+
+
+def test_a_scene_whose_frames_are_timed(rows_of, tmp_path):
+    (tmp_path / "s.yaml").write_text(
+        "bodies: [{name: cube, shape: {kind: box, divisions: [1, 1, 1]}, position: [0, 0.6, 0], "
+        "material: {kind: stable_neo_hookean, youngs: 1e4, poisson: 0.2}}]\nobstacles: [{kind: half_space}]\n"
+        "solver: {kind: xpbd, substeps: 2}\ndt: 0.01\nsteps: 40\n"
+    )
+    rows = rows_of("s.yaml", "--time")
+    assert rows["intersections"] == "none at the start"
+    assert re.fullmatch(r"[\d.e+-]+ ms at the start; 40 steps take about [\d.e+-]+ s .*", rows["each frame"])
 
 
 def test_a_recording(rows_of):

@@ -51,6 +51,7 @@ def test_writes_recording_page_and_plot_and_prints_their_paths(folder, capfd):
     for name in products:
         assert os.path.join("out", "first", name) in out
     assert "6 frames to t = 0.1 s (converged)" in out
+    assert out.startswith("scene      1 body, 48 tets, 6 frames of 0.0166667 s\nsolver     XPBD(substeps=5")
     assert "supple:" not in err
     with read_recording(folder / "out" / "first" / "recording.vtkhdf") as recording:
         assert len(recording) == 7

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+import trimesh
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
@@ -55,6 +56,34 @@ design: {kind: latin_hypercube, samples: 4, seed: 1}
 measures: {tip: {quantity: position, body: box, axis: y, over: max, vertices: [0]}}
 """
 RESULT = '{"status": "done", "measures": {"y": 1.5}, "frames": 3, "simulated": true}'
+SETS = (
+    "*NODE, NSET=all\n1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n*ELEMENT, TYPE=C3D4, ELSET=e\n9,1,2,3,4\n"
+    "*NSET, NSET=b\nall, 2\n*ELSET, ELSET=g, GENERATE\n1, 9, 2\n"
+)
+GROUPS = """\
+$MeshFormat
+4.1 0 8
+$EndMeshFormat
+$PhysicalNames
+1
+3 2 "bone"
+$EndPhysicalNames
+$Entities
+0 0 0 1
+5 0 0 0 1 1 1 1 2 0
+$EndEntities
+$Nodes
+1 4 1 4
+3 5 0 4
+1 2 3 4
+0 0 0 1 0 0 0 1 0 0 0 1
+$EndNodes
+$Elements
+1 1 1 1
+3 5 4 1
+1 1 2 3 4
+$EndElements
+"""
 CUBE = shapes.box_surface((1, 1, 1), (1, 1, 1))
 BODY = shapes.box((1.0, 0.1, 1 / 3), (3, 1, 2))
 
@@ -140,6 +169,13 @@ READERS = {
         )
         for kind in SURFACE_WRITERS
     },
+    "sets .inp": Reader(text_file("s.inp", SETS), "s.inp", sp.read_sets),
+    "sets .msh": Reader(text_file("s.msh", GROUPS), "s.msh", sp.read_sets),
+    "surface .glb": Reader(
+        lambda folder: trimesh.Trimesh(CUBE.vertices, CUBE.triangles).export(folder / "s.glb"),
+        "s.glb",
+        sp.SurfaceMesh.load,
+    ),
     **{
         f"tets {kind}": Reader(lambda folder, kind=kind: BODY.save(folder / f"t{kind}"), f"t{kind}", sp.TetMesh.load)
         for kind in (".msh", ".vtu", ".vtk")

@@ -30,7 +30,7 @@ def vtp(counts, points, connectivity, offsets):
 
 MALFORMED_SURFACES = {
     "no extension": ("bear", SQUARE, "no extension"),
-    "wrong extension": ("a.docx", SQUARE, "'.docx' is not one of .obj, .off"),
+    "wrong extension": ("a.docx", SQUARE, "'.docx' is not one of .glb, .obj, .off"),
     "tets' extension": ("a.msh", SQUARE, "TetMesh.load"),
     "empty stl": ("a.stl", "", "empty"),
     "blank obj": ("a.obj", " \n\n", "empty"),

@@ -263,11 +263,25 @@ def test_the_end_of_the_child_is_reported(tmp_path, monkeypatch, code: str, kind
     assert text in str(error.value)
 
 
+def test_auto_goes_on_with_ftetwild_where_tetgen_crashes(tmp_path, monkeypatch, caplog) -> None:
+    real = Path(mesher_worker.__file__).read_text(encoding="utf-8")
+    crash = 'import os, pathlib, sys\nif "tetgen" in pathlib.Path(sys.argv[1], "job.json").read_text(): os.abort()\n'
+    future = "from __future__ import annotations\n"
+    worker(monkeypatch, tmp_path, future + crash + real.replace(future, ""))
+    mesh, report = tetrahedralize_reported(SPHERE, max_volume=0.05)
+    assert report.mesher == "ftetwild"
+    assert mesh.volume == pytest.approx(SPHERE.volume, rel=0.05)
+    assert "tetgen crashed" in caplog.text
+    assert "meshing it with fTetWild" in caplog.text
+    with pytest.raises(MesherFailure, match="tetgen crashed"):
+        fill(SPHERE, keep_surface=True)
+
+
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_a_signal_is_named(tmp_path, monkeypatch) -> None:
     worker(monkeypatch, tmp_path, "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
     with pytest.raises(MesherFailure, match=r"crashed \(SIGSEGV\).*mesher=\"ftetwild\""):
-        fill(SPHERE)
+        fill(SPHERE, mesher="tetgen")
 
 
 def test_a_python_that_cannot_start_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:

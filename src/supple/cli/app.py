@@ -35,6 +35,7 @@ app = App(
 # Import paths: a command's module is imported when the command is used.
 COMMANDS = {
     "demo": "supple.cli.commands.demo:demo",
+    "new": "supple.cli.commands.new:new",
     "run": "supple.cli.commands.run:run",
     "resume": "supple.cli.commands.resume:resume",
     "sweep": "supple.cli.commands.sweep:sweep",

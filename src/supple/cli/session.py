@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Generator, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -69,6 +70,14 @@ class Products:
                     f"{path}: this is a folder, and a file of that name must be written; choose another --output"
                 )
 
+    def waiting(self) -> AbstractContextManager[object]:
+        """Shows in a terminal that the solver prepares the scene; the first run of a solver compiles it."""
+        if self.quiet:
+            return nullcontext()
+        from rich.console import Console
+
+        return Console(stderr=True).status("preparing (the first run of a solver compiles it)")
+
     def progress(self) -> list[ProgressBar]:
         """The sink that shows the progress; none where nothing is printed."""
         if self.quiet:
@@ -130,7 +139,9 @@ def run_session(
     )
     if products.fields and not products.quiet:
         _print_cost(scene, steps, products.fields)
-    frames = simulate(scene, solver, dt, steps, sinks=[folder, *sinks, *products.progress()], **(start or {}))
+    every = [folder, *sinks, *([] if products.quiet else [_Announcement()]), *products.progress()]
+    with products.waiting():
+        frames = simulate(scene, solver, dt, steps, sinks=every, **(start or {}))
     return _driven(frames, products, strict)
 
 
@@ -179,6 +190,25 @@ def _driven(frames: Generator[Frame], products: Products, strict: bool = False) 
     if not products.quiet:
         _print_summary(outcome, recording, products)
     return outcome
+
+
+class _Announcement:
+    """A sink that prints what is simulated, once the solver has accepted the start."""
+
+    def begin(self, first: Frame, dt: float, steps: int) -> None:
+        from rich.markup import escape
+
+        from supple.cli.console import shell_console
+
+        bodies, console = first.system.scene.bodies, shell_console()
+        tets = sum(len(body.mesh.tets) for body in bodies)
+        named = f"{len(bodies)} {'body' if len(bodies) == 1 else 'bodies'}"
+        console.print(f"scene      {named}, {tets:,} tets, {steps} frames of {dt:.6g} s")
+        console.print(f"solver     {escape(str(first.solver))}")
+
+    def write(self, frame: Frame) -> None: ...
+
+    def end(self) -> None: ...
 
 
 def _print_cost(scene: Scene, steps: int, names: Sequence[str]) -> None:

@@ -29,7 +29,12 @@ _MEASURED_EACH = 50
 
 @dataclass(frozen=True, eq=False)
 class BatchSnapshot:
-    """Where all copies of a batch were at one time; see `Batch.snapshot`."""
+    """Where all copies of a batch were at one time; see `Batch.snapshot`.
+
+    Attributes
+    ----------
+    moments : of each copy, in their order
+    """
 
     moments: tuple[Moment, ...]
 
@@ -45,7 +50,7 @@ class Batch:
     n : number of copies
     solver : of all copies
     dt : length of a step [s]
-    parameters : for a function: by name, n values, of which each copy gets its own
+    parameters : for a function: by name, n values in its units, of which each copy gets its own
     threads : number of threads that step copies; None: one, or one per core where that is measured to be faster. Each
         copy runs on one of them.
 

@@ -28,6 +28,10 @@ class Material(ABC):
     density : mass density at rest [kg/m^3], above zero.
     damping : Kelvin-Voigt time tau [s]: the stress at strain e and strain rate e' is that of strain e + tau e'.
         Acts on deformation only, never on rigid motion.
+
+    Raises
+    ------
+    SceneError : where a value is not finite or out of range.
     """
 
     density: float = 1000.0

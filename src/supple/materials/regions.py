@@ -20,7 +20,7 @@ class Regions(Elastic):
     Parameters
     ----------
     materials : the elastic materials, of the same kind or not.
-    index : (n_tets,) which of `materials` each tet of the mesh is made of, counted from 0.
+    index : (n_tets,) of each tet of the mesh, which of `materials` it is made of: indices from 0.
 
     Attributes
     ----------

@@ -32,7 +32,7 @@ class Embedding:
     ----------
     tets : (k,) the tet that each point is tied to
     corners : (k, 4) vertices of that tet
-    weights : (k, 4) barycentric coordinates; they sum to 1, and are all >= 0 for points inside
+    weights : (k, 4) barycentric coordinates [-]; they sum to 1, and are all >= 0 for points inside
     vertex_count : vertices of the mesh
     """
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from supple.displayed import Displayed, extent
 from supple.errors import MeshError
 from supple.mesh.checked_arrays import frozen, index_array, vertex_array
 from supple.mesh.io.mesh_files import read_surface, write_surface
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
     from supple.mesh.surface_checks import SurfaceReport
 
 
-@dataclass(frozen=True, eq=False)
-class SurfaceMesh:
+@dataclass(frozen=True, eq=False, repr=False)
+class SurfaceMesh(Displayed):
     """Triangles in space, counter-clockwise seen from outside.
 
     Wrong shapes of arrays, indices out of range and coordinates that are not finite are errors. Holes,
@@ -49,12 +50,16 @@ class SurfaceMesh:
         object.__setattr__(self, "triangles", index_array(triangles, 3, len(checked), "SurfaceMesh", "triangle"))
         object.__setattr__(self, "shares_vertices", bool(shares_vertices))
 
-    def __repr__(self) -> str:
-        return f"SurfaceMesh({len(self.vertices)} vertices, {len(self.triangles)} triangles)"
+    def _facts(self) -> dict[str, str]:
+        return {
+            "vertices": str(len(self.vertices)),
+            "triangles": str(len(self.triangles)),
+            "size": extent(self.vertices) if len(self.vertices) else "none",
+        }
 
     @classmethod
     def load(cls, path: str | Path) -> SurfaceMesh:
-        """Read a surface from an STL, OBJ, PLY, OFF, VTP, VTK or VTU file, selected by its extension.
+        """Read a surface from an STL, OBJ, PLY, OFF, GLB, VTP, VTK or VTU file, selected by its extension.
 
         Polygons are cut into triangles. Vertices closer than 2e-7 of the bounding box's diagonal (two units in the
         last place of the single precision that most files are written in) become one; triangles that collapse by

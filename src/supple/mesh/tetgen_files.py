@@ -15,6 +15,10 @@ def read_tetgen(path: str | Path) -> TetMesh:
     otherwise. Vertices that no tet uses (for example the middle nodes of ten-node tets) are dropped, and negative tets
     are turned.
 
+    Parameters
+    ----------
+    path : one of the files, such as bear.1.node, or the name of the family.
+
     Raises
     ------
     MeshError : `file:line: reason`, or the name of the file that is missing.
@@ -30,6 +34,7 @@ def write_tetgen(mesh: TetMesh, path: str | Path, base_index: int = 1) -> dict[s
 
     Parameters
     ----------
+    mesh : what is written
     path : the name of one of the four files, or of the family ("bear.1")
     base_index : 1 (TetGen's default) or 0
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from supple.displayed import Displayed, extent
 from supple.errors import MeshError
 from supple.mesh.checked_arrays import frozen, index_array, place, vertex_array
 from supple.mesh.io.mesh_files import read_tets, write_tets
@@ -34,8 +35,8 @@ logger = logging.getLogger(__name__)
 ROUND_OFF_UNITS = 64.0
 
 
-@dataclass(frozen=True, eq=False)
-class TetMesh:
+@dataclass(frozen=True, eq=False, repr=False)
+class TetMesh(Displayed):
     """Tetrahedra in space, each with det[x1-x0, x2-x0, x3-x0] > 0.
 
     Tets given with the other winding are turned by swapping their last two vertices; `turned` is their number.
@@ -75,8 +76,13 @@ class TetMesh:
         object.__setattr__(self, "turned", turned)
         _ = self.adjacency  # raises for facets that three or more tets share
 
-    def __repr__(self) -> str:
-        return f"TetMesh({len(self.vertices)} vertices, {len(self.tets)} tets)"
+    def _facts(self) -> dict[str, str]:
+        return {
+            "vertices": str(len(self.vertices)),
+            "tets": str(len(self.tets)),
+            "size": extent(self.vertices),
+            "volume": f"{self.volume:.4g} m^3",
+        }
 
     @classmethod
     def dropping_unused(cls, vertices: ArrayLike, tets: ArrayLike) -> TetMesh:

@@ -177,7 +177,7 @@ def rotation_variant_svd(
 
     Parameters
     ----------
-    F : (..., 3, 3) finite numbers, of any rank and sign of determinant.
+    F : (..., 3, 3) finite numbers [-], of any rank and sign of determinant.
 
     Returns
     -------

@@ -178,7 +178,7 @@ def opened(recording: Recording | str | Path) -> AbstractContextManager[Recordin
     return nullcontext(recording) if isinstance(recording, Recording) else read_recording(recording)
 
 
-def evenly(recording: Recording, most: int) -> list[RecordedFrame]:
+def evenly(recording: Sequence[RecordedFrame], most: int) -> list[RecordedFrame]:
     """At most `most` frames, evenly spaced, including the first and the last."""
     if len(recording) <= most:
         return list(recording)

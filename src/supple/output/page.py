@@ -6,6 +6,7 @@ The player is the client of viser (three.js), which is in the wheel of viser; th
 from __future__ import annotations
 
 import html
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from supple.output.drawing import (
     pictures,
     view_of,
 )
-from supple.output.recording.reader import Recording
+from supple.output.recording.reader import RecordedFrame, Recording
 from supple.output.viser_server import temporary_server
 
 # Bytes of moving vertices before compression, which at least halves them; pages of longer recordings have fewer frames.
@@ -31,8 +32,15 @@ _ANGLE = 35.0  # of the camera, upwards [degrees]
 _RESOLUTION = 2.0**-13  # to which vertices are rounded, as a share of the size of the scene: less than a pixel
 
 
-def write_page(recording: Recording | str | Path, output: str | Path) -> Path:
+def write_page(
+    recording: Recording | str | Path, output: str | Path, *, frames: Sequence[RecordedFrame] | None = None
+) -> Path:
     """Write `output` (such as index.html), which plays the recording in a loop in any browser.
+
+    Parameters
+    ----------
+    recording : an open recording, or its path; output : the page, replaced where it exists.
+    frames : of the recording, at least one, which the page plays; all without this.
 
     Raises
     ------
@@ -41,7 +49,7 @@ def write_page(recording: Recording | str | Path, output: str | Path) -> Path:
     output = Path(output)
     with opened(recording) as source, whole_file(output) as fresh:
         with temporary_server() as server:
-            page = _serialize(server, source)
+            page = _serialize(server, source, frames or source)
         fresh.write_text(titled(page, ", ".join(body.name for body in source.bodies)), encoding="utf-8")
     return output
 
@@ -51,22 +59,22 @@ def titled(page: str, title: str) -> str:
     return page.replace("<title>Viser</title>", f"<title>{html.escape(title[:80])} · Supple</title>", 1)
 
 
-def _serialize(server: Any, recording: Recording) -> str:
+def _serialize(server: Any, recording: Recording, played: Sequence[RecordedFrame]) -> str:
     drawn = pictures(recording)
     view = view_of(recording)
     _set_stage(server, view)
-    obstacles = _add_obstacles(server, recording, view)
+    first = played[0]
+    obstacles = _add_obstacles(server, recording, first, view)
     quantum = quantum_of(view)
-    first = recording[0]
     handles = [
         server.scene.add_mesh_simple(
             f"/bodies/{i} {picture.name}", _rounded(picture.at(first), quantum), picture.triangles, color=picture.color
         )
         for i, picture in enumerate(drawn)
     ]
-    stitches = _add_stitches(server, recording, quantum)
+    stitches = _add_stitches(server, recording, first, quantum)
     size = sum(12 * len(picture.at(first)) for picture in drawn) + 24 * len(recording.stitches)
-    frames = evenly(recording, max(2, _MOST_BYTES // max(1, size)))
+    frames = evenly(played, max(2, _MOST_BYTES // max(1, size)))
     serializer = server.get_scene_serializer()
     previous = first.time
     for frame in frames[1:]:
@@ -96,11 +104,13 @@ def _set_stage(server: Any, view: View) -> None:
     camera.near, camera.far = view.radius * 1e-2, view.radius * 1e3
 
 
-def _add_obstacles(server: Any, recording: Recording, view: View) -> dict[int, tuple[Any, NDArray[np.float64]]]:
+def _add_obstacles(
+    server: Any, recording: Recording, first: RecordedFrame, view: View
+) -> dict[int, tuple[Any, NDArray[np.float64]]]:
     """Draw the obstacles; returns their handles and poses by number."""
     handles = {}
     for obstacle in obstacle_pictures(recording.obstacles, view):
-        pose = recording[0].obstacle_poses[obstacle.number]
+        pose = first.obstacle_poses[obstacle.number]
         handle = server.scene.add_mesh_simple(
             f"/obstacles/{obstacle.number} {obstacle.name}",
             obstacle.vertices.astype(np.float32),
@@ -117,11 +127,10 @@ def _add_obstacles(server: Any, recording: Recording, view: View) -> dict[int, t
     return handles
 
 
-def _add_stitches(server: Any, recording: Recording, quantum: float) -> Any:
+def _add_stitches(server: Any, recording: Recording, first: RecordedFrame, quantum: float) -> Any:
     """Draw stitches as segments; returns their handle, or None where there are none."""
     if not len(recording.stitches):
         return None
-    first = recording[0]
     return server.scene.add_line_segments(
         "/stitches",
         _rounded(recording.stitches.segments(first.state.positions, first.obstacle_poses), quantum),

@@ -29,6 +29,10 @@ _AXES = (("x", "#d1495b"), ("y", "#3a7d44"), ("z", "#30638e"))
 def plot_recording(recording: Recording | str | Path, output: str | Path) -> Path:
     """Draw energies, momenta, volumes, the smallest J and the time of each step to a PNG (or PDF, SVG) file.
 
+    Parameters
+    ----------
+    recording : an open recording, or its path; output : the picture, replaced where it exists.
+
     Raises
     ------
     OutputError : where the recording cannot be read, or the picture cannot be written.

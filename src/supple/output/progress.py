@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from typing import TYPE_CHECKING
 
@@ -11,13 +12,16 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress
 
+_PERIOD = 0.2  # between two lines in a notebook [s]
+_STARTING = "starting (the first run of a solver compiles it)"
 _SMOOTHING = 0.2  # weight of the newest frame in the displayed milliseconds
 
 
 class ProgressBar:
     """Frames done, milliseconds of each, time left, and how the last step ended.
 
-    Where the output is not a terminal (a file, a pipe, CI), there is one line at the end instead of a bar.
+    In a notebook it is a line that changes. Where the output is neither a terminal nor a notebook (a file, a pipe, CI),
+    there is one line at the end.
 
     Parameters
     ----------
@@ -29,7 +33,7 @@ class ProgressBar:
         self._bar: Progress | None = None
         self._start, self._steps, self._status = 0.0, 0, ""
         self._seconds: list[float] = []  # of each step, in the solver
-        self._displayed_ms = 0.0
+        self._displayed_ms = self._next_line = 0.0
 
     def begin(self, first: Frame, dt: float, steps: int) -> None:
         from rich.console import Console
@@ -37,7 +41,7 @@ class ProgressBar:
 
         if self._console is None:
             self._console = Console(stderr=True)
-        self._start, self._steps, self._status = time.perf_counter(), steps, "starting"
+        self._start, self._steps, self._status = time.perf_counter(), steps, _STARTING
         self._seconds.clear()
         if self._console.is_terminal:
             columns = (
@@ -61,14 +65,25 @@ class ProgressBar:
             self._bar.update(
                 self._task, completed=len(self._seconds), ms=f"{self._displayed_ms:.1f}", status=self._status
             )
+        elif self._console is not None and self._console.is_jupyter and time.perf_counter() > self._next_line:
+            self._next_line = time.perf_counter() + _PERIOD
+            frames = f"{len(self._seconds)} of {self._steps} frames"
+            # A carriage return replaces the line: a bar of rich needs ipywidgets there.
+            sys.stdout.write(f"\r{frames}, {self._displayed_ms:.1f} ms each; {self._status}{' ' * 12}")
+            sys.stdout.flush()
 
     def end(self) -> None:
+        if self._console is not None and self._console.is_jupyter:
+            sys.stdout.write(f"\r{self._summary()}{' ' * 12}\n")
+            return
         if self._bar is not None:
             self._bar.stop()
             self._bar = None
         elif self._console is not None:
-            frames = len(self._seconds)
-            each = f", {1e3 * sum(self._seconds) / frames:.1f} ms each in the solver" if frames else ""
-            seconds = time.perf_counter() - self._start
-            done = f"{frames} of {self._steps} frames in {seconds:.1f} s{each}; {self._status}"
-            self._console.print(done, soft_wrap=True, highlight=False, markup=False)
+            self._console.print(self._summary(), soft_wrap=True, highlight=False, markup=False)
+
+    def _summary(self) -> str:
+        frames = len(self._seconds)
+        each = f", {1e3 * sum(self._seconds) / frames:.1f} ms each in the solver" if frames else ""
+        seconds = time.perf_counter() - self._start
+        return f"{frames} of {self._steps} frames in {seconds:.1f} s{each}; {self._status}"

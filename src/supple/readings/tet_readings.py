@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.displayed import DisplayedFrame
 from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.elastic_tets.stress import cauchy_stresses, energy_densities, first_piolas, von_mises
 from supple.numerics.deformation import deformation_gradients, determinants
@@ -20,7 +21,7 @@ _NO_LAW = "has no known elastic law, so it has no {}; give it an elastic materia
 _RIGID = "has rigid edges or volumes, whose forces do not follow from positions; give both a compliance above 0"
 
 
-class TetReadings(ABC):
+class TetReadings(DisplayedFrame, ABC):
     """Fields on tets, by body name: `frame.stress["bear"]` is (m, 3, 3), `frame.stress.at_vertices["bear"]` (n, 3, 3).
 
     Stresses are those of the elastic forces, without the viscous ones of `damping`. A value is not finite where a tet

@@ -79,6 +79,10 @@ class SoftTarget(OnVertices):
     stiffness : of each vertex's spring [N/m].
     motion : None, `Keyframes`, or t -> displacement [m], (3,) for all or (k, 3) for each vertex.
     name : appears in messages.
+
+    Raises
+    ------
+    SceneError : where a value is of the wrong kind, not finite or out of range; the text names the body.
     """
 
     kind: ClassVar[str] = "soft target"

@@ -35,7 +35,7 @@ class Input(ABC):
     Parameters
     ----------
     name : by which `simulate` and `Batch` set it; no two inputs of a scene have the same
-    value : at the start; (3,), or (k, 3) with a row for each vertex
+    value : at the start, in the unit of the kind; (3,), or (k, 3) with a row for each vertex
 
     Attributes
     ----------

@@ -22,6 +22,10 @@ class Pin(OnVertices):
     vertices : indices into the body's mesh, or an `InBox`; None for a rigid body.
     motion : None, `Keyframes`, or t -> displacement [m], (3,) for all or (k, 3) for each vertex of a soft body.
     name : appears in messages and in the reaction forces of a report.
+
+    Raises
+    ------
+    SceneError : where a value is of the wrong kind, not finite or out of range; the text names the body.
     """
 
     kind: ClassVar[str] = "pin"

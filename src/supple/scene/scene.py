@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from supple.displayed import Showable, short_list
 from supple.errors import SceneError
 from supple.scene.body import PlacedBody
 from supple.scene.contact_pairs import ContactPair, pair_table
@@ -42,8 +43,8 @@ _PARTS = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class Scene:
+@dataclass(frozen=True, eq=False, repr=False)
+class Scene(Showable):
     """Bodies, obstacles, pins, forces, soft targets and stitches under gravity.
 
     Parameters
@@ -114,6 +115,13 @@ class Scene:
             pair_table(self)
         self.inputs  # noqa: B018 - raises where two have the same name
         check_names(self.stitches, list(pinned), [str(obstacle.name) for obstacle in self.obstacles])
+
+    def _facts(self) -> dict[str, str]:
+        facts = {"bodies": short_list(body.name for body in self.bodies)}
+        facts["tets"] = str(sum(len(body.mesh.tets) for body in self.bodies))
+        facts["obstacles"] = short_list(obstacle.name for obstacle in self.obstacles)
+        facts |= {key: str(len(getattr(self, key))) for key, _ in _PARTS[2:]}
+        return {name: value for name, value in facts.items() if value not in ("", "0")}
 
     def _check_selection(self, item: Pin | Force | SoftTarget, pinned: dict[str, NDArray[np.bool_]]) -> None:
         """Raise where body or vertices do not exist, or a pin selects vertices that are `pinned`, then mark these."""

@@ -19,6 +19,10 @@ class InBox:
     Parameters
     ----------
     low, high : (3,) opposite corners [m]; the faces belong to the box.
+
+    Raises
+    ------
+    SceneError : where a corner is not finite, or `low` is above `high`.
     """
 
     low: ArrayLike

@@ -19,6 +19,7 @@ from supple.scene.located import LocatedError, at
 from supple.scene.scene import Scene
 from supple.scene_file.document import OutputModel, SceneFileModel
 from supple.scene_file.entries.mesh_sources import MeshStore
+from supple.scene_file.mesh_sets import with_numbers
 from supple.scene_file.validation_errors import scene_error
 from supple.scene_file.yaml_reader import Key, YamlDocument, read_yaml
 from supple.system import Solver
@@ -61,6 +62,10 @@ def load_scene(path: str | Path) -> Scene:
 
     Solver, timing and deformed starts in the file are checked too, but only `load_run` returns them.
 
+    Parameters
+    ----------
+    path : of the scene file.
+
     Raises
     ------
     SceneError : where the file cannot be read or is not a valid scene; one line that begins with `file:line:`.
@@ -76,6 +81,7 @@ def load_run(path: str | Path, meshes: Callable[[Path], MeshStore] = MeshStore) 
 
     Parameters
     ----------
+    path : of the scene file (YAML).
     meshes : makes the store of meshes from the file's folder; `ConfinedMeshStore` reads only files in this folder.
 
     Raises
@@ -105,6 +111,7 @@ def validated(document: YamlDocument) -> SceneFileModel:
 
 
 def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
+    model = with_numbers(model, meshes)
     bodies: dict[str, PlacedBody] = {}
     starts: dict[str, NDArray[np.float64]] = {}
     for i, described in enumerate(model.bodies):

@@ -25,8 +25,8 @@ class Model(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
-    alternatives: ClassVar[tuple[str, str, str] | None] = None
-    """Two keys of which exactly one must be given, and the message otherwise."""
+    alternatives: ClassVar[tuple[str, ...] | None] = None
+    """Keys of which exactly one must be given, and last the message otherwise."""
 
     @model_validator(mode="before")
     @classmethod
@@ -42,7 +42,7 @@ class Model(BaseModel):
     @model_validator(mode="after")
     def _one_of_the_alternatives(self) -> Self:
         if self.alternatives is not None:
-            first, second, message = self.alternatives
-            if (getattr(self, first) is None) == (getattr(self, second) is None):
+            *keys, message = self.alternatives
+            if sum(getattr(self, key) is not None for key in keys) != 1:
                 raise ValueError(message)
         return self

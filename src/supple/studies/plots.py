@@ -24,6 +24,10 @@ def plot_study(table: StudyTable, folder: str | Path) -> list[Path]:
 
     One factor: a curve. Two: a map, and a tornado plot. More: a tornado plot, and the points over each factor.
 
+    Parameters
+    ----------
+    table : of a study; folder : of the pictures, made where it does not exist.
+
     Raises
     ------
     OutputError : where a file cannot be written.

@@ -178,6 +178,10 @@ def study_schema() -> dict[str, Any]:
 def load_study(path: str | Path) -> Study:
     """Read a study file (YAML), and the scene file that it names.
 
+    Parameters
+    ----------
+    path : of the study file.
+
     Raises
     ------
     SceneError, StudyError : where one of them cannot be read, or is not valid; one line that begins with the file.

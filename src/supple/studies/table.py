@@ -28,6 +28,7 @@ class StudyTable:
     factors : names of the factors; measures : names of the measures, which failed cases do not have
     units : of both, where they are known
     keys : (cases,) names of the cases' folders
+    values : (cases,) of the factors, by name; results : (cases,) what each case gave
     reasons : (cases,) why a case failed; empty where it did not
     """
 

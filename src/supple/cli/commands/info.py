@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
 
 from supple.cli.console import print_table
 
@@ -15,6 +17,9 @@ if TYPE_CHECKING:
     from supple.scene.body import PlacedBody
     from supple.scene.rigid.rigid_body import RigidBody
     from supple.scene.stitches.stitching import Stitching
+    from supple.scene_file.loader import Run
+    from supple.state import State
+    from supple.system import System
 
 SCENE_FILES = (".yaml", ".yml")
 RECORDINGS = (".vtkhdf", ".hdf", ".h5")
@@ -22,13 +27,15 @@ PACKAGES = ("numpy", "scipy", "numba", "h5py", "tetgen", "viser", "pydantic", "a
 EXTRAS = ("pytetwild", "pymeshfix", "usd-core", "pyvista")
 
 
-def info(file: Path | None = None, /) -> None:
+def info(file: Path | None = None, /, *, time: Annotated[bool, Parameter(negative="")] = False) -> None:
     """Print what a file contains: counts, sizes, quality, problems. Without a file: versions, platform and threads.
 
     Parameters
     ----------
     file
         A scene (.yaml), a surface, a tet mesh, a recording (.vtkhdf) or a run folder.
+    time
+        Of a scene: simulate its first frames, and print how long one takes. The first run of a solver compiles it.
     """
     if file is None:
         print_table(_platform(), "Supple")
@@ -40,7 +47,7 @@ def info(file: Path | None = None, /) -> None:
         return
     suffix = file.suffix.lower()
     if suffix in SCENE_FILES:
-        _scene(file)
+        _scene(file, time)
     elif suffix in RECORDINGS:
         _recording(file)
     else:
@@ -109,6 +116,7 @@ def _tet_rows(mesh: TetMesh) -> list[tuple[str, str]]:
 def _mesh(file: Path, suffix: str) -> None:
     from supple.errors import MeshError
     from supple.mesh.io.mesh_files import SURFACE_READERS, TET_EXTENSIONS
+    from supple.mesh.sets import SETS_EXTENSIONS, read_sets
     from supple.mesh.surface import SurfaceMesh
     from supple.mesh.tetmesh import TetMesh
 
@@ -128,16 +136,21 @@ def _mesh(file: Path, suffix: str) -> None:
                 mesh = SurfaceMesh.load(file)
             except MeshError:
                 raise error from None
-    print_table(_tet_rows(mesh) if isinstance(mesh, TetMesh) else _surface_rows(mesh), str(file))
+    rows = _tet_rows(mesh) if isinstance(mesh, TetMesh) else _surface_rows(mesh)
+    if isinstance(mesh, TetMesh) and suffix in SETS_EXTENSIONS:
+        rows += [(f"sets of {kind}", listed) for kind, listed in read_sets(file).listed().items()]
+    print_table(rows, str(file))
 
 
-def _scene(file: Path) -> None:
+def _scene(file: Path, timed: bool) -> None:
     from supple.scene.rigid.rigid_body import RigidBody
     from supple.scene_file.loader import load_run
-    from supple.system import build_system
+    from supple.system import build_system, initial_state
 
     run = load_run(file)
-    scene, system = run.scene, build_system(run.scene)
+    start = initial_state(run.scene, **{key.removeprefix("initial_"): value for key, value in run.start.items()})
+    scene, system = run.scene, build_system(run.scene, start)
+    points = system.split(start.positions)
     rows = [
         ("kind", "scene"),
         ("bodies", str(len(scene.bodies))),
@@ -147,9 +160,14 @@ def _scene(file: Path) -> None:
         ("pins", ", ".join(f"{p.pin.label}: {len(p.vertices)} vertices" for p in system.pins) or "none"),
         ("solver", str(run.solver)),
         ("time", f"{run.steps} steps of {run.dt:.6g} s: {run.steps * run.dt:.6g} s"),
+        ("memory", f"about {run.solver.bytes_needed(scene) / 1e6:.3g} MB beyond that of the program"),
+        ("intersections", _start_problem(system, start)),
     ]
+    if timed:
+        rows.append(("each frame", _frame_time(run)))
     for part in system.bodies:
         mass = system.masses[part.vertices].sum()
+        rows.append((f"place of {part.name}", _place(points[part.name])))
         if isinstance(part.body, RigidBody):
             rows.append((f"body {part.name}", _rigid_text(part.body)))
             continue
@@ -159,6 +177,36 @@ def _scene(file: Path) -> None:
         rows += _locking_rows(part.body)
     rows += _stitch_rows(system.stitching)
     print_table(rows, str(file))
+
+
+def _place(x: np.ndarray) -> str:
+    """The bounding box of points (n, 3) [m]."""
+    low, high = (", ".join(f"{value:.4g}" for value in corner) for corner in (x.min(axis=0), x.max(axis=0)))
+    return f"({low}) to ({high}) m"
+
+
+def _start_problem(system: System, start: State) -> str:
+    """Which surfaces are not apart at the start; the solver's own check may allow what it is told of here."""
+    from supple.contact.start.start_error import raise_if_intersecting
+    from supple.errors import SceneError
+    from supple.scene.contact_pairs import pair_table
+
+    try:
+        raise_if_intersecting(system, start.positions, start.time, pair_table(system.scene))
+    except SceneError as problem:
+        return str(problem)
+    return "none at the start"
+
+
+def _frame_time(run: Run) -> str:
+    """Time of the fastest of the first frames after the one that may compile."""
+    from supple.simulate import simulate
+
+    start: dict[str, Any] = {**run.start}
+    reports = [frame.report for frame in simulate(run.scene, run.solver, run.dt, 4, **start)]
+    seconds = min(report.wall_seconds for report in reports[1:] or reports)
+    whole = seconds * run.steps
+    return f"{1e3 * seconds:.3g} ms at the start; {run.steps} steps take about {whole:.3g} s if all are like these"
 
 
 def _rigid_text(body: RigidBody) -> str:

@@ -45,7 +45,7 @@ def mesh(
     Parameters
     ----------
     surface
-        STL, OBJ, PLY, OFF, VTP, VTK or VTU file.
+        STL, OBJ, PLY, OFF, GLB, VTP, VTK or VTU file.
     output
         One of TetGen's names (bear.1.node writes .node, .ele, .edge and .face), or a .msh, .vtu or .vtk file.
     scale
@@ -63,7 +63,7 @@ def mesh(
     keep_surface
         Add no vertices on the surface.
     mesher
-        "auto" uses TetGen for a clean surface, and fTetWild (an extra) for any other.
+        "auto" uses TetGen for a clean surface, and fTetWild (an extra) for any other, and where TetGen fails.
     repair
         Repair a surface that is not clean first, and list the changes. Where that fails, fTetWild meshes it as it is.
     envelope

@@ -15,6 +15,7 @@ from supple.mesh.checked_arrays import vertex_array
 from supple.mesh.io import msh, obj, off, ply, stl, vtk_legacy, vtk_xml
 from supple.mesh.io.cells import CellSoup, FormatError, tets_of
 from supple.mesh.io.file_contents import file_contents
+from supple.mesh.io.models import glb
 from supple.mesh.io.polygons import triangles_of
 from supple.mesh.io.tetgen_family import SUFFIXES, family_paths, is_tetgen_path, read_tetgen_family
 from supple.mesh.merge import merge_map
@@ -27,6 +28,7 @@ SURFACE_READERS: dict[str, Callable[[bytes], CellSoup]] = {
     ".obj": obj.read,
     ".ply": ply.read,
     ".off": off.read,
+    ".glb": glb.read,
     ".vtp": vtk_xml.read,
     ".vtu": vtk_xml.read,
     ".vtk": vtk_legacy.read,

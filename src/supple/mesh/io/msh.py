@@ -26,17 +26,17 @@ ELEMENTS = {
 }  # fmt: skip
 
 
-class _Form(NamedTuple):
+class Form(NamedTuple):
     version: str
     is_text: bool
     size_bytes: int
     order: str
 
 
-class _Section:
+class Section:
     """The numbers between $Name and $EndName, read one group after another."""
 
-    def __init__(self, data: bytes, name: str, form: _Form) -> None:
+    def __init__(self, data: bytes, name: str, form: Form) -> None:
         self.name, self.form, self.data = name, form, data
         found = re.search(rb"^\$" + name.encode() + rb"[ \t]*\r?\n", data, re.MULTILINE)
         if found is None:
@@ -125,24 +125,22 @@ class _Section:
             if at + 3 > len(values):
                 raise self._short(count)
             kind, tags = int(values[at + 1]), int(values[at + 2])
-            nodes = _nodes_of(kind)
+            nodes = nodes_of_kind(kind)
             start = at + 3 + tags
             at = start + nodes
             if tags < 0 or at > len(values):
                 raise self._short(count)
             rows.append((kind, start))
         starts = {k: np.array([s for kind, s in rows if kind == k]) for k in sorted({kind for kind, _ in rows})}
-        return [(k, values[s[:, None] + np.arange(_nodes_of(k))]) for k, s in starts.items()]
+        return [(k, values[s[:, None] + np.arange(nodes_of_kind(k))]) for k, s in starts.items()]
 
 
 def read(data: bytes) -> CellSoup:
     """Points and cells of a .msh file; physical groups and data are ignored."""
     data = without_mark(data)
-    form = _form(data)
-    first = _Section(data, "Nodes", form)
-    is_2 = form.version == "2"
-    tags, points = first.tagged(first.first_count(), 3) if is_2 else _nodes_4(first)
-    blocks = (_elements_2 if is_2 else _elements_4)(_Section(data, "Elements", form))
+    form = file_form(data)
+    tags, points = _nodes(data, form)
+    blocks = (_elements_2 if form.version == "2" else _elements_4)(Section(data, "Elements", form))
     if len(tags) == 0:
         raise FormatError("it has no nodes")
     order = np.argsort(tags, kind="stable")
@@ -163,7 +161,18 @@ def read(data: bytes) -> CellSoup:
     return CellSoup.of_blocks(points, cells)
 
 
-def _form(data: bytes) -> _Form:
+def _nodes(data: bytes, form: Form) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Tags (n,) and coordinates (n, 3) of the nodes, in the order of the file."""
+    first = Section(data, "Nodes", form)
+    return first.tagged(first.first_count(), 3) if form.version == "2" else _nodes_4(first)
+
+
+def node_tags(data: bytes, form: Form) -> NDArray[np.int64]:
+    """(n,) in the order of the file."""
+    return _nodes(data, form)[0]
+
+
+def file_form(data: bytes) -> Form:
     head = re.match(
         rb"\s*(?:\$Comments.*?\$EndComments\s*)?\$MeshFormat\s+(\S+)\s+([01])\s+(\d+)[^\n]*\n", data, re.DOTALL
     )
@@ -179,16 +188,16 @@ def _form(data: bytes) -> _Form:
         raise FormatError("the size of its numbers is neither 4 nor 8 bytes")
     is_text = head.group(2) == b"0"
     order = "<" if is_text or data[head.end() : head.end() + 4] == b"\x01\0\0\0" else ">"
-    return _Form(version, is_text, int(size), order)
+    return Form(version, is_text, int(size), order)
 
 
-def _nodes_of(kind: int) -> int:
+def nodes_of_kind(kind: int) -> int:
     if kind not in ELEMENTS:
         raise FormatError(f"it holds elements of type {kind}; only linear tetrahedra can be used: convert or remesh it")
     return ELEMENTS[kind][0]
 
 
-def _nodes_4(section: _Section) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _nodes_4(section: Section) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     size, is_40 = section.form.size_bytes, section.form.version == "4.0"
     blocks = int(section.integers(2 if is_40 else 4, size)[0])
     tags, points = [np.empty(0, dtype=np.int64)], [np.empty((0, 3))]
@@ -208,7 +217,7 @@ def _nodes_4(section: _Section) -> tuple[NDArray[np.int64], NDArray[np.float64]]
     return np.concatenate(tags), np.concatenate(points)
 
 
-def _elements_2(section: _Section) -> list[tuple[int, NDArray[np.int64]]]:
+def _elements_2(section: Section) -> list[tuple[int, NDArray[np.int64]]]:
     count = section.first_count()
     if section.form.is_text:
         return section.text_elements(count)
@@ -217,18 +226,18 @@ def _elements_2(section: _Section) -> list[tuple[int, NDArray[np.int64]]]:
         kind, n, tags = (int(v) for v in section.integers(3))
         if n < 1 or tags < 0:
             raise FormatError("a block of $Elements has no valid count")
-        width = 1 + tags + _nodes_of(kind)
+        width = 1 + tags + nodes_of_kind(kind)
         blocks.append((kind, section.integers(n * width).reshape(n, width)[:, 1 + tags :]))
         count -= n
     return blocks
 
 
-def _elements_4(section: _Section) -> list[tuple[int, NDArray[np.int64]]]:
+def _elements_4(section: Section) -> list[tuple[int, NDArray[np.int64]]]:
     size, is_40 = section.form.size_bytes, section.form.version == "4.0"
     blocks = []
     for _ in range(int(section.integers(2 if is_40 else 4, size)[0])):
         kind = int(section.integers(3)[2])
-        n, width = int(section.integers(1, size)[0]), 1 + _nodes_of(kind)
+        n, width = int(section.integers(1, size)[0]), 1 + nodes_of_kind(kind)
         blocks.append((kind, section.integers(n * width, 4 if is_40 else size).reshape(-1, width)[:, 1:]))
     return blocks
 

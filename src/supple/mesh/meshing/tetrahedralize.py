@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from supple.errors import MeshError, MeshingError
-from supple.mesh.meshing.child_process import Limits
+from supple.mesh.meshing.child_process import Limits, MesherFailure
 from supple.mesh.meshing.ftetwild import INSTALL, ftetwild_installed, mesh_with_ftetwild
 from supple.mesh.meshing.repair import RepairReport, repair_surface
 from supple.mesh.meshing.sizes import mesh_with_count, volume_of_edge
@@ -68,14 +68,15 @@ def tetrahedralize(
         Number of tets, instead of `max_volume`: it is reached within 10 % by at most six meshings. Where the surface
         needs more, its coarsest mesh is returned, with a warning in the log.
     quality : float, optional
-        TetGen's upper bound on circumradius over shortest edge of each tet, above 1. A smaller bound gives more tets of
-        better shape. Tets at small angles of the surface may exceed it. None: no bound.
+        TetGen's upper bound on circumradius over shortest edge of each tet [-], above 1. A smaller bound gives more
+        tets of better shape. Tets at small angles of the surface may exceed it. None: no bound.
     min_dihedral : float [degrees], optional
         TetGen's target for the smallest dihedral angle, below 70. Much above 18, TetGen may not end.
     keep_surface : bool
         Add no vertices on the surface.
     mesher : "auto", "tetgen" or "ftetwild"
-        "auto" uses TetGen for a clean surface. It warns and uses fTetWild (the extra `dirty`) for any other.
+        "auto" uses TetGen for a clean surface. It warns and uses fTetWild (the extra `dirty`) for any other, and where
+        TetGen fails.
     repair : bool
         Repair a surface that is not clean first, see `repair_surface`. Where that fails, "auto" and "ftetwild" mesh the
         surface as it is with fTetWild, if that is installed, with a warning in the log.
@@ -127,13 +128,14 @@ def tetrahedralize_reported(
     limits = Limits(time_limit, None if memory_limit is None else int(memory_limit))
 
     repaired = None
+    others_can = ftetwild_installed() and not keep_surface and min_dihedral is None
     surface, report = _facing_outward(surface)
     if repair and not report.ok:
         try:
             fixed, repaired = repair_surface(surface, time_limit=time_limit, memory_limit=limits.memory)
         except MeshingError as failure:
             # fTetWild needs no repair, and meshes much that MeshFix cannot repair: components that cut each other.
-            if mesher == "tetgen" or not ftetwild_installed() or keep_surface or min_dihedral is not None:
+            if mesher == "tetgen" or not others_can:
                 raise
             logger.warning("%s; meshing the surface without repair", failure)
         else:
@@ -144,7 +146,8 @@ def tetrahedralize_reported(
     seconds = 0.0
 
     def make(max_volume: float | None) -> TetMesh:
-        nonlocal seconds
+        nonlocal seconds, chosen
+        result = None
         if chosen == "tetgen":
             options = {
                 "max_volume": max_volume,
@@ -152,8 +155,14 @@ def tetrahedralize_reported(
                 "min_dihedral": min_dihedral,
                 "keep_surface": keep_surface,
             }
-            result = mesh_with_tetgen(surface, options, limits)
-        else:
+            try:
+                result = mesh_with_tetgen(surface, options, limits)
+            except MesherFailure as failure:
+                if not (mesher == "auto" and failure.kind in ("failed", "crash") and others_can):
+                    raise
+                logger.warning("%s; meshing it with fTetWild, which may move the surface slightly", failure)
+                chosen = "ftetwild"
+        if result is None:
             result = mesh_with_ftetwild(surface, max_volume, envelope, limits)
         seconds += result.seconds
         try:

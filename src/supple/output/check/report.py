@@ -27,7 +27,8 @@ class CheckResult:
     ----------
     name : of the check; verdict : pass, fail or skipped
     message : what was found, or why the check was skipped
-    worst : the number closest to failing, or furthest beyond; None where there is none; unit : its unit, "" for a ratio
+    worst : the number closest to failing, or furthest beyond, in the unit below; None where there is none
+    unit : of that number, "" for a ratio
     frame, time : of that number, frames counted from 0, [s]; None where it belongs to no frame
     where : the body, and its tet, triangle or vertex
     failed_frames : number of checked frames in which the check failed; first_failure : the first of them, or None

@@ -38,7 +38,7 @@ class CheckSettings:
     every : check each k-th frame, and the last.
     max_volume_change : how far a body's volume may differ from that at rest, as a share of it. None: 0.5 for bodies
         with a Poisson's ratio of 0.45 or more, unlimited for others.
-    max_orthogonality_error : |F^T F - 1| that a rigid body may have.
+    max_orthogonality_error : |F^T F - 1| that a rigid body may have [-].
     max_energy_gain : how far the energy may exceed that at the start, as a share of the energy in motion.
     max_momentum_change : how far momenta may change without a force, as a share of the momentum present.
 

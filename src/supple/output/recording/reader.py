@@ -11,6 +11,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.displayed import Showable, short_list
 from supple.errors import OutputError
 from supple.materials.elastic_tets.laws import TetLaws
 from supple.output.recording.checked_hdf5 import CheckedFile
@@ -36,7 +37,7 @@ _MESSAGE = "supple/frames/message"
 _READ_BY_FRAME = ("VTKHDF/Points", "VTKHDF/PointData/velocities", "VTKHDF/CellData/det_F", "supple/frames/poses")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class RecordedFrame(TetReadings):
     """One frame, read when it is asked for. Names are those of `supple.Frame`; see also `TetReadings`.
 
@@ -160,7 +161,7 @@ class RecordedFrame(TetReadings):
         return self.recording._frame_rows(path, self.number)
 
 
-class Recording(Sequence[RecordedFrame]):
+class Recording(Showable, Sequence[RecordedFrame]):
     """A recorded simulation: a sequence of frames. Made by `read_recording`; close it, or use it in a `with` block.
 
     Attributes
@@ -249,9 +250,14 @@ class Recording(Sequence[RecordedFrame]):
     def __iter__(self) -> Iterator[RecordedFrame]:
         return (RecordedFrame(self, i) for i in range(self._count))
 
-    def __repr__(self) -> str:
-        names = ", ".join(body.name for body in self.bodies)
-        return f"Recording({str(self.path)!r}: {self._count} frames to {self.times[-1]:g} s of {names})"
+    def _facts(self) -> dict[str, str]:
+        return {
+            "file": str(self.path),
+            "frames": f"{self._count} to {self.times[-1]:g} s",
+            "bodies": short_list(body.name for body in self.bodies),
+            "tets": str(len(self.tets)),
+            "ended": str(self.statuses[-1]),
+        }
 
     @cached_property
     def laws(self) -> TetLaws:
@@ -334,6 +340,10 @@ def read_recording(path: str | Path) -> Recording:
     """Open a recording, of a simulation that has ended, was killed, or is still running.
 
     A frame is read when it is used. Frames that are written after the recording was opened are not in it.
+
+    Parameters
+    ----------
+    path : of the recording (.vtkhdf).
 
     Raises
     ------

@@ -26,7 +26,7 @@ class HalfSpace(Obstacle):
 
     Parameters
     ----------
-    point : (3,) a point of the plane [m]; normal : (3,) out of the solid, towards the free side.
+    point : (3,) a point of the plane [m]; normal : (3,) direction out of the solid [-], towards the free side.
     """
 
     point: ArrayLike = field(default=(0.0, 0.0, 0.0), metadata=parameter("vector", "a point of the plane [m]"))

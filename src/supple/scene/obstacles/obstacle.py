@@ -29,6 +29,10 @@ class Obstacle(ABC):
     friction : Coulomb coefficient between this obstacle and every body.
     motion : None, Keyframes, or t -> displacement (3,) [m].
     name : optional; appears in messages and exports. A scene names unnamed obstacles by kind and number.
+
+    Raises
+    ------
+    SceneError : where a value is of the wrong kind, not finite or out of range; the text names the obstacle.
     """
 
     friction: float = 0.0

@@ -14,7 +14,7 @@ class Pose:
 
     Attributes
     ----------
-    rotation : (3, 3) with determinant 1; translation : (3,) where the origin of its coordinates is [m]
+    rotation : (3, 3) with determinant 1 [-]; translation : (3,) where the origin of its coordinates is [m]
     velocity : (3,) of the center of mass [m/s]; angular_velocity : (3,) [rad/s]
     """
 

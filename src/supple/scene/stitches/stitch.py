@@ -36,6 +36,11 @@ class Stitch(ABC):
         opposed to that of the vertex's own surface; and of these the one of lowest number; or "all" in reach
     damping : Kelvin-Voigt time of the stitches [s]
     name : used in messages
+
+    Raises
+    ------
+    SceneError : where a value is of the wrong kind, not finite or out of range, or both of `pairs` and `max_distance`
+        are given, or none; the text names the stitch.
     """
 
     partner: ClassVar[str]  # the kind of the second part of a pair, in the plural

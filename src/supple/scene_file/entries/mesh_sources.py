@@ -8,6 +8,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, Field
 
 from supple.errors import MeshError
+from supple.mesh.sets import MeshSets, read_sets
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.scene.located import at
@@ -15,8 +16,8 @@ from supple.scene.rotation import rotation_matrix
 from supple.scene_file.entries.shapes import GummyBearShapeModel, ShapeModel, SurfaceShapeModel
 from supple.scene_file.model import FilePath, Model, Positive, Vector
 
-SURFACE_FILES = (".stl", ".obj", ".ply", ".off", ".vtp")
-TET_FILES = (".node", ".ele", ".edge", ".face", ".msh")
+SURFACE_FILES = (".stl", ".obj", ".ply", ".off", ".glb", ".vtp")
+TET_FILES = (".node", ".ele", ".edge", ".face", ".msh", ".inp")
 MESHING_OPTIONS = (
     "tets",
     "edge",
@@ -94,6 +95,10 @@ class MeshStore:
     def tets(self, source: MeshFileModel) -> TetMesh:
         """The tet mesh of a file, or of the surface in it."""
         return self._once(source, lambda: self._read(source))
+
+    def sets(self, source: MeshFileModel) -> MeshSets:
+        """The named sets of a file of tets."""
+        return self._once(source, lambda: read_sets(self.located(source.file)), "sets ")
 
     def shape(self, shape: ShapeModel) -> TetMesh:
         """The tet mesh of a shape."""

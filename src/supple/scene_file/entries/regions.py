@@ -14,7 +14,7 @@ from supple.scene.located import at
 from supple.scene.selection import InBox
 from supple.scene_file.entries.materials import ElasticMaterialModel
 from supple.scene_file.entries.selections import InBoxModel
-from supple.scene_file.model import Index, Model
+from supple.scene_file.model import Index, Model, Name
 
 
 class BoxOfMeshModel(InBoxModel):
@@ -25,13 +25,14 @@ class BoxOfMeshModel(InBoxModel):
 class RegionModel(Model):
     """Tets of a body with another elastic material than the body's."""
 
-    alternatives = ("box", "tets", "give the tets of a region by either `box` or `tets`")
+    alternatives = ("box", "tets", "set", "give the tets of a region by either `box`, `tets` or `set`")
 
     material: ElasticMaterialModel
     box: BoxOfMeshModel | None = Field(default=None, description="all tets whose center is inside")
     tets: list[Index] | None = Field(
         default=None, min_length=1, description="instead of `box`: tet numbers of the mesh, from 0"
     )
+    set: Name | None = Field(default=None, description="instead of `box`: a set of the mesh file (.inp or .msh)")
 
     def select(self, mesh: TetMesh) -> NDArray[np.int64]:
         """Numbers (k,) of the selected tets."""

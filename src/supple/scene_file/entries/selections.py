@@ -20,11 +20,14 @@ class InBoxModel(Model):
 
 
 class _SelectionModel(Model):
-    alternatives = ("vertices", "box", "give the vertices by either `vertices` or `box`")
+    alternatives = ("vertices", "box", "set", "give the vertices by either `vertices`, `box` or `set`")
 
     body: Name = Field(description="name of the body")
     vertices: list[Index] | None = Field(default=None, min_length=1, description="vertex numbers, from 0")
     box: InBoxModel | None = Field(default=None, description="instead of `vertices`: all vertices inside")
+    set: Name | None = Field(
+        default=None, description="instead of `vertices`: a set of the body's mesh file (.inp or .msh)"
+    )
     name: Name | None = Field(default=None, description="used in messages and reports")
 
     def selection(self) -> Selection:
@@ -36,7 +39,7 @@ class _SelectionModel(Model):
 
 
 class PinModel(_SelectionModel):
-    """Vertices of a soft body that are held, or moved by keyframes; or a rigid body, without `vertices` and `box`."""
+    """Vertices of a soft body that are held, or moved by keyframes; or a rigid body, without any of the three."""
 
     alternatives = None
 
@@ -44,8 +47,8 @@ class PinModel(_SelectionModel):
 
     @model_validator(mode="after")
     def _one_selection(self) -> PinModel:
-        if self.vertices is not None and self.box is not None:
-            raise ValueError("give the vertices by either `vertices` or `box`")
+        if sum(given is not None for given in (self.vertices, self.box, self.set)) > 1:
+            raise ValueError("give the vertices by either `vertices`, `box` or `set`")
         return self
 
     def build(self) -> Pin:

@@ -74,6 +74,10 @@ class LatinHypercube(Design):
     Parameters
     ----------
     samples : number of cases; seed : of the random numbers
+
+    Raises
+    ------
+    StudyError : where `samples` is not a whole number above zero.
     """
 
     samples: int
@@ -97,6 +101,10 @@ class Sobol(Design):
     Parameters
     ----------
     samples : number of cases, a power of two: only then are the points balanced; seed : of the scrambling
+
+    Raises
+    ------
+    StudyError : where `samples` is not a power of two.
     """
 
     samples: int

@@ -114,6 +114,7 @@ def uniform(low: float, high: float, count: int | None = None) -> Uniform:
 
     Parameters
     ----------
+    low, high : ends of the range, in the unit of the factor.
     count : number of levels in a grid, evenly spaced, with both ends. Random designs do not need it.
 
     Raises
@@ -128,6 +129,7 @@ def loguniform(low: float, high: float, count: int | None = None) -> LogUniform:
 
     Parameters
     ----------
+    low, high : ends of the range, in the unit of the factor; above zero.
     count : number of levels in a grid, in constant ratios, with both ends. Random designs do not need it.
 
     Raises

@@ -1,0 +1,80 @@
+"""The pages of the API reference: which public names are on which page."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+STUB = Path(__file__).parents[2] / "src" / "supple" / "__init__.pyi"
+
+# Page, title, and the parts of the package whose public names it has. The longest part that fits decides.
+API = (
+    ("scenes", "Bodies and scenes", ("scene",)),
+    ("obstacles", "Obstacles", ("scene.obstacles",)),
+    ("stitches", "Stitches", ("scene.stitches",)),
+    ("loads", "Forces and loads", ("scene.loads", "scene.forces", "scene.inputs", "scene.sensors")),
+    ("materials", "Materials", ("materials",)),
+    ("meshes", "Meshes", ("mesh",)),
+    ("simulation", "Solvers and simulation", ("simulate", "state", "xpbd", "implicit", "readings")),
+    ("recordings", "Recordings, checks and exports", ("output",)),
+    ("runs", "Scene files and runs", ("scene_file", "runs")),
+    ("studies", "Studies", ("studies",)),
+    ("learning", "Batches", ("learning",)),
+    ("numerics", "Numerics", ("numerics",)),
+    ("errors", "Errors", ("errors",)),
+)
+# Not public names, but what public ones return.
+RETURNED = {
+    "simulation": (
+        "supple.readings.frame_readings.FrameReadings",
+        "supple.xpbd.details.XPBDDetails",
+        "supple.implicit.details.ImplicitDetails",
+    ),
+    "recordings": ("supple.output.recording.reader.RecordedFrame",),
+}
+
+
+def public_names() -> dict[str, str]:
+    """By public name, the module below `supple` that it is from."""
+    tree = ast.parse(STUB.read_text(encoding="utf-8"))
+    return {
+        alias.asname or alias.name: str(node.module)
+        for node in tree.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+
+
+def path_of(name: str) -> str:
+    """Of a public name, for griffe, to which `supple.simulate` is the module."""
+    return "supple.simulate.simulate" if name == "simulate" else f"supple.{name}"
+
+
+def page_of(module: str) -> str:
+    """The page for the names of a module.
+
+    Raises
+    ------
+    LookupError : where there is none.
+    """
+    fitting = [
+        (len(part), page) for page, _, parts in API for part in parts if module == part or module.startswith(part + ".")
+    ]
+    if not fitting:
+        raise LookupError(f"no page of the API reference has names of supple.{module}; add it to API in {__file__}")
+    return max(fitting)[1]
+
+
+def api_pages() -> dict[str, str]:
+    """The text of each page by its path, and of the contents."""
+    names: dict[str, list[str]] = {page: [] for page, _, _ in API}
+    for name, module in public_names().items():
+        names[page_of(module)].append(name)
+    contents = ["# API reference\n\nAll names are attributes of `supple`: `import supple as sp`.\n"]
+    pages = {}
+    for page, title, _ in API:
+        links = ", ".join(f"[`{name}`][{path_of(name)}]" for name in names[page])
+        contents.append(f"**[{title}]({page}.md)**\n: {links}\n")
+        objects = [*map(path_of, names[page]), *RETURNED.get(page, ())]
+        pages[f"api/{page}.md"] = f"# {title}\n\n" + "\n".join(f"::: {name}\n" for name in objects)
+    return pages | {"api/index.md": "\n".join(contents)}

@@ -1,0 +1,58 @@
+"""Metadata that depends on where the repository is: addresses, and a README that renders outside of it.
+
+The repository's address is the variable SUPPLE_REPOSITORY, that of GitHub Actions, or the remote `origin`, if one of
+these is an https address. Without one, there are no project addresses, and relative links become plain text.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+from pathlib import Path
+
+from hatchling.metadata.plugin.interface import MetadataHookInterface
+
+
+class RepositoryMetadata(MetadataHookInterface):
+    """Sets `urls` and `readme`. A wheel that is built from an sdist takes both from there."""
+
+    PLUGIN_NAME = "custom"
+
+    def update(self, metadata: dict) -> None:
+        root = Path(self.root)
+        address = repository(root)
+        if address:
+            metadata["urls"] = {
+                "Repository": address,
+                "Documentation": f"{address}/blob/HEAD/docs/tutorial.md",
+                "Changelog": f"{address}/blob/HEAD/CHANGELOG.md",
+                "Issues": f"{address}/issues",
+            }
+        text = off_site((root / "README.md").read_text(encoding="utf-8"), address)
+        metadata["readme"] = {"content-type": "text/markdown", "text": text}
+
+
+def repository(root: Path) -> str:
+    """The https address of the repository, or "" where it has none."""
+    server, name = os.environ.get("GITHUB_SERVER_URL", ""), os.environ.get("GITHUB_REPOSITORY", "")
+    candidates = [os.environ.get("SUPPLE_REPOSITORY", ""), f"{server}/{name}" if server and name else ""]
+    try:
+        command = ["git", "-C", str(root), "remote", "get-url", "origin"]
+        candidates.append(subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip())
+    except OSError:
+        pass  # no git here
+    for candidate in candidates:
+        found = re.fullmatch(r"(https://[^\s@]+?)(\.git)?/?", candidate)
+        if found:
+            return found[1]
+    return ""
+
+
+def off_site(text: str, address: str) -> str:
+    """A README without relative links: they lead to the repository, or are plain text without an address."""
+    if not address:
+        text = re.sub(r"!\[[^\]]*\]\((?!https:)[^)]+\)\n*", "", text)
+        return re.sub(r"\[([^\]]+)\]\((?!https:|#)[^)]+\)", r"\1", text)
+    text = re.sub(r"(!\[[^\]]*\])\((?!https:)([^)]+)\)", rf"\1({address}/raw/HEAD/\2)", text)
+    return re.sub(r"(?<!!)(\[[^\]]+\])\((?!https:|#)([^)]+)\)", rf"\1({address}/blob/HEAD/\2)", text)

@@ -1,0 +1,119 @@
+"""Named sets of vertices and tets, as modelling programs write them into mesh files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.displayed import Displayed
+from supple.errors import MeshError
+from supple.mesh.io.cells import FormatError
+from supple.mesh.io.file_contents import file_contents
+from supple.mesh.io.models import abaqus_sets, gmsh_groups
+from supple.mesh.io.models.named_sets import NamedSets
+
+_READERS: dict[str, Callable[[bytes], NamedSets]] = {".inp": abaqus_sets.read, ".msh": gmsh_groups.read}
+SETS_EXTENSIONS = tuple(_READERS)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MeshSets(Displayed):
+    """Named sets of a mesh file, in the numbering of `TetMesh.load`: for pins, forces and regions.
+
+    Attributes
+    ----------
+    vertices : by name, (k,) indices of vertices
+    tets : by name, (k,) indices of tets
+    tet_count : number of tets of the mesh
+    """
+
+    vertices: Mapping[str, NDArray[np.int32]]
+    tets: Mapping[str, NDArray[np.int32]]
+    tet_count: int
+
+    def listed(self) -> dict[str, str]:
+        """Names and sizes of the sets, by what they are of."""
+
+        def counted(sets: Mapping[str, NDArray[np.int32]]) -> str:
+            return ", ".join(f"{name} ({len(rows)})" for name, rows in sets.items()) or "none"
+
+        return {"vertices": counted(self.vertices), "tets": counted(self.tets)}
+
+    _facts = listed
+
+    def vertices_of(self, name: str) -> NDArray[np.int32]:
+        """(k,) indices of the vertices of a set.
+
+        Raises
+        ------
+        MeshError : where there is no such set.
+        """
+        return _found(self.vertices, name, "vertices")
+
+    def tets_of(self, name: str) -> NDArray[np.int32]:
+        """(k,) indices of the tets of a set.
+
+        Raises
+        ------
+        MeshError : where there is no such set.
+        """
+        return _found(self.tets, name, "tets")
+
+    def regions(self, names: Sequence[str]) -> NDArray[np.int32]:
+        """(m,) for the `index` of `Regions`: 0 of tets in no set, k + 1 of those in set `names[k]`; the last counts.
+
+        Raises
+        ------
+        MeshError : where there is no such set.
+        """
+        index = np.zeros(self.tet_count, dtype=np.int32)
+        for k, name in enumerate(names):
+            index[self.tets_of(name)] = k + 1
+        return index
+
+
+def _found(sets: Mapping[str, NDArray[np.int32]], name: str, kind: str) -> NDArray[np.int32]:
+    for known, rows in sets.items():
+        if known.upper() == str(name).upper():
+            return rows
+    listed = ", ".join(sets) or "none"
+    raise MeshError(f"there is no set of {kind} {name!r}; there are: {listed}")
+
+
+def read_sets(path: str | Path) -> MeshSets:
+    """The named sets of a mesh file: node and element sets of Abaqus (.inp), physical groups of Gmsh (.msh).
+
+    A physical group of surfaces or curves, and an element set, is also a set of the vertices of its elements. Vertices
+    that belong to no tet are left out, as `TetMesh.load` does.
+
+    Parameters
+    ----------
+    path : of the mesh file.
+
+    Raises
+    ------
+    MeshError : where the file cannot be read, or has a format without sets; the text begins with the path.
+    """
+    path = Path(path)
+    reader = _READERS.get(path.suffix.lower())
+    if reader is None:
+        raise MeshError(f"{path}: sets are read from {' and '.join(_READERS)} files, not from '{path.suffix}'")
+    data = file_contents(path)
+    try:
+        found = reader(data)
+    except FormatError as error:
+        where = f"{path}:{error.line}" if error.line is not None else str(path)
+        raise MeshError(f"{where}: {error.reason}") from None
+    used = np.zeros(found.node_count, dtype=bool)
+    used[found.tets] = True
+    place = np.cumsum(used) - 1
+    of_nodes = {name: place[rows[used[rows]]].astype(np.int32) for name, rows in found.node_sets.items()}
+    of_tets = {name: rows.astype(np.int32) for name, rows in found.tet_sets.items()}
+    for name, rows in of_tets.items():
+        of_nodes.setdefault(name, place[np.unique(found.tets[rows])].astype(np.int32))
+    vertices = {name: rows for name, rows in of_nodes.items() if len(rows)}
+    return MeshSets(vertices, of_tets, len(found.tets))

@@ -1,0 +1,95 @@
+"""What is published: the README outside of the repository, types, and a workflow of the Makefile's commands."""
+
+import importlib.util
+import re
+import sys
+import types
+from pathlib import Path
+
+import pytest
+import yaml
+
+import supple
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def hook(monkeypatch):
+    """hatch_build.py, without the package that only builds have."""
+    interface = types.ModuleType("hatchling.metadata.plugin.interface")
+    interface.MetadataHookInterface = object  # pyright: ignore[reportAttributeAccessIssue]
+    for name in ("hatchling", "hatchling.metadata", "hatchling.metadata.plugin"):
+        monkeypatch.setitem(sys.modules, name, types.ModuleType(name))
+    monkeypatch.setitem(sys.modules, interface.__name__, interface)
+    for name in ("SUPPLE_REPOSITORY", "GITHUB_SERVER_URL", "GITHUB_REPOSITORY"):
+        monkeypatch.delenv(name, raising=False)
+    spec = importlib.util.spec_from_file_location("hatch_build", ROOT / "hatch_build.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def built(hook, root=ROOT):
+    """The metadata that a build gets."""
+    builder, metadata = hook.RepositoryMetadata(), {}
+    builder.root = str(root)
+    builder.update(metadata)
+    return metadata
+
+
+def links(text):
+    return re.findall(r"\]\(([^)\s]+)\)", text)
+
+
+def test_the_readme_begins_with_the_installation():
+    assert README.index("pip install supple") < README.index("\n## ")
+
+
+def test_with_an_address_all_links_of_the_readme_lead_to_it(hook, monkeypatch):
+    monkeypatch.setenv("SUPPLE_REPOSITORY", "https://git.example/a/supple.git")
+    metadata = built(hook)
+    assert metadata["urls"]["Repository"] == "https://git.example/a/supple"
+    found = links(metadata["readme"]["text"])
+    assert len(found) == len(links(README))
+    assert all(link.startswith("https://") for link in found)
+    assert "https://git.example/a/supple/raw/HEAD/docs/images/bears.png" in found
+    for link in found:
+        path = re.fullmatch(r"https://git\.example/a/supple/(?:raw|blob)/HEAD/(.*)", link)
+        assert path is None or (ROOT / path[1]).exists(), link
+
+
+def test_without_an_address_the_readme_has_no_relative_links(hook, tmp_path):
+    (tmp_path / "README.md").write_text(README, encoding="utf-8")
+    metadata = built(hook, tmp_path)
+    assert "urls" not in metadata
+    text = metadata["readme"]["text"]
+    assert "![" not in text
+    assert all(link.startswith("https://") for link in links(text))
+    assert "Tutorial: from a surface" in text, "the text of a link stays"
+
+
+def test_the_address_on_github_is_that_of_its_actions(hook, monkeypatch):
+    monkeypatch.setenv("GITHUB_SERVER_URL", "https://github.example")
+    monkeypatch.setenv("GITHUB_REPOSITORY", "a/b")
+    assert hook.repository(ROOT) == "https://github.example/a/b"
+
+
+def test_types_are_marked_as_such():
+    assert (Path(supple.__file__).parent / "py.typed").is_file()
+
+
+def test_the_workflow_runs_commands_that_exist():
+    workflow = yaml.safe_load((ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8"))
+    targets = set(re.findall(r"^([a-z][a-z-]*):", (ROOT / "Makefile").read_text(encoding="utf-8"), flags=re.M))
+    commands = [step["run"] for job in workflow["jobs"].values() for step in job["steps"] if "run" in step]
+    used = [command.split()[1] for command in commands if command.startswith("make ")]
+    assert set(used) == {"demo", "test", "dist"}
+    assert set(used) <= targets
+    scripts = [match[0] for command in commands for match in re.finditer(r"\.ci/\w+", command)]
+    assert scripts
+    assert all((ROOT / script).is_file() for script in scripts)
+    assert {"make lint", "make docs", "make test"} <= set(
+        line.strip() for line in (ROOT / ".ci" / "run").read_text(encoding="utf-8").splitlines()
+    )
