@@ -15,6 +15,9 @@ from .learning.batch import BatchSnapshot as BatchSnapshot
 from .materials.arap import ARAP as ARAP
 from .materials.edges_and_volume import EdgesAndVolume as EdgesAndVolume
 from .materials.fixed_corotated import FixedCorotated as FixedCorotated
+from .materials.hyperelastic.mooney_rivlin import MooneyRivlin as MooneyRivlin
+from .materials.hyperelastic.ogden import Ogden as Ogden
+from .materials.hyperelastic.yeoh import Yeoh as Yeoh
 from .materials.neo_hookean import NeoHookean as NeoHookean
 from .materials.regions import Regions as Regions
 from .materials.st_venant_kirchhoff import StVenantKirchhoff as StVenantKirchhoff

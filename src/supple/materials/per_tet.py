@@ -1,8 +1,13 @@
-"""A body's material as arrays with one row per tetrahedron, as solvers read it, for one material or several."""
+"""A body's material as arrays with one row per tetrahedron, as solvers read it, for one material or several.
+
+The energies of `stretch_energies` have two parameters and are compiled into the kernels of elements. All others are
+laws: of many deformation gradients at once, they give energies, stresses and Hessians as arrays.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,7 +15,67 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError
 
 NOT_ELASTIC = -1
+BY_LAW = -2
 NO_REGION = -1
+
+
+class Law(ABC):
+    """An energy per rest volume psi(F, p) of a deformation gradient and a row of parameters, zero at rest.
+
+    Attributes
+    ----------
+    counts : numbers of parameters that a row may have
+    name : by which recordings know the law; None for one that they do not keep
+    infinite_when_flat : whether psi goes to infinity wherever J goes to zero. No law has an energy for J <= 0.
+    bulk : the parameter K, where psi has the volume term K/2 (J - 1)^2 and no other; such tets can be averaged over
+        patches. None where there is none.
+    """
+
+    counts: range
+    name: str | None = None
+    infinite_when_flat: bool = False
+    bulk: int | None = None
+
+    @abstractmethod
+    def densities(self, F: NDArray[np.float64], p: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(k,) psi [Pa] of F (k, 3, 3) and parameters p (k, q); infinite for J <= 0."""
+
+    @abstractmethod
+    def models(
+        self, F: NDArray[np.float64], p: NDArray[np.float64], second: bool, project: bool
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """psi (k,), P = d psi / dF (k, 3, 3) and, with `second`, its Hessian (k, 9, 9), else (0, 9, 9) [Pa].
+
+        Entry (3 i + j, 3 k + l) of a Hessian is d^2 psi / (dF_ij dF_kl). With `project` it is positive semi-definite.
+        """
+
+
+@dataclass(frozen=True, eq=False)
+class LawTets:
+    """Tets with one law. A tet may have several, whose energies are added.
+
+    Attributes
+    ----------
+    rows : (k,) numbers of the tets
+    parameters : (k, q) of the law
+    """
+
+    law: Law
+    rows: NDArray[np.int64]
+    parameters: NDArray[np.float64]
+
+    def of(self, rows: NDArray[np.int64], parameters: NDArray[np.float64]) -> LawTets:
+        """The same law for other tets."""
+        return replace(self, rows=rows, parameters=np.ascontiguousarray(parameters))
+
+    def shifted(self, by: int) -> LawTets:
+        """The same tets, with numbers that are larger by this."""
+        return replace(self, rows=self.rows + by)
+
+    def selected(self, chosen: NDArray[np.bool_]) -> LawTets:
+        """Those of the tets that are `chosen` (m,), with the same numbers."""
+        keep = chosen[self.rows]
+        return replace(self, rows=self.rows[keep], parameters=np.ascontiguousarray(self.parameters[keep]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,9 +85,10 @@ class TetMaterial:
     Attributes
     ----------
     density : (m,) [kg/m^3]; damping : (m,) Kelvin-Voigt time [s]
-    kind : (m,) int32, the row of `kinds.STRETCH_ENERGIES`, or `NOT_ELASTIC`
-    mu, lam : (m,) parameters of each material's energy density [Pa]
+    kind : (m,) int32, the row of `kinds.STRETCH_ENERGIES`, `BY_LAW` or `NOT_ELASTIC`
+    mu, lam : (m,) parameters of each material's energy density [Pa]; of tets `BY_LAW` the Lamé parameters at rest
     region : (m,) int32, the region over whose patches the energy of a tet is averaged, or `NO_REGION`
+    laws : whose energies are added to those of `kind`; tets `BY_LAW` have no other
     """
 
     density: NDArray[np.float64]
@@ -31,6 +97,11 @@ class TetMaterial:
     mu: NDArray[np.float64]
     lam: NDArray[np.float64]
     region: NDArray[np.int32]
+    laws: tuple[LawTets, ...] = ()
+
+    def with_laws(self, *laws: LawTets) -> TetMaterial:
+        """These tets with more laws."""
+        return replace(self, laws=(*self.laws, *laws))
 
 
 def one_per_tet(value: ArrayLike, n_tets: int, what: str) -> NDArray[np.float64]:

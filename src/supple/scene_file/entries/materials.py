@@ -8,9 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 from pydantic import Field, create_model
 
 from supple.materials.edges_and_volume import EdgesAndVolume
-from supple.materials.material import Elastic, Material
+from supple.materials.hyperelastic.mooney_rivlin import MooneyRivlin
+from supple.materials.hyperelastic.ogden import Ogden
+from supple.materials.hyperelastic.yeoh import Yeoh
+from supple.materials.material import Elastic, Hyperelastic, Material
 from supple.materials.registry import ELASTIC_MATERIALS
-from supple.scene_file.model import Model, NonNegative, Positive
+from supple.scene_file.model import Model, NonNegative, Number, Positive
 
 
 def _kind(material: type[Elastic]) -> str:
@@ -51,6 +54,44 @@ class ElasticModel(_MaterialModel):
         return ELASTIC_KINDS[self.kind](**self.model_dump(exclude={"kind"}))
 
 
+class _ByLawModel(_MaterialModel):
+    bulk: Positive = Field(description="bulk modulus K [Pa]")
+    integration: Literal["tets", "patches"] = Field(
+        default="tets", description="strains of each tet, or means over patches, which do not lock (Implicit only)"
+    )
+
+    def build(self) -> Hyperelastic:
+        return BY_LAW_KINDS[self.kind](**self.model_dump(exclude={"kind"}))  # pyright: ignore[reportAttributeAccessIssue]
+
+
+class MooneyRivlinModel(_ByLawModel):
+    """Mooney-Rivlin rubber (Implicit only)."""
+
+    kind: Literal["mooney_rivlin"]
+    c10: Number = Field(description="[Pa]; the shear modulus 2 (c10 + c01) must be above zero")
+    c01: Number = Field(default=0.0, description="[Pa]")
+
+
+class YeohModel(_ByLawModel):
+    """Yeoh rubber (Implicit only)."""
+
+    kind: Literal["yeoh"]
+    c10: Positive = Field(description="[Pa]; half of the shear modulus")
+    c20: Number = Field(default=0.0, description="[Pa]")
+    c30: Number = Field(default=0.0, description="[Pa]")
+
+
+class OgdenModel(_ByLawModel):
+    """Ogden rubber (Implicit only)."""
+
+    kind: Literal["ogden"]
+    mu: list[Number] = Field(min_length=1, max_length=9, description="of every term [Pa]")
+    alpha: list[Number] = Field(min_length=1, max_length=9, description="exponent of every term")
+
+
+BY_LAW_KINDS = {"mooney_rivlin": MooneyRivlin, "yeoh": Yeoh, "ogden": Ogden}
+
+
 def _elastic_model(kind: str) -> type[ElasticModel]:
     name = ELASTIC_KINDS[kind].__name__ + "Model"
     doc = (ELASTIC_KINDS[kind].__doc__ or "").partition("\n")[0]
@@ -59,10 +100,10 @@ def _elastic_model(kind: str) -> type[ElasticModel]:
 
 
 if TYPE_CHECKING:
-    ElasticMaterialModel = ElasticModel
-    MaterialModel = EdgesAndVolumeModel | ElasticModel
+    ElasticMaterialModel = ElasticModel | MooneyRivlinModel | YeohModel | OgdenModel
+    MaterialModel = EdgesAndVolumeModel | ElasticModel | MooneyRivlinModel | YeohModel | OgdenModel
 else:
     # Built from lists of models.
-    _ELASTIC = tuple(_elastic_model(kind) for kind in ELASTIC_KINDS)
+    _ELASTIC = (*(_elastic_model(kind) for kind in ELASTIC_KINDS), MooneyRivlinModel, YeohModel, OgdenModel)
     ElasticMaterialModel = Annotated[Union[_ELASTIC], Field(discriminator="kind")]  # noqa: UP007
     MaterialModel = Annotated[Union[(EdgesAndVolumeModel, *_ELASTIC)], Field(discriminator="kind")]
