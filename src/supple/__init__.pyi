@@ -14,6 +14,8 @@ from .learning.batch import Batch as Batch
 from .learning.batch import BatchSnapshot as BatchSnapshot
 from .materials.arap import ARAP as ARAP
 from .materials.edges_and_volume import EdgesAndVolume as EdgesAndVolume
+from .materials.fitting.fit import MaterialFit as MaterialFit
+from .materials.fitting.fit import fit_material as fit_material
 from .materials.fixed_corotated import FixedCorotated as FixedCorotated
 from .materials.hyperelastic.mooney_rivlin import MooneyRivlin as MooneyRivlin
 from .materials.hyperelastic.ogden import Ogden as Ogden

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from dataclasses import fields
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
 from pydantic import Field, create_model
 
 from supple.materials.edges_and_volume import EdgesAndVolume
+from supple.materials.hyperelastic.by_law import ByLaw
 from supple.materials.hyperelastic.mooney_rivlin import MooneyRivlin
 from supple.materials.hyperelastic.ogden import Ogden
 from supple.materials.hyperelastic.yeoh import Yeoh
@@ -89,7 +91,16 @@ class OgdenModel(_ByLawModel):
     alpha: list[Number] = Field(min_length=1, max_length=9, description="exponent of every term")
 
 
-BY_LAW_KINDS = {"mooney_rivlin": MooneyRivlin, "yeoh": Yeoh, "ogden": Ogden}
+BY_LAW_KINDS: dict[str, type[ByLaw]] = {"mooney_rivlin": MooneyRivlin, "yeoh": Yeoh, "ogden": Ogden}
+
+
+def scene_file_line(material: ByLaw) -> str:
+    """A rubber as a scene file has it, with the parameters of its class; density and damping are left out."""
+    kind = next(kind for kind, each in BY_LAW_KINDS.items() if each is type(material))
+    skipped = {field.name for field in fields(Material)} | {"integration"}
+    values = {f.name: getattr(material, f.name) for f in fields(material) if f.name not in skipped}
+    texts = [f"{key}: {list(value) if isinstance(value, tuple) else float(value)}" for key, value in values.items()]
+    return f"{{kind: {kind}, {', '.join(texts)}}}"
 
 
 def _elastic_model(kind: str) -> type[ElasticModel]:
