@@ -17,6 +17,7 @@ from .materials.edges_and_volume import EdgesAndVolume as EdgesAndVolume
 from .materials.fitting.fit import MaterialFit as MaterialFit
 from .materials.fitting.fit import fit_material as fit_material
 from .materials.fixed_corotated import FixedCorotated as FixedCorotated
+from .materials.hyperelastic.holzapfel_gasser_ogden import HolzapfelGasserOgden as HolzapfelGasserOgden
 from .materials.hyperelastic.mooney_rivlin import MooneyRivlin as MooneyRivlin
 from .materials.hyperelastic.ogden import Ogden as Ogden
 from .materials.hyperelastic.yeoh import Yeoh as Yeoh

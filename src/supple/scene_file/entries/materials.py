@@ -10,12 +10,13 @@ from pydantic import Field, create_model
 
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.hyperelastic.by_law import ByLaw
+from supple.materials.hyperelastic.holzapfel_gasser_ogden import HolzapfelGasserOgden
 from supple.materials.hyperelastic.mooney_rivlin import MooneyRivlin
 from supple.materials.hyperelastic.ogden import Ogden
 from supple.materials.hyperelastic.yeoh import Yeoh
 from supple.materials.material import Elastic, Hyperelastic, Material
 from supple.materials.registry import ELASTIC_MATERIALS
-from supple.scene_file.model import Model, NonNegative, Number, Positive
+from supple.scene_file.model import Model, NonNegative, Number, Positive, Vector
 
 
 def _kind(material: type[Elastic]) -> str:
@@ -57,13 +58,14 @@ class ElasticModel(_MaterialModel):
 
 
 class _ByLawModel(_MaterialModel):
+    kind: str
     bulk: Positive = Field(description="bulk modulus K [Pa]")
     integration: Literal["tets", "patches"] = Field(
         default="tets", description="strains of each tet, or means over patches, which do not lock (Implicit only)"
     )
 
     def build(self) -> Hyperelastic:
-        return BY_LAW_KINDS[self.kind](**self.model_dump(exclude={"kind"}))  # pyright: ignore[reportAttributeAccessIssue]
+        return BY_LAW_KINDS[self.kind](**self.model_dump(exclude={"kind"}))
 
 
 class MooneyRivlinModel(_ByLawModel):
@@ -91,7 +93,25 @@ class OgdenModel(_ByLawModel):
     alpha: list[Number] = Field(min_length=1, max_length=9, description="exponent of every term")
 
 
-BY_LAW_KINDS: dict[str, type[ByLaw]] = {"mooney_rivlin": MooneyRivlin, "yeoh": Yeoh, "ogden": Ogden}
+class HolzapfelGasserOgdenModel(_ByLawModel):
+    """Tissue with families of fibres (Implicit only)."""
+
+    kind: Literal["holzapfel_gasser_ogden"]
+    c10: Positive = Field(description="of the ground [Pa]; half of its shear modulus")
+    k1: NonNegative = Field(description="stiffness of the fibres [Pa]")
+    k2: Positive = Field(description="how fast the fibres stiffen")
+    kappa: float = Field(default=0.0, ge=0.0, le=1.0 / 3.0, description="dispersion of their directions, up to 1/3")
+    directions: list[Vector] = Field(
+        min_length=1, max_length=100, description="mean direction of each family at rest, in the mesh's coordinates"
+    )
+
+
+BY_LAW_KINDS: dict[str, type[ByLaw]] = {
+    "mooney_rivlin": MooneyRivlin,
+    "yeoh": Yeoh,
+    "ogden": Ogden,
+    "holzapfel_gasser_ogden": HolzapfelGasserOgden,
+}
 
 
 def scene_file_line(material: ByLaw) -> str:
@@ -111,10 +131,11 @@ def _elastic_model(kind: str) -> type[ElasticModel]:
 
 
 if TYPE_CHECKING:
-    ElasticMaterialModel = ElasticModel | MooneyRivlinModel | YeohModel | OgdenModel
-    MaterialModel = EdgesAndVolumeModel | ElasticModel | MooneyRivlinModel | YeohModel | OgdenModel
+    ElasticMaterialModel = ElasticModel | _ByLawModel
+    MaterialModel = EdgesAndVolumeModel | ElasticModel | _ByLawModel
 else:
     # Built from lists of models.
-    _ELASTIC = (*(_elastic_model(kind) for kind in ELASTIC_KINDS), MooneyRivlinModel, YeohModel, OgdenModel)
+    _BY_LAW = (MooneyRivlinModel, YeohModel, OgdenModel, HolzapfelGasserOgdenModel)
+    _ELASTIC = (*(_elastic_model(kind) for kind in ELASTIC_KINDS), *_BY_LAW)
     ElasticMaterialModel = Annotated[Union[_ELASTIC], Field(discriminator="kind")]  # noqa: UP007
     MaterialModel = Annotated[Union[(EdgesAndVolumeModel, *_ELASTIC)], Field(discriminator="kind")]
