@@ -21,6 +21,8 @@ from .materials.hyperelastic.holzapfel_gasser_ogden import HolzapfelGasserOgden 
 from .materials.hyperelastic.mooney_rivlin import MooneyRivlin as MooneyRivlin
 from .materials.hyperelastic.ogden import Ogden as Ogden
 from .materials.hyperelastic.yeoh import Yeoh as Yeoh
+from .materials.inelastic.j2_plastic import J2Plastic as J2Plastic
+from .materials.inelastic.viscoelastic import Viscoelastic as Viscoelastic
 from .materials.neo_hookean import NeoHookean as NeoHookean
 from .materials.regions import Regions as Regions
 from .materials.st_venant_kirchhoff import StVenantKirchhoff as StVenantKirchhoff

@@ -189,7 +189,9 @@ def test_a_body_in_equilibrium_is_recorded_with_its_laws(integration, tmp_path):
         read = recording[-1]
         np.testing.assert_array_equal(read.stress["bar"], frame.stress["bar"])
         np.testing.assert_array_equal(read.energy_density["bar"], frame.energy_density["bar"])
-        checked = elastic_energy(recording, frame.state.positions, frame.det_F, system.rest_shape_inverse)
+        checked = elastic_energy(
+            recording, frame.state.positions, frame.det_F, system.rest_shape_inverse, frame.state.internal
+        )
         assert checked == pytest.approx(frame.report.elastic_energy, rel=1e-12)
 
 

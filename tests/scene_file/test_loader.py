@@ -207,6 +207,21 @@ def test_rubber(load, text, exact):
         load("bodies:\n  - name: block\n    shape: {kind: box}\n    material: {kind: yeoh, c10: 1e5}\n")
 
 
+def test_materials_that_flow(load):
+    run = load(
+        "bodies:\n"
+        "  - name: slow\n    shape: {kind: box}\n    material: {kind: viscoelastic, prony: [[0.3, 0.1], [0.2, 1]], "
+        "material: {kind: yeoh, c10: 1e5, bulk: 1e7, density: 900}}\n"
+        "  - name: metal\n    shape: {kind: box}\n    material: {kind: j2_plastic, youngs: 2e11, poisson: 0.3, "
+        "yield_stress: 2e8, hardening: 1e9}\n    position: [3, 0, 0]\nsolver: {kind: implicit}\n"
+    )
+    slow, metal = (body.material for body in run.scene.bodies)
+    assert isinstance(slow, sp.Viscoelastic)
+    assert (slow.prony, slow.density, type(slow.material)) == (((0.3, 0.1), (0.2, 1.0)), 900.0, sp.Yeoh)
+    assert isinstance(metal, sp.J2Plastic)
+    assert (metal.yield_stress, metal.saturation_stress, metal.hardening) == (2e8, 2e8, 1e9)
+
+
 def test_the_schema_is_valid_and_accepts_what_the_loader_accepts(load, tmp_path):
     schema = json_schema()
     Draft202012Validator.check_schema(schema)

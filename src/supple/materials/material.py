@@ -5,12 +5,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.materials.flows.internal import add_resting_densities, add_resting_hessians, add_resting_piolas
 from supple.materials.kinds import STRETCH_ENERGIES
 from supple.materials.lame import lame_from_engineering
 from supple.materials.laws.pointwise import densities_at, hessians_at, piolas_at
@@ -118,7 +119,7 @@ class Hyperelastic(Material):
         -------
         (...) energy densities [Pa].
         """
-        return self._evaluated(densities_at, F, ())
+        return self._evaluated((densities_at, add_resting_densities), F, ())
 
     def first_piola(self, F: ArrayLike) -> NDArray[np.float64]:
         """First Piola-Kirchhoff stress P = d psi / d F.
@@ -131,7 +132,7 @@ class Hyperelastic(Material):
         -------
         (..., 3, 3) stresses [Pa].
         """
-        return self._evaluated(piolas_at, F, (3, 3))
+        return self._evaluated((piolas_at, add_resting_piolas), F, (3, 3))
 
     def hessian(self, F: ArrayLike, project: bool = False) -> NDArray[np.float64]:
         """Second derivative of the energy density, H[3 i + j, 3 k + l] = d^2 psi / (dF_ij dF_kl).
@@ -145,17 +146,25 @@ class Hyperelastic(Material):
         -------
         (..., 9, 9) symmetric [Pa].
         """
-        return self._evaluated(hessians_at, F, (9, 9), bool(project))
+        return self._evaluated((hessians_at, add_resting_hessians), F, (9, 9), bool(project))
 
     def _evaluated(
-        self, function: Callable[..., NDArray[np.float64]], F: ArrayLike, shape: tuple[int, ...], *options: bool
+        self,
+        functions: tuple[Callable[..., NDArray[np.float64]], Callable[..., None]],
+        F: ArrayLike,
+        shape: tuple[int, ...],
+        *options: Any,
     ) -> NDArray[np.float64]:
-        """What a function computes of every F, an array of that shape each."""
+        """What functions compute of every F, an array of that shape each: of elastic tets, and of what may flow."""
+        function, add_flow = functions
         F = np.asarray(F, dtype=np.float64)
         if F.shape[-2:] != (3, 3):
             raise SceneError(f"F has shape {F.shape}; its last two axes must be (3, 3)")
         flat = np.ascontiguousarray(F.reshape(-1, 3, 3))
-        return function(self.per_tet(len(flat)), flat, *options).reshape(F.shape[:-2] + shape)
+        tets = self.per_tet(len(flat))
+        out = function(tets, flat, *options)
+        add_flow(tets, flat, *options, out)
+        return out.reshape(F.shape[:-2] + shape)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

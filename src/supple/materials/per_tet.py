@@ -50,6 +50,32 @@ class Law(ABC):
         """
 
 
+class Flow(ABC):
+    """How the inelastic part F_i of F = F_e F_i changes; the law is one of F_e.
+
+    A row of internal variables is F_i^-1 (nine numbers, row after row), a measure of all flow so far, and the energy
+    that was dissipated per rest volume [J/m^3].
+
+    Attributes
+    ----------
+    name : by which recordings know it
+    step_law : whose derivative by the trial F_e, that without flow in the step, is the stress at the step's end
+    """
+
+    name: str
+    step_law: Law
+
+    @abstractmethod
+    def step_parameters(self, p: NDArray[np.float64], internal: NDArray[np.float64], h: float) -> NDArray[np.float64]:
+        """Parameters of `step_law` for a step of h [s], from those of the law (k, q) and internal variables (k, 11)."""
+
+    @abstractmethod
+    def advanced(
+        self, F: NDArray[np.float64], p: NDArray[np.float64], internal: NDArray[np.float64], h: float
+    ) -> NDArray[np.float64]:
+        """(k, 11) the internal variables at the end of a step of h [s] to the trial F_e (k, 3, 3)."""
+
+
 @dataclass(frozen=True, eq=False)
 class LawTets:
     """Tets with one law. A tet may have several, whose energies are added.
@@ -58,11 +84,13 @@ class LawTets:
     ----------
     rows : (k,) numbers of the tets
     parameters : (k, q) of the law
+    flow : how the tets flow; None where they are elastic
     """
 
     law: Law
     rows: NDArray[np.int64]
     parameters: NDArray[np.float64]
+    flow: Flow | None = None
 
     def of(self, rows: NDArray[np.int64], parameters: NDArray[np.float64]) -> LawTets:
         """The same law for other tets."""
@@ -98,6 +126,21 @@ class TetMaterial:
     lam: NDArray[np.float64]
     region: NDArray[np.int32]
     laws: tuple[LawTets, ...] = ()
+
+    @property
+    def elastic_laws(self) -> tuple[LawTets, ...]:
+        """Those that do not flow."""
+        return tuple(tets for tets in self.laws if tets.flow is None)
+
+    @property
+    def flowing_laws(self) -> tuple[tuple[LawTets, slice], ...]:
+        """Those that flow, each with its rows of the internal variables."""
+        found, begin = [], 0
+        for tets in self.laws:
+            if tets.flow is not None:
+                found.append((tets, slice(begin, begin + len(tets.rows))))
+                begin += len(tets.rows)
+        return tuple(found)
 
     def with_laws(self, *laws: LawTets) -> TetMaterial:
         """These tets with more laws."""

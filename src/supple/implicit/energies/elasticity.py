@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -93,6 +93,14 @@ class Elasticity(Potential):
                 total += more.add_model(x, gradient, hessian, project)
         return total
 
+    def in_step(self, internal: NDArray[np.float64], h: float) -> Elasticity:
+        """The energy of a step of h [s] from these internal variables (k, 11), at whose end its forces act."""
+        return self if self.laws is None else replace(self, laws=self.laws.in_step(internal, h))
+
+    def flowed(self, x: NDArray[np.float64], internal: NDArray[np.float64], h: float) -> NDArray[np.float64]:
+        """(k, 11) the internal variables at the end of a step of h [s] to x (n, 3)."""
+        return internal if self.laws is None else self.laws.flowed(x, internal, h)
+
     @cached_property
     def _parameters(self) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
         """Kind, mu and lam (m,) of each tet's own energy, which is zero where patches or laws have it."""
@@ -126,14 +134,13 @@ def elasticity_of(system: System) -> Elasticity:
 
 
 def _law_elasticity(system: System) -> LawElasticity | None:
-    elements, own = [], system.laws.material.region == NO_REGION
-    for part in (part.selected(own) for part in system.laws.material.laws):
-        if not len(part.rows):
-            continue
-        tets = np.ascontiguousarray(system.tets[part.rows])
-        B, volumes = np.ascontiguousarray(system.rest_shape_inverse[part.rows]), system.rest_volumes[part.rows]
-        elements.append(LawElements(part.law, part.rows, tets, B, volumes, part.parameters))
-    return LawElasticity(tuple(elements)) if elements else None
+    material = system.laws.material
+    own = material.region == NO_REGION
+    arrays = system.tets, system.rest_shape_inverse, system.rest_volumes
+    elastic = [LawElements.of(part.selected(own), *arrays) for part in material.elastic_laws]
+    flowing = [(LawElements.of(part, *arrays), part.flow, rows) for part, rows in material.flowing_laws]
+    elements = tuple(each for each in elastic if len(each.rows))
+    return LawElasticity(elements, tuple(flowing)) if elements or flowing else None
 
 
 @njit(cache=True, parallel=True, error_model="numpy")

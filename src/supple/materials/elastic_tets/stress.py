@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.edge_springs import cofactors
 from supple.materials.elastic_tets.laws import TetLaws
+from supple.materials.flows.internal import add_densities, add_piolas
 from supple.materials.isotropic import piolas
 from supple.materials.laws.pointwise import densities_at, piolas_at
 from supple.materials.patches.domains import Patches
@@ -25,7 +26,9 @@ from supple.numerics.threads import threads_for
 _SERIAL_TETS = 5_000
 
 
-def energy_densities(laws: TetLaws, x: NDArray[np.float64], F: NDArray[np.float64]) -> NDArray[np.float64]:
+def energy_densities(
+    laws: TetLaws, x: NDArray[np.float64], F: NDArray[np.float64], internal: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """(m,) strain energy per rest volume [J/m^3], zero at rest; NaN where a tet has no law.
 
     Their sum, weighted with rest volumes, is the elastic energy.
@@ -33,17 +36,21 @@ def energy_densities(laws: TetLaws, x: NDArray[np.float64], F: NDArray[np.float6
     Parameters
     ----------
     x : (n, 3) positions [m]; F : (m, 3, 3) deformation gradients of the tets at x
+    internal : (k, 11) internal variables of what flows, or (0, 11) where nothing has flowed, see `State`
     """
     out = densities_at(laws.material, F)
     if laws.patches is not None:
         out[laws.patches.rows] = tet_shares(laws.patches, x) / laws.patches.tet_volumes
+    add_densities(laws.material, F, internal, out)
     for springs in laws.springs:
         volumes = laws.volumes[springs.rows]
         out[springs.rows] = springs.energies(x, determinants(F[springs.rows]), volumes) / volumes
     return out
 
 
-def first_piolas(laws: TetLaws, x: NDArray[np.float64], F: NDArray[np.float64]) -> NDArray[np.float64]:
+def first_piolas(
+    laws: TetLaws, x: NDArray[np.float64], F: NDArray[np.float64], internal: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """(m, 3, 3) first Piola stress of the elastic forces [Pa], without viscous ones.
 
     NaN where a tet has no law, or holds something rigid. Parameters as of `energy_densities`.
@@ -51,6 +58,7 @@ def first_piolas(laws: TetLaws, x: NDArray[np.float64], F: NDArray[np.float64]) 
     out = piolas_at(laws.material, F)
     if laws.patches is not None:
         out[laws.patches.rows] = _of_patches(laws.patches, x, F[laws.patches.rows])
+    add_piolas(laws.material, F, internal, out)
     for springs in laws.springs:
         own = F[springs.rows]
         out[springs.rows] = springs.first_piolas(x, own, determinants(own), laws.volumes[springs.rows])

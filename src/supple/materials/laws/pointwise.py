@@ -1,4 +1,7 @@
-"""Energy densities, stresses and Hessians at given deformation gradients, of materials of any kind."""
+"""Energy densities, stresses and Hessians at given deformation gradients, of materials of any kind.
+
+What flows is not in them: see `supple.materials.flows.internal`.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,7 @@ def densities_at(material: TetMaterial, F: NDArray[np.float64]) -> NDArray[np.fl
     with threads_for(len(F), _SERIAL_TETS):
         densities(F, material.kind, material.mu, material.lam, out)
     out[material.kind == BY_LAW] = 0.0
-    for tets in material.laws:
+    for tets in material.elastic_laws:
         out[tets.rows] += tets.law.densities(F[tets.rows], tets.parameters)
     return out
 
@@ -29,7 +32,7 @@ def piolas_at(material: TetMaterial, F: NDArray[np.float64]) -> NDArray[np.float
     with threads_for(len(F), _SERIAL_TETS):
         piolas(F, material.kind, material.mu, material.lam, out)
     out[material.kind == BY_LAW] = 0.0
-    for tets in material.laws:
+    for tets in material.elastic_laws:
         out[tets.rows] += tets.law.models(F[tets.rows], tets.parameters, False, False)[1]
     return out
 
@@ -39,6 +42,6 @@ def hessians_at(material: TetMaterial, F: NDArray[np.float64], project: bool) ->
     out = np.empty((len(F), 9, 9))
     hessians(F, material.kind, material.mu, material.lam, project, out)
     out[material.kind == BY_LAW] = 0.0
-    for tets in material.laws:
+    for tets in material.elastic_laws:
         out[tets.rows] += tets.law.models(F[tets.rows], tets.parameters, True, project)[2]
     return out

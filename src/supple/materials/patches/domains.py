@@ -128,7 +128,7 @@ def patches_of(
         kind = np.where(by_law, np.int32(_SQUARED), kind)
         mu, lam = np.where(by_law, 0.0, mu), np.where(by_law, rest, lam)
     edges = _edge_patches(tets, Dm_inv, volumes, region, (kind, mu, lam - rest))
-    laws = tuple(_edge_law(part, rows, volumes, rest, edges.of_tet) for part in material.laws)
+    laws = tuple(_edge_law(part, rows, volumes, rest, edges.of_tet) for part in material.elastic_laws)
     edges = replace(edges, laws=tuple(part for part in laws if len(part.rows)))
     return Patches(rows, tets, Dm_inv, volumes, edges, _vertex_patches(tets, volumes, region, kind, rest))
 

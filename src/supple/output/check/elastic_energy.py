@@ -11,6 +11,7 @@ from supple.materials.kinds import needs_positive_volume
 from supple.materials.per_tet import BY_LAW, NO_REGION, LawTets, TetMaterial
 from supple.materials.tet_energies import element_energies
 from supple.numerics.threads import threads_for
+from supple.output.recording.physics import RecordedPhysics
 from supple.output.recording.reader import Recording
 
 _TETS_PER_THREAD = 5_000
@@ -22,17 +23,19 @@ def elastic_energy(
     x: NDArray[np.float64],
     J: NDArray[np.float64],
     rest_inverse: NDArray[np.float64],
+    internal: NDArray[np.float64],
 ) -> float | None:
     """[J], zero at rest; None where the recording does not contain the law of a body.
 
     Parameters
     ----------
     x : (n, 3) positions [m]; J : (m,) determinants of F; rest_inverse : (m, 3, 3) Dm^-1 [1/m]
+    internal : (k, 11) internal variables of the frame, see `State`
     """
     physics = recording.physics
     if physics is None:
         return None
-    total = 0.0
+    total = _flowing(physics, _gradients(x, recording.tets, rest_inverse), recording.rest_volumes, internal)
     for k, body in enumerate(recording.bodies):
         if not physics.knows_law(k, body.tets):
             return None
@@ -44,7 +47,7 @@ def elastic_energy(
             laws = physics.tet_kinds[body.tets], physics.mu[body.tets], physics.lam[body.tets]
             with threads_for(len(tets), _TETS_PER_THREAD):
                 element_energies(x, tets, rest_inverse[body.tets], volumes, *laws, out)
-            own = [_of_body(part, body.tets) for part in physics.laws]
+            own = [_of_body(part, body.tets) for part in physics.laws if part.flow is None]
             out[laws[0] == BY_LAW] = 0.0
             F = _gradients(x, tets, rest_inverse[body.tets])
             for part in own:
@@ -71,6 +74,17 @@ def _gradients(x, tets, rest_inverse):
     """(m, 3, 3) F of tets."""
     x_of = x[tets]
     return np.einsum("eki,ekj->eij", x_of[:, 1:] - x_of[:, :1], rest_inverse)
+
+
+def _flowing(physics: RecordedPhysics, F, volumes, internal) -> float:
+    """The energy of what is left of F after flow, F F_i^-1."""
+    total, begin = 0.0, 0
+    for part in physics.laws:
+        if part.flow is not None:
+            inverse = internal[begin : begin + len(part.rows), :9].reshape(-1, 3, 3)
+            total += float(volumes[part.rows] @ part.law.densities(F[part.rows] @ inverse, part.parameters))
+            begin += len(part.rows)
+    return total
 
 
 def _of_body(part: LawTets, tets: slice) -> LawTets:

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.edges_and_volume import EdgesAndVolume
+from supple.materials.flows.internal import count_of
+from supple.materials.flows.registry import RECORDED_FLOWS
 from supple.materials.laws.registry import RECORDED_LAWS
 from supple.materials.material import Hyperelastic
 from supple.materials.per_tet import BY_LAW, NO_REGION, NOT_ELASTIC, LawTets
@@ -35,6 +37,7 @@ class RecordedPhysics:
     region : (m,) the region over whose patches the energy of a tet is averaged, or `NO_REGION`
     kind : (m,) row of `registry.ELASTIC_MATERIALS` of each tet, `GIVEN_BY_LAW` or `NOT_KNOWN`; mu, lam : (m,) [Pa]
     laws : whose energies are added to those of `kind`
+    internal : number of rows of internal variables of a frame
     compliances : for each body those of its edges [m/N] and volumes [m^5/N], or None for a body of another law
     forces, soft_targets, scripted_pins, stitches : numbers of them in the scene
     """
@@ -49,6 +52,7 @@ class RecordedPhysics:
     stitches: int
     region: NDArray[np.int32]
     laws: tuple[LawTets, ...] = ()
+    internal: int = 0
 
     @property
     def tet_kinds(self) -> NDArray[np.int32]:
@@ -92,6 +96,8 @@ def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
     return {
         "laws": [law.__name__ for law in ELASTIC_MATERIALS],
         "by_law": [tets.law.name for tets in known],
+        "flows": [None if tets.flow is None else tets.flow.name for tets in known],
+        "internal": count_of(system.laws.material),
         "compliances": compliances,
         "forces": len(system.loads),
         "soft_targets": len(system.soft_targets),
@@ -124,6 +130,8 @@ def read_physics(file: CheckedFile, header: dict[str, Any], m: int) -> RecordedP
         counts = [int(physics[key]) for key in ("forces", "soft_targets", "scripted_pins", "stitches")]
         laws = [str(law) for law in physics["laws"]]
         names = [str(name) for name in physics.get("by_law", [])]
+        flows = list(physics.get("flows", [None] * len(names)))
+        internal = int(physics.get("internal", 0))
         compliances = tuple(
             None if pair is None else (float(pair[0]), float(pair[1])) for pair in physics["compliances"]
         )
@@ -142,14 +150,20 @@ def read_physics(file: CheckedFile, header: dict[str, Any], m: int) -> RecordedP
     if physics.get("patches", False):
         region = file.array(f"{_GROUP}/region", "i", (m,)).astype(np.int32)
     known = []
-    for k, name in enumerate(names):
+    for k, (name, flow) in enumerate(zip(names, flows, strict=False)):
         tets = file.indices(f"{_GROUP}/law_{k}/rows", 1, m)[:, 0].astype(np.int64)
         parameters = file.array(f"{_GROUP}/law_{k}/parameters", "f", (len(tets), None))
-        if name in RECORDED_LAWS and parameters.shape[1] in RECORDED_LAWS[name].counts:
-            known.append(LawTets(RECORDED_LAWS[name], tets, np.ascontiguousarray(parameters)))
+        if flow is not None and flow not in RECORDED_FLOWS:
+            raise file.newer(f"a material flows by a law {flow!r} that this version does not know")
+        law = RECORDED_LAWS.get(name)
+        if law is not None and parameters.shape[1] in law.counts:
+            parameters = np.ascontiguousarray(parameters)
+            known.append(LawTets(law, tets, parameters, None if flow is None else RECORDED_FLOWS[flow]))
         else:
             kind[tets] = NOT_KNOWN
-    return RecordedPhysics(kind, mu, lam, compliances, *counts, region=region, laws=tuple(known))
+    if internal != sum(len(tets.rows) for tets in known if tets.flow is not None):
+        raise file.broken("its number of internal variables is not that of its materials")
+    return RecordedPhysics(kind, mu, lam, compliances, *counts, region=region, laws=tuple(known), internal=internal)
 
 
 def read_untouching(file: CheckedFile, header: dict[str, Any]) -> tuple[tuple[int, int], ...]:

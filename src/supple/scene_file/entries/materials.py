@@ -14,6 +14,8 @@ from supple.materials.hyperelastic.holzapfel_gasser_ogden import HolzapfelGasser
 from supple.materials.hyperelastic.mooney_rivlin import MooneyRivlin
 from supple.materials.hyperelastic.ogden import Ogden
 from supple.materials.hyperelastic.yeoh import Yeoh
+from supple.materials.inelastic.j2_plastic import J2Plastic
+from supple.materials.inelastic.viscoelastic import Viscoelastic
 from supple.materials.material import Elastic, Hyperelastic, Material
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.scene_file.model import Model, NonNegative, Number, Positive, Vector
@@ -106,6 +108,21 @@ class HolzapfelGasserOgdenModel(_ByLawModel):
     )
 
 
+class J2PlasticModel(_MaterialModel):
+    """A metal that yields: J2 plasticity at finite strain (Implicit only)."""
+
+    kind: Literal["j2_plastic"]
+    youngs: Positive = Field(description="Young's modulus [Pa]")
+    poisson: float = Field(gt=-1.0, lt=0.5, description="Poisson's ratio, above -1 and below 0.5")
+    yield_stress: Positive = Field(description="at first yield [Pa]")
+    hardening: NonNegative = Field(default=0.0, description="linear hardening [Pa]")
+    saturation_stress: Positive | None = Field(default=None, description="at least yield_stress [Pa]; null: as that")
+    saturation_rate: NonNegative = Field(default=0.0, description="of the exponential hardening")
+
+    def build(self) -> Hyperelastic:
+        return J2Plastic(**self.model_dump(exclude={"kind"}))
+
+
 BY_LAW_KINDS: dict[str, type[ByLaw]] = {
     "mooney_rivlin": MooneyRivlin,
     "yeoh": Yeoh,
@@ -131,11 +148,38 @@ def _elastic_model(kind: str) -> type[ElasticModel]:
 
 
 if TYPE_CHECKING:
-    ElasticMaterialModel = ElasticModel | _ByLawModel
-    MaterialModel = EdgesAndVolumeModel | ElasticModel | _ByLawModel
+    UnrelaxedModel = ElasticModel | _ByLawModel
 else:
     # Built from lists of models.
-    _BY_LAW = (MooneyRivlinModel, YeohModel, OgdenModel, HolzapfelGasserOgdenModel)
-    _ELASTIC = (*(_elastic_model(kind) for kind in ELASTIC_KINDS), *_BY_LAW)
+    _UNRELAXED = (
+        *(_elastic_model(kind) for kind in ELASTIC_KINDS),
+        MooneyRivlinModel,
+        YeohModel,
+        OgdenModel,
+        HolzapfelGasserOgdenModel,
+    )
+    UnrelaxedModel = Annotated[Union[_UNRELAXED], Field(discriminator="kind")]  # noqa: UP007
+
+
+class ViscoelasticModel(Model):
+    """A hyperelastic material whose stress relaxes as a Prony series (Implicit only)."""
+
+    kind: Literal["viscoelastic"]
+    material: UnrelaxedModel = Field(
+        description="hyperelastic, with density and damping: what is left after a long time"
+    )
+    prony: list[Annotated[list[Positive], Field(min_length=2, max_length=2)]] = Field(
+        min_length=1, max_length=20, description="pairs: share of the shear modulus at once, and time [s]"
+    )
+
+    def build(self) -> Hyperelastic:
+        return Viscoelastic(material=self.material.build(), prony=[(share, time) for share, time in self.prony])
+
+
+if TYPE_CHECKING:
+    ElasticMaterialModel = ElasticModel | _ByLawModel | J2PlasticModel | ViscoelasticModel
+    MaterialModel = EdgesAndVolumeModel | ElasticModel | _ByLawModel | J2PlasticModel | ViscoelasticModel
+else:
+    _ELASTIC = (*_UNRELAXED, J2PlasticModel, ViscoelasticModel)
     ElasticMaterialModel = Annotated[Union[_ELASTIC], Field(discriminator="kind")]  # noqa: UP007
     MaterialModel = Annotated[Union[(EdgesAndVolumeModel, *_ELASTIC)], Field(discriminator="kind")]
