@@ -18,6 +18,8 @@ DOCS = Path(__file__).parents[1] / "docs"
         "locking.md",
         "rigid_bodies.md",
         "rubber.md",
+        "flow.md",
+        "own_materials.md",
     ],
 )
 def test_the_programs_of_a_page_run(page, tmp_path, monkeypatch):

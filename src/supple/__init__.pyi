@@ -24,6 +24,7 @@ from .materials.hyperelastic.yeoh import Yeoh as Yeoh
 from .materials.inelastic.j2_plastic import J2Plastic as J2Plastic
 from .materials.inelastic.viscoelastic import Viscoelastic as Viscoelastic
 from .materials.neo_hookean import NeoHookean as NeoHookean
+from .materials.own.energy_material import EnergyMaterial as EnergyMaterial
 from .materials.regions import Regions as Regions
 from .materials.st_venant_kirchhoff import StVenantKirchhoff as StVenantKirchhoff
 from .materials.stable_neo_hookean import StableNeoHookean as StableNeoHookean

@@ -48,12 +48,12 @@ def test_confidence_intervals_contain_the_truth_as_often_as_they_say():
     rng = np.random.default_rng(5)
     exact = mooney_stress(2e5, 3e4, STRETCH, "uniaxial")
     inside = np.zeros(2)
-    for _ in range(200):
+    for _ in range(80):
         noisy = exact + rng.normal(0, 5e3, len(exact))
         fit = sp.fit_material(sp.MooneyRivlin, np.column_stack([STRETCH, noisy]), confidence=0.9)
         inside += (fit.intervals[:, 0] < [2e5, 3e4]) & (fit.intervals[:, 1] > [2e5, 3e4])
     # Three standard deviations of a binomial distribution.
-    np.testing.assert_allclose(inside / 200, 0.9, atol=3 * np.sqrt(0.09 / 200))
+    np.testing.assert_allclose(inside / 80, 0.9, atol=3 * np.sqrt(0.09 / 80))
 
 
 def test_treloars_rubber(tmp_path, capsys):

@@ -47,11 +47,18 @@ def fit(
     from supple.materials.fitting.fit import fit_material
     from supple.scene_file.entries.materials import BY_LAW_KINDS, scene_file_line
 
-    tests = {"uniaxial": uniaxial, "equibiaxial": equibiaxial, "pure_shear": pure_shear}
     if output is not None:
-        for path in (path for paths in tests.values() for path in paths or []):
+        for path in (*(uniaxial or ()), *(equibiaxial or ()), *(pure_shear or ())):
             refuse_to_replace(path, output)
-    found = fit_material(BY_LAW_KINDS[kind], **tests, terms=terms, bulk=bulk, stress_unit=_UNITS[unit])
+    found = fit_material(
+        BY_LAW_KINDS[kind],
+        uniaxial,
+        equibiaxial=equibiaxial,
+        pure_shear=pure_shear,
+        terms=terms,
+        bulk=bulk,
+        stress_unit=_UNITS[unit],
+    )
     print(found)
     print(f"material: {scene_file_line(found.material)}")
     if output is not None:

@@ -138,7 +138,11 @@ def _law_elasticity(system: System) -> LawElasticity | None:
     own = material.region == NO_REGION
     arrays = system.tets, system.rest_shape_inverse, system.rest_volumes
     elastic = [LawElements.of(part.selected(own), *arrays) for part in material.elastic_laws]
-    flowing = [(LawElements.of(part, *arrays), part.flow, rows) for part, rows in material.flowing_laws]
+    flowing = [
+        (LawElements.of(part, *arrays), part.flow, rows)
+        for part, rows in material.flowing_laws
+        if part.flow is not None
+    ]
     elements = tuple(each for each in elastic if len(each.rows))
     return LawElasticity(elements, tuple(flowing)) if elements or flowing else None
 

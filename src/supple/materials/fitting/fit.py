@@ -15,6 +15,7 @@ from supple.materials.fitting.curves import MODES, Curve, nominal_stresses, read
 from supple.materials.fitting.families import Family, family_of
 from supple.materials.fitting.picture import draw_fit
 from supple.materials.hyperelastic.by_law import ByLaw
+from supple.materials.laws.isotropic_law import IsotropicLaw
 from supple.numerics.threads import threads_for
 
 Source = str | Path | ArrayLike
@@ -66,7 +67,9 @@ class MaterialFit:
     def stresses(self, stretch: ArrayLike, mode: str = "uniaxial") -> NDArray[np.float64]:
         """(k,) nominal stresses of the material at stretches (k,) [Pa], its volume being kept."""
         row = np.array([float(np.asarray(value)) for _, value in self.material.law_parameters()])
-        return nominal_stresses(self.material.law(), row, np.asarray(stretch, dtype=np.float64), mode)
+        law = self.material.law()
+        assert isinstance(law, IsotropicLaw)
+        return nominal_stresses(law, row, np.asarray(stretch, dtype=np.float64), mode)
 
 
 def fit_material(

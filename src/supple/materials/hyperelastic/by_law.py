@@ -35,7 +35,7 @@ class ByLaw(Hyperelastic):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._require_finite("bulk", positive=True, unit="Pa")
+        self._check_bulk()
         self._check()
         self._check_integration()
         mu = np.atleast_1d(self.rest_moduli()[0])
@@ -44,6 +44,9 @@ class ByLaw(Hyperelastic):
                 f"{type(self).__name__}: the shear modulus at rest, {self.shear_formula}, is "
                 f"{mu[~(mu > 0.0)][0]:g} Pa; give parameters with which it is above zero"
             )
+
+    def _check_bulk(self) -> None:
+        self._require_finite("bulk", positive=True, unit="Pa")
 
     def _check_integration(self) -> None:
         name = type(self).__name__

@@ -48,17 +48,14 @@ class Viscoelastic(Hyperelastic):
         for key in ("density", "damping"):
             object.__setattr__(self, key, getattr(self.material, key))
         super().__post_init__()
-        try:
-            pairs = np.asarray(self.prony, dtype=np.float64)
-        except (TypeError, ValueError):
-            pairs = np.zeros(0)
+        pairs = _numbers(self.prony)
         if pairs.ndim != 2 or pairs.shape[1] != 2:
             raise SceneError("Viscoelastic: prony is no list of pairs (share of the shear modulus, time [s])")
         if not (np.isfinite(pairs) & (pairs > 0.0)).all():
             raise SceneError("Viscoelastic: prony has a share or a time that is not above zero and finite")
         if not pairs[:, 0].sum() < 1.0:
             raise SceneError(f"Viscoelastic: the shares of prony add up to {pairs[:, 0].sum():g}; it must be below 1")
-        object.__setattr__(self, "prony", tuple(map(tuple, pairs.tolist())))
+        object.__setattr__(self, "prony", tuple((share, time) for share, time in pairs.tolist()))
 
     @property
     def integration(self) -> str:
@@ -81,3 +78,10 @@ class Viscoelastic(Hyperelastic):
         rows, zero = np.arange(n_tets), np.zeros(n_tets)
         elements = (np.column_stack([zero, g * at_once, np.full(n_tets, time)]) for g, time in self.prony)
         return basis.with_laws(*(LawTets(MAXWELL, rows, p, MAXWELL_FLOW) for p in elements))
+
+
+def _numbers(value: object) -> NDArray[np.float64]:
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        return np.zeros(0)

@@ -39,19 +39,22 @@ def log_strains(s):
 
 
 @njit(error_model="numpy")
-def exp_remainder(x):
-    """e^x - 1 - x, accurate near 0."""
+def exp_remainder(x, grown):
+    """e^x - 1 - x, accurate near 0, from x and `grown` = e^x - 1."""
     if abs(x) > 0.1:
-        return math.expm1(x) - x
+        return grown - x
     inner = 1.0 + x / 7.0 * (1.0 + x / 8.0 * (1.0 + x / 9.0))
     return 0.5 * x * x * (1.0 + x / 3.0 * (1.0 + x / 4.0 * (1.0 + x / 5.0 * (1.0 + x / 6.0 * inner))))
 
 
 @njit(error_model="numpy")
-def exp_quotient(x, y):
-    """(e^x - e^y) / (x - y)."""
+def exp_quotient(x, y, grown_x, grown_y):
+    """(e^x - e^y) / (x - y), from x, y and `grown` = e^x - 1 of both."""
     z = x - y
-    return math.exp(y) * (1.0 + 0.5 * z * (1.0 + z / 3.0) if abs(z) < 1e-5 else math.expm1(z) / z)
+    if abs(z) > 0.02:
+        return (grown_x - grown_y) / z
+    inner = 1.0 + z / 5.0 * (1.0 + z / 6.0 * (1.0 + z / 7.0))
+    return (grown_y + 1.0) * (1.0 + 0.5 * z * (1.0 + z / 3.0 * (1.0 + 0.25 * z * inner)))
 
 
 @njit(error_model="numpy")

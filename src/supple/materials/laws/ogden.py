@@ -33,17 +33,19 @@ def _energy(s, p):
     psi = x0 = x1 = x2 = g0 = g1 = g2 = b0 = b1 = b2 = 0.0
     for k in range(1, len(p), 2):
         mu, a = p[k], p[k + 1]
-        psi += mu / a * (exp_remainder(a * e0) + exp_remainder(a * e1) + exp_remainder(a * e2))
+        f0, f1, f2 = a * e0, a * e1, a * e2
+        y0, y1, y2 = math.expm1(f0), math.expm1(f1), math.expm1(f2)
+        psi += mu / a * (exp_remainder(f0, y0) + exp_remainder(f1, y1) + exp_remainder(f2, y2))
         # The stress less mu, which all three would have in common.
-        x0 += mu * math.expm1(a * e0)
-        x1 += mu * math.expm1(a * e1)
-        x2 += mu * math.expm1(a * e2)
-        g0 += mu * a * math.exp(a * e0)
-        g1 += mu * a * math.exp(a * e1)
-        g2 += mu * a * math.exp(a * e2)
-        b0 += mu * a * exp_quotient(a * e1, a * e2)
-        b1 += mu * a * exp_quotient(a * e0, a * e2)
-        b2 += mu * a * exp_quotient(a * e0, a * e1)
+        x0 += mu * y0
+        x1 += mu * y1
+        x2 += mu * y2
+        g0 += mu * a * (y0 + 1.0)
+        g1 += mu * a * (y1 + 1.0)
+        g2 += mu * a * (y2 + 1.0)
+        b0 += mu * a * exp_quotient(f1, f2, y1, y2)
+        b1 += mu * a * exp_quotient(f0, f2, y0, y2)
+        b2 += mu * a * exp_quotient(f0, f1, y0, y1)
     psi, tau, c = with_squared_volume_change(s, psi, (x0, x1, x2), (g0, g1, g2, 0.0, 0.0, 0.0), p[0])
     return psi, tau, c, (b0, b1, b2)
 

@@ -25,13 +25,14 @@ def _energy(s, p):
     """p : K, c10, c20, c30."""
     e, mean = log_strains(s)
     x, y, z = 2.0 * (e[0] - mean), 2.0 * (e[1] - mean), 2.0 * (e[2] - mean)
-    i = exp_remainder(x) + exp_remainder(y) + exp_remainder(z)
+    f, g, h = math.expm1(x), math.expm1(y), math.expm1(z)
+    i = exp_remainder(x, f) + exp_remainder(y, g) + exp_remainder(z, h)
     psi = i * (p[1] + i * (p[2] + i * p[3]))
     first = p[1] + i * (2.0 * p[2] + 3.0 * i * p[3])
     second = 2.0 * p[2] + 6.0 * i * p[3]
-    u, v, w = 2.0 * math.exp(x), 2.0 * math.exp(y), 2.0 * math.exp(z)
-    beta = (2.0 * first * math.expm1(x), 2.0 * first * math.expm1(y), 2.0 * first * math.expm1(z))
-    g = (
+    u, v, w = 2.0 * f + 2.0, 2.0 * g + 2.0, 2.0 * h + 2.0
+    beta = (2.0 * first * f, 2.0 * first * g, 2.0 * first * h)
+    tangent = (
         2.0 * first * u + second * u * u,
         2.0 * first * v + second * v * v,
         2.0 * first * w + second * w * w,
@@ -40,11 +41,11 @@ def _energy(s, p):
         second * u * v,
     )
     quotients = (
-        4.0 * first * exp_quotient(y, z),
-        4.0 * first * exp_quotient(x, z),
-        4.0 * first * exp_quotient(x, y),
+        4.0 * first * exp_quotient(y, z, g, h),
+        4.0 * first * exp_quotient(x, z, f, h),
+        4.0 * first * exp_quotient(x, y, f, g),
     )
-    psi, tau, c = with_squared_volume_change(s, psi, beta, g, p[0])
+    psi, tau, c = with_squared_volume_change(s, psi, beta, tangent, p[0])
     return psi, tau, c, quotients
 
 

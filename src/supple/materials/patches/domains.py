@@ -140,7 +140,8 @@ def _edge_law(part: LawTets, rows, volumes, rest, of_tet) -> LawTets:
     p = part.parameters[inside].copy()
     p[:, part.law.bulk] -= rest[tets]
     shares, patch = np.repeat(volumes[tets] / 6.0, 6), of_tet[tets].ravel()
-    numbers, patch = np.unique(patch, return_inverse=True)
+    numbers, inverse = np.unique(patch, return_inverse=True)
+    patch = inverse.astype(np.int32)
     means = [_means(patch, shares, np.repeat(column, 6)) for column in p.T] if len(tets) else []
     return part.of(numbers, np.column_stack(means) if means else p)
 
