@@ -14,8 +14,17 @@ from .learning.batch import Batch as Batch
 from .learning.batch import BatchSnapshot as BatchSnapshot
 from .materials.arap import ARAP as ARAP
 from .materials.edges_and_volume import EdgesAndVolume as EdgesAndVolume
+from .materials.fitting.fit import MaterialFit as MaterialFit
+from .materials.fitting.fit import fit_material as fit_material
 from .materials.fixed_corotated import FixedCorotated as FixedCorotated
+from .materials.hyperelastic.holzapfel_gasser_ogden import HolzapfelGasserOgden as HolzapfelGasserOgden
+from .materials.hyperelastic.mooney_rivlin import MooneyRivlin as MooneyRivlin
+from .materials.hyperelastic.ogden import Ogden as Ogden
+from .materials.hyperelastic.yeoh import Yeoh as Yeoh
+from .materials.inelastic.j2_plastic import J2Plastic as J2Plastic
+from .materials.inelastic.viscoelastic import Viscoelastic as Viscoelastic
 from .materials.neo_hookean import NeoHookean as NeoHookean
+from .materials.own.energy_material import EnergyMaterial as EnergyMaterial
 from .materials.regions import Regions as Regions
 from .materials.st_venant_kirchhoff import StVenantKirchhoff as StVenantKirchhoff
 from .materials.stable_neo_hookean import StableNeoHookean as StableNeoHookean

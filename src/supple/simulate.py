@@ -16,8 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.displayed import DisplayedReport, supplied
 from supple.errors import SceneError, SolverError
-from supple.materials.elastic_tets.laws import TetLaws
+from supple.materials.elastic_tets.laws import TetLaws, joined_materials
 from supple.materials.elastic_tets.stress import energy_densities
+from supple.materials.flows.internal import checked
 from supple.numerics.deformation import deformation_gradients, determinants
 from supple.numerics.memory import require_memory
 from supple.readings.frame_readings import FrameReadings
@@ -133,6 +134,10 @@ class Frame(FrameReadings):
     @property
     def _laws(self) -> TetLaws:
         return self.system.laws
+
+    @property
+    def _internal(self) -> NDArray[np.float64]:
+        return self.state.internal
 
     @property
     def _bodies(self) -> tuple[BodyRange, ...]:
@@ -260,7 +265,7 @@ def first_frame(scene: Scene, start: StartFrame | State, solver: Solver | None =
         raise SceneError(
             f"simulate: start has {len(state.positions)} vertices, the scene has {count}; give one of this scene"
         )
-    state = _with_inputs(scene, state)
+    state = _with_inputs(scene, _with_internal(scene, state))
     # A frame of this scene has the pins' anchors; computing them again would give them only up to round-off.
     if isinstance(start, Frame) and start.system.scene is scene:
         system = start.system
@@ -276,6 +281,12 @@ def start_frame(system: System, state: State, index: int, solver: Solver | None)
     """A frame without a step that led to it."""
     report = completed_report(system, state, StepReport(Status.CONVERGED, 0), 0.0)
     return Frame(index, state, system, report, solver=solver)
+
+
+def _with_internal(scene: Scene, state: State) -> State:
+    """The state with the internal variables of the scene's materials, at rest where it has none."""
+    material = joined_materials([body.material.per_tet(len(body.mesh.tets)) for body in scene.bodies])
+    return replace(state, internal=checked(material, state.internal)) if material.flowing_laws else state
 
 
 def _with_inputs(scene: Scene, state: State) -> State:
@@ -384,7 +395,7 @@ def measure(system: System, state: State) -> Diagnostics:
     return Diagnostics(
         min_det_F=float(determinants(F).min()),
         kinetic_energy=0.5 * float(m @ np.einsum("ij,ij->i", v, v)),
-        elastic_energy=float((energy_densities(laws, x, F) * laws.volumes)[laws.known].sum()),
+        elastic_energy=float((energy_densities(laws, x, F, state.internal) * laws.volumes)[laws.known].sum()),
         potential_energy=-float((m @ x) @ system.gravity),
         stitch_energy=stitch_energy(stitching, points) if len(stitching) else 0.0,
         largest_stitch_stretch=largest_stitch_stretch(stitching, points) if len(stitching) else None,

@@ -126,6 +126,9 @@ class State:
     positions, velocities : (n_vertices, 3) float64 [m], [m/s]
     memory : what a solver must know of earlier steps (BDF2, contact of XPBD); None for a state that comes from outside.
     inputs : values of the scene's inputs at that time, by name, see `supple.scene.inputs`
+    internal : (k, 11) internal variables of materials that flow, in the order of the bodies and of their laws: of each
+        tet and law F_i^-1 of F = F_e F_i (nine numbers), a measure of all flow so far, and the energy dissipated per
+        rest volume [J/m^3]. (0, 11) where nothing flows, or has flowed.
     """
 
     time: float
@@ -133,6 +136,7 @@ class State:
     velocities: NDArray[np.float64]
     memory: Any = None
     inputs: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    internal: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 11)))
 
 
 @dataclass(frozen=True, eq=False)

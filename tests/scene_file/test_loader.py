@@ -186,6 +186,42 @@ def test_every_elastic_material_has_a_kind(load):
         assert type(run.scene.bodies[0].material) is material
 
 
+@pytest.mark.parametrize(
+    ("text", "exact"),
+    [
+        ("kind: mooney_rivlin, c10: 1e5, c01: 2e4, bulk: 1e7, integration: patches", sp.MooneyRivlin),
+        ("kind: yeoh, c10: 1e5, c20: -1e3, bulk: 1e7", sp.Yeoh),
+        ("kind: ogden, mu: [6e5, -1e4], alpha: [1.3, -2], bulk: 1e7, damping: 0.1", sp.Ogden),
+    ],
+)
+def test_rubber(load, text, exact):
+    run = load(
+        f"bodies:\n  - name: block\n    shape: {{kind: box}}\n    material: {{{text}}}\nsolver: {{kind: implicit}}\n"
+    )
+    material = run.scene.bodies[0].material
+    assert type(material) is exact
+    given = dict(pair.split(": ") for pair in re.split(r", (?=[a-z])", text))
+    for key in given.keys() - {"kind", "integration"}:
+        np.testing.assert_allclose(getattr(material, key), json.loads(given[key]))
+    with pytest.raises(sp.SceneError, match=r"bodies\[0\].material.*: the key `bulk` is missing"):
+        load("bodies:\n  - name: block\n    shape: {kind: box}\n    material: {kind: yeoh, c10: 1e5}\n")
+
+
+def test_materials_that_flow(load):
+    run = load(
+        "bodies:\n"
+        "  - name: slow\n    shape: {kind: box}\n    material: {kind: viscoelastic, prony: [[0.3, 0.1], [0.2, 1]], "
+        "material: {kind: yeoh, c10: 1e5, bulk: 1e7, density: 900}}\n"
+        "  - name: metal\n    shape: {kind: box}\n    material: {kind: j2_plastic, youngs: 2e11, poisson: 0.3, "
+        "yield_stress: 2e8, hardening: 1e9}\n    position: [3, 0, 0]\nsolver: {kind: implicit}\n"
+    )
+    slow, metal = (body.material for body in run.scene.bodies)
+    assert isinstance(slow, sp.Viscoelastic)
+    assert (slow.prony, slow.density, type(slow.material)) == (((0.3, 0.1), (0.2, 1.0)), 900.0, sp.Yeoh)
+    assert isinstance(metal, sp.J2Plastic)
+    assert (metal.yield_stress, metal.saturation_stress, metal.hardening) == (2e8, 2e8, 1e9)
+
+
 def test_the_schema_is_valid_and_accepts_what_the_loader_accepts(load, tmp_path):
     schema = json_schema()
     Draft202012Validator.check_schema(schema)

@@ -44,6 +44,7 @@ COMMANDS = {
     "export": "supple.cli.commands.export:export",
     "check": "supple.cli.commands.check:check",
     "plot": "supple.cli.commands.plot:plot",
+    "fit": "supple.cli.commands.fit:fit",
     "table": "supple.cli.commands.table:table",
     "schema": "supple.cli.commands.schema:schema",
     "info": "supple.cli.commands.info:info",

@@ -32,6 +32,7 @@ from supple.implicit.stepping.substep import StepSettings, Substep, take_substep
 from supple.implicit.stepping.substepping import Substepping
 from supple.implicit.stepping.workspace import Workspace
 from supple.implicit.timings import PARTS
+from supple.materials.flows.internal import checked
 from supple.materials.per_tet import NO_REGION
 from supple.numerics.noninverting_step import KEEP
 from supple.numerics.threads import threads_for
@@ -146,6 +147,11 @@ class Implicit(Solver):
                 "or remove them"
             )
         method = integrator_of(self.integrator)
+        if method.name == "newmark" and system.laws.material.flowing_laws:
+            raise SolverError(
+                "Implicit: integrator='newmark' cannot simulate Viscoelastic and J2Plastic, which flow to the end of a "
+                "step; use 'backward_euler', 'bdf2' or 'static'"
+            )
         free_motion = FreeMotion.of(system)
         if isinstance(method, Static) and len(free_motion.totals):
             body = next(part for part in system.bodies if free_motion.piece[part.vertices].max() >= 0)
@@ -209,6 +215,7 @@ class Implicit(Solver):
         workspace.tools.clock.restart()
         if state.positions is not workspace.checked:
             self.check(system, state, workspace)
+        state = replace(state, internal=checked(system.laws.material, state.internal))
         n = len(state.positions)
         state = workspace.with_obstacles(state)
         substepping = Substepping.of(

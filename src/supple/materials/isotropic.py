@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.kinds import STRETCH_ENERGIES
-from supple.materials.per_tet import TetMaterial
+from supple.materials.per_tet import BY_LAW, TetMaterial
 from supple.materials.stretch_energies.stretches import UNKNOWN_ONE, UNKNOWN_SIX, UNKNOWN_THREE, dispatch
 from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed, store_mat, symmetric_eigen
@@ -172,4 +172,5 @@ def rest_lame_parameters(material: TetMaterial) -> tuple[NDArray[np.float64], ND
     """mu_L and lam_L (m,) of every tet's own linearization at rest [Pa]."""
     mu, lam = np.empty_like(material.mu), np.empty_like(material.lam)
     _rest_moduli(material.kind, material.mu, material.lam, mu, lam)
-    return mu, lam
+    by_law = material.kind == BY_LAW
+    return np.where(by_law, material.mu, mu), np.where(by_law, material.lam, lam)

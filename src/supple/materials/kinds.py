@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.materials.per_tet import TetMaterial
 from supple.materials.stretch_energies import (
     arap,
     fixed_corotated,
@@ -30,3 +31,20 @@ def needs_positive_volume(kind: NDArray[np.int32]) -> NDArray[np.bool_]:
     """(m,) whether the energy of each tet's material is infinite for J <= 0, from its kind (m,)."""
     wanted = [k for k, energy in enumerate(STRETCH_ENERGIES) if energy.needs_positive_volume]
     return np.isin(kind, wanted)
+
+
+def without_inversion(material: TetMaterial) -> NDArray[np.bool_]:
+    """(m,) whether a tet has no energy for J <= 0."""
+    refused = needs_positive_volume(material.kind)
+    for tets in material.laws:
+        refused[tets.rows] = True
+    return refused
+
+
+def infinite_when_flat(material: TetMaterial) -> NDArray[np.bool_]:
+    """(m,) whether the energy of a tet goes to infinity wherever J goes to zero."""
+    infinite = needs_positive_volume(material.kind)
+    for tets in material.laws:
+        if tets.law.infinite_when_flat:
+            infinite[tets.rows] = True
+    return infinite

@@ -5,18 +5,18 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.materials.isotropic import densities, hessians, piolas
+from supple.materials.flows.internal import add_resting_densities, add_resting_hessians, add_resting_piolas
 from supple.materials.kinds import STRETCH_ENERGIES
 from supple.materials.lame import lame_from_engineering
+from supple.materials.laws.pointwise import densities_at, hessians_at, piolas_at
 from supple.materials.per_tet import NO_REGION, TetMaterial, one_per_tet
 from supple.materials.stretch_energies.stretches import StretchFunctions, no_volume_term
-from supple.numerics.threads import threads_for
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -42,6 +42,16 @@ class Material(ABC):
         self._require_finite("damping", positive=False, unit="s")
 
     def _require_finite(self, field: str, *, positive: bool, unit: str) -> None:
+        values = self._values(field, unit)
+        low = values <= 0.0 if positive else values < 0.0
+        must = "above zero" if positive else "zero or more"
+        self._refuse(field, values, low, f"it must be finite and {must} [{unit}]")
+
+    def _require_number(self, field: str, unit: str) -> None:
+        values = self._values(field, unit)
+        self._refuse(field, values, np.zeros(values.shape, dtype=np.bool_), f"it must be finite [{unit}]")
+
+    def _values(self, field: str, unit: str) -> NDArray[np.float64]:
         value = getattr(self, field)
         kind = type(self).__name__
         try:
@@ -50,13 +60,14 @@ class Material(ABC):
             raise SceneError(f"{kind}: {field} is {value!r}; give a number in {unit}") from None
         if values.ndim > 1:
             raise SceneError(f"{kind}: {field} has shape {values.shape}; give one number, or one per tetrahedron")
-        low = values <= 0.0 if positive else values < 0.0
+        return values
+
+    def _refuse(self, field: str, values: NDArray[np.float64], low: NDArray[np.bool_], must: str) -> None:
         bad = ~np.isfinite(values) | low
         if bad.any():
             first = values.reshape(-1)[np.flatnonzero(bad.reshape(-1))[0]]
             at = f" (tet {np.flatnonzero(bad)[0]})" if values.ndim else ""
-            must = "above zero" if positive else "zero or more"
-            raise SceneError(f"{kind}: {field} is {first:g}{at}; it must be finite and {must} [{unit}]")
+            raise SceneError(f"{type(self).__name__}: {field} is {first:g}{at}; {must}")
 
     @abstractmethod
     def per_tet(self, n_tets: int) -> TetMaterial:
@@ -86,7 +97,82 @@ class Material(ABC):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Elastic(Material):
+class Hyperelastic(Material):
+    """Base of the materials with an energy per rest volume, of which stresses are the derivative.
+
+    Attributes
+    ----------
+    youngs, poisson : Young's modulus [Pa] and Poisson's ratio [-] of small strains; one number, or one per tet
+    """
+
+    if TYPE_CHECKING:  # fields of some materials, properties of others
+
+        @property
+        def youngs(self) -> float | NDArray[np.float64]: ...
+        @property
+        def poisson(self) -> float | NDArray[np.float64]: ...
+
+    def energy_density(self, F: ArrayLike) -> NDArray[np.float64]:
+        """Strain energy per rest volume, zero at rest.
+
+        Parameters
+        ----------
+        F : (..., 3, 3) deformation gradients; (m, 3, 3) where parameters are given per tet.
+
+        Returns
+        -------
+        (...) energy densities [Pa].
+        """
+        return self._evaluated((densities_at, add_resting_densities), F, ())
+
+    def first_piola(self, F: ArrayLike) -> NDArray[np.float64]:
+        """First Piola-Kirchhoff stress P = d psi / d F.
+
+        Parameters
+        ----------
+        F : (..., 3, 3) deformation gradients; (m, 3, 3) where parameters are given per tet.
+
+        Returns
+        -------
+        (..., 3, 3) stresses [Pa].
+        """
+        return self._evaluated((piolas_at, add_resting_piolas), F, (3, 3))
+
+    def hessian(self, F: ArrayLike, project: bool = False) -> NDArray[np.float64]:
+        """Second derivative of the energy density, H[3 i + j, 3 k + l] = d^2 psi / (dF_ij dF_kl).
+
+        Parameters
+        ----------
+        F : (..., 3, 3) deformation gradients; (m, 3, 3) where parameters are given per tet.
+        project : return the nearest positive semi-definite matrix instead (negative eigenvalues become 0).
+
+        Returns
+        -------
+        (..., 9, 9) symmetric [Pa].
+        """
+        return self._evaluated((hessians_at, add_resting_hessians), F, (9, 9), bool(project))
+
+    def _evaluated(
+        self,
+        functions: tuple[Callable[..., NDArray[np.float64]], Callable[..., None]],
+        F: ArrayLike,
+        shape: tuple[int, ...],
+        *options: Any,
+    ) -> NDArray[np.float64]:
+        """What functions compute of every F, an array of that shape each: of elastic tets, and of what may flow."""
+        function, add_flow = functions
+        F = np.asarray(F, dtype=np.float64)
+        if F.shape[-2:] != (3, 3):
+            raise SceneError(f"F has shape {F.shape}; its last two axes must be (3, 3)")
+        flat = np.ascontiguousarray(F.reshape(-1, 3, 3))
+        tets = self.per_tet(len(flat))
+        out = function(tets, flat, *options)
+        add_flow(tets, flat, *options, out)
+        return out.reshape(F.shape[:-2] + shape)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Elastic(Hyperelastic):
     """A hyperelastic material given by its engineering constants.
 
     Parameters
@@ -159,56 +245,3 @@ class Elastic(Material):
         one_per_tet(self.poisson, n_tets, f"{name}: poisson")
         region = 0 if self.integration == "patches" else NO_REGION
         return self._tet_material(n_tets, self.kind(), *self.lame_parameters(), region)
-
-    def energy_density(self, F: ArrayLike) -> NDArray[np.float64]:
-        """Strain energy per rest volume, zero at rest.
-
-        Parameters
-        ----------
-        F : (..., 3, 3) deformation gradients; (m, 3, 3) where parameters are given per tet.
-
-        Returns
-        -------
-        (...) energy densities [Pa].
-        """
-        return self._evaluated(densities, F, ())
-
-    def first_piola(self, F: ArrayLike) -> NDArray[np.float64]:
-        """First Piola-Kirchhoff stress P = d psi / d F.
-
-        Parameters
-        ----------
-        F : (..., 3, 3) deformation gradients; (m, 3, 3) where parameters are given per tet.
-
-        Returns
-        -------
-        (..., 3, 3) stresses [Pa].
-        """
-        return self._evaluated(piolas, F, (3, 3))
-
-    def hessian(self, F: ArrayLike, project: bool = False) -> NDArray[np.float64]:
-        """Second derivative of the energy density, H[3 i + j, 3 k + l] = d^2 psi / (dF_ij dF_kl).
-
-        Parameters
-        ----------
-        F : (..., 3, 3) deformation gradients; (m, 3, 3) where parameters are given per tet.
-        project : return the nearest positive semi-definite matrix instead (negative eigenvalues become 0).
-
-        Returns
-        -------
-        (..., 9, 9) symmetric [Pa].
-        """
-        return self._evaluated(hessians, F, (9, 9), bool(project))
-
-    def _evaluated(
-        self, kernel: Callable[..., None], F: ArrayLike, shape: tuple[int, ...], *options: bool
-    ) -> NDArray[np.float64]:
-        """What a kernel computes of every F, an array of that shape each."""
-        F = np.asarray(F, dtype=np.float64)
-        if F.shape[-2:] != (3, 3):
-            raise SceneError(f"F has shape {F.shape}; its last two axes must be (3, 3)")
-        flat = np.ascontiguousarray(F.reshape(-1, 3, 3))
-        tet, out = self.per_tet(len(flat)), np.empty((len(flat), *shape))
-        with threads_for(len(flat), 5_000):
-            kernel(flat, tet.kind, tet.mu, tet.lam, *options, out)
-        return out.reshape(F.shape[:-2] + shape)

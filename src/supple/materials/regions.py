@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
-from supple.materials.material import Elastic
+from supple.materials.material import Elastic, Hyperelastic
 from supple.materials.per_tet import NO_REGION, TetMaterial
 
 
@@ -32,7 +32,7 @@ class Regions(Elastic):
     SceneError : where a material is not elastic or is itself a `Regions`, or `index` is out of range.
     """
 
-    materials: Sequence[Elastic]
+    materials: Sequence[Hyperelastic]
     index: ArrayLike
     youngs: NDArray[np.float64] = field(init=False)
     poisson: NDArray[np.float64] = field(init=False)
@@ -45,7 +45,7 @@ class Regions(Elastic):
         if not materials:
             raise SceneError("Regions: materials is empty; give at least one elastic material")
         for k, material in enumerate(materials):
-            if not isinstance(material, Elastic) or isinstance(material, Regions):
+            if not isinstance(material, Hyperelastic) or isinstance(material, Regions):
                 raise SceneError(f"Regions: materials[{k}] is a {type(material).__name__}; give an elastic material")
         index = np.asarray(self.index)
         if index.ndim != 1 or index.dtype.kind not in "iu":
@@ -76,17 +76,17 @@ class Regions(Elastic):
             out[here] = np.broadcast_to(given, len(index))[here]
         return out
 
-    def lame_parameters(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """(n_tets,) mu and lam [Pa] of the energy density of each tet's material."""
-        mus, lams = zip(*(material.lame_parameters() for material in self.materials), strict=True)
-        return self._values_per_tet(mus, "mu"), self._values_per_tet(lams, "lam")
-
     def per_tet(self, n_tets: int) -> TetMaterial:
         index = np.asarray(self.index)
         if len(index) != n_tets:
             raise SceneError(f"Regions: index has {len(index)} values for {n_tets} tets; give one per tet")
-        kinds = np.array([material.kind() for material in self.materials], dtype=np.int32)
-        mu, lam = self.lame_parameters()
-        averaged = [material.integration == "patches" for material in self.materials]
-        region = np.where(averaged, np.arange(len(averaged)), NO_REGION).astype(np.int32)[index]
-        return TetMaterial(density=self.density, damping=self.damping, kind=kinds[index], mu=mu, lam=lam, region=region)
+        kind, region = np.empty(n_tets, dtype=np.int32), np.empty(n_tets, dtype=np.int32)
+        mu, lam = np.empty(n_tets), np.empty(n_tets)
+        laws = []
+        for k, material in enumerate(self.materials):
+            here, part = index == k, material.per_tet(n_tets)
+            for out, values in ((kind, part.kind), (mu, part.mu), (lam, part.lam)):
+                out[here] = values[here]
+            region[here] = k if part.region[0] != NO_REGION else NO_REGION
+            laws += [tets.selected(here) for tets in part.laws]
+        return TetMaterial(self.density, self.damping, kind, mu, lam, region, tuple(laws))

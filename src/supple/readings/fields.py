@@ -50,6 +50,8 @@ _OF_TETS = (
     Field("von_mises", "tets", (), "Pa"),
     Field("principal_stretches", "tets", (3,), ""),
     Field("energy_density", "tets", (), "J/m^3"),
+    Field("plastic_strain", "tets", (), ""),
+    Field("dissipated_energy", "tets", (), "J/m^3"),
 )
 _OF_VERTICES = (
     *(Field(f"{field.name}{_AT_VERTICES}", "vertices", field.shape, field.unit) for field in _OF_TETS),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from supple.displayed import DisplayedFrame
 from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.elastic_tets.stress import cauchy_stresses, energy_densities, first_piolas, von_mises
+from supple.materials.flows.internal import DISSIPATED, FLOW, checked
+from supple.materials.laws.hencky import HENCKY
+from supple.materials.per_tet import LawTets
 from supple.numerics.deformation import deformation_gradients, determinants
 from supple.numerics.svd3 import rotation_variant_svd
 from supple.readings.by_body import BodyRows, TetField, vertex_means
@@ -40,6 +43,10 @@ class TetReadings(DisplayedFrame, ABC):
     @abstractmethod
     def _bodies(self) -> Sequence[BodyRows]: ...
 
+    @property
+    @abstractmethod
+    def _internal(self) -> NDArray[np.float64]: ...
+
     @cached_property
     def det_F(self) -> NDArray[np.float64]:
         """(m,) J of every tet, in the order of the bodies."""
@@ -51,7 +58,7 @@ class TetReadings(DisplayedFrame, ABC):
 
         The nodal forces -V P Dm^-T of all tets add up to the elastic forces, with any material.
         """
-        return self._field(first_piolas(self._laws, self._x, self._F), "stress")
+        return self._field(first_piolas(self._laws, self._x, self._F, self._internal), "stress")
 
     @cached_property
     def stress(self) -> TetField:
@@ -75,7 +82,27 @@ class TetReadings(DisplayedFrame, ABC):
         """Strain energy per rest volume (m,) [J/m^3], zero at rest. Rigid edges and volumes have none."""
         refused = {name: _NO_LAW.format("energy") for name in self._names_where(~self._laws.known)}
         refused |= self._refused_of_rigid
-        return TetField(energy_densities(self._laws, self._x, self._F), self._bodies, refused, self._to_vertices)
+        return TetField(
+            energy_densities(self._laws, self._x, self._F, self._internal), self._bodies, refused, self._to_vertices
+        )
+
+    @cached_property
+    def plastic_strain(self) -> TetField:
+        """Accumulated plastic strain (m,) [-] of `J2Plastic`; zero where a tet has none."""
+        return self._of_flow(FLOW, lambda tets: tets.law is HENCKY)
+
+    @cached_property
+    def dissipated_energy(self) -> TetField:
+        """Energy per rest volume (m,) [J/m^3] that viscous and plastic flow has dissipated since the start."""
+        return self._of_flow(DISSIPATED, lambda tets: True)
+
+    def _of_flow(self, column: int, chosen: Callable[[LawTets], bool]) -> TetField:
+        material, out = self._laws.material, np.zeros(len(self._laws.tets))
+        internal = checked(material, self._internal)
+        for tets, rows in material.flowing_laws:
+            if chosen(tets):
+                out[tets.rows] += internal[rows, column]
+        return TetField(out, self._bodies, self._refused_of_rigid, self._to_vertices)
 
     @cached_property
     def _F(self) -> NDArray[np.float64]:

@@ -228,12 +228,12 @@ def _locking_rows(body: PlacedBody) -> list[tuple[str, str]]:
     """A warning where nearly incompressible tets are too few across to deform (docs/locking.md)."""
     import numpy as np
 
-    from supple.materials.material import Elastic
+    from supple.materials.material import Hyperelastic
     from supple.materials.per_tet import NO_REGION
     from supple.mesh.quality import thickness
 
     material, mesh = body.material, body.mesh
-    if not isinstance(material, Elastic):
+    if not isinstance(material, Hyperelastic):
         return []
     poisson = np.broadcast_to(np.asarray(material.poisson, dtype=np.float64), len(mesh.tets))
     locking = (poisson > 0.4) & (material.per_tet(len(mesh.tets)).region == NO_REGION)

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SolverError
+from supple.implicit.energies.laws.law_elasticity import LawElasticity, LawElements
 from supple.implicit.energies.patch_elasticity import PatchElasticity
 from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
-from supple.materials.material import Elastic
+from supple.materials.material import Hyperelastic
 from supple.materials.patches.energy import tet_shares
-from supple.materials.per_tet import NO_REGION, TetMaterial
+from supple.materials.per_tet import BY_LAW, NO_REGION, TetMaterial
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.materials.tet_energies import element_energies, element_models
 from supple.numerics.kernel_cache import njit, prange
@@ -34,6 +35,7 @@ class Elasticity(Potential):
     material : one row per tet
     start, incidence : for every vertex the (tet, node) pairs that name it, coded 4 tet + node
     patches : the energy of the tets that are averaged over patches, or None
+    laws : the energies of tets that are given by laws, or None
     """
 
     system: System
@@ -41,17 +43,22 @@ class Elasticity(Potential):
     start: NDArray[np.int32]
     incidence: NDArray[np.int32]
     patches: PatchElasticity | None = None
+    laws: LawElasticity | None = None
     label = "elasticity"
     projection = Projection.RELEASED_FIRST
 
     def value(self, x: NDArray[np.float64]) -> float:
-        return float(self._own_energies(x).sum()) + (self.patches.value(x) if self.patches is not None else 0.0)
+        total = float(self._own_energies(x).sum()) + (self.patches.value(x) if self.patches is not None else 0.0)
+        return total if self.laws is None else total + self.laws.value(x)
 
     def energies(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(m,) of each tet [J]; those of patches are divided among their tets."""
         energies = self._own_energies(x)
         if self.patches is not None:
             energies[self.patches.patches.rows] += tet_shares(self.patches.patches, x)
+        if self.laws is not None:
+            for rows, values in self.laws.energies(x):
+                energies[rows] += values
         return energies
 
     def _own_energies(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -81,15 +88,26 @@ class Elasticity(Potential):
                 hessian.add_tets(lambda blocks: element_models(*tets, True, project, energies, gradients, blocks))
             gather_gradients(self.start, self.incidence, gradients, gradient)
         total = float(energies.sum())
-        return total if self.patches is None else total + self.patches.add_model(x, gradient, hessian, project)
+        for more in (self.patches, self.laws):
+            if more is not None:
+                total += more.add_model(x, gradient, hessian, project)
+        return total
+
+    def in_step(self, internal: NDArray[np.float64], h: float) -> Elasticity:
+        """The energy of a step of h [s] from these internal variables (k, 11), at whose end its forces act."""
+        return self if self.laws is None else replace(self, laws=self.laws.in_step(internal, h))
+
+    def flowed(self, x: NDArray[np.float64], internal: NDArray[np.float64], h: float) -> NDArray[np.float64]:
+        """(k, 11) the internal variables at the end of a step of h [s] to x (n, 3)."""
+        return internal if self.laws is None else self.laws.flowed(x, internal, h)
 
     @cached_property
     def _parameters(self) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
-        """Kind, mu and lam (m,) of each tet's own energy, which is zero where patches have it."""
+        """Kind, mu and lam (m,) of each tet's own energy, which is zero where patches or laws have it."""
         material = self.material
-        if self.patches is None:
+        own = (material.region == NO_REGION) & (material.kind != BY_LAW)
+        if own.all():
             return material.kind, material.mu, material.lam
-        own = material.region == NO_REGION
         zero = np.int32(StableNeoHookean.kind())  # with mu = lam = 0, an energy that is zero for every F
         return np.where(own, material.kind, zero), np.where(own, material.mu, 0.0), np.where(own, material.lam, 0.0)
 
@@ -105,14 +123,28 @@ def elasticity_of(system: System) -> Elasticity:
     SolverError : where a body's material has no elastic energy; the text names the body.
     """
     for part in system.bodies:
-        if not isinstance(part.body.material, Elastic):
+        if not isinstance(part.body.material, Hyperelastic):
             raise SolverError(
                 f"body {part.name!r}: {type(part.body.material).__name__} is a material for XPBD only; for Implicit, "
                 "give it an elastic one such as StableNeoHookean"
             )
     start, incidence = incidences(system.tets, len(system.rest_positions))
     patches = None if system.laws.patches is None else PatchElasticity.of(system.laws.patches)
-    return Elasticity(system, system.laws.material, start, incidence, patches)
+    return Elasticity(system, system.laws.material, start, incidence, patches, _law_elasticity(system))
+
+
+def _law_elasticity(system: System) -> LawElasticity | None:
+    material = system.laws.material
+    own = material.region == NO_REGION
+    arrays = system.tets, system.rest_shape_inverse, system.rest_volumes
+    elastic = [LawElements.of(part.selected(own), *arrays) for part in material.elastic_laws]
+    flowing = [
+        (LawElements.of(part, *arrays), part.flow, rows)
+        for part, rows in material.flowing_laws
+        if part.flow is not None
+    ]
+    elements = tuple(each for each in elastic if len(each.rows))
+    return LawElasticity(elements, tuple(flowing)) if elements or flowing else None
 
 
 @njit(cache=True, parallel=True, error_model="numpy")

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from supple.implicit.energies.elasticity import SERIAL_TETS, Elasticity, gather_gradients
 from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
-from supple.materials.kinds import needs_positive_volume
+from supple.materials.kinds import infinite_when_flat
 from supple.materials.per_tet import NO_REGION
 from supple.materials.tet_energies import deformation_gradient, edge_matrix, put_gradient
 from supple.numerics.kernel_cache import njit, prange
@@ -81,7 +81,7 @@ def inversion_barrier(elasticity: Elasticity, guarded: NDArray[np.bool_], onset:
     """The barrier below J = `onset` of the guarded tets whose energy has none; None where there is no such tet."""
     material = elasticity.material
     # The energy of a patch is finite where one of its tets is flat.
-    wanted = guarded & (~needs_positive_volume(material.kind) | (material.region != NO_REGION))
+    wanted = guarded & (~infinite_when_flat(material) | (material.region != NO_REGION))
     if not wanted.any():
         return None
     kappa = onset * (material.mu + np.abs(material.lam))

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
+from supple.materials.laws.isotropic_law import IsotropicLaw
 from supple.materials.patches.domains import Patches
-from supple.materials.patches.edge_kernels import FRAME, edge_models
-from supple.materials.patches.energy import SERIAL_TETS, patch_energies, vertex_states
+from supple.materials.patches.edge_kernels import FRAME, add_law_models, edge_models
+from supple.materials.patches.energy import SERIAL_TETS, edge_gradients, patch_energies, vertex_states
 from supple.materials.patches.pair_kernel import pair_blocks
 from supple.materials.patches.pairs import Pairs
 from supple.materials.patches.vertex_kernels import (
@@ -68,6 +69,14 @@ class PatchElasticity(Potential):
                 x, edges.start, edges.vertices, edges.gradients, edges.volumes, *law, second, project, energies,
                 forces, frames, turned,
             )  # fmt: skip
+            for part in edges.laws:
+                assert isinstance(part.law, IsotropicLaw)
+                F = edge_gradients(edges, x, part.rows)
+                U, _, V, values = part.law.decomposed(F, part.parameters)
+                add_law_models(
+                    part.rows, edges.start, edges.gradients, edges.volumes, U, V, values, second, project, energies,
+                    forces, frames,
+                )  # fmt: skip
             of_vertices, pressures, stiffness = vertex_states(patches, x)
             tet_pressures(vertices.of_tet, pressures, pressure)
             volume_gradients(x, patches.tets, patches.Dm_inv, patches.tet_volumes, of_tets)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from supple.errors import SolverError
 from supple.implicit.energies.elasticity import SERIAL_TETS
-from supple.materials.kinds import needs_positive_volume
+from supple.materials.kinds import without_inversion
 from supple.materials.per_tet import TetMaterial
 from supple.materials.tet_energies import deformation_gradient
 from supple.numerics.kernel_cache import njit, prange
@@ -80,7 +80,7 @@ def refuse_inverted(system: System, material: TetMaterial, x: NDArray[np.float64
     ------
     SolverError : where one is; the text names the body and its tets.
     """
-    bad = needs_positive_volume(material.kind) & ~(volume_signs(x, system.tets) > 0.0)
+    bad = without_inversion(material) & ~(volume_signs(x, system.tets) > 0.0)
     if not bad.any():
         return
     for part in system.bodies:

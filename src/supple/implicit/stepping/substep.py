@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.implicit.energies.damping import Damping
+from supple.implicit.energies.elasticity import Elasticity
 from supple.implicit.energies.external_forces import ExternalForces, total_forces
 from supple.implicit.energies.inertia import Inertia
 from supple.implicit.energies.inversion_barrier import inversion_barrier
@@ -89,7 +90,8 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     forces = total_forces(system, state.positions, middle)
     guard = InversionGuard.at(system, state.positions, settings.volume_kept)
     limits = StepLimits(guard, workspace.contact, tools.clock)
-    base = _objective(system, state.positions, middle, plan, forces, workspace)
+    elasticity = workspace.elasticity.in_step(state.internal, h)
+    base = _objective(elasticity, state.positions, middle, plan, forces, workspace)
     barrier = inversion_barrier(workspace.elasticity, guard.guarded, settings.barrier_onset)
     if barrier is not None:
         base = replace(base, terms=[*base.terms, barrier])
@@ -120,7 +122,8 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
             break
         problem = replace(problem, objective=contact.with_contact(base, x))
     outcome = contact.verified(replace(outcome, rows=rows))
-    after = State(end, x, plan.velocity(x), plan.memory)
+    internal = workspace.elasticity.flowed(x, state.internal, h)
+    after = State(end, x, plan.velocity(x), plan.memory, internal=internal)
     residual = plan.place * outcome.end.gradient
     after = settings.integrator.finish(plan, state, after, residual, workspace.conservation)
     if plan.place != 1.0 and system.rigid_bodies and outcome.status is Status.CONVERGED:
@@ -129,10 +132,16 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
 
 
 def _objective(
-    system: System, x: NDArray[np.float64], time: float, plan: Plan, forces: NDArray[np.float64], workspace: Workspace
+    elasticity: Elasticity,
+    x: NDArray[np.float64],
+    time: float,
+    plan: Plan,
+    forces: NDArray[np.float64],
+    workspace: Workspace,
 ) -> Objective:
     """All but contact and the inversion barrier, with the loads of `time` [s]; energies of loads are zero at x."""
-    terms: list[Potential] = [workspace.elasticity]
+    system = workspace.system
+    terms: list[Potential] = [elasticity]
     if workspace.stitches is not None:
         terms.append(workspace.stitches.at(time))
     if forces.any():

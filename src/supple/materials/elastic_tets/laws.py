@@ -59,4 +59,8 @@ def joined_materials(parts: list[TetMaterial]) -> TetMaterial:
     """The materials of several bodies as one, in their order."""
     names = ("density", "damping", "kind", "mu", "lam", "region")
     joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
-    return replace(parts[0], **joined)
+    laws, begin = [], 0
+    for part in parts:
+        laws += [tets.shifted(begin) for tets in part.laws]
+        begin += len(part.kind)
+    return replace(parts[0], **joined, laws=tuple(laws))

@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.edge_springs import cofactors
 from supple.materials.elastic_tets.laws import TetLaws
-from supple.materials.isotropic import densities, piolas
+from supple.materials.flows.internal import add_densities, add_piolas
+from supple.materials.isotropic import piolas
+from supple.materials.laws.pointwise import densities_at, piolas_at
 from supple.materials.patches.domains import Patches
 from supple.materials.patches.energy import tet_shares, vertex_states
 from supple.numerics.deformation import determinants
@@ -24,7 +26,9 @@ from supple.numerics.threads import threads_for
 _SERIAL_TETS = 5_000
 
 
-def energy_densities(laws: TetLaws, x: NDArray[np.float64], F: NDArray[np.float64]) -> NDArray[np.float64]:
+def energy_densities(
+    laws: TetLaws, x: NDArray[np.float64], F: NDArray[np.float64], internal: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """(m,) strain energy per rest volume [J/m^3], zero at rest; NaN where a tet has no law.
 
     Their sum, weighted with rest volumes, is the elastic energy.
@@ -32,30 +36,29 @@ def energy_densities(laws: TetLaws, x: NDArray[np.float64], F: NDArray[np.float6
     Parameters
     ----------
     x : (n, 3) positions [m]; F : (m, 3, 3) deformation gradients of the tets at x
+    internal : (k, 11) internal variables of what flows, or (0, 11) where nothing has flowed, see `State`
     """
-    material = laws.material
-    out = np.empty(len(F))
-    with threads_for(len(F), _SERIAL_TETS):
-        densities(F, material.kind, material.mu, material.lam, out)
+    out = densities_at(laws.material, F)
     if laws.patches is not None:
         out[laws.patches.rows] = tet_shares(laws.patches, x) / laws.patches.tet_volumes
+    add_densities(laws.material, F, internal, out)
     for springs in laws.springs:
         volumes = laws.volumes[springs.rows]
         out[springs.rows] = springs.energies(x, determinants(F[springs.rows]), volumes) / volumes
     return out
 
 
-def first_piolas(laws: TetLaws, x: NDArray[np.float64], F: NDArray[np.float64]) -> NDArray[np.float64]:
+def first_piolas(
+    laws: TetLaws, x: NDArray[np.float64], F: NDArray[np.float64], internal: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """(m, 3, 3) first Piola stress of the elastic forces [Pa], without viscous ones.
 
     NaN where a tet has no law, or holds something rigid. Parameters as of `energy_densities`.
     """
-    material = laws.material
-    out = np.empty((len(F), 3, 3))
-    with threads_for(len(F), _SERIAL_TETS):
-        piolas(F, material.kind, material.mu, material.lam, out)
+    out = piolas_at(laws.material, F)
     if laws.patches is not None:
         out[laws.patches.rows] = _of_patches(laws.patches, x, F[laws.patches.rows])
+    add_piolas(laws.material, F, internal, out)
     for springs in laws.springs:
         own = F[springs.rows]
         out[springs.rows] = springs.first_piolas(x, own, determinants(own), laws.volumes[springs.rows])
@@ -72,6 +75,8 @@ def _of_patches(patches: Patches, x: NDArray[np.float64], F: NDArray[np.float64]
     P = np.empty((len(means), 3, 3))
     with threads_for(len(P), _SERIAL_TETS):
         piolas(means.reshape(-1, 3, 3), edges.kind, edges.mu, edges.lam, P)
+        for part in edges.laws:
+            P[part.rows] += part.law.models(means[part.rows].reshape(-1, 3, 3), part.parameters, False, False)[1]
         pressures = vertex_states(patches, x)[1]
     mean_pressure = pressures[vertices.of_tet].mean(axis=1)
     return P[edges.of_tet].mean(axis=1) + mean_pressure[:, None, None] * cofactors(F)

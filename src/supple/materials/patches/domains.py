@@ -19,15 +19,18 @@ for vertices; Onishi, Iida, Amaya, "F-bar aided edge-based smoothed finite eleme
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.isotropic import rest_lame_parameters
+from supple.materials.kinds import STRETCH_ENERGIES
 from supple.materials.patches.pairs import Pairs, pairs_of
-from supple.materials.per_tet import TetMaterial
+from supple.materials.per_tet import BY_LAW, LawTets, TetMaterial
+from supple.materials.stretch_energies import stable_neo_hookean
 
+_SQUARED = STRETCH_ENERGIES.index(stable_neo_hookean.FUNCTIONS)
 _EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 
 
@@ -40,6 +43,7 @@ class EdgePatches:
     start : (k + 1,); vertices : (s,); owner : (s,) the patch of each slot
     gradients : (s, 3) g with F = sum x g^T [1/m]; volumes : (k,) [m^3]; kind, mu, lam : (k,) of psi'
     of_tet : (m, 6) the patches that each tet belongs to
+    laws : whose energies are added to those of `kind`; their rows are patches
     """
 
     start: NDArray[np.int32]
@@ -51,6 +55,7 @@ class EdgePatches:
     mu: NDArray[np.float64]
     lam: NDArray[np.float64]
     of_tet: NDArray[np.int32]
+    laws: tuple[LawTets, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,8 +122,28 @@ def patches_of(
     rest_mu, rest_lam = (values[rows] for values in rest_lame_parameters(material))
     kind, mu, lam, region = (getattr(material, key)[rows] for key in ("kind", "mu", "lam", "region"))
     rest = np.maximum(rest_lam - rest_mu, 0.0)
+    by_law = kind == BY_LAW
+    if by_law.any():
+        # Their volume term is (J - 1)^2 / 2, too; with mu = lam = 0 that energy is zero for every F.
+        kind = np.where(by_law, np.int32(_SQUARED), kind)
+        mu, lam = np.where(by_law, 0.0, mu), np.where(by_law, rest, lam)
     edges = _edge_patches(tets, Dm_inv, volumes, region, (kind, mu, lam - rest))
+    laws = tuple(_edge_law(part, rows, volumes, rest, edges.of_tet) for part in material.elastic_laws)
+    edges = replace(edges, laws=tuple(part for part in laws if len(part.rows)))
     return Patches(rows, tets, Dm_inv, volumes, edges, _vertex_patches(tets, volumes, region, kind, rest))
+
+
+def _edge_law(part: LawTets, rows, volumes, rest, of_tet) -> LawTets:
+    """The law of the edges around which the tets of `part` are: its parameters are their means, with a lowered K."""
+    inside = np.isin(part.rows, rows)
+    tets = np.searchsorted(rows, part.rows[inside])
+    p = part.parameters[inside].copy()
+    p[:, part.law.bulk] -= rest[tets]
+    shares, patch = np.repeat(volumes[tets] / 6.0, 6), of_tet[tets].ravel()
+    numbers, inverse = np.unique(patch, return_inverse=True)
+    patch = inverse.astype(np.int32)
+    means = [_means(patch, shares, np.repeat(column, 6)) for column in p.T] if len(tets) else []
+    return part.of(numbers, np.column_stack(means) if means else p)
 
 
 def _numbered(keys: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int32]]:

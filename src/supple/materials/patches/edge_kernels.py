@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from supple.materials.isotropic import density, energy_density, principal_hessian, stress
+from supple.materials.laws.isotropic_law import principal_hessian_of
 from supple.numerics.kernel_cache import njit, prange
+from supple.numerics.mat3 import load_mat, mat_mul_transposed, store_mat
 from supple.numerics.svd3 import svd3 as decompose
 
 # Numbers of a patch's frame: U (9), psi_ij (6), alpha (3) and beta (3) times its volume, see `isotropic`.
@@ -71,3 +73,38 @@ def edge_models(
             for c in range(3):
                 frames[k, 15 + c] = v * alpha[c]
                 frames[k, 18 + c] = v * beta[c]
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def mean_gradients(x, start, vertices, gradients, rows, out):
+    """F of the patches `rows` (r,) into out (r, 3, 3)."""
+    for k in prange(len(rows)):
+        store_mat(_mean_gradient(x, start, vertices, gradients, rows[k]), out, k)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def add_law_models(rows, start, gradients, volumes, U, V, values, second, project, energies, forces, frames):
+    """Add what `edge_models` computes of the patches `rows` (r,), from the `values` (r, 16) of a law at their stretches
+    and their U and V (r, 3, 3)."""
+    for n in prange(len(rows)):
+        k, u, x = rows[n], load_mat(U, n), values[n]
+        v = volumes[k]
+        energies[k] += v * x[0]
+        scaled = (
+            u[0] * x[1], u[1] * x[2], u[2] * x[3],
+            u[3] * x[1], u[4] * x[2], u[5] * x[3],
+            u[6] * x[1], u[7] * x[2], u[8] * x[3],
+        )  # fmt: skip
+        P = mat_mul_transposed(scaled, load_mat(V, n))
+        for t in range(start[k], start[k + 1]):
+            g, h, i = gradients[t, 0], gradients[t, 1], gradients[t, 2]
+            forces[t, 0] += v * (P[0] * g + P[1] * h + P[2] * i)
+            forces[t, 1] += v * (P[3] * g + P[4] * h + P[5] * i)
+            forces[t, 2] += v * (P[6] * g + P[7] * h + P[8] * i)
+        if second:
+            A, alpha, beta = principal_hessian_of(x, project)
+            for c in range(6):
+                frames[k, 9 + c] += v * A[c]
+            for c in range(3):
+                frames[k, 15 + c] += v * alpha[c]
+                frames[k, 18 + c] += v * beta[c]

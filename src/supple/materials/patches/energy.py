@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.materials.patches.domains import Patches
-from supple.materials.patches.edge_kernels import edge_energies
+from supple.materials.patches.domains import EdgePatches, Patches
+from supple.materials.patches.edge_kernels import edge_energies, mean_gradients
 from supple.materials.patches.vertex_kernels import vertex_pressures
 from supple.numerics.threads import threads_for
 
@@ -20,7 +20,17 @@ def patch_energies(patches: Patches, x: NDArray[np.float64]) -> tuple[NDArray[np
     of_edges = np.empty(len(p.volumes))
     with threads_for(len(patches.tets), SERIAL_TETS):
         edge_energies(x, p.start, p.vertices, p.gradients, p.volumes, p.kind, p.mu, p.lam, of_edges)
+        for part in p.laws:
+            psi = part.law.densities(edge_gradients(p, x, part.rows), part.parameters)
+            of_edges[part.rows] += p.volumes[part.rows] * psi
         return of_edges, vertex_states(patches, x)[0]
+
+
+def edge_gradients(edges: EdgePatches, x: NDArray[np.float64], rows: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(r, 3, 3) the mean F of the patches `rows` (r,)."""
+    F = np.empty((len(rows), 3, 3))
+    mean_gradients(x, edges.start, edges.vertices, edges.gradients, rows, F)
+    return F
 
 
 def tet_shares(patches: Patches, x: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -8,9 +8,10 @@ from scipy import sparse
 
 from supple.materials.isotropic import densities, rest_lame_parameters
 from supple.materials.kinds import needs_positive_volume
-from supple.materials.per_tet import NO_REGION, TetMaterial
+from supple.materials.per_tet import BY_LAW, NO_REGION, LawTets, TetMaterial
 from supple.materials.tet_energies import element_energies
 from supple.numerics.threads import threads_for
+from supple.output.recording.physics import RecordedPhysics
 from supple.output.recording.reader import Recording
 
 _TETS_PER_THREAD = 5_000
@@ -22,17 +23,19 @@ def elastic_energy(
     x: NDArray[np.float64],
     J: NDArray[np.float64],
     rest_inverse: NDArray[np.float64],
+    internal: NDArray[np.float64],
 ) -> float | None:
     """[J], zero at rest; None where the recording does not contain the law of a body.
 
     Parameters
     ----------
     x : (n, 3) positions [m]; J : (m,) determinants of F; rest_inverse : (m, 3, 3) Dm^-1 [1/m]
+    internal : (k, 11) internal variables of the frame, see `State`
     """
     physics = recording.physics
     if physics is None:
         return None
-    total = 0.0
+    total = _flowing(physics, _gradients(x, recording.tets, rest_inverse), recording.rest_volumes, internal)
     for k, body in enumerate(recording.bodies):
         if not physics.knows_law(k, body.tets):
             return None
@@ -41,16 +44,20 @@ def elastic_energy(
         pair = physics.compliances[k]
         if pair is None:
             out = np.empty(len(tets))
-            laws = physics.kind[body.tets].astype(np.int32), physics.mu[body.tets], physics.lam[body.tets]
+            laws = physics.tet_kinds[body.tets], physics.mu[body.tets], physics.lam[body.tets]
             with threads_for(len(tets), _TETS_PER_THREAD):
                 element_energies(x, tets, rest_inverse[body.tets], volumes, *laws, out)
+            own = [_of_body(part, body.tets) for part in physics.laws if part.flow is None]
+            out[laws[0] == BY_LAW] = 0.0
+            F = _gradients(x, tets, rest_inverse[body.tets])
+            for part in own:
+                out[part.rows] += volumes[part.rows] * part.law.densities(F[part.rows], part.parameters)
             region = physics.region[body.tets]
             total += float(out[region == NO_REGION].sum())
             for number in np.unique(region[region != NO_REGION]):
                 of = region == number
-                total += _averaged(
-                    x, tets[of], rest_inverse[body.tets][of], volumes[of], J[body.tets][of], [law[of] for law in laws]
-                )
+                arrays = tets[of], volumes[of], F[of], J[body.tets][of], [law[of] for law in laws]
+                total += _averaged(*arrays, next((part for part in own if of[part.rows].any()), None))
             continue
         if pair[0] > 0.0:
             edges = np.unique(np.sort(tets[:, _EDGES].reshape(-1, 2), axis=1), axis=0)
@@ -63,20 +70,47 @@ def elastic_energy(
     return total
 
 
-def _averaged(x, tets, rest_inverse, volumes, J, laws) -> float:
+def _gradients(x, tets, rest_inverse):
+    """(m, 3, 3) F of tets."""
+    x_of = x[tets]
+    return np.einsum("eki,ekj->eij", x_of[:, 1:] - x_of[:, :1], rest_inverse)
+
+
+def _flowing(physics: RecordedPhysics, F, volumes, internal) -> float:
+    """The energy of what is left of F after flow, F F_i^-1."""
+    total, begin = 0.0, 0
+    for part in physics.laws:
+        if part.flow is not None:
+            inverse = internal[begin : begin + len(part.rows), :9].reshape(-1, 3, 3)
+            total += float(volumes[part.rows] @ part.law.densities(F[part.rows] @ inverse, part.parameters))
+            begin += len(part.rows)
+    return total
+
+
+def _of_body(part: LawTets, tets: slice) -> LawTets:
+    """The tets of a law that are a body's, with numbers in the body."""
+    inside = (part.rows >= tets.start) & (part.rows < tets.stop)
+    return part.of(part.rows[inside] - tets.start, part.parameters[inside])
+
+
+def _averaged(tets, volumes, F, J, laws, by_law: LawTets | None) -> float:
     """The energy of one region's tets, averaged over edges and vertices (see `materials.patches`)."""
     kind, mu, lam = laws
     mu_L, lam_L = rest_lame_parameters(TetMaterial(mu, mu, kind, mu, lam, kind))
     rest = np.maximum(lam_L - mu_L, 0.0)
-    x_of = x[tets]
-    F = np.einsum("eki,ekj->eij", x_of[:, 1:] - x_of[:, :1], rest_inverse)
     ends = np.sort(tets[:, _EDGES], axis=2).reshape(-1, 2)
     _, first, edge = np.unique(ends, axis=0, return_index=True, return_inverse=True)
     shares = sparse.coo_array((np.repeat(volumes / 6.0, 6), (edge.ravel(), np.repeat(np.arange(len(tets)), 6)))).tocsr()
     around = shares.sum(axis=1)
     means = (shares @ np.column_stack([F.reshape(-1, 9), mu, lam - rest])) / around[:, None]
+    F_mean = means[:, :9].reshape(-1, 3, 3).copy()
     out = np.empty(len(means))
-    densities(means[:, :9].reshape(-1, 3, 3).copy(), kind[first // 6], means[:, 9].copy(), means[:, 10].copy(), out)
+    if by_law is None:
+        densities(F_mean, kind[first // 6], means[:, 9].copy(), means[:, 10].copy(), out)
+    else:
+        p = by_law.parameters.copy()
+        p[:, by_law.law.bulk] -= rest
+        out = by_law.law.densities(F_mean, (shares @ p) / around[:, None])
     total = float(out @ around)
     quarters = np.repeat(volumes / 4.0, 4)
     _, first, vertex = np.unique(tets.ravel(), return_index=True, return_inverse=True)

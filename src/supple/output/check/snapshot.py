@@ -60,6 +60,7 @@ class Snapshot:
     ----------
     scene : of the frame; number, time : of the frame, [s]
     positions, velocities : (n, 3) [m], [m/s]; det_F : (m,) as recorded; poses : (obstacles, 3, 4)
+    internal : (k, 11) internal variables of materials that flow, see `State`
     """
 
     scene: Scene
@@ -69,11 +70,21 @@ class Snapshot:
     velocities: NDArray[np.float64]
     det_F: NDArray[np.float64]
     poses: NDArray[np.float64]
+    internal: NDArray[np.float64]
 
     @classmethod
     def of(cls, scene: Scene, frame: RecordedFrame) -> Snapshot:
         x, v = frame.state.positions, frame.state.velocities
-        return cls(scene, frame.number, frame.time, np.ascontiguousarray(x), v, frame.det_F, frame.obstacle_poses)
+        return cls(
+            scene,
+            frame.number,
+            frame.time,
+            np.ascontiguousarray(x),
+            v,
+            frame.det_F,
+            frame.obstacle_poses,
+            frame.state.internal,
+        )
 
     @cached_property
     def finite(self) -> bool:
@@ -99,7 +110,7 @@ class Snapshot:
     @cached_property
     def elastic_energy(self) -> float | None:
         """[J], zero at rest; None where the recording does not contain the law of a body."""
-        return elastic_energy(self.scene.recording, self.positions, self.J, self.scene.rest_inverse)
+        return elastic_energy(self.scene.recording, self.positions, self.J, self.scene.rest_inverse, self.internal)
 
     @cached_property
     def stitch_energy(self) -> float | None:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from supple.errors import OutputError
 from supple.files.replacing import whole_file
+from supple.materials.flows.internal import COLUMNS
 from supple.output.checkpoint.memories import MEMORIES
 from supple.output.checkpoint.values import decoded, described, encoded, restored
 from supple.state import State
@@ -147,6 +148,11 @@ def _is_a_state(state: object, like: State) -> bool:
         isinstance(state, State)
         and isinstance(state.time, float)
         and isinstance(state.inputs, dict)
+        and isinstance(state.internal, np.ndarray)
+        and state.internal.dtype == np.float64
+        and state.internal.ndim == 2
+        and state.internal.shape[1] == COLUMNS
+        and bool(np.isfinite(state.internal).all())
         and all(
             isinstance(rows, np.ndarray)
             and rows.dtype == np.float64

@@ -25,6 +25,7 @@ def write_vtkhdf(recording: Recording, output: Path) -> None:
         recording.details,
         recording.fields,
         recording.sensors,
+        recording.internal_rows,
     )
     with whole_file(output) as fresh:
         try:

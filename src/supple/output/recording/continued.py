@@ -75,6 +75,7 @@ class ContinuedRecorder(Recorder):
             recorded.time == first.time
             and np.array_equal(recorded.positions, first.state.positions)
             and np.array_equal(recorded.velocities, first.state.velocities)
+            and np.array_equal(recorded.internal, first.state.internal)
         )
         if not same:
             raise OutputError(f"{self.path}: its frame {first.index} is not the one to continue from; run again")

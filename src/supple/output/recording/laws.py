@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from supple.materials.elastic_tets.edge_springs import EdgeSprings
 from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.per_tet import NO_REGION, NOT_ELASTIC, TetMaterial
-from supple.output.recording.physics import NOT_KNOWN, RecordedPhysics
+from supple.output.recording.physics import RecordedPhysics
 from supple.output.recording.scene import RecordedBody
 
 
@@ -38,8 +38,8 @@ def recorded_laws(
     if physics is None:
         kind, region = np.full(m, NOT_ELASTIC, dtype=np.int32), np.full(m, NO_REGION, dtype=np.int32)
         return TetLaws(tets, Dm_inv, volumes, TetMaterial(unknown, unknown, kind, unknown, unknown, region))
-    kind = np.where(physics.kind == NOT_KNOWN, NOT_ELASTIC, physics.kind.astype(np.int32)).astype(np.int32)
-    material = TetMaterial(unknown, unknown, kind, physics.mu, physics.lam, physics.region)
+    kind = physics.tet_kinds
+    material = TetMaterial(unknown, unknown, kind, physics.mu, physics.lam, physics.region, physics.laws)
     springs = [
         EdgeSprings.of(pair, body.tets, rest_positions, tets[body.tets], volumes[body.tets])
         for body, pair in zip(bodies, physics.compliances, strict=True)

@@ -13,14 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.edges_and_volume import EdgesAndVolume
-from supple.materials.material import Elastic
-from supple.materials.per_tet import NO_REGION
+from supple.materials.flows.internal import count_of
+from supple.materials.flows.registry import RECORDED_FLOWS
+from supple.materials.laws.registry import RECORDED_LAWS
+from supple.materials.material import Hyperelastic
+from supple.materials.per_tet import BY_LAW, NO_REGION, NOT_ELASTIC, LawTets
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.output.recording.checked_hdf5 import CheckedFile
 from supple.scene.contact_pairs import pair_table
 from supple.system import System
 
 NOT_KNOWN = 255
+GIVEN_BY_LAW = 254  # in a recording; earlier versions read it as `NOT_KNOWN`
 _GROUP = "supple/physics"
 
 
@@ -31,7 +35,9 @@ class RecordedPhysics:
     Attributes
     ----------
     region : (m,) the region over whose patches the energy of a tet is averaged, or `NO_REGION`
-    kind : (m,) row of `registry.ELASTIC_MATERIALS` of each tet, or `NOT_KNOWN`; mu, lam : (m,) [Pa]
+    kind : (m,) row of `registry.ELASTIC_MATERIALS` of each tet, `GIVEN_BY_LAW` or `NOT_KNOWN`; mu, lam : (m,) [Pa]
+    laws : whose energies are added to those of `kind`
+    internal : number of rows of internal variables of a frame
     compliances : for each body those of its edges [m/N] and volumes [m^5/N], or None for a body of another law
     forces, soft_targets, scripted_pins, stitches : numbers of them in the scene
     """
@@ -45,6 +51,16 @@ class RecordedPhysics:
     scripted_pins: int
     stitches: int
     region: NDArray[np.int32]
+    laws: tuple[LawTets, ...] = ()
+    internal: int = 0
+
+    @property
+    def tet_kinds(self) -> NDArray[np.int32]:
+        """(m,) as of `TetMaterial`."""
+        kind = self.kind.astype(np.int32)
+        kind[self.kind == NOT_KNOWN] = NOT_ELASTIC
+        kind[self.kind == GIVEN_BY_LAW] = BY_LAW
+        return kind
 
     def knows_law(self, body: int, tets: slice) -> bool:
         """Whether the elastic energy of a body can be computed."""
@@ -62,16 +78,26 @@ def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
         compliances.append(None)
         if isinstance(material, EdgesAndVolume):
             compliances[-1] = [float(material.edge_compliance), float(material.volume_compliance)]
-        elif isinstance(material, Elastic):
+        elif isinstance(material, Hyperelastic):
             rows = material.per_tet(part.tets.stop - part.tets.start)
-            kind[part.tets], mu[part.tets], lam[part.tets] = rows.kind, rows.mu, rows.lam
-            region[part.tets] = rows.region
+            kind[part.tets] = np.where(rows.kind == BY_LAW, GIVEN_BY_LAW, rows.kind)
+            mu[part.tets], lam[part.tets], region[part.tets] = rows.mu, rows.lam, rows.region
+    known = [tets for tets in system.laws.material.laws if tets.law.name in RECORDED_LAWS]
+    for tets in system.laws.material.laws:
+        if tets.law.name not in RECORDED_LAWS:
+            kind[tets.rows] = NOT_KNOWN
     group = own.create_group("physics")
     group["kind"], group["mu"], group["lam"] = kind, mu, lam
     if (region != NO_REGION).any():
         group["region"] = region
+    for k, tets in enumerate(known):
+        group[f"law_{k}/rows"] = tets.rows.astype(np.int32)[:, None]
+        group[f"law_{k}/parameters"] = tets.parameters
     return {
         "laws": [law.__name__ for law in ELASTIC_MATERIALS],
+        "by_law": [tets.law.name for tets in known],
+        "flows": [None if tets.flow is None else tets.flow.name for tets in known],
+        "internal": count_of(system.laws.material),
         "compliances": compliances,
         "forces": len(system.loads),
         "soft_targets": len(system.soft_targets),
@@ -103,6 +129,9 @@ def read_physics(file: CheckedFile, header: dict[str, Any], m: int) -> RecordedP
     try:
         counts = [int(physics[key]) for key in ("forces", "soft_targets", "scripted_pins", "stitches")]
         laws = [str(law) for law in physics["laws"]]
+        names = [str(name) for name in physics.get("by_law", [])]
+        flows = list(physics.get("flows", [None] * len(names)))
+        internal = int(physics.get("internal", 0))
         compliances = tuple(
             None if pair is None else (float(pair[0]), float(pair[1])) for pair in physics["compliances"]
         )
@@ -114,12 +143,27 @@ def read_physics(file: CheckedFile, header: dict[str, Any], m: int) -> RecordedP
     number = np.full(256, NOT_KNOWN, dtype=np.uint8)
     for k, law in enumerate(laws[:NOT_KNOWN]):
         number[k] = here.index(law) if law in here else NOT_KNOWN
+    number[GIVEN_BY_LAW] = GIVEN_BY_LAW
     kind = number[file.array(f"{_GROUP}/kind", "u", (m,)).astype(np.uint8)]
     mu, lam = file.array(f"{_GROUP}/mu", "f", (m,)), file.array(f"{_GROUP}/lam", "f", (m,))
     region = np.full(m, NO_REGION, dtype=np.int32)
     if physics.get("patches", False):
         region = file.array(f"{_GROUP}/region", "i", (m,)).astype(np.int32)
-    return RecordedPhysics(kind, mu, lam, compliances, *counts, region=region)
+    known = []
+    for k, (name, flow) in enumerate(zip(names, flows, strict=False)):
+        tets = file.indices(f"{_GROUP}/law_{k}/rows", 1, m)[:, 0].astype(np.int64)
+        parameters = file.array(f"{_GROUP}/law_{k}/parameters", "f", (len(tets), None))
+        if flow is not None and flow not in RECORDED_FLOWS:
+            raise file.newer(f"a material flows by a law {flow!r} that this version does not know")
+        law = RECORDED_LAWS.get(name)
+        if law is not None and parameters.shape[1] in law.counts:
+            parameters = np.ascontiguousarray(parameters)
+            known.append(LawTets(law, tets, parameters, None if flow is None else RECORDED_FLOWS[flow]))
+        else:
+            kind[tets] = NOT_KNOWN
+    if internal != sum(len(tets.rows) for tets in known if tets.flow is not None):
+        raise file.broken("its number of internal variables is not that of its materials")
+    return RecordedPhysics(kind, mu, lam, compliances, *counts, region=region, laws=tuple(known), internal=internal)
 
 
 def read_untouching(file: CheckedFile, header: dict[str, Any]) -> tuple[tuple[int, int], ...]:

@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 from supple.displayed import Showable, short_list
 from supple.errors import OutputError
 from supple.materials.elastic_tets.laws import TetLaws
+from supple.materials.flows.internal import NEVER_FLOWED
 from supple.output.recording.checked_hdf5 import CheckedFile
 from supple.output.recording.details import RecordedDetails
 from supple.output.recording.file import WRITTEN
 from supple.output.recording.laws import recorded_laws
 from supple.output.recording.physics import RecordedPhysics, read_physics, read_untouching
-from supple.output.recording.recorder import REPORT_NUMBERS, REPORT_VECTORS, field_series, frame_layout
+from supple.output.recording.recorder import INTERNAL, REPORT_NUMBERS, REPORT_VECTORS, field_series, frame_layout
 from supple.output.recording.scene import RecordedBody, RecordedObstacle, read_bodies, read_header, read_obstacles
 from supple.output.recording.sensors import RecordedSensor, sensors_of_header
 from supple.output.recording.stitches import RecordedStitches, read_stitches
@@ -60,7 +61,9 @@ class RecordedFrame(TetReadings):
     @cached_property
     def state(self) -> State:
         """All vertices, in the order of the bodies."""
-        return State(self.time, self._rows("VTKHDF/Points"), self._rows("VTKHDF/PointData/velocities"))
+        internal = self._rows(INTERNAL) if self.recording.internal_rows else NEVER_FLOWED
+        vertices = self._rows("VTKHDF/Points"), self._rows("VTKHDF/PointData/velocities")
+        return State(self.time, *vertices, internal=internal)
 
     @cached_property
     def positions(self) -> dict[str, NDArray[np.float64]]:
@@ -84,6 +87,10 @@ class RecordedFrame(TetReadings):
     @property
     def _laws(self) -> TetLaws:
         return self.recording.laws
+
+    @property
+    def _internal(self) -> NDArray[np.float64]:
+        return self.state.internal
 
     @property
     def _bodies(self) -> tuple[RecordedBody, ...]:
@@ -216,10 +223,16 @@ class Recording(Showable, Sequence[RecordedFrame]):
             raise file.broken(f"its number of frames is {self._count}")
         self.fields: tuple[Field, ...] = _recorded_fields(file, header)
         self.sensors: tuple[RecordedSensor, ...] = sensors_of_header(file, header)
-        layout = frame_layout(n, m, len(self.obstacles), self.details, self.fields, self.sensors)
+        flowing = self.internal_rows
+        layout = frame_layout(n, m, len(self.obstacles), self.details, self.fields, self.sensors, flowing)
         self._series = {series.path: series for series in layout.series}
         own = [field_series(field, n, m).path for field in self.fields]
-        for path in (*_READ_BY_FRAME, *own, *([_MESSAGE] if _MESSAGE in file else [])):
+        for path in (
+            *_READ_BY_FRAME,
+            *own,
+            *([_MESSAGE] if _MESSAGE in file else []),
+            *([INTERNAL] if flowing else []),
+        ):
             file.check_series(self._series[path], self._count)
         self.times: NDArray[np.float64] = self._values("supple/frames/time")
         if not np.isfinite(self.times).all():
@@ -263,6 +276,11 @@ class Recording(Showable, Sequence[RecordedFrame]):
     def laws(self) -> TetLaws:
         """The elastic laws of all tets; unknown where an earlier version wrote the recording."""
         return recorded_laws(self.physics, self.bodies, self.rest_positions, self.tets, self.rest_volumes)
+
+    @property
+    def internal_rows(self) -> int:
+        """How many rows of internal variables a frame has."""
+        return 0 if self.physics is None else self.physics.internal
 
     @property
     def frames(self) -> Recording:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from supple.errors import OutputError
 from supple.files.replacing import output_error, parent_folder, put_in_place, remove_abandoned, temporary_name
+from supple.materials.flows.internal import COLUMNS, count_of
 from supple.output.recording.details import RecordedDetails
 from supple.output.recording.file import STEP_TIMES, Layout, RecordingFile, Series, create, rewrite
 from supple.output.recording.scene import write_scene
@@ -38,6 +39,7 @@ REPORT_NUMBERS = (
     "largest_stitch_stretch",
 )
 REPORT_VECTORS = ("linear_momentum", "angular_momentum")
+INTERNAL = "supple/frames/internal"
 MESSAGE_BYTES = 512  # longer messages are cut
 # Frames, and bytes of frames, for which there is room at first; the file grows when more are needed.
 _FIRST_FRAMES, _FIRST_ROOM = 1 << 16, 1 << 30
@@ -50,8 +52,9 @@ def frame_layout(
     details: RecordedDetails,
     fields: Sequence[Field] = (),
     sensors: Sequence[RecordedSensor] = (),
+    internal: int = 0,
 ) -> Layout:
-    """The series of a recording with these details, chosen fields and sensors."""
+    """The series of a recording with these details, chosen fields, sensors and rows of internal variables."""
     numbers = (Series(f"supple/frames/{name}", 1) for name in REPORT_NUMBERS)
     vectors = (Series(f"supple/frames/{name}", 1, (3,)) for name in REPORT_VECTORS)
     series = (
@@ -70,6 +73,7 @@ def frame_layout(
         *(field.series for field in details.fields),
         *(field_series(field, points, tets) for field in fields),
         *(sensor.series for sensor in sensors),
+        *([Series(INTERNAL, internal, (COLUMNS,))] if internal else []),
     )
     return Layout(points, tets, series)
 
@@ -158,7 +162,8 @@ class Recorder:
 
     def _layout(self, system: System) -> Layout:
         sizes = len(system.rest_positions), len(system.tets), len(system.obstacles)
-        return frame_layout(*sizes, self._details, self._fields, recorded_sensors(system.scene))
+        flowing = count_of(system.laws.material)
+        return frame_layout(*sizes, self._details, self._fields, recorded_sensors(system.scene), flowing)
 
     def write(self, frame: Frame) -> None:
         """Add one frame."""
@@ -252,6 +257,8 @@ class Recorder:
             file.put("supple/frames/message", _message_bytes(report.message))
         for field in self._details.fields:
             file.put(field.series.path, field.stored(getattr(report.details, field.name)))
+        if len(frame.state.internal):
+            file.put(INTERNAL, frame.state.internal)
         for sensor in recorded_sensors(frame.system.scene):
             file.put(sensor.series.path, frame.sensors[sensor.name].numbers())
         for field in self._fields:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from supple.errors import SceneError
-from supple.materials.material import Elastic, Material
+from supple.materials.material import Hyperelastic, Material
 from supple.materials.regions import Regions
 from supple.mesh.tetmesh import TetMesh
 from supple.scene.located import at
@@ -60,7 +60,7 @@ def with_regions(material: Material, regions: list[RegionModel], mesh: TetMesh) 
     ------
     LocatedError : where a region is empty or not of this mesh, or the body's own material is not elastic.
     """
-    if not isinstance(material, Elastic):
+    if not isinstance(material, Hyperelastic):
         raise SceneError(f"a body with regions needs an elastic material, which {type(material).__name__} is not")
     index = np.zeros(len(mesh.tets), dtype=np.int64)
     for k, region in enumerate(regions):

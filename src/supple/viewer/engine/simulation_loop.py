@@ -191,7 +191,9 @@ class SimulationLoop:
         pusher = setup.pusher
         contacts = self._requested("contacts", lambda: contact_points(system, state.positions, state.time))
         quantity = self.view.tet_values or ""
-        values = self._requested("tet_values", lambda: tet_values(system.laws, state.positions, quantity))
+        values = self._requested(
+            "tet_values", lambda: tet_values(system.laws, state.positions, quantity, state.internal)
+        )
         return Snapshot(
             description=None,  # pyright: ignore[reportArgumentType]
             frame=live.frame,
@@ -243,6 +245,7 @@ class SimulationLoop:
             before.time + share * (after.time - before.time),
             before.positions + share * (after.positions - before.positions),
             before.velocities + share * (after.velocities - before.velocities),
+            internal=after.internal,
         )
 
     def _time_to_wait(self) -> float:

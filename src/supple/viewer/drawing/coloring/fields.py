@@ -53,7 +53,9 @@ def energy_density(moment: Moment) -> NDArray[np.float64]:
 
 def _of_laws(moment: Moment, quantity: str) -> NDArray[np.float64]:
     laws = moment.model.laws
-    return np.full(len(moment.model.tets), np.nan) if laws is None else tet_values(laws, moment.positions, quantity)
+    if laws is None:
+        return np.full(len(moment.model.tets), np.nan)
+    return tet_values(laws, moment.positions, quantity, moment.internal)
 
 
 FIELDS = {

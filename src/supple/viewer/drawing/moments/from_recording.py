@@ -35,5 +35,6 @@ def moment_of_frame(model: Model, frame: RecordedFrame) -> Moment:
         frame.state.positions,
         frame.state.velocities,
         frame.obstacle_poses,
+        internal=frame.state.internal,
         pinned=frame.recording.pinned_vertices.astype(np.int64),
     )

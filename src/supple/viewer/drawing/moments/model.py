@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.laws import TetLaws
+from supple.materials.flows.internal import NEVER_FLOWED
 from supple.mesh.topology import TET_FACETS, facet_keys
 from supple.numerics.deformation import deformation_gradients
 from supple.output.drawing import BODY_COLORS, View
@@ -136,6 +137,7 @@ class Moment:
     springs : point of a body and target (3,) [m], by number of the grab
     pusher : center (3,) and radius of a ball [m], or None
     tet_values : values of tets (m,) that the simulation sent, by the key of their field
+    internal : (k, 11) internal variables of a recorded frame, see `State`
     """
 
     model: Model
@@ -148,6 +150,7 @@ class Moment:
     springs: Mapping[int, tuple[NDArray[np.float64], NDArray[np.float64]]] = field(default_factory=dict)
     pusher: tuple[NDArray[np.float64], float] | None = None
     tet_values: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    internal: NDArray[np.float64] = NEVER_FLOWED
 
     @cached_property
     def deformation_gradients(self) -> NDArray[np.float64]:

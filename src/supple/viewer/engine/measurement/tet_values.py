@@ -7,14 +7,19 @@ from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.elastic_tets.stress import cauchy_stresses, energy_densities, first_piolas, von_mises
+from supple.materials.flows.internal import NEVER_FLOWED
 from supple.numerics.deformation import deformation_gradients, determinants
 
 QUANTITIES = ("J", "von_mises", "energy")
 
 
 @np.errstate(all="ignore")
-def tet_values(laws: TetLaws, positions: NDArray[np.float64], quantity: str) -> NDArray[np.float64]:
+def tet_values(
+    laws: TetLaws, positions: NDArray[np.float64], quantity: str, internal: NDArray[np.float64] = NEVER_FLOWED
+) -> NDArray[np.float64]:
     """(m,) of every tet: "J" [-], "von_mises" stress [Pa], or "energy" density per rest volume [J/m^3].
+
+    internal : of the state, see `State`
 
     NaN where the tet has no law, or holds something rigid and a stress is asked for.
     """
@@ -23,5 +28,5 @@ def tet_values(laws: TetLaws, positions: NDArray[np.float64], quantity: str) -> 
     if quantity == "J":
         return determinants(F)
     if quantity == "energy":
-        return energy_densities(laws, x, F)
-    return von_mises(cauchy_stresses(first_piolas(laws, x, F), F))
+        return energy_densities(laws, x, F, internal)
+    return von_mises(cauchy_stresses(first_piolas(laws, x, F, internal), F))

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import CommandError
+from supple.materials.flows.internal import at_rest, checked, count_of, tets_of
+from supple.materials.inelastic.viscoelastic import Viscoelastic
 from supple.materials.material import Material
 from supple.materials.regions import Regions
 from supple.scene.body import Body, PlacedBody
@@ -122,6 +124,9 @@ def _material_with_value(material: Material, name: str, value: float) -> Materia
     if isinstance(material, Regions):
         materials = [_material_with_value(each, name, value) or each for each in material.materials]
         return replace(material, materials=materials)
+    if isinstance(material, Viscoelastic):
+        inner = _material_with_value(material.material, name, value)
+        return None if inner is None else replace(material, material=inner)
     if name not in {field.name for field in fields(material)}:
         return None
     return replace(material, **{name: value})
@@ -227,7 +232,7 @@ def _(command: commands.Squash, live: LiveScene) -> None:
     x, v = live.state.positions.copy(), live.state.velocities.copy()
     x[rows] = flattened(x[rows], live.up, command.factor)
     v[rows] = 0.0
-    live.adopt_checked(live.setup, State(live.state.time, x, v))
+    live.adopt_checked(live.setup, State(live.state.time, x, v, internal=live.state.internal))
 
 
 def flattened(points: NDArray[np.float64], up: NDArray[np.float64], factor: float) -> NDArray[np.float64]:
@@ -273,8 +278,14 @@ def _add(live: LiveScene, body: PlacedBody) -> None:
         live.state.time,
         np.concatenate([live.state.positions, alone.positions]),
         np.concatenate([live.state.velocities, alone.velocities]),
+        internal=np.concatenate([_internal(live), at_rest(count_of(body.material.per_tet(len(body.mesh.tets))))]),
     )
     live.adopt_checked(replace(live.setup, scene=grown, added=live.setup.added | {body.name}), state)
+
+
+def _internal(live: LiveScene) -> NDArray[np.float64]:
+    """The internal variables of the materials that flow."""
+    return checked(live.system.laws.material, live.state.internal)
 
 
 @change.register
@@ -284,7 +295,9 @@ def _(command: commands.RemoveBody, live: LiveScene) -> None:
         raise CommandError(f"body {part.name!r} is the only one; add another body first")
     keep = np.ones(len(live.state.positions), dtype=bool)
     keep[part.vertices] = False
-    state = State(live.state.time, live.state.positions[keep], live.state.velocities[keep])
+    owners = tets_of(live.system.laws.material)
+    internal = _internal(live)[(owners < part.tets.start) | (owners >= part.tets.stop)]
+    state = State(live.state.time, live.state.positions[keep], live.state.velocities[keep], internal=internal)
     smaller = replace(
         setup,
         scene=without_body(setup.scene, part.name),

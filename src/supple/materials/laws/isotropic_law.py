@@ -1,0 +1,111 @@
+"""An isotropic law: the decomposition of F, the law's values of the principal stretches, and what follows from both."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.materials.isotropic import hessian_block, nearest_semidefinite
+from supple.materials.laws.log_strains import VALUES
+from supple.materials.per_tet import Law
+from supple.numerics.kernel_cache import njit, prange
+from supple.numerics.mat3 import load_mat, mat_mul_transposed, store_mat
+from supple.numerics.svd3 import svd3 as decompose
+from supple.numerics.threads import threads_for
+
+# Fewer tets than this are processed by one thread.
+_SERIAL_TETS = 2_000
+
+
+@dataclass(frozen=True, eq=False)
+class IsotropicLaw(Law):
+    """A law of the principal stretches.
+
+    Attributes
+    ----------
+    kernel : (s (k, 3), p (k, q), out (k, 16)), see `law_kernel`
+    """
+
+    kernel: Callable[..., Any]
+    counts: range
+    name: str | None = None
+    infinite_when_flat: bool = False
+    bulk: int | None = None
+
+    def densities(self, F: NDArray[np.float64], p: NDArray[np.float64]) -> NDArray[np.float64]:
+        with threads_for(len(F), _SERIAL_TETS):
+            return self.decomposed(F, p)[3][:, 0].copy()
+
+    def models(
+        self, F: NDArray[np.float64], p: NDArray[np.float64], second: bool, project: bool
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        P, H = np.empty((len(F), 3, 3)), np.empty((len(F) if second else 0, 9, 9))
+        with threads_for(len(F), _SERIAL_TETS):
+            U, _, V, values = self.decomposed(F, p)
+            _models(U, V, values, second, project, P, H)
+        return values[:, 0].copy(), P, H
+
+    def stretch_values(self, s: NDArray[np.float64], p: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(k, 16) of stretches s (k, 3) and parameters p (k, q): psi, psi_i, psi_ij, quotients d and t."""
+        values = np.empty((len(s), VALUES))
+        self.kernel(np.ascontiguousarray(s), np.ascontiguousarray(p), values)
+        return values
+
+    def decomposed(
+        self, F: NDArray[np.float64], p: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """U (k, 3, 3), s (k, 3), V (k, 3, 3) of F = U diag(s) V^T, and the values (k, 16) at s."""
+        k = len(F)
+        U, s, V = np.empty((k, 3, 3)), np.empty((k, 3)), np.empty((k, 3, 3))
+        decompositions(np.ascontiguousarray(F), U, s, V)
+        return U, s, V, self.stretch_values(s, p)
+
+
+@njit(parallel=True, cache=True, error_model="numpy")
+def decompositions(F, U, s, V):
+    """F = U diag(s) V^T of every F (k, 3, 3), into U, s (k, 3) and V."""
+    for e in prange(len(F)):
+        u, values, v = decompose(load_mat(F, e))
+        store_mat(u, U, e)
+        store_mat(v, V, e)
+        s[e, 0], s[e, 1], s[e, 2] = values
+
+
+@njit(error_model="numpy")
+def principal_hessian_of(x, project):
+    """`supple.materials.isotropic.principal_hessian` of the 16 values x of a tet."""
+    A = (x[4], x[5], x[6], x[7], x[8], x[9])
+    q = (x[10], x[11], x[12], x[13], x[14], x[15])
+    if project:
+        A = nearest_semidefinite(A)
+        q = (max(q[0], 0.0), max(q[1], 0.0), max(q[2], 0.0), max(q[3], 0.0), max(q[4], 0.0), max(q[5], 0.0))
+    alpha = (0.5 * (q[0] + q[3]), 0.5 * (q[1] + q[4]), 0.5 * (q[2] + q[5]))
+    beta = (0.5 * (q[0] - q[3]), 0.5 * (q[1] - q[4]), 0.5 * (q[2] - q[5]))
+    return A, alpha, beta
+
+
+@njit(parallel=True, cache=True, error_model="numpy")
+def _models(U, V, values, second, project, P, H):
+    """Stresses (k, 3, 3) and, with `second`, Hessians (k, 9, 9), see `supple.materials.isotropic`."""
+    for e in prange(len(values)):
+        u, v, x = load_mat(U, e), load_mat(V, e), values[e]
+        scaled = (
+            u[0] * x[1], u[1] * x[2], u[2] * x[3],
+            u[3] * x[1], u[4] * x[2], u[5] * x[3],
+            u[6] * x[1], u[7] * x[2], u[8] * x[3],
+        )  # fmt: skip
+        store_mat(mat_mul_transposed(scaled, v), P, e)
+        if second:
+            A, alpha, beta = principal_hessian_of(x, project)
+            for j in range(3):
+                g = (v[3 * j], v[3 * j + 1], v[3 * j + 2])
+                for k in range(j + 1):
+                    K = hessian_block(u, A, alpha, beta, g, (v[3 * k], v[3 * k + 1], v[3 * k + 2]))
+                    for i in range(3):
+                        for n in range(3):
+                            H[e, 3 * i + j, 3 * n + k] = K[3 * i + n]
+                            H[e, 3 * n + k, 3 * i + j] = K[3 * i + n]

@@ -1,0 +1,109 @@
+"""Materials with an energy that a user gives as a Python function."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from supple.errors import SceneError
+from supple.materials.hyperelastic.by_law import ByLaw
+from supple.materials.laws.isotropic_law import IsotropicLaw
+from supple.materials.own.derivation import VARIABLES, compiled_law, derivatives, expression_of, stress_at_rest
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class EnergyMaterial(ByLaw):
+    """An isotropic material with an energy of one's own: psi plus K/2 (J - 1)^2.
+
+    `psi` is called once, with symbols. SymPy differentiates the formula that it returns, and Numba compiles all of it.
+
+    Parameters
+    ----------
+    psi : function of three variables and of all `parameters` by name, which returns the energy per rest volume [Pa];
+        made of +, -, *, /, ** and functions of SymPy such as `sympy.exp`. A constant in it is taken away.
+    of : "invariants", then the variables are I1 = tr C, I2 = (I1^2 - tr C^2) / 2 and J = det F; or "stretches", then
+        they are the principal stretches, in which psi must be symmetric.
+    parameters : by name; one number each, or one per tetrahedron.
+    bulk : K [Pa], zero or more. `integration="patches"` needs one above zero.
+
+    Raises
+    ------
+    SceneError : where psi is no such formula, is not symmetric in the stretches, or has a stress at rest.
+    """
+
+    psi: Callable[..., Any]
+    of: str = "invariants"
+    parameters: Mapping[str, float | NDArray[np.float64]] = field(default_factory=dict)
+    bulk: float | NDArray[np.float64] = 0.0
+    formula: str = field(init=False, default="")
+
+    shear_formula = "that of psi"
+
+    def _check_bulk(self) -> None:
+        self._require_finite("bulk", positive=False, unit="Pa")
+
+    def _check(self) -> None:
+        if self.of not in VARIABLES:
+            raise SceneError(f"EnergyMaterial: of is {self.of!r}; give 'invariants' or 'stretches'")
+        if not callable(self.psi):
+            raise SceneError(f"EnergyMaterial: psi is a {type(self.psi).__name__}; give a function")
+        for name, value in self.parameters.items():
+            try:
+                good = np.isfinite(np.asarray(value, dtype=np.float64)).all()
+            except (TypeError, ValueError):
+                good = False
+            if not good:
+                raise SceneError(f"EnergyMaterial: the parameter {name!r} is {value!r}; give finite numbers")
+        expression = expression_of(self.psi, self.of, self._names)
+        object.__setattr__(self, "formula", str(expression))
+        self._check_rest(expression)
+        object.__setattr__(self, "_law", compiled_law(expression, self.of, self._names))
+
+    def _check_integration(self) -> None:
+        super()._check_integration()
+        if self.integration == "patches" and not np.all(np.asarray(self.bulk) > 0.0):
+            raise SceneError("EnergyMaterial: integration='patches' needs a bulk above zero, the part that is averaged")
+
+    def _check_rest(self, expression: Any) -> None:
+        """Before anything is compiled."""
+        values = {name: float(np.ravel(np.asarray(value))[0]) for name, value in self.parameters.items()}
+        function = derivatives(expression, self.of, self._names)
+        try:
+            stress = stress_at_rest(expression, self.of, values)
+            rest = function(*((3.0, 3.0, 1.0) if self.of == "invariants" else (1.0, 1.0, 1.0)), *values.values())
+            orders = permutations((1.2, 0.9, 1.1)) if self.of == "stretches" else ()
+            stretched = [float(function(*s, *values.values())[0]) for s in orders]
+        except (ArithmeticError, ValueError, TypeError):
+            raise SceneError("EnergyMaterial: psi or a derivative of it is not finite near rest") from None
+        if not np.isfinite([stress, *rest]).all():
+            raise SceneError("EnergyMaterial: psi or a derivative of it is not finite near rest")
+        if abs(stress) > 1e-9 * max(abs(float(each)) for each in rest[1:]):
+            raise SceneError(
+                f"EnergyMaterial: psi has a stress of {stress:g} Pa at rest; add a term that takes it away, such as a "
+                "multiple of log(J)"
+            )
+        if stretched and np.ptp(stretched) > 1e-9 * np.abs(stretched).max():
+            raise SceneError("EnergyMaterial: psi is not symmetric in the stretches; use all three alike")
+
+    @property
+    def _names(self) -> tuple[str, ...]:
+        return tuple(self.parameters)
+
+    def rest_moduli(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        columns = np.broadcast_arrays(*(np.asarray(value, dtype=np.float64) for _, value in self.law_parameters()))
+        rows = np.column_stack([np.ravel(column) for column in columns])
+        values = self.law().stretch_values(np.ones((len(rows), 3)), rows)
+        mu = 0.5 * (values[:, 4] - values[:, 7])
+        bulk = values[:, 7] + 2.0 * mu / 3.0
+        return (mu, bulk) if columns[0].ndim else (mu[0], bulk[0])
+
+    def law(self) -> IsotropicLaw:
+        return self._law  # pyright: ignore[reportAttributeAccessIssue]
+
+    def law_parameters(self) -> tuple[tuple[str, ArrayLike], ...]:
+        return (("bulk", self.bulk), *self.parameters.items())
