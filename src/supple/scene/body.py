@@ -119,6 +119,8 @@ class Body(PlacedBody):
         owner = f"body {self.name!r}"
         if not isinstance(self.mesh, TetMesh):
             raise SceneError(f"{owner}: mesh is a {type(self.mesh).__name__}; give a TetMesh (see tetrahedralize)")
+        if self.mesh.order == 2:
+            raise SceneError(f"{owner}: its mesh has quadratic tets; give linear ones: mesh.to_order(1)")
         if not isinstance(self.material, Material):
             raise SceneError(f"{owner}: material is {self.material!r}; give a material such as StableNeoHookean(...)")
         if self.skin is not None and not isinstance(self.skin, SurfaceMesh):

@@ -95,9 +95,9 @@ class MeshStore:
         """The tet mesh of a file, or of the surface in it."""
         return self._once(source, lambda: self._read(source))
 
-    def shape(self, shape: ShapeModel) -> TetMesh:
+    def shape(self, shape: ShapeModel, order: int = 1) -> TetMesh:
         """The tet mesh of a shape."""
-        return self._once(shape, shape.build)
+        return self._once(shape, lambda: shape.build(order), f"order {order} ")
 
     def solid(self, source: MeshFileModel) -> SurfaceMesh | TetMesh:
         """The surface in a file as it is, without meshing options; otherwise its tet mesh."""
