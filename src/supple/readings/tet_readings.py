@@ -10,10 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.laws import TetLaws
-from supple.materials.elastic_tets.stress import cauchy_stresses, energy_densities, first_piolas, von_mises
-from supple.numerics.deformation import deformation_gradients, determinants
+from supple.materials.elastic_tets.stress import (
+    cauchy_of_tets,
+    energy_densities,
+    first_piolas,
+    mean_deformation_gradients,
+    volume_ratios,
+    von_mises,
+)
 from supple.numerics.svd3 import rotation_variant_svd
-from supple.readings.by_body import BodyRows, TetField, vertex_means
+from supple.readings.by_body import BodyRows, TetField
 
 _OF_RIGID = "is rigid: it has no strain and no stress of its own"
 _NO_LAW = "has no known elastic law, so it has no {}; give it an elastic material such as StableNeoHookean"
@@ -24,7 +30,7 @@ class TetReadings(ABC):
     """Fields on tets, by body name: `frame.stress["bear"]` is (m, 3, 3), `frame.stress.at_vertices["bear"]` (n, 3, 3).
 
     Stresses are those of the elastic forces, without the viscous ones of `damping`. A value is not finite where a tet
-    is flat, or where its energy is infinite.
+    is flat, or where its energy is infinite. Those of a quadratic tet are means over it.
     """
 
     @property
@@ -41,8 +47,8 @@ class TetReadings(ABC):
 
     @cached_property
     def det_F(self) -> NDArray[np.float64]:
-        """(m,) J of every tet, in the order of the bodies."""
-        return determinants(self._F)
+        """(m,) J of every tet, in the order of the bodies; of a quadratic one, the ratio of its volumes."""
+        return volume_ratios(self._laws, self._x, self._F)
 
     @cached_property
     def first_piola(self) -> TetField:
@@ -56,7 +62,7 @@ class TetReadings(ABC):
     def stress(self) -> TetField:
         """Cauchy stress P F^T / J (m, 3, 3) [Pa]: force per area as it is, symmetric."""
         with np.errstate(all="ignore"):
-            return self._field(cauchy_stresses(self.first_piola.values_of_all, self._F), "stress")
+            return self._field(cauchy_of_tets(self._laws, self._x, self.first_piola.values_of_all, self._F), "stress")
 
     @cached_property
     def von_mises(self) -> TetField:
@@ -78,7 +84,7 @@ class TetReadings(ABC):
 
     @cached_property
     def _F(self) -> NDArray[np.float64]:
-        return deformation_gradients(self._x, self._laws.tets, self._laws.Dm_inv)
+        return mean_deformation_gradients(self._laws, self._x)
 
     def _field(self, values: NDArray[np.float64], what: str) -> TetField:
         refused = dict.fromkeys(self._names_where(~self._laws.stressed), _RIGID)
@@ -94,4 +100,4 @@ class TetReadings(ABC):
         return [body.name for body in self._bodies if chosen[body.tets].any()]
 
     def _to_vertices(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        return vertex_means(values, self._laws.tets, self._laws.volumes, len(self._x))
+        return self._laws.vertex_means(values, len(self._x))

@@ -11,6 +11,10 @@ from numpy.typing import NDArray
 from supple.errors import SolverError
 from supple.implicit.energies.patch_elasticity import PatchElasticity
 from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
+from supple.implicit.energies.quadratic.gathering import Gathering
+from supple.implicit.energies.quadratic.term import OfQuadraticTets, VirtualTets
+from supple.materials.elastic_tets.laws import of_points
+from supple.materials.elastic_tets.quadratic import QuadraticTets
 from supple.materials.material import Elastic
 from supple.materials.patches.energy import tet_shares
 from supple.materials.per_tet import NO_REGION, TetMaterial
@@ -26,6 +30,27 @@ SERIAL_TETS = 2_000
 
 
 @dataclass(frozen=True, eq=False)
+class QuadraticElasticity(OfQuadraticTets):
+    """The energy of the quadratic tets `rows` (k,), at their quadrature points."""
+
+    rows: NDArray[np.int64]
+    at_points: Elasticity
+
+    @classmethod
+    def of(cls, tets: QuadraticTets, material: TetMaterial, vertices: int) -> QuadraticElasticity:
+        """With the material (m,) of all tets; `vertices` : their number."""
+        virtual = VirtualTets(tets.quadrature, Gathering.of(tets.nodes, vertices))
+        own = of_points(material, tets.rows, tets.quadrature.volumes.shape[1])
+        each = np.arange(4 * virtual.count + 1, dtype=np.int32)
+        at_points = Elasticity(virtual.system(), own, each, each[:-1])
+        return cls(at_points, virtual, tets.rows, at_points)
+
+    def energies(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(k,) of each element [J]."""
+        return self.at_points.energies(self.virtual.corners(x)).reshape(len(self.rows), -1).sum(axis=1)
+
+
+@dataclass(frozen=True, eq=False)
 class Elasticity(Potential):
     """The hyperelastic energy of every tet with its own material.
 
@@ -34,6 +59,7 @@ class Elasticity(Potential):
     material : one row per tet
     start, incidence : for every vertex the (tet, node) pairs that name it, coded 4 tet + node
     patches : the energy of the tets that are averaged over patches, or None
+    quadratic : the energy of the quadratic tets, or None
     """
 
     system: System
@@ -41,17 +67,21 @@ class Elasticity(Potential):
     start: NDArray[np.int32]
     incidence: NDArray[np.int32]
     patches: PatchElasticity | None = None
+    quadratic: QuadraticElasticity | None = None
     label = "elasticity"
     projection = Projection.RELEASED_FIRST
 
     def value(self, x: NDArray[np.float64]) -> float:
-        return float(self._own_energies(x).sum()) + (self.patches.value(x) if self.patches is not None else 0.0)
+        parts = [part.value(x) for part in (self.patches, self.quadratic) if part is not None]
+        return float(self._own_energies(x).sum()) + sum(parts)
 
     def energies(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(m,) of each tet [J]; those of patches are divided among their tets."""
         energies = self._own_energies(x)
         if self.patches is not None:
             energies[self.patches.patches.rows] += tet_shares(self.patches.patches, x)
+        if self.quadratic is not None:
+            energies[self.quadratic.rows] += self.quadratic.energies(x)
         return energies
 
     def _own_energies(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -80,16 +110,24 @@ class Elasticity(Potential):
             else:
                 hessian.add_tets(lambda blocks: element_models(*tets, True, project, energies, gradients, blocks))
             gather_gradients(self.start, self.incidence, gradients, gradient)
-        total = float(energies.sum())
-        return total if self.patches is None else total + self.patches.add_model(x, gradient, hessian, project)
+        parts = [part for part in (self.patches, self.quadratic) if part is not None]
+        return float(energies.sum()) + sum(part.add_model(x, gradient, hessian, project) for part in parts)
+
+    @cached_property
+    def own(self) -> NDArray[np.bool_]:
+        """(m,) which tets have an energy of their own F: not those of patches, nor the quadratic ones."""
+        own = self.material.region == NO_REGION
+        if self.quadratic is not None:
+            own[self.quadratic.rows] = False
+        return own
 
     @cached_property
     def _parameters(self) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
-        """Kind, mu and lam (m,) of each tet's own energy, which is zero where patches have it."""
+        """Kind, mu and lam (m,) of each tet's own energy, which is zero where patches or quadratic tets have it."""
         material = self.material
-        if self.patches is None:
+        if self.patches is None and self.quadratic is None:
             return material.kind, material.mu, material.lam
-        own = material.region == NO_REGION
+        own = self.own
         zero = np.int32(StableNeoHookean.kind())  # with mu = lam = 0, an energy that is zero for every F
         return np.where(own, material.kind, zero), np.where(own, material.mu, 0.0), np.where(own, material.lam, 0.0)
 
@@ -112,7 +150,10 @@ def elasticity_of(system: System) -> Elasticity:
             )
     start, incidence = incidences(system.tets, len(system.rest_positions))
     patches = None if system.laws.patches is None else PatchElasticity.of(system.laws.patches)
-    return Elasticity(system, system.laws.material, start, incidence, patches)
+    material, quadratic = system.laws.material, None
+    if system.quadratic is not None:
+        quadratic = QuadraticElasticity.of(system.quadratic, material, len(system.rest_positions))
+    return Elasticity(system, material, start, incidence, patches, quadratic)
 
 
 @njit(cache=True, parallel=True, error_model="numpy")

@@ -179,6 +179,16 @@ def positive_elements(x, nodes, out):
         out[e] = size < np.inf and _is_positive(coefficients, ROUND_OFF * size)
 
 
+@njit(cache=True, parallel=True, error_model="numpy")
+def positive_coefficients(x, nodes, out):
+    """Whether all coefficients of each element are positive: x (n, 3), nodes (k, 10) -> out (k,) bool."""
+    for e in prange(len(nodes)):
+        derivatives, coefficients = np.empty((4, 3, 3)), np.zeros(TERMS)
+        size = corner_derivatives(x, nodes, e, derivatives)
+        add_coefficients(derivatives, derivatives, derivatives, 1.0, coefficients)
+        out[e] = size < np.inf and coefficients.min() > ROUND_OFF * size
+
+
 @njit(cache=True, error_model="numpy")
 def determinant_coefficients(x, nodes):
     """(k, 20) the coefficients of each element's determinant; those of the corners come first.

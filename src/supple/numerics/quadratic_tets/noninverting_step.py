@@ -8,6 +8,8 @@ are those of
 Before the first root of any of these cubics g is positive in the whole element. At the corners the coefficients are g
 itself, and their first root bounds the step from above. Where the two bounds are apart, the element is bisected. The
 result is not beyond the true limit, and not below 95 % of it.
+
+Elements whose coefficients are to stay positive themselves, because they have a barrier, are not bisected.
 """
 
 from __future__ import annotations
@@ -67,9 +69,10 @@ def _smallest_root(v):
 
 
 @njit(error_model="numpy")
-def _element_step(x, p, nodes, e, keep, here, ahead, terms):
+def _element_step(x, p, nodes, e, whole, keep, here, ahead, terms):
     """Largest t in [0, 1] for element e; 0 where it is inverted or flat somewhere, or something is not finite.
 
+    whole : whether all coefficients are kept, not only the determinant
     here, ahead : (4, 3, 3) and terms : (4, 20) memory
     """
     size_here = corner_derivatives(x, nodes, e, here)
@@ -105,7 +108,14 @@ def _element_step(x, p, nodes, e, keep, here, ahead, terms):
             terms[j, k] -= kept + ROUND_OFF * (size_here if j == 0 else longest)
             if not terms[j, k] > 0.0:
                 positive = False
-    return 1.0 if positive else _bisected_step(terms)
+    if positive:
+        return 1.0
+    if not whole:
+        return _bisected_step(terms)
+    smallest = 1.0
+    for k in range(TERMS):
+        smallest = min(smallest, _first_root(terms[0, k], terms[1, k], terms[2, k], terms[3, k]))
+    return smallest
 
 
 @njit(error_model="numpy")
@@ -157,14 +167,15 @@ def _bisected_step(terms):
 
 
 @njit(parallel=True, cache=True, error_model="numpy")
-def noninverting_step(x, direction, nodes, guarded, keep):
+def noninverting_step(x, direction, nodes, guarded, whole, keep):
     """The largest step in [0, 1] over which the determinant of no guarded element falls anywhere below `keep` of its
     value at x.
 
     Parameters
     ----------
     x, direction : (n, 3) positions and their change over a full step [m]
-    nodes : (k, 10) int32; guarded : (k,) bool; keep : in (0, 1)
+    nodes : (k, 10) int32; guarded, whole : (k,) bool; keep : in (0, 1)
+    whole : where each coefficient of the determinant is kept, which must be positive at x
 
     Returns
     -------
@@ -178,7 +189,7 @@ def noninverting_step(x, direction, nodes, guarded, keep):
         here, ahead, terms = np.empty((4, 3, 3)), np.empty((4, 3, 3)), np.empty((4, TERMS))
         for e in range(r * _RUN, min(m, (r + 1) * _RUN)):
             if guarded[e]:
-                t = _element_step(x, direction, nodes, e, keep, here, ahead, terms)
+                t = _element_step(x, direction, nodes, e, whole[e], keep, here, ahead, terms)
                 if t < steps[r]:
                     steps[r] = t
                     limiting[r] = e

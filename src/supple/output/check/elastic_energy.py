@@ -11,6 +11,7 @@ from supple.materials.kinds import needs_positive_volume
 from supple.materials.per_tet import NO_REGION, TetMaterial
 from supple.materials.tet_energies import element_energies
 from supple.numerics.threads import threads_for
+from supple.output.check.geometry.quadratic_tets import at_quadrature_points
 from supple.output.recording.reader import Recording
 
 _TETS_PER_THREAD = 5_000
@@ -39,6 +40,14 @@ def elastic_energy(
         tets = np.ascontiguousarray(recording.tets[body.tets])
         volumes = recording.rest_volumes[body.tets]
         pair = physics.compliances[k]
+        nodes = recording.nodes_of(body)
+        if nodes.shape[1] == 10:
+            F, parts = at_quadrature_points(x[nodes], recording.rest_positions[nodes])
+            laws = physics.kind[body.tets].astype(np.int32), physics.mu[body.tets], physics.lam[body.tets]
+            of_points = np.empty(parts.size)
+            densities(F.reshape(-1, 3, 3), *(np.repeat(law, parts.shape[1]) for law in laws), of_points)
+            total += float(of_points @ parts.ravel())
+            continue
         if pair is None:
             out = np.empty(len(tets))
             laws = physics.kind[body.tets].astype(np.int32), physics.mu[body.tets], physics.lam[body.tets]

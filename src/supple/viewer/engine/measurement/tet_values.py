@@ -6,8 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.laws import TetLaws
-from supple.materials.elastic_tets.stress import cauchy_stresses, energy_densities, first_piolas, von_mises
-from supple.numerics.deformation import deformation_gradients, determinants
+from supple.materials.elastic_tets.stress import (
+    cauchy_of_tets,
+    energy_densities,
+    first_piolas,
+    mean_deformation_gradients,
+    volume_ratios,
+    von_mises,
+)
 
 QUANTITIES = ("J", "von_mises", "energy")
 
@@ -19,9 +25,9 @@ def tet_values(laws: TetLaws, positions: NDArray[np.float64], quantity: str) -> 
     NaN where the tet has no law, or holds something rigid and a stress is asked for.
     """
     x = np.ascontiguousarray(positions)
-    F = deformation_gradients(x, laws.tets, laws.Dm_inv)
+    F = mean_deformation_gradients(laws, x)
     if quantity == "J":
-        return determinants(F)
+        return volume_ratios(laws, x, F)
     if quantity == "energy":
         return energy_densities(laws, x, F)
-    return von_mises(cauchy_stresses(first_piolas(laws, x, F), F))
+    return von_mises(cauchy_of_tets(laws, x, first_piolas(laws, x, F), F))
