@@ -284,7 +284,8 @@ def _lumped_masses(body: PlacedBody) -> NDArray[np.float64]:
     if mesh.order == 2:
         density = np.broadcast_to(np.asarray(body.material.density, dtype=np.float64), len(mesh.tets))
         parts = density[:, None] * node_volumes(mesh.vertices, mesh.nodes)
-        return np.bincount(mesh.nodes.ravel(), weights=parts.ravel(), minlength=len(mesh.vertices))
+        masses = np.bincount(mesh.nodes.ravel(), weights=parts.ravel(), minlength=len(mesh.vertices))
+        return masses.astype(np.float64, copy=False)
     quarters = np.broadcast_to(np.asarray(body.material.density, dtype=np.float64), len(mesh.tets)) * mesh.volumes / 4.0
     masses = np.bincount(mesh.tets.ravel(), weights=np.repeat(quarters, 4), minlength=len(mesh.vertices))
     return masses.astype(np.float64, copy=False)

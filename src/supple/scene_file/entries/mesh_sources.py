@@ -16,7 +16,7 @@ from supple.scene_file.entries.shapes import GummyBearShapeModel, ShapeModel, Su
 from supple.scene_file.model import FilePath, Model, Positive, Vector
 
 SURFACE_FILES = (".stl", ".obj", ".ply", ".off", ".vtp")
-TET_FILES = (".node", ".ele", ".edge", ".face", ".msh")
+TET_FILES = (".node", ".ele", ".edge", ".face", ".msh", ".inp")
 MESHING_OPTIONS = (
     "tets",
     "edge",

@@ -84,7 +84,7 @@ def are_positive(corners: NDArray[np.float64]) -> NDArray[np.bool_]:
 
     Where it comes closer to zero than fourteen cuts and round-off can tell, it counts as not positive.
     """
-    positive = np.isfinite(corners).all(axis=(1, 2))
+    positive: NDArray[np.bool_] = np.asarray(np.isfinite(corners).all(axis=(1, 2)))
     D = np.abs(derivatives(np.where(positive[:, None, None], corners, 0.0), np.eye(4))).sum(axis=2).max(axis=1)
     least = _ROUND_OFF * D.prod(axis=1)
     left, parts = np.flatnonzero(positive), np.tile(np.eye(4), (int(positive.sum()), 1, 1))
