@@ -14,6 +14,7 @@ from supple.implicit.energies.potential import HessianBlocks
 from supple.implicit.limits.inversion_guard import InversionGuard
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.numerics.quadratic_tets.shape_functions import conical_rule, reference_gradients, shape_functions
+from supple.numerics.threads import one_thread
 from supple.scene.forces import Force
 from supple.system import build_system
 
@@ -367,3 +368,19 @@ def test_what_cannot_be_simulated_is_refused_in_one_line():
     with pytest.raises(SceneError) as error:
         sp.RigidBody("r", BAR, density=1000.0)
     assert "quadratic tets" in str(error.value)
+
+
+def test_any_number_of_threads_gives_the_same_bits():
+    mesh = wavy(sp.shapes.box((1, 1, 1), (4, 4, 4), order=2))
+    system = build_system(sp.Scene([sp.Body("b", mesh, SOFT)]))
+    x = system.rest_positions + 0.01 * np.random.default_rng(0).normal(size=mesh.vertices.shape)
+    results = []
+    for alone in (True, False):
+        blocks, gradient = HessianBlocks.zeros(len(system.tets), len(x)), np.zeros_like(x)
+        with one_thread(alone):
+            energy = elasticity_of(system).add_model(x, gradient, blocks, True)
+            guard = InversionGuard.at(system, x)
+            step = guard.largest_step(x, 0.1 * np.sin(40.0 * x))
+        results.append((energy, gradient.tobytes(), blocks.patches[0].blocks.tobytes(), step))
+    assert results[0] == results[1]
+    assert results[0][3][0] < 1.0
