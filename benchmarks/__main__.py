@@ -8,6 +8,7 @@ from benchmarks import (
     implicit_scaling,
     live,
     projections,
+    quadratic_tets,
     startup,
     work_precision,
 )
@@ -22,4 +23,5 @@ if __name__ == "__main__":
     implicit_scaling.main()
     candidate_search.main()
     contact_scenes.main()
+    quadratic_tets.main()
     live.main()

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -113,3 +114,13 @@ def test_a_checkout_without_the_package_is_refused(tmp_path):
 
     with pytest.raises(SystemExit, match="there is no package supple in it"):
         contact_scenes.main(["slope:small"], against=tmp_path)
+
+
+def test_quadratic_tets_are_compared_with_linear_ones(capsys):
+    from benchmarks import quadratic_tets
+
+    problem = quadratic_tets.PROBLEMS[0]
+    quadratic_tets.main((replace(problem, linear=(2, 4), quadratic=(2,), reference=4),), rounds=1)
+    out = capsys.readouterr().out
+    assert "Cook's membrane" in out
+    assert "24 quadratic tets are as good as 96 linear ones" in out

@@ -17,9 +17,13 @@ from numpy.typing import ArrayLike, NDArray
 from supple.displayed import DisplayedReport, supplied
 from supple.errors import SceneError, SolverError
 from supple.materials.elastic_tets.laws import TetLaws, joined_materials
-from supple.materials.elastic_tets.stress import energy_densities
+from supple.materials.elastic_tets.stress import (
+    energy_densities,
+    mean_deformation_gradients,
+    smallest_ratio,
+    volume_ratios,
+)
 from supple.materials.flows.internal import checked
-from supple.numerics.deformation import deformation_gradients, determinants
 from supple.numerics.memory import require_memory
 from supple.readings.frame_readings import FrameReadings
 from supple.scene.inputs import checked_values, drive_inputs, hold_inputs
@@ -41,7 +45,7 @@ class Diagnostics:
 
     Attributes
     ----------
-    min_det_F : smallest J over all tets [-]
+    min_det_F : smallest J over all tets, of quadratic ones at their nodes and quadrature points [-]
     kinetic_energy, elastic_energy : [J], elastic from the rest state
     potential_energy : of gravity [J], zero where all mass is at the origin
     stitch_energy : of all stitches, from their rest state [J]
@@ -389,11 +393,11 @@ def measure(system: System, state: State) -> Diagnostics:
     m, x, v = system.masses, state.positions, state.velocities
     center = m @ x / m.sum()
     momentum = m @ v
-    F = deformation_gradients(x, system.tets, system.rest_shape_inverse)
     laws, stitching = system.laws, system.stitching
+    F = mean_deformation_gradients(laws, x)
     points = stitching.points(x, state.time)
     return Diagnostics(
-        min_det_F=float(determinants(F).min()),
+        min_det_F=smallest_ratio(laws, x, volume_ratios(laws, x, F)),
         kinetic_energy=0.5 * float(m @ np.einsum("ij,ij->i", v, v)),
         elastic_energy=float((energy_densities(laws, x, F, state.internal) * laws.volumes)[laws.known].sum()),
         potential_energy=-float((m @ x) @ system.gravity),

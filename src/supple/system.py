@@ -22,6 +22,8 @@ from supple.loads.build import applied, applied_force
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.elastic_tets.edge_springs import EdgeSprings
 from supple.materials.elastic_tets.laws import TetLaws, joined_materials
+from supple.materials.elastic_tets.quadratic import QuadraticTets
+from supple.mesh.quadratic import node_volumes
 from supple.mesh.topology import graph_components
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.scene.body import PlacedBody
@@ -100,7 +102,7 @@ class System:
     Attributes
     ----------
     rest_positions : (n, 3) [m] rest shapes, each in its body's own coordinates, before placement
-    masses : (n,) lumped, rho V / 4 to each node of a tet [kg]
+    masses : (n,) lumped, rho V / 4 to each node of a tet; see `node_volumes` for quadratic tets [kg]
     tets : (m, 4); rest_shape_inverse : (m, 3, 3) Dm^-1 [1/m]; rest_volumes : (m,) [m^3]
     edges : (e, 2); rest_lengths : (e,) [m]
     points : combinations of vertices that touch and are drawn; those of a soft body are its vertices
@@ -110,6 +112,7 @@ class System:
     loads : those of the scene's forces, then of its loads
     stitching : tets and springs that join bodies to each other, and to obstacles
     start_states : where a simulation began, then where it continues; vertices in the scene's order
+    quadratic : the quadratic ones among the tets, of which `tets` and `rest_shape_inverse` have the corners; or None
     """
 
     scene: Scene
@@ -130,6 +133,7 @@ class System:
     soft_targets: tuple[SoftTargetRange, ...] = ()
     stitching: Stitching = field(default_factory=lambda: no_stitching(0))
     start_states: tuple[State, ...] = ()
+    quadratic: QuadraticTets | None = None
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
@@ -163,7 +167,8 @@ class System:
                 of_tets = self.rest_positions, self.tets[rows], self.rest_volumes[rows]
                 springs.append(EdgeSprings.of(own, rows, *of_tets))
         joined = joined_materials(materials)
-        return TetLaws(self.tets, self.rest_shape_inverse, self.rest_volumes, joined, tuple(springs))
+        rest = self.rest_shape_inverse, self.rest_volumes
+        return TetLaws(self.tets, *rest, joined, tuple(springs), self.quadratic)
 
     @cached_property
     def joined_components(self) -> NDArray[np.int32]:
@@ -224,7 +229,8 @@ def build_system(scene: Scene, start: State | None = None) -> System:
     all_masses, start_states = np.concatenate(masses), _start_states(scene, start)
     begins = {part.name: part.vertices.start for part in ranges}
     forces = [_applied_force(force, next(part for part in ranges if part.name == force.body)) for force in scene.forces]
-    loads = [applied(load, scene.bodies, begins, all_masses, start_states[0].positions) for load in scene.loads]
+    given = [applied(load, scene.bodies, begins, all_masses, start_states[0].positions) for load in scene.loads]
+    loads = [load for parts in given for load in parts]
     return System(
         scene=scene,
         bodies=tuple(ranges),
@@ -244,7 +250,17 @@ def build_system(scene: Scene, start: State | None = None) -> System:
         soft_targets=tuple(SoftTargetRange(item, *_anchored(item, ranges, start)) for item in scene.soft_targets),
         stitching=scene.stitching,
         start_states=start_states,
+        quadratic=_quadratic_tets(ranges, rest_positions),
     )
+
+
+def _quadratic_tets(ranges: list[BodyRange], rest_positions: NDArray[np.float64]) -> QuadraticTets | None:
+    own = [part for part in ranges if part.body.mesh.order == 2]
+    if not own:
+        return None
+    rows = np.concatenate([np.arange(part.tets.start, part.tets.stop) for part in own])
+    nodes = np.concatenate([part.body.mesh.nodes + part.vertices.start for part in own])
+    return QuadraticTets.of(rows, nodes, rest_positions)
 
 
 def rebuilt_system(scene: Scene, start_states: tuple[State, ...], anchors: Sequence[NDArray[np.float64]]) -> System:
@@ -263,8 +279,13 @@ def _start_states(scene: Scene, start: State | None) -> tuple[State, ...]:
 
 
 def _lumped_masses(body: PlacedBody) -> NDArray[np.float64]:
-    """(n,) [kg]: of each tet's mass rho V, a quarter to each of its vertices."""
+    """(n,) [kg]: of each tet's mass rho V, a quarter to each of its vertices, or parts of a quadratic tet's."""
     mesh = body.mesh
+    if mesh.order == 2:
+        density = np.broadcast_to(np.asarray(body.material.density, dtype=np.float64), len(mesh.tets))
+        parts = density[:, None] * node_volumes(mesh.vertices, mesh.nodes)
+        masses = np.bincount(mesh.nodes.ravel(), weights=parts.ravel(), minlength=len(mesh.vertices))
+        return masses.astype(np.float64, copy=False)
     quarters = np.broadcast_to(np.asarray(body.material.density, dtype=np.float64), len(mesh.tets)) * mesh.volumes / 4.0
     masses = np.bincount(mesh.tets.ravel(), weights=np.repeat(quarters, 4), minlength=len(mesh.vertices))
     return masses.astype(np.float64, copy=False)

@@ -111,3 +111,16 @@ def test_contact_points_between_bodies():
     assert heights.min() < 0.0 < heights.max()
     apart = x + np.repeat([[0, 0.3, 0], [0, 0.6, 0]], len(mesh.vertices), axis=0)
     assert len(contact_points(system, apart, 0.0)) == 0
+
+
+def test_values_of_quadratic_tets_are_those_of_their_means():
+    mesh = sp.shapes.box((1, 1, 1), (1, 1, 1), order=2)
+    system = build_system(sp.Scene([sp.Body("cube", mesh, RUBBER)]))
+    x = system.rest_positions + 0.02 * np.random.default_rng(0).normal(size=system.rest_positions.shape)
+    measured = measure(system, State(0.0, x, np.zeros_like(x)))
+    energies = tet_values(system.laws, x, "energy")
+    assert energies @ system.rest_volumes == pytest.approx(measured.elastic_energy, rel=1e-12)
+    np.testing.assert_allclose(tet_values(system.laws, x, "J"), sp.TetMesh(x, mesh.nodes).volumes / mesh.volumes)
+    assert measured.min_det_F < tet_values(system.laws, x, "J").min()
+    stretched = system.rest_positions * [1.0 + 1e-5, 1.0 - 3e-6, 1.0 - 3e-6]
+    assert tet_values(system.laws, stretched, "von_mises") == pytest.approx(np.full(6, 1.0), rel=1e-3)

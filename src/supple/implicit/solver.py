@@ -14,7 +14,7 @@ from supple.implicit.contact.points import forces_on_owners
 from supple.implicit.contact.scales import smallest_diagonal
 from supple.implicit.contact.settings import IPCContact
 from supple.implicit.details import ImplicitDetails
-from supple.implicit.energies.damping import viscosity_of
+from supple.implicit.energies.damping import quadratic_viscosity_of, viscosity_of
 from supple.implicit.energies.elasticity import SERIAL_TETS, elasticity_of
 from supple.implicit.energies.potential import HessianBlocks
 from supple.implicit.energies.regularization import regularization_of
@@ -50,6 +50,8 @@ _LINEAR_SOLVERS = ("auto", "pcg", "direct")
 _BYTES_PER_TET = 5000
 _BYTES_OF_PATCHES = 7000
 _BYTES_OF_FACTOR = 1200
+# For the matrices of its quadrature points and nodes, and its blocks.
+_BYTES_PER_QUADRATIC_TET = 50_000
 
 
 @dataclass(frozen=True)
@@ -121,6 +123,8 @@ class Implicit(Solver):
         needed = 0
         for body in scene.bodies:
             averaged = body.material.per_tet(len(body.mesh.tets)).region != NO_REGION
+            if body.mesh.order == 2:
+                needed += _BYTES_PER_QUADRATIC_TET * len(averaged)
             needed += _BYTES_PER_TET * len(averaged) + _BYTES_OF_PATCHES * int(np.count_nonzero(averaged))
         if self.linear_solver == "direct":
             needed += int(_BYTES_OF_FACTOR * sum(len(body.mesh.vertices) ** (4.0 / 3.0) for body in scene.bodies))
@@ -178,6 +182,7 @@ class Implicit(Solver):
             regularization_of(elasticity),
             stitches,
             damped,
+            quadratic_viscosity_of(elasticity),
         )
 
     def check(self, system: System, state: State, workspace: Workspace) -> None:

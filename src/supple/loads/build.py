@@ -27,8 +27,8 @@ def applied(
     begins: dict[str, int],
     masses: NDArray[np.float64],
     x: NDArray[np.float64],
-) -> AppliedLoad:
-    """A load of a scene on the vertices of all bodies.
+) -> list[AppliedLoad]:
+    """A load of a scene on the vertices of all bodies, as one or several.
 
     Parameters
     ----------
@@ -42,29 +42,49 @@ def applied(
     named = {body.name: body for body in bodies}
     if isinstance(load, Traction):
         body = named[load.body]
-        triangles = body.triangles[load.triangles(body)]
-        areas = np.linalg.norm(area_vectors(body.points, triangles), axis=1) / 3.0
-        shares = np.bincount(triangles.ravel(), np.repeat(areas, 3), len(body.points))
-        touched = np.unique(triangles)
+        shares, parts = np.zeros(len(body.points)), _weighted_triangles(body, load.triangles(body))
+        for triangles, weight in parts:
+            areas = weight * np.linalg.norm(area_vectors(body.points, triangles), axis=1) / 3.0
+            shares += np.bincount(triangles.ravel(), np.repeat(areas, 3), len(body.points))
+        touched = np.unique(np.concatenate([triangles for triangles, _ in parts]))
         at = _over_time(load.traction, f"{load.label}: traction", (3,))
-        return _on_points(body, begins[load.body], touched, lambda time: shares[touched, None] * at(time))
+        return [_on_points(body, begins[load.body], touched, lambda time: shares[touched, None] * at(time))]
     if isinstance(load, Pressure):
         body = named[load.body]
         if isinstance(body, RigidBody):
             raise SceneError(
                 f"{load.label}: body {load.body!r} is rigid, and pressure acts on soft ones; give a Traction"
             )
-        triangles = body.triangles[load.triangles(body)] + begins[load.body]
-        at = _over_time(load.pressure, f"{load.label}: pressure", ())
-        return FollowerPressure(triangles.astype(np.int32), lambda time: float(at(time)))
+        at, begin = _over_time(load.pressure, f"{load.label}: pressure", ()), begins[load.body]
+        return [
+            FollowerPressure((triangles + begin).astype(np.int32), lambda time, weight=weight: weight * float(at(time)))
+            for triangles, weight in _weighted_triangles(body, load.triangles(body))
+        ]
     if isinstance(load, BodyForce):
         chosen = bodies if load.body is None else [named[load.body]]
         parts = [np.arange(len(body.mesh.vertices)) + begins[body.name] for body in chosen]
         vertices = np.concatenate(parts).astype(np.int32)
-        return MassLoad(load, vertices, masses[vertices])
+        return [MassLoad(load, vertices, masses[vertices])]
     if isinstance(load, Spring):
-        return _spring(load, bodies, begins, x)
+        return [_spring(load, bodies, begins, x)]
     raise SceneError(f"{load.label}: a {type(load).__name__} is not a load that solvers know")
+
+
+def _weighted_triangles(body: PlacedBody, rows: NDArray[np.int64]) -> list[tuple[NDArray[np.int32], float]]:
+    """The triangles (t, 3) that a load per area acts on, and the weight of each group.
+
+    The forces on the four triangles of a quadratic facet are those of shape functions that are linear in each of them.
+    4/3 of them, without 1/3 of the forces on the triangle between the corners, are those of the quadratic ones: exact
+    for a plane facet with straight sides, and to fourth order for a curved one.
+    """
+    triangles = body.triangles
+    if body.mesh.order == 1:
+        return [(triangles[rows], 1.0)]
+    whole = np.bincount(rows // 4, minlength=len(triangles) // 4) == 4
+    some, facets = ~whole[rows // 4], np.flatnonzero(whole)
+    corners = np.column_stack([triangles[4 * facets + k, k] for k in range(3)])
+    parts = [(triangles[rows[some]], 1.0), (triangles[rows[~some]], 4.0 / 3.0), (corners, -1.0 / 3.0)]
+    return [part for part in parts if len(part[0])]
 
 
 def applied_force(force: Force, body: PlacedBody, begin: int, rows: NDArray[np.integer]) -> DeadLoad:

@@ -7,7 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.mesh.primitives.gummy_bear import gummy_bear, gummy_bear_surface
+from supple.mesh.primitives import gummy_bear as bear
+from supple.mesh.primitives.curved import of_order
+from supple.mesh.primitives.gummy_bear import gummy_bear_surface
 from supple.mesh.primitives.isosurface_stuffing import stuff
 from supple.mesh.primitives.sizes import check_torus, counts, fits, lengths, not_too_many, positive
 from supple.mesh.primitives.surfaces import sphere_surface, torus_surface
@@ -28,7 +30,7 @@ __all__ = [
 ]
 
 
-def box(size: Sequence[float] = (1.0, 1.0, 1.0), divisions: Sequence[int] = (4, 4, 4)) -> TetMesh:
+def box(size: Sequence[float] = (1.0, 1.0, 1.0), divisions: Sequence[int] = (4, 4, 4), order: int = 1) -> TetMesh:
     """A box cut into a grid of cells, each of six tets around its diagonal (Kuhn 1960).
 
     Vertices are in the order of `numpy.mgrid`: z runs fastest, then y, then x.
@@ -37,6 +39,7 @@ def box(size: Sequence[float] = (1.0, 1.0, 1.0), divisions: Sequence[int] = (4, 
     ----------
     size : (3,) full edge lengths [m]
     divisions : (3,) number of cells along x, y and z
+    order : 1, or 2 for quadratic tets (see `TetMesh`); the nodes on edges come after the grid's
 
     Raises
     ------
@@ -51,7 +54,7 @@ def box(size: Sequence[float] = (1.0, 1.0, 1.0), divisions: Sequence[int] = (4, 
     # Each path from corner 0 to corner 7 along the axes is one tet. In half of them two corners are swapped.
     paths = [(0, 4, 6, 7), (0, 6, 2, 7), (0, 2, 3, 7), (0, 3, 1, 7), (0, 1, 5, 7), (0, 5, 4, 7)]
     tets = np.stack([np.column_stack([cell[c] for c in path]) for path in paths], axis=1).reshape(-1, 4)
-    return TetMesh(points * extent, tets)
+    return of_order(TetMesh(points * extent, tets), order)
 
 
 def box_surface(size: Sequence[float] = (1.0, 1.0, 1.0), divisions: Sequence[int] = (4, 4, 4)) -> SurfaceMesh:
@@ -59,13 +62,14 @@ def box_surface(size: Sequence[float] = (1.0, 1.0, 1.0), divisions: Sequence[int
     return box(size, divisions).surface.compact()
 
 
-def sphere(radius: float = 0.5, edge_length: float = 0.1) -> TetMesh:
+def sphere(radius: float = 0.5, edge_length: float = 0.1, order: int = 1) -> TetMesh:
     """A ball of well-shaped tets, with its surface vertices exactly on the sphere.
 
     Parameters
     ----------
     radius : [m]
     edge_length : mean edge [m], at most `radius`
+    order : 1, or 2 for quadratic tets (see `TetMesh`); their surface nodes are on the sphere
 
     Raises
     ------
@@ -74,10 +78,11 @@ def sphere(radius: float = 0.5, edge_length: float = 0.1) -> TetMesh:
     positive("sphere", radius=radius, edge_length=edge_length)
     fits("sphere", edge_length, "radius", radius)
     reach = np.full(3, float(radius))
-    return stuff("sphere", lambda x: np.linalg.norm(x, axis=1) - radius, (-reach, reach), edge_length)
+    mesh = stuff("sphere", lambda x: np.linalg.norm(x, axis=1) - radius, (-reach, reach), edge_length)
+    return of_order(mesh, order, lambda x: x * (radius / np.linalg.norm(x, axis=1))[:, None])
 
 
-def torus(radius: float = 0.5, tube_radius: float = 0.2, edge_length: float = 0.1) -> TetMesh:
+def torus(radius: float = 0.5, tube_radius: float = 0.2, edge_length: float = 0.1, order: int = 1) -> TetMesh:
     """A ring around the y axis, of well-shaped tets.
 
     Parameters
@@ -85,6 +90,7 @@ def torus(radius: float = 0.5, tube_radius: float = 0.2, edge_length: float = 0.
     radius : of the circle in the middle of the tube [m]
     tube_radius : of the tube [m], less than `radius`
     edge_length : mean edge [m], at most `tube_radius`
+    order : 1, or 2 for quadratic tets (see `TetMesh`); their surface nodes are on the torus
 
     Raises
     ------
@@ -96,16 +102,22 @@ def torus(radius: float = 0.5, tube_radius: float = 0.2, edge_length: float = 0.
     def inside(x: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.hypot(np.hypot(x[:, 0], x[:, 2]) - radius, x[:, 1]) - tube_radius
 
-    return stuff("torus", inside, (-reach, reach), edge_length)
+    def onto(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        around = x * [1.0, 0.0, 1.0]
+        center = radius * around / np.linalg.norm(around, axis=1)[:, None]
+        return center + tube_radius * (x - center) / np.linalg.norm(x - center, axis=1)[:, None]
+
+    return of_order(stuff("torus", inside, (-reach, reach), edge_length), order, onto)
 
 
-def cylinder(radius: float = 0.5, height: float = 1.0, edge_length: float = 0.1) -> TetMesh:
+def cylinder(radius: float = 0.5, height: float = 1.0, edge_length: float = 0.1, order: int = 1) -> TetMesh:
     """A cylinder along the y axis: rings of triangles, in layers of prisms, each of three tets.
 
     Parameters
     ----------
     radius, height : [m]
     edge_length : approximate length of edges [m], at most `radius` and `height`
+    order : 1, or 2 for quadratic tets (see `TetMesh`); the nodes of the side are on the cylinder
 
     Raises
     ------
@@ -126,7 +138,20 @@ def cylinder(radius: float = 0.5, height: float = 1.0, edge_length: float = 0.1)
     b0, b1, b2 = a0 + n, a1 + n, a2 + n
     layer = np.concatenate([np.column_stack(t) for t in ((a0, a1, a2, b2), (a0, a1, b1, b2), (a0, b0, b1, b2))])
     tets = layer[None] + n * np.arange(layers)[:, None, None]
-    return TetMesh(points.reshape(-1, 3), tets.reshape(-1, 4))
+
+    def onto(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        # In the middle of an edge between two of the outermost columns; edges of the ends may be farther inside.
+        distance = np.hypot(x[:, 0], x[:, 2])
+        outermost = distance > radius * (np.cos(np.pi / (6 * rings)) - 1e-9)
+        scale = np.where(outermost, radius / np.maximum(distance, 0.1 * radius), np.nan)
+        return np.column_stack([scale * x[:, 0], x[:, 1], scale * x[:, 2]])
+
+    return of_order(TetMesh(points.reshape(-1, 3), tets.reshape(-1, 4)), order, onto)
+
+
+def gummy_bear(height: float = 1.0, edge_length: float = 0.08, order: int = 1) -> TetMesh:
+    """The gummy bear, see `supple.mesh.primitives.gummy_bear`; quadratic tets with `order=2` have straight sides."""
+    return of_order(bear.gummy_bear(height, edge_length), order)
 
 
 def cylinder_surface(radius: float = 0.5, height: float = 1.0, edge_length: float = 0.1) -> SurfaceMesh:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import MeshError
 from supple.mesh.checked_arrays import frozen, vertex_array
+from supple.mesh.quadratic import node_weights
 from supple.mesh.tetmesh import TetMesh
 from supple.numerics.kernel_cache import njit
 
@@ -31,15 +32,17 @@ class Embedding:
     Attributes
     ----------
     tets : (k,) the tet that each point is tied to
-    corners : (k, 4) vertices of that tet
-    weights : (k, 4) barycentric coordinates [-]; they sum to 1, and are all >= 0 for points inside
+    corners : (k, 4) vertices of that tet; (k, 10) its nodes in a mesh of quadratic tets
+    weights : barycentric coordinates, or values of the quadratic shape functions [-]; they sum to 1
     vertex_count : vertices of the mesh
+    outside : (k,) which points lie outside the mesh, of quadratic tets outside the straight ones between the corners
     """
 
     tets: NDArray[np.int32]
     corners: NDArray[np.int32]
     weights: NDArray[np.float64]
     vertex_count: int
+    outside: NDArray[np.bool_]
 
     @classmethod
     def of(cls, mesh: TetMesh, points: ArrayLike) -> Embedding:
@@ -57,12 +60,12 @@ class Embedding:
         places = vertex_array(points, "Embedding")
         tets = _containing_tets(mesh, places)
         weights = _barycentric(mesh, places, tets)
-        return cls(frozen(tets.astype(np.int32)), frozen(mesh.tets[tets]), frozen(weights), len(mesh.vertices))
-
-    @property
-    def outside(self) -> NDArray[np.bool_]:
-        """Which points (k,) lie outside the mesh."""
-        return self.weights.min(axis=1) < -SLACK
+        outside = frozen(weights.min(axis=1) < -SLACK)
+        if mesh.order == 2:
+            weights = node_weights(mesh.vertices, mesh.nodes[tets], places, weights)
+        return cls(
+            frozen(tets.astype(np.int32)), frozen(mesh.nodes[tets]), frozen(weights), len(mesh.vertices), outside
+        )
 
     def apply(self, positions: ArrayLike) -> NDArray[np.float64]:
         """Where the points (k, 3) are when the mesh's vertices are at `positions` (n, 3) [m].
@@ -79,14 +82,14 @@ class Embedding:
 
 @njit(cache=True, error_model="numpy")
 def mixed(corners, weights, x):
-    """Points (k, 3), each the sum of the rows `corners` (k, 4) of x (n, 3), weighted by `weights` (k, 4)."""
+    """Points (k, 3), each the sum of the rows `corners` (k, w) of x (n, 3), weighted by `weights` (k, w)."""
     out = np.empty((len(corners), 3))
     for i in range(len(corners)):
-        a, b, c, d = corners[i]
         for k in range(3):
-            out[i, k] = (
-                weights[i, 0] * x[a, k] + weights[i, 1] * x[b, k] + weights[i, 2] * x[c, k] + weights[i, 3] * x[d, k]
-            )
+            total = weights[i, 0] * x[corners[i, 0], k]
+            for j in range(1, corners.shape[1]):
+                total += weights[i, j] * x[corners[i, j], k]
+            out[i, k] = total
     return out
 
 

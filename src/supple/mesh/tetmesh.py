@@ -15,6 +15,15 @@ from supple.errors import MeshError
 from supple.mesh.checked_arrays import frozen, index_array, place, vertex_array
 from supple.mesh.io.mesh_files import read_tets, write_tets
 from supple.mesh.io.tetgen_family import is_tetgen_path, write_tetgen_family
+from supple.mesh.quadratic import (
+    check_middle_nodes,
+    check_positive,
+    facet_quarters,
+    half_edges,
+    turned_nodes,
+    volumes_of,
+    with_middle_nodes,
+)
 from supple.mesh.quality import min_dihedrals, radius_ratios
 from supple.mesh.surface import SurfaceMesh, linear_map
 from supple.mesh.topology import (
@@ -41,54 +50,92 @@ class TetMesh(Displayed):
 
     Tets given with the other winding are turned by swapping their last two vertices; `turned` is their number.
 
+    Quadratic tets have ten nodes: the four corners, and one on each of the edges (0, 1), (1, 2), (0, 2), (0, 3),
+    (1, 3), (2, 3), in this order, that of VTK. Their edges and sides may be curved. The determinant of the map
+    from a straight tet must be positive everywhere in each; its Bernstein coefficients prove that.
+
     A tet is rejected as flat when its thickness |det| / L^2, with L its longest edge, is at most 64 eps times the
     larger of L and its largest coordinate (eps = 2.2e-16): then round-off alone decides its sign.
 
     Parameters
     ----------
     vertices : (n, 3) float [m], each used by some tet (`TetMesh.dropping_unused` drops the others)
-    tets : (m, 4) int, rows of `vertices`
+    tets : (m, 4) int, rows of `vertices`; (m, 10) for quadratic tets
 
     Attributes
     ----------
+    tets : (m, 4) the corners
+    nodes : (m, 4), or (m, 10) of quadratic tets
+    order : 1, or 2 of quadratic tets
     turned : int
         Number of tets that were given with negative winding.
 
     Raises
     ------
     MeshError : naming the vertex, tet or facet at fault: not finite, out of range, repeated, flat, given twice,
-        in no tet, or shared by more than two tets.
+        in no tet, or shared by more than two tets. Of quadratic tets also the edge with two middle nodes, the node
+        on two edges, and the tet whose determinant is not positive everywhere.
     """
 
     vertices: NDArray[np.float64]
     tets: NDArray[np.int32]
+    nodes: NDArray[np.int32]
     turned: int
 
     def __init__(self, vertices: ArrayLike, tets: ArrayLike) -> None:
         points = vertex_array(vertices, "TetMesh")
-        given = index_array(tets, 4, len(points), "TetMesh", "tet")
+        given = index_array(tets, _width(tets), len(points), "TetMesh", "tet")
         _check_repeated_corners(given)
-        positive, turned = _positive_winding(points, given)
-        _check_unused(points, positive)
-        _check_duplicates(positive, len(points))
+        negative = _negative_winding(points, given[:, :4])
+        nodes = turned_nodes(given, negative)
+        corners = np.ascontiguousarray(nodes[:, :4])
+        _check_unused(points, nodes)
+        _check_duplicates(corners, len(points))
         object.__setattr__(self, "vertices", points)
-        object.__setattr__(self, "tets", frozen(positive))
-        object.__setattr__(self, "turned", turned)
+        object.__setattr__(self, "tets", frozen(corners))
+        object.__setattr__(self, "nodes", self.tets if nodes.shape[1] == 4 else frozen(nodes))
+        object.__setattr__(self, "turned", int(np.count_nonzero(negative)))
         _ = self.adjacency  # raises for facets that three or more tets share
+        if self.order == 2:
+            check_middle_nodes(nodes, len(points))
+            check_positive(points, nodes)
 
     def _facts(self) -> dict[str, str]:
         return {
             "vertices": str(len(self.vertices)),
-            "tets": str(len(self.tets)),
+            "quadratic tets" if self.order == 2 else "tets": str(len(self.tets)),
             "size": extent(self.vertices),
             "volume": f"{self.volume:.4g} m^3",
         }
+
+    @property
+    def order(self) -> int:
+        """1 of linear tets, 2 of quadratic ones."""
+        return 1 if self.nodes.shape[1] == 4 else 2
+
+    def to_order(self, order: int) -> TetMesh:
+        """The mesh with linear or quadratic tets; `self` where it has these.
+
+        From 1 to 2 a node is added in the middle of each edge, after the present vertices. From 2 to 1 only the corners
+        are kept, in their order, so that curved sides become straight.
+
+        Raises
+        ------
+        MeshError : for another order than 1 and 2.
+        """
+        if order not in (1, 2) or isinstance(order, bool):
+            raise MeshError(f"TetMesh.to_order: order is {order!r}; give 1 for linear tets or 2 for quadratic ones")
+        if order == self.order:
+            return self
+        if order == 1:
+            return TetMesh(*without_unused(self.vertices, self.tets))
+        return TetMesh(*with_middle_nodes(self.vertices, self.tets, self.edges))
 
     @classmethod
     def dropping_unused(cls, vertices: ArrayLike, tets: ArrayLike) -> TetMesh:
         """A `TetMesh` of the vertices that some tet uses, in their order; the log gives the number of the others."""
         points = vertex_array(vertices, "TetMesh")
-        given = index_array(tets, 4, len(points), "TetMesh", "tet")
+        given = index_array(tets, _width(tets), len(points), "TetMesh", "tet")
         kept, renumbered = without_unused(points, given)
         if len(kept) < len(points):
             logger.warning("dropped %d of %d vertices that belong to no tet", len(points) - len(kept), len(points))
@@ -96,7 +143,10 @@ class TetMesh(Displayed):
 
     @classmethod
     def load(cls, path: str | Path) -> TetMesh:
-        """Read a tet mesh from TetGen's .node/.ele/.edge/.face, Gmsh .msh, .vtu or .vtk, selected by the extension.
+        """Read a tet mesh from TetGen's .node/.ele/.edge/.face, Gmsh .msh, .vtu, .vtk or Abaqus's .inp, selected by the
+        extension.
+
+        Tets of ten nodes stay quadratic; of TetGen's only the corners are used.
 
         Vertices that belong to no tet are dropped, and negative tets are turned; the log gives their numbers.
 
@@ -115,25 +165,36 @@ class TetMesh(Displayed):
         return mesh
 
     def save(self, path: str | Path) -> None:
-        """Write the mesh as TetGen's four files (.node, .ele, .edge or .face), .msh, .vtu or .vtk, by the extension.
+        """Write the mesh as TetGen's four files (.node, .ele, .edge or .face), .msh, .vtu, .vtk or .inp, by the
+        extension.
 
         Raises
         ------
-        MeshError : where the extension is none of these, or the file cannot be written. No partial file is left.
+        MeshError : where the extension is none of these, the file cannot be written, or quadratic tets shall go to
+            TetGen's files. No partial file is left.
         """
         if is_tetgen_path(path):
+            if self.order == 2:
+                raise MeshError(
+                    f"{path}: TetGen's files are written for linear tets only; use .msh, .vtu, .vtk or .inp, or "
+                    "save mesh.to_order(1)"
+                )
             write_tetgen_family(path, self.vertices, self.tets, self.edges, self.surface.triangles)
         else:
-            write_tets(path, self.vertices, self.tets)
+            write_tets(path, self.vertices, self.nodes)
 
     @cached_property
     def edges(self) -> NDArray[np.int32]:
-        """Unique edges (e, 2), lower vertex first, sorted."""
+        """Unique edges (e, 2), lower vertex first, sorted; of quadratic tets, both halves of each edge."""
+        if self.order == 2:
+            return frozen(half_edges(self.nodes))
         return frozen(unique_edges(self.tets, len(self.vertices)))
 
     @cached_property
     def volumes(self) -> NDArray[np.float64]:
         """Volume of each tet (m,) [m^3], all positive."""
+        if self.order == 2:
+            return frozen(volumes_of(self.vertices, self.nodes))
         return frozen(_determinants(self.vertices, self.tets) / 6.0)
 
     @cached_property
@@ -145,12 +206,14 @@ class TetMesh(Displayed):
     def rest_shape_inverse(self) -> NDArray[np.float64]:
         """Inverse of Dm = [x1-x0, x2-x0, x3-x0] (columns) of each tet (m, 3, 3) [1/m].
 
-        Its rows are the gradients of the barycentric coordinates of vertices 1, 2 and 3.
+        Its rows are the gradients of the barycentric coordinates of vertices 1, 2 and 3. Of quadratic tets, this is
+        that of the straight tet between their corners.
         """
         x0, x1, x2, x3 = self.vertices[self.tets].transpose(1, 0, 2)
         a, b, c = x1 - x0, x2 - x0, x3 - x0
         rows = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
-        return frozen(rows / (6.0 * self.volumes)[:, None, None])
+        volumes = self.volumes if self.order == 1 else _determinants(self.vertices, self.tets) / 6.0
+        return frozen(rows / (6.0 * volumes)[:, None, None])
 
     @cached_property
     def adjacency(self) -> NDArray[np.int32]:
@@ -159,8 +222,13 @@ class TetMesh(Displayed):
 
     @cached_property
     def surface(self) -> SurfaceMesh:
-        """The boundary, counter-clockwise from outside; its triangles index into this mesh's whole vertex array."""
+        """The boundary, counter-clockwise from outside; its triangles index into this mesh's whole vertex array.
+
+        Each facet of a quadratic tet is four triangles between its six nodes.
+        """
         tet, facet = np.nonzero(self.adjacency < 0)
+        if self.order == 2:
+            return SurfaceMesh(self.vertices, facet_quarters(self.nodes[tet], facet), shares_vertices=True)
         triangles = self.tets[tet[:, None], TET_FACETS[facet]]
         return SurfaceMesh(self.vertices, triangles, shares_vertices=True)
 
@@ -187,7 +255,7 @@ class TetMesh(Displayed):
     ) -> TetMesh:
         """The mesh scaled, then turned by a matrix (3, 3), then moved by a vector (3,) [m]."""
         linear, shift = linear_map(scale, rotation, translation, "TetMesh.transformed")
-        return TetMesh(self.vertices @ linear.T + shift, self.tets)
+        return TetMesh(self.vertices @ linear.T + shift, self.nodes)
 
 
 def _determinants(vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> NDArray[np.float64]:
@@ -195,8 +263,13 @@ def _determinants(vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> NDA
     return np.einsum("ij,ij->i", x1 - x0, np.cross(x2 - x0, x3 - x0))
 
 
-def _positive_winding(vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> tuple[NDArray[np.int32], int]:
-    """Tets with positive determinants, and how many were turned; raises for flat ones."""
+def _width(tets: ArrayLike) -> int:
+    shape = np.shape(tets)
+    return 10 if len(shape) == 2 and shape[1] == 10 else 4
+
+
+def _negative_winding(vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """(m,) which tets have negative determinants; raises for flat ones."""
     det = _determinants(vertices, tets)
     corners = vertices[tets]
     longest = np.zeros(len(tets))
@@ -216,10 +289,7 @@ def _positive_winding(vertices: NDArray[np.float64], tets: NDArray[np.int32]) ->
             f"TetMesh: tet {t} {tets[t].tolist()} at {place(corners[t].mean(axis=0))} is flat: it is {thickness} thick "
             f"with edges up to {length:.3g} m{more}; remove it or remesh"
         )
-    negative = det < 0.0
-    positive = tets.copy()
-    positive[negative, 2], positive[negative, 3] = tets[negative, 3], tets[negative, 2]
-    return positive, int(np.count_nonzero(negative))
+    return det < 0.0
 
 
 def _check_repeated_corners(tets: NDArray[np.int32]) -> None:

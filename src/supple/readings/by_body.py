@@ -89,15 +89,3 @@ class TetField(ByBody):
     @cached_property
     def at_vertices(self) -> ByBody:
         return ByBody(self._to_vertices(self.values_of_all), self._vertices, self._refused)
-
-
-def vertex_means(
-    values: NDArray[np.float64], tets: NDArray[np.int32], volumes: NDArray[np.float64], count: int
-) -> NDArray[np.float64]:
-    """(count, ...) means of values (m, ...) of tets (m, 4), weighted with their volumes (m,); NaN without a tet."""
-    corners = tets.ravel()
-    flat = values.reshape(len(values), -1)
-    sums = [np.bincount(corners, np.repeat(column * volumes, 4), count) for column in flat.T]
-    with np.errstate(invalid="ignore"):
-        means = np.stack(sums, axis=1) / np.bincount(corners, np.repeat(volumes, 4), count)[:, None]
-    return means.reshape(count, *values.shape[1:])

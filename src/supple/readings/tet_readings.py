@@ -11,13 +11,19 @@ from numpy.typing import NDArray
 
 from supple.displayed import DisplayedFrame
 from supple.materials.elastic_tets.laws import TetLaws
-from supple.materials.elastic_tets.stress import cauchy_stresses, energy_densities, first_piolas, von_mises
+from supple.materials.elastic_tets.stress import (
+    cauchy_of_tets,
+    energy_densities,
+    first_piolas,
+    mean_deformation_gradients,
+    volume_ratios,
+    von_mises,
+)
 from supple.materials.flows.internal import DISSIPATED, FLOW, checked
 from supple.materials.laws.hencky import HENCKY
 from supple.materials.per_tet import LawTets
-from supple.numerics.deformation import deformation_gradients, determinants
 from supple.numerics.svd3 import rotation_variant_svd
-from supple.readings.by_body import BodyRows, TetField, vertex_means
+from supple.readings.by_body import BodyRows, TetField
 
 _OF_RIGID = "is rigid: it has no strain and no stress of its own"
 _NO_LAW = "has no known elastic law, so it has no {}; give it an elastic material such as StableNeoHookean"
@@ -28,7 +34,7 @@ class TetReadings(DisplayedFrame, ABC):
     """Fields on tets, by body name: `frame.stress["bear"]` is (m, 3, 3), `frame.stress.at_vertices["bear"]` (n, 3, 3).
 
     Stresses are those of the elastic forces, without the viscous ones of `damping`. A value is not finite where a tet
-    is flat, or where its energy is infinite.
+    is flat, or where its energy is infinite. Those of a quadratic tet are means over it.
     """
 
     @property
@@ -49,8 +55,8 @@ class TetReadings(DisplayedFrame, ABC):
 
     @cached_property
     def det_F(self) -> NDArray[np.float64]:
-        """(m,) J of every tet, in the order of the bodies."""
-        return determinants(self._F)
+        """(m,) J of every tet, in the order of the bodies; of a quadratic one, the ratio of its volumes."""
+        return volume_ratios(self._laws, self._x, self._F)
 
     @cached_property
     def first_piola(self) -> TetField:
@@ -64,7 +70,7 @@ class TetReadings(DisplayedFrame, ABC):
     def stress(self) -> TetField:
         """Cauchy stress P F^T / J (m, 3, 3) [Pa]: force per area as it is, symmetric."""
         with np.errstate(all="ignore"):
-            return self._field(cauchy_stresses(self.first_piola.values_of_all, self._F), "stress")
+            return self._field(cauchy_of_tets(self._laws, self._x, self.first_piola.values_of_all, self._F), "stress")
 
     @cached_property
     def von_mises(self) -> TetField:
@@ -106,7 +112,7 @@ class TetReadings(DisplayedFrame, ABC):
 
     @cached_property
     def _F(self) -> NDArray[np.float64]:
-        return deformation_gradients(self._x, self._laws.tets, self._laws.Dm_inv)
+        return mean_deformation_gradients(self._laws, self._x)
 
     def _field(self, values: NDArray[np.float64], what: str) -> TetField:
         refused = dict.fromkeys(self._names_where(~self._laws.stressed), _RIGID)
@@ -122,4 +128,4 @@ class TetReadings(DisplayedFrame, ABC):
         return [body.name for body in self._bodies if chosen[body.tets].any()]
 
     def _to_vertices(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        return vertex_means(values, self._laws.tets, self._laws.volumes, len(self._x))
+        return self._laws.vertex_means(values, len(self._x))

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.materials.material import Material
+from supple.materials.per_tet import NO_REGION
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
@@ -125,6 +126,8 @@ class Body(PlacedBody):
             raise SceneError(f"{owner}: skin is a {type(self.skin).__name__}; give a SurfaceMesh")
         self._check_placement(owner, self.mesh.edges)
         self._require_one_value_per_tet(owner)
+        if self.mesh.order == 2 and (self.material.per_tet(len(self.mesh.tets)).region != NO_REGION).any():
+            raise SceneError(f'{owner}: quadratic tets need no patches; give its material integration="tets"')
 
     def _require_one_value_per_tet(self, owner: str) -> None:
         try:

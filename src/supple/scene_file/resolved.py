@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from supple.scene_file.entries.mesh_sources import TET_FILES
+from supple.mesh.io.tetgen_family import SUFFIXES
 from supple.scene_file.entries.solvers import model_of_kind
 from supple.scene_file.loader import Run
 from supple.scene_file.yaml_writer import yaml_text
@@ -51,6 +51,6 @@ def _redirect(data: Any, folder: Path, names: dict[str, str], copies: dict[str, 
 
 def _files_of(path: Path) -> list[Path]:
     """A mesh file; of TetGen, all files of the mesh."""
-    if path.suffix.lower() not in TET_FILES or path.suffix.lower() == ".msh":
+    if path.suffix.lower() not in SUFFIXES:
         return [path]
-    return [other for suffix in TET_FILES if (other := path.with_suffix(suffix)).exists()]
+    return [other for suffix in SUFFIXES if (other := path.with_suffix(suffix)).exists()]

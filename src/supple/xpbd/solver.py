@@ -114,11 +114,18 @@ class XPBD(Solver):
 
         Raises
         ------
-        SolverError : where a body is rigid, or its material has no XPBD constraints; the text names the body.
+        SolverError : where a body is rigid, has quadratic tets, or its material has no XPBD constraints; the text names
+            the body.
         """
         if system.rigid_bodies:
             raise SolverError(
                 f"XPBD: body {system.rigid_bodies[0].name!r} is rigid; simulate rigid bodies with Implicit"
+            )
+        quadratic = [part.name for part in system.bodies if part.body.mesh.order == 2]
+        if quadratic:
+            raise SolverError(
+                f"XPBD: body {quadratic[0]!r} has quadratic tets; simulate it with Implicit, or give linear tets: "
+                "mesh.to_order(1)"
             )
         layout = make_layout(system)
         inner = reordered(system, layout)

@@ -53,7 +53,7 @@ def describe(*meshes: sp.TetMesh, skin=None, **changes) -> SceneDescription:
                 *rows,
                 mesh.vertices,
                 mesh.surface.triangles,
-                mesh.tets,
+                mesh.nodes,
                 skin if i == 0 else None,
                 "StableNeoHookean",
                 values,

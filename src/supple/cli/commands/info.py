@@ -98,7 +98,7 @@ def _surface_rows(surface: SurfaceMesh) -> list[tuple[str, str]]:
 
 def _tet_rows(mesh: TetMesh) -> list[tuple[str, str]]:
     return [
-        ("kind", "tetrahedral mesh"),
+        ("kind", "tetrahedral mesh" if mesh.order == 1 else "mesh of quadratic tetrahedra"),
         ("vertices", str(len(mesh.vertices))),
         ("tets", str(len(mesh.tets))),
         ("edges", str(len(mesh.edges))),
@@ -172,7 +172,8 @@ def _scene(file: Path, timed: bool) -> None:
             rows.append((f"body {part.name}", _rigid_text(part.body)))
             continue
         mesh = part.body.mesh
-        text = f"{type(part.body.material).__name__}, {len(mesh.tets)} tets, {mesh.volume:.6g} m^3, {mass:.6g} kg"
+        tets = f"{len(mesh.tets)} {'tets' if mesh.order == 1 else 'quadratic tets'}"
+        text = f"{type(part.body.material).__name__}, {tets}, {mesh.volume:.6g} m^3, {mass:.6g} kg"
         rows.append((f"body {part.name}", text))
         rows += _locking_rows(part.body)
     rows += _stitch_rows(system.stitching)
@@ -233,7 +234,7 @@ def _locking_rows(body: PlacedBody) -> list[tuple[str, str]]:
     from supple.mesh.quality import thickness
 
     material, mesh = body.material, body.mesh
-    if not isinstance(material, Hyperelastic):
+    if not isinstance(material, Hyperelastic) or mesh.order == 2:
         return []
     poisson = np.broadcast_to(np.asarray(material.poisson, dtype=np.float64), len(mesh.tets))
     locking = (poisson > 0.4) & (material.per_tet(len(mesh.tets)).region == NO_REGION)
@@ -246,8 +247,8 @@ def _locking_rows(body: PlacedBody) -> list[tuple[str, str]]:
         return []
     text = (
         f"{100 * share:.0f} % of the surface has fewer than three tets across behind it, with Poisson's ratio up to "
-        f"{poisson[locking].max():g}: linear tets are too stiff there; give integration='patches' (Implicit only), or "
-        "smaller tets"
+        f"{poisson[locking].max():g}: linear tets are too stiff there; give integration='patches' or quadratic tets "
+        "(order: 2; both for Implicit only), or smaller tets"
     )
     return [(f"warning {body.name}", text)]
 

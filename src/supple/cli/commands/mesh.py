@@ -47,7 +47,7 @@ def mesh(
     surface
         STL, OBJ, PLY, OFF, GLB, VTP, VTK or VTU file.
     output
-        One of TetGen's names (bear.1.node writes .node, .ele, .edge and .face), or a .msh, .vtu or .vtk file.
+        One of TetGen's names (bear.1.node writes .node, .ele, .edge and .face), or a .msh, .vtu, .vtk or .inp file.
     scale
         Factor of all coordinates: 0.001 for a surface in millimetres.
     tets

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from supple.implicit.energies.elasticity import SERIAL_TETS, Elasticity, gather_gradients
 from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
+from supple.implicit.energies.quadratic.term import OfQuadraticTets, VirtualTets
 from supple.materials.isotropic import rest_lame_parameters
 from supple.materials.per_tet import NO_REGION
 from supple.materials.stretch_energies.stretches import green_strain
@@ -65,14 +66,44 @@ class Viscosity:
 
 
 def viscosity_of(elasticity: Elasticity) -> Viscosity | None:
-    """The viscosity of a system's bodies; None where no material is damped."""
+    """The viscosity of a system's linear tets; None where no material is damped."""
     tau = elasticity.material.damping
+    if elasticity.quadratic is not None:
+        tau = tau.copy()
+        tau[elasticity.quadratic.rows] = 0.0
     if not tau.any():
         return None
     mu, lam = rest_lame_parameters(elasticity.material)
     # Viscosity acts tet by tet. With a bulk viscosity far above that of shear, tets would lock.
     lam = np.where(elasticity.material.region == NO_REGION, lam, np.minimum(lam, mu))
     return Viscosity(elasticity, tau * mu, tau * lam)
+
+
+@dataclass(frozen=True, eq=False)
+class QuadraticViscosity:
+    """The viscosity at the quadrature points of quadratic tets, under the names of `Viscosity`."""
+
+    virtual: VirtualTets
+    inner: Viscosity
+
+    def strains(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(m, 6) Green strain at every point."""
+        return self.inner.strains(self.virtual.corners(x))
+
+    def strain_rates(self, x: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(m, 6) its rate [1/s]."""
+        return self.inner.strain_rates(self.virtual.corners(x), self.virtual.corners(v))
+
+    def damping(self, rate: StrainRate) -> OfQuadraticTets:
+        """The dissipation potential of one step."""
+        return OfQuadraticTets(Damping(self.inner, rate), self.virtual)
+
+
+def quadratic_viscosity_of(elasticity: Elasticity) -> QuadraticViscosity | None:
+    """The viscosity of a system's quadratic tets; None where no material is damped."""
+    quadratic = elasticity.quadratic
+    inner = None if quadratic is None else viscosity_of(quadratic.at_points)
+    return None if quadratic is None or inner is None else QuadraticViscosity(quadratic.virtual, inner)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,10 @@ from supple.errors import SolverError
 from supple.implicit.energies.laws.law_elasticity import LawElasticity, LawElements
 from supple.implicit.energies.patch_elasticity import PatchElasticity
 from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
+from supple.implicit.energies.quadratic.gathering import Gathering
+from supple.implicit.energies.quadratic.term import OfQuadraticTets, VirtualTets
+from supple.materials.elastic_tets.laws import of_points
+from supple.materials.elastic_tets.quadratic import QuadraticTets
 from supple.materials.material import Hyperelastic
 from supple.materials.patches.energy import tet_shares
 from supple.materials.per_tet import BY_LAW, NO_REGION, TetMaterial
@@ -27,6 +31,28 @@ SERIAL_TETS = 2_000
 
 
 @dataclass(frozen=True, eq=False)
+class QuadraticElasticity(OfQuadraticTets):
+    """The energy of the quadratic tets `rows` (k,), at their quadrature points."""
+
+    rows: NDArray[np.int64]
+    at_points: Elasticity
+
+    @classmethod
+    def of(cls, tets: QuadraticTets, material: TetMaterial, vertices: int) -> QuadraticElasticity:
+        """With the material (m,) of all tets; `vertices` : their number."""
+        virtual = VirtualTets(tets.quadrature, Gathering.of(tets.nodes, vertices))
+        own = of_points(material, tets.rows, tets.quadrature.volumes.shape[1])
+        each = np.arange(4 * virtual.count + 1, dtype=np.int32)
+        system = virtual.system()
+        at_points = Elasticity(system, own, each, each[:-1], laws=_law_elasticity(system, own, own.region == NO_REGION))
+        return cls(at_points, virtual, tets.rows, at_points)
+
+    def energies(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(k,) of each element [J]."""
+        return self.at_points.energies(self.virtual.corners(x)).reshape(len(self.rows), -1).sum(axis=1)
+
+
+@dataclass(frozen=True, eq=False)
 class Elasticity(Potential):
     """The hyperelastic energy of every tet with its own material.
 
@@ -36,6 +62,7 @@ class Elasticity(Potential):
     start, incidence : for every vertex the (tet, node) pairs that name it, coded 4 tet + node
     patches : the energy of the tets that are averaged over patches, or None
     laws : the energies of tets that are given by laws, or None
+    quadratic : the energy of the quadratic tets, or None
     """
 
     system: System
@@ -44,12 +71,13 @@ class Elasticity(Potential):
     incidence: NDArray[np.int32]
     patches: PatchElasticity | None = None
     laws: LawElasticity | None = None
+    quadratic: QuadraticElasticity | None = None
     label = "elasticity"
     projection = Projection.RELEASED_FIRST
 
     def value(self, x: NDArray[np.float64]) -> float:
-        total = float(self._own_energies(x).sum()) + (self.patches.value(x) if self.patches is not None else 0.0)
-        return total if self.laws is None else total + self.laws.value(x)
+        parts = [part.value(x) for part in (self.patches, self.laws, self.quadratic) if part is not None]
+        return float(self._own_energies(x).sum()) + sum(parts)
 
     def energies(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(m,) of each tet [J]; those of patches are divided among their tets."""
@@ -59,6 +87,8 @@ class Elasticity(Potential):
         if self.laws is not None:
             for rows, values in self.laws.energies(x):
                 energies[rows] += values
+        if self.quadratic is not None:
+            energies[self.quadratic.rows] += self.quadratic.energies(x)
         return energies
 
     def _own_energies(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -87,11 +117,8 @@ class Elasticity(Potential):
             else:
                 hessian.add_tets(lambda blocks: element_models(*tets, True, project, energies, gradients, blocks))
             gather_gradients(self.start, self.incidence, gradients, gradient)
-        total = float(energies.sum())
-        for more in (self.patches, self.laws):
-            if more is not None:
-                total += more.add_model(x, gradient, hessian, project)
-        return total
+        parts = [part for part in (self.patches, self.laws, self.quadratic) if part is not None]
+        return float(energies.sum()) + sum(part.add_model(x, gradient, hessian, project) for part in parts)
 
     def in_step(self, internal: NDArray[np.float64], h: float) -> Elasticity:
         """The energy of a step of h [s] from these internal variables (k, 11), at whose end its forces act."""
@@ -102,10 +129,18 @@ class Elasticity(Potential):
         return internal if self.laws is None else self.laws.flowed(x, internal, h)
 
     @cached_property
+    def own(self) -> NDArray[np.bool_]:
+        """(m,) which tets have an energy of their own F: not those of patches or laws, nor the quadratic ones."""
+        own = (self.material.region == NO_REGION) & (self.material.kind != BY_LAW)
+        if self.quadratic is not None:
+            own[self.quadratic.rows] = False
+        return own
+
+    @cached_property
     def _parameters(self) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
-        """Kind, mu and lam (m,) of each tet's own energy, which is zero where patches or laws have it."""
+        """Kind, mu and lam (m,) of each tet's own energy: zero where patches, laws or quadratic tets have it."""
         material = self.material
-        own = (material.region == NO_REGION) & (material.kind != BY_LAW)
+        own = self.own
         if own.all():
             return material.kind, material.mu, material.lam
         zero = np.int32(StableNeoHookean.kind())  # with mu = lam = 0, an energy that is zero for every F
@@ -120,7 +155,7 @@ def elasticity_of(system: System) -> Elasticity:
 
     Raises
     ------
-    SolverError : where a body's material has no elastic energy; the text names the body.
+    SolverError : where a body's material has no elastic energy, or flows in quadratic tets; the text names the body.
     """
     for part in system.bodies:
         if not isinstance(part.body.material, Hyperelastic):
@@ -128,14 +163,23 @@ def elasticity_of(system: System) -> Elasticity:
                 f"body {part.name!r}: {type(part.body.material).__name__} is a material for XPBD only; for Implicit, "
                 "give it an elastic one such as StableNeoHookean"
             )
+        if part.body.mesh.order == 2 and part.body.material.per_tet(part.tets.stop - part.tets.start).flowing_laws:
+            raise SolverError(
+                f"body {part.name!r}: {type(part.body.material).__name__} cannot be simulated with quadratic tets; "
+                "give mesh.to_order(1), or an elastic material"
+            )
     start, incidence = incidences(system.tets, len(system.rest_positions))
     patches = None if system.laws.patches is None else PatchElasticity.of(system.laws.patches)
-    return Elasticity(system, system.laws.material, start, incidence, patches, _law_elasticity(system))
-
-
-def _law_elasticity(system: System) -> LawElasticity | None:
-    material = system.laws.material
+    material, quadratic = system.laws.material, None
     own = material.region == NO_REGION
+    if system.quadratic is not None:
+        quadratic = QuadraticElasticity.of(system.quadratic, material, len(system.rest_positions))
+        own[system.quadratic.rows] = False
+    return Elasticity(system, material, start, incidence, patches, _law_elasticity(system, material, own), quadratic)
+
+
+def _law_elasticity(system: System, material: TetMaterial, own: NDArray[np.bool_]) -> LawElasticity | None:
+    """The laws of all tets of a material; of elastic ones, those of the tets (m,) that have an energy of their own."""
     arrays = system.tets, system.rest_shape_inverse, system.rest_volumes
     elastic = [LawElements.of(part.selected(own), *arrays) for part in material.elastic_laws]
     flowing = [

@@ -13,7 +13,6 @@ Source of b: Li et al., "Incremental Potential Contact" (2020), equation 6, with
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +26,7 @@ from supple.materials.tet_energies import deformation_gradient, edge_matrix, put
 from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import cross, det, dot, load_mat
 from supple.numerics.threads import threads_for
+from supple.numerics.volume_barrier import barrier_derivatives
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +80,9 @@ class InversionBarrier(Potential):
 def inversion_barrier(elasticity: Elasticity, guarded: NDArray[np.bool_], onset: float) -> InversionBarrier | None:
     """The barrier below J = `onset` of the guarded tets whose energy has none; None where there is no such tet."""
     material = elasticity.material
+    if elasticity.quadratic is not None:
+        guarded = guarded.copy()
+        guarded[elasticity.quadratic.rows] = False
     # The energy of a patch is finite where one of its tets is flat.
     wanted = guarded & (~infinite_when_flat(material) | (material.region != NO_REGION))
     if not wanted.any():
@@ -94,31 +97,18 @@ def _volume_ratio(x, tets, Dm_inv, e):
     return det(edge_matrix(x, tets, e)) * det(load_mat(Dm_inv, e))
 
 
-@njit(cache=True, error_model="numpy")
-def _derivatives(J, onset):
-    """b and its first and second derivative by J."""
-    y = J / onset
-    if not y < 1.0:
-        return 0.0, 0.0, 0.0
-    if y <= 0.0:
-        return math.inf, 0.0, 0.0
-    log, ratio = math.log(y), (y - 1.0) / y
-    first = -2.0 * (y - 1.0) * log - (y - 1.0) * ratio
-    return -(y - 1.0) * (y - 1.0) * log, first / onset, (-2.0 * log - 4.0 * ratio + ratio * ratio) / (onset * onset)
-
-
 @njit(cache=True, parallel=True, error_model="numpy")
 def _energies(x, tets, Dm_inv, stiffness, onset, out):
     for e in prange(len(tets)):
         out[e] = 0.0
         if stiffness[e] > 0.0:
-            out[e] = stiffness[e] * _derivatives(_volume_ratio(x, tets, Dm_inv, e), onset)[0]
+            out[e] = stiffness[e] * barrier_derivatives(_volume_ratio(x, tets, Dm_inv, e), onset)[0]
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def _gradients(x, tets, Dm_inv, stiffness, onset, out):
     for e in prange(len(tets)):
-        _, first, _ = _derivatives(_volume_ratio(x, tets, Dm_inv, e), onset)
+        _, first, _ = barrier_derivatives(_volume_ratio(x, tets, Dm_inv, e), onset)
         C = _cofactors(deformation_gradient(x, tets, Dm_inv, e))
         f = first * stiffness[e]
         P = (f * C[0], f * C[1], f * C[2], f * C[3], f * C[4], f * C[5], f * C[6], f * C[7], f * C[8])
@@ -129,7 +119,7 @@ def _gradients(x, tets, Dm_inv, stiffness, onset, out):
 def _hessians(x, tets, Dm_inv, stiffness, onset, project, out):
     """For nodes p and q with shape gradients g and h: b'' (C g)(C h)^T + b' [F (g x h)]_x, C the cofactors of F."""
     for e in prange(len(tets)):
-        _, first, second = _derivatives(_volume_ratio(x, tets, Dm_inv, e), onset)
+        _, first, second = barrier_derivatives(_volume_ratio(x, tets, Dm_inv, e), onset)
         if stiffness[e] == 0.0 or second == 0.0:
             continue
         F, B = deformation_gradient(x, tets, Dm_inv, e), load_mat(Dm_inv, e)

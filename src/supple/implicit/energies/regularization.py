@@ -44,4 +44,10 @@ def regularization_of(elasticity: Elasticity) -> Regularization:
     squares = np.einsum("eij,eij->e", system.rest_shape_inverse, system.rest_shape_inverse)
     share = _SHARE * elasticity.material.mu * system.rest_volumes * squares
     stiffness = np.bincount(system.tets.ravel(), weights=np.repeat(share, 4), minlength=len(system.rest_positions))
-    return Regularization(stiffness.astype(np.float64))
+    stiffness = stiffness.astype(np.float64)
+    if system.quadratic is not None:
+        points = system.quadratic.quadrature
+        squares = np.einsum("ks,ksai,ksai->ka", points.volumes, points.gradients, points.gradients)
+        share = _SHARE * elasticity.material.mu[system.quadratic.rows, None] * squares
+        stiffness += np.bincount(points.nodes.ravel(), weights=share.ravel(), minlength=len(stiffness))
+    return Regularization(stiffness)

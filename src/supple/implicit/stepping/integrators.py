@@ -19,13 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SolverError
-from supple.implicit.energies.damping import StrainRate, Viscosity
+from supple.implicit.energies.damping import QuadraticViscosity, StrainRate, Viscosity
 from supple.implicit.energies.stitch_damping import StitchViscosity
 from supple.implicit.stepping.conservation import Conservation
 from supple.state import State
 from supple.system import System
 
-Damped = Viscosity | StitchViscosity
+Damped = Viscosity | QuadraticViscosity | StitchViscosity
 
 
 @dataclass(frozen=True, eq=False)

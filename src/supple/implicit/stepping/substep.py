@@ -92,9 +92,9 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     limits = StepLimits(guard, workspace.contact, tools.clock)
     elasticity = workspace.elasticity.in_step(state.internal, h)
     base = _objective(elasticity, state.positions, middle, plan, forces, workspace)
-    barrier = inversion_barrier(workspace.elasticity, guard.guarded, settings.barrier_onset)
-    if barrier is not None:
-        base = replace(base, terms=[*base.terms, barrier])
+    onset = settings.barrier_onset
+    barriers = (inversion_barrier(workspace.elasticity, guard.guarded, onset), guard.quadratic_barrier(onset))
+    base = replace(base, terms=[*base.terms, *(barrier for barrier in barriers if barrier is not None)])
     contact = ContactStep(workspace.contact, state.positions, (state.time, end), plan.contact_weight)
     problem = Problem(
         contact.with_contact(base, state.positions),
@@ -152,6 +152,8 @@ def _objective(
     terms += springs_at(system, time)
     if plan.scale is not None and workspace.viscosity is not None:
         terms.append(Damping(workspace.viscosity, plan.strain_rate(workspace.viscosity)))
+    if plan.scale is not None and workspace.quadratic_viscosity is not None:
+        terms.append(workspace.quadratic_viscosity.damping(plan.strain_rate(workspace.quadratic_viscosity)))
     if plan.scale is not None and workspace.stitch_viscosity is not None:
         rate = plan.strain_rate(workspace.stitch_viscosity)
         terms.append(StitchDamping.of(workspace.stitch_viscosity, rate))

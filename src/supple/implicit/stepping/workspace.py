@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from supple.contact.obstacle_vertices import obstacle_positions
 from supple.implicit.contact.model import ContactModel
-from supple.implicit.energies.damping import Viscosity
+from supple.implicit.energies.damping import QuadraticViscosity, Viscosity
 from supple.implicit.energies.elasticity import Elasticity
 from supple.implicit.energies.regularization import Regularization
 from supple.implicit.energies.stitch_damping import StitchViscosity
@@ -40,6 +40,7 @@ class Workspace:
     regularization: Regularization
     stitches: StitchEnergy | None
     stitch_viscosity: StitchViscosity | None
+    quadratic_viscosity: QuadraticViscosity | None
     checked: NDArray[np.float64] | None = None
     conservation: Conservation = field(init=False)
 

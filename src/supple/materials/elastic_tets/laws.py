@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.edge_springs import EdgeSprings
+from supple.materials.elastic_tets.quadratic import QuadraticTets
 from supple.materials.patches.domains import Patches, patches_of
 from supple.materials.per_tet import NO_REGION, NOT_ELASTIC, TetMaterial
 
@@ -22,6 +23,7 @@ class TetLaws:
     tets : (m, 4); Dm_inv : (m, 3, 3) Dm^-1 [1/m]; volumes : (m,) at rest [m^3]
     material : of the tets; its kind is `NOT_ELASTIC` where a tet is of none of the elastic materials
     springs : of the tets of bodies that are made of edges and volumes
+    quadratic : those of the tets that are quadratic; `tets` and `Dm_inv` are then those of the corners
     """
 
     tets: NDArray[np.int32]
@@ -29,6 +31,7 @@ class TetLaws:
     volumes: NDArray[np.float64]
     material: TetMaterial
     springs: tuple[EdgeSprings, ...] = ()
+    quadratic: QuadraticTets | None = None
 
     @cached_property
     def patches(self) -> Patches | None:
@@ -37,6 +40,23 @@ class TetLaws:
             return None
         # Patches must not reach from body to body or into another region of the same body.
         return patches_of(self.tets, self.Dm_inv, self.volumes, self.material)
+
+    def vertex_means(self, values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+        """(count, ...) means of values (m, ...) over the tets around each vertex, weighted with their rest volumes.
+
+        NaN for a vertex without a tet.
+        """
+        vertices, tets = self.tets.ravel(), np.repeat(np.arange(len(self.tets)), 4)
+        if self.quadratic is not None:
+            linear = np.ones(len(self.tets), dtype=bool)
+            linear[self.quadratic.rows] = False
+            vertices = np.concatenate([self.tets[linear].ravel(), self.quadratic.nodes.ravel()])
+            tets = np.concatenate([np.repeat(np.flatnonzero(linear), 4), np.repeat(self.quadratic.rows, 10)])
+        flat = values.reshape(len(values), -1)
+        sums = [np.bincount(vertices, (column * self.volumes)[tets], count) for column in flat.T]
+        with np.errstate(invalid="ignore"):
+            means = np.stack(sums, axis=1) / np.bincount(vertices, self.volumes[tets], count)[:, None]
+        return means.reshape(count, *values.shape[1:])
 
     @cached_property
     def known(self) -> NDArray[np.bool_]:
@@ -64,3 +84,18 @@ def joined_materials(parts: list[TetMaterial]) -> TetMaterial:
         laws += [tets.shifted(begin) for tets in part.laws]
         begin += len(part.kind)
     return replace(parts[0], **joined, laws=tuple(laws))
+
+
+def of_points(material: TetMaterial, rows: NDArray[np.int64], points: int) -> TetMaterial:
+    """The material of each of `points` points in each of the tets `rows` (k,), tet after tet."""
+    each = np.repeat(rows, points)
+    place = np.full(len(material.kind), -1, dtype=np.int64)
+    place[rows] = np.arange(len(rows))
+    values = {field.name: getattr(material, field.name) for field in fields(material)}
+    taken = {name: np.ascontiguousarray(of[each]) for name, of in values.items() if isinstance(of, np.ndarray)}
+    laws = []
+    for part in material.laws:
+        own = place[part.rows] >= 0
+        numbers = place[part.rows[own], None] * points + np.arange(points)
+        laws.append(part.of(numbers.ravel(), np.repeat(part.parameters[own], points, axis=0)))
+    return replace(material, **taken, laws=tuple(laws))

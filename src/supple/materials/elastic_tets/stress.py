@@ -6,6 +6,9 @@ vertices. For most materials it is d psi / dF. Where strains are averaged over p
     sum_k V_k P_k : dF_k + sum_a p_a dV_a = sum_e V_e (mean_k P_k + mean_a p_a cof F) : dF_e,
 
 the means over the six edges and the four vertices of tet e (see `materials.patches`): the stress of the tet.
+
+A quadratic tet has one value of each quantity, too, the mean over its volume: at rest of F, P and the energy density,
+as it is deformed of the Cauchy stress. J is the ratio of the volumes.
 """
 
 from __future__ import annotations
@@ -14,13 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.edge_springs import cofactors
-from supple.materials.elastic_tets.laws import TetLaws
+from supple.materials.elastic_tets.laws import TetLaws, of_points
+from supple.materials.elastic_tets.quadratic import QuadraticTets
 from supple.materials.flows.internal import add_densities, add_piolas
 from supple.materials.isotropic import piolas
 from supple.materials.laws.pointwise import densities_at, piolas_at
 from supple.materials.patches.domains import Patches
 from supple.materials.patches.energy import tet_shares, vertex_states
-from supple.numerics.deformation import determinants
+from supple.numerics.deformation import deformation_gradients, determinants
+from supple.numerics.quadratic_tets.bernstein import determinant_coefficients
 from supple.numerics.threads import threads_for
 
 _SERIAL_TETS = 5_000
@@ -42,6 +47,8 @@ def energy_densities(
     if laws.patches is not None:
         out[laws.patches.rows] = tet_shares(laws.patches, x) / laws.patches.tet_volumes
     add_densities(laws.material, F, internal, out)
+    if laws.quadratic is not None:
+        out[laws.quadratic.rows] = quadratic_energies(laws, laws.quadratic, x) / laws.volumes[laws.quadratic.rows]
     for springs in laws.springs:
         volumes = laws.volumes[springs.rows]
         out[springs.rows] = springs.energies(x, determinants(F[springs.rows]), volumes) / volumes
@@ -59,6 +66,8 @@ def first_piolas(
     if laws.patches is not None:
         out[laws.patches.rows] = _of_patches(laws.patches, x, F[laws.patches.rows])
     add_piolas(laws.material, F, internal, out)
+    if laws.quadratic is not None:
+        out[laws.quadratic.rows] = laws.quadratic.quadrature.means(_at_points(laws, laws.quadratic, x)[1])
     for springs in laws.springs:
         own = F[springs.rows]
         out[springs.rows] = springs.first_piolas(x, own, determinants(own), laws.volumes[springs.rows])
@@ -80,6 +89,64 @@ def _of_patches(patches: Patches, x: NDArray[np.float64], F: NDArray[np.float64]
         pressures = vertex_states(patches, x)[1]
     mean_pressure = pressures[vertices.of_tet].mean(axis=1)
     return P[edges.of_tet].mean(axis=1) + mean_pressure[:, None, None] * cofactors(F)
+
+
+def mean_deformation_gradients(laws: TetLaws, x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m, 3, 3) F of every tet at x (n, 3); of a quadratic one its mean."""
+    F = deformation_gradients(x, laws.tets, laws.Dm_inv)
+    if laws.quadratic is not None:
+        quadrature = laws.quadratic.quadrature
+        F[laws.quadratic.rows] = quadrature.means(quadrature.deformation_gradients(x))
+    return F
+
+
+def volume_ratios(laws: TetLaws, x: NDArray[np.float64], F: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m,) the volume of every tet at x (n, 3) over that at rest: J = det F, where F (m, 3, 3) is constant in it."""
+    J = determinants(F)
+    if laws.quadratic is not None:
+        rows = laws.quadratic.rows
+        J[rows] = determinant_coefficients(x, laws.quadratic.nodes).mean(axis=1) / (6.0 * laws.volumes[rows])
+    return J
+
+
+def smallest_ratio(laws: TetLaws, x: NDArray[np.float64], J: NDArray[np.float64]) -> float:
+    """The smallest of the J (m,) of the tets; in quadratic ones, of J at their nodes and quadrature points."""
+    if laws.quadratic is None:
+        return float(J.min())
+    smallest = J.copy()
+    smallest[laws.quadratic.rows] = laws.quadratic.smallest_ratios(x)
+    return float(smallest.min())
+
+
+def quadratic_energies(laws: TetLaws, tets: QuadraticTets, x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(k,) of every quadratic tet [J]."""
+    F = tets.quadrature.deformation_gradients(x)
+    material = of_points(laws.material, tets.rows, F.shape[1])
+    at_points = densities_at(material, F.reshape(-1, 3, 3)).reshape(tets.quadrature.volumes.shape)
+    return (at_points * tets.quadrature.volumes).sum(axis=1)
+
+
+def _at_points(
+    laws: TetLaws, tets: QuadraticTets, x: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(k, s, 3, 3) F and first Piola stress at the quadrature points."""
+    F = tets.quadrature.deformation_gradients(x)
+    material = of_points(laws.material, tets.rows, F.shape[1])
+    return F, piolas_at(material, F.reshape(-1, 3, 3)).reshape(F.shape)
+
+
+def cauchy_of_tets(
+    laws: TetLaws, x: NDArray[np.float64], P: NDArray[np.float64], F: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(m, 3, 3) Cauchy stress of every tet at x (n, 3), with its P and F (m, 3, 3) [Pa]."""
+    stresses = cauchy_stresses(P, F)
+    if laws.quadratic is not None:
+        quadratic = laws.quadratic
+        at, stress = _at_points(laws, quadratic, x)
+        forces = quadratic.quadrature.means(stress @ np.swapaxes(at, 2, 3))
+        J = quadratic.quadrature.means(np.linalg.det(at))
+        stresses[quadratic.rows] = 0.5 * (forces + np.swapaxes(forces, 1, 2)) / J[:, None, None]
+    return stresses
 
 
 def cauchy_stresses(P: NDArray[np.float64], F: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,10 +10,14 @@ from numpy.typing import NDArray
 
 # Cell types by VTK's numbers.
 TRIANGLE, TRIANGLE_STRIP, POLYGON, PIXEL, QUAD, TETRA = 5, 6, 7, 8, 9, 10
+QUADRATIC_EDGE, QUADRATIC_TRIANGLE, QUADRATIC_TETRA = 21, 22, 24
+# The cells that are written, by their number of points.
+CELL_OF_WIDTH = {3: TRIANGLE, 4: TETRA, 10: QUADRATIC_TETRA}
 CELL_NAMES = {
     1: "vertex", 2: "poly-vertex", 3: "line", 4: "poly-line", 5: "triangle", 6: "triangle strip", 7: "polygon",
     8: "pixel", 9: "quad", 10: "tetrahedron", 11: "voxel", 12: "hexahedron", 13: "wedge", 14: "pyramid",
-    22: "quadratic triangle", 24: "quadratic tetrahedron", 25: "quadratic hexahedron", 42: "polyhedron",
+    21: "quadratic edge", 22: "quadratic triangle", 24: "quadratic tetrahedron",
+    25: "quadratic hexahedron", 42: "polyhedron",
 }  # fmt: skip
 
 
@@ -72,21 +76,30 @@ def checked(soup: CellSoup) -> CellSoup:
 
 
 def tets_of(soup: CellSoup) -> NDArray[np.int64]:
-    """The tets (m, 4) of a soup; points, lines and surface cells are ignored, other cells are errors."""
+    """The tets of a soup, (m, 4) or, of quadratic ones, (m, 10) in VTK's order of nodes.
+
+    Points, lines and surface cells are ignored; other cells, and tets of both kinds together, are errors.
+    """
     soup = checked(soup)
-    others = np.unique(soup.types[(soup.types != TETRA) & (soup.types > QUAD)])
+    solid = (soup.types > QUAD) & (soup.types != QUADRATIC_EDGE) & (soup.types != QUADRATIC_TRIANGLE)
+    kinds = np.unique(soup.types[solid])
+    others = kinds[(kinds != TETRA) & (kinds != QUADRATIC_TETRA)]
     if len(others):
         name = CELL_NAMES.get(int(others[0]), f"type {others[0]}")
-        raise FormatError(f"it has {name} cells; only linear tetrahedra can be used: convert or remesh it")
-    cells = np.flatnonzero(soup.types == TETRA)
-    if len(cells) == 0:
+        raise FormatError(f"it has {name} cells; only tetrahedra of 4 or 10 nodes can be used: convert or remesh it")
+    if len(kinds) == 0:
         raise FormatError(
             "it has no tetrahedra; a surface is loaded with SurfaceMesh.load and meshed with tetrahedralize"
         )
+    if len(kinds) == 2:
+        raise FormatError("it has both linear and quadratic tetrahedra; save it with one kind")
+    width = 4 if kinds[0] == TETRA else 10
+    cells = np.flatnonzero(solid)
     starts, sizes = soup.offsets[cells], soup.offsets[cells + 1] - soup.offsets[cells]
-    if (sizes != 4).any():
-        cell = int(cells[np.flatnonzero(sizes != 4)[0]])
+    if (sizes != width).any():
+        cell = int(cells[np.flatnonzero(sizes != width)[0]])
         raise FormatError(
-            f"cell {cell} is a tetrahedron of {soup.offsets[cell + 1] - soup.offsets[cell]} points, not 4"
+            f"cell {cell} is a {CELL_NAMES[int(kinds[0])]} of {soup.offsets[cell + 1] - soup.offsets[cell]} points, "
+            f"not {width}"
         )
-    return soup.connectivity[starts[:, None] + np.arange(4)]
+    return soup.connectivity[starts[:, None] + np.arange(width)]

@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from supple.errors import MeshError
 from supple.files.replacing import whole_files
 from supple.mesh.checked_arrays import vertex_array
-from supple.mesh.io import msh, obj, off, ply, stl, vtk_legacy, vtk_xml
+from supple.mesh.io import abaqus, msh, obj, off, ply, stl
 from supple.mesh.io.cells import CellSoup, FormatError, tets_of
 from supple.mesh.io.file_contents import file_contents
 from supple.mesh.io.models import glb
 from supple.mesh.io.polygons import triangles_of
 from supple.mesh.io.tetgen_family import SUFFIXES, family_paths, is_tetgen_path, read_tetgen_family
+from supple.mesh.io.vtk import legacy as vtk_legacy
+from supple.mesh.io.vtk import xml as vtk_xml
 from supple.mesh.merge import merge_map
 from supple.mesh.topology import has_vertex_twice, without_unused
 
@@ -46,7 +48,9 @@ TET_READERS: dict[str, Callable[[bytes], CellSoup]] = {
     ".msh": msh.read,
     ".vtu": vtk_xml.read,
     ".vtk": vtk_legacy.read,
+    ".inp": abaqus.read,
 }
+TET_WRITERS = {".vtu": vtk_xml.written_cells, ".vtk": vtk_legacy.written_cells, ".inp": abaqus.written}
 TET_EXTENSIONS = (*SUFFIXES, *TET_READERS)
 # Two units in the last place of single precision, relative to the bounding box.
 MERGE_TOLERANCE = 2e-7
@@ -95,14 +99,14 @@ def write_surface(path: str | Path, vertices: NDArray[np.float64], triangles: ND
 
 
 def read_tets(path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.integer], Path]:
-    """Vertices (n, 3), tets (m, 4), and the file that lists the tets; see `TetMesh.load`."""
+    """Vertices (n, 3), tets (m, 4) or (m, 10), and the file that lists the tets; see `TetMesh.load`."""
     path = Path(path)
     extension = path.suffix.lower()
     if is_tetgen_path(path):
         family = read_tetgen_family(path)
         ele = family_paths(path)[".ele"]
         if family.order == 2:
-            logger.warning("%s: ten-node tets: only their four corners are used", ele)
+            logger.warning("%s: ten-node tets: only their four corners are used; to keep them, convert it to .vtu", ele)
         return family.points, family.tets, ele
     if extension not in TET_EXTENSIONS:
         hint = "; a surface is loaded with SurfaceMesh.load" if extension in SURFACE_READERS else ""
@@ -116,13 +120,13 @@ def read_tets(path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.integer
 
 
 def write_tets(path: str | Path, vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> None:
-    """Write tets to a `.msh`, `.vtu` or `.vtk` file; see `TetMesh.save`."""
+    """Write tets (m, 4) or (m, 10) to a `.msh`, `.vtu`, `.vtk` or `.inp` file; see `TetMesh.save`."""
     path = Path(path)
     extension = path.suffix.lower()
     if extension == ".msh":
         _write_whole(path, lambda temporary: msh.write(temporary, vertices, tets))
     elif extension in TET_READERS:
-        data = (vtk_xml if extension == ".vtu" else vtk_legacy).written_cells(vertices, tets)
+        data = TET_WRITERS[extension](vertices, tets)
         _write_whole(path, lambda temporary: temporary.write_bytes(data))
     else:
         raise _unknown_extension(path, TET_EXTENSIONS, "")

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.mesh.io.cells import Block, CellSoup, FormatError
+from supple.mesh.io.cells import QUADRATIC_TETRA, Block, CellSoup, FormatError
 from supple.mesh.io.text import without_mark
 
 # Gmsh's element types: nodes, and VTK's number for the same cell.
@@ -24,6 +24,10 @@ ELEMENTS = {
     10: (9, 28), 11: (10, 24), 12: (27, 29), 13: (18, 32), 14: (14, 27), 15: (1, 1), 16: (8, 23), 17: (20, 25),
     18: (15, 26), 19: (13, 27),
 }  # fmt: skip
+
+
+# Gmsh numbers the last two edges of a quadratic tet the other way round; see the manual, "Node ordering".
+GMSH_TO_VTK = np.array([0, 1, 2, 3, 4, 5, 6, 7, 9, 8])
 
 
 class Form(NamedTuple):
@@ -155,7 +159,10 @@ def read(data: bytes) -> CellSoup:
         if unknown.any():
             raise FormatError(f"an element names node {nodes[unknown][0]}, which does not exist")
         size, cell_type = ELEMENTS[kind]
-        cells.append((cell_type, np.full(len(nodes), size), order[place].ravel()))
+        found = order[place]
+        if cell_type == QUADRATIC_TETRA:
+            found = found[:, GMSH_TO_VTK]
+        cells.append((cell_type, np.full(len(nodes), size), found.ravel()))
     if not cells:
         raise FormatError("it has no elements")
     return CellSoup.of_blocks(points, cells)
@@ -193,7 +200,9 @@ def file_form(data: bytes) -> Form:
 
 def nodes_of_kind(kind: int) -> int:
     if kind not in ELEMENTS:
-        raise FormatError(f"it holds elements of type {kind}; only linear tetrahedra can be used: convert or remesh it")
+        raise FormatError(
+            f"it holds elements of type {kind}; only tetrahedra of 4 or 10 nodes can be used: convert or remesh it"
+        )
     return ELEMENTS[kind][0]
 
 
@@ -247,5 +256,6 @@ def write(path: Path, vertices: NDArray[np.float64], tets: NDArray[np.int32]) ->
     import meshio
 
     with contextlib.redirect_stderr(io.StringIO()):
-        mesh = meshio.Mesh(np.array(vertices), [("tetra", np.array(tets))])
+        kind = "tetra" if tets.shape[1] == 4 else "tetra10"
+        mesh = meshio.Mesh(np.array(vertices), [(kind, np.array(tets))])
         meshio.gmsh.write(str(path), mesh, fmt_version="4.1", binary=True)

@@ -11,6 +11,7 @@ from supple.materials.kinds import needs_positive_volume
 from supple.materials.per_tet import BY_LAW, NO_REGION, LawTets, TetMaterial
 from supple.materials.tet_energies import element_energies
 from supple.numerics.threads import threads_for
+from supple.output.check.geometry.quadratic_tets import at_quadrature_points
 from supple.output.recording.physics import RecordedPhysics
 from supple.output.recording.reader import Recording
 
@@ -42,6 +43,18 @@ def elastic_energy(
         tets = np.ascontiguousarray(recording.tets[body.tets])
         volumes = recording.rest_volumes[body.tets]
         pair = physics.compliances[k]
+        nodes = recording.nodes_of(body)
+        if nodes.shape[1] == 10:
+            F, parts = at_quadrature_points(x[nodes], recording.rest_positions[nodes])
+            laws = physics.tet_kinds[body.tets], physics.mu[body.tets], physics.lam[body.tets]
+            of_points = np.empty(parts.size)
+            densities(F.reshape(-1, 3, 3), *(np.repeat(law, parts.shape[1]) for law in laws), of_points)
+            of_points = np.where(laws[0][:, None] == BY_LAW, 0.0, of_points.reshape(parts.shape))
+            for part in (_of_body(each, body.tets) for each in physics.laws if each.flow is None):
+                for point in range(parts.shape[1]):
+                    of_points[part.rows, point] += part.law.densities(F[part.rows, point], part.parameters)
+            total += float((of_points * parts).sum())
+            continue
         if pair is None:
             out = np.empty(len(tets))
             laws = physics.tet_kinds[body.tets], physics.mu[body.tets], physics.lam[body.tets]

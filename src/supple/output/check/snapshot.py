@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.output.check.elastic_energy import elastic_energy
+from supple.output.check.geometry import quadratic_tets
 from supple.output.check.geometry.box_tree import build_tree, triangle_boxes
 from supple.output.check.geometry.orientation import volume_signs
 from supple.output.check.geometry.surface_pairs import meeting_pairs
@@ -33,6 +34,12 @@ class Scene:
     def rest_inverse(self) -> NDArray[np.float64]:
         """(m, 3, 3) Dm^-1 [1/m]; NaN where a tet is flat at rest."""
         return _inverses(edge_vectors(self.recording.rest_positions, self.recording.tets))
+
+    @cached_property
+    def quadratic_at_rest(self) -> NDArray[np.float64]:
+        """(k, 10, 3) nodes of the quadratic tets at rest [m]."""
+        quadratic = self.recording.quadratic
+        return np.zeros((0, 10, 3)) if quadratic is None else self.recording.rest_positions[quadratic[1]]
 
     @cached_property
     def size(self) -> float:
@@ -93,8 +100,12 @@ class Snapshot:
 
     @cached_property
     def signs(self) -> NDArray[np.int8]:
-        """(m,) exact sign of every tet's determinant."""
-        return volume_signs(self.positions, self.scene.recording.tets)
+        """(m,) exact sign of every tet's determinant; of a quadratic one, 1 where it is positive everywhere in it."""
+        signs = volume_signs(self.positions, self.scene.recording.tets)
+        if self.scene.recording.quadratic is not None:
+            rows, nodes = self.scene.recording.quadratic
+            signs[rows] = np.where(quadratic_tets.are_positive(self.positions[nodes]), 1, -1)
+        return signs
 
     @cached_property
     def F(self) -> NDArray[np.float64]:
@@ -103,9 +114,23 @@ class Snapshot:
 
     @cached_property
     def J(self) -> NDArray[np.float64]:
-        """(m,) their determinants, computed here."""
+        """(m,) their determinants, computed here; of quadratic tets, the ratios of their volumes."""
         a, b, c = self.F[:, :, 0], self.F[:, :, 1], self.F[:, :, 2]
-        return np.einsum("ij,ij->i", a, np.cross(b, c))
+        J = np.einsum("ij,ij->i", a, np.cross(b, c))
+        if self.scene.recording.quadratic is not None:
+            rows, nodes = self.scene.recording.quadratic
+            J[rows] = quadratic_tets.volumes(self.positions[nodes]) / self.scene.recording.rest_volumes[rows]
+        return J
+
+    @cached_property
+    def least_J(self) -> NDArray[np.float64]:
+        """(m,) as `J`; in quadratic tets the smallest of those at nodes and quadrature points."""
+        if self.scene.recording.quadratic is None:
+            return self.J
+        rows, nodes = self.scene.recording.quadratic
+        least = self.J.copy()
+        least[rows] = quadratic_tets.smallest_ratios(self.positions[nodes], self.scene.quadratic_at_rest)
+        return least
 
     @cached_property
     def elastic_energy(self) -> float | None:

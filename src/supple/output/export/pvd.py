@@ -37,30 +37,28 @@ def _write_vtu(recording: Recording, frame: RecordedFrame, path: Path) -> None:
 
     positions, velocities = list(frame.positions.values()), list(frame.velocities.values())
     starts = np.cumsum([0, *map(len, positions)])
-    tets, triangles = [np.zeros((0, 4), np.int32)], [np.zeros((0, 3), np.int32)]
-    of_point, of_tet, of_triangle = np.zeros(starts[-1], np.int32), [], []
+    triangles = [np.zeros((0, 3), np.int32)]
+    of_point, of_triangle = np.zeros(starts[-1], np.int32), []
+    parts = []
     for i, body in enumerate(recording.bodies):
         of_point[starts[i] : starts[i + 1]] = i
         if body.rigid and body.skin is not None:
             triangles.append(body.skin.triangles + starts[i])
             of_triangle += [i] * len(body.skin.triangles)
         else:
-            tets.append(recording.tets[body.tets] - body.vertices.start + starts[i])
-            of_tet += [i] * (body.tets.stop - body.tets.start)
-    soft = np.concatenate([np.arange(b.tets.start, b.tets.stop) for b in recording.bodies if not b.rigid] or [[]])
+            nodes = recording.nodes_of(body) - body.vertices.start + starts[i]
+            kind = "tetra" if nodes.shape[1] == 4 else "tetra10"
+            parts.append((kind, nodes, frame.det_F[body.tets], np.full(len(nodes), i, dtype=np.int32)))
     rigid = np.array([frame.det_F[body.tets.start] if body.rigid else 1.0 for body in recording.bodies])
-    parts = [
-        ("tetra", np.concatenate(tets), frame.det_F[soft.astype(int)], of_tet),
-        ("triangle", np.concatenate(triangles), rigid[of_triangle], of_triangle),
-    ]
-    parts = [part for part in parts if len(part[1])]
+    if of_triangle:
+        parts.append(("triangle", np.concatenate(triangles), rigid[of_triangle], np.array(of_triangle, dtype=np.int32)))
     mesh = meshio.Mesh(
         np.concatenate(positions),
         [(kind, cells) for kind, cells, _, _ in parts],
         point_data={"velocities": np.concatenate(velocities), "body": of_point},
         cell_data={
             "det_F": [values for _, _, values, _ in parts],
-            "body": [np.array(numbers, dtype=np.int32) for _, _, _, numbers in parts],
+            "body": [numbers for _, _, _, numbers in parts],
         },
     )
     mesh.write(path, file_format="vtu")

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.edge_springs import EdgeSprings
 from supple.materials.elastic_tets.laws import TetLaws
+from supple.materials.elastic_tets.quadratic import QuadraticTets
 from supple.materials.per_tet import NO_REGION, NOT_ELASTIC, TetMaterial
 from supple.output.recording.physics import RecordedPhysics
 from supple.output.recording.scene import RecordedBody
@@ -20,6 +21,7 @@ def recorded_laws(
     rest_positions: NDArray[np.float64],
     tets: NDArray[np.int32],
     volumes: NDArray[np.float64],
+    quadratic: tuple[NDArray[np.int32], NDArray[np.int32]] | None = None,
 ) -> TetLaws:
     """The laws of `tets` (m, 4); of none, where an earlier version wrote the recording and `physics` is None.
 
@@ -28,7 +30,11 @@ def recorded_laws(
     Parameters
     ----------
     rest_positions : (n, 3) [m]; volumes : (m,) at rest [m^3]
+    quadratic : rows (k,) and nodes (k, 10) of the quadratic tets, or None
     """
+    curved = None
+    if quadratic is not None:
+        curved = QuadraticTets.of(quadratic[0].astype(np.int64), quadratic[1], rest_positions)
     m = len(tets)
     corners = rest_positions[tets]
     a, b, c = (corners[:, k] - corners[:, 0] for k in (1, 2, 3))
@@ -37,7 +43,8 @@ def recorded_laws(
     tets, unknown = np.ascontiguousarray(tets, dtype=np.int32), np.full(m, np.nan)
     if physics is None:
         kind, region = np.full(m, NOT_ELASTIC, dtype=np.int32), np.full(m, NO_REGION, dtype=np.int32)
-        return TetLaws(tets, Dm_inv, volumes, TetMaterial(unknown, unknown, kind, unknown, unknown, region))
+        nothing = TetMaterial(unknown, unknown, kind, unknown, unknown, region)
+        return TetLaws(tets, Dm_inv, volumes, nothing, quadratic=curved)
     kind = physics.tet_kinds
     material = TetMaterial(unknown, unknown, kind, physics.mu, physics.lam, physics.region, physics.laws)
     springs = [
@@ -45,4 +52,4 @@ def recorded_laws(
         for body, pair in zip(bodies, physics.compliances, strict=True)
         if pair is not None
     ]
-    return TetLaws(tets, Dm_inv, volumes, material, tuple(springs))
+    return TetLaws(tets, Dm_inv, volumes, material, tuple(springs), curved)

@@ -176,6 +176,7 @@ class Recording(Showable, Sequence[RecordedFrame]):
     path : of the file; times : (frames,) [s]
     bodies, obstacles, stitches : of the scene
     rest_positions : (n, 3) [m]; masses : (n,) [kg]; tets : (m, 4); triangles : (t, 3); rest_volumes : (m,) [m^3]
+    quadratic : rows (k,) and nodes (k, 10) of the quadratic tets, whose corners `tets` has; None without such
     gravity : (3,) [m/s^2]; dt : time from frame to frame [s]
     physics : the bodies' laws and what acts on them, or None where an older version wrote the recording
     details : which fields of the solver's details are kept; fields : of tets and vertices that were recorded
@@ -204,6 +205,15 @@ class Recording(Showable, Sequence[RecordedFrame]):
         n = len(self.rest_positions)
         self.tets = file.indices("supple/tets", 4, n)
         m = len(self.tets)
+        self.quadratic: tuple[NDArray[np.int32], NDArray[np.int32]] | None = None
+        if "supple/quadratic" in file:
+            rows = file.array("supple/quadratic/rows", "i", (None,))
+            if len(rows) and (rows.min() < 0 or rows.max() >= m or (np.diff(rows) <= 0).any()):
+                raise file.broken("its quadratic tets are not rows of its tets in ascending order")
+            nodes = file.indices("supple/quadratic/nodes", 10, n)
+            if len(nodes) != len(rows) or not np.array_equal(nodes[:, :4], self.tets[rows]):
+                raise file.broken("the nodes of its quadratic tets do not have the corners of its tets")
+            self.quadratic = rows.astype(np.int32), nodes
         self.triangles = file.indices("supple/triangles", 3, n)
         self.rest_volumes = file.array("supple/rest_volumes", "f", (m,))
         self.masses = file.array("supple/masses", "f", (n,))
@@ -275,7 +285,17 @@ class Recording(Showable, Sequence[RecordedFrame]):
     @cached_property
     def laws(self) -> TetLaws:
         """The elastic laws of all tets; unknown where an earlier version wrote the recording."""
-        return recorded_laws(self.physics, self.bodies, self.rest_positions, self.tets, self.rest_volumes)
+        of_tets = self.rest_positions, self.tets, self.rest_volumes
+        return recorded_laws(self.physics, self.bodies, *of_tets, self.quadratic)
+
+    def nodes_of(self, body: RecordedBody) -> NDArray[np.int32]:
+        """(m, 4) or (m, 10) nodes of a body's tets, rows of all vertices."""
+        if self.quadratic is not None:
+            rows, nodes = self.quadratic
+            begin, end = np.searchsorted(rows, [body.tets.start, body.tets.stop])
+            if end > begin:
+                return nodes[begin:end]
+        return self.tets[body.tets]
 
     @property
     def internal_rows(self) -> int:

@@ -27,7 +27,7 @@ from supple.state import Status
 from supple.system import System
 
 FORMAT_VERSION = 2
-VTK_TETRA = 10
+VTK_TETRA, VTK_QUADRATIC_TETRA = 10, 24
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +115,8 @@ def write_scene(file: h5py.File, first: Frame, facts: dict[str, Any], scene_text
     own["masses"] = system.masses
     own["gravity"] = system.gravity
     own["tets"] = system.tets
+    if system.quadratic is not None:
+        own["quadratic/rows"], own["quadratic/nodes"] = system.quadratic.rows, system.quadratic.nodes
     own["triangles"] = np.concatenate([p.body.mesh.surface.triangles + p.vertices.start for p in system.bodies])
     own["pinned_vertices"] = system.pinned_vertices
     write_stitches(own, system)
@@ -133,7 +135,8 @@ def write_scene(file: h5py.File, first: Frame, facts: dict[str, Any], scene_text
 
 
 def _attached(body: PlacedBody, skin: SurfaceMesh) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Corners and weights (k, 4) of the skin's vertices; of a rigid body those that the simulation has."""
+    """Corners and weights (k, 4) of the skin's vertices, (k, 10) of quadratic tets; of a rigid body those that the
+    simulation has."""
     if isinstance(body, RigidBody):
         return np.tile(np.arange(4, dtype=np.int32), (len(body.weights), 1)), body.weights
     attached = Embedding.of(body.mesh, skin.vertices)
@@ -144,11 +147,13 @@ def _write_grid(grid: h5py.Group, first: Frame, n: int, m: int) -> None:
     system = first.system
     grid.attrs.create("Version", np.array([2, 2], dtype=np.int64))
     grid.attrs.create("Type", np.bytes_("UnstructuredGrid"))
-    for name, count in (("NumberOfPoints", n), ("NumberOfCells", m), ("NumberOfConnectivityIds", 4 * m)):
+    cells = [part.body.mesh.nodes + part.vertices.start for part in system.bodies]
+    widths = np.concatenate([np.full(len(nodes), nodes.shape[1], dtype=np.int64) for nodes in cells])
+    for name, count in (("NumberOfPoints", n), ("NumberOfCells", m), ("NumberOfConnectivityIds", widths.sum())):
         grid[name] = np.array([count], dtype=np.int64)
-    grid["Connectivity"] = system.tets.ravel().astype(np.int64)
-    grid["Offsets"] = np.arange(0, 4 * m + 1, 4, dtype=np.int64)
-    grid["Types"] = np.full(m, VTK_TETRA, dtype=np.uint8)
+    grid["Connectivity"] = np.concatenate([nodes.ravel() for nodes in cells]).astype(np.int64)
+    grid["Offsets"] = np.concatenate([[0], np.cumsum(widths)])
+    grid["Types"] = np.where(widths == 4, VTK_TETRA, VTK_QUADRATIC_TETRA).astype(np.uint8)
     of_point, of_cell = np.zeros(n, dtype=np.int32), np.zeros(m, dtype=np.int32)
     for i, part in enumerate(system.bodies):
         of_point[part.vertices], of_cell[part.tets] = i, i
@@ -243,8 +248,11 @@ def read_bodies(
 
 
 def _read_skin(file: CheckedFile, path: str, vertices: int) -> SkinnedSurface:
-    corners = file.indices(f"{path}/corners", 4, vertices)
-    weights = file.array(f"{path}/weights", "f", (len(corners), 4))
+    width = file.array(f"{path}/corners", "i", (None, None)).shape[1]
+    if width not in (4, 10):
+        raise file.broken(f"{path}/corners has {width} columns; a skin's vertices have 4 corners or 10 nodes")
+    corners = file.indices(f"{path}/corners", width, vertices)
+    weights = file.array(f"{path}/weights", "f", corners.shape)
     return SkinnedSurface(corners, weights, file.indices(f"{path}/triangles", 3, len(corners)))
 
 

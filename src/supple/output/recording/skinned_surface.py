@@ -16,8 +16,10 @@ class SkinnedSurface:
 
     Attributes
     ----------
-    corners : (k, 4) int32, rows of the body's vertices: the tet that carries each surface vertex
-    weights : (k, 4) barycentric coordinates in it, summing to one; negative where the vertex lies outside
+    corners : (k, 4) int32, rows of the body's vertices: the tet that carries each surface vertex; (k, 10) the nodes of
+        a quadratic one
+    weights : (k, 4) barycentric coordinates in it, or (k, 10) shape functions, summing to one; negative
+        where the vertex lies outside
     triangles : (t, 3) int32, rows of `corners`
     """
 

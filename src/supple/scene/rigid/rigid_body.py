@@ -95,6 +95,8 @@ class RigidBody(PlacedBody):
         if not isinstance(self.shape, (SurfaceMesh, TetMesh)):
             raise SceneError(f"{owner}: shape is a {type(self.shape).__name__}; give a SurfaceMesh or a TetMesh")
         properties = self._properties(owner)
+        if isinstance(self.shape, TetMesh) and self.shape.order == 2:
+            raise SceneError(f"{owner}: shape has quadratic tets; give its surface or mesh.to_order(1)")
         surface = (self.shape.surface if isinstance(self.shape, TetMesh) else self.shape).compact()
         control = control_points(properties, surface.vertices)
         # What is drawn is what touches.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,6 +95,10 @@ class BodyModel(Model):
     name: Name = Field(description="unique in the scene")
     mesh: MeshFileModel | None = Field(default=None, description="of tetrahedra, or a surface to fill with them")
     shape: ShapeModel | None = Field(default=None, description="instead of `mesh`: a ready-made shape")
+    order: Literal[1, 2] | None = Field(
+        default=None,
+        description="of the tets: 2 for quadratic ones (implicit solver), 1 for linear ones; default: as in the file",
+    )
     material: MaterialModel | None = Field(default=None, description="of a soft body")
     rigid: RigidModel | None = Field(default=None, description="instead of `material`: the body is rigid")
     regions: list[RegionModel] | None = Field(
@@ -121,7 +125,7 @@ class BodyModel(Model):
         if (self.material is None) == (self.rigid is None):
             raise ValueError("a body needs either `material` or `rigid`; give one of them")
         if self.rigid is not None:
-            for key in ("regions", "skin", "initial"):
+            for key in ("regions", "skin", "initial", "order"):
                 if getattr(self, key) is not None:
                     raise ValueError(f"a rigid body has no `{key}`; remove it")
         return self
@@ -171,10 +175,11 @@ class BodyModel(Model):
         if self.mesh is not None:
             with at("mesh"):
                 mesh = meshes.tets(self.mesh)
+                mesh = mesh if self.order is None else mesh.to_order(self.order)
         else:
             assert self.shape is not None
             with at("shape"):
-                mesh = meshes.shape(self.shape)
+                mesh = meshes.shape(self.shape, self.order or 1)
         with at("skin"):
             skin = meshes.surface(self.skin) if self.skin is not None else None
         with at("material"):

@@ -100,9 +100,9 @@ class MeshStore:
         """The named sets of a file of tets."""
         return self._once(source, lambda: read_sets(self.located(source.file)), "sets ")
 
-    def shape(self, shape: ShapeModel) -> TetMesh:
+    def shape(self, shape: ShapeModel, order: int = 1) -> TetMesh:
         """The tet mesh of a shape."""
-        return self._once(shape, shape.build)
+        return self._once(shape, lambda: shape.build(order), f"order {order} ")
 
     def solid(self, source: MeshFileModel) -> SurfaceMesh | TetMesh:
         """The surface in a file as it is, without meshing options; otherwise its tet mesh."""

@@ -21,8 +21,8 @@ class BoxShapeModel(Model):
     size: Extents = Field(default=[1.0, 1.0, 1.0], description="full edge lengths [m]")
     divisions: Divisions = Field(default=[4, 4, 4], description="cells along x, y and z")
 
-    def build(self) -> TetMesh:
-        return shapes.box(self.size, self.divisions)
+    def build(self, order: int = 1) -> TetMesh:
+        return shapes.box(self.size, self.divisions, order)
 
     def build_surface(self) -> SurfaceMesh:
         return shapes.box_surface(self.size, self.divisions)
@@ -35,8 +35,8 @@ class SphereShapeModel(Model):
     radius: Positive = Field(default=0.5, description="[m]")
     edge_length: Positive | None = Field(default=None, description="mean edge [m]; default: a fifth of the radius")
 
-    def build(self) -> TetMesh:
-        return shapes.sphere(self.radius, self.edge_length or 0.2 * self.radius)
+    def build(self, order: int = 1) -> TetMesh:
+        return shapes.sphere(self.radius, self.edge_length or 0.2 * self.radius, order)
 
     def build_surface(self) -> SurfaceMesh:
         return shapes.sphere_surface(self.radius, self.edge_length or 0.2 * self.radius)
@@ -52,8 +52,9 @@ class CylinderShapeModel(Model):
         default=None, description="mean edge [m]; default: a fifth of the smaller of radius and height"
     )
 
-    def build(self) -> TetMesh:
-        return shapes.cylinder(self.radius, self.height, self.edge_length or 0.2 * min(self.radius, self.height))
+    def build(self, order: int = 1) -> TetMesh:
+        edge_length = self.edge_length or 0.2 * min(self.radius, self.height)
+        return shapes.cylinder(self.radius, self.height, edge_length, order)
 
     def build_surface(self) -> SurfaceMesh:
         return shapes.cylinder_surface(
@@ -69,8 +70,8 @@ class TorusShapeModel(Model):
     tube_radius: Positive = Field(default=0.2, description="of the tube [m]")
     edge_length: Positive | None = Field(default=None, description="mean edge [m]; default: 0.4 of the tube's radius")
 
-    def build(self) -> TetMesh:
-        return shapes.torus(self.radius, self.tube_radius, self.edge_length or 0.4 * self.tube_radius)
+    def build(self, order: int = 1) -> TetMesh:
+        return shapes.torus(self.radius, self.tube_radius, self.edge_length or 0.4 * self.tube_radius, order)
 
     def build_surface(self) -> SurfaceMesh:
         return shapes.torus_surface(self.radius, self.tube_radius, self.edge_length or 0.4 * self.tube_radius)
@@ -83,8 +84,8 @@ class GummyBearShapeModel(Model):
     height: Positive = Field(default=1.0, description="[m]")
     edge_length: Positive | None = Field(default=None, description="mean edge [m]; default: 0.08 of the height")
 
-    def build(self) -> TetMesh:
-        return shapes.gummy_bear(self.height, self.edge_length or 0.08 * self.height)
+    def build(self, order: int = 1) -> TetMesh:
+        return shapes.gummy_bear(self.height, self.edge_length or 0.08 * self.height, order)
 
 
 ShapeModel = Annotated[

@@ -22,7 +22,8 @@ class BodyDescription:
     ----------
     vertices, tet_rows : slices of a snapshot's `positions` and `tet_values`
     rest_positions : (n, 3) in the coordinates of the mesh [m]
-    triangles : (t, 3) surface, counter-clockwise from outside; tets : (m, 4); both numbered from 0 in the body
+    triangles : (t, 3) surface, counter-clockwise from outside; nodes : (m, 4) or (m, 10) of the tets; both numbered
+        from 0 in the body
     skin : vertices (s, 3) in the coordinates of the mesh [m] and triangles (u, 3) of the finer surface, or None
     material : name of its class; values : of the parameters that a page can change, by name
     mass : [kg]
@@ -34,7 +35,7 @@ class BodyDescription:
     tet_rows: slice
     rest_positions: NDArray[np.float64]
     triangles: NDArray[np.int32]
-    tets: NDArray[np.int32]
+    nodes: NDArray[np.int32]
     skin: tuple[NDArray[np.float64], NDArray[np.int32]] | None
     material: str
     values: dict[str, Value]

@@ -45,7 +45,7 @@ class Records(FrameCheck):
         row = int(np.argmax(apart))
         yield float(apart[row]), f"det F of {self.scene.name('tet', row)}"
         recorded = recording.series("min_det_F")[k]
-        yield abs(recorded - at.J.min()) / sizes[int(np.argmin(at.J))], "smallest det F"
+        yield abs(recorded - at.least_J.min()) / sizes[int(np.argmin(at.least_J))], "smallest det F"
         kinetic = 0.5 * float(m @ np.einsum("ij,ij->i", v, v))
         recorded = recording.series("kinetic_energy")[k]
         yield abs(recorded - kinetic) / (kinetic + _NOTHING), "kinetic energy"

@@ -7,6 +7,7 @@ import numpy as np
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.materials.stable_neo_hookean import StableNeoHookean
 from supple.output.check.frame_check import FrameCheck
+from supple.output.check.geometry import quadratic_tets
 from supple.output.check.geometry.orientation import volume_signs
 from supple.output.check.snapshot import Snapshot, edge_vectors
 
@@ -29,7 +30,12 @@ class RestShape(FrameCheck):
         recording = self.scene.recording
         D = edge_vectors(recording.rest_positions, recording.tets)
         volumes = np.einsum("ij,ij->i", D[:, :, 0], np.cross(D[:, :, 1], D[:, :, 2])) / 6.0
-        bad = np.flatnonzero(volume_signs(recording.rest_positions, recording.tets) <= 0)
+        flat = volume_signs(recording.rest_positions, recording.tets) <= 0
+        if recording.quadratic is not None:
+            rows = recording.quadratic[0]
+            volumes[rows] = quadratic_tets.volumes(self.scene.quadratic_at_rest)
+            flat[rows] |= ~quadratic_tets.are_positive(self.scene.quadratic_at_rest)
+        bad = np.flatnonzero(flat)
         row = int(bad[0]) if len(bad) else int(np.argmin(volumes))
         self.tally.see(None, volumes[row], len(bad) > 0, self.scene.name("tet", row))
         sizes = np.abs(D).max(axis=(1, 2)) ** 3
@@ -46,7 +52,7 @@ class RestShape(FrameCheck):
 
 
 class Inversion(FrameCheck):
-    """The exact sign of every tet's determinant; the smallest det F is reported."""
+    """The sign of every tet's determinant, exact or everywhere in a quadratic one; the smallest det F is reported."""
 
     name = "inversion"
     lowest = True
@@ -55,7 +61,7 @@ class Inversion(FrameCheck):
 
     def see(self, at: Snapshot) -> None:
         bad = np.flatnonzero(at.signs <= 0)
-        J = np.where(np.isfinite(at.J), at.J, np.inf)
+        J = np.where(np.isfinite(at.least_J), at.least_J, np.inf)
         row = int(bad[np.argmin(J[bad])]) if len(bad) else int(np.argmin(J))
         self.tally.see(at, float(J[row]), len(bad) > 0, lambda: self.scene.name("tet", row))
 

@@ -59,7 +59,7 @@ class MomentBuilder:
             ModelBody(body.name, body.vertices, body.tet_rows, body.triangles, self._skin_of(body), i)
             for i, body in enumerate(scene.bodies)
         )
-        tets = np.concatenate([body.tets + body.vertices.start for body in scene.bodies])
+        tets = np.concatenate([body.nodes[:, :4] + body.vertices.start for body in scene.bodies])
         return Model(
             bodies,
             _scene_obstacles(scene),
@@ -76,7 +76,7 @@ class MomentBuilder:
         vertices, triangles = body.skin
         key = _fingerprint(vertices), _fingerprint(body.rest_positions)
         if key not in self._skins:
-            held = Embedding.of(TetMesh(body.rest_positions, body.tets), vertices)
+            held = Embedding.of(TetMesh(body.rest_positions, body.nodes), vertices)
             self._skins[key] = SkinnedSurface(held.corners, held.weights, np.asarray(triangles, dtype=np.int32))
         return self._skins[key]
 
@@ -89,7 +89,7 @@ def _scene_obstacles(scene: SceneDescription) -> tuple[RecordedObstacle, ...]:
 
 def _model_key(scene: SceneDescription) -> tuple[Any, ...]:
     """A key that is equal for scenes with the same things to draw, apart from their positions."""
-    bodies = ((b.name, _fingerprint(b.rest_positions), _fingerprint(b.tets), b.skin is None) for b in scene.bodies)
+    bodies = ((b.name, _fingerprint(b.rest_positions), _fingerprint(b.nodes), b.skin is None) for b in scene.bodies)
     return (*bodies, *((o.name, o.kind) for o in _scene_obstacles(scene)), _fingerprint(scene.stitches))
 
 

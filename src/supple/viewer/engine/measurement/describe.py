@@ -52,7 +52,7 @@ def _body(part: BodyRange, masses: NDArray[np.float64], added: frozenset[str]) -
         tet_rows=part.tets,
         rest_positions=body.mesh.vertices,
         triangles=body.mesh.surface.triangles.astype(np.int32),
-        tets=body.mesh.tets.astype(np.int32),
+        nodes=body.mesh.nodes.astype(np.int32),
         skin=None if skin is None else (skin.vertices, skin.triangles.astype(np.int32)),
         material="rigid" if isinstance(body, RigidBody) else type(body.material).__name__,
         values={"friction": body.friction, **({} if isinstance(body, RigidBody) else _material_values(body.material))},

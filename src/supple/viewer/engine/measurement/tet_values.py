@@ -6,9 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.laws import TetLaws
-from supple.materials.elastic_tets.stress import cauchy_stresses, energy_densities, first_piolas, von_mises
+from supple.materials.elastic_tets.stress import (
+    cauchy_of_tets,
+    energy_densities,
+    first_piolas,
+    mean_deformation_gradients,
+    volume_ratios,
+    von_mises,
+)
 from supple.materials.flows.internal import NEVER_FLOWED
-from supple.numerics.deformation import deformation_gradients, determinants
 
 QUANTITIES = ("J", "von_mises", "energy")
 
@@ -24,9 +30,9 @@ def tet_values(
     NaN where the tet has no law, or holds something rigid and a stress is asked for.
     """
     x = np.ascontiguousarray(positions)
-    F = deformation_gradients(x, laws.tets, laws.Dm_inv)
+    F = mean_deformation_gradients(laws, x)
     if quantity == "J":
-        return determinants(F)
+        return volume_ratios(laws, x, F)
     if quantity == "energy":
         return energy_densities(laws, x, F, internal)
-    return von_mises(cauchy_stresses(first_piolas(laws, x, F, internal), F))
+    return von_mises(cauchy_of_tets(laws, x, first_piolas(laws, x, F, internal), F))

@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.mesh.io.cells import POLYGON, TETRA, TRIANGLE, TRIANGLE_STRIP, Block, CellSoup, FormatError
+from supple.mesh.io.cells import CELL_OF_WIDTH, POLYGON, TRIANGLE_STRIP, Block, CellSoup, FormatError
 from supple.mesh.io.text import shortened
 
 SCALARS = {
@@ -218,6 +218,6 @@ def written_cells(vertices: NDArray[np.float64], cells: NDArray[np.int32]) -> by
     arrays = (
         _array("connectivity", cells, "Int64")
         + _array("offsets", width * np.arange(1, m + 1), "Int64")
-        + _array("types", np.full(m, TETRA if width == 4 else TRIANGLE), "UInt8")
+        + _array("types", np.full(m, CELL_OF_WIDTH[width]), "UInt8")
     )
     return _file("UnstructuredGrid", vertices, f'NumberOfCells="{m}"', b"<Cells>\n" + arrays + b"</Cells>\n")

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.mesh.io.cells import POLYGON, TETRA, TRIANGLE, TRIANGLE_STRIP, Block, CellSoup, FormatError
+from supple.mesh.io.cells import CELL_OF_WIDTH, POLYGON, TRIANGLE_STRIP, Block, CellSoup, FormatError
 from supple.mesh.io.text import integer, shortened, without_mark
 
 SCALARS = {
@@ -192,7 +192,7 @@ def written_surface(vertices: NDArray[np.float64], triangles: NDArray[np.int32])
 def written_cells(vertices: NDArray[np.float64], cells: NDArray[np.int32]) -> bytes:
     """Triangles or tets as an UnstructuredGrid in binary legacy VTK 3.0."""
     m, width = cells.shape
-    types = np.full(m, TETRA if width == 4 else TRIANGLE, dtype=">i4").tobytes()
+    types = np.full(m, CELL_OF_WIDTH[width], dtype=">i4").tobytes()
     return _written("UNSTRUCTURED_GRID", vertices, "CELLS", cells) + f"CELL_TYPES {m}\n".encode() + types + b"\n"
 
 

@@ -1,0 +1,386 @@
+"""Quadratic tets in `Implicit`: derivatives, masses, loads, equilibria against exact solutions, motion, refusals."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import supple as sp
+from supple.errors import SceneError, SolverError
+from supple.implicit.energies.damping import StrainRate, quadratic_viscosity_of
+from supple.implicit.energies.elasticity import elasticity_of
+from supple.implicit.energies.potential import HessianBlocks
+from supple.implicit.limits.inversion_guard import InversionGuard
+from supple.materials.registry import ELASTIC_MATERIALS
+from supple.numerics.quadratic_tets.shape_functions import conical_rule, reference_gradients, shape_functions
+from supple.numerics.threads import one_thread
+from supple.scene.forces import Force
+from supple.system import build_system
+
+STATIC = sp.Implicit(integrator="static", contact=None)
+SOFT = sp.StableNeoHookean(youngs=1e4, poisson=0.4, density=1000.0, damping=0.01)
+
+
+def wavy(mesh, size=0.01):
+    """The mesh with curved edges."""
+    x = mesh.vertices
+    return sp.TetMesh(x + size * np.sin(7.0 * x[:, [1, 2, 0]]), mesh.nodes)
+
+
+BAR = wavy(sp.shapes.box((0.6, 0.2, 0.2), (3, 1, 1), order=2))
+
+
+def bar_scene(material=SOFT, pinned=True, mesh=BAR, **extra):
+    left = np.flatnonzero(mesh.vertices[:, 0] < mesh.vertices[:, 0].min() + 0.02)
+    pins = [sp.Pin("bar", left)] if pinned else []
+    return sp.Scene([sp.Body("bar", mesh, material)], pins=pins, **extra)
+
+
+def equilibrium(scene, solver=STATIC):
+    frame = list(sp.simulate(scene, solver, 1.0, 1))[-1]
+    assert frame.report.status == "converged", frame.report.message
+    return frame
+
+
+def hessian_of(potential, system, x, project):
+    blocks = HessianBlocks.zeros(len(system.tets), len(x))
+    potential.add_hessian(x, blocks, project)
+    assert not blocks.tets.any()
+    H = np.zeros((3 * len(x), 3 * len(x)))
+    for part in blocks.patches:
+        for i, j, block in zip(part.rows, part.columns, part.blocks, strict=True):
+            H[3 * i : 3 * i + 3, 3 * j : 3 * j + 3] += block
+            if i != j:
+                H[3 * j : 3 * j + 3, 3 * i : 3 * i + 3] += block.T
+    return H
+
+
+def assert_derivatives(potential, system, x, scale):
+    """Central differences, of the energy to 1e-6 and of the gradient to 1e-5."""
+    d = np.random.default_rng(5).normal(size=x.shape)
+    h = 1e-6
+    gradient, ahead, behind = (np.zeros_like(x) for _ in range(3))
+    potential.add_gradient(x, gradient)
+    slope = (potential.value(x + h * d) - potential.value(x - h * d)) / (2 * h)
+    assert slope == pytest.approx(np.sum(gradient * d), rel=1e-6, abs=1e-9 * scale)
+    potential.add_gradient(x + h * d, ahead)
+    potential.add_gradient(x - h * d, behind)
+    H = hessian_of(potential, system, x, False)
+    np.testing.assert_allclose(H, H.T, atol=1e-9 * np.abs(H).max())
+    product = (H @ d.ravel()).reshape(-1, 3)
+    np.testing.assert_allclose(product, (ahead - behind) / (2 * h), atol=1e-5 * np.abs(product).max())
+    assert np.linalg.eigvalsh(hessian_of(potential, system, x, True)).min() > -1e-9 * np.abs(H).max()
+
+
+@pytest.mark.parametrize("material", ELASTIC_MATERIALS, ids=lambda m: m.__name__)
+def test_derivatives_of_the_energy(material):
+    system = build_system(bar_scene(material(youngs=1e4, poisson=0.4)))
+    x = system.rest_positions + 0.01 * np.random.default_rng(1).normal(size=BAR.vertices.shape)
+    elasticity = elasticity_of(system)
+    assert elasticity.value(x) > 0.0
+    assert elasticity.energies(x).sum() == pytest.approx(elasticity.value(x), rel=1e-12)
+    assert elasticity.value(system.rest_positions) == pytest.approx(0.0, abs=1e-12)
+    assert_derivatives(elasticity, system, x, 1.0)
+
+
+def test_derivatives_of_damping_and_of_the_barrier():
+    system = build_system(bar_scene())
+    random = np.random.default_rng(1)
+    x = system.rest_positions + 0.01 * random.normal(size=BAR.vertices.shape)
+    elasticity = elasticity_of(system)
+    viscosity = quadratic_viscosity_of(elasticity)
+    rate = StrainRate(50.0, viscosity.strains(system.rest_positions))
+    assert_derivatives(viscosity.damping(rate), system, x, 1.0)
+    turning = np.cross([0.3, -0.2, 0.9], system.rest_positions)
+    np.testing.assert_allclose(viscosity.strain_rates(system.rest_positions, turning), 0.0, atol=1e-12)
+    barrier = InversionGuard.at(system, x).quadratic_barrier(0.9)
+    assert barrier.value(x) > 0.0
+    assert barrier.value(system.rest_positions) == 0.0
+    assert barrier.value(x * [1.0, 1.0, -1.0]) == np.inf
+    assert_derivatives(barrier, system, x, 1.0)
+
+
+def test_a_linear_body_beside_a_quadratic_one_has_its_own_energy():
+    """The sum of both, and the bits of the linear one are those that it has alone."""
+    linear = sp.Body("linear", sp.shapes.box((0.2, 0.2, 0.2), (1, 1, 1)), SOFT, position=(1, 0, 0))
+    both = build_system(sp.Scene([linear, sp.Body("bar", BAR, SOFT)]))
+    alone = [build_system(sp.Scene([body])) for body in both.scene.bodies]
+    x = both.rest_positions + 0.01 * np.random.default_rng(2).normal(size=both.rest_positions.shape)
+    parts = [elasticity_of(s).energies(x[part.vertices]) for s, part in zip(alone, both.bodies, strict=True)]
+    np.testing.assert_array_equal(elasticity_of(both).energies(x), np.concatenate(parts))
+
+
+def test_masses_are_positive_and_those_of_the_volume():
+    system = build_system(bar_scene())
+    assert (system.masses > 0.0).all()
+    assert system.masses.sum() == pytest.approx(1000.0 * BAR.volume, rel=1e-12)
+    straight = sp.shapes.box((1, 1, 1), (1, 1, 1), order=2)
+    shares = build_system(sp.Scene([sp.Body("b", straight, SOFT)])).masses
+    tets = 1000.0 * straight.volumes
+    expected = np.bincount(straight.nodes.ravel(), np.outer(tets, [1 / 36] * 4 + [4 / 27] * 6).ravel())
+    np.testing.assert_allclose(shares, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("integrator", ["backward_euler", "bdf2", "newmark"])
+def test_free_bodies_fall_and_keep_their_momenta(integrator):
+    body = sp.Body("bar", BAR, SOFT, velocity=(1, 0, 0), angular_velocity=(0, 3, 1))
+    solver = sp.Implicit(integrator=integrator, contact=None)
+    first = sp.simulate(sp.Scene([body]), solver, 0.01, 6)
+    frames = list(first)
+    assert all(frame.report.status == "converged" for frame in frames)
+    m = frames[0].system.masses
+    start = m @ BAR.vertices / m.sum()
+    steps = np.arange(1, 7)
+    fall = {"backward_euler": -9.81e-4 * steps * (steps + 1) / 2, "newmark": -9.81e-4 * steps**2 / 2}
+    for k, frame in enumerate(frames):
+        center = m @ frame.positions["bar"] / m.sum() - start
+        assert center[0] == pytest.approx(0.01 * (k + 1), rel=1e-9)
+        if integrator in fall:
+            assert center[1] == pytest.approx(fall[integrator][k], rel=1e-9)
+    if integrator == "newmark":
+        spins = [frame.report.angular_momentum for frame in frames]
+        np.testing.assert_allclose(spins, np.tile(spins[0], (6, 1)), rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize(("curvature", "error"), [(0.0, 1e-8), (0.03, 1e-4)])
+def test_affine_patch(curvature, error):
+    """An affine motion of the boundary is that of the inside: exactly where sides are straight.
+
+    The rule of four points is not exact for the gradients of curved elements, of degree 3.
+    """
+    linear, random = sp.shapes.box((1, 1, 1), (2, 2, 2)), np.random.default_rng(0)
+    x = linear.vertices.copy()
+    x[np.abs(x).max(axis=1) < 0.4] += 0.05
+    mesh = sp.TetMesh(x, linear.tets).to_order(2)
+    hull = np.unique(mesh.surface.triangles)
+    inner = np.setdiff1d(np.arange(len(mesh.vertices)), hull)
+    x = mesh.vertices.copy()
+    x[inner] += curvature * random.uniform(-1, 1, (len(inner), 3))
+    mesh = sp.TetMesh(x, mesh.nodes)
+    A = np.array([[0.2, 0.1, 0.0], [-0.05, -0.1, 0.15], [0.0, 0.1, 0.05]])
+    move = x[hull] @ A.T
+    body = sp.Body("bar", mesh, sp.NeoHookean(youngs=1.0, poisson=0.45))
+    scene = sp.Scene([body], pins=[sp.Pin("bar", hull, lambda t: t * move)], gravity=(0, 0, 0))
+    frame = equilibrium(scene)
+    assert np.abs(frame.positions["bar"] - x @ (np.eye(3) + A).T).max() < error
+    if not curvature:
+        J = np.linalg.det(np.eye(3) + A)
+        stress, at_vertices = frame.stress["bar"], frame.stress.at_vertices["bar"]
+        np.testing.assert_allclose(stress, np.broadcast_to(stress[0], stress.shape), atol=1e-8)
+        np.testing.assert_allclose(at_vertices, np.broadcast_to(stress[0], at_vertices.shape), atol=1e-8)
+        np.testing.assert_allclose(frame.det_F, J, rtol=1e-8)
+        assert frame.report.min_det_F == pytest.approx(J, rel=1e-8)
+
+
+@pytest.mark.parametrize("load", ["traction", "pressure"])
+def test_uniform_loads_on_faces_make_a_uniform_stress(load):
+    mesh = sp.shapes.box((1, 1, 1), (2, 1, 1), order=2)
+    held = np.flatnonzero(np.abs(mesh.vertices).sum(axis=1) == 0.5)  # the middles of faces, where there is a vertex
+    x, triangles = mesh.vertices, mesh.surface.triangles
+    if load == "pressure":
+        loads, expected = [sp.Pressure("b", 1e-5)], -1e-5 * np.eye(3)
+    else:
+        ends = [np.flatnonzero((s * x[triangles][:, :, 0] > 0.5 - 1e-9).all(axis=1)) for s in (1, -1)]
+        loads = [sp.Traction("b", (s * 1e-5, 0, 0), rows) for s, rows in zip((1, -1), ends, strict=True)]
+        expected = np.diag([1e-5, 0.0, 0.0])
+    scene = sp.Scene(
+        [sp.Body("b", mesh, sp.StableNeoHookean(youngs=1.0, poisson=0.3))],
+        soft_targets=[sp.SoftTarget("b", held[:4], 1e-6)],
+        loads=loads,
+        gravity=(0, 0, 0),
+    )
+    stress = equilibrium(scene).stress["b"]
+    np.testing.assert_allclose(stress, np.broadcast_to(expected, stress.shape), atol=3e-9)
+
+
+def test_a_part_of_a_facet_can_be_loaded():
+    mesh = sp.shapes.box((1, 1, 1), (1, 1, 1), order=2)
+    area = 1.0 / 8.0
+    scene = sp.Scene([sp.Body("b", mesh, SOFT)], loads=[sp.Traction("b", (1.0, 0, 0), [0, 5, 6])], gravity=(0, 0, 0))
+    forces = np.zeros_like(mesh.vertices)
+    for part in build_system(scene).loads:
+        part.add_forces(mesh.vertices, 0.0, forces)
+    assert forces.sum(axis=0) == pytest.approx([3 * area, 0, 0])
+
+
+def cook(cells, poisson):
+    """Deflection of the middle of the loaded edge of Cook's membrane, 10 thick, per load; cells graded to the clamp."""
+    unit = sp.shapes.box((1, 1, 1), (cells, cells, 1))
+    X = unit.vertices + 0.5
+    s, t = X[:, 0] ** 2, 1.0 - X[:, 1]
+    t = np.where(t < 0.5, 0.5 * (2 * t) ** 1.5, 1 - 0.5 * np.maximum(2 * (1 - t), 0.0) ** 1.5)
+    places = np.column_stack([48 * s, 44 * s + t * (44 - 28 * s), 10 * X[:, 2]])
+    mesh = sp.TetMesh(places, unit.tets).to_order(2)
+    x, load = mesh.vertices, 1e-5
+    end = np.flatnonzero((x[mesh.surface.triangles][:, :, 0] > 48 - 1e-9).all(axis=1))
+    scene = sp.Scene(
+        [sp.Body("cook", mesh, sp.StableNeoHookean(youngs=1.0, poisson=poisson))],
+        pins=[sp.Pin("cook", np.flatnonzero(x[:, 0] < 1e-9))],
+        loads=[sp.Traction("cook", (0.0, load / 16, 0.0), end)],
+        gravity=(0, 0, 0),
+    )
+    middle = (x[:, 0] > 48 - 1e-9) & (np.abs(x[:, 1] - 52) < 1e-6)
+    return (equilibrium(scene).positions["cook"] - x)[middle, 1].mean() / load
+
+
+# Limits of meshes with 16 and 24 graded cells; see docs/locking.md.
+@pytest.mark.parametrize(("poisson", "converged"), [(1 / 3, 23.85), (0.499, 23.85)])
+def test_cooks_membrane_with_eight_elements_on_a_side(poisson, converged):
+    assert cook(8, poisson) == pytest.approx(converged, rel=0.01)
+
+
+def test_cantilever():
+    """Timoshenko's deflection. That of a clamped solid is 0.9935 of it, from 8,640 graded tets (docs/locking.md)."""
+    length, side, youngs, nu, load = 1.0, 0.1, 1e6, 0.3, 0.01
+    linear = sp.shapes.box((1, side, side), (20, 3, 3))
+    x = linear.vertices.copy()
+    x[:, 0] = length * (x[:, 0] + 0.5) ** 1.5
+    mesh = sp.TetMesh(x, linear.tets).to_order(2)
+    x = mesh.vertices
+    end = np.flatnonzero((x[mesh.surface.triangles][:, :, 0] > length - 1e-9).all(axis=1))
+    scene = sp.Scene(
+        [sp.Body("bar", mesh, sp.StableNeoHookean(youngs=youngs, poisson=nu))],
+        pins=[sp.Pin("bar", np.flatnonzero(x[:, 0] < 1e-9))],
+        loads=[sp.Traction("bar", (0, -load / side**2, 0), end)],
+        gravity=(0, 0, 0),
+    )
+    moved = equilibrium(scene).positions["bar"] - x
+    deflection = -moved[x[:, 0] > length - 1e-9, 1].mean()
+    kappa = 10 * (1 + nu) / (12 + 11 * nu)
+    shear = load * length / (kappa * youngs / (2 * (1 + nu)) * side**2)
+    assert len(mesh.tets) == 1080
+    share = deflection / (4 * load * length**3 / (youngs * side**4) + shear)
+    assert share == pytest.approx(0.9935, abs=0.003)
+
+
+def test_torsion_constant_at_three_elements_across():
+    """Of a unit square, 0.1406 (Saint-Venant), from bars of two lengths, so that their bonded ends do not count."""
+    nu, angle = 0.3, 1e-4
+    compliances = []
+    for cells in (6, 12):
+        mesh = sp.shapes.box((1, 1, cells / 3), (3, 3, cells), order=2)
+        x = mesh.vertices
+        ends = np.flatnonzero(np.abs(x[:, 2]) > cells / 6 - 1e-9)
+        around = np.column_stack([-x[ends, 1], x[ends, 0], 0 * x[ends, 0]])
+        turn = np.where(x[ends, 2] > 0, angle, 0.0)[:, None] * around
+        scene = sp.Scene(
+            [sp.Body("bar", mesh, sp.StableNeoHookean(youngs=2 * (1 + nu), poisson=nu))],
+            pins=[sp.Pin("bar", ends, lambda t, turn=turn: t * turn)],
+            gravity=(0, 0, 0),
+        )
+        compliances.append(0.5 * angle**2 / equilibrium(scene).report.elastic_energy)
+    assert 2.0 / (compliances[1] - compliances[0]) == pytest.approx(0.1406, rel=0.02)
+
+
+@cache
+def manufactured_errors(n):
+    """L2 and H1 errors of the displacement a sin(pi x) sin(pi y) sin(pi z) e on the unit cube."""
+    unit = sp.shapes.box((1, 1, 1), (n, n, n), order=2)
+    mesh = sp.TetMesh(unit.vertices + 0.5, unit.nodes)
+    nu, a, e = 0.3, 1e-6, np.array([1.0, 0.5, -0.7])
+    mu, lam = 1.0 / (2 * (1 + nu)), nu / ((1 + nu) * (1 - 2 * nu))
+    places, weights = conical_rule(4)
+    N, corners = shape_functions(places), mesh.vertices[mesh.nodes]
+    at = np.einsum("qa,mai->mqi", N, corners)
+    s, c = np.sin(np.pi * at), np.cos(np.pi * at)
+    phi = s.prod(axis=2)
+    u = a * phi[..., None] * e
+    slope = np.pi * np.stack([np.where(np.arange(3) == k, c, s).prod(axis=2) for k in range(3)], axis=2)
+    second = np.empty((*phi.shape, 3, 3))
+    for i in range(3):
+        for j in range(3):
+            chosen = (np.arange(3) == i) | (np.arange(3) == j)
+            second[..., i, j] = np.pi**2 * (-phi if i == j else np.where(chosen, c, s).prod(axis=2))
+    force = a * (3 * np.pi**2 * mu * phi[..., None] * e - (lam + mu) * second @ e)
+    dV = np.outer(mesh.volumes, weights)
+    loads = np.zeros_like(mesh.vertices)
+    np.add.at(loads, mesh.nodes, np.einsum("mq,mqi,qa->mai", dV, force, N))
+    hull = np.unique(mesh.surface.triangles)
+    inner = np.setdiff1d(np.arange(len(mesh.vertices)), hull)
+    scene = sp.Scene(
+        [sp.Body("cube", mesh, sp.StableNeoHookean(youngs=1.0, poisson=nu))],
+        pins=[sp.Pin("cube", hull)],
+        forces=[Force("cube", inner, loads[inner])],
+        gravity=(0, 0, 0),
+    )
+    moved = (equilibrium(scene).positions["cube"] - mesh.vertices)[mesh.nodes]
+    inverse = np.linalg.inv(np.einsum("mai,aj->mij", corners, reference_gradients(places[:1])[0]))
+    gradients = np.einsum("mai,qak,mkj->mqij", moved, reference_gradients(places), inverse)
+    wrong = np.einsum("qa,mai->mqi", N, moved) - u
+    wrong_slope = gradients - a * e[:, None] * slope[:, :, None, :]
+    return (
+        np.sqrt(np.einsum("mq,mqi,mqi->", dV, wrong, wrong)),
+        np.sqrt(np.einsum("mq,mqij,mqij->", dV, wrong_slope, wrong_slope)),
+    )
+
+
+def test_manufactured_solution_converges_with_orders_three_and_two():
+    (coarse, coarse_slope), (fine, fine_slope) = manufactured_errors(3), manufactured_errors(6)
+    assert np.log2(coarse / fine) > 2.8
+    assert np.log2(coarse_slope / fine_slope) > 1.85
+
+
+def test_tets_stay_positive_everywhere_under_a_crushing_motion():
+    """A block is pressed to a fifth of its height within one step, and sheared."""
+    mesh = sp.shapes.box((1, 1, 1), (2, 2, 2), order=2)
+    x = mesh.vertices
+    top, bottom = np.flatnonzero(x[:, 1] > 0.49), np.flatnonzero(x[:, 1] < -0.49)
+    scene = sp.Scene(
+        [sp.Body("b", mesh, sp.StableNeoHookean(youngs=1e4, poisson=0.3))],
+        pins=[sp.Pin("b", bottom), sp.Pin("b", top, lambda t: t * np.array([0.5, -0.8, 0.2]))],
+        gravity=(0, 0, 0),
+    )
+    frame = equilibrium(scene)
+    assert 0.0 < frame.report.min_det_F < 0.35
+    guard = InversionGuard.at(frame.system, frame.state.positions)
+    assert guard.complete
+    assert guard.allows(frame.state.positions)
+    far = frame.state.positions + 0.3 * np.random.default_rng(0).normal(size=x.shape)
+    assert not guard.allows(far)
+    step, tet = guard.largest_step(frame.state.positions, far - frame.state.positions)
+    assert 0.0 < step < 1.0
+    assert guard.name(tet).endswith("of body 'b'")
+    assert guard.allows(frame.state.positions + step * (far - frame.state.positions))
+
+
+def test_a_quadratic_body_rests_on_a_floor_and_on_a_linear_one():
+    soft = replace(SOFT, youngs=2e5)
+    low = sp.Body("low", sp.shapes.sphere(0.2, 0.15, order=2), soft, position=(0, 0.2005, 0), friction=0.4)
+    high = sp.Body("high", sp.shapes.box((0.2, 0.2, 0.2), (1, 1, 1)), soft, position=(0, 0.51, 0), friction=0.4)
+    scene = sp.Scene([low, high], obstacles=[sp.HalfSpace((0, 0, 0), (0, 1, 0), friction=0.4)])
+    *_, frame = sp.simulate(scene, sp.Implicit(), 0.02, 12)
+    assert frame.report.status == "converged", frame.report.message
+    assert frame.report.min_distance > 0.0
+    forces = frame.report.details.contact_forces
+    weight = 9.81 * frame.system.masses.sum()
+    assert 0.2 * weight < forces["low"][1] + forces["high"][1] < 5.0 * weight
+    assert forces["high"][1] > 0.0
+
+
+def test_what_cannot_be_simulated_is_refused_in_one_line():
+    with pytest.raises(SolverError) as error:
+        list(sp.simulate(bar_scene(), sp.XPBD(), 0.01, 1))
+    assert "has quadratic tets; simulate it with Implicit, or give linear tets: mesh.to_order(1)" in str(error.value)
+    with pytest.raises(SceneError) as error:
+        bar_scene(sp.StableNeoHookean(youngs=1.0, poisson=0.4, integration="patches"))
+    assert 'give its material integration="tets"' in str(error.value)
+    with pytest.raises(SceneError) as error:
+        sp.RigidBody("r", BAR, density=1000.0)
+    assert "quadratic tets" in str(error.value)
+
+
+def test_any_number_of_threads_gives_the_same_bits():
+    mesh = wavy(sp.shapes.box((1, 1, 1), (4, 4, 4), order=2))
+    system = build_system(sp.Scene([sp.Body("b", mesh, SOFT)]))
+    x = system.rest_positions + 0.01 * np.random.default_rng(0).normal(size=mesh.vertices.shape)
+    results = []
+    for alone in (True, False):
+        blocks, gradient = HessianBlocks.zeros(len(system.tets), len(x)), np.zeros_like(x)
+        with one_thread(alone):
+            energy = elasticity_of(system).add_model(x, gradient, blocks, True)
+            guard = InversionGuard.at(system, x)
+            step = guard.largest_step(x, 0.1 * np.sin(40.0 * x))
+        results.append((energy, gradient.tobytes(), blocks.patches[0].blocks.tobytes(), step))
+    assert results[0] == results[1]
+    assert results[0][3][0] < 1.0
