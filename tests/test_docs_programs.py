@@ -10,7 +10,15 @@ DOCS = Path(__file__).parents[1] / "docs"
 
 @pytest.mark.parametrize(
     "page",
-    ["contact.md", "forces_and_stresses.md", "implicit.md", "learning.md", "locking.md", "rigid_bodies.md"],
+    [
+        "contact.md",
+        "forces_and_stresses.md",
+        "implicit.md",
+        "joints.md",
+        "learning.md",
+        "locking.md",
+        "rigid_bodies.md",
+    ],
 )
 def test_the_programs_of_a_page_run(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -167,8 +167,14 @@ class System:
 
     @cached_property
     def joined_components(self) -> NDArray[np.int32]:
-        """(n,) the piece that a vertex belongs to; stitched pieces count as one."""
-        return self.stitching.joined_components(self.components)
+        """(n,) the piece that a vertex belongs to; stitched pieces, and those that joints join, count as one."""
+        pieces = self.stitching.joined_components(self.components)
+        begins = {part.name: part.vertices.start for part in self.bodies}
+        pairs = [(begins[one.first], begins[one.second]) for one in self.scene.joints if one.second in begins]
+        if not pairs:
+            return pieces
+        first, second = np.array(pairs).T
+        return graph_components(int(pieces.max()) + 1, pieces[first], pieces[second])[pieces]
 
     @cached_property
     def inverse_masses(self) -> NDArray[np.float64]:

@@ -20,12 +20,15 @@ from supple.implicit.energies.potential import HessianBlocks
 from supple.implicit.energies.regularization import regularization_of
 from supple.implicit.energies.stitch_damping import StitchViscosity
 from supple.implicit.energies.stitches import StitchEnergy
+from supple.implicit.joints.geometry import JointGeometry
+from supple.implicit.joints.joint_step import initial_joint_details, refuse_apart
 from supple.implicit.limits.inversion_guard import refuse_inverted
 from supple.implicit.newton.direction import Tools
 from supple.implicit.newton.free_motion import FreeMotion
 from supple.implicit.newton.linear_solver import LinearSolver
 from supple.implicit.newton.trace import NewtonRow
 from supple.implicit.stepping.integrators import Integrator, Static, integrator_of
+from supple.implicit.stepping.joint_support import refuse_joints
 from supple.implicit.stepping.reactions import reaction_forces
 from supple.implicit.stepping.rigid_bodies import orthogonality_errors
 from supple.implicit.stepping.substep import StepSettings, Substep, take_substep
@@ -130,8 +133,8 @@ class Implicit(Solver):
 
         Raises
         ------
-        SolverError : for what this solver does not support: materials of XPBD, obstacles without contact, and free
-            bodies with the static integrator.
+        SolverError : for what this solver does not support: materials of XPBD, obstacles without contact, free bodies
+            with the static integrator, and joints with integrators that do not hold them.
         """
         elasticity = elasticity_of(system)
         contact = None
@@ -153,6 +156,8 @@ class Implicit(Solver):
                 f"body {body.name!r}: nothing holds it, so that it has no static equilibrium; pin some of its "
                 "vertices, or use another integrator"
             )
+        if system.scene.joints:
+            refuse_joints(method, system.scene.joints)
         tools = Tools(
             LinearSolver.of(system, self.linear_solver),
             HessianBlocks.zeros(len(system.tets), len(system.rest_positions), len(system.stitching)),
@@ -172,6 +177,7 @@ class Implicit(Solver):
             regularization_of(elasticity),
             stitches,
             damped,
+            JointGeometry.of(system) if system.scene.joints else None,
         )
 
     def check(self, system: System, state: State, workspace: Workspace) -> None:
@@ -183,6 +189,8 @@ class Implicit(Solver):
         SolverError : where surfaces touch, or a tet is inverted whose material has no energy there.
         """
         refuse_inverted(system, workspace.elasticity.material, state.positions)
+        if workspace.joints is not None:
+            refuse_apart(workspace.joints, state)
         if workspace.contact is not None:
             workspace.contact.raise_if_intersecting(workspace.with_obstacles(state).positions, state.time)
         workspace.checked = state.positions
@@ -196,6 +204,7 @@ class Implicit(Solver):
             friction_forces=pushes,
             reaction_forces=reaction_forces(system, zero)[0],
             orthogonality_errors=dict.fromkeys((part.name for part in system.rigid_bodies), 0.0),
+            **initial_joint_details(workspace.joints),
             seconds=dict.fromkeys((*PARTS, "other"), 0.0),
         )
 
@@ -250,6 +259,8 @@ class Implicit(Solver):
             totals, by_vertex = reaction_forces(system, last.outcome.end.gradient / last.contact.weight)
             details = replace(details, reaction_forces=totals, reaction_forces_by_vertex=by_vertex)
             details, nearest, contacts = last.contact.measured(details, last.state.positions)
+            if last.joints is not None:
+                details = last.joints.measured(details, last.outcome.end.positions)
         errors = orthogonality_errors(system, now.positions)
         details = replace(details, orthogonality_errors=errors, seconds=workspace.tools.clock.shares())
         return now, StepReport(worst, details.newton_iterations, message, nearest, details, contacts)

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +16,7 @@ from supple.scene.body import PlacedBody
 from supple.scene.contact_pairs import ContactPair, pair_table
 from supple.scene.forces import Force, SoftTarget
 from supple.scene.inputs import Input, inputs_among
+from supple.scene.joints.joint import Joint
 from supple.scene.loads.load import Load
 from supple.scene.located import at
 from supple.scene.obstacles.obstacle import Obstacle
@@ -29,6 +30,8 @@ from supple.scene.stitches.stitching import Stitching, check_names, stitch_toget
 from supple.scene.suggestion import suggestion
 from supple.scene.values import finite_vector
 
+Named = TypeVar("Named", Obstacle, Joint)
+
 _PARTS = (
     ("bodies", PlacedBody),
     ("obstacles", Obstacle),
@@ -39,6 +42,7 @@ _PARTS = (
     ("contact_pairs", ContactPair),
     ("loads", Load),
     ("sensors", Sensor),
+    ("joints", Joint),
 )
 
 
@@ -57,6 +61,7 @@ class Scene:
     loads : tractions, pressures, forces per mass and springs between points.
     sensors : of contact on surfaces; no two have the same name.
     contact_pairs : friction of some pairs of bodies and obstacles, and which of them pass through each other.
+    joints : of rigid bodies with each other, with obstacles and with the world; no two have the same name.
 
     Raises
     ------
@@ -73,6 +78,7 @@ class Scene:
     contact_pairs: Sequence[ContactPair] = ()
     loads: Sequence[Load] = ()
     sensors: Sequence[Sensor] = ()
+    joints: Sequence[Joint] = ()
 
     def __post_init__(self) -> None:
         for key, kind in _PARTS:
@@ -89,6 +95,7 @@ class Scene:
         object.__setattr__(self, "gravity", finite_vector(self.gravity, "scene: gravity"))
         object.__setattr__(self, "bodies", with_stiffness(self.bodies, np.asarray(self.gravity)))
         object.__setattr__(self, "obstacles", _all_named(self.obstacles, [body.name for body in self.bodies]))
+        object.__setattr__(self, "joints", _all_named(self.joints, []))
         named: dict[str | None, str] = {}
         for key, thing, items in (("bodies", "body", self.bodies), ("obstacles", "obstacle", self.obstacles)):
             for i, item in enumerate(items):
@@ -110,10 +117,20 @@ class Scene:
                 sensor.triangles(self.bodies)
                 if any(other.name == sensor.name for other in self.sensors[:i]):
                     raise SceneError(f"{sensor.label}: another sensor has this name; give each a name of its own")
+        self._check_joints()
         if self.contact_pairs:
             pair_table(self)
         self.inputs  # noqa: B018 - raises where two have the same name
         check_names(self.stitches, list(pinned), [str(obstacle.name) for obstacle in self.obstacles])
+
+    def _check_joints(self) -> None:
+        bodies = {body.name: body for body in self.bodies}
+        obstacles = {str(obstacle.name): obstacle for obstacle in self.obstacles}
+        for i, joint in enumerate(self.joints):
+            with at("joints", i):
+                joint.check(bodies, obstacles)
+                if any(other.name == joint.name for other in self.joints[:i]):
+                    raise SceneError(f"{joint.label}: another joint has this name; give each a name of its own")
 
     def _check_selection(self, item: Pin | Force | SoftTarget, pinned: dict[str, NDArray[np.bool_]]) -> None:
         """Raise where body or vertices do not exist, or a pin selects vertices that are `pinned`, then mark these."""
@@ -187,15 +204,15 @@ def _name(kind: type) -> str:
     return "Body or RigidBody" if kind is PlacedBody else kind.__name__
 
 
-def _all_named(obstacles: Sequence[Obstacle], bodies: Sequence[str]) -> tuple[Obstacle, ...]:
-    """The obstacles; those without a name get a free one, their kind and number, such as `HalfSpace 1`."""
-    taken = {*bodies, *(obstacle.name for obstacle in obstacles)}
+def _all_named(things: Sequence[Named], bodies: Sequence[str]) -> tuple[Named, ...]:
+    """The things; those without a name get a free one, their kind and number, such as `HalfSpace 1`."""
+    taken = {*bodies, *(thing.name for thing in things)}
     numbers: Counter[str] = Counter()
     named = []
-    for obstacle in obstacles:
-        kind = type(obstacle).__name__
+    for thing in things:
+        kind = type(thing).__name__
         numbers[kind] += 1
-        while obstacle.name is None and f"{kind} {numbers[kind]}" in taken:
+        while thing.name is None and f"{kind} {numbers[kind]}" in taken:
             numbers[kind] += 1
-        named.append(obstacle if obstacle.name else replace(obstacle, name=f"{kind} {numbers[kind]}"))
+        named.append(thing if thing.name else replace(thing, name=f"{kind} {numbers[kind]}"))
     return tuple(named)

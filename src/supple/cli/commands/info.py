@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from supple.mesh.surface import SurfaceMesh
     from supple.mesh.tetmesh import TetMesh
     from supple.scene.body import PlacedBody
+    from supple.scene.joints.joint import Joint
     from supple.scene.rigid.rigid_body import RigidBody
     from supple.scene.stitches.stitching import Stitching
 
@@ -158,7 +159,21 @@ def _scene(file: Path) -> None:
         rows.append((f"body {part.name}", text))
         rows += _locking_rows(part.body)
     rows += _stitch_rows(system.stitching)
+    rows += [(joint.label, _joint_text(joint)) for joint in scene.joints]
     print_table(rows, str(file))
+
+
+def _joint_text(joint: Joint) -> str:
+    from supple.scene.joints.axis_joint import AxisJoint
+
+    text = f"{type(joint).__name__} of {joint.first} and {joint.second or 'the world'}"
+    if isinstance(joint, AxisJoint):
+        if joint.limits is not None:
+            text += f", from {joint.limits[0]:g} to {joint.limits[1]:g}"
+        if joint.motor is not None:
+            bound = "" if joint.motor.max_force is None else f" of at most {joint.motor.max_force:g}"
+            text += f", {joint.motor.label}{bound}"
+    return text
 
 
 def _rigid_text(body: RigidBody) -> str:

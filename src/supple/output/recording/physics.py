@@ -18,6 +18,7 @@ from supple.materials.per_tet import NO_REGION
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.output.recording.checked_hdf5 import CheckedFile
 from supple.scene.contact_pairs import pair_table
+from supple.scene.joints.axis_joint import AxisJoint
 from supple.system import System
 
 NOT_KNOWN = 255
@@ -34,6 +35,7 @@ class RecordedPhysics:
     kind : (m,) row of `registry.ELASTIC_MATERIALS` of each tet, or `NOT_KNOWN`; mu, lam : (m,) [Pa]
     compliances : for each body those of its edges [m/N] and volumes [m^5/N], or None for a body of another law
     forces, soft_targets, scripted_pins, stitches : numbers of them in the scene
+    held_joints, motors : numbers of the joints with the world or an obstacle, and of motors of joints
     """
 
     kind: NDArray[np.uint8]
@@ -44,6 +46,8 @@ class RecordedPhysics:
     soft_targets: int
     scripted_pins: int
     stitches: int
+    held_joints: int
+    motors: int
     region: NDArray[np.int32]
 
     def knows_law(self, body: int, tets: slice) -> bool:
@@ -77,6 +81,8 @@ def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
         "soft_targets": len(system.soft_targets),
         "scripted_pins": sum(part.pin.motion is not None for part in system.pins),
         "stitches": len(system.stitching),
+        "held_joints": sum(joint.second not in {part.name for part in system.bodies} for joint in system.scene.joints),
+        "motors": sum(isinstance(joint, AxisJoint) and joint.motor is not None for joint in system.scene.joints),
         "patches": bool((region != NO_REGION).any()),
         "untouching": _untouching(system),
     }
@@ -102,6 +108,7 @@ def read_physics(file: CheckedFile, header: dict[str, Any], m: int) -> RecordedP
         return None
     try:
         counts = [int(physics[key]) for key in ("forces", "soft_targets", "scripted_pins", "stitches")]
+        counts += [int(physics.get(key, 0)) for key in ("held_joints", "motors")]
         laws = [str(law) for law in physics["laws"]]
         compliances = tuple(
             None if pair is None else (float(pair[0]), float(pair[1])) for pair in physics["compliances"]
