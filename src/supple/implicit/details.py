@@ -40,6 +40,7 @@ class ImplicitDetails(SolverDetails):
     joint_coordinates : angles of hinges [rad] and travels of sliders [m], by name
     motor_forces : efforts of the motors [N], [N m], by name of their joint
     joint_violations : how far each joint is from holding, as a share of the diameter of gyration of its smaller body
+    weld_forces : of the rigid bodies on the soft ones that are welded to them, by name of the weld, (3,) [N]
     seconds : of wall time, by part of the step; see `supple.implicit.timings`
     reaction_forces_by_vertex : by label of the pin, (k, 3) [N]
     newton : every iteration
@@ -63,6 +64,7 @@ class ImplicitDetails(SolverDetails):
     joint_coordinates: Mapping[str, float] = field(default_factory=dict)
     motor_forces: Mapping[str, float] = field(default_factory=dict)
     joint_violations: Mapping[str, float] = field(default_factory=dict)
+    weld_forces: Forces = field(default_factory=dict)
     seconds: Mapping[str, float] = field(default_factory=dict)
     reaction_forces_by_vertex: Forces = field(default_factory=dict, compare=False)
     newton: Sequence[NewtonRow] = field(default=(), compare=False)

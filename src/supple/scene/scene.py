@@ -17,6 +17,8 @@ from supple.scene.contact_pairs import ContactPair, pair_table
 from supple.scene.forces import Force, SoftTarget
 from supple.scene.inputs import Input, inputs_among
 from supple.scene.joints.joint import Joint
+from supple.scene.joints.weld import Weld
+from supple.scene.joints.welding import Welding, weld_together
 from supple.scene.loads.load import Load
 from supple.scene.located import at
 from supple.scene.obstacles.obstacle import Obstacle
@@ -30,7 +32,7 @@ from supple.scene.stitches.stitching import Stitching, check_names, stitch_toget
 from supple.scene.suggestion import suggestion
 from supple.scene.values import finite_vector
 
-Named = TypeVar("Named", Obstacle, Joint)
+Named = TypeVar("Named", Obstacle, Joint, Weld)
 
 _PARTS = (
     ("bodies", PlacedBody),
@@ -43,6 +45,7 @@ _PARTS = (
     ("loads", Load),
     ("sensors", Sensor),
     ("joints", Joint),
+    ("welds", Weld),
 )
 
 
@@ -62,6 +65,7 @@ class Scene:
     sensors : of contact on surfaces; no two have the same name.
     contact_pairs : friction of some pairs of bodies and obstacles, and which of them pass through each other.
     joints : of rigid bodies with each other, with obstacles and with the world; no two have the same name.
+    welds : vertices of soft bodies that are points of rigid ones; no two have the same name.
 
     Raises
     ------
@@ -79,6 +83,7 @@ class Scene:
     loads: Sequence[Load] = ()
     sensors: Sequence[Sensor] = ()
     joints: Sequence[Joint] = ()
+    welds: Sequence[Weld] = ()
 
     def __post_init__(self) -> None:
         for key, kind in _PARTS:
@@ -96,6 +101,7 @@ class Scene:
         object.__setattr__(self, "bodies", with_stiffness(self.bodies, np.asarray(self.gravity)))
         object.__setattr__(self, "obstacles", _all_named(self.obstacles, [body.name for body in self.bodies]))
         object.__setattr__(self, "joints", _all_named(self.joints, []))
+        object.__setattr__(self, "welds", _all_named(self.welds, []))
         named: dict[str | None, str] = {}
         for key, thing, items in (("bodies", "body", self.bodies), ("obstacles", "obstacle", self.obstacles)):
             for i, item in enumerate(items):
@@ -118,6 +124,7 @@ class Scene:
                 if any(other.name == sensor.name for other in self.sensors[:i]):
                     raise SceneError(f"{sensor.label}: another sensor has this name; give each a name of its own")
         self._check_joints()
+        self._check_welds(pinned)
         if self.contact_pairs:
             pair_table(self)
         self.inputs  # noqa: B018 - raises where two have the same name
@@ -131,6 +138,24 @@ class Scene:
                 joint.check(bodies, obstacles)
                 if any(other.name == joint.name for other in self.joints[:i]):
                     raise SceneError(f"{joint.label}: another joint has this name; give each a name of its own")
+
+    def _check_welds(self, pinned: dict[str, NDArray[np.bool_]]) -> None:
+        for i, weld in enumerate(self.welds):
+            with at("welds", i):
+                if any(other.name == weld.name for other in self.welds[:i]):
+                    raise SceneError(f"{weld.label}: another weld has this name; give each a name of its own")
+        vertices, weld_of, begin = self.welding.vertices, self.welding.weld, 0
+        for body in self.bodies:
+            count = len(body.mesh.vertices)
+            own = (vertices >= begin) & (vertices < begin + count)
+            held = pinned[body.name][vertices[own] - begin]
+            if held.any():
+                k, vertex = int(weld_of[own][held][0]), int((vertices[own] - begin)[held][0])
+                with at("welds", k):
+                    raise SceneError(
+                        f"{self.welds[k].label}: vertex {vertex} is also held by a pin; pin the rigid body instead"
+                    )
+            begin += count
 
     def _check_selection(self, item: Pin | Force | SoftTarget, pinned: dict[str, NDArray[np.bool_]]) -> None:
         """Raise where body or vertices do not exist, or a pin selects vertices that are `pinned`, then mark these."""
@@ -158,6 +183,16 @@ class Scene:
         SceneError : where a pair does not exist, or none is within reach.
         """
         return stitch_together(self.bodies, self.obstacles, self.stitches)
+
+    @cached_property
+    def welding(self) -> Welding:
+        """All welds with their vertices, found where the scene places everything.
+
+        Raises
+        ------
+        SceneError : where a weld has no vertex, or a vertex has two welds.
+        """
+        return weld_together(self.welds, self.bodies)
 
     @cached_property
     def inputs(self) -> dict[str, Input]:

@@ -160,6 +160,9 @@ def _scene(file: Path) -> None:
         rows += _locking_rows(part.body)
     rows += _stitch_rows(system.stitching)
     rows += [(joint.label, _joint_text(joint)) for joint in scene.joints]
+    for k, weld in enumerate(scene.welds):
+        count = int((scene.welding.weld == k).sum())
+        rows.append((weld.name or weld.kind, f"{count} vertices of {weld.body} are points of {weld.rigid}"))
     print_table(rows, str(file))
 
 

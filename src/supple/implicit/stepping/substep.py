@@ -184,6 +184,7 @@ def _first_guess(
     ahead = plan.predicted + plan.scale / plan.place * forces / system.masses[:, None]
     ahead = with_rigid_bodies(system, x, ahead, plan.place)
     ahead[pinned] = x[pinned]
+    system.welding.follow(ahead)
     step = limits.largest_step(x, ahead - x).step
     if step < 1.0:
         ahead = x + step * (ahead - x)

@@ -85,6 +85,7 @@ def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
         "motors": sum(isinstance(joint, AxisJoint) and joint.motor is not None for joint in system.scene.joints),
         "patches": bool((region != NO_REGION).any()),
         "untouching": _untouching(system),
+        "welds": _welds(system),
     }
 
 
@@ -94,6 +95,14 @@ def _untouching(system: System) -> list[list[int]]:
     obstacle = np.arange(len(collide)) >= len(system.bodies)
     passing = np.argwhere(np.triu(~collide & ~(obstacle[:, None] & obstacle[None, :])))
     return passing.tolist()
+
+
+def _welds(system: System) -> list[tuple[int, int, list[int]]]:
+    """The soft and the rigid body of each weld, and its vertices."""
+    number = {part.name: k for k, part in enumerate(system.bodies)}
+    vertices, weld_of = system.welding.vertices, system.welding.weld
+    welds = enumerate(system.scene.welds)
+    return [(number[weld.body], number[weld.rigid], vertices[weld_of == k].tolist()) for k, weld in welds]
 
 
 def read_physics(file: CheckedFile, header: dict[str, Any], m: int) -> RecordedPhysics | None:
@@ -146,3 +155,33 @@ def read_untouching(file: CheckedFile, header: dict[str, Any]) -> tuple[tuple[in
     if not all(0 <= number < owners for pair in pairs for number in pair):
         raise file.broken("what may touch names a body or obstacle that does not exist")
     return pairs
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedWeld:
+    """Vertices (k,) that are points of a rigid body; soft, rigid : numbers of the bodies."""
+
+    soft: int
+    rigid: int
+    vertices: NDArray[np.int64]
+
+
+def read_welds(file: CheckedFile, header: dict[str, Any], n: int) -> tuple[RecordedWeld, ...]:
+    """The welds of a recording with n vertices; none in recordings of older versions.
+
+    Raises
+    ------
+    OutputError : where a body or a vertex does not exist.
+    """
+    described = (header.get("physics") or {}).get("welds", [])
+    bodies = len(header["bodies"])
+    try:
+        welds = tuple(RecordedWeld(int(a), int(b), np.array(rows, dtype=np.int64)) for a, b, rows in described)
+    except (TypeError, ValueError, OverflowError):
+        raise file.broken("its welds are not described as they should be") from None
+    for weld in welds:
+        numbers = weld.vertices
+        right = numbers.ndim == 1 and len(numbers) and numbers.min() >= 0 and numbers.max() < n
+        if not (0 <= weld.soft < bodies and 0 <= weld.rigid < bodies and right):
+            raise file.broken("a weld names a body or a vertex that does not exist")
+    return welds

@@ -1,19 +1,22 @@
-"""Joints and motors of a scene file, by `kind`."""
+"""Joints and motors of a scene file, by `kind`, and welds."""
 
 from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from supple.scene.joints.axis_joint import HingeJoint, SliderJoint
 from supple.scene.joints.ball_joint import BallJoint
 from supple.scene.joints.fixed_joint import FixedJoint
 from supple.scene.joints.joint import Joint
 from supple.scene.joints.motors import ForceMotor, Motor, PositionMotor, VelocityMotor
+from supple.scene.joints.weld import Weld
 from supple.scene.located import at
+from supple.scene.selection import InBox
 from supple.scene_file.entries.loads import CurveModel, over_time
-from supple.scene_file.model import Model, Name, NonNegative, Number, Positive, Vector
+from supple.scene_file.entries.selections import InBoxModel
+from supple.scene_file.model import Index, Model, Name, NonNegative, Number, Positive, Vector
 
 
 class PositionMotorModel(Model):
@@ -117,3 +120,29 @@ class SliderJointModel(_AxisJointModel):
 JointModel = Annotated[
     FixedJointModel | BallJointModel | HingeJointModel | SliderJointModel, Field(discriminator="kind")
 ]
+
+
+class WeldModel(Model):
+    """Vertices of a soft body that are points of a rigid one. Give `vertices`, `box` or `max_distance`."""
+
+    body: Name = Field(description="name of the soft body")
+    rigid: Name = Field(description="name of the rigid body")
+    vertices: list[Index] | None = Field(default=None, min_length=1, description="vertex numbers, from 0")
+    box: InBoxModel | None = Field(default=None, description="instead of `vertices`: all vertices inside")
+    max_distance: Positive | None = Field(
+        default=None, description="instead of `vertices`: all that are no farther from the rigid body's surface [m]"
+    )
+    name: Name | None = Field(default=None, description="in reports; default: kind and number")
+
+    @model_validator(mode="after")
+    def _one_selection(self) -> WeldModel:
+        if sum(value is not None for value in (self.vertices, self.box, self.max_distance)) != 1:
+            raise ValueError("give the vertices by one of `vertices`, `box` and `max_distance`")
+        return self
+
+    def build(self) -> Weld:
+        chosen: Any = self.vertices
+        if self.box is not None:
+            with at("box"):
+                chosen = InBox(self.box.low, self.box.high)
+        return Weld(self.body, self.rigid, chosen, self.max_distance, self.name)
