@@ -7,7 +7,7 @@ import pytest
 
 from supple.cli.app import main
 from supple.cli.exit_codes import ExitCode
-from supple.demos import cantilever, dzhanibekov, quilt
+from supple.demos import cantilever, dzhanibekov, gripper, quilt
 from supple.demos.demo import Claim, Demo, Measurement
 from supple.demos.motion_measures import stitch_lengths
 from supple.demos.registry import DEMOS, find_demo
@@ -31,7 +31,18 @@ def run(demo, kind, steps=None):
 
 
 def test_the_names_and_solvers_of_the_demos():
-    names = {"squash", "stretch", "compliance", "bears", "cantilever", "twist", "stitch", "quilt", "dzhanibekov"}
+    names = {
+        "squash",
+        "stretch",
+        "compliance",
+        "bears",
+        "cantilever",
+        "twist",
+        "stitch",
+        "quilt",
+        "dzhanibekov",
+        "gripper",
+    }
     assert {name for name, _ in EVERY} == names
     assert {kind for _, kind in EVERY} == set(SOLVERS)
     assert {("squash", "implicit"), ("stretch", "implicit"), ("squash", "xpbd"), ("stretch", "xpbd")} <= set(EVERY)
@@ -66,6 +77,15 @@ def test_the_box_turns_over_when_it_should_and_not_by_other_equations(monkeypatc
     true = dzhanibekov.spin_by_euler
     monkeypatch.setattr(dzhanibekov, "spin_by_euler", lambda inertia, times: true(inertia * [1.0, 1.0, 1.1], times))
     assert not run(DEMOS["dzhanibekov"], "implicit", steps=320)[1][0].holds
+
+
+@pytest.mark.slow
+def test_the_gripper_holds_its_box_and_not_a_slippery_one(monkeypatch):
+    _, claims = run(DEMOS["gripper"], "implicit")
+    assert all(claim.holds for claim in claims), claims
+    monkeypatch.setattr(gripper, "FRICTION", 0.1)
+    lifted, *_ = run(DEMOS["gripper"], "implicit", steps=100)[1]
+    assert not lifted.holds
 
 
 def test_cantilever_on_coarser_meshes_bends_less_than_theory(monkeypatch):

@@ -7,6 +7,7 @@ from supple.demos.cantilever import CANTILEVER
 from supple.demos.compliance import COMPLIANCE
 from supple.demos.demo import Demo
 from supple.demos.dzhanibekov import DZHANIBEKOV
+from supple.demos.gripper import GRIPPER
 from supple.demos.quilt import QUILT
 from supple.demos.squash import SQUASH
 from supple.demos.stitch import STITCH
@@ -16,7 +17,7 @@ from supple.demos.twist import TWIST
 from supple.errors import SceneError
 
 _TORTURE = [torture.full for torture in TORTURE.values()]
-_PLAIN = (SQUASH, STRETCH, COMPLIANCE, BEARS, CANTILEVER, TWIST, STITCH, QUILT, DZHANIBEKOV)
+_PLAIN = (SQUASH, STRETCH, COMPLIANCE, BEARS, CANTILEVER, TWIST, STITCH, QUILT, DZHANIBEKOV, GRIPPER)
 DEMOS: dict[str, Demo] = {demo.name: demo for demo in (*_PLAIN, *_TORTURE)}
 
 
