@@ -31,19 +31,9 @@ def run(demo, kind, steps=None):
 
 
 def test_the_names_and_solvers_of_the_demos():
-    names = {
-        "squash",
-        "stretch",
-        "compliance",
-        "bears",
-        "cantilever",
-        "twist",
-        "stitch",
-        "quilt",
-        "dzhanibekov",
-        "gripper",
-    }
-    assert {name for name, _ in EVERY} == names
+    soft = {"squash", "stretch", "compliance", "bears", "cantilever", "twist", "stitch", "quilt"}
+    rigid = {"dzhanibekov", "dominoes", "gripper", "ragdoll"}
+    assert {name for name, _ in EVERY} == soft | rigid
     assert {kind for _, kind in EVERY} == set(SOLVERS)
     assert {("squash", "implicit"), ("stretch", "implicit"), ("squash", "xpbd"), ("stretch", "xpbd")} <= set(EVERY)
 
@@ -77,6 +67,13 @@ def test_the_box_turns_over_when_it_should_and_not_by_other_equations(monkeypatc
     true = dzhanibekov.spin_by_euler
     monkeypatch.setattr(dzhanibekov, "spin_by_euler", lambda inertia, times: true(inertia * [1.0, 1.0, 1.1], times))
     assert not run(DEMOS["dzhanibekov"], "implicit", steps=320)[1][0].holds
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["dominoes", "ragdoll"])
+def test_scenes_of_rigid_bodies_keep_their_claims(name):
+    _, claims = run(DEMOS[name], "implicit")
+    assert all(claim.holds for claim in claims), claims
 
 
 @pytest.mark.slow

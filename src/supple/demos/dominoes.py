@@ -84,5 +84,5 @@ DOMINOES = Demo(
     solvers={"implicit": lambda: Implicit()},
     measurement=_Measurement,
     dt=1 / 480,
-    steps=480,
+    steps=600,
 )

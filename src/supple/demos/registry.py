@@ -6,9 +6,11 @@ from supple.demos.bears import BEARS
 from supple.demos.cantilever import CANTILEVER
 from supple.demos.compliance import COMPLIANCE
 from supple.demos.demo import Demo
+from supple.demos.dominoes import DOMINOES
 from supple.demos.dzhanibekov import DZHANIBEKOV
 from supple.demos.gripper import GRIPPER
 from supple.demos.quilt import QUILT
+from supple.demos.ragdoll import RAGDOLL
 from supple.demos.squash import SQUASH
 from supple.demos.stitch import STITCH
 from supple.demos.stretch import STRETCH
@@ -17,7 +19,7 @@ from supple.demos.twist import TWIST
 from supple.errors import SceneError
 
 _TORTURE = [torture.full for torture in TORTURE.values()]
-_PLAIN = (SQUASH, STRETCH, COMPLIANCE, BEARS, CANTILEVER, TWIST, STITCH, QUILT, DZHANIBEKOV, GRIPPER)
+_PLAIN = (SQUASH, STRETCH, COMPLIANCE, BEARS, CANTILEVER, TWIST, STITCH, QUILT, DZHANIBEKOV, DOMINOES, GRIPPER, RAGDOLL)
 DEMOS: dict[str, Demo] = {demo.name: demo for demo in (*_PLAIN, *_TORTURE)}
 
 
