@@ -7,10 +7,11 @@ import pytest
 
 from supple.cli.app import main
 from supple.cli.exit_codes import ExitCode
-from supple.demos import cantilever, dzhanibekov, gripper, quilt
+from supple.demos import cantilever, quilt
 from supple.demos.demo import Claim, Demo, Measurement
 from supple.demos.motion_measures import stitch_lengths
 from supple.demos.registry import DEMOS, find_demo
+from supple.demos.rigid import dzhanibekov, gripper
 from supple.errors import SceneError, SolverError
 from supple.implicit.solver import Implicit
 from supple.simulate import simulate

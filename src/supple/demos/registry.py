@@ -6,11 +6,11 @@ from supple.demos.bears import BEARS
 from supple.demos.cantilever import CANTILEVER
 from supple.demos.compliance import COMPLIANCE
 from supple.demos.demo import Demo
-from supple.demos.dominoes import DOMINOES
-from supple.demos.dzhanibekov import DZHANIBEKOV
-from supple.demos.gripper import GRIPPER
 from supple.demos.quilt import QUILT
-from supple.demos.ragdoll import RAGDOLL
+from supple.demos.rigid.dominoes import DOMINOES
+from supple.demos.rigid.dzhanibekov import DZHANIBEKOV
+from supple.demos.rigid.gripper import GRIPPER
+from supple.demos.rigid.ragdoll import RAGDOLL
 from supple.demos.squash import SQUASH
 from supple.demos.stitch import STITCH
 from supple.demos.stretch import STRETCH

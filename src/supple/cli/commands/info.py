@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from supple.scene.rigid.rigid_body import RigidBody
     from supple.scene.stitches.stitching import Stitching
 
-SCENE_FILES = (".yaml", ".yml")
+SCENE_FILES = (".yaml", ".yml", ".urdf")
 RECORDINGS = (".vtkhdf", ".hdf", ".h5")
 PACKAGES = ("numpy", "scipy", "numba", "h5py", "tetgen", "viser", "pydantic", "arro3-io")
 EXTRAS = ("pytetwild", "pymeshfix", "usd-core", "pyvista")
@@ -29,7 +29,7 @@ def info(file: Path | None = None, /) -> None:
     Parameters
     ----------
     file
-        A scene (.yaml), a surface, a tet mesh, a recording (.vtkhdf) or a run folder.
+        A scene (.yaml), a robot (.urdf), a surface, a tet mesh, a recording (.vtkhdf) or a run folder.
     """
     if file is None:
         print_table(_platform(), "Supple")

@@ -14,7 +14,7 @@ from supple.scene.joints.motors import Motor
 from supple.scene.values import finite_vector, float_array
 
 # A range of angles has to leave a gap in the full turn, in which it is clear which end is nearer.
-_LARGEST_RANGE = 2.0 * np.pi - 0.1
+LARGEST_RANGE = 2.0 * np.pi - 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,9 +72,9 @@ class HingeJoint(AxisJoint):
 
     def _checked_limits(self) -> tuple[float, float]:
         low, high = super()._checked_limits()
-        if not high - low <= _LARGEST_RANGE:
+        if not high - low <= LARGEST_RANGE:
             raise SceneError(
-                f"{self.label}: limits are ({low:g}, {high:g}); give two angles that are at most {_LARGEST_RANGE:.4g} "
+                f"{self.label}: limits are ({low:g}, {high:g}); give two angles that are at most {LARGEST_RANGE:.4g} "
                 "rad apart, or none"
             )
         return low, high
