@@ -61,6 +61,14 @@ from .scene.forces import Force as Force
 from .scene.forces import SoftTarget as SoftTarget
 from .scene.inputs import ForceInput as ForceInput
 from .scene.inputs import MotionInput as MotionInput
+from .scene.joints.axis_joint import HingeJoint as HingeJoint
+from .scene.joints.axis_joint import SliderJoint as SliderJoint
+from .scene.joints.ball_joint import BallJoint as BallJoint
+from .scene.joints.fixed_joint import FixedJoint as FixedJoint
+from .scene.joints.motors import ForceMotor as ForceMotor
+from .scene.joints.motors import PositionMotor as PositionMotor
+from .scene.joints.motors import VelocityMotor as VelocityMotor
+from .scene.joints.weld import Weld as Weld
 from .scene.loads.body_force import BodyForce as BodyForce
 from .scene.loads.over_time import Curve as Curve
 from .scene.loads.spring import Spring as Spring

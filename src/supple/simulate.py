@@ -26,6 +26,7 @@ from supple.materials.elastic_tets.stress import (
 from supple.materials.flows.internal import checked
 from supple.numerics.memory import require_memory
 from supple.readings.frame_readings import FrameReadings
+from supple.readings.joint_readings import JointReading, joint_readings
 from supple.scene.inputs import checked_values, drive_inputs, hold_inputs
 from supple.scene.rigid.pose import Pose, pose_of
 from supple.scene.scene import Scene
@@ -84,6 +85,11 @@ class Report(DisplayedReport, Diagnostics):
     def softening(self) -> Mapping[str, float]:
         """By body, the share of its stiffness that it lacks, estimated; empty where the solver does not soften."""
         return getattr(self.details, "softening", {})
+
+    @property
+    def joints(self) -> Mapping[str, JointReading]:
+        """What every joint does, by name."""
+        return joint_readings(self.details)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -28,6 +28,7 @@ from supple.mesh.topology import graph_components
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.scene.body import PlacedBody
 from supple.scene.forces import Force, SoftTarget
+from supple.scene.joints.welding import Welding
 from supple.scene.motion import Motion, moved_points, points_at_origin, rigid_pose
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.pins import Pin
@@ -136,6 +137,11 @@ class System:
     quadratic: QuadraticTets | None = None
 
     @property
+    def welding(self) -> Welding:
+        """Vertices of soft bodies that are points of rigid ones."""
+        return self.scene.welding
+
+    @property
     def obstacles(self) -> tuple[Obstacle, ...]:
         return tuple(self.scene.obstacles)
 
@@ -172,8 +178,15 @@ class System:
 
     @cached_property
     def joined_components(self) -> NDArray[np.int32]:
-        """(n,) the piece that a vertex belongs to; stitched pieces count as one."""
-        return self.stitching.joined_components(self.components)
+        """(n,) the piece that a vertex belongs to; those that stitches, joints or welds join count as one."""
+        pieces = self.stitching.joined_components(self.components)
+        begins = {part.name: part.vertices.start for part in self.bodies}
+        pairs = [(begins[one.first], begins[one.second]) for one in self.scene.joints if one.second in begins]
+        pairs += zip(self.welding.vertices.tolist(), self.welding.control[:, 0].tolist(), strict=True)
+        if not pairs:
+            return pieces
+        first, second = np.array(pairs).T
+        return graph_components(int(pieces.max()) + 1, pieces[first], pieces[second])[pieces]
 
     @cached_property
     def inverse_masses(self) -> NDArray[np.float64]:

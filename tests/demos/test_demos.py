@@ -7,10 +7,11 @@ import pytest
 
 from supple.cli.app import main
 from supple.cli.exit_codes import ExitCode
-from supple.demos import cantilever, dzhanibekov, quilt
+from supple.demos import cantilever, quilt
 from supple.demos.demo import Claim, Demo, Measurement
 from supple.demos.motion_measures import stitch_lengths
 from supple.demos.registry import DEMOS, find_demo
+from supple.demos.rigid import dzhanibekov, gripper
 from supple.errors import SceneError, SolverError
 from supple.implicit.solver import Implicit
 from supple.simulate import simulate
@@ -31,8 +32,9 @@ def run(demo, kind, steps=None):
 
 
 def test_the_names_and_solvers_of_the_demos():
-    names = {"squash", "stretch", "compliance", "bears", "cantilever", "twist", "stitch", "quilt", "dzhanibekov"}
-    assert {name for name, _ in EVERY} == names
+    soft = {"squash", "stretch", "compliance", "bears", "cantilever", "twist", "stitch", "quilt"}
+    rigid = {"dzhanibekov", "dominoes", "gripper", "ragdoll"}
+    assert {name for name, _ in EVERY} == soft | rigid
     assert {kind for _, kind in EVERY} == set(SOLVERS)
     assert {("squash", "implicit"), ("stretch", "implicit"), ("squash", "xpbd"), ("stretch", "xpbd")} <= set(EVERY)
 
@@ -66,6 +68,22 @@ def test_the_box_turns_over_when_it_should_and_not_by_other_equations(monkeypatc
     true = dzhanibekov.spin_by_euler
     monkeypatch.setattr(dzhanibekov, "spin_by_euler", lambda inertia, times: true(inertia * [1.0, 1.0, 1.1], times))
     assert not run(DEMOS["dzhanibekov"], "implicit", steps=320)[1][0].holds
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["dominoes", "ragdoll"])
+def test_scenes_of_rigid_bodies_keep_their_claims(name):
+    _, claims = run(DEMOS[name], "implicit")
+    assert all(claim.holds for claim in claims), claims
+
+
+@pytest.mark.slow
+def test_the_gripper_holds_its_box_and_not_a_slippery_one(monkeypatch):
+    _, claims = run(DEMOS["gripper"], "implicit")
+    assert all(claim.holds for claim in claims), claims
+    monkeypatch.setattr(gripper, "FRICTION", 0.1)
+    lifted, *_ = run(DEMOS["gripper"], "implicit", steps=100)[1]
+    assert not lifted.holds
 
 
 def test_cantilever_on_coarser_meshes_bends_less_than_theory(monkeypatch):

@@ -273,7 +273,9 @@ def test_the_rigid_bodies_of_the_manual_are_valid(load, tmp_path):
     assert next(sp.simulate(run.scene, run.solver, run.dt, 1)).report.status == "converged"
 
 
-@pytest.mark.parametrize("kinds", ["material", "shape", "obstacle", "solver", "stitch", "load", "sensor"])
+@pytest.mark.parametrize(
+    "kinds", ["material", "shape", "obstacle", "solver", "stitch", "load", "sensor", "joint", "motor"]
+)
 def test_the_manual_lists_every_kind(kinds):
     manual = (Path(__file__).parents[2] / "docs" / "scene_files.md").read_text(encoding="utf-8")
     row = next(line for line in manual.splitlines() if line.startswith(f"| {kinds} |"))
@@ -298,6 +300,9 @@ def _family(name):
         return "obstacle"
     if name in ("SoftVertexTriangleModel", "VertexVertexModel", "VertexEdgeModel"):
         return "stitch"
+    for family in ("joint", "motor"):
+        if name.endswith(f"{family.capitalize()}Model"):
+            return family
     return "material"
 
 

@@ -20,13 +20,16 @@ from supple.implicit.energies.potential import HessianBlocks
 from supple.implicit.energies.regularization import regularization_of
 from supple.implicit.energies.stitch_damping import StitchViscosity
 from supple.implicit.energies.stitches import StitchEnergy
+from supple.implicit.joints.geometry import JointGeometry
+from supple.implicit.joints.joint_step import initial_joint_details, refuse_apart
 from supple.implicit.limits.inversion_guard import refuse_inverted
 from supple.implicit.newton.direction import Tools
 from supple.implicit.newton.free_motion import FreeMotion
 from supple.implicit.newton.linear_solver import LinearSolver
 from supple.implicit.newton.trace import NewtonRow
 from supple.implicit.stepping.integrators import Integrator, Static, integrator_of
-from supple.implicit.stepping.reactions import reaction_forces
+from supple.implicit.stepping.joint_support import refuse_joints, refuse_moved_welds
+from supple.implicit.stepping.reactions import reaction_forces, weld_forces
 from supple.implicit.stepping.rigid_bodies import orthogonality_errors
 from supple.implicit.stepping.substep import StepSettings, Substep, take_substep
 from supple.implicit.stepping.substepping import Substepping
@@ -135,8 +138,8 @@ class Implicit(Solver):
 
         Raises
         ------
-        SolverError : for what this solver does not support: materials of XPBD, obstacles without contact, and free
-            bodies with the static integrator.
+        SolverError : for what this solver does not support: materials of XPBD, obstacles without contact, free bodies
+            with the static integrator, and joints with integrators that do not hold them.
         """
         elasticity = elasticity_of(system)
         contact = None
@@ -163,6 +166,7 @@ class Implicit(Solver):
                 f"body {body.name!r}: nothing holds it, so that it has no static equilibrium; pin some of its "
                 "vertices, or use another integrator"
             )
+        refuse_joints(method, system.scene)
         tools = Tools(
             LinearSolver.of(system, self.linear_solver),
             HessianBlocks.zeros(len(system.tets), len(system.rest_positions), len(system.stitching)),
@@ -183,6 +187,7 @@ class Implicit(Solver):
             stitches,
             damped,
             quadratic_viscosity_of(elasticity),
+            JointGeometry.of(system) if system.scene.joints else None,
         )
 
     def check(self, system: System, state: State, workspace: Workspace) -> None:
@@ -194,6 +199,9 @@ class Implicit(Solver):
         SolverError : where surfaces touch, or a tet is inverted whose material has no energy there.
         """
         refuse_inverted(system, workspace.elasticity.material, state.positions)
+        refuse_moved_welds(system, state)
+        if workspace.joints is not None:
+            refuse_apart(workspace.joints, state)
         if workspace.contact is not None:
             workspace.contact.raise_if_intersecting(workspace.with_obstacles(state).positions, state.time)
         workspace.checked = state.positions
@@ -206,7 +214,9 @@ class Implicit(Solver):
             contact_forces=pushes,
             friction_forces=pushes,
             reaction_forces=reaction_forces(system, zero)[0],
+            weld_forces=weld_forces(system, zero),
             orthogonality_errors=dict.fromkeys((part.name for part in system.rigid_bodies), 0.0),
+            **initial_joint_details(workspace.joints),
             seconds=dict.fromkeys((*PARTS, "other"), 0.0),
         )
 
@@ -259,9 +269,15 @@ class Implicit(Solver):
         details = ImplicitDetails.of_rows(rows, substeps)
         nearest, contacts = None, None
         if last is not None:
-            totals, by_vertex = reaction_forces(system, last.outcome.end.gradient / last.contact.weight)
+            gradient = last.outcome.end.gradient / last.contact.weight
+            details = replace(details, weld_forces=weld_forces(system, gradient))
+            if workspace.tools.linear_solver.reduction is not None:
+                workspace.tools.linear_solver.reduction.reduce(gradient)
+            totals, by_vertex = reaction_forces(system, gradient)
             details = replace(details, reaction_forces=totals, reaction_forces_by_vertex=by_vertex)
             details, nearest, contacts = last.contact.measured(details, last.state.positions)
+            if last.joints is not None:
+                details = last.joints.measured(details, last.outcome.end.positions)
         errors = orthogonality_errors(system, now.positions)
         details = replace(details, orthogonality_errors=errors, seconds=workspace.tools.clock.shares())
         return now, StepReport(worst, details.newton_iterations, message, nearest, details, contacts)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from time import perf_counter
 
 # What is reported; the rest of a step is "other".
-PARTS = ("elasticity", "contact", "linear_solve")
+PARTS = ("elasticity", "contact", "joints", "linear_solve")
 
 
 @dataclass(eq=False)

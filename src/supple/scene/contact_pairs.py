@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from supple.errors import SceneError
 from supple.scene.body import PlacedBody
+from supple.scene.joints.joint import Joint
 from supple.scene.located import at
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.rigid.rigid_body import RigidBody
@@ -87,13 +88,15 @@ class HasContactPairs(Protocol):
     def obstacles(self) -> Sequence[Obstacle]: ...
     @property
     def contact_pairs(self) -> Sequence[ContactPair]: ...
+    @property
+    def joints(self) -> Sequence[Joint]: ...
 
 
 def pair_table(scene: HasContactPairs) -> PairTable:
     """Which bodies and obstacles of a scene touch, and with which friction coefficient.
 
-    Without a rule everything touches. An obstacle's coefficient holds for all bodies. Two bodies, or a body and itself,
-    use the geometric mean of their coefficients.
+    Without a rule everything touches, except what joints join with `collide=False`. An obstacle's coefficient holds for
+    all bodies. Two bodies, or a body and itself, use the geometric mean of their coefficients.
 
     Raises
     ------
@@ -135,6 +138,10 @@ def pair_table(scene: HasContactPairs) -> PairTable:
                 collide[block] = False
             else:
                 friction[block] = pair.friction
+    for joint in scene.joints:
+        if joint.second is not None and not joint.collide:
+            i, j = names.index(joint.first), names.index(joint.second)
+            collide[i, j] = collide[j, i] = False
     return PairTable(collide, friction, bodies)
 
 

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,9 @@ from supple.scene.body import PlacedBody
 from supple.scene.contact_pairs import ContactPair, pair_table
 from supple.scene.forces import Force, SoftTarget
 from supple.scene.inputs import Input, inputs_among
+from supple.scene.joints.joint import Joint
+from supple.scene.joints.weld import Weld
+from supple.scene.joints.welding import Welding, weld_together
 from supple.scene.loads.load import Load
 from supple.scene.located import at
 from supple.scene.obstacles.obstacle import Obstacle
@@ -30,6 +33,8 @@ from supple.scene.stitches.stitching import Stitching, check_names, stitch_toget
 from supple.scene.suggestion import suggestion
 from supple.scene.values import finite_vector
 
+Named = TypeVar("Named", Obstacle, Joint, Weld)
+
 _PARTS = (
     ("bodies", PlacedBody),
     ("obstacles", Obstacle),
@@ -40,6 +45,8 @@ _PARTS = (
     ("contact_pairs", ContactPair),
     ("loads", Load),
     ("sensors", Sensor),
+    ("joints", Joint),
+    ("welds", Weld),
 )
 
 
@@ -58,6 +65,8 @@ class Scene(Showable):
     loads : tractions, pressures, forces per mass and springs between points.
     sensors : of contact on surfaces; no two have the same name.
     contact_pairs : friction of some pairs of bodies and obstacles, and which of them pass through each other.
+    joints : of rigid bodies with each other, with obstacles and with the world; no two have the same name.
+    welds : vertices of soft bodies that are points of rigid ones; no two have the same name.
 
     Raises
     ------
@@ -74,6 +83,8 @@ class Scene(Showable):
     contact_pairs: Sequence[ContactPair] = ()
     loads: Sequence[Load] = ()
     sensors: Sequence[Sensor] = ()
+    joints: Sequence[Joint] = ()
+    welds: Sequence[Weld] = ()
 
     def __post_init__(self) -> None:
         for key, kind in _PARTS:
@@ -90,6 +101,8 @@ class Scene(Showable):
         object.__setattr__(self, "gravity", finite_vector(self.gravity, "scene: gravity"))
         object.__setattr__(self, "bodies", with_stiffness(self.bodies, np.asarray(self.gravity)))
         object.__setattr__(self, "obstacles", _all_named(self.obstacles, [body.name for body in self.bodies]))
+        object.__setattr__(self, "joints", _all_named(self.joints, []))
+        object.__setattr__(self, "welds", _all_named(self.welds, []))
         named: dict[str | None, str] = {}
         for key, thing, items in (("bodies", "body", self.bodies), ("obstacles", "obstacle", self.obstacles)):
             for i, item in enumerate(items):
@@ -111,6 +124,8 @@ class Scene(Showable):
                 sensor.triangles(self.bodies)
                 if any(other.name == sensor.name for other in self.sensors[:i]):
                     raise SceneError(f"{sensor.label}: another sensor has this name; give each a name of its own")
+        self._check_joints()
+        self._check_welds(pinned)
         if self.contact_pairs:
             pair_table(self)
         self.inputs  # noqa: B018 - raises where two have the same name
@@ -122,6 +137,33 @@ class Scene(Showable):
         facts["obstacles"] = short_list(obstacle.name for obstacle in self.obstacles)
         facts |= {key: str(len(getattr(self, key))) for key, _ in _PARTS[2:]}
         return {name: value for name, value in facts.items() if value not in ("", "0")}
+
+    def _check_joints(self) -> None:
+        bodies = {body.name: body for body in self.bodies}
+        obstacles = {str(obstacle.name): obstacle for obstacle in self.obstacles}
+        for i, joint in enumerate(self.joints):
+            with at("joints", i):
+                joint.check(bodies, obstacles)
+                if any(other.name == joint.name for other in self.joints[:i]):
+                    raise SceneError(f"{joint.label}: another joint has this name; give each a name of its own")
+
+    def _check_welds(self, pinned: dict[str, NDArray[np.bool_]]) -> None:
+        for i, weld in enumerate(self.welds):
+            with at("welds", i):
+                if any(other.name == weld.name for other in self.welds[:i]):
+                    raise SceneError(f"{weld.label}: another weld has this name; give each a name of its own")
+        vertices, weld_of, begin = self.welding.vertices, self.welding.weld, 0
+        for body in self.bodies:
+            count = len(body.mesh.vertices)
+            own = (vertices >= begin) & (vertices < begin + count)
+            held = pinned[body.name][vertices[own] - begin]
+            if held.any():
+                k, vertex = int(weld_of[own][held][0]), int((vertices[own] - begin)[held][0])
+                with at("welds", k):
+                    raise SceneError(
+                        f"{self.welds[k].label}: vertex {vertex} is also held by a pin; pin the rigid body instead"
+                    )
+            begin += count
 
     def _check_selection(self, item: Pin | Force | SoftTarget, pinned: dict[str, NDArray[np.bool_]]) -> None:
         """Raise where body or vertices do not exist, or a pin selects vertices that are `pinned`, then mark these."""
@@ -149,6 +191,16 @@ class Scene(Showable):
         SceneError : where a pair does not exist, or none is within reach.
         """
         return stitch_together(self.bodies, self.obstacles, self.stitches)
+
+    @cached_property
+    def welding(self) -> Welding:
+        """All welds with their vertices, found where the scene places everything.
+
+        Raises
+        ------
+        SceneError : where a weld has no vertex, or a vertex has two welds.
+        """
+        return weld_together(self.welds, self.bodies)
 
     @cached_property
     def inputs(self) -> dict[str, Input]:
@@ -195,15 +247,15 @@ def _name(kind: type) -> str:
     return "Body or RigidBody" if kind is PlacedBody else kind.__name__
 
 
-def _all_named(obstacles: Sequence[Obstacle], bodies: Sequence[str]) -> tuple[Obstacle, ...]:
-    """The obstacles; those without a name get a free one, their kind and number, such as `HalfSpace 1`."""
-    taken = {*bodies, *(obstacle.name for obstacle in obstacles)}
+def _all_named(things: Sequence[Named], bodies: Sequence[str]) -> tuple[Named, ...]:
+    """The things; those without a name get a free one, their kind and number, such as `HalfSpace 1`."""
+    taken = {*bodies, *(thing.name for thing in things)}
     numbers: Counter[str] = Counter()
     named = []
-    for obstacle in obstacles:
-        kind = type(obstacle).__name__
+    for thing in things:
+        kind = type(thing).__name__
         numbers[kind] += 1
-        while obstacle.name is None and f"{kind} {numbers[kind]}" in taken:
+        while thing.name is None and f"{kind} {numbers[kind]}" in taken:
             numbers[kind] += 1
-        named.append(obstacle if obstacle.name else replace(obstacle, name=f"{kind} {numbers[kind]}"))
+        named.append(thing if thing.name else replace(thing, name=f"{kind} {numbers[kind]}"))
     return tuple(named)

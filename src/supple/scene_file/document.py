@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema
 from supple.readings.fields import FIELDS
 from supple.scene_file.entries.bodies import BodyModel
 from supple.scene_file.entries.contact_pairs import ContactPairModel
+from supple.scene_file.entries.joints import JointModel, WeldModel
 from supple.scene_file.entries.loads import LoadModel
 from supple.scene_file.entries.obstacles import ObstacleModel
 from supple.scene_file.entries.selections import ForceModel, PinModel, SoftTargetModel
@@ -73,6 +74,8 @@ class SceneFileModel(Model):
     soft_targets: list[SoftTargetModel] = Field(default=[], max_length=10_000)
     contact_pairs: list[ContactPairModel] = Field(default=[], max_length=10_000)
     stitches: list[StitchModel] = Field(default=[], max_length=10_000)
+    joints: list[JointModel] = Field(default=[], max_length=10_000)
+    welds: list[WeldModel] = Field(default=[], max_length=10_000)
     gravity: Vector = Field(default=[0.0, -9.81, 0.0], description="[m/s^2]")
     solver: SolverModel = Field(default_factory=lambda: XPBDModel(kind="xpbd"))
     dt: Seconds = Field(default=1.0 / 60.0, description="time from frame to frame [s], or a fraction such as 1/60")

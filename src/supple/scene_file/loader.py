@@ -20,6 +20,7 @@ from supple.scene.scene import Scene
 from supple.scene_file.document import OutputModel, SceneFileModel
 from supple.scene_file.entries.mesh_sources import MeshStore
 from supple.scene_file.mesh_sets import with_numbers
+from supple.scene_file.urdf.document import read_urdf
 from supple.scene_file.validation_errors import scene_error
 from supple.scene_file.yaml_reader import Key, YamlDocument, read_yaml
 from supple.system import Solver
@@ -58,7 +59,9 @@ class Run:
 
 
 def load_scene(path: str | Path) -> Scene:
-    """The scene of a scene file (YAML). Paths in it are relative to the file. The format: `supple schema`.
+    """The scene of a scene file (YAML), or of a robot (URDF). Paths in it are relative to the file.
+
+    The format of scene files: `supple schema`; what is read of a URDF: docs/robots.md.
 
     Solver, timing and deformed starts in the file are checked too, but only `load_run` returns them.
 
@@ -88,7 +91,7 @@ def load_run(path: str | Path, meshes: Callable[[Path], MeshStore] = MeshStore) 
     ------
     SceneError : where the file cannot be read or is not a valid scene; one line that begins with `file:line:`.
     """
-    document = read_yaml(path)
+    document = read_urdf(path) if Path(path).suffix.lower() == ".urdf" else read_yaml(path)
     model = validated(document)
     try:
         built = _built(model, meshes(Path(path).parent))
@@ -123,7 +126,7 @@ def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
                 if built.initial_positions is not None:
                     starts[built.body.name] = built.initial_positions
     obstacles = _each("obstacles", model.obstacles, meshes)
-    lists = ("pins", "forces", "soft_targets", "stitches", "contact_pairs", "loads", "sensors")
+    lists = ("pins", "forces", "soft_targets", "stitches", "contact_pairs", "loads", "sensors", "joints", "welds")
     parts = {key: _each(key, getattr(model, key)) for key in lists}
     with at("solver"):
         solver = model.solver.build()

@@ -93,7 +93,16 @@ def read_yaml(path: str | Path) -> YamlDocument:
     SceneError : where the file cannot be read or is not valid YAML; one line that begins with `file:line:`.
     """
     path = Path(path)
-    text = _read_text(path)
+    return parse_yaml(_read_text(path), path)
+
+
+def parse_yaml(text: str, path: Path) -> YamlDocument:
+    """The data of a text; `path` is named in errors.
+
+    Raises
+    ------
+    SceneError : where the text is not valid YAML; one line that begins with `file:line:`.
+    """
     loader = None
     try:
         loader = SceneLoader(text)

@@ -81,6 +81,13 @@ def energy_and_derivatives(system, x, project=False):
     return energy.value(x), gradient, blocks.tets[0].copy()
 
 
+def test_a_center_of_mass_that_is_not_that_of_the_solid():
+    own = body(BOX, density=None, mass=3.0, inertia=[3.0, 4.0, 5.0], center=(0.1, 0.2, -0.3))
+    np.testing.assert_allclose(own.mesh.vertices.mean(axis=0), [0.1, 0.2, -0.3], atol=1e-14)
+    np.testing.assert_allclose(own.properties.inertia, np.diag([3.0, 4.0, 5.0]), atol=1e-14)
+    np.testing.assert_allclose(own.weights @ own.mesh.vertices, own.points, atol=1e-14)
+
+
 def test_the_energy_is_that_of_an_affine_body_and_its_derivatives_are_limits_of_differences():
     rigid, rng = body(stiffness=2e3), np.random.default_rng(2)
     system = system_of(rigid)
@@ -187,6 +194,8 @@ PIN = sp.Pin("palm")
         (lambda: body(density=0.0), "rigid body 'palm': density is 0; it must be above zero"),
         (lambda: body(density=None, mass=0.0), "rigid body 'palm': mass is 0; it must be above zero"),
         (lambda: body(inertia=[1, 1, 1]), "rigid body 'palm': inertia needs a mass"),
+        (lambda: body(density=None, mass=1.0, center=(0, 0, 0)), "rigid body 'palm': center needs an inertia"),
+        (lambda: body(center=(0, 0, 0)), "rigid body 'palm': center needs a mass and an inertia"),
         (lambda: body(density=None, mass=1.0, inertia=[1, 1, 3]), "rigid body 'palm': .*triangle inequality"),
         (lambda: body(BOX.flipped()), "rigid body 'palm': its surface is inside out"),
         (lambda: body("box"), "rigid body 'palm': shape is a str; give a SurfaceMesh or a TetMesh"),

@@ -15,13 +15,14 @@ if TYPE_CHECKING:
     from supple.mesh.surface import SurfaceMesh
     from supple.mesh.tetmesh import TetMesh
     from supple.scene.body import PlacedBody
+    from supple.scene.joints.joint import Joint
     from supple.scene.rigid.rigid_body import RigidBody
     from supple.scene.stitches.stitching import Stitching
     from supple.scene_file.loader import Run
     from supple.state import State
     from supple.system import System
 
-SCENE_FILES = (".yaml", ".yml")
+SCENE_FILES = (".yaml", ".yml", ".urdf")
 RECORDINGS = (".vtkhdf", ".hdf", ".h5")
 PACKAGES = ("numpy", "scipy", "numba", "h5py", "tetgen", "viser", "pydantic", "arro3-io")
 EXTRAS = ("pytetwild", "pymeshfix", "usd-core", "pyvista")
@@ -33,7 +34,7 @@ def info(file: Path | None = None, /, *, time: Annotated[bool, Parameter(negativ
     Parameters
     ----------
     file
-        A scene (.yaml), a surface, a tet mesh, a recording (.vtkhdf) or a run folder.
+        A scene (.yaml), a robot (.urdf), a surface, a tet mesh, a recording (.vtkhdf) or a run folder.
     time
         Of a scene: simulate its first frames, and print how long one takes. The first run of a solver compiles it.
     """
@@ -177,6 +178,10 @@ def _scene(file: Path, timed: bool) -> None:
         rows.append((f"body {part.name}", text))
         rows += _locking_rows(part.body)
     rows += _stitch_rows(system.stitching)
+    rows += [(joint.label, _joint_text(joint)) for joint in scene.joints]
+    for k, weld in enumerate(scene.welds):
+        count = int((scene.welding.weld == k).sum())
+        rows.append((weld.name or weld.kind, f"{count} vertices of {weld.body} are points of {weld.rigid}"))
     print_table(rows, str(file))
 
 
@@ -208,6 +213,19 @@ def _frame_time(run: Run) -> str:
     seconds = min(report.wall_seconds for report in reports[1:] or reports)
     whole = seconds * run.steps
     return f"{1e3 * seconds:.3g} ms at the start; {run.steps} steps take about {whole:.3g} s if all are like these"
+
+
+def _joint_text(joint: Joint) -> str:
+    from supple.scene.joints.axis_joint import AxisJoint
+
+    text = f"{type(joint).__name__} of {joint.first} and {joint.second or 'the world'}"
+    if isinstance(joint, AxisJoint):
+        if joint.limits is not None:
+            text += f", from {joint.limits[0]:g} to {joint.limits[1]:g}"
+        if joint.motor is not None:
+            bound = "" if joint.motor.max_force is None else f" of at most {joint.motor.max_force:g}"
+            text += f", {joint.motor.label}{bound}"
+    return text
 
 
 def _rigid_text(body: RigidBody) -> str:

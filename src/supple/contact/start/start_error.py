@@ -14,7 +14,7 @@ from supple.system import System
 
 
 def raise_if_intersecting(system: System, positions: NDArray[np.float64], time: float, table: PairTable) -> None:
-    """Raise where surfaces are not apart at the start. Things that are stitched to each other are named last.
+    """Raise where surfaces are not apart at the start. Things that are stitched or welded are named last.
 
     Parameters
     ----------
@@ -31,6 +31,7 @@ def raise_if_intersecting(system: System, positions: NDArray[np.float64], time: 
         return
     names = [str(thing.name) for thing in (*system.bodies, *system.obstacles)]
     stitched = [{names.index(stitch.first), names.index(stitch.second)} for stitch in system.scene.stitches]
+    stitched += [{names.index(weld.body), names.index(weld.rigid)} for weld in system.scene.welds]
     found = [item for item in found if {item.first, item.second} not in stitched] or found
     mover = Mover(system, table, default_gap(system))
     worst = next((item for item in found if item.kind != "touches"), found[0])

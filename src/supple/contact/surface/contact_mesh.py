@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.obstacle_vertices import ObstacleRange
-from supple.contact.surface.stitch_filter import StitchFilter, stitch_filter
+from supple.contact.surface.stitch_filter import StitchFilter, WeldedPoints, stitch_filter
 from supple.mesh.topology import edge_keys
 from supple.numerics.adjacency import Adjacency, adjacency
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
@@ -33,7 +33,7 @@ class ContactMesh:
     edge_lengths : (e,) at rest [m]
     body_count : how many of the owners are bodies; names : of all owners
     collide : (p, p) which owners may touch
-    stitched : pairs that do not collide because they are stitched to each other; None where there are no stitches
+    stitched : pairs that do not collide because they are stitched or welded; None where there are none
     """
 
     points: EmbeddedPoints
@@ -92,8 +92,18 @@ def contact_mesh(
         names=tuple(part.name for part in system.bodies) + tuple(str(o.name) for o in system.obstacles),
         collide=collide,
         stitches=(of_vertex[system.stitching.nodes()], surface.positions(start)),
+        welded=_welded_points(system, of_vertex),
         rows=np.where(used < len(system.points), used, -1).astype(np.int32),
     )
+
+
+def _welded_points(system: System, of_vertex: NDArray[np.int32]) -> WeldedPoints | None:
+    if not len(system.welding):
+        return None
+    number = {part.name: k for k, part in enumerate(system.bodies)}
+    joined = np.array([(number[weld.body], number[weld.rigid]) for weld in system.scene.welds], dtype=np.int64)
+    points = of_vertex[system.welding.vertices]
+    return WeldedPoints(points[points >= 0], joined)
 
 
 def mesh_of_triangles(
@@ -106,13 +116,14 @@ def mesh_of_triangles(
     names: tuple[str, ...],
     collide: NDArray[np.bool_],
     stitches: tuple[NDArray[np.int32], NDArray[np.float64]] | None = None,
+    welded: WeldedPoints | None = None,
     rows: NDArray[np.int32] | None = None,
 ) -> ContactMesh:
     """The mesh of triangles (f, 3) of points with rest positions (s, 3); for the other arguments see `ContactMesh`.
 
     Parameters
     ----------
-    stitches : nodes (k, 4) of stitches, -1 for none, and (s, 3) where the points are at the start
+    stitches : nodes (k, 4) of stitches, -1 for none, and (s, 3) where the points are at the start; welded : of welds
     rows : see `ContactMesh`; None where the points belong to no system
     """
     s = len(points)
@@ -126,8 +137,8 @@ def mesh_of_triangles(
     doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     thirds = np.repeat(doubled / 6.0, 3)
     stitched = None
-    if stitches is not None and len(stitches[0]):
-        stitched = stitch_filter((triangles, edges, triangle_edges), *stitches, owner, collide)
+    if stitches is not None and (len(stitches[0]) or welded is not None):
+        stitched = stitch_filter((triangles, edges, triangle_edges), *stitches, owner, collide, welded)
     return ContactMesh(
         points=points,
         triangles=triangles,

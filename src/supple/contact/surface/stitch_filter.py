@@ -2,11 +2,15 @@
 
 Excluded are the pairs of `supple.scene.stitches.masks`. Excluded are also pairs with a stitched point that touch at the
 start, between things that are stitched to each other: halves stitched face to face touch everywhere.
+
+Of welds, excluded are the pairs of the rigid body with the welded points and their neighbours that are nearer at the
+start than the longest edge there: welded points stay where they are on the rigid body, and their neighbours near it.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,14 +41,22 @@ class StitchFilter:
     crossing: Adjacency
 
 
+class WeldedPoints(NamedTuple):
+    """Points (w,) of the mesh that are welded, and the pairs (k, 2) of things that welds join."""
+
+    points: NDArray[np.int32]
+    joined: NDArray[np.int64]
+
+
 def stitch_filter(
     mesh: tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]],
     nodes: NDArray[np.int32],
     start: NDArray[np.float64],
     owner: NDArray[np.int32],
     collide: NDArray[np.bool_],
+    welded: WeldedPoints | None = None,
 ) -> StitchFilter:
-    """Of stitches with nodes (k, 4) in the mesh's numbers, -1 for none.
+    """Of stitches with nodes (k, 4) in the mesh's numbers, -1 for none, and of welds.
 
     Parameters
     ----------
@@ -57,6 +69,10 @@ def stitch_filter(
     points, faces = stitched_triangles(nodes, triangles, s)
     one, other = stitched_edges(nodes, edges, s)
     near_triangles, near_edges = _touching(mesh, nodes, start, owner, collide)
+    if welded is not None:
+        more_triangles, more_edges = _welded(mesh, welded, start, owner)
+        near_triangles = np.concatenate([near_triangles, more_triangles])
+        near_edges = np.concatenate([near_edges, more_edges])
     crossing = stitched_crossings(nodes, triangles, s)
     crossing = crossing + _crossings((triangles, triangle_edges), near_triangles, near_edges, (s, e))
     t, u = crossing.nonzero()
@@ -110,4 +126,27 @@ def _touching(
     near_triangles, near_edges = touching_pairs(start, triangles, edges, owner, joined & collide, reach)
     of_triangles = stitched[near_triangles[:, 0]] | stitched[triangles[near_triangles[:, 1]]].any(axis=1)
     of_edges = stitched[edges[near_edges]].any(axis=(1, 2))
+    return near_triangles[of_triangles], near_edges[of_edges]
+
+
+def _welded(
+    mesh: tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]],
+    welded: WeldedPoints,
+    start: NDArray[np.float64],
+    owner: NDArray[np.int32],
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Pairs (k, 2) of points with triangles, and of edges with edges, that welds exclude; see the module."""
+    triangles, edges, _ = mesh
+    is_welded = np.zeros(len(owner), dtype=np.bool_)
+    is_welded[welded.points] = True
+    ring = edges[is_welded[edges].any(axis=1)]
+    near = is_welded.copy()
+    near[ring] = True
+    reach = float(np.linalg.norm(start[ring[:, 1]] - start[ring[:, 0]], axis=1).max(initial=0.0))
+    count = int(max(owner.max(), welded.joined.max())) + 1
+    joined = np.zeros((count, count), dtype=np.bool_)
+    joined[tuple(welded.joined.T)] = joined[tuple(welded.joined[:, ::-1].T)] = True
+    near_triangles, near_edges = touching_pairs(start, triangles, edges, owner, joined, reach)
+    of_triangles = near[near_triangles[:, 0]] | near[triangles[near_triangles[:, 1]]].all(axis=1)
+    of_edges = near[edges[near_edges]].all(axis=2).any(axis=1)
     return near_triangles[of_triangles], near_edges[of_edges]

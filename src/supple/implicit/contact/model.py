@@ -116,9 +116,9 @@ class ContactModel:
         ------
         SceneError, SolverError : where they are not apart; names the pair and the place.
         """
-        stitching = self.system.stitching
+        held_together = len(self.system.stitching) > 0 or len(self.system.welding) > 0
         apart = self.allows(x) and not self.collisions.intersect(x) and self.smallest_distance(x) > 0.0
-        if len(stitching) and apart:
+        if held_together and apart:
             return
         raise_if_intersecting(self.system, x, time, self.table)
         if not apart:

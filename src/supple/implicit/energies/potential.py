@@ -31,7 +31,7 @@ class HessianBlocks:
     memory : (m + k, 12, 12) of `elements`
     vertices : (n, 3, 3) one matrix for each vertex with itself [N/m]
     tet_count : m
-    couplings : matrices of contacts, between vertices that no element joins [N/m]
+    couplings : matrices of contacts and joints, between vertices that no element joins [N/m]
     patches : matrices of patches of tets, likewise [N/m]
     blank : whether nothing has been added to `elements`; the memory may then hold an earlier sum
     """
@@ -52,7 +52,7 @@ class HessianBlocks:
 
     @property
     def beyond_elements(self) -> list[Couplings]:
-        """The matrices of patches, then those of contacts."""
+        """The matrices of patches, then those of contacts and joints."""
         return [*self.patches, *self.couplings]
 
     @property
@@ -131,7 +131,7 @@ class Potential(ABC):
 
 
 class ContactPotential(Potential):
-    """A term of contact: so stiff that a short Newton step can leave large forces."""
+    """A term of contact or of joints: so stiff that a short Newton step can leave large forces."""
 
     label = "contact"
     projection = Projection.RELEASED_LAST

@@ -40,6 +40,14 @@ class Tools:
     free_motion: FreeMotion
     clock: Clock = field(default_factory=Clock)
 
+    def freed(self, gradient: NDArray[np.float64]) -> NDArray[np.float64]:
+        """A gradient (n, 3) by the free vertices: zero where pinned or welded."""
+        out = gradient.copy()
+        if self.linear_solver.reduction is not None:
+            self.linear_solver.reduction.reduce(out)
+        out[self.pinned] = 0.0
+        return out
+
 
 @dataclass(frozen=True, eq=False)
 class Direction:
@@ -87,8 +95,7 @@ class DirectionFinder:
     def find(self, here: Model) -> Direction | None:
         """The direction from a point whose Hessian is in `tools.hessian`; None where no system could be solved."""
         tools = self.tools
-        gradient = here.gradient.copy()
-        gradient[tools.pinned] = 0.0
+        gradient = tools.freed(here.gradient)
         vector, report = self._solve(gradient)
         while vector is None and self.policy.now is not ProjectedTerms.ALL:
             self.policy.step_back(bool(tools.hessian.couplings))

@@ -20,9 +20,10 @@ from supple.system import System
 
 @dataclass(frozen=True, eq=False)
 class FreeMotion:
-    """The pieces of a system that nothing holds: no pin, soft target, spring to the world or stitch to an obstacle.
+    """The pieces of a system that nothing holds: no pin, soft target, spring to the world, stitch to an obstacle, or
+    joint with one or with the world.
 
-    Stitched bodies are one piece.
+    Bodies that stitches or joints join are one piece.
 
     Attributes
     ----------
@@ -41,6 +42,10 @@ class FreeMotion:
         held[components[system.stitching.anchored_vertices()]] = True
         for part in system.soft_targets:
             held[components[part.vertices]] = True
+        begins = {part.name: part.vertices.start for part in system.bodies}
+        for joint in system.scene.joints:
+            if joint.second not in begins:
+                held[components[begins[joint.first]]] = True
         for load in system.loads:
             if isinstance(load, PointSpring) and load.is_anchored:
                 held[components[load.vertices]] = True

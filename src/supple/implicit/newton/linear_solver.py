@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from supple.implicit.energies.potential import HessianBlocks
 from supple.implicit.newton.direct_solver import solve_directly
+from supple.implicit.newton.reduction import Reduction
 from supple.numerics.sparse.block_csr import SERIAL_BLOCKS, BlockPattern, build_pattern
 from supple.numerics.sparse.block_sum import JointPattern
 from supple.numerics.sparse.couplings import Couplings
@@ -68,6 +69,7 @@ class LinearSolver:
     matrix: NDArray[np.float64] = field(init=False)
     preconditioner: TwoLevel = field(init=False)
     joint: JointPattern | None = None
+    reduction: Reduction | None = None
     age: int = -1
     fresh_iterations: int = 0
     pace: ThreadTuner = field(init=False)
@@ -79,12 +81,14 @@ class LinearSolver:
         """Build the pattern and the groups of a system's free vertices."""
         free = np.ones(len(system.rest_positions), dtype=bool)
         free[system.pinned_vertices] = False
+        free[system.welding.vertices] = False
         order = order_rows(system.rest_positions, system.components, system.elements, free)
         rows = np.full(len(free) + 1, -1, dtype=np.int32)  # the last one for nodes without a vertex, number -1
         rows[order.vertices] = np.arange(len(order.vertices), dtype=np.int32)
         pattern = build_pattern(rows[system.elements], len(order.vertices))
         preconditioner = two_level(pattern, system.rest_positions[order.vertices], order.group_start)
-        return cls(kind, order, rows[:-1], pattern, preconditioner, np.zeros((pattern.blocks, 3, 3)))
+        elements = np.zeros((pattern.blocks, 3, 3))
+        return cls(kind, order, rows[:-1], pattern, preconditioner, elements, reduction=Reduction.of(system))
 
     def __post_init__(self) -> None:
         self.matrix, self.preconditioner = self.elements, self.elements_only
@@ -101,7 +105,8 @@ class LinearSolver:
         self.parallel = self.pace.choose()
         with one_thread(not self.parallel):
             diagonal = hessian.vertices[self.order.vertices]
-            if couplings := hessian.beyond_elements:
+            reduction = self.reduction
+            if couplings := (hessian.beyond_elements if reduction is None else reduction.couplings(hessian)):
                 self._assemble_joint(hessian.elements, diagonal, Couplings.joined(couplings))
             else:
                 if self.joint is not None:
@@ -141,11 +146,14 @@ class LinearSolver:
 
         Returns
         -------
-        p : (n, 3), zero where pinned; None where the system could not be solved, or was found to be indefinite
+        p : (n, 3), zero where pinned, and welded vertices with their rigid bodies; None where the system could not be
+            solved, or was found to be indefinite
         """
         began = perf_counter()
         with one_thread(not self.parallel):
             p, report = self._solve(force, tolerance, convex)
+        if p is not None and self.reduction is not None:
+            self.reduction.welding.follow(p)
         seconds = self.spent + perf_counter() - began
         self.pace.note(self.parallel, seconds / (_ASSEMBLY + report.iterations))
         return p, report

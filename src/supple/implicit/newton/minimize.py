@@ -150,12 +150,12 @@ def _is_outdated(problem: Problem, here: Model, tools: Tools) -> bool:
     if problem.outdated is None:
         return False
     contact = _free_norm(problem.objective.contact_gradient(here.positions), tools)
-    return _free_norm(here.gradient.copy(), tools) <= _NEARLY * contact and problem.outdated(here.positions)
+    return _free_norm(here.gradient, tools) <= _NEARLY * contact and problem.outdated(here.positions)
 
 
 def _is_balanced(problem: Problem, here: Model, tools: Tools) -> bool:
     contact = _free_norm(problem.objective.contact_gradient(here.positions), tools)
-    return _free_norm(here.gradient.copy(), tools) <= problem.convergence.force * contact
+    return _free_norm(here.gradient, tools) <= problem.convergence.force * contact
 
 
 def _is_converged(problem: Problem, length: float, here: Model, tools: Tools, touching: bool) -> bool:
@@ -163,9 +163,8 @@ def _is_converged(problem: Problem, length: float, here: Model, tools: Tools, to
     if touching:
         contact = _free_norm(problem.objective.contact_gradient(here.positions), tools)
     extent = float(np.abs(here.positions).max(initial=0.0))
-    return problem.convergence.is_reached(length, extent, _free_norm(here.gradient.copy(), tools), contact)
+    return problem.convergence.is_reached(length, extent, _free_norm(here.gradient, tools), contact)
 
 
 def _free_norm(gradient: NDArray[np.float64], tools: Tools) -> float:
-    gradient[tools.pinned] = 0.0
-    return float(np.linalg.norm(gradient))
+    return float(np.linalg.norm(tools.freed(gradient)))

@@ -48,7 +48,7 @@ class Objective:
         return sum(values), sum(abs(value) for value in values)
 
     def contact_gradient(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n, 3) of the contact terms alone [N]."""
+        """(n, 3) of contact and joints alone [N]."""
         return _gradient([term for term in self.terms if isinstance(term, ContactPotential)], x)
 
     def gradient(self, x: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -42,12 +42,14 @@ def move_pins(
         where the filters do not let them arrive.
     """
     pinned = tools.pinned
-    near = np.flatnonzero(np.isin(system.elements, pinned).any(axis=1))
+    moved_with = np.concatenate([pinned, system.welding.vertices])
+    near = np.flatnonzero(np.isin(system.elements, moved_with).any(axis=1))
     nodes = system.elements[near]
     rows: list[NewtonRow] = []
     for iteration in range(_MOST_ITERATIONS):
         displacement = np.zeros_like(x)
         displacement[pinned] = targets - x[pinned]
+        system.welding.follow(displacement)
         here = problem.objective.model(x, tools.hessian)
         gradient = here.gradient
         with tools.clock.of("linear_solve"):
@@ -60,11 +62,12 @@ def move_pins(
         for coupling in tools.hessian.beyond_elements:
             coupling.add_product(displacement, pull)
         with tools.clock.of("linear_solve"):
-            direction, report = tools.linear_solver.solve(-(gradient + pull), _TOLERANCE)
+            direction, report = tools.linear_solver.solve(-tools.freed(gradient + pull), _TOLERANCE)
         if direction is None or not np.isfinite(direction).all():
             text = "the linear system that moves the pins could not be solved"
             return x, Outcome(Status.NOT_FINITE, here, text, rows)
         direction[pinned] = displacement[pinned]
+        system.welding.follow(direction)
         step, tet, reason = limits.largest_step(x, direction)
         rows.append(
             NewtonRow(
@@ -85,6 +88,7 @@ def move_pins(
         end = x + step * direction
         if step == 1.0:
             end[pinned] = targets
+            system.welding.follow(end)
         while step > 0.0 and not limits.allows(end):
             step *= 0.5
             end = x + step * direction

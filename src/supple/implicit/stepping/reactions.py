@@ -1,4 +1,4 @@
-"""Reaction forces of pins on the bodies that they hold."""
+"""Reaction forces of pins on the bodies that they hold, and of rigid bodies on what is welded to them."""
 
 from __future__ import annotations
 
@@ -27,3 +27,15 @@ def reaction_forces(system: System, gradient: NDArray[np.float64]) -> tuple[dict
         by_vertex[label] = gradient[pin.vertices]
         totals[label] = by_vertex[label].sum(axis=0)
     return totals, by_vertex
+
+
+def weld_forces(system: System, gradient: NDArray[np.float64]) -> dict[str, NDArray]:
+    """The forces (3,) of rigid bodies on the vertices that are welded to them, by name of the weld [N].
+
+    Parameters
+    ----------
+    gradient : as of `reaction_forces`, before welded vertices are eliminated
+    """
+    welding, welds = system.welding, system.scene.welds
+    shares = gradient[welding.vertices]
+    return {str(weld.name): shares[welding.weld == k].sum(axis=0) for k, weld in enumerate(welds)}

@@ -17,6 +17,7 @@ from supple.implicit.energies.pressure import pressures_at
 from supple.implicit.energies.soft_targets import soft_targets_at
 from supple.implicit.energies.springs import springs_at
 from supple.implicit.energies.stitch_damping import StitchDamping
+from supple.implicit.joints.joint_step import JointStep
 from supple.implicit.limits.inversion_guard import InversionGuard
 from supple.implicit.limits.step_limits import StepLimits
 from supple.implicit.newton.convergence import Convergence
@@ -70,11 +71,12 @@ class StepSettings:
 
 @dataclass(frozen=True, eq=False)
 class Substep:
-    """The result of a step: the state at its end, the course of Newton's method, and the contact at the end."""
+    """The result of a step: the state at its end, the course of Newton's method, contact and joints at the end."""
 
     state: State
     outcome: Outcome
     contact: ContactStep
+    joints: JointStep | None
 
 
 def take_substep(state: State, end: float, h: float, settings: StepSettings, workspace: Workspace) -> Substep:
@@ -95,9 +97,13 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     onset = settings.barrier_onset
     barriers = (inversion_barrier(workspace.elasticity, guard.guarded, onset), guard.quadratic_barrier(onset))
     base = replace(base, terms=[*base.terms, *(barrier for barrier in barriers if barrier is not None)])
-    contact = ContactStep(workspace.contact, state.positions, (state.time, end), plan.contact_weight)
+    times = state.time, end
+    joints = None
+    if workspace.joints is not None:
+        joints = JointStep.of(workspace.joints, state, times, plan.scale, plan.contact_weight)
+    contact = ContactStep(workspace.contact, state.positions, times, plan.contact_weight)
     problem = Problem(
-        contact.with_contact(base, state.positions),
+        contact.with_contact(_with_joints(base, joints), state.positions),
         plan.scale,
         Convergence(settings.shortest(workspace, h), settings.force_tolerance),
         settings.max_iterations,
@@ -113,22 +119,32 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
         x, moved = move_pins(system, problem, x, targets, limits, tools)
         rows = moved.rows
         if moved.status is not Status.CONVERGED:
-            return Substep(state, moved, contact)
+            return Substep(state, moved, contact, joints)
     while True:
         outcome = minimize(problem, x, limits, tools)
         rows = rows + outcome.rows
         x = outcome.end.positions
-        if outcome.status is not Status.CONVERGED or not contact.needs_update(x):
+        if outcome.status is not Status.CONVERGED:
             break
-        problem = replace(problem, objective=contact.with_contact(base, x))
+        updated = joints is not None and joints.update(x)
+        if not contact.needs_update(x) and not updated:
+            break
+        problem = replace(problem, objective=contact.with_contact(_with_joints(base, joints), x))
     outcome = contact.verified(replace(outcome, rows=rows))
+    if joints is not None:
+        outcome = joints.verified(outcome)
     internal = workspace.elasticity.flowed(x, state.internal, h)
     after = State(end, x, plan.velocity(x), plan.memory, internal=internal)
     residual = plan.place * outcome.end.gradient
     after = settings.integrator.finish(plan, state, after, residual, workspace.conservation)
     if plan.place != 1.0 and system.rigid_bodies and outcome.status is Status.CONVERGED:
         after = rigid_ends(system, state, after, limits)
-    return Substep(after, outcome, contact)
+    return Substep(after, outcome, contact, joints)
+
+
+def _with_joints(objective: Objective, joints: JointStep | None) -> Objective:
+    """The objective with the present energy of the joints."""
+    return objective if joints is None else replace(objective, terms=[*objective.terms, joints.potential])
 
 
 def _objective(
@@ -179,6 +195,7 @@ def _first_guess(
     ahead = plan.predicted + plan.scale / plan.place * forces / system.masses[:, None]
     ahead = with_rigid_bodies(system, x, ahead, plan.place)
     ahead[pinned] = x[pinned]
+    system.welding.follow(ahead)
     step = limits.largest_step(x, ahead - x).step
     if step < 1.0:
         ahead = x + step * (ahead - x)

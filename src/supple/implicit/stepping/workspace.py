@@ -14,6 +14,7 @@ from supple.implicit.energies.elasticity import Elasticity
 from supple.implicit.energies.regularization import Regularization
 from supple.implicit.energies.stitch_damping import StitchViscosity
 from supple.implicit.energies.stitches import StitchEnergy
+from supple.implicit.joints.geometry import JointGeometry
 from supple.implicit.newton.direction import Tools
 from supple.implicit.stepping.conservation import Conservation
 from supple.state import State
@@ -41,6 +42,7 @@ class Workspace:
     stitches: StitchEnergy | None
     stitch_viscosity: StitchViscosity | None
     quadratic_viscosity: QuadraticViscosity | None
+    joints: JointGeometry | None
     checked: NDArray[np.float64] | None = None
     conservation: Conservation = field(init=False)
 

@@ -13,6 +13,7 @@ from supple.output.check.checks.plain_values import CONSTANTS, Converged, Finite
 from supple.output.check.checks.records import Records
 from supple.output.check.checks.rigidity import Rigidity
 from supple.output.check.checks.tets import Inversion, RestShape, Volume
+from supple.output.check.checks.welds import Welds
 from supple.output.check.frame_check import FrameCheck
 from supple.output.check.report import CheckReport, CheckResult
 from supple.output.check.settings import CheckSettings
@@ -31,6 +32,7 @@ CHECKS: tuple[type[FrameCheck], ...] = (
     Containment,
     Distance,
     Rigidity,
+    Welds,
     Volume,
     Momentum,
     Spin,

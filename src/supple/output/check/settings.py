@@ -20,6 +20,7 @@ NAMES = {
     "containment": "nothing is completely inside another thing",
     "distance": "the distance of surfaces is above zero",
     "rigidity": "rigid bodies are neither deformed nor mirrored",
+    "welds": "welded vertices stay in their places on rigid bodies",
     "volume": "nearly incompressible bodies keep at least half of their volume",
     "momentum": "without loads, momentum changes by gravity alone",
     "spin": "without loads, angular momentum about the center of mass does not grow",
@@ -39,6 +40,7 @@ class CheckSettings:
     max_volume_change : how far a body's volume may differ from that at rest, as a share of it. None: 0.5 for bodies
         with a Poisson's ratio of 0.45 or more, unlimited for others.
     max_orthogonality_error : |F^T F - 1| that a rigid body may have [-].
+    max_weld_error : how far a welded vertex may be from its place on the rigid body, as a share of that body's size [-].
     max_energy_gain : how far the energy may exceed that at the start, as a share of the energy in motion.
     max_momentum_change : how far momenta may change without a force, as a share of the momentum present.
 
@@ -52,6 +54,7 @@ class CheckSettings:
     every: int = 1
     max_volume_change: float | None = None
     max_orthogonality_error: float = 0.01
+    max_weld_error: float = 1e-9
     max_energy_gain: float = 0.05
     max_momentum_change: float = 1e-6
 
@@ -61,7 +64,8 @@ class CheckSettings:
                 raise OutputError(f"check: there is no check {name!r}; there are {', '.join(NAMES)}")
         if isinstance(self.every, bool) or not isinstance(self.every, (int, np.integer)) or self.every < 1:
             raise OutputError(f"check: every is {self.every!r}; give a whole number of one or more")
-        for key in ("max_volume_change", "max_orthogonality_error", "max_energy_gain", "max_momentum_change"):
+        shares = ("max_orthogonality_error", "max_weld_error", "max_energy_gain", "max_momentum_change")
+        for key in ("max_volume_change", *shares):
             value = getattr(self, key)
             if value is not None and not (isinstance(value, (int, float)) and value >= 0.0):
                 raise OutputError(f"check: {key} is {value!r}; give a number of zero or more")

@@ -72,7 +72,7 @@ class Surfaces:
         self.first_triangle = np.cumsum(counts) - counts
         self.allowed = _allowed(recording, self.bodies, len(self.names))
         self.stitched = self._stitched_points(recording)
-        self.ignored = _ignored_keys(self.stitched, self.triangles)
+        self.ignored = np.union1d(_ignored_keys(self.stitched, self.triangles), self._welded_keys(recording))
         self.pieces = _pieces(recording, self.triangles, self.owners, row)
 
     def place(self, positions: NDArray[np.float64], poses: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -96,6 +96,16 @@ class Surfaces:
             points, row = placed.get(owner, (anchor[None], 0))
             number.append(row + int(np.argmin(np.linalg.norm(points - anchor, axis=1))))
         return np.array(number, dtype=np.int64)[stitches.nodes]
+
+    def _welded_keys(self, recording: Recording) -> NDArray[np.int64]:
+        """Welds as pairs of triangles that may meet: those with a welded corner, with those of the rigid body."""
+        keys = [np.zeros(0, dtype=np.int64)]
+        for weld in recording.welds:
+            soft = np.flatnonzero((self.owners == weld.soft) & np.isin(self.triangles, weld.vertices).any(axis=1))
+            rigid = np.flatnonzero(self.owners == weld.rigid)
+            low, high = np.minimum(soft[:, None], rigid), np.maximum(soft[:, None], rigid)
+            keys.append((low * len(self.triangles) + high).ravel())
+        return np.concatenate(keys)
 
     def name_triangle(self, row: int) -> str:
         """A triangle as messages call it: the row of its own body's surface."""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from supple.errors import SuppleError
 from supple.loads.applied import AppliedLoad
 from supple.scene.inputs import Input
+from supple.scene.joints.axis_joint import AxisJoint
 from supple.system import System
 
 # Functions of time cannot be read; their values at so many times of a run are taken instead.
@@ -35,6 +36,9 @@ def scene_hash(system: System, begin: float, duration: float) -> str:
             _add(digest, _forces_of(load, system, time) if _is_script(force.force) else None)
         for load in system.loads[len(system.scene.forces) :]:
             _add(digest, _forces_of(load, system, time))
+        for joint in system.scene.joints:
+            motor = joint.motor if isinstance(joint, AxisJoint) else None
+            _add(digest, motor.at(time) if motor is not None and callable(motor.script) else None)
         for target in system.soft_targets:
             _add(digest, target.targets(time) if _is_script(target.target.motion) else None)
         for obstacle in system.obstacles:

@@ -21,6 +21,7 @@ from supple.materials.per_tet import BY_LAW, NO_REGION, NOT_ELASTIC, LawTets
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.output.recording.checked_hdf5 import CheckedFile
 from supple.scene.contact_pairs import pair_table
+from supple.scene.joints.axis_joint import AxisJoint
 from supple.system import System
 
 NOT_KNOWN = 255
@@ -40,6 +41,7 @@ class RecordedPhysics:
     internal : number of rows of internal variables of a frame
     compliances : for each body those of its edges [m/N] and volumes [m^5/N], or None for a body of another law
     forces, soft_targets, scripted_pins, stitches : numbers of them in the scene
+    held_joints, motors : numbers of the joints with the world or an obstacle, and of motors of joints
     """
 
     kind: NDArray[np.uint8]
@@ -50,6 +52,8 @@ class RecordedPhysics:
     soft_targets: int
     scripted_pins: int
     stitches: int
+    held_joints: int
+    motors: int
     region: NDArray[np.int32]
     laws: tuple[LawTets, ...] = ()
     internal: int = 0
@@ -103,8 +107,11 @@ def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
         "soft_targets": len(system.soft_targets),
         "scripted_pins": sum(part.pin.motion is not None for part in system.pins),
         "stitches": len(system.stitching),
+        "held_joints": sum(joint.second not in {part.name for part in system.bodies} for joint in system.scene.joints),
+        "motors": sum(isinstance(joint, AxisJoint) and joint.motor is not None for joint in system.scene.joints),
         "patches": bool((region != NO_REGION).any()),
         "untouching": _untouching(system),
+        "welds": _welds(system),
     }
 
 
@@ -114,6 +121,14 @@ def _untouching(system: System) -> list[list[int]]:
     obstacle = np.arange(len(collide)) >= len(system.bodies)
     passing = np.argwhere(np.triu(~collide & ~(obstacle[:, None] & obstacle[None, :])))
     return passing.tolist()
+
+
+def _welds(system: System) -> list[tuple[int, int, list[int]]]:
+    """The soft and the rigid body of each weld, and its vertices."""
+    number = {part.name: k for k, part in enumerate(system.bodies)}
+    vertices, weld_of = system.welding.vertices, system.welding.weld
+    welds = enumerate(system.scene.welds)
+    return [(number[weld.body], number[weld.rigid], vertices[weld_of == k].tolist()) for k, weld in welds]
 
 
 def read_physics(file: CheckedFile, header: dict[str, Any], m: int) -> RecordedPhysics | None:
@@ -128,6 +143,7 @@ def read_physics(file: CheckedFile, header: dict[str, Any], m: int) -> RecordedP
         return None
     try:
         counts = [int(physics[key]) for key in ("forces", "soft_targets", "scripted_pins", "stitches")]
+        counts += [int(physics.get(key, 0)) for key in ("held_joints", "motors")]
         laws = [str(law) for law in physics["laws"]]
         names = [str(name) for name in physics.get("by_law", [])]
         flows = list(physics.get("flows", [None] * len(names)))
@@ -183,3 +199,33 @@ def read_untouching(file: CheckedFile, header: dict[str, Any]) -> tuple[tuple[in
     if not all(0 <= number < owners for pair in pairs for number in pair):
         raise file.broken("what may touch names a body or obstacle that does not exist")
     return pairs
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedWeld:
+    """Vertices (k,) that are points of a rigid body; soft, rigid : numbers of the bodies."""
+
+    soft: int
+    rigid: int
+    vertices: NDArray[np.int64]
+
+
+def read_welds(file: CheckedFile, header: dict[str, Any], n: int) -> tuple[RecordedWeld, ...]:
+    """The welds of a recording with n vertices; none in recordings of older versions.
+
+    Raises
+    ------
+    OutputError : where a body or a vertex does not exist.
+    """
+    described = (header.get("physics") or {}).get("welds", [])
+    bodies = len(header["bodies"])
+    try:
+        welds = tuple(RecordedWeld(int(a), int(b), np.array(rows, dtype=np.int64)) for a, b, rows in described)
+    except (TypeError, ValueError, OverflowError):
+        raise file.broken("its welds are not described as they should be") from None
+    for weld in welds:
+        numbers = weld.vertices
+        right = numbers.ndim == 1 and len(numbers) and numbers.min() >= 0 and numbers.max() < n
+        if not (0 <= weld.soft < bodies and 0 <= weld.rigid < bodies and right):
+            raise file.broken("a weld names a body or a vertex that does not exist")
+    return welds

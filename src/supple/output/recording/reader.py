@@ -19,7 +19,7 @@ from supple.output.recording.checked_hdf5 import CheckedFile
 from supple.output.recording.details import RecordedDetails
 from supple.output.recording.file import WRITTEN
 from supple.output.recording.laws import recorded_laws
-from supple.output.recording.physics import RecordedPhysics, read_physics, read_untouching
+from supple.output.recording.physics import RecordedPhysics, RecordedWeld, read_physics, read_untouching, read_welds
 from supple.output.recording.recorder import INTERNAL, REPORT_NUMBERS, REPORT_VECTORS, field_series, frame_layout
 from supple.output.recording.scene import RecordedBody, RecordedObstacle, read_bodies, read_header, read_obstacles
 from supple.output.recording.sensors import RecordedSensor, sensors_of_header
@@ -182,6 +182,7 @@ class Recording(Showable, Sequence[RecordedFrame]):
     details : which fields of the solver's details are kept; fields : of tets and vertices that were recorded
     sensors : of the scene
     untouching : pairs that may pass through each other: numbers of bodies, then obstacles
+    welds : vertices of soft bodies that are points of rigid ones
     scene_text : the scene file's text, or None; solver : its description, or None; supple_version : of the writer
     """
 
@@ -223,6 +224,7 @@ class Recording(Showable, Sequence[RecordedFrame]):
         self.obstacles: tuple[RecordedObstacle, ...] = read_obstacles(file, header)
         self.physics: RecordedPhysics | None = read_physics(file, header, m)
         self.untouching = read_untouching(file, header)
+        self.welds: tuple[RecordedWeld, ...] = read_welds(file, header, n)
         self.stitches: RecordedStitches = read_stitches(file, n, len(self.obstacles))
         self.dt = float(header["dt"])
         self.solver: str | None = header.get("solver")

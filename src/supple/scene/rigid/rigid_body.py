@@ -14,7 +14,7 @@ Source: Lan et al., "Affine Body Dynamics" (2022), section 3.
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,7 +29,7 @@ from supple.scene.body import PlacedBody
 from supple.scene.rigid.control_points import control_points
 from supple.scene.rigid.mass_properties import MassProperties, of_solid, with_inertia, with_mass
 from supple.scene.rigid.pose import deformation_of
-from supple.scene.values import check_name, positive
+from supple.scene.values import check_name, finite_vector, positive
 
 # Positions that are given for the surface must be a rigid motion of it, up to round-off in what a user computed and the
 # orthogonality error of a solver.
@@ -49,6 +49,7 @@ class RigidBody(PlacedBody):
     density, mass : one of the two [kg/m^3], [kg]; above zero.
     inertia : about the center of mass, in the body's own coordinates, (3, 3) or its diagonal (3,) [kg m^2]; needs
         `mass`. None: that of a homogeneous solid, exact for the given triangles or tets.
+    center : (3,) of mass, in the body's own coordinates [m]; needs `inertia`. None: that of a homogeneous solid.
     position : (3,) of the shape's origin [m].
     rotation : (3,) rotation vector that turns the shape about its origin before it is placed [rad].
     velocity : (3,) initial velocity of the center of mass [m/s].
@@ -81,6 +82,7 @@ class RigidBody(PlacedBody):
     angular_velocity: ArrayLike = (0.0, 0.0, 0.0)
     friction: float = 0.0
     stiffness: float | None = None
+    center: ArrayLike | None = None
     kappa: float = field(init=False, repr=False)
     surface: SurfaceMesh = field(init=False, repr=False)
     properties: MassProperties = field(init=False, repr=False)
@@ -167,9 +169,18 @@ class RigidBody(PlacedBody):
         if self.mass is None:
             if self.inertia is not None:
                 raise SceneError(f"{owner}: inertia needs a mass [kg] in place of the density; give mass=...")
+            if self.center is not None:
+                raise SceneError(f"{owner}: center needs a mass and an inertia; give both")
             return with_mass(solid, solid.volume * positive(self.density, f"{owner}: density"))
         mass = positive(self.mass, f"{owner}: mass")
-        return with_mass(solid, mass) if self.inertia is None else with_inertia(solid, mass, self.inertia, owner)
+        if self.inertia is None:
+            if self.center is not None:
+                raise SceneError(f"{owner}: center needs an inertia [kg m^2] about it; give inertia=...")
+            return with_mass(solid, mass)
+        properties = with_inertia(solid, mass, self.inertia, owner)
+        if self.center is None:
+            return properties
+        return replace(properties, center=finite_vector(self.center, f"{owner}: center"))
 
     def _set_stiffness(self, kappa: float) -> None:
         object.__setattr__(self, "kappa", kappa)

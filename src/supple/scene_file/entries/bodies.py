@@ -74,6 +74,9 @@ class RigidModel(Model):
     inertia: Annotated[list[Vector], Field(min_length=3, max_length=3)] | None = Field(
         default=None, description="rows of the tensor about the center of mass, with `mass` [kg m^2]"
     )
+    center: Vector | None = Field(
+        default=None, description="of mass, with `inertia`, in the coordinates of the shape; default: of the solid [m]"
+    )
     stiffness: Positive | None = Field(
         default=None, description="of the energy that keeps it rigid [Pa]; default: from the heaviest load of the scene"
     )
@@ -165,6 +168,7 @@ class BodyModel(Model):
                 density=rigid.density,
                 mass=rigid.mass,
                 inertia=rigid.inertia,
+                center=rigid.center,
                 stiffness=rigid.stiffness,
                 **self._placement(),
             )

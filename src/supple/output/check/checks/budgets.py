@@ -24,6 +24,8 @@ def external_action(recording: Recording) -> str | None:
         return "pins hold bodies"
     if recording.obstacles:
         return "bodies may rest on obstacles"
+    if physics.held_joints:
+        return "joints hold bodies"
     if physics.forces or physics.soft_targets:
         return "forces or soft targets act on bodies"
     return None
@@ -114,6 +116,8 @@ class Energy(FrameCheck):
             self.why_not = "forces or soft targets do work"
         elif physics.scripted_pins:
             self.why_not = "scripted pins do work"
+        elif physics.motors:
+            self.why_not = "motors do work"
         elif physics.stitches and recording.stitches.laws is None:
             self.why_not = "the recording does not contain the laws of its stitches: an older version wrote it"
         self._first: Snapshot | None = None

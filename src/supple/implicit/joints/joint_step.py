@@ -1,0 +1,187 @@
+"""The joints in one step: their energy, the update of the multipliers, and what is measured at the end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.errors import SceneError
+from supple.implicit.details import ImplicitDetails
+from supple.implicit.joints.functions import values
+from supple.implicit.joints.geometry import ANGLE, JointGeometry
+from supple.implicit.joints.laws import laws_of, near_limits
+from supple.implicit.joints.potential import JointPotential
+from supple.implicit.newton.minimize import Outcome
+from supple.scene.joints.axis_joint import AxisJoint
+from supple.state import State, Status
+
+# The stiffness of a joint in multiples of that of its bodies against strain, and of inertia in a step. Each update of
+# the multipliers divides the violation by about the latter.
+_BODIES = 100.0
+_INERTIA = 100.0
+
+# A joint holds where its violation is below this share of its size.
+_HELD = 1e-7
+_MOST_UPDATES = 12
+# An update that does not reduce the largest violation below this share of it leads nowhere.
+_GAIN = 0.9
+
+# At the start, the sides of a joint are placed up to round-off in what a user computed. A share of the joint's size.
+_APART = 1e-3
+
+
+@dataclass(eq=False)
+class JointStep:
+    """The joints of one step; `potential` is their energy now.
+
+    Attributes
+    ----------
+    updates : of the multipliers; last : the largest violation before the latest update, in sizes of the joint [-]
+    """
+
+    geometry: JointGeometry
+    potential: JointPotential
+    updates: int = 0
+    last: float = field(default=np.inf)
+
+    @classmethod
+    def of(
+        cls, geometry: JointGeometry, start: State, times: tuple[float, float], scale: float | None, weight: float
+    ) -> JointStep:
+        """A step between two times [s] from a state.
+
+        Parameters
+        ----------
+        scale : s of the inertia term [s^2], or None; weight : factor of the energies
+        """
+        stiffness = _BODIES * geometry.stiffness
+        if scale is not None:
+            stiffness = stiffness + _INERTIA * geometry.masses / scale
+        g = coordinates_at(geometry, start)
+        laws, multipliers = laws_of(geometry, stiffness, g, times, moving=scale is not None)
+        zero = np.zeros((len(geometry.differences.joint), 3))
+        return cls(geometry, JointPotential(geometry, times[1], stiffness, laws, g, zero, multipliers, weight))
+
+    def update(self, x: NDArray[np.float64]) -> bool:
+        """Whether to continue from x (n, 3) with the multipliers that this call has found there."""
+        violation = float(self.violations(x).max(initial=0.0))
+        stuck = violation > _GAIN * self.last and self.updates > 1
+        if violation <= _HELD or self.updates == _MOST_UPDATES or stuck:
+            return False
+        self.updates, self.last = self.updates + 1, violation
+        multipliers, law_multipliers = self.potential.renewed(x)
+        self.potential = replace(self.potential, multipliers=multipliers, law_multipliers=law_multipliers)
+        return True
+
+    def verified(self, outcome: Outcome) -> Outcome:
+        """The outcome, or one that names a joint that does not hold."""
+        violations = self.violations(outcome.end.positions)
+        if outcome.status is not Status.CONVERGED or not violations.max(initial=0.0) > _HELD:
+            return outcome
+        j = int(violations.argmax())
+        apart = violations[j] * self.geometry.sizes[j]
+        text = (
+            f"{self.geometry.joints[j].label} is off by {apart:.2e} m: a pin, a script, a limit or another joint "
+            "contradicts it"
+        )
+        return replace(outcome, status=Status.ITERATION_LIMIT, message=text)
+
+    def violations(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(j,) how far the conditions of each joint are from holding, as a share of its size.
+
+        Of a condition that has a largest effort or one direction: the change of effort that is missing, over k.
+        """
+        geometry, potential = self.geometry, self.potential
+        out = np.zeros(len(geometry.joints))
+        lengths = np.linalg.norm(potential.differences(x), axis=1)
+        np.maximum.at(out, geometry.differences.joint, lengths / geometry.sizes[geometry.differences.joint])
+        laws = potential.laws
+        if laws.adapts.any():
+            missing = np.abs(potential.efforts(x) - potential.law_multipliers)[laws.adapts] / laws.k[laws.adapts]
+            function = laws.function[laws.adapts]
+            joint = geometry.triples[0].joint[function]
+            size = np.where(geometry.functions[function] == ANGLE, 1.0, geometry.sizes[joint])
+            np.maximum.at(out, joint, missing / size)
+        return out
+
+    def measured(self, details: ImplicitDetails, x: NDArray[np.float64]) -> ImplicitDetails:
+        """The details of a step that ended at x (n, 3), with what the joints do there."""
+        geometry, potential = self.geometry, self.potential
+        forces, torques = potential.actions(x)
+        names = [str(joint.name) for joint in geometry.joints]
+        g, efforts = near_limits(geometry, potential.coordinates(x)), potential.efforts(x)
+        along = {name: int(row) for name, row in zip(names, geometry.along, strict=True) if row >= 0}
+        laws = potential.laws
+        motors = {int(laws.function[k]): -float(efforts[k]) for k in np.flatnonzero(laws.is_motor)}
+        return replace(
+            details,
+            joint_forces=dict(zip(names, forces, strict=True)),
+            joint_torques=dict(zip(names, torques, strict=True)),
+            joint_coordinates={name: float(g[row]) for name, row in along.items()},
+            motor_forces={name: motors[row] for name, row in along.items() if row in motors},
+            joint_violations=dict(zip(names, map(float, self.violations(x)), strict=True)),
+        )
+
+
+def initial_joint_details(geometry: JointGeometry | None) -> dict[str, Any]:
+    """The entries of `ImplicitDetails` before any step: no forces."""
+    if geometry is None:
+        return {}
+    names = [str(joint.name) for joint in geometry.joints]
+    with_axis = {str(joint.name): joint for joint in geometry.joints if isinstance(joint, AxisJoint)}
+    driven = [name for name, joint in with_axis.items() if joint.motor is not None]
+    return {
+        "joint_forces": {name: np.zeros(3) for name in names},
+        "joint_torques": {name: np.zeros(3) for name in names},
+        "joint_coordinates": dict.fromkeys(with_axis, 0.0),
+        "motor_forces": dict.fromkeys(driven, 0.0),
+        "joint_violations": dict.fromkeys(names, 0.0),
+    }
+
+
+def coordinates_at(geometry: JointGeometry, state: State) -> NDArray[np.float64]:
+    """(s,) the functions' values at a state, angles near their limits."""
+    poses = geometry.poses(state.time)
+    corners = state.positions[geometry.corners]
+    triples = np.stack(
+        [
+            np.einsum("fk,fki->fi", column.coefficients, corners[column.joint]) + column.offsets(poses)
+            for column in geometry.triples
+        ],
+        axis=1,
+    )
+    return near_limits(geometry, values(geometry.functions, triples))
+
+
+def refuse_apart(geometry: JointGeometry, state: State) -> None:
+    """Check that the joints hold where a simulation starts.
+
+    Raises
+    ------
+    SceneError : where the two sides of one are apart, or its coordinate is outside of its limits; the text names it.
+    """
+    g = coordinates_at(geometry, state)
+    poses = geometry.poses(state.time)
+    vectors = geometry.differences
+    corners = state.positions[geometry.corners[vectors.joint]]
+    q = np.einsum("fk,fki->fi", vectors.coefficients, corners) + vectors.offsets(poses)
+    off = np.zeros(len(geometry.joints))
+    np.maximum.at(off, vectors.joint, np.linalg.norm(q, axis=1))
+    np.maximum.at(off, geometry.triples[0].joint[geometry.across], np.abs(g[geometry.across]))
+    for j, joint in enumerate(geometry.joints):
+        if off[j] > _APART * geometry.sizes[j]:
+            raise SceneError(
+                f"{joint.label}: at the start it is off by {off[j]:.3g} m; start both sides where the joint holds"
+            )
+        if isinstance(joint, AxisJoint) and joint.limits is not None:
+            unit = "rad" if geometry.functions[geometry.along[j]] == ANGLE else "m"
+            here, (low, high) = float(g[geometry.along[j]]), joint.limits
+            slack = _APART * (1.0 if unit == "rad" else geometry.sizes[j])
+            if not low - slack <= here <= high + slack:
+                raise SceneError(
+                    f"{joint.label}: at the start it is at {here:.4g} {unit}, outside of its limits ({low:g}, "
+                    f"{high:g}); give limits that contain it"
+                )

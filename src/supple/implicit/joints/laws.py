@@ -1,0 +1,167 @@
+"""What acts along the coordinate of a joint, or across a slider: conditions, limits and motors.
+
+Each is an energy psi of one number g whose derivative is a line that is cut off,
+
+    psi'(g) = clip(lambda + k (g - g0), low, high).
+
+A condition g = g0 has no ends, with the multiplier lambda; a limit pushes in one direction only; a motor that is to
+reach a velocity has g0 = g_n + h v, and its largest force as ends. Their multipliers are updated until the line gives
+the force that is needed at g0 (the method of multipliers). Where a motor has a stiffness K and a damping D, the line is
+that of an implicit step of h,
+
+    K (g - target) + D ((g - g_n) / h - v) = lambda + (K + D / h) (g - g_n),    lambda = K (g_n - target) - D v,
+
+and it stays.
+
+Source: Nocedal, Wright, "Numerical Optimization" (2006), section 17.4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.implicit.joints.geometry import ANGLE, JointGeometry
+from supple.scene.joints.axis_joint import AxisJoint
+from supple.scene.joints.motors import ForceMotor, Motor, PositionMotor, VelocityMotor
+
+
+class Law(NamedTuple):
+    """One law; see the module. function : whose value is g; adapts : whether lambda is updated"""
+
+    function: int
+    k: float
+    start: float
+    low: float = -np.inf
+    high: float = np.inf
+    multiplier: float = 0.0
+    adapts: bool = True
+    is_motor: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Laws:
+    """Many laws, each an entry of arrays (l,)."""
+
+    function: NDArray[np.int64]
+    k: NDArray[np.float64]
+    start: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    adapts: NDArray[np.bool_]
+    is_motor: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, laws: Sequence[Law]) -> tuple[Laws, NDArray[np.float64]]:
+        """The laws, and their multipliers (l,)."""
+        columns = list(zip(*laws, strict=True)) if laws else [()] * len(Law._fields)
+        function, k, start, low, high, multipliers, adapts, is_motor = columns
+        made = cls(
+            np.array(function, dtype=np.int64),
+            *(np.array(column, dtype=np.float64) for column in (k, start, low, high)),
+            adapts=np.array(adapts, dtype=np.bool_),
+            is_motor=np.array(is_motor, dtype=np.bool_),
+        )
+        return made, np.array(multipliers, dtype=np.float64)
+
+    def efforts(self, g: NDArray[np.float64], multipliers: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(l,) psi' at the values g (l,)."""
+        return np.clip(multipliers + self.k * (g - self.start), self.low, self.high)
+
+    def energies(self, g: NDArray[np.float64], multipliers: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(l,) psi, up to a constant."""
+        line = multipliers + self.k * (g - self.start)
+        effort = np.clip(line, self.low, self.high)
+        stiff = self.k > 0.0
+        k = np.where(stiff, self.k, 1.0)
+        return np.where(stiff, effort * (line - 0.5 * effort) / k, multipliers * (g - self.start))
+
+    def stiffness(self, g: NDArray[np.float64], multipliers: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(l,) psi''."""
+        line = multipliers + self.k * (g - self.start)
+        return np.where((line > self.low) & (line < self.high), self.k, 0.0)
+
+
+def wrapped(angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The angle within half a turn of zero [rad]."""
+    return angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
+
+
+def near_limits(geometry: JointGeometry, g: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values (s,) of the functions, with angles within half a turn of the middle of their joint's limits."""
+    out = g.copy()
+    for j, joint in enumerate(geometry.joints):
+        row = geometry.along[j]
+        if row >= 0 and geometry.functions[row] == ANGLE:
+            limits = joint.limits if isinstance(joint, AxisJoint) and joint.limits is not None else (0.0, 0.0)
+            middle = 0.5 * (limits[0] + limits[1])
+            out[row] = middle + float(wrapped(np.asarray(g[row] - middle)))
+    return out
+
+
+def laws_of(
+    geometry: JointGeometry,
+    stiffness: NDArray[np.float64],
+    start: NDArray[np.float64],
+    times: tuple[float, float],
+    *,
+    moving: bool,
+) -> tuple[Laws, NDArray[np.float64]]:
+    """The laws of a step, and their multipliers (l,) at its beginning.
+
+    Parameters
+    ----------
+    stiffness : (j,) k of conditions, of each joint [N/m]; start : (s,) values at the beginning, see `near_limits`
+    times : begin and end of the step [s]; moving : whether rates count; without them, as in equilibrium, motors do not
+        damp
+    """
+    laws = [Law(int(row), float(stiffness[geometry.triples[0].joint[row]]), 0.0) for row in geometry.across]
+    for j, joint in enumerate(geometry.joints):
+        if not isinstance(joint, AxisJoint):
+            continue
+        row = int(geometry.along[j])
+        k = float(stiffness[j]) * (geometry.sizes[j] ** 2 if geometry.functions[row] == ANGLE else 1.0)
+        if joint.limits is not None:
+            low, high = joint.limits
+            laws += [Law(row, k, low, high=0.0)] if np.isfinite(low) else []
+            laws += [Law(row, k, high, low=0.0)] if np.isfinite(high) else []
+        if joint.motor is not None:
+            angle = geometry.functions[row] == ANGLE
+            limits = joint.limits or (-np.inf, np.inf)
+            laws.append(_motor_law(joint.motor, row, k, float(start[row]), times, limits, angle=angle, moving=moving))
+    return Laws.of(laws)
+
+
+def _motor_law(
+    motor: Motor,
+    row: int,
+    k: float,
+    start: float,
+    times: tuple[float, float],
+    limits: tuple[float, float],
+    *,
+    angle: bool,
+    moving: bool,
+) -> Law:
+    h = times[1] - times[0]
+    bound = np.inf if motor.max_force is None else float(motor.max_force)
+    if isinstance(motor, ForceMotor):
+        return Law(row, 0.0, start, multiplier=-motor.at(times[1]), adapts=False, is_motor=True)
+    if isinstance(motor, VelocityMotor):
+        # A limit stops the motor, also one without a largest force.
+        end = float(np.clip(start + h * motor.at(times[1]), *limits))
+        return Law(row, k, end, -bound, bound, is_motor=True)
+    assert isinstance(motor, PositionMotor)
+    target = motor.at(times[1])
+    ahead = start - target
+    if angle:
+        ahead = float(wrapped(np.asarray(ahead)))
+    rate = (target - motor.at(times[0])) / h if moving else 0.0
+    damping = motor.damping if moving else 0.0
+    multiplier = motor.stiffness * ahead - damping * rate
+    stiffness = motor.stiffness + damping / h
+    return Law(row, stiffness, start, -bound, bound, multiplier, adapts=False, is_motor=True)

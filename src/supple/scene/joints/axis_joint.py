@@ -1,0 +1,94 @@
+"""Joints with an axis and one coordinate: `HingeJoint` and `SliderJoint`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from supple.errors import SceneError
+from supple.scene.joints.joint import Joint
+from supple.scene.joints.motors import Motor
+from supple.scene.values import finite_vector, float_array
+
+# A range of angles has to leave a gap in the full turn, in which it is clear which end is nearer.
+LARGEST_RANGE = 2.0 * np.pi - 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class AxisJoint(Joint):
+    """A joint with one coordinate, which may be limited and driven.
+
+    Parameters
+    ----------
+    axis : (3,) its direction in the world where the scene places everything; it moves with the second.
+    limits : the smallest and the largest coordinate, (low, high); for a slider, an end may be infinite. None: no
+        limits.
+    motor : `PositionMotor`, `VelocityMotor` or `ForceMotor`; None: it moves freely.
+    """
+
+    axis: ArrayLike = (0.0, 0.0, 1.0)
+    limits: tuple[float, float] | None = None
+    motor: Motor | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        axis = finite_vector(self.axis, f"{self.label}: axis", nonzero=True)
+        object.__setattr__(self, "axis", axis / np.linalg.norm(axis))
+        if self.limits is not None:
+            object.__setattr__(self, "limits", self._checked_limits())
+        if self.motor is not None and not isinstance(self.motor, Motor):
+            raise SceneError(f"{self.label}: motor is {self.motor!r}; give PositionMotor(...) or another motor")
+
+    def _checked_limits(self) -> tuple[float, float]:
+        ends = float_array(self.limits, f"{self.label}: limits", "give two numbers (low, high)")
+        if ends.shape != (2,) or np.isnan(ends).any():
+            raise SceneError(f"{self.label}: limits is {self.limits!r}; give two numbers (low, high)")
+        low, high = float(ends[0]), float(ends[1])
+        if not low < high:
+            raise SceneError(
+                f"{self.label}: limits are ({low:g}, {high:g}), and the first is not below the second; exchange them, "
+                "or use a FixedJoint"
+            )
+        return low, high
+
+
+@dataclass(frozen=True, eq=False)
+class HingeJoint(AxisJoint):
+    """Two bodies that turn against each other about an axis; see `Joint` and `AxisJoint`.
+
+    The coordinate is the angle [rad] by which the first has turned about the axis against the second, within half a
+    turn of the middle of the limits. Limits are less than a turn apart.
+
+    Raises
+    ------
+    SceneError : where a value is of the wrong kind or out of range, there is no point, or both ends are one body.
+    """
+
+    kind: ClassVar[str] = "hinge"
+    needs_point: ClassVar[bool] = True
+
+    def _checked_limits(self) -> tuple[float, float]:
+        low, high = super()._checked_limits()
+        if not high - low <= LARGEST_RANGE:
+            raise SceneError(
+                f"{self.label}: limits are ({low:g}, {high:g}); give two angles that are at most {LARGEST_RANGE:.4g} "
+                "rad apart, or none"
+            )
+        return low, high
+
+
+@dataclass(frozen=True, eq=False)
+class SliderJoint(AxisJoint):
+    """Two bodies that shift against each other along an axis, and do not turn; see `Joint` and `AxisJoint`.
+
+    The coordinate is the travel [m] of the first along the axis against the second.
+
+    Raises
+    ------
+    SceneError : where a value is of the wrong kind or out of range, or both ends are one body.
+    """
+
+    kind: ClassVar[str] = "slider"

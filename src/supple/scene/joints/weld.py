@@ -1,0 +1,94 @@
+"""Welds: vertices of a soft body that are points of a rigid one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.errors import SceneError
+from supple.numerics.geometry.triangle_tree import TriangleTree
+from supple.scene.body import PlacedBody
+from supple.scene.located import at
+from supple.scene.rigid.rigid_body import RigidBody
+from supple.scene.selection import OnVertices, Selection
+from supple.scene.suggestion import suggestion
+from supple.scene.values import check_name, positive
+
+
+@dataclass(frozen=True, eq=False)
+class Weld(OnVertices):
+    """Vertices of a soft body that move with a rigid one as its points, from where the scene places them.
+
+    Parameters
+    ----------
+    body : name of the soft body.
+    rigid : name of the rigid body.
+    vertices : indices into the soft body's mesh, or an `InBox`.
+    max_distance : instead of `vertices`: all vertices of the soft body's surface that are no farther than this from the
+        rigid body's surface where the scene places both [m].
+    name : appears in messages, and in the forces of a report; a scene names unnamed welds by number.
+
+    Raises
+    ------
+    SceneError : where a value is of the wrong kind, or both or none of `vertices` and `max_distance` are given.
+    """
+
+    kind: ClassVar[str] = "weld"
+    takes_all: ClassVar[bool] = True
+
+    body: str
+    rigid: str
+    vertices: Selection | None = None
+    max_distance: float | None = None
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_name(self.rigid, f"{self.label}: rigid")
+        if (self.vertices is None) == (self.max_distance is None):
+            raise SceneError(f"{self.label}: give its vertices by either `vertices` or `max_distance`")
+        if self.max_distance is not None:
+            object.__setattr__(self, "max_distance", positive(self.max_distance, f"{self.label}: max_distance"))
+
+    def bodies_of(self, bodies: Mapping[str, PlacedBody]) -> tuple[PlacedBody, RigidBody]:
+        """The soft and the rigid body.
+
+        Raises
+        ------
+        SceneError : where one does not exist, or is of the other kind.
+        """
+        for key, name, rigid in (("body", self.body, False), ("rigid", self.rigid, True)):
+            with at(key):
+                if name not in bodies:
+                    raise SceneError(f"{self.label}: there is no body {name!r}; {suggestion(name, list(bodies))}")
+                if isinstance(bodies[name], RigidBody) != rigid:
+                    what = "soft" if rigid else "rigid"
+                    raise SceneError(f"{self.label}: body {name!r} is {what}; a weld is of a soft body to a rigid one")
+        soft, rigid_body = bodies[self.body], bodies[self.rigid]
+        assert isinstance(rigid_body, RigidBody)
+        return soft, rigid_body
+
+    def chosen(self, soft: PlacedBody, rigid: RigidBody) -> NDArray[np.int32]:
+        """The welded vertices (k,) of the soft body's mesh.
+
+        Raises
+        ------
+        SceneError : where there is none.
+        """
+        placed = soft.place(soft.mesh.vertices)
+        if self.max_distance is None:
+            return self.select(placed)
+        surface = np.unique(soft.mesh.surface.triangles).astype(np.int32)
+        tree = TriangleTree.of(rigid.place(rigid.points), rigid.triangles)
+        distances = tree.nearest(placed[surface])[1]
+        near = surface[distances <= self.max_distance]
+        if not len(near):
+            raise SceneError(
+                f"{self.label}: no vertex is within {self.max_distance:g} m of body {self.rigid!r}; the nearest is "
+                f"{distances.min():.3g} m away: move the bodies, or give a larger max_distance"
+            )
+        return near

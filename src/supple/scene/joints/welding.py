@@ -1,0 +1,74 @@
+"""All welds of a scene: which vertices are combinations of control points, and of which."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.errors import SceneError
+from supple.scene.body import PlacedBody
+from supple.scene.joints.weld import Weld
+from supple.scene.located import at
+from supple.scene.rotation import rotation_matrix
+
+
+@dataclass(frozen=True, eq=False)
+class Welding:
+    """Welded vertices x = sum w_k x_k, numbered as those of a system.
+
+    Attributes
+    ----------
+    vertices : (s,); control : (s, 4) control points of their rigid bodies; weights : (s, 4)
+    weld : (s,) the number of each one's weld
+    """
+
+    vertices: NDArray[np.int32]
+    control: NDArray[np.int32]
+    weights: NDArray[np.float64]
+    weld: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.vertices)
+
+    def follow(self, x: NDArray[np.float64]) -> None:
+        """Set the rows of welded vertices, in place, in positions or displacements x (n, 3) of all."""
+        if len(self):
+            x[self.vertices] = np.einsum("sk,ski->si", self.weights, x[self.control])
+
+
+def weld_together(welds: Sequence[Weld], bodies: Sequence[PlacedBody]) -> Welding:
+    """The welds of bodies in their scene's order.
+
+    Raises
+    ------
+    SceneError : where a weld has no vertex, or a vertex has two welds.
+    """
+    named = {body.name: body for body in bodies}
+    begins = dict(zip(named, np.cumsum([0, *(len(body.mesh.vertices) for body in bodies)]), strict=False))
+    vertices, control, weights, weld = [np.zeros(0, np.int32)], [np.zeros((0, 4), np.int32)], [np.zeros((0, 4))], []
+    for k, one in enumerate(welds):
+        with at("welds", k):
+            soft, rigid = one.bodies_of(named)
+            chosen = one.chosen(soft, rigid)
+            own = (chosen + begins[one.body]).astype(np.int32)
+            twice = np.isin(own, np.concatenate(vertices))
+            if twice.any():
+                raise SceneError(
+                    f"{one.label}: vertex {chosen[twice][0]} is already welded; name each vertex in one weld"
+                )
+            local = (soft.place(soft.mesh.vertices[chosen]) - np.asarray(rigid.position)) @ rotation_matrix(
+                rigid.rotation
+            )
+            vertices.append(own)
+            weights.append(rigid.weights_of(local))
+            control.append(np.tile(np.arange(4, dtype=np.int32) + np.int32(begins[one.rigid]), (len(own), 1)))
+            weld += [k] * len(own)
+    return Welding(
+        np.concatenate(vertices),
+        np.ascontiguousarray(np.concatenate(control)),
+        np.ascontiguousarray(np.concatenate(weights)),
+        np.array(weld, dtype=np.int64),
+    )

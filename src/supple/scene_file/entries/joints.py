@@ -1,0 +1,148 @@
+"""Joints and motors of a scene file, by `kind`, and welds."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from supple.scene.joints.axis_joint import HingeJoint, SliderJoint
+from supple.scene.joints.ball_joint import BallJoint
+from supple.scene.joints.fixed_joint import FixedJoint
+from supple.scene.joints.joint import Joint
+from supple.scene.joints.motors import ForceMotor, Motor, PositionMotor, VelocityMotor
+from supple.scene.joints.weld import Weld
+from supple.scene.located import at
+from supple.scene.selection import InBox
+from supple.scene_file.entries.loads import CurveModel, over_time
+from supple.scene_file.entries.selections import InBoxModel
+from supple.scene_file.model import Index, Model, Name, NonNegative, Number, Positive, Vector
+
+
+class PositionMotorModel(Model):
+    """Pulls the coordinate to a target: stiffness (target - q) + damping (rate of the target - rate of q)."""
+
+    kind: Literal["position"]
+    target: Number | CurveModel = Field(description="[rad] or [m], or a curve")
+    stiffness: NonNegative = Field(description="[N m/rad] or [N/m]")
+    damping: NonNegative = Field(default=0.0, description="[N m s/rad] or [N s/m]")
+    max_force: Positive | None = Field(default=None, description="largest torque [N m] or force [N]")
+
+    def build(self) -> Motor:
+        return PositionMotor(over_time(self.target, "target"), self.stiffness, self.damping, self.max_force)
+
+
+class VelocityMotorModel(Model):
+    """Gives the coordinate a rate, with at most the largest force."""
+
+    kind: Literal["velocity"]
+    target: Number | CurveModel = Field(description="[rad/s] or [m/s], or a curve")
+    max_force: Positive | None = Field(default=None, description="largest torque [N m] or force [N]")
+
+    def build(self) -> Motor:
+        return VelocityMotor(over_time(self.target, "target"), self.max_force)
+
+
+class ForceMotorModel(Model):
+    """A given torque or force."""
+
+    kind: Literal["force"]
+    force: Number | CurveModel = Field(description="[N m] or [N], or a curve")
+
+    def build(self) -> Motor:
+        return ForceMotor(over_time(self.force, "force"))
+
+
+MotorModel = Annotated[PositionMotorModel | VelocityMotorModel | ForceMotorModel, Field(discriminator="kind")]
+
+
+class _JointModel(Model):
+    first: Name = Field(description="name of a rigid body")
+    second: Name | None = Field(default=None, description="another rigid body, or an obstacle; without it, the world")
+    collide: bool = Field(default=False, description="whether the two touch each other")
+    name: Name | None = Field(default=None, description="in reports; default: kind and number")
+
+
+class FixedJointModel(_JointModel):
+    """No motion against each other."""
+
+    kind: Literal["fixed"]
+    point: Vector | None = Field(default=None, description="that torques are about; default: the first's center [m]")
+
+    def build(self) -> Joint:
+        return FixedJoint(**self.model_dump(exclude={"kind"}))
+
+
+class BallJointModel(_JointModel):
+    """A common point."""
+
+    kind: Literal["ball"]
+    point: Vector = Field(description="in the world at the start [m]")
+
+    def build(self) -> Joint:
+        return BallJoint(**self.model_dump(exclude={"kind"}))
+
+
+class _AxisJointModel(_JointModel):
+    axis: Vector = Field(description="direction in the world at the start")
+    limits: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = Field(
+        default=None, description="[smallest, largest] angle [rad] or travel [m]; at the start it is zero"
+    )
+    motor: MotorModel | None = None
+
+    def values(self) -> dict[str, Any]:
+        """The arguments of the joint."""
+        given = self.model_dump(exclude={"kind", "motor"})
+        with at("motor"):
+            return {**given, "motor": None if self.motor is None else self.motor.build()}
+
+
+class HingeJointModel(_AxisJointModel):
+    """A turn about an axis."""
+
+    kind: Literal["hinge"]
+    point: Vector = Field(description="on the axis, in the world at the start [m]")
+
+    def build(self) -> Joint:
+        return HingeJoint(**self.values())
+
+
+class SliderJointModel(_AxisJointModel):
+    """A shift along an axis, without a turn."""
+
+    kind: Literal["slider"]
+    point: Vector | None = Field(default=None, description="that torques are about; default: the first's center [m]")
+
+    def build(self) -> Joint:
+        return SliderJoint(**self.values())
+
+
+JointModel = Annotated[
+    FixedJointModel | BallJointModel | HingeJointModel | SliderJointModel, Field(discriminator="kind")
+]
+
+
+class WeldModel(Model):
+    """Vertices of a soft body that are points of a rigid one. Give `vertices`, `box` or `max_distance`."""
+
+    body: Name = Field(description="name of the soft body")
+    rigid: Name = Field(description="name of the rigid body")
+    vertices: list[Index] | None = Field(default=None, min_length=1, description="vertex numbers, from 0")
+    box: InBoxModel | None = Field(default=None, description="instead of `vertices`: all vertices inside")
+    max_distance: Positive | None = Field(
+        default=None, description="instead of `vertices`: all that are no farther from the rigid body's surface [m]"
+    )
+    name: Name | None = Field(default=None, description="in reports; default: kind and number")
+
+    @model_validator(mode="after")
+    def _one_selection(self) -> WeldModel:
+        if sum(value is not None for value in (self.vertices, self.box, self.max_distance)) != 1:
+            raise ValueError("give the vertices by one of `vertices`, `box` and `max_distance`")
+        return self
+
+    def build(self) -> Weld:
+        chosen: Any = self.vertices
+        if self.box is not None:
+            with at("box"):
+                chosen = InBox(self.box.low, self.box.high)
+        return Weld(self.body, self.rigid, chosen, self.max_distance, self.name)

@@ -1,0 +1,278 @@
+"""Joints of rigid bodies: pendulums, a gyroscope, a chain, limits, motors, reactions, and what is refused."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.special import ellipk
+
+import supple as sp
+from supple.implicit.joints.geometry import JointGeometry
+from supple.implicit.joints.joint_step import coordinates_at
+from supple.scene.rotation import rotation_matrix
+from supple.system import build_system, initial_state
+
+G = 9.81
+BAR = sp.shapes.box_surface((1.0, 0.05, 0.05), (1, 1, 1))
+MASS = 2.5
+
+
+def bar(name="bar", **values):
+    return sp.RigidBody(name, BAR, **({"density": 1000.0, "position": (0.5, 0, 0)} | values))
+
+
+def hinge(first="bar", second=None, **values):
+    return sp.HingeJoint(first, second, **({"point": (0, 0, 0), "name": "hinge"} | values))
+
+
+def run(scene, dt, steps, integrator="backward_euler", contact=None):
+    frames = list(sp.simulate(scene, sp.Implicit(integrator=integrator, contact=contact), dt, steps))
+    assert {frame.report.status for frame in frames} == {"converged"}
+    assert max(max(one.violation for one in frame.report.joints.values()) for frame in frames) < 1e-6
+    return frames
+
+
+def test_a_compound_pendulum_has_its_period():
+    """Released at 60 degrees; the exact period is that of the elliptic integral."""
+    a = np.radians(60.0)
+    down = np.array([np.sin(a), -np.cos(a), 0.0])
+    body = bar(position=0.5 * down, rotation=(0, 0, a - np.pi / 2))
+    frames = run(sp.Scene([body], joints=[hinge()]), 0.01, 100, "bdf2")
+    inertia = body.properties.inertia[2, 2] + 0.25 * MASS
+    quarter = np.sqrt(inertia / (MASS * G * 0.5)) * ellipk(np.sin(a / 2) ** 2)
+    sides = np.array([frame.poses["bar"].translation[0] for frame in frames])
+    at = np.flatnonzero(sides[1:] * sides[:-1] < 0.0)[0]
+    crossed = 0.01 * (at + 1 + sides[at] / (sides[at] - sides[at + 1]))
+    assert crossed == pytest.approx(quarter, rel=0.003)
+    # At the bottom, the hinge carries the weight and the centripetal force.
+    rate2 = 2.0 * MASS * G * 0.5 * (1.0 - np.cos(a)) / inertia
+    assert frames[at].report.joints["hinge"].force[1] == pytest.approx(MASS * (G + rate2 * 0.5), rel=0.01)
+
+
+def test_a_double_pendulum_keeps_its_energy():
+    scene = sp.Scene(
+        [bar("a"), bar("b", position=(1.5, 0, 0))],
+        joints=[hinge("a"), hinge("b", "a", point=(1, 0, 0), name="elbow")],
+    )
+    frames = run(scene, 0.005, 160, "bdf2")
+    energies = np.array([frame.report.kinetic_energy + frame.report.potential_energy for frame in frames])
+    assert np.ptp(energies) < 0.004 * np.ptp([frame.report.kinetic_energy for frame in frames])
+
+
+def test_a_gyroscope_precesses():
+    """With a horizontal axis the steady precession is m g l / (I w), exactly."""
+    length, spin = 0.1, 50.0
+    disk = sp.shapes.box_surface((0.2, 0.02, 0.2), (1, 1, 1))
+    inertia = sp.RigidBody("disk", disk, density=2700.0).properties
+    rate = inertia.mass * G * length / (inertia.inertia[1, 1] * spin)
+    body = sp.RigidBody(
+        "disk",
+        disk,
+        density=2700.0,
+        position=(length, 0, 0),
+        rotation=(0, 0, -np.pi / 2),
+        velocity=(0, 0, -rate * length),
+        angular_velocity=(spin, rate, 0),
+    )
+    frames = run(sp.Scene([body], joints=[sp.BallJoint("disk", point=(0, 0, 0))]), 1e-3, 200, "bdf2")
+    centers = np.array([frame.poses["disk"].translation for frame in frames])
+    angles = np.unwrap(np.arctan2(-centers[:, 2], centers[:, 0]))
+    assert (angles[-1] - angles[0]) / 0.199 == pytest.approx(rate, rel=0.01)
+    assert np.abs(centers[:, 1]).max() < 1e-3
+
+
+def chain(count, span):
+    """A scene of links of 0.1 m on a circular arc, and the places of the links' middles at equilibrium (count, 2)."""
+    ell = 0.1
+    link = sp.shapes.box_surface((ell, 0.01, 0.01), (1, 1, 1))
+    radius = brentq(lambda r: 2 * r * np.sin(count * np.arcsin(ell / (2 * r))) - span, 1.2 * count * ell / 6.2832, 99)
+    angles = (np.arange(count + 1) - count / 2) * 2 * np.arcsin(ell / (2 * radius))
+    nodes = np.column_stack([radius * np.sin(angles), -radius * np.cos(angles), 0 * angles])
+    bodies, joints = [], []
+    for i in range(count):
+        way = nodes[i + 1] - nodes[i]
+        place = {"position": 0.5 * (nodes[i] + nodes[i + 1]), "rotation": (0, 0, np.arctan2(way[1], way[0]))}
+        bodies.append(sp.RigidBody(f"{i}", link, density=1000.0, **place))
+        joints.append(sp.HingeJoint(f"{i}", f"{i - 1}" if i else None, point=nodes[i]))
+    joints.append(sp.HingeJoint(f"{count - 1}", point=nodes[-1]))
+    # Forces along a chain of equal links: the slope grows by the same from middle to middle.
+    rises = np.arange(count) - 0.5 * (count - 1)
+    slopes = rises / brentq(lambda pull: (ell / np.hypot(1.0, rises / pull)).sum() - span, 1e-3, 1e3)
+    steps = ell * np.column_stack([np.ones(count), slopes]) / np.hypot(1.0, slopes)[:, None]
+    return sp.Scene(bodies, joints=joints), nodes[0, :2] + np.cumsum(steps, axis=0) - 0.5 * steps
+
+
+@pytest.mark.parametrize("count", [6, pytest.param(20, marks=pytest.mark.slow)])
+def test_a_chain_hangs_in_its_catenary(count):
+    scene, expected = chain(count, 0.075 * count)
+    (frame,) = run(scene, 1.0, 1, "static")
+    found = np.array([pose.translation[:2] for pose in frame.poses.values()])
+    assert np.abs(found - expected).max() < 1e-3 * np.ptp(expected[:, 1])
+    weight = count * 0.01 * G
+    ends = [frame.report.joints[f"HingeJoint {k}"].force[1] for k in (1, count + 1)]
+    np.testing.assert_allclose(ends, weight / 2, rtol=1e-3)
+
+
+def test_joints_between_bodies_keep_momentum():
+    turning = np.array([0.0, 2.0, 3.0])
+    first = bar("a", angular_velocity=turning)
+    second = bar("b", position=(1.5, 0, 0), velocity=np.cross(turning, (0.5, 0, 0)))
+    for joint in (sp.BallJoint("a", "b", point=(1, 0, 0)), sp.FixedJoint("a", "b"), sp.SliderJoint("a", "b")):
+        frames = run(sp.Scene([first, second], joints=[joint], gravity=(0, 0, 0)), 0.005, 20, "bdf2")
+        P, L = (np.array([getattr(f.report, key) for f in frames]) for key in ("linear_momentum", "angular_momentum"))
+        assert np.abs(P - P[0]).max() < 1e-11 * np.linalg.norm(P[0])
+        # That of a free body, by the integrator: see docs/rigid_bodies.md.
+        assert np.abs(L - L[0]).max() < 1e-3 * np.linalg.norm(L[0])
+
+
+def test_what_the_fixed_joint_of_a_cantilever_carries():
+    scene = sp.Scene([bar()], joints=[sp.FixedJoint("bar", point=(0, 0, 0), name="clamp")])
+    clamp = run(scene, 0.01, 3)[-1].report.joints["clamp"]
+    np.testing.assert_allclose(clamp.force, [0, MASS * G, 0], atol=1e-4 * MASS * G)
+    np.testing.assert_allclose(clamp.torque, [0, 0, MASS * G * 0.5], atol=1e-4 * MASS * G)
+    assert (clamp.coordinate, clamp.motor_force) == (None, None)
+
+
+def test_a_slider_between_moving_bodies_slides():
+    """Pushed apart by a force along the axis, while both turn."""
+    motor = sp.ForceMotor(2.0)
+    spin = {"angular_velocity": (0, 0, 1)}
+    second = bar("b", position=(0.5, 0, 0.2), **spin)
+    scene = sp.Scene([bar("a", **spin), second], joints=[sp.SliderJoint("a", "b", motor=motor)], gravity=(0, 0, 0))
+    frames = run(scene, 0.01, 30)
+    # Backward Euler, along the axis about which both turn: each with the acceleration F / m.
+    n = 30
+    travel = frames[-1].report.joints["SliderJoint 1"].coordinate
+    assert travel == pytest.approx(2 * 0.5 * (2.0 / MASS) * 1e-4 * n * (n + 1), rel=1e-3)
+    turned = frames[-1].poses["a"].rotation.T @ frames[-1].poses["b"].rotation
+    np.testing.assert_allclose(turned, np.eye(3), atol=1e-6)
+
+
+LIMITS = (-0.4, 0.3)
+
+
+@pytest.mark.parametrize(
+    ("motor", "end"),
+    [
+        (None, LIMITS[0]),
+        (sp.PositionMotor(0.2, stiffness=1e4, damping=1e3), 0.2),
+        (sp.PositionMotor(0.2, stiffness=1e4, damping=1e2, max_force=10.0), LIMITS[0]),
+        (sp.VelocityMotor(sp.Curve([0.0, 0.3], [0.0, 1.0])), LIMITS[1]),
+        (sp.VelocityMotor(0.0, max_force=10.0), LIMITS[0]),
+        (sp.VelocityMotor(0.0, max_force=13.0), 0.0),
+        (sp.ForceMotor(lambda t: 20.0), LIMITS[1]),
+    ],
+)
+def test_motors_reach_their_targets_and_never_exceed_their_maximum_and_limits_hold(motor, end):
+    """The weight turns the hinge with 12.26 N m."""
+    frames = run(sp.Scene([bar()], joints=[hinge(limits=LIMITS, motor=motor)]), 0.01, 60)
+    readings = [frame.report.joints["hinge"] for frame in frames]
+    assert readings[-1].coordinate == pytest.approx(end, abs=2e-3)
+    assert all(LIMITS[0] - 1e-6 < one.coordinate < LIMITS[1] + 1e-6 for one in readings)
+    if motor is not None:
+        assert max(abs(one.motor_force) for one in readings) <= (motor.max_force or np.inf)
+        if motor.max_force == 10.0:  # on the way down
+            assert readings[10].motor_force == 10.0
+
+
+def test_a_velocity_motor_gives_its_rate_over_many_turns():
+    frames = run(sp.Scene([bar()], joints=[hinge(axis=(0, 1, 0), motor=sp.VelocityMotor(30.0))]), 0.01, 50)
+    angles = np.unwrap([frame.report.joints["hinge"].coordinate for frame in frames])
+    np.testing.assert_allclose(angles, 0.3 * np.arange(1, 51), atol=1e-5)
+
+
+def test_a_joint_follows_an_obstacle():
+    """A bar on the rim of a scripted wheel, clamped to it."""
+    wheel = sp.Sphere(radius=0.1, center=(-0.3, 0, 0), name="wheel", motion=sp.Keyframes([0, 1], angles=[0, 2.0]))
+    scene = sp.Scene([bar()], obstacles=[wheel], joints=[sp.FixedJoint("bar", "wheel")])
+    frame = run(scene, 0.02, 25, contact=sp.IPCContact())[-1]
+    R, t = wheel.pose(0.5)
+    np.testing.assert_allclose(frame.poses["bar"].translation, R @ (0.5, 0, 0) + t, atol=1e-5)
+    np.testing.assert_allclose(frame.poses["bar"].rotation, R, atol=1e-4)
+
+
+def test_joined_bodies_overlap_unless_they_shall_collide():
+    bodies = [bar("a", density=1000.0), bar("b", position=(1.45, 0, 0))]
+    joint = sp.HingeJoint("a", "b", point=(0.97, 0, 0))
+    run(sp.Scene(bodies, joints=[joint]), 0.01, 2, contact=sp.IPCContact())
+    touching = sp.HingeJoint("a", "b", point=(0.97, 0, 0), collide=True)
+    with pytest.raises(sp.SceneError, match="body 'a' overlaps body 'b' at the start"):
+        sp.simulate(sp.Scene(bodies, joints=[touching]), sp.Implicit(), 0.01, 1)
+
+
+def test_a_run_continues_with_the_same_bits():
+    scene = sp.Scene([bar()], joints=[hinge(limits=(-1.0, 1.0), motor=sp.VelocityMotor(1.0, max_force=9.0))])
+    solver = sp.Implicit(integrator="bdf2", contact=None)
+    whole = list(sp.simulate(scene, solver, 0.01, 6))
+    rest = list(sp.simulate(scene, solver, 0.01, 3, start=whole[2]))
+    np.testing.assert_array_equal(rest[-1].state.positions, whole[-1].state.positions)
+    assert rest[-1].report.joints["hinge"].motor_force == whole[-1].report.joints["hinge"].motor_force
+
+
+def test_coordinates_are_measured_from_where_the_scene_places_the_bodies():
+    body = bar()
+    scene = sp.Scene([body], joints=[hinge(limits=(0.5, 4.0))])
+    turned = body.place(body.points) @ rotation_matrix((0, 0, 3.5)).T
+    state = initial_state(scene, {"bar": turned})
+    assert coordinates_at(JointGeometry.of(build_system(scene)), state) == pytest.approx([3.5])
+
+
+SOFT = sp.Body("soft", sp.shapes.box((0.1, 0.1, 0.1), (1, 1, 1)), sp.StableNeoHookean(youngs=1e5, poisson=0.3))
+
+
+@pytest.mark.parametrize(
+    ("make", "problem"),
+    [
+        (lambda: hinge(second="bar"), "joint 'hinge': it joins body 'bar' to itself"),
+        (lambda: hinge(axis=(0, 0, 0)), "joint 'hinge': axis has no length"),
+        (lambda: hinge(limits=(1, -1)), "limits are (1, -1), and the first is not below the second"),
+        (lambda: hinge(limits=(-4, 4)), "at most 6.183 rad apart"),
+        (lambda: hinge(limits=(-4, np.inf)), "at most 6.183 rad apart"),
+        (lambda: hinge(limits=3), "give two numbers (low, high)"),
+        (lambda: hinge(motor=3.0), "motor is 3.0; give PositionMotor"),
+        (lambda: sp.BallJoint("bar"), "there is no point"),
+        (lambda: sp.BallJoint("bar", point=(0, 0)), "point has shape (2,)"),
+        (lambda: sp.PositionMotor(1.0, stiffness=0.0), "stiffness and damping are both zero"),
+        (lambda: sp.PositionMotor(1.0, stiffness=-1.0), "PositionMotor: stiffness is -1"),
+        (lambda: sp.VelocityMotor(1.0, max_force=0.0), "VelocityMotor: max_force is 0; it must be above zero"),
+        (lambda: sp.ForceMotor((1, 2, 3)), "ForceMotor: force has shape (3,)"),
+        (lambda: sp.Scene([bar()], joints=[hinge("bat")]), "there is no body 'bat'; did you mean 'bar'?"),
+        (lambda: sp.Scene([bar()], joints=[hinge(second="x")]), "there is no body or obstacle 'x'"),
+        (lambda: sp.Scene([SOFT], joints=[hinge("soft")]), "body 'soft' is soft; joints join rigid bodies"),
+        (lambda: sp.Scene([bar()], joints=[hinge(), hinge()]), "another joint has this name"),
+    ],
+)
+def test_bad_joints_are_refused_in_one_line(make, problem):
+    with pytest.raises(sp.SceneError) as error:
+        make()
+    assert problem in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("joints", "integrator", "problem"),
+    [
+        ([hinge()], "newmark", "joint 'hinge': the integrator 'newmark' does not support joints"),
+        ([hinge(motor=sp.VelocityMotor(1.0))], "static", "nothing moves, and its motor has a velocity"),
+        ([hinge(limits=(0.5, 1.0))], "bdf2", "at the start it is at 0 rad, outside of its limits (0.5, 1)"),
+    ],
+)
+def test_starts_without_sense_are_refused_in_one_line(joints, integrator, problem):
+    with pytest.raises((sp.SceneError, sp.SolverError)) as error:
+        sp.simulate(sp.Scene([bar()], joints=joints), sp.Implicit(integrator=integrator), 0.01, 1)
+    assert problem in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_a_start_at_which_the_sides_are_apart_is_refused():
+    body = bar()
+    moved = {"bar": body.points + np.array([0.6, 0.0, 0.0])}
+    with pytest.raises(sp.SceneError, match=r"joint 'hinge': at the start it is off by 0.1 m"):
+        sp.simulate(sp.Scene([body], joints=[hinge()]), sp.Implicit(), 0.01, 1, initial_positions=moved)
+
+
+def test_joints_that_contradict_each_other_are_named():
+    """A pin moves the body away from its hinge."""
+    scene = sp.Scene([bar()], joints=[hinge()], pins=[sp.Pin("bar", motion=lambda t: (t, 0, 0))])
+    with_hinge = list(sp.simulate(scene, sp.Implicit(contact=None, max_substeps=1), 0.01, 1))[-1].report
+    assert with_hinge.status == "iteration_limit"
+    assert with_hinge.message.startswith("joint 'hinge' is off by 1.00e-02 m: a pin")

@@ -1,0 +1,95 @@
+"""Joints in scene files, and in everything that reads or writes a run of one."""
+
+import pytest
+from jsonschema import Draft202012Validator
+
+import supple as sp
+from supple.cli.app import main
+from supple.scene_file.document import json_schema
+from supple.scene_file.loader import load_run
+from supple.scene_file.resolved import resolved_scene
+from supple.scene_file.yaml_reader import read_yaml
+
+BAR = (
+    "{name: %s, shape: {kind: box, size: [1, .05, .05], divisions: [1, 1, 1]}, rigid: {mass: 2}, position: [%g, 1, 0]}"
+)
+SCENE = f"""\
+bodies:
+  - {BAR % ("upper", 0.5)}
+  - {BAR % ("lower", 1.5)}
+  - {BAR % ("slide", 2.5)}
+  - {BAR % ("tool", 3.5)}
+joints:
+  - {{kind: ball, first: upper, point: [0, 1, 0], name: shoulder}}
+  - kind: hinge
+    first: lower
+    second: upper
+    point: [1, 1, 0]
+    axis: [0, 0, 2]
+    limits: [-1, 2]
+    motor: {{kind: position, target: {{times: [0, 1], values: [0, 0.5]}}, stiffness: 100, damping: 10, max_force: 8}}
+  - {{kind: slider, first: slide, second: lower, axis: [1, 0, 0], motor: {{kind: velocity, target: 1, max_force: 30}}}}
+  - {{kind: fixed, first: tool, second: slide}}
+solver: {{kind: implicit, contact: null}}
+dt: 0.01
+steps: 3
+"""
+
+
+@pytest.fixture
+def scene_file(tmp_path):
+    path = tmp_path / "arm.yaml"
+    path.write_text(SCENE)
+    return path
+
+
+def test_a_scene_file_describes_joints(scene_file):
+    run = load_run(scene_file)
+    shoulder, elbow, slider, fixed = run.scene.joints
+    assert [type(joint) for joint in run.scene.joints] == [sp.BallJoint, sp.HingeJoint, sp.SliderJoint, sp.FixedJoint]
+    assert [joint.name for joint in run.scene.joints] == ["shoulder", "HingeJoint 1", "SliderJoint 1", "FixedJoint 1"]
+    assert (elbow.first, elbow.second, elbow.axis.tolist(), elbow.limits) == ("lower", "upper", [0, 0, 1], (-1, 2))
+    assert (elbow.motor.at(0.5), elbow.motor.stiffness, elbow.motor.max_force) == (0.25, 100, 8)
+    assert (slider.motor.at(0), slider.motor.max_force) == (1, 30)
+    assert (shoulder.second, fixed.point) == (None, None)
+    data = read_yaml(scene_file).data
+    Draft202012Validator(json_schema()).validate(data)
+    again = scene_file.with_name("again.yaml")
+    again.write_text(str(resolved_scene(run, solver=None, dt=run.dt, steps=run.steps)["scene.yaml"]))
+    assert load_run(again).scene.joints[1].motor.at(0.5) == 0.25
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ("second: upper", "second: uper", ":10: joints[1].second: joint 'HingeJoint 1': there is no body or obstacle"),
+        ("limits: [-1, 2]", "limits: [2, -1]", ":13: joints[1].limits: "),
+        ("[0, 0, 2]", "[0, 0, 0]", ":12: joints[1].axis: "),
+        ("kind: velocity", "kind: speed", ":15: joints[2].motor"),
+        ("damping: 10", "damping: -1", ":14: joints[1].motor"),
+    ],
+)
+def test_bad_joints_are_refused_with_their_line(scene_file, old, new, problem):
+    scene_file.write_text(SCENE.replace(old, new))
+    with pytest.raises(sp.SceneError) as error:
+        load_run(scene_file)
+    assert problem in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_info_run_recording_and_check_know_joints(scene_file, tmp_path, capsys):
+    main(["info", str(scene_file)])
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "HingeJoint of lower and upper, from -1 to 2, PositionMotor of at most 8" in printed
+    assert "BallJoint of upper and the world" in printed
+    out = tmp_path / "out"
+    main(["run", str(scene_file), "-o", str(out), "--quiet"])
+    with sp.read_recording(out / "recording.vtkhdf") as recording:
+        details = recording[-1].report.details
+        assert set(details.joint_forces) == {"shoulder", "HingeJoint 1", "SliderJoint 1", "FixedJoint 1"}
+        assert recording[-1].report.joints["SliderJoint 1"].motor_force == 30.0
+        assert recording.physics.held_joints == 1
+        assert recording.physics.motors == 2
+    results = {result.name: result for result in sp.check_recording(out / "recording.vtkhdf").results}
+    assert results["momentum"].message == "joints hold bodies"
+    assert results["energy"].message == "motors do work"
