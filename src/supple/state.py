@@ -135,6 +135,10 @@ class State:
     inputs: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
 
+# The fields of `SolverDetails` with the work of actuators, by name [J].
+ACTUATOR_WORKS = ("cavity_work",)
+
+
 @dataclass(frozen=True, eq=False)
 class SolverDetails:
     """What one solver reports of a step beyond what all solvers do. Each solver has a subclass of its own.
@@ -146,9 +150,13 @@ class SolverDetails:
     Attributes
     ----------
     contacts : number of pairs in contact
+    cavity_pressure, cavity_volume, cavity_work : by name [Pa], [m^3], [J]; see `Report.cavities`
     """
 
     contacts: int = 0
+    cavity_pressure: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+    cavity_volume: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+    cavity_work: Mapping[str, float] = field(default_factory=dict, kw_only=True)
 
     def __eq__(self, other: object) -> bool:
         if type(self) is not type(other):

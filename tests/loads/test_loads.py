@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.implicit.energies.loads.pressure import pressures_at
+from supple.implicit.energies.loads.springs import springs_at
 from supple.implicit.energies.potential import HessianBlocks
-from supple.implicit.energies.pressure import pressures_at
-from supple.implicit.energies.springs import springs_at
 from supple.implicit.newton.objective import Objective
 from supple.system import build_system
 
@@ -31,7 +31,7 @@ def hessian_product(potential, system, x, d):
     blocks = HessianBlocks.zeros(len(system.tets), len(x))
     potential.add_hessian(x, blocks, False)
     out = np.einsum("nij,nj->ni", blocks.vertices, d)
-    for part in blocks.couplings:
+    for part in blocks.beyond_elements:
         part.add_product(d, out)
     return out
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from supple.scene.body import PlacedBody
 from supple.scene.forces import Force
 from supple.scene.loads.body_force import BodyForce
 from supple.scene.loads.load import Load
-from supple.scene.loads.over_time import OverTime, value_at
+from supple.scene.loads.over_time import OverTime, magnitude_at, value_at
 from supple.scene.loads.spring import Spring
 from supple.scene.loads.surface_loads import Pressure, Traction
 from supple.scene.rigid.rigid_body import RigidBody
@@ -103,14 +104,7 @@ def _spring(
     if given is None:
         length = made.length(x)[0]
         return PointSpring(made.vertices, made.coefficients, offset, spring.stiffness, lambda time: length)
-    at = _over_time(given, what, ())
-
-    def rest_length(time: float) -> float:
-        length = float(at(time))
-        if length < 0.0:
-            raise SceneError(f"{what}({time:g}) is {length:g}; it must be zero or more")
-        return length
-
+    rest_length = partial(magnitude_at, given, what=what)
     return PointSpring(made.vertices, made.coefficients, offset, spring.stiffness, rest_length)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.scene.actuators.cavity import Cavity
 from supple.scene.body import PlacedBody
 from supple.scene.contact_pairs import ContactPair, pair_table
 from supple.scene.forces import Force, SoftTarget
@@ -39,6 +40,7 @@ _PARTS = (
     ("contact_pairs", ContactPair),
     ("loads", Load),
     ("sensors", Sensor),
+    ("cavities", Cavity),
 )
 
 
@@ -56,6 +58,7 @@ class Scene:
     stitches : joints of bodies with each other, and with triangle obstacles.
     loads : tractions, pressures, forces per mass and springs between points.
     sensors : of contact on surfaces; no two have the same name.
+    cavities : closed inner surfaces filled with gas or liquid; no two have the same name.
     contact_pairs : friction of some pairs of bodies and obstacles, and which of them pass through each other.
 
     Raises
@@ -73,6 +76,7 @@ class Scene:
     contact_pairs: Sequence[ContactPair] = ()
     loads: Sequence[Load] = ()
     sensors: Sequence[Sensor] = ()
+    cavities: Sequence[Cavity] = ()
 
     def __post_init__(self) -> None:
         for key, kind in _PARTS:
@@ -110,6 +114,11 @@ class Scene:
                 sensor.triangles(self.bodies)
                 if any(other.name == sensor.name for other in self.sensors[:i]):
                     raise SceneError(f"{sensor.label}: another sensor has this name; give each a name of its own")
+        for i, cavity in enumerate(self.cavities):
+            with at("cavities", i):
+                cavity.surface(self.bodies)
+                if any(other.name == cavity.name for other in self.cavities[:i]):
+                    raise SceneError(f"{cavity.label}: another cavity has this name; give each a name of its own")
         if self.contact_pairs:
             pair_table(self)
         self.inputs  # noqa: B018 - raises where two have the same name

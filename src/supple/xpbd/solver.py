@@ -19,11 +19,13 @@ from supple.errors import SolverError
 from supple.numerics.interruption import interruption_point
 from supple.numerics.thread_tuning import ThreadTuner
 from supple.numerics.threads import numba_threads
+from supple.readings.actuator_readings import actuator_fields, start_of
 from supple.state import State, Status, StepReport
 from supple.system import Solver, System
 from supple.xpbd.assessment.assessment import Assessment
 from supple.xpbd.assessment.findings import Findings
 from supple.xpbd.assessment.surfaces import Overlap, crossings
+from supple.xpbd.constraints.actuators import ActuatorProjection
 from supple.xpbd.constraints.registry import build_constraint_sets
 from supple.xpbd.constraints.stitch_anchors import StitchAnchors
 from supple.xpbd.constraints.stitches import stitch_constraints
@@ -137,6 +139,7 @@ class XPBD(Solver):
             damping=make_damping(inner, layout, extended[:, 3]),
             momentum=MomentumRestore(inner) if self.momentum_restore else None,
             collisions=collisions,
+            actuators=ActuatorProjection(inner),
             guard=VolumeGuard(inner),
             fallback=RigidFallback(inner, collisions.skin),
             assessment=assessment,
@@ -244,6 +247,7 @@ class XPBD(Solver):
             held_back=held_back,
             contact_forces=pushes,
             friction_forces=friction,
+            **ws.actuators.fields(h * used.count),
         )
         world, surfaces = ws.world.copy(), ws.collisions.positions
         message = findings.message(time, self._remedy(ws, dt, findings, used.count))
@@ -278,6 +282,7 @@ class XPBD(Solver):
         ws.guard.guarded[:] = ws.assessment.begin(ws.moment(state.time), ws.guard.J, h, memory.ledger)
         ws.guard.accept()
         balance = ws.assessment.balance
+        ws.actuators.begin_frame(ws.points, ws.origins)
         damping = self._damping(ws, h)
         cycles = _cycles(substeps)
         if damping is not None:
@@ -298,6 +303,7 @@ class XPBD(Solver):
                 _push_contacts(ws, h)
             for constraints in ws.sets:
                 constraints.project(ws.extended, h, parallel)
+            ws.actuators.project(ws.points, ws.origins, end, h)
             restore(ws, h, parallel)
             ws.pace.note(parallel, perf_counter() - started)
             pull_to_targets(ws.system, ws.points, ws.velocities, ws.origins, end, h)
@@ -308,6 +314,7 @@ class XPBD(Solver):
             if collides:
                 ws.collisions.end_substep()
             balance.note_loads(ws.points, ws.previous, ws.origins, end, h)
+            balance.note_work(ws.actuators.end_substep(ws.points, ws.origins, h))
             balance.note_contacts(ws.collisions.contacts)
         return held_back
 
@@ -323,6 +330,7 @@ class XPBD(Solver):
             softening=dict.fromkeys((part.name for part in system.bodies), 0.0),
             contact_forces=pushes,
             friction_forces=friction,
+            **actuator_fields(system.actuators, *start_of(system)),
         )
 
 

@@ -11,6 +11,7 @@ from supple.numerics.thread_tuning import ThreadTuner
 from supple.system import System
 from supple.xpbd.assessment.assessment import Assessment
 from supple.xpbd.assessment.moment import Moment
+from supple.xpbd.constraints.actuators import ActuatorProjection
 from supple.xpbd.constraints.registry import ConstraintSet
 from supple.xpbd.constraints.stitch_anchors import StitchAnchors
 from supple.xpbd.contact.collisions import Collisions
@@ -43,6 +44,7 @@ class XPBDWorkspace:
     damping: Damping | None
     momentum: MomentumRestore | None
     collisions: Collisions
+    actuators: ActuatorProjection
     guard: VolumeGuard
     fallback: RigidFallback
     assessment: Assessment

@@ -157,6 +157,8 @@ def _scene(file: Path) -> None:
         text = f"{type(part.body.material).__name__}, {len(mesh.tets)} tets, {mesh.volume:.6g} m^3, {mass:.6g} kg"
         rows.append((f"body {part.name}", text))
         rows += _locking_rows(part.body)
+    for each in system.actuators:
+        rows.append((f"{each.kind} {each.name}", f"{each.start:.6g} m^3 at the start"))
     rows += _stitch_rows(system.stitching)
     print_table(rows, str(file))
 

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.implicit.energies.damping import Damping
-from supple.implicit.energies.external_forces import ExternalForces, total_forces
 from supple.implicit.energies.inertia import Inertia
 from supple.implicit.energies.inversion_barrier import inversion_barrier
+from supple.implicit.energies.loads.actuators import ActuatorPotential, actuators_at
+from supple.implicit.energies.loads.external_forces import ExternalForces, total_forces
+from supple.implicit.energies.loads.pressure import pressures_at
+from supple.implicit.energies.loads.soft_targets import soft_targets_at
+from supple.implicit.energies.loads.springs import springs_at
 from supple.implicit.energies.potential import Potential
-from supple.implicit.energies.pressure import pressures_at
-from supple.implicit.energies.soft_targets import soft_targets_at
-from supple.implicit.energies.springs import springs_at
 from supple.implicit.energies.stitch_damping import StitchDamping
 from supple.implicit.limits.inversion_guard import InversionGuard
 from supple.implicit.limits.step_limits import StepLimits
@@ -69,11 +71,15 @@ class StepSettings:
 
 @dataclass(frozen=True, eq=False)
 class Substep:
-    """The result of a step: the state at its end, the course of Newton's method, and the contact at the end."""
+    """The result of a step: the state at its end, the course of Newton's method, and the contact at the end.
+
+    actuators : generalized force of each actuator, as it acted in the step
+    """
 
     state: State
     outcome: Outcome
     contact: ContactStep
+    actuators: tuple[float, ...] = ()
 
 
 def take_substep(state: State, end: float, h: float, settings: StepSettings, workspace: Workspace) -> Substep:
@@ -89,7 +95,9 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     forces = total_forces(system, state.positions, middle)
     guard = InversionGuard.at(system, state.positions, settings.volume_kept)
     limits = StepLimits(guard, workspace.contact, tools.clock)
-    base = _objective(system, state.positions, middle, plan, forces, workspace)
+    mu = workspace.elasticity.material.mu
+    actuators = actuators_at(system, state.positions, middle, plan.scale, mu)
+    base = _objective(system, state.positions, middle, plan, forces, workspace, actuators)
     barrier = inversion_barrier(workspace.elasticity, guard.guarded, settings.barrier_onset)
     if barrier is not None:
         base = replace(base, terms=[*base.terms, barrier])
@@ -125,11 +133,18 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     after = settings.integrator.finish(plan, state, after, residual, workspace.conservation)
     if plan.place != 1.0 and system.rigid_bodies and outcome.status is Status.CONVERGED:
         after = rigid_ends(system, state, after, limits)
-    return Substep(after, outcome, contact)
+    acted = state.positions + plan.place * (x - state.positions)
+    return Substep(after, outcome, contact, tuple(actuator.force(acted) for actuator in actuators))
 
 
 def _objective(
-    system: System, x: NDArray[np.float64], time: float, plan: Plan, forces: NDArray[np.float64], workspace: Workspace
+    system: System,
+    x: NDArray[np.float64],
+    time: float,
+    plan: Plan,
+    forces: NDArray[np.float64],
+    workspace: Workspace,
+    actuators: Sequence[ActuatorPotential],
 ) -> Objective:
     """All but contact and the inversion barrier, with the loads of `time` [s]; energies of loads are zero at x."""
     terms: list[Potential] = [workspace.elasticity]
@@ -141,6 +156,7 @@ def _objective(
         terms.append(soft_targets_at(system, time))
     terms += pressures_at(system, x, time)
     terms += springs_at(system, time)
+    terms += actuators
     if plan.scale is not None and workspace.viscosity is not None:
         terms.append(Damping(workspace.viscosity, plan.strain_rate(workspace.viscosity)))
     if plan.scale is not None and workspace.stitch_viscosity is not None:

@@ -23,7 +23,7 @@ NAMES = {
     "volume": "nearly incompressible bodies keep at least half of their volume",
     "momentum": "without loads, momentum changes by gravity alone",
     "spin": "without loads, angular momentum about the center of mass does not grow",
-    "energy": "where nothing does work, energy does not grow",
+    "energy": "energy does not grow by more than the work of actuators, where nothing else does work",
     "records": "recorded determinants, energies and momenta are those of the recorded positions and velocities",
 }
 

@@ -35,6 +35,8 @@ def scene_hash(system: System, begin: float, duration: float) -> str:
             _add(digest, _forces_of(load, system, time) if _is_script(force.force) else None)
         for load in system.loads[len(system.scene.forces) :]:
             _add(digest, _forces_of(load, system, time))
+        for actuator in system.actuators:
+            _add(digest, actuator.law.reached(time, actuator.start, 1.0))
         for target in system.soft_targets:
             _add(digest, target.targets(time) if _is_script(target.target.motion) else None)
         for obstacle in system.obstacles:

@@ -13,7 +13,7 @@ from supple.errors import SceneError
 from supple.mesh.skin import Embedding
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import Load, body_of
-from supple.scene.loads.over_time import Curve, OverTime, checked_over_time
+from supple.scene.loads.over_time import OverTime, checked_magnitude
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.values import check_name, finite_vector, positive
 
@@ -55,12 +55,7 @@ class Spring(Load):
             raise SceneError(f"{self.label}: both ends are fixed in the world; give at least one point of a body")
         object.__setattr__(self, "stiffness", positive(self.stiffness, f"{self.label}: stiffness"))
         if self.rest_length is not None:
-            what = f"{self.label}: rest_length"
-            given = checked_over_time(self.rest_length, what, ())
-            known = given.values if isinstance(given, Curve) else () if callable(given) else given
-            lowest = np.min(np.asarray(known, dtype=np.float64), initial=np.inf)
-            if lowest < 0.0:
-                raise SceneError(f"{what} is {lowest:g}; it must be zero or more")
+            given = checked_magnitude(self.rest_length, f"{self.label}: rest_length")
             object.__setattr__(self, "rest_length", given)
 
     @property

@@ -24,7 +24,8 @@ class CurveModel(Model):
     values: list[Number] | list[Vector] = Field(min_length=1, description="one per time")
 
 
-def _over_time(value: Any, key: str) -> Any:
+def over_time(value: Any, key: str) -> Any:
+    """A value of a scene file, or the `Curve` that it describes."""
     if isinstance(value, CurveModel):
         with at(key):
             return Curve(value.times, value.values)
@@ -53,7 +54,7 @@ class TractionModel(OnSurfaceModel):
     traction: Vector | CurveModel = Field(description="[N/m^2], or a curve")
 
     def build(self) -> Load:
-        return Traction(self.body, _over_time(self.traction, "traction"), self.region(), self.name)
+        return Traction(self.body, over_time(self.traction, "traction"), self.region(), self.name)
 
 
 class PressureModel(OnSurfaceModel):
@@ -63,7 +64,7 @@ class PressureModel(OnSurfaceModel):
     pressure: Number | CurveModel = Field(description="[Pa], or a curve")
 
     def build(self) -> Load:
-        return Pressure(self.body, _over_time(self.pressure, "pressure"), self.region(), self.name)
+        return Pressure(self.body, over_time(self.pressure, "pressure"), self.region(), self.name)
 
 
 class BodyForceModel(Model):
@@ -75,7 +76,7 @@ class BodyForceModel(Model):
     name: Name | None = Field(default=None, description="used in messages")
 
     def build(self) -> Load:
-        return BodyForce(_over_time(self.force, "force"), self.body, self.name)
+        return BodyForce(over_time(self.force, "force"), self.body, self.name)
 
 
 class PointModel(Model):
@@ -104,7 +105,7 @@ class SpringModel(Model):
     name: Name | None = Field(default=None, description="used in messages")
 
     def build(self) -> Load:
-        rest_length = _over_time(self.rest_length, "rest_length")
+        rest_length = over_time(self.rest_length, "rest_length")
         return Spring(self.first.point(), self.second.point(), self.stiffness, rest_length, self.name)
 
 

@@ -104,6 +104,10 @@ class EnergyBalance:
             longer, shorter = soft.targets(end) - x, soft.targets(end - h) - x
             self._work += 0.5 * soft.target.stiffness * float((longer**2).sum() - (shorter**2).sum())
 
+    def note_work(self, work: float) -> None:
+        """Add work that is known [J]."""
+        self._work += work
+
     def note_contacts(self, count: int) -> None:
         """Take notice of the number of contacts in a substep."""
         if count and self._obstacles_move:
