@@ -44,6 +44,7 @@ from .output.recording.reader import read_recording as read_recording
 from .output.recording.recorder import Recorder as Recorder
 from .runs.resume import resume as resume
 from .runs.run_folder import RunFolder as RunFolder
+from .scene.actuators.cable import Cable as Cable
 from .scene.actuators.cavity import Cavity as Cavity
 from .scene.actuators.gas import Gas as Gas
 from .scene.body import Body as Body

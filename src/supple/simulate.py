@@ -19,7 +19,7 @@ from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.elastic_tets.stress import energy_densities
 from supple.numerics.deformation import deformation_gradients, determinants
 from supple.numerics.memory import require_memory
-from supple.readings.actuator_readings import CavityReading, cavity_readings
+from supple.readings.actuator_readings import CableReading, CavityReading, cable_readings, cavity_readings
 from supple.readings.frame_readings import FrameReadings
 from supple.scene.inputs import checked_values, drive_inputs, hold_inputs
 from supple.scene.rigid.pose import Pose, pose_of
@@ -84,6 +84,11 @@ class Report(Diagnostics):
     def cavities(self) -> Mapping[str, CavityReading]:
         """By name, the pressure [Pa] and volume [m^3] of each cavity, and its work over the frame [J]."""
         return cavity_readings(self.details)
+
+    @property
+    def cables(self) -> Mapping[str, CableReading]:
+        """By name, the tensions [N] and the length [m] of each cable, and its work over the frame [J]."""
+        return cable_readings(self.details)
 
 
 @dataclass(frozen=True, eq=False)

@@ -136,7 +136,7 @@ class State:
 
 
 # The fields of `SolverDetails` with the work of actuators, by name [J].
-ACTUATOR_WORKS = ("cavity_work",)
+ACTUATOR_WORKS = ("cavity_work", "cable_work")
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,12 +151,17 @@ class SolverDetails:
     ----------
     contacts : number of pairs in contact
     cavity_pressure, cavity_volume, cavity_work : by name [Pa], [m^3], [J]; see `Report.cavities`
+    cable_tension, cable_length, cable_work : by name, with ".k" for span k of the first one [N], [m], [J]; see
+        `Report.cables`
     """
 
     contacts: int = 0
     cavity_pressure: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     cavity_volume: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     cavity_work: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+    cable_tension: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+    cable_length: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+    cable_work: Mapping[str, float] = field(default_factory=dict, kw_only=True)
 
     def __eq__(self, other: object) -> bool:
         if type(self) is not type(other):

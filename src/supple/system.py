@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.loads.actuators.actuator import Actuator
-from supple.loads.actuators.build import cavity_actuator
+from supple.loads.actuators.build import actuators_of
 from supple.loads.applied import AppliedLoad, DeadLoad
 from supple.loads.build import applied, applied_force
 from supple.materials.edges_and_volume import EdgesAndVolume
@@ -110,7 +110,7 @@ class System:
     components : (n,) the connected piece of a mesh that a vertex belongs to
     gravity : (3,) [m/s^2]
     loads : those of the scene's forces, then of its loads
-    actuators : those of the scene's cavities
+    actuators : those of the scene's cavities, then of its cables
     stitching : tets and springs that join bodies to each other, and to obstacles
     start_states : where a simulation began, then where it continues; vertices in the scene's order
     """
@@ -246,7 +246,7 @@ def build_system(scene: Scene, start: State | None = None) -> System:
         gravity=np.asarray(scene.gravity, dtype=np.float64),
         points=EmbeddedPoints.joined(points),
         loads=(*forces, *loads),
-        actuators=tuple(cavity_actuator(cavity, scene.bodies, begins, x_start) for cavity in scene.cavities),
+        actuators=actuators_of(scene.cavities, scene.cables, scene.bodies, begins, x_start),
         soft_targets=tuple(SoftTargetRange(item, *_anchored(item, ranges, start)) for item in scene.soft_targets),
         stitching=scene.stitching,
         start_states=start_states,

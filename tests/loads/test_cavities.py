@@ -38,7 +38,7 @@ def test_gradients_and_hessians_have_slope_two(cavity):
     x = system.rest_positions + 0.005 * rng.normal(size=system.rest_positions.shape)
     d = rng.normal(size=x.shape)
     mu = np.full(len(system.tets), MU)
-    (potential,) = actuators_at(system, system.rest_positions, 0.0, 1e-4, mu)
+    (potential,) = actuators_at(system, system.rest_positions, (0.0, 0.01), 1e-4, mu)
     assert isinstance(potential, ActuatorPotential)
 
     def gradient(at):

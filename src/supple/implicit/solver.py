@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from supple.errors import SolverError
 from supple.implicit.contact.build import contact_model
@@ -199,7 +198,7 @@ class Implicit(Solver):
             reaction_forces=reaction_forces(system, zero)[0],
             orthogonality_errors=dict.fromkeys((part.name for part in system.rigid_bodies), 0.0),
             seconds=dict.fromkeys((*PARTS, "other"), 0.0),
-            **actuator_fields(system.actuators, *start_of(system)),
+            **actuator_fields(system, *start_of(system)),
         )
 
     def step(self, system: System, state: State, dt: float, workspace: Workspace) -> tuple[State, StepReport]:
@@ -230,8 +229,8 @@ class Implicit(Solver):
         substeps = 0
         worst, message = Status.CONVERGED, ""
         last: Substep | None = None
-        forces, works = np.zeros(len(system.actuators)), np.zeros(len(system.actuators))
-        values = _actuator_values(system, now)
+        forces, parts, works = start_of(system)
+        parts = [each.parts(now.positions) for each in system.actuators]
         while not substepping.over:
             # For a small scene all at once: changing the number of threads takes longer than its kernels.
             with threads_for(len(system.tets), SERIAL_TETS):
@@ -245,9 +244,9 @@ class Implicit(Solver):
                 if not worst.can_go_on:
                     break
             now, last = taken.state, taken
-            before, values = values, _actuator_values(system, now)
-            forces = np.array(taken.actuators)
-            works += forces * (values - before)
+            before, parts = parts, [each.parts(now.positions) for each in system.actuators]
+            forces = list(taken.actuators)
+            works = [w + Q * (s - t) for w, Q, s, t in zip(works, forces, parts, before, strict=True)]
             substeps += 1
             substepping.advance()
         now = replace(now, positions=now.positions[:n], velocities=now.velocities[:n])
@@ -258,15 +257,10 @@ class Implicit(Solver):
             totals, by_vertex = reaction_forces(system, last.outcome.end.gradient / last.contact.weight)
             details = replace(details, reaction_forces=totals, reaction_forces_by_vertex=by_vertex)
             details, nearest, contacts = last.contact.measured(details, last.state.positions)
-        details = replace(details, **actuator_fields(system.actuators, forces, values, works))
+        details = replace(details, **actuator_fields(system, forces, parts, works))
         errors = orthogonality_errors(system, now.positions)
         details = replace(details, orthogonality_errors=errors, seconds=workspace.tools.clock.shares())
         return now, StepReport(worst, details.newton_iterations, message, nearest, details, contacts)
-
-
-def _actuator_values(system: System, state: State) -> NDArray[np.float64]:
-    """The coordinates of all actuators."""
-    return np.array([each.value(state.positions) for each in system.actuators])
 
 
 def _limit_message(message: str, substepping: Substepping) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.scene.actuators.cable import Cable
 from supple.scene.actuators.cavity import Cavity
 from supple.scene.body import PlacedBody
 from supple.scene.contact_pairs import ContactPair, pair_table
@@ -41,6 +42,7 @@ _PARTS = (
     ("loads", Load),
     ("sensors", Sensor),
     ("cavities", Cavity),
+    ("cables", Cable),
 )
 
 
@@ -58,7 +60,8 @@ class Scene:
     stitches : joints of bodies with each other, and with triangle obstacles.
     loads : tractions, pressures, forces per mass and springs between points.
     sensors : of contact on surfaces; no two have the same name.
-    cavities : closed inner surfaces filled with gas or liquid; no two have the same name.
+    cavities : closed inner surfaces filled with gas or liquid; cables : through points of bodies. No two cavities and
+        no two cables have the same name.
     contact_pairs : friction of some pairs of bodies and obstacles, and which of them pass through each other.
 
     Raises
@@ -77,6 +80,7 @@ class Scene:
     loads: Sequence[Load] = ()
     sensors: Sequence[Sensor] = ()
     cavities: Sequence[Cavity] = ()
+    cables: Sequence[Cable] = ()
 
     def __post_init__(self) -> None:
         for key, kind in _PARTS:
@@ -112,13 +116,15 @@ class Scene:
         for i, sensor in enumerate(self.sensors):
             with at("sensors", i):
                 sensor.triangles(self.bodies)
-                if any(other.name == sensor.name for other in self.sensors[:i]):
-                    raise SceneError(f"{sensor.label}: another sensor has this name; give each a name of its own")
+                _check_own_name("sensor", sensor, self.sensors[:i])
         for i, cavity in enumerate(self.cavities):
             with at("cavities", i):
                 cavity.surface(self.bodies)
-                if any(other.name == cavity.name for other in self.cavities[:i]):
-                    raise SceneError(f"{cavity.label}: another cavity has this name; give each a name of its own")
+                _check_own_name("cavity", cavity, self.cavities[:i])
+        for i, cable in enumerate(self.cables):
+            with at("cables", i):
+                cable.corners(self.bodies)
+                _check_own_name("cable", cable, self.cables[:i])
         if self.contact_pairs:
             pair_table(self)
         self.inputs  # noqa: B018 - raises where two have the same name
@@ -190,6 +196,11 @@ class Scene:
             if body.name == name:
                 return body
         raise SceneError(f"scene: there is no body {name!r}; there are {', '.join(repr(b.name) for b in self.bodies)}")
+
+
+def _check_own_name(kind: str, item: Cavity | Cable | Sensor, others: Sequence[Cavity | Cable | Sensor]) -> None:
+    if any(other.name == item.name for other in others):
+        raise SceneError(f"{item.label}: another {kind} has this name; give each a name of its own")
 
 
 def _name(kind: type) -> str:

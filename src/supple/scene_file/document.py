@@ -7,8 +7,9 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from supple.readings.fields import FIELDS
+from supple.scene_file.entries.actuators.cables import CableModel
+from supple.scene_file.entries.actuators.cavities import CavityModel
 from supple.scene_file.entries.bodies import BodyModel
-from supple.scene_file.entries.cavities import CavityModel
 from supple.scene_file.entries.contact_pairs import ContactPairModel
 from supple.scene_file.entries.loads import LoadModel
 from supple.scene_file.entries.obstacles import ObstacleModel
@@ -71,6 +72,7 @@ class SceneFileModel(Model):
     forces: list[ForceModel] = Field(default=[], max_length=10_000)
     loads: list[LoadModel] = Field(default=[], max_length=10_000)
     cavities: list[CavityModel] = Field(default=[], max_length=10_000)
+    cables: list[CableModel] = Field(default=[], max_length=10_000)
     sensors: list[SensorModel] = Field(default=[], max_length=10_000)
     soft_targets: list[SoftTargetModel] = Field(default=[], max_length=10_000)
     contact_pairs: list[ContactPairModel] = Field(default=[], max_length=10_000)

@@ -303,11 +303,12 @@ class XPBD(Solver):
                 _push_contacts(ws, h)
             for constraints in ws.sets:
                 constraints.project(ws.extended, h, parallel)
-            ws.actuators.project(ws.points, ws.origins, end, h)
+            ws.actuators.project_within(ws.points, ws.origins, end, h)
             restore(ws, h, parallel)
             ws.pace.note(parallel, perf_counter() - started)
             pull_to_targets(ws.system, ws.points, ws.velocities, ws.origins, end, h)
             pull_springs(ws.system, ws.points, ws.velocities, ws.origins, end, h)
+            ws.actuators.project_between(ws.points, ws.velocities, ws.origins, end, h)
             if collides and not collide(ws, end, h, parallel):
                 break
             held_back += keep_volumes(ws, end, h, parallel)
@@ -330,7 +331,7 @@ class XPBD(Solver):
             softening=dict.fromkeys((part.name for part in system.bodies), 0.0),
             contact_forces=pushes,
             friction_forces=friction,
-            **actuator_fields(system.actuators, *start_of(system)),
+            **actuator_fields(system, *start_of(system)),
         )
 
 

@@ -158,7 +158,8 @@ def _scene(file: Path) -> None:
         rows.append((f"body {part.name}", text))
         rows += _locking_rows(part.body)
     for each in system.actuators:
-        rows.append((f"{each.kind} {each.name}", f"{each.start:.6g} m^3 at the start"))
+        unit = "m^3" if each.kind == "cavity" else "m"
+        rows.append((f"{each.kind} {each.name}", f"{each.start:.6g} {unit} at the start"))
     rows += _stitch_rows(system.stitching)
     print_table(rows, str(file))
 

@@ -20,7 +20,8 @@ from supple.system import System
 
 @dataclass(frozen=True, eq=False)
 class FreeMotion:
-    """The pieces of a system that nothing holds: no pin, soft target, spring to the world or stitch to an obstacle.
+    """The pieces of a system that nothing holds: no pin, soft target, stitch to an obstacle, or spring or cable to the
+    world.
 
     Stitched bodies are one piece.
 
@@ -44,6 +45,9 @@ class FreeMotion:
         for load in system.loads:
             if isinstance(load, PointSpring) and load.is_anchored:
                 held[components[load.vertices]] = True
+        for actuator in system.actuators:
+            if actuator.coordinate.is_anchored:
+                held[components[actuator.coordinate.vertices]] = True
         number = np.where(held, -1, np.cumsum(~held) - 1)
         piece = number[components].astype(np.int32)
         inside = piece >= 0

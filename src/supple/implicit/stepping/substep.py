@@ -73,13 +73,13 @@ class StepSettings:
 class Substep:
     """The result of a step: the state at its end, the course of Newton's method, and the contact at the end.
 
-    actuators : generalized force of each actuator, as it acted in the step
+    actuators : generalized forces of each actuator, as they acted in the step
     """
 
     state: State
     outcome: Outcome
     contact: ContactStep
-    actuators: tuple[float, ...] = ()
+    actuators: tuple[NDArray[np.float64], ...] = ()
 
 
 def take_substep(state: State, end: float, h: float, settings: StepSettings, workspace: Workspace) -> Substep:
@@ -96,7 +96,7 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     guard = InversionGuard.at(system, state.positions, settings.volume_kept)
     limits = StepLimits(guard, workspace.contact, tools.clock)
     mu = workspace.elasticity.material.mu
-    actuators = actuators_at(system, state.positions, middle, plan.scale, mu)
+    actuators = actuators_at(system, state.positions, (state.time, middle), plan.scale, mu)
     base = _objective(system, state.positions, middle, plan, forces, workspace, actuators)
     barrier = inversion_barrier(workspace.elasticity, guard.guarded, settings.barrier_onset)
     if barrier is not None:
@@ -134,7 +134,7 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     if plan.place != 1.0 and system.rigid_bodies and outcome.status is Status.CONVERGED:
         after = rigid_ends(system, state, after, limits)
     acted = state.positions + plan.place * (x - state.positions)
-    return Substep(after, outcome, contact, tuple(actuator.force(acted) for actuator in actuators))
+    return Substep(after, outcome, contact, tuple(actuator.forces(acted) for actuator in actuators))
 
 
 def _objective(

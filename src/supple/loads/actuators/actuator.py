@@ -17,7 +17,7 @@ from supple.numerics.sparse.couplings import Couplings
 
 
 class Coordinate(ABC):
-    """A number s that the positions of some vertices determine.
+    """A number s that the positions of some vertices determine, the sum of one or more parts.
 
     Attributes
     ----------
@@ -26,21 +26,37 @@ class Coordinate(ABC):
 
     vertices: NDArray[np.int32]
 
+    @property
+    def is_anchored(self) -> bool:
+        """Whether s depends on places that are fixed in the world."""
+        return False
+
     @abstractmethod
     def renumbered(self, new: NDArray[np.int32]) -> Self:
         """The same where vertex i has the number new[i]."""
 
     @abstractmethod
+    def parts(self, own: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(p,)"""
+
+    @abstractmethod
+    def part_gradients(self, own: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(p, v, 3)"""
+
+    @abstractmethod
+    def hessian(self, own: NDArray[np.float64], factors: NDArray[np.float64], project: bool) -> Couplings | None:
+        """The sum of `factors` (p,) times the second derivatives of the parts.
+
+        With `project`, the part of it that is known to be positive semi-definite.
+        """
+
     def value(self, own: NDArray[np.float64]) -> float:
         """s"""
+        return float(self.parts(own).sum())
 
-    @abstractmethod
     def gradient(self, own: NDArray[np.float64]) -> NDArray[np.float64]:
         """(v, 3) of s"""
-
-    @abstractmethod
-    def hessian(self, own: NDArray[np.float64], factor: float, project: bool) -> Couplings | None:
-        """`factor` times the second derivative of s; with `project`, the part known to be positive semi-definite."""
+        return self.part_gradients(own).sum(axis=0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,9 +65,10 @@ class Actuator:
 
     Attributes
     ----------
-    kind : "cavity"; name : of it in the scene
+    kind : "cavity" or "cable"; name : of it in the scene
     coordinate : s; start : s where the simulation began; law : of the generalized force Q, positive where it increases
         s, so that Q ds is the work on the bodies
+    friction : at the eyelets of a cable
     """
 
     kind: str
@@ -59,10 +76,11 @@ class Actuator:
     coordinate: Coordinate
     start: float
     law: Law
+    friction: float = 0.0
 
-    def value(self, x: NDArray[np.float64]) -> float:
-        """s at the positions x (n, 3) of all vertices [m]."""
-        return self.coordinate.value(x[self.coordinate.vertices])
+    def parts(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(p,) of s at the positions x (n, 3) of all vertices [m]."""
+        return self.coordinate.parts(x[self.coordinate.vertices])
 
     def renumbered(self, new: NDArray[np.int32]) -> Actuator:
         """The same actuator where vertex i has the number new[i]."""

@@ -34,6 +34,12 @@ class EnclosedVolume(Coordinate):
     def renumbered(self, new: NDArray[np.int32]) -> EnclosedVolume:
         return replace(self, vertices=new[self.vertices])
 
+    def parts(self, own: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.array([self.value(own)])
+
+    def part_gradients(self, own: NDArray[np.float64]) -> NDArray[np.float64]:
+        return self.gradient(own)[None]
+
     def value(self, own: NDArray[np.float64]) -> float:
         return float(_volume(own, self.triangles))
 
@@ -42,13 +48,13 @@ class EnclosedVolume(Coordinate):
         _add_gradient(own, self.triangles, out)
         return out
 
-    def hessian(self, own: NDArray[np.float64], factor: float, project: bool) -> Couplings | None:
+    def hessian(self, own: NDArray[np.float64], factors: NDArray[np.float64], project: bool) -> Couplings | None:
         """It has no diagonal, so that no part of it is definite."""
-        if project or factor == 0.0:
+        if project or factors[0] == 0.0:
             return None
         i, j, k = self.triangles.T
         a, b, c = (own[corner] - own[0] for corner in (i, j, k))
-        blocks = factor / 6.0 * cross_matrices(np.concatenate([c, a, b]))
+        blocks = factors[0] / 6.0 * cross_matrices(np.concatenate([c, a, b]))
         rows, columns = np.concatenate([i, j, k]), np.concatenate([j, k, i])
         return Couplings(self.vertices[rows], self.vertices[columns], blocks)
 

@@ -118,6 +118,37 @@ class GivenValue(Law):
 
 
 @dataclass(frozen=True)
+class Stretch(ForceLaw):
+    """A cable of the stiffness k that is `length` long without tension: k/2 max(s - length, 0)^2."""
+
+    k: float
+    length: float
+
+    def energy(self, s: float) -> float:
+        return 0.5 * self.k * max(s - self.length, 0.0) ** 2
+
+    def force(self, s: float) -> float:
+        return -self.k * max(s - self.length, 0.0)
+
+    def stiffness(self, s: float) -> float:
+        return self.k if s > self.length else 0.0
+
+
+@dataclass(frozen=True)
+class ElasticCable(Law):
+    """A cable with its length without tension as a function of time."""
+
+    k: float
+    length: Callable[[float], float]
+
+    def at(self, time: float, penalty: float) -> ForceLaw:
+        return Stretch(self.k, self.length(time))
+
+    def reached(self, time: float, s: float, mobility: float) -> float:
+        return -self.k * max(s - self.length(time), 0.0) / (1.0 + self.k * mobility)
+
+
+@dataclass(frozen=True)
 class GasPressure(ForceLaw):
     """p = c / V0 (V0 / V)^gamma - ambient, with c = n R T [J]."""
 

@@ -73,7 +73,7 @@ def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
     return {
         "laws": [law.__name__ for law in ELASTIC_MATERIALS],
         "compliances": compliances,
-        "forces": len(system.loads),
+        "forces": len(system.loads) + sum(each.coordinate.is_anchored for each in system.actuators),
         "soft_targets": len(system.soft_targets),
         "scripted_pins": sum(part.pin.motion is not None for part in system.pins),
         "stitches": len(system.stitching),

@@ -9,7 +9,8 @@ from pydantic import Field
 from supple.scene.loads.body_force import BodyForce
 from supple.scene.loads.load import Load, Region
 from supple.scene.loads.over_time import Curve
-from supple.scene.loads.spring import Point, Spring
+from supple.scene.loads.points import Point
+from supple.scene.loads.spring import Spring
 from supple.scene.loads.surface_loads import Pressure, Traction
 from supple.scene.located import at
 from supple.scene.selection import InBox

@@ -305,6 +305,7 @@ def without_body(scene: Scene, name: str) -> Scene:
         forces=[force for force in scene.forces if force.body != name],
         loads=[load for load in scene.loads if name not in load.bodies],
         cavities=[cavity for cavity in scene.cavities if name not in cavity.bodies],
+        cables=[cable for cable in scene.cables if name not in cable.bodies],
         sensors=[sensor for sensor in scene.sensors if sensor.body != name],
         soft_targets=[target for target in scene.soft_targets if target.body != name],
         stitches=[stitch for stitch in scene.stitches if name not in (stitch.first, stitch.second)],
