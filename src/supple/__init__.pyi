@@ -54,6 +54,7 @@ from .scene.forces import SoftTarget as SoftTarget
 from .scene.inputs import ForceInput as ForceInput
 from .scene.inputs import MotionInput as MotionInput
 from .scene.loads.body_force import BodyForce as BodyForce
+from .scene.loads.muscle import Muscle as Muscle
 from .scene.loads.over_time import Curve as Curve
 from .scene.loads.spring import Spring as Spring
 from .scene.loads.surface_loads import Pressure as Pressure

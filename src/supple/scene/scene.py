@@ -58,7 +58,7 @@ class Scene:
     gravity : (3,) acceleration [m/s^2].
     forces : loads on vertices; soft_targets : springs to places.
     stitches : joints of bodies with each other, and with triangle obstacles.
-    loads : tractions, pressures, forces per mass and springs between points.
+    loads : tractions, pressures, forces per mass, springs between points, and muscles.
     sensors : of contact on surfaces; no two have the same name.
     cavities : closed inner surfaces filled with gas or liquid; cables : through points of bodies. No two cavities and
         no two cables have the same name.

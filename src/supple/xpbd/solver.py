@@ -33,7 +33,7 @@ from supple.xpbd.contact.collisions import Collisions
 from supple.xpbd.contact.settings import XPBDContact
 from supple.xpbd.damping.kelvin_voigt import Damping, ViscousMemory, cycle_lengths, make_damping
 from supple.xpbd.details import XPBDDetails
-from supple.xpbd.external_forces import add_forces, pull_springs, pull_to_targets
+from supple.xpbd.external_forces import ExternalForces
 from supple.xpbd.integration import (
     apply_changes,
     first_lost,
@@ -139,6 +139,7 @@ class XPBD(Solver):
             damping=make_damping(inner, layout, extended[:, 3]),
             momentum=MomentumRestore(inner) if self.momentum_restore else None,
             collisions=collisions,
+            loads=ExternalForces(inner),
             actuators=ActuatorProjection(inner),
             guard=VolumeGuard(inner),
             fallback=RigidFallback(inner, collisions.skin),
@@ -296,7 +297,7 @@ class XPBD(Solver):
                 moving = ws.anchors.velocities(end - h, h)
                 damping.begin_cycle(ws.extended, ws.velocities, moving, cycles[k], h, parallel)
             _begin_substep(ws, targets[k], end, h, parallel)
-            add_forces(ws.system, ws.points, ws.velocities, ws.origins, end, h)
+            ws.loads.add_forces(ws.points, ws.velocities, ws.origins, end, h)
             if damping is not None:
                 damping.push(ws.points, h)
             if collides:
@@ -306,8 +307,8 @@ class XPBD(Solver):
             ws.actuators.project_within(ws.points, ws.origins, end, h)
             restore(ws, h, parallel)
             ws.pace.note(parallel, perf_counter() - started)
-            pull_to_targets(ws.system, ws.points, ws.velocities, ws.origins, end, h)
-            pull_springs(ws.system, ws.points, ws.velocities, ws.origins, end, h)
+            ws.loads.pull_to_targets(ws.points, ws.velocities, ws.origins, end, h)
+            ws.loads.pull_springs(ws.points, ws.velocities, ws.origins, end, h)
             ws.actuators.project_between(ws.points, ws.velocities, ws.origins, end, h)
             if collides and not collide(ws, end, h, parallel):
                 break

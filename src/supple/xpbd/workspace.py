@@ -16,6 +16,7 @@ from supple.xpbd.constraints.registry import ConstraintSet
 from supple.xpbd.constraints.stitch_anchors import StitchAnchors
 from supple.xpbd.contact.collisions import Collisions
 from supple.xpbd.damping.kelvin_voigt import Damping
+from supple.xpbd.external_forces import ExternalForces
 from supple.xpbd.limits.rigid_fallback import RigidFallback
 from supple.xpbd.limits.volume_guard import VolumeGuard
 from supple.xpbd.momentum import MomentumRestore
@@ -44,6 +45,7 @@ class XPBDWorkspace:
     damping: Damping | None
     momentum: MomentumRestore | None
     collisions: Collisions
+    loads: ExternalForces
     actuators: ActuatorProjection
     guard: VolumeGuard
     fallback: RigidFallback

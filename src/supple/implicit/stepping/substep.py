@@ -13,6 +13,7 @@ from supple.implicit.energies.inertia import Inertia
 from supple.implicit.energies.inversion_barrier import inversion_barrier
 from supple.implicit.energies.loads.actuators import ActuatorPotential, actuators_at
 from supple.implicit.energies.loads.external_forces import ExternalForces, total_forces
+from supple.implicit.energies.loads.muscles import muscles_at
 from supple.implicit.energies.loads.pressure import pressures_at
 from supple.implicit.energies.loads.soft_targets import soft_targets_at
 from supple.implicit.energies.loads.springs import springs_at
@@ -156,6 +157,7 @@ def _objective(
         terms.append(soft_targets_at(system, time))
     terms += pressures_at(system, x, time)
     terms += springs_at(system, time)
+    terms += muscles_at(system, time)
     terms += actuators
     if plan.scale is not None and workspace.viscosity is not None:
         terms.append(Damping(workspace.viscosity, plan.strain_rate(workspace.viscosity)))
