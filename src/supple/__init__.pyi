@@ -55,6 +55,9 @@ from .output.recording.reader import read_recording as read_recording
 from .output.recording.recorder import Recorder as Recorder
 from .runs.resume import resume as resume
 from .runs.run_folder import RunFolder as RunFolder
+from .scene.actuators.cable import Cable as Cable
+from .scene.actuators.cavity import Cavity as Cavity
+from .scene.actuators.gas import Gas as Gas
 from .scene.body import Body as Body
 from .scene.contact_pairs import ContactPair as ContactPair
 from .scene.forces import Force as Force
@@ -70,6 +73,7 @@ from .scene.joints.motors import PositionMotor as PositionMotor
 from .scene.joints.motors import VelocityMotor as VelocityMotor
 from .scene.joints.weld import Weld as Weld
 from .scene.loads.body_force import BodyForce as BodyForce
+from .scene.loads.muscle import Muscle as Muscle
 from .scene.loads.over_time import Curve as Curve
 from .scene.loads.spring import Spring as Spring
 from .scene.loads.surface_loads import Pressure as Pressure

@@ -25,6 +25,7 @@ from supple.materials.elastic_tets.stress import (
 )
 from supple.materials.flows.internal import checked
 from supple.numerics.memory import require_memory
+from supple.readings.actuator_readings import CableReading, CavityReading, cable_readings, cavity_readings
 from supple.readings.frame_readings import FrameReadings
 from supple.readings.joint_readings import JointReading, joint_readings
 from supple.scene.inputs import checked_values, drive_inputs, hold_inputs
@@ -90,6 +91,16 @@ class Report(DisplayedReport, Diagnostics):
     def joints(self) -> Mapping[str, JointReading]:
         """What every joint does, by name."""
         return joint_readings(self.details)
+
+    @property
+    def cavities(self) -> Mapping[str, CavityReading]:
+        """By name, the pressure [Pa] and volume [m^3] of each cavity, and its work over the frame [J]."""
+        return cavity_readings(self.details)
+
+    @property
+    def cables(self) -> Mapping[str, CableReading]:
+        """By name, the tensions [N] and the length [m] of each cable, and its work over the frame [J]."""
+        return cable_readings(self.details)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -139,6 +139,10 @@ class State:
     internal: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 11)))
 
 
+# The fields of `SolverDetails` with the work of actuators, by name [J].
+ACTUATOR_WORKS = ("cavity_work", "cable_work")
+
+
 @dataclass(frozen=True, eq=False)
 class SolverDetails:
     """What one solver reports of a step beyond what all solvers do. Each solver has a subclass of its own.
@@ -150,9 +154,18 @@ class SolverDetails:
     Attributes
     ----------
     contacts : number of pairs in contact
+    cavity_pressure, cavity_volume, cavity_work : by name [Pa], [m^3], [J]; see `Report.cavities`
+    cable_tension, cable_length, cable_work : by name, with ".k" for span k of the first one [N], [m], [J]; see
+        `Report.cables`
     """
 
     contacts: int = 0
+    cavity_pressure: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+    cavity_volume: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+    cavity_work: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+    cable_tension: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+    cable_length: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+    cable_work: Mapping[str, float] = field(default_factory=dict, kw_only=True)
 
     def __eq__(self, other: object) -> bool:
         if type(self) is not type(other):

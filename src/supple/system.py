@@ -17,6 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
+from supple.loads.actuators.actuator import Actuator
+from supple.loads.actuators.build import actuators_of
 from supple.loads.applied import AppliedLoad, DeadLoad
 from supple.loads.build import applied, applied_force
 from supple.materials.edges_and_volume import EdgesAndVolume
@@ -111,6 +113,7 @@ class System:
     components : (n,) the connected piece of a mesh that a vertex belongs to
     gravity : (3,) [m/s^2]
     loads : those of the scene's forces, then of its loads
+    actuators : those of the scene's cavities, then of its cables
     stitching : tets and springs that join bodies to each other, and to obstacles
     start_states : where a simulation began, then where it continues; vertices in the scene's order
     quadratic : the quadratic ones among the tets, of which `tets` and `rest_shape_inverse` have the corners; or None
@@ -131,6 +134,7 @@ class System:
     gravity: NDArray[np.float64]
     points: EmbeddedPoints = field(default_factory=EmbeddedPoints.none)
     loads: tuple[AppliedLoad, ...] = ()
+    actuators: tuple[Actuator, ...] = ()
     soft_targets: tuple[SoftTargetRange, ...] = ()
     stitching: Stitching = field(default_factory=lambda: no_stitching(0))
     start_states: tuple[State, ...] = ()
@@ -242,7 +246,8 @@ def build_system(scene: Scene, start: State | None = None) -> System:
     all_masses, start_states = np.concatenate(masses), _start_states(scene, start)
     begins = {part.name: part.vertices.start for part in ranges}
     forces = [_applied_force(force, next(part for part in ranges if part.name == force.body)) for force in scene.forces]
-    given = [applied(load, scene.bodies, begins, all_masses, start_states[0].positions) for load in scene.loads]
+    x_start = start_states[0].positions
+    given = [applied(load, scene.bodies, begins, all_masses, x_start) for load in scene.loads]
     loads = [load for parts in given for load in parts]
     return System(
         scene=scene,
@@ -260,6 +265,7 @@ def build_system(scene: Scene, start: State | None = None) -> System:
         gravity=np.asarray(scene.gravity, dtype=np.float64),
         points=EmbeddedPoints.joined(points),
         loads=(*forces, *loads),
+        actuators=actuators_of(scene.cavities, scene.cables, scene.bodies, begins, x_start),
         soft_targets=tuple(SoftTargetRange(item, *_anchored(item, ranges, start)) for item in scene.soft_targets),
         stitching=scene.stitching,
         start_states=start_states,

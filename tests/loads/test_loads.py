@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.implicit.energies.loads.pressure import pressures_at
+from supple.implicit.energies.loads.springs import springs_at
 from supple.implicit.energies.potential import HessianBlocks
-from supple.implicit.energies.pressure import pressures_at
-from supple.implicit.energies.springs import springs_at
 from supple.implicit.newton.objective import Objective
 from supple.system import build_system
 
@@ -31,7 +31,7 @@ def hessian_product(potential, system, x, d):
     blocks = HessianBlocks.zeros(len(system.tets), len(x))
     potential.add_hessian(x, blocks, False)
     out = np.einsum("nij,nj->ni", blocks.vertices, d)
-    for part in blocks.couplings:
+    for part in blocks.beyond_elements:
         part.add_product(d, out)
     return out
 
@@ -266,12 +266,13 @@ AT = ("bar", (0.1, 0.0, 0.0))
         (lambda: sp.Spring(AT, ("bar", 0), 1.0, rest_length=-0.1), "rest_length is -0.1; it must be zero or more"),
         (lambda: sp.Curve([0, 0], [1, 2]), "does not come after"),
         (lambda: sp.Curve([0, 1], [1, 2, 3]), "give 2 numbers or vectors"),
+        (lambda: sp.Pressure("rigid", 1.0), "pressure on body 'rigid': the body is rigid, and pressure acts on soft"),
         (lambda: 3.0, "loads.0. is a float; give a Load"),
     ],
 )
 def test_bad_loads_are_one_line(make, message):
     with pytest.raises(sp.SceneError, match=message) as error:
-        sp.Scene([bar()], loads=[make()])
+        sp.Scene([bar(), sp.RigidBody("rigid", BAR, density=1, position=(1, 0, 0))], loads=[make()])
     assert "\n" not in str(error.value)
 
 

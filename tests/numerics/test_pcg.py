@@ -149,3 +149,19 @@ def test_groups_are_of_about_equal_size_and_hold_one_component():
     assert sorted(np.concatenate(groups)) == list(range(1000))
     assert all(len(set(labels[g])) == 1 for g in groups)
     assert max(len(g) for g in groups) <= 1.5 * min(len(g) for g in groups if labels[g[0]] == 0)
+
+
+def test_vectors_over_all_rows_cost_no_iterations():
+    pattern, preconditioner, data = beam_problem()
+    rng = np.random.default_rng(1)
+    b = rng.normal(size=(pattern.rows, 3))
+    plain = conjugate_gradients(data, preconditioner, b, np.zeros_like(b), 1e-10, 500)
+    # As stiff as a liquid that fills the body: the matrix alone has eigenvalues of about 1.
+    low_rank = np.stack([1e3 * rng.normal(size=b.shape), 0.1 * rng.normal(size=b.shape)])
+    x = np.zeros_like(b)
+    result = conjugate_gradients(data, preconditioner, b, x, 1e-10, 500, low_rank)
+    assert result.converged
+    assert result.iterations <= plain.iterations + 5
+    G = low_rank.reshape(2, -1).T
+    residual = pattern.to_scipy(data) @ x.ravel() + G @ (G.T @ x.ravel()) - b.ravel()
+    assert np.abs(residual).max() < 1e-6 * np.abs(b).max()

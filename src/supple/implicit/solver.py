@@ -39,6 +39,7 @@ from supple.materials.flows.internal import checked
 from supple.materials.per_tet import NO_REGION
 from supple.numerics.noninverting_step import KEEP
 from supple.numerics.threads import threads_for
+from supple.readings.actuator_readings import actuator_fields, start_of
 from supple.scene.scene import Scene
 from supple.state import State, Status, StepReport
 from supple.system import Solver, System
@@ -218,6 +219,7 @@ class Implicit(Solver):
             orthogonality_errors=dict.fromkeys((part.name for part in system.rigid_bodies), 0.0),
             **initial_joint_details(workspace.joints),
             seconds=dict.fromkeys((*PARTS, "other"), 0.0),
+            **actuator_fields(system, *start_of(system)),
         )
 
     def step(self, system: System, state: State, dt: float, workspace: Workspace) -> tuple[State, StepReport]:
@@ -249,6 +251,8 @@ class Implicit(Solver):
         substeps = 0
         worst, message = Status.CONVERGED, ""
         last: Substep | None = None
+        forces, parts, works = start_of(system)
+        parts = [each.parts(now.positions) for each in system.actuators]
         while not substepping.over:
             # For a small scene all at once: changing the number of threads takes longer than its kernels.
             with threads_for(len(system.tets), SERIAL_TETS):
@@ -262,6 +266,9 @@ class Implicit(Solver):
                 if not worst.can_go_on:
                     break
             now, last = taken.state, taken
+            before, parts = parts, [each.parts(now.positions) for each in system.actuators]
+            forces = list(taken.actuators)
+            works = [w + Q * (s - t) for w, Q, s, t in zip(works, forces, parts, before, strict=True)]
             substeps += 1
             substepping.advance()
         now = replace(now, positions=now.positions[:n], velocities=now.velocities[:n])
@@ -278,6 +285,7 @@ class Implicit(Solver):
             details, nearest, contacts = last.contact.measured(details, last.state.positions)
             if last.joints is not None:
                 details = last.joints.measured(details, last.outcome.end.positions)
+        details = replace(details, **actuator_fields(system, forces, parts, works))
         errors = orthogonality_errors(system, now.positions)
         details = replace(details, orthogonality_errors=errors, seconds=workspace.tools.clock.shares())
         return now, StepReport(worst, details.newton_iterations, message, nearest, details, contacts)

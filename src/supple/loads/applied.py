@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,14 @@ from supple.scene.loads.body_force import BodyForce
 
 
 class AppliedLoad(ABC):
-    """A load, with the numbers of the vertices that it acts on."""
+    """A load, with the numbers of the vertices that it acts on.
+
+    Attributes
+    ----------
+    is_internal : whether its forces act between vertices of one body, so that they change no momentum
+    """
+
+    is_internal: ClassVar[bool] = False
 
     @abstractmethod
     def renumbered(self, new: NDArray[np.int32]) -> Self:

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
 from supple.loads.applied import AppliedLoad, DeadLoad, MassLoad
+from supple.loads.muscles import FibreTension
 from supple.loads.pressure import FollowerPressure, area_vectors
 from supple.loads.springs import PointSpring
 from supple.scene.body import PlacedBody
 from supple.scene.forces import Force
 from supple.scene.loads.body_force import BodyForce
 from supple.scene.loads.load import Load
-from supple.scene.loads.over_time import OverTime, value_at
+from supple.scene.loads.muscle import Muscle, check_activation
+from supple.scene.loads.over_time import OverTime, magnitude_at, value_at
 from supple.scene.loads.spring import Spring
 from supple.scene.loads.surface_loads import Pressure, Traction
-from supple.scene.rigid.rigid_body import RigidBody
 
 
 def applied(
@@ -51,10 +53,6 @@ def applied(
         return [_on_points(body, begins[load.body], touched, lambda time: shares[touched, None] * at(time))]
     if isinstance(load, Pressure):
         body = named[load.body]
-        if isinstance(body, RigidBody):
-            raise SceneError(
-                f"{load.label}: body {load.body!r} is rigid, and pressure acts on soft ones; give a Traction"
-            )
         at, begin = _over_time(load.pressure, f"{load.label}: pressure", ()), begins[load.body]
         return [
             FollowerPressure((triangles + begin).astype(np.int32), lambda time, weight=weight: weight * float(at(time)))
@@ -67,6 +65,8 @@ def applied(
         return [MassLoad(load, vertices, masses[vertices])]
     if isinstance(load, Spring):
         return [_spring(load, bodies, begins, x)]
+    if isinstance(load, Muscle):
+        return [_muscle(load, named[load.body], begins[load.body])]
     raise SceneError(f"{load.label}: a {type(load).__name__} is not a load that solvers know")
 
 
@@ -105,6 +105,29 @@ def _on_points(
     return DeadLoad((vertices + begin).astype(np.int32), lambda time: weights.T @ forces(time))
 
 
+def _muscle(muscle: Muscle, body: PlacedBody, begin: int) -> FibreTension:
+    rows, directions = muscle.fibres(body)
+    inner = np.einsum("mki,mi->mk", body.mesh.rest_shape_inverse[rows], directions)
+    coefficients = np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)
+    what = f"{muscle.label}: activation"
+
+    def activation(time: float) -> float:
+        value = magnitude_at(muscle.activation, time, what)
+        check_activation(value, f"{what}({time:g})")
+        return value
+
+    stretches, values = muscle.force_length or ([1.0], [1.0])
+    return FibreTension(
+        muscle.body,
+        rows,
+        (body.mesh.tets[rows] + begin).astype(np.int32),
+        coefficients,
+        muscle.strength * body.mesh.volumes[rows],
+        activation,
+        (np.asarray(stretches, dtype=np.float64), np.asarray(values, dtype=np.float64)),
+    )
+
+
 def _spring(
     spring: Spring, bodies: Sequence[PlacedBody], begins: dict[str, int], x: NDArray[np.float64]
 ) -> PointSpring:
@@ -123,14 +146,7 @@ def _spring(
     if given is None:
         length = made.length(x)[0]
         return PointSpring(made.vertices, made.coefficients, offset, spring.stiffness, lambda time: length)
-    at = _over_time(given, what, ())
-
-    def rest_length(time: float) -> float:
-        length = float(at(time))
-        if length < 0.0:
-            raise SceneError(f"{what}({time:g}) is {length:g}; it must be zero or more")
-        return length
-
+    rest_length = partial(magnitude_at, given, what=what)
     return PointSpring(made.vertices, made.coefficients, offset, spring.stiffness, rest_length)
 
 

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.loads.applied import AppliedLoad
+from supple.numerics.geometry.cross_matrices import cross_matrices
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,14 +80,6 @@ class SweptTriangles:
         A corner has none with itself: W is linear in it.
         """
         i, j, k = self.triangles.T
-        B, C, turn = -_cross_matrices(self.first), _cross_matrices(self.second), -_cross_matrices(self.sum) / 3.0
+        B, C, turn = -cross_matrices(self.first), cross_matrices(self.second), -cross_matrices(self.sum) / 3.0
         blocks = np.concatenate([2.0 * B + C + turn, C - B + turn, -B - 2.0 * C + turn]) / 6.0
         return np.concatenate([i, j, k]), np.concatenate([j, k, i]), blocks
-
-
-def _cross_matrices(v: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(k, 3, 3) the matrices of w -> v x w for v (k, 3)."""
-    out = np.zeros((len(v), 3, 3))
-    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -v[:, 2], v[:, 1], -v[:, 0]
-    out[:, 1, 0], out[:, 2, 0], out[:, 2, 1] = v[:, 2], -v[:, 1], v[:, 0]
-    return out

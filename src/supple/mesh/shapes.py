@@ -7,10 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.errors import MeshError
 from supple.mesh.primitives import gummy_bear as bear
 from supple.mesh.primitives.curved import of_order
 from supple.mesh.primitives.gummy_bear import gummy_bear_surface
 from supple.mesh.primitives.isosurface_stuffing import stuff
+from supple.mesh.primitives.layers import tets_between_layers
 from supple.mesh.primitives.sizes import check_torus, counts, fits, lengths, not_too_many, positive
 from supple.mesh.primitives.surfaces import sphere_surface, torus_surface
 from supple.mesh.surface import SurfaceMesh
@@ -25,6 +27,7 @@ __all__ = [
     "gummy_bear_surface",
     "sphere",
     "sphere_surface",
+    "spherical_shell",
     "torus",
     "torus_surface",
 ]
@@ -82,6 +85,31 @@ def sphere(radius: float = 0.5, edge_length: float = 0.1, order: int = 1) -> Tet
     return of_order(mesh, order, lambda x: x * (radius / np.linalg.norm(x, axis=1))[:, None])
 
 
+def spherical_shell(inner_radius: float = 0.3, outer_radius: float = 0.5, edge_length: float = 0.1) -> TetMesh:
+    """A hollow ball: layers of prisms over the triangles of a sphere, each of three tets.
+
+    Parameters
+    ----------
+    inner_radius, outer_radius : [m]
+    edge_length : approximate length of edges on the outer surface and across the wall [m], at most `inner_radius`
+
+    Raises
+    ------
+    MeshError : where a length is not positive, the inner radius is not the smaller one, or the edge is too long.
+    """
+    owner = "spherical_shell"
+    positive(owner, inner_radius=inner_radius, outer_radius=outer_radius, edge_length=edge_length)
+    if inner_radius >= outer_radius:
+        raise MeshError(f"{owner}: inner_radius = {inner_radius:g} m is not below outer_radius = {outer_radius:g} m")
+    fits(owner, edge_length, "inner_radius", inner_radius)
+    surface = sphere_surface(1.0, edge_length / outer_radius)
+    layers = max(1, round((outer_radius - inner_radius) / edge_length))
+    not_too_many(owner, 3.0 * layers * len(surface.triangles), "make edge_length longer")
+    radii = np.linspace(inner_radius, outer_radius, layers + 1)
+    points = (radii[:, None, None] * surface.vertices).reshape(-1, 3)
+    return TetMesh(points, tets_between_layers(surface.triangles, len(surface.vertices), layers))
+
+
 def torus(radius: float = 0.5, tube_radius: float = 0.2, edge_length: float = 0.1, order: int = 1) -> TetMesh:
     """A ring around the y axis, of well-shaped tets.
 
@@ -133,11 +161,6 @@ def cylinder(radius: float = 0.5, height: float = 1.0, edge_length: float = 0.1,
     points = np.empty((layers + 1, n, 3))
     points[:, :, 0], points[:, :, 2] = radius * disk[:, 0], radius * disk[:, 1]
     points[:, :, 1] = np.linspace(-0.5 * height, 0.5 * height, layers + 1)[:, None]
-    # The quad between two columns is cut from the bottom of the lower-numbered one, so that neighbours agree.
-    a0, a1, a2 = np.sort(triangles, axis=1).T
-    b0, b1, b2 = a0 + n, a1 + n, a2 + n
-    layer = np.concatenate([np.column_stack(t) for t in ((a0, a1, a2, b2), (a0, a1, b1, b2), (a0, b0, b1, b2))])
-    tets = layer[None] + n * np.arange(layers)[:, None, None]
 
     def onto(x: NDArray[np.float64]) -> NDArray[np.float64]:
         # In the middle of an edge between two of the outermost columns; edges of the ends may be farther inside.
@@ -146,7 +169,7 @@ def cylinder(radius: float = 0.5, height: float = 1.0, edge_length: float = 0.1,
         scale = np.where(outermost, radius / np.maximum(distance, 0.1 * radius), np.nan)
         return np.column_stack([scale * x[:, 0], x[:, 1], scale * x[:, 2]])
 
-    return of_order(TetMesh(points.reshape(-1, 3), tets.reshape(-1, 4)), order, onto)
+    return of_order(TetMesh(points.reshape(-1, 3), tets_between_layers(triangles, n, layers)), order, onto)
 
 
 def gummy_bear(height: float = 1.0, edge_length: float = 0.08, order: int = 1) -> TetMesh:

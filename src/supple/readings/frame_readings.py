@@ -52,7 +52,7 @@ class FrameReadings(TetReadings):
         for pin in self.system.pins:
             self.first_piola[pin.pin.body]  # raises where it is not defined
         P = self.first_piola.values_of_all
-        return balanced_reactions(self.system, self._x, self.state.time, P, self.contacts)
+        return balanced_reactions(self.system, self._x, self.state.time, P, self.contacts, self.report.details)
 
     @cached_property
     def sensors(self) -> dict[str, Reading]:

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
-from supple.state import ContactPoints
+from supple.readings.actuator_readings import add_actuator_forces
+from supple.state import ContactPoints, SolverDetails
 from supple.system import System
 
 
@@ -23,16 +24,22 @@ def pin_labels(system: System) -> list[str]:
 
 
 def balanced_reactions(
-    system: System, x: NDArray[np.float64], time: float, P: NDArray[np.float64], contacts: ContactPoints | None
+    system: System,
+    x: NDArray[np.float64],
+    time: float,
+    P: NDArray[np.float64],
+    contacts: ContactPoints | None,
+    details: SolverDetails,
 ) -> dict[str, NDArray[np.float64]]:
     """By label, minus the sum (3,) of all other forces on the pinned vertices [N].
 
-    Other forces: elastic ones, weight, loads and contact. Viscous forces and the inertia of the pinned vertices
-    themselves are left out.
+    Other forces: elastic ones, weight, loads, actuators and contact. Viscous forces and the inertia of the pinned
+    vertices themselves are left out.
 
     Parameters
     ----------
     x : (n, 3) positions [m]; time : [s]; P : (m, 3, 3) first Piola stress of all tets [Pa]
+    details : of the solver, with the forces of actuators
 
     Raises
     ------
@@ -41,6 +48,7 @@ def balanced_reactions(
     forces = system.masses[:, None] * system.gravity
     for load in system.loads:
         load.add_forces(x, time, forces)
+    add_actuator_forces(system, details, x, forces)
     if contacts is not None:
         forces += contacts.on_vertices(contacts.forces + contacts.friction, len(x))
     _add_elastic_forces(system, P, forces)

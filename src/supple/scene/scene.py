@@ -13,6 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.displayed import Showable, short_list
 from supple.errors import SceneError
+from supple.scene.actuators.cable import Cable
+from supple.scene.actuators.cavity import Cavity
 from supple.scene.body import PlacedBody
 from supple.scene.contact_pairs import ContactPair, pair_table
 from supple.scene.forces import Force, SoftTarget
@@ -47,6 +49,8 @@ _PARTS = (
     ("sensors", Sensor),
     ("joints", Joint),
     ("welds", Weld),
+    ("cavities", Cavity),
+    ("cables", Cable),
 )
 
 
@@ -62,8 +66,10 @@ class Scene(Showable):
     gravity : (3,) acceleration [m/s^2].
     forces : loads on vertices; soft_targets : springs to places.
     stitches : joints of bodies with each other, and with triangle obstacles.
-    loads : tractions, pressures, forces per mass and springs between points.
+    loads : tractions, pressures, forces per mass, springs between points, and muscles.
     sensors : of contact on surfaces; no two have the same name.
+    cavities : closed inner surfaces filled with gas or liquid; cables : through points of bodies. No two cavities and
+        no two cables have the same name.
     contact_pairs : friction of some pairs of bodies and obstacles, and which of them pass through each other.
     joints : of rigid bodies with each other, with obstacles and with the world; no two have the same name.
     welds : vertices of soft bodies that are points of rigid ones; no two have the same name.
@@ -85,6 +91,8 @@ class Scene(Showable):
     sensors: Sequence[Sensor] = ()
     joints: Sequence[Joint] = ()
     welds: Sequence[Weld] = ()
+    cavities: Sequence[Cavity] = ()
+    cables: Sequence[Cable] = ()
 
     def __post_init__(self) -> None:
         for key, kind in _PARTS:
@@ -122,8 +130,15 @@ class Scene(Showable):
         for i, sensor in enumerate(self.sensors):
             with at("sensors", i):
                 sensor.triangles(self.bodies)
-                if any(other.name == sensor.name for other in self.sensors[:i]):
-                    raise SceneError(f"{sensor.label}: another sensor has this name; give each a name of its own")
+                _check_own_name("sensor", sensor, self.sensors[:i])
+        for i, cavity in enumerate(self.cavities):
+            with at("cavities", i):
+                cavity.surface(self.bodies)
+                _check_own_name("cavity", cavity, self.cavities[:i])
+        for i, cable in enumerate(self.cables):
+            with at("cables", i):
+                cable.corners(self.bodies)
+                _check_own_name("cable", cable, self.cables[:i])
         self._check_joints()
         self._check_welds(pinned)
         if self.contact_pairs:
@@ -241,6 +256,11 @@ class Scene(Showable):
             if body.name == name:
                 return body
         raise SceneError(f"scene: there is no body {name!r}; there are {', '.join(repr(b.name) for b in self.bodies)}")
+
+
+def _check_own_name(kind: str, item: Cavity | Cable | Sensor, others: Sequence[Cavity | Cable | Sensor]) -> None:
+    if any(other.name == item.name for other in others):
+        raise SceneError(f"{item.label}: another {kind} has this name; give each a name of its own")
 
 
 def _name(kind: type) -> str:

@@ -7,6 +7,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from supple.readings.fields import FIELDS
+from supple.scene_file.entries.actuators.cables import CableModel
+from supple.scene_file.entries.actuators.cavities import CavityModel
 from supple.scene_file.entries.bodies import BodyModel
 from supple.scene_file.entries.contact_pairs import ContactPairModel
 from supple.scene_file.entries.joints import JointModel, WeldModel
@@ -70,6 +72,8 @@ class SceneFileModel(Model):
     pins: list[PinModel] = Field(default=[], max_length=10_000)
     forces: list[ForceModel] = Field(default=[], max_length=10_000)
     loads: list[LoadModel] = Field(default=[], max_length=10_000)
+    cavities: list[CavityModel] = Field(default=[], max_length=10_000)
+    cables: list[CableModel] = Field(default=[], max_length=10_000)
     sensors: list[SensorModel] = Field(default=[], max_length=10_000)
     soft_targets: list[SoftTargetModel] = Field(default=[], max_length=10_000)
     contact_pairs: list[ContactPairModel] = Field(default=[], max_length=10_000)

@@ -126,7 +126,8 @@ def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
                 if built.initial_positions is not None:
                     starts[built.body.name] = built.initial_positions
     obstacles = _each("obstacles", model.obstacles, meshes)
-    lists = ("pins", "forces", "soft_targets", "stitches", "contact_pairs", "loads", "sensors", "joints", "welds")
+    lists = ("pins", "forces", "soft_targets", "stitches", "contact_pairs", "loads", "cavities", "cables", "sensors")
+    lists += ("joints", "welds")
     parts = {key: _each(key, getattr(model, key)) for key in lists}
     with at("solver"):
         solver = model.solver.build()

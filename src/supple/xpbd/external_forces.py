@@ -1,4 +1,4 @@
-"""External loads beside gravity and contact: forces, and springs to target positions and between points."""
+"""Loads beside gravity and contact: forces, and springs to target positions and between points."""
 
 from __future__ import annotations
 
@@ -11,45 +11,60 @@ from supple.numerics.kernel_cache import njit
 from supple.system import System
 
 
-def add_forces(
-    system: System,
-    points: NDArray[np.float64],
-    velocities: NDArray[np.float64],
-    origins: NDArray[np.float64],
-    time: float,
-    h: float,
-) -> None:
-    """Add the loads at `time` to a prediction: v += h w f, x += h^2 w f. Springs follow in `pull_springs`.
+class ExternalForces:
+    """The loads of a system, sorted by how they are applied.
 
-    Parameters
-    ----------
-    points : (n, 4) positions about the components' origins [m], and inverse masses [1/kg]; velocities : (n, 3) [m/s]
-    origins : (n, 3) [m]
+    Arguments of the methods: points (n, 4) positions about the components' origins [m], and inverse masses [1/kg];
+    velocities (n, 3) [m/s]; origins (n, 3) [m]; time of the end of the substep [s]; h, its length [s].
     """
-    loads = [load for load in system.loads if not isinstance(load, PointSpring)]
-    if loads:
+
+    def __init__(self, system: System) -> None:
+        loads = system.loads
+        self._springs = [load for load in loads if isinstance(load, PointSpring)]
+        self._pushes = [load for load in loads if not isinstance(load, PointSpring) and not load.is_internal]
+        self._internal = [load for load in loads if load.is_internal]
+        self._need_places = not all(isinstance(load, DeadLoad) for load in (*self._pushes, *self._internal))
+        self._targets = system.soft_targets
+
+    def add_forces(
+        self,
+        points: NDArray[np.float64],
+        velocities: NDArray[np.float64],
+        origins: NDArray[np.float64],
+        time: float,
+        h: float,
+    ) -> None:
+        """Add the loads to a prediction: v += h w f, x += h^2 w f.
+
+        Internal ones change positions alone: like constraints, they change velocities where momenta are restored.
+        """
+        if not (self._pushes or self._internal):
+            return
         forces = np.zeros_like(velocities)
-        dead = all(isinstance(load, DeadLoad) for load in loads)
-        x = points[:, :3] if dead else points[:, :3] + origins
-        for load in loads:
+        x = points[:, :3] + origins if self._need_places else points[:, :3]
+        for load in self._pushes:
             load.add_forces(x, time, forces)
-        _push(points, velocities, forces, h)
+        inside = np.zeros_like(velocities)
+        for load in self._internal:
+            load.add_forces(x, time, inside)
+        if self._pushes:
+            _push(points, velocities, forces, h)
+        if self._internal:
+            _push(points, np.zeros_like(velocities), inside, h)
 
+    def pull_springs(
+        self,
+        points: NDArray[np.float64],
+        velocities: NDArray[np.float64],
+        origins: NDArray[np.float64],
+        time: float,
+        h: float,
+    ) -> None:
+        """Project the springs between points: C = l - l0 with compliance 1 / k, one after the other.
 
-def pull_springs(
-    system: System,
-    points: NDArray[np.float64],
-    velocities: NDArray[np.float64],
-    origins: NDArray[np.float64],
-    time: float,
-    h: float,
-) -> None:
-    """Project the springs between points: C = l - l0 with compliance 1 / k, one after the other.
-
-    Dlam = -C / (sum w c^2 + 1 / (k h^2)), with the coefficients c of the vertices. Arguments as of `add_forces`.
-    """
-    for spring in system.loads:
-        if isinstance(spring, PointSpring):
+        Dlam = -C / (sum w c^2 + 1 / (k h^2)), with the coefficients c of the vertices.
+        """
+        for spring in self._springs:
             rows, c = spring.vertices, spring.coefficients
             own = points[rows, :3] + origins[rows]
             r = c @ own + spring.offset
@@ -62,23 +77,22 @@ def pull_springs(
                 points[rows, :3] += moved
                 velocities[rows] += moved / h
 
+    def pull_to_targets(
+        self,
+        points: NDArray[np.float64],
+        velocities: NDArray[np.float64],
+        origins: NDArray[np.float64],
+        time: float,
+        h: float,
+    ) -> None:
+        """Project the springs to soft targets: C = x - target with compliance 1 / k, all three components at once.
 
-def pull_to_targets(
-    system: System,
-    points: NDArray[np.float64],
-    velocities: NDArray[np.float64],
-    origins: NDArray[np.float64],
-    time: float,
-    h: float,
-) -> None:
-    """Project the springs to soft targets: C = x - target with compliance 1 / k, all three components at once.
-
-    Dlam = -C / (w + 1 / (k h^2)), as for any XPBD constraint. These forces are external, so they act after the momentum
-    restore. Arguments as of `add_forces`.
-    """
-    for target in system.soft_targets:
-        places = np.ascontiguousarray(target.targets(time))
-        _pull(points, velocities, origins, target.vertices, places, target.target.stiffness, h)
+        Dlam = -C / (w + 1 / (k h^2)), as for any XPBD constraint. These forces are external, so they act after the
+        momentum restore.
+        """
+        for target in self._targets:
+            places = np.ascontiguousarray(target.targets(time))
+            _pull(points, velocities, origins, target.vertices, places, target.target.stiffness, h)
 
 
 @njit(cache=True)

@@ -19,11 +19,13 @@ from supple.errors import SolverError
 from supple.numerics.interruption import interruption_point
 from supple.numerics.thread_tuning import ThreadTuner
 from supple.numerics.threads import numba_threads
+from supple.readings.actuator_readings import actuator_fields, start_of
 from supple.state import State, Status, StepReport
 from supple.system import Solver, System
 from supple.xpbd.assessment.assessment import Assessment
 from supple.xpbd.assessment.findings import Findings
 from supple.xpbd.assessment.surfaces import Overlap, crossings
+from supple.xpbd.constraints.actuators import ActuatorProjection
 from supple.xpbd.constraints.registry import build_constraint_sets
 from supple.xpbd.constraints.stitch_anchors import StitchAnchors
 from supple.xpbd.constraints.stitches import stitch_constraints
@@ -31,7 +33,7 @@ from supple.xpbd.contact.collisions import Collisions
 from supple.xpbd.contact.settings import XPBDContact
 from supple.xpbd.damping.kelvin_voigt import Damping, make_damping
 from supple.xpbd.details import XPBDDetails
-from supple.xpbd.external_forces import add_forces, pull_springs, pull_to_targets
+from supple.xpbd.external_forces import ExternalForces
 from supple.xpbd.integration import first_lost, to_world
 from supple.xpbd.limits.rigid_fallback import RigidFallback
 from supple.xpbd.limits.volume_guard import VolumeGuard
@@ -144,6 +146,8 @@ class XPBD(Solver):
             damping=make_damping(inner, layout, extended[:, 3]),
             momentum=MomentumRestore(inner) if self.momentum_restore else None,
             collisions=collisions,
+            loads=ExternalForces(inner),
+            actuators=ActuatorProjection(inner),
             guard=VolumeGuard(inner),
             fallback=RigidFallback(inner, collisions.skin),
             assessment=assessment,
@@ -266,6 +270,7 @@ class XPBD(Solver):
             asleep={part.name: bool(rests) for part, rests in zip(ws.system.bodies, sleep.asleep, strict=True)},
             contact_forces=pushes,
             friction_forces=friction,
+            **ws.actuators.fields(h * used.count),
         )
         world, surfaces = ws.world.copy(), ws.collisions.positions
         message = findings.message(time, self._remedy(ws, dt, findings, used.count))
@@ -309,6 +314,7 @@ class XPBD(Solver):
         ws.guard.guarded[:] = ws.assessment.begin(ws.moment(state.time), ws.guard.J, h, memory.ledger)
         ws.guard.accept()
         balance = ws.assessment.balance
+        ws.actuators.begin_frame(ws.points, ws.origins)
         damping = self._damping(ws, h)
         lengths = cycles(substeps)
         if damping is not None:
@@ -322,23 +328,26 @@ class XPBD(Solver):
                 moving = ws.anchors.velocities(end - h, h)
                 damping.begin_cycle(ws.extended, ws.velocities, moving, lengths[k], h, parallel)
             begin_substep(ws, targets[k], end, h, parallel)
-            add_forces(ws.system, ws.points, ws.velocities, ws.origins, end, h)
+            ws.loads.add_forces(ws.points, ws.velocities, ws.origins, end, h)
             if damping is not None:
                 damping.push(ws.points, h)
             if collides:
                 push_contacts(ws, h)
             for constraints in ws.sets:
                 constraints.project(ws.extended, h, parallel)
+            ws.actuators.project_within(ws.points, ws.origins, end, h)
             restore(ws, h, parallel)
             ws.pace.note(parallel, perf_counter() - started)
-            pull_to_targets(ws.system, ws.points, ws.velocities, ws.origins, end, h)
-            pull_springs(ws.system, ws.points, ws.velocities, ws.origins, end, h)
+            ws.loads.pull_to_targets(ws.points, ws.velocities, ws.origins, end, h)
+            ws.loads.pull_springs(ws.points, ws.velocities, ws.origins, end, h)
+            ws.actuators.project_between(ws.points, ws.velocities, ws.origins, end, h)
             if collides and not collide(ws, end, h, parallel):
                 break
             held_back += keep_volumes(ws, end, h, parallel)
             if collides:
                 ws.collisions.end_substep()
             balance.note_loads(ws.points, ws.previous, ws.origins, end, h)
+            balance.note_work(ws.actuators.end_substep(ws.points, ws.origins, h))
             balance.note_contacts(ws.collisions.contacts)
         return held_back
 
@@ -355,6 +364,7 @@ class XPBD(Solver):
             asleep=dict.fromkeys((part.name for part in system.bodies), False),
             contact_forces=pushes,
             friction_forces=friction,
+            **actuator_fields(system, *start_of(system)),
         )
 
 

@@ -11,10 +11,12 @@ from supple.numerics.thread_tuning import ThreadTuner
 from supple.system import System
 from supple.xpbd.assessment.assessment import Assessment
 from supple.xpbd.assessment.moment import Moment
+from supple.xpbd.constraints.actuators import ActuatorProjection
 from supple.xpbd.constraints.registry import ConstraintSet
 from supple.xpbd.constraints.stitch_anchors import StitchAnchors
 from supple.xpbd.contact.collisions import Collisions
 from supple.xpbd.damping.kelvin_voigt import Damping
+from supple.xpbd.external_forces import ExternalForces
 from supple.xpbd.limits.rigid_fallback import RigidFallback
 from supple.xpbd.limits.volume_guard import VolumeGuard
 from supple.xpbd.momentum import MomentumRestore
@@ -44,6 +46,8 @@ class XPBDWorkspace:
     damping: Damping | None
     momentum: MomentumRestore | None
     collisions: Collisions
+    loads: ExternalForces
+    actuators: ActuatorProjection
     guard: VolumeGuard
     fallback: RigidFallback
     assessment: Assessment

@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 import supple as sp
 from supple.implicit.energies.damping import Damping, StrainRate, viscosity_of
 from supple.implicit.energies.elasticity import elasticity_of
-from supple.implicit.energies.external_forces import ExternalForces
 from supple.implicit.energies.inertia import Inertia
 from supple.implicit.energies.inversion_barrier import inversion_barrier
+from supple.implicit.energies.loads.external_forces import ExternalForces
+from supple.implicit.energies.loads.soft_targets import SoftTargets
 from supple.implicit.energies.potential import HessianBlocks
-from supple.implicit.energies.soft_targets import SoftTargets
 from supple.implicit.newton.hessian_projection import ProjectedTerms
 from supple.implicit.newton.objective import Objective
 from supple.materials.neo_hookean import NeoHookean

@@ -63,3 +63,28 @@ def test_a_bar_that_buckles_converges_with_a_factorization(factorization, integr
     middle = np.abs(x) < 1e-12
     sideways = frames[-1].positions["bar"][middle].mean(axis=0)[1:]
     assert np.linalg.norm(sideways) > 0.1, "it has left the saddle"
+
+
+@pytest.mark.parametrize("factorization", ["pardiso", "superlu"])
+def test_vectors_over_all_rows_are_added_to_a_factorization(factorization, monkeypatch) -> None:
+    """An indefinite matrix that one vector makes definite, and another one does not."""
+    if factorization == "pardiso":
+        pytest.importorskip("pypardiso")
+    else:
+        monkeypatch.setattr(direct_solver, "_pardiso", lambda: None)
+    pattern = build_pattern(np.array([[0, 1, 2, 3]], dtype=np.int32), 4)
+    rng = np.random.default_rng(3)
+    root = rng.normal(size=(12, 12))
+    values, vectors = np.linalg.eigh(root @ root.T + 12.0 * np.eye(12))
+    values[0] = -1.0
+    dense = vectors * values @ vectors.T
+    rows = np.repeat(np.arange(4), np.diff(pattern.row_start))
+    data = np.stack([dense[3 * i : 3 * i + 3, 3 * j : 3 * j + 3] for i, j in zip(rows, pattern.columns, strict=True)])
+    b = np.arange(12.0).reshape(4, 3)
+    enough = np.stack([3.0 * vectors[:, 0], rng.normal(size=12)]).reshape(2, 4, 3)
+    solved = direct_solver.solve_directly(pattern, np.ascontiguousarray(data), b, True, enough)
+    assert solved is not None
+    G = enough.reshape(2, -1).T
+    np.testing.assert_allclose((dense + G @ G.T) @ solved.ravel(), b.ravel(), atol=1e-9)
+    for too_little in (direct_solver.NOTHING_MORE, 0.9 * vectors[:, 0].reshape(1, 4, 3)):
+        assert direct_solver.solve_directly(pattern, np.ascontiguousarray(data), b, True, too_little) is None

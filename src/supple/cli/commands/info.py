@@ -177,6 +177,9 @@ def _scene(file: Path, timed: bool) -> None:
         text = f"{type(part.body.material).__name__}, {tets}, {mesh.volume:.6g} m^3, {mass:.6g} kg"
         rows.append((f"body {part.name}", text))
         rows += _locking_rows(part.body)
+    for each in system.actuators:
+        unit = "m^3" if each.kind == "cavity" else "m"
+        rows.append((f"{each.kind} {each.name}", f"{each.start:.6g} {unit} at the start"))
     rows += _stitch_rows(system.stitching)
     rows += [(joint.label, _joint_text(joint)) for joint in scene.joints]
     for k, weld in enumerate(scene.welds):

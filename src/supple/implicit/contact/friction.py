@@ -22,12 +22,12 @@ from supple.contact.potentials.friction_energy import (
     renew_duals,
 )
 from supple.contact.surface.embedded_couplings import vertex_couplings
-from supple.implicit.energies.potential import FrictionPotential, HessianBlocks
+from supple.implicit.energies.potential import ContactPotential, HessianBlocks, Projection
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 
 
 @dataclass(frozen=True, eq=False)
-class Friction(FrictionPotential):
+class Friction(ContactPotential):
     """Of contacts between points.
 
     Attributes
@@ -40,6 +40,7 @@ class Friction(FrictionPotential):
     slips: Slips
     reach: float
     duals: NDArray[np.float64] = field(init=False)
+    projection = Projection.UNNEEDED
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "duals", np.zeros((len(self.slips.forces), 3)))

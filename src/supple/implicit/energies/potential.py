@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.numerics.sparse.couplings import Couplings
+from supple.numerics.sparse.low_rank import RankOne
 
 
 class Projection(Enum):
@@ -32,7 +33,8 @@ class HessianBlocks:
     vertices : (n, 3, 3) one matrix for each vertex with itself [N/m]
     tet_count : m
     couplings : matrices of contacts and joints, between vertices that no element joins [N/m]
-    patches : matrices of patches of tets, likewise [N/m]
+    patches, loads : matrices of patches of tets and of loads, likewise [N/m]
+    low_rank : matrices between all vertices of an actuator [N/m]
     blank : whether nothing has been added to `elements`; the memory may then hold an earlier sum
     """
 
@@ -41,6 +43,8 @@ class HessianBlocks:
     tet_count: int
     couplings: list[Couplings] = field(default_factory=list)
     patches: list[Couplings] = field(default_factory=list)
+    loads: list[Couplings] = field(default_factory=list)
+    low_rank: list[RankOne] = field(default_factory=list)
     blank: bool = False
 
     def clear(self) -> None:
@@ -48,12 +52,19 @@ class HessianBlocks:
         self.vertices[:] = 0.0
         self.couplings.clear()
         self.patches.clear()
+        self.loads.clear()
+        self.low_rank.clear()
         self.blank = True
 
     @property
     def beyond_elements(self) -> list[Couplings]:
-        """The matrices of patches, then those of contacts and joints."""
-        return [*self.patches, *self.couplings]
+        """The matrices of patches and loads, then those of contacts and joints."""
+        return [*self.patches, *self.loads, *self.couplings]
+
+    @property
+    def between_bodies(self) -> list[Couplings]:
+        """The matrices of loads, then those of contacts and joints."""
+        return [*self.loads, *self.couplings]
 
     @property
     def elements(self) -> NDArray[np.float64]:
@@ -129,22 +140,17 @@ class Potential(ABC):
             self.add_hessian(x, hessian, project)
         return self.value(x)
 
+    def renew(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> None:
+        """Set the unknowns that this term has of its own, its duals, to those at the end of a whole step.
+
+        The step is from x (n, 3), whose Hessian gave `direction` (n, 3). Most terms have none. An objective with a term
+        that has some serves one minimization.
+        """
+        return
+
 
 class ContactPotential(Potential):
     """A term of contact or of joints: so stiff that a short Newton step can leave large forces."""
 
     label = "contact"
     projection = Projection.RELEASED_LAST
-
-
-class FrictionPotential(ContactPotential):
-    """A term of friction. It has unknowns of its own, the duals, which make its Hessian that of a primal-dual step.
-
-    An objective with such a term serves one minimization.
-    """
-
-    projection = Projection.UNNEEDED
-
-    @abstractmethod
-    def renew(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> None:
-        """Set the duals to those at the end of a whole step from x (n, 3), whose Hessian gave `direction` (n, 3)."""

@@ -14,6 +14,8 @@ from supple.numerics.sparse.block_csr import BlockRows
 
 logger = logging.getLogger(__name__)
 
+NOTHING_MORE = np.zeros((0, 0, 3))
+
 # Pardiso's number for real symmetric indefinite matrices, and which of its parameters (from 1) holds the number of
 # negative eigenvalues.
 _SYMMETRIC = -2
@@ -34,40 +36,61 @@ def _pardiso() -> tuple[Any, type[Exception]] | None:
 
 
 def solve_directly(
-    pattern: BlockRows, data: NDArray[np.float64], b: NDArray[np.float64], require_definite: bool = False
+    pattern: BlockRows,
+    data: NDArray[np.float64],
+    b: NDArray[np.float64],
+    require_definite: bool = False,
+    low_rank: NDArray[np.float64] = NOTHING_MORE,
 ) -> NDArray[np.float64] | None:
-    """Solve A x = b, (n, 3), for a symmetric A by the factorization L D L^T.
+    """Solve (A + G G^T) x = b, (n, 3), for a symmetric A by the factorization L D L^T.
 
-    By Sylvester's law of inertia the signs in D are those of the eigenvalues of A.
+    By Sylvester's law of inertia the signs in D are those of the eigenvalues of A. With M = 1 + G^T A^-1 G, the matrix
+    has as many negative eigenvalues as A has, less those of M (Haynsworth 1968), and
+    x = A^-1 b - A^-1 G M^-1 G^T A^-1 b (Woodbury).
+
+    Parameters
+    ----------
+    low_rank : (k, n, 3) the columns of G
 
     Returns
     -------
-    x, or None where the matrix is singular to working precision or, with `require_definite`, not positive definite.
+    x, or None where A is singular to working precision or, with `require_definite`, the sum is not positive definite.
     """
     matrix, pardiso = pattern.to_scipy(data), _pardiso()
+    G = low_rank.reshape(len(low_rank), b.size).T if len(low_rank) else np.zeros((b.size, 0))
+    right = np.column_stack([b.ravel(), G]) if len(low_rank) else b.ravel()
     if pardiso is not None:
-        x, definite = _by_pardiso(*pardiso, matrix, b.ravel())
+        x, negative = _by_pardiso(*pardiso, matrix, right)
     else:
-        x, definite = _by_superlu(matrix, b.ravel(), require_definite)
-    if x is None or not np.isfinite(x).all() or (require_definite and not definite):
+        x, negative = _by_superlu(matrix, right, require_definite)
+    if x is None or not np.isfinite(x).all():
+        return None
+    if len(low_rank):
+        x, of_G = x[:, 0], x[:, 1:]
+        M = np.eye(len(low_rank)) + G.T @ of_G
+        negative -= int((np.linalg.eigvalsh(M) < 0.0).sum())
+        x = x - of_G @ np.linalg.solve(M, G.T @ x)
+        if not np.isfinite(x).all():
+            return None
+    if require_definite and negative:
         return None
     return np.ascontiguousarray(x.reshape(-1, 3))
 
 
 def _by_pardiso(
     solver: Any, failure: type[Exception], matrix: bsr_matrix, b: NDArray[np.float64]
-) -> tuple[NDArray[np.float64] | None, bool]:
-    """The solution, and whether there is no negative eigenvalue."""
+) -> tuple[NDArray[np.float64] | None, int]:
+    """The solution, and the number of negative eigenvalues."""
     try:
         x = solver.solve(triu(matrix, format="csr"), b)
     except failure as error:
         logger.debug("direct solve: %s", error)
-        return None, False
-    return x, solver.get_iparm(_NEGATIVE_EIGENVALUES) == 0
+        return None, 0
+    return x, solver.get_iparm(_NEGATIVE_EIGENVALUES)
 
 
-def _by_superlu(matrix: bsr_matrix, b: NDArray[np.float64], inertia: bool) -> tuple[NDArray[np.float64] | None, bool]:
-    """The solution and, where `inertia` is wanted, whether all eigenvalues are positive."""
+def _by_superlu(matrix: bsr_matrix, b: NDArray[np.float64], inertia: bool) -> tuple[NDArray[np.float64] | None, int]:
+    """The solution and, where `inertia` is wanted, the number of eigenvalues that are not positive."""
     from scipy.sparse.linalg import splu
 
     try:
@@ -76,9 +99,10 @@ def _by_superlu(matrix: bsr_matrix, b: NDArray[np.float64], inertia: bool) -> tu
         )
     except RuntimeError as error:
         logger.debug("direct solve: %s", error)
-        return None, False
-    # The diagonal of U is D, unless a pivot of zero made SuperLU take one beside the diagonal.
-    definite = not inertia or (
-        np.array_equal(factors.perm_r, factors.perm_c) and bool((factors.U.diagonal() > 0).all())
-    )
-    return factors.solve(b), definite
+        return None, 0
+    negative = 0
+    if inertia:
+        # The diagonal of U is D, unless a pivot of zero made SuperLU take one beside the diagonal.
+        regular = np.array_equal(factors.perm_r, factors.perm_c)
+        negative = int((factors.U.diagonal() <= 0).sum()) if regular else len(b)
+    return factors.solve(b), negative

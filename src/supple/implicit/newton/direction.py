@@ -112,7 +112,7 @@ class DirectionFinder:
             if better is not None and np.isfinite(better).all():
                 vector, report = better, replace(report, iterations=report.iterations + more.iterations)
         if self.scale is not None:
-            tools.free_motion.joined(tools.hessian.couplings).correct(vector, gradient, self.scale)
+            tools.free_motion.joined(tools.hessian.between_bodies).correct(vector, gradient, self.scale)
         else:
             # Without inertia a turn may cost nothing: the direction is as long as the linear solver's errors make it.
             vector *= min(1.0, self.longest / max(float(np.abs(vector).max(initial=0.0)), np.finfo(float).tiny))

@@ -20,8 +20,8 @@ from supple.system import System
 
 @dataclass(frozen=True, eq=False)
 class FreeMotion:
-    """The pieces of a system that nothing holds: no pin, soft target, spring to the world, stitch to an obstacle, or
-    joint with one or with the world.
+    """The pieces of a system that nothing holds: no pin, soft target, spring or cable to the world, stitch to an
+    obstacle, or joint with one or with the world.
 
     Bodies that stitches or joints join are one piece.
 
@@ -49,6 +49,9 @@ class FreeMotion:
         for load in system.loads:
             if isinstance(load, PointSpring) and load.is_anchored:
                 held[components[load.vertices]] = True
+        for actuator in system.actuators:
+            if actuator.coordinate.is_anchored:
+                held[components[actuator.coordinate.vertices]] = True
         number = np.where(held, -1, np.cumsum(~held) - 1)
         piece = number[components].astype(np.int32)
         inside = piece >= 0

@@ -16,7 +16,7 @@ from supple.implicit.newton.reduction import Reduction
 from supple.numerics.sparse.block_csr import SERIAL_BLOCKS, BlockPattern, build_pattern
 from supple.numerics.sparse.block_sum import JointPattern
 from supple.numerics.sparse.couplings import Couplings
-from supple.numerics.sparse.pcg import conjugate_gradients
+from supple.numerics.sparse.pcg import CGResult, conjugate_gradients
 from supple.numerics.sparse.preconditioner import RowOrder, TwoLevel, order_rows, two_level
 from supple.numerics.thread_tuning import ThreadTuner
 from supple.numerics.threads import one_thread
@@ -56,6 +56,7 @@ class LinearSolver:
     ----------
     kind : "auto" (CG, and a factorization where CG stalls), "pcg" or "direct"
     order : which vertex each row belongs to; row_of : (n,) row of each vertex, -1 where it is pinned
+    matrix : the sparse part; low_rank : (k, rows, 3) vectors g, of which g g^T is added to it
     age, fresh_iterations : the number of runs of CG on the present coarse level (-1: none), and the iterations of the
         first one
     """
@@ -70,6 +71,7 @@ class LinearSolver:
     preconditioner: TwoLevel = field(init=False)
     joint: JointPattern | None = None
     reduction: Reduction | None = None
+    low_rank: NDArray[np.float64] = field(init=False)
     age: int = -1
     fresh_iterations: int = 0
     pace: ThreadTuner = field(init=False)
@@ -92,6 +94,7 @@ class LinearSolver:
 
     def __post_init__(self) -> None:
         self.matrix, self.preconditioner = self.elements, self.elements_only
+        self.low_rank = np.zeros((0, len(self.order.vertices), 3))
         choice = numba.get_num_threads() > 1 and self.pattern.blocks >= SERIAL_BLOCKS
         self.pace = ThreadTuner(choice, choice, _REST)
 
@@ -113,6 +116,10 @@ class LinearSolver:
                     self.joint, self.age = None, -1
                 self.matrix, self.preconditioner = self.elements, self.elements_only
                 self.pattern.assemble(hessian.elements, diagonal, self.elements)
+            count = len(self.order.vertices)
+            self.low_rank = np.zeros((len(hessian.low_rank), count, 3))
+            for k, part in enumerate(hessian.low_rank):
+                self.low_rank[k] = part.in_rows(self.row_of, count)
             if self.kind != "direct":
                 self.preconditioner.update(self.matrix, coarse=self.age < 0)
         self.spent = perf_counter() - began
@@ -170,7 +177,7 @@ class LinearSolver:
         iterations = 0
         if self.kind != "direct":
             most = _STALLED if self.kind == "auto" else max(1000, 3 * b.size)
-            result = conjugate_gradients(self.matrix, self.preconditioner, b, x, tolerance, most)
+            result = self._conjugate_gradients(b, x, tolerance, most)
             if result.indefinite and not convex:
                 return None, LinearReport("pcg", result.iterations, result.first_norm)
             if not result.converged and self.age > 0:
@@ -178,7 +185,7 @@ class LinearSolver:
                 iterations += result.iterations
                 self.preconditioner.update(self.matrix)
                 self.age = -1
-                result = conjugate_gradients(self.matrix, self.preconditioner, b, x, tolerance, most)
+                result = self._conjugate_gradients(b, x, tolerance, most)
             iterations += result.iterations
             first_norm = result.first_norm
             self._age_by(result.iterations)
@@ -188,11 +195,17 @@ class LinearSolver:
             if self.kind == "pcg":
                 return None, LinearReport("pcg", iterations, first_norm)
             logger.debug("CG stalled after %d iterations; factorizing", iterations)
-        solution = solve_directly(self.preconditioner.pattern, self.matrix, b, require_definite=not convex)
+        pattern = self.preconditioner.pattern
+        solution = solve_directly(pattern, self.matrix, b, not convex, self.low_rank)
         if solution is None:
             return None, LinearReport("direct", iterations, first_norm)
         p[self.order.vertices] = solution
         return p, LinearReport("direct", iterations, first_norm)
+
+    def _conjugate_gradients(
+        self, b: NDArray[np.float64], x: NDArray[np.float64], tolerance: float, most: int
+    ) -> CGResult:
+        return conjugate_gradients(self.matrix, self.preconditioner, b, x, tolerance, most, self.low_rank)
 
     def _age_by(self, iterations: int) -> None:
         """After a run of CG: keep the coarse level unless it has become too old."""

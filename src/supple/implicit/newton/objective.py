@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.energies.potential import ContactPotential, FrictionPotential, HessianBlocks, Potential
+from supple.implicit.energies.potential import ContactPotential, HessianBlocks, Potential
 from supple.implicit.newton.hessian_projection import ProjectedTerms
 from supple.implicit.timings import Clock
 
@@ -56,11 +56,10 @@ class Objective:
         return _gradient(self.terms, x)
 
     def renew(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> None:
-        """Renew the duals of friction after a direction (n, 3) that was found at x (n, 3)."""
+        """Renew the duals of all terms after a direction (n, 3) that was found at x (n, 3)."""
         for term in self.terms:
-            if isinstance(term, FrictionPotential):
-                with self.clock.of(term.label):
-                    term.renew(x, direction)
+            with self.clock.of(term.label):
+                term.renew(x, direction)
 
     def model(
         self, x: NDArray[np.float64], hessian: HessianBlocks | None, projected: ProjectedTerms = ProjectedTerms.ALL

@@ -61,6 +61,8 @@ def move_pins(
         pull = pull[:-1]
         for coupling in tools.hessian.beyond_elements:
             coupling.add_product(displacement, pull)
+        for part in tools.hessian.low_rank:
+            part.add_product(displacement, pull)
         with tools.clock.of("linear_solve"):
             direction, report = tools.linear_solver.solve(-tools.freed(gradient + pull), _TOLERANCE)
         if direction is None or not np.isfinite(direction).all():

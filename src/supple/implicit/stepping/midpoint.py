@@ -55,5 +55,8 @@ class ActingWithin(Potential):
         gradient += own / self.place
         return value / self.place**2
 
+    def renew(self, x: NDArray[np.float64], direction: NDArray[np.float64]) -> None:
+        self.term.renew(self._within(x), self.place * direction)
+
     def _within(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         return self.start + self.place * (x - self.start)

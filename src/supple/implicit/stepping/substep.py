@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,13 +10,15 @@ from numpy.typing import NDArray
 
 from supple.implicit.energies.damping import Damping
 from supple.implicit.energies.elasticity import Elasticity
-from supple.implicit.energies.external_forces import ExternalForces, total_forces
 from supple.implicit.energies.inertia import Inertia
 from supple.implicit.energies.inversion_barrier import inversion_barrier
+from supple.implicit.energies.loads.actuators import ActuatorPotential, actuators_at
+from supple.implicit.energies.loads.external_forces import ExternalForces, total_forces
+from supple.implicit.energies.loads.muscles import muscles_at
+from supple.implicit.energies.loads.pressure import pressures_at
+from supple.implicit.energies.loads.soft_targets import soft_targets_at
+from supple.implicit.energies.loads.springs import springs_at
 from supple.implicit.energies.potential import Potential
-from supple.implicit.energies.pressure import pressures_at
-from supple.implicit.energies.soft_targets import soft_targets_at
-from supple.implicit.energies.springs import springs_at
 from supple.implicit.energies.stitch_damping import StitchDamping
 from supple.implicit.joints.joint_step import JointStep
 from supple.implicit.limits.inversion_guard import InversionGuard
@@ -71,12 +74,16 @@ class StepSettings:
 
 @dataclass(frozen=True, eq=False)
 class Substep:
-    """The result of a step: the state at its end, the course of Newton's method, contact and joints at the end."""
+    """The result of a step: the state at its end, the course of Newton's method, contact and joints at the end.
+
+    actuators : generalized forces of each actuator, as they acted in the step
+    """
 
     state: State
     outcome: Outcome
     contact: ContactStep
     joints: JointStep | None
+    actuators: tuple[NDArray[np.float64], ...] = ()
 
 
 def take_substep(state: State, end: float, h: float, settings: StepSettings, workspace: Workspace) -> Substep:
@@ -93,7 +100,9 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     guard = InversionGuard.at(system, state.positions, settings.volume_kept)
     limits = StepLimits(guard, workspace.contact, tools.clock)
     elasticity = workspace.elasticity.in_step(state.internal, h)
-    base = _objective(elasticity, state.positions, middle, plan, forces, workspace)
+    mu = workspace.elasticity.material.mu
+    actuators = actuators_at(system, state.positions, (state.time, middle), plan.scale, mu)
+    base = _objective(elasticity, state.positions, middle, plan, forces, workspace, actuators)
     onset = settings.barrier_onset
     barriers = (inversion_barrier(workspace.elasticity, guard.guarded, onset), guard.quadratic_barrier(onset))
     base = replace(base, terms=[*base.terms, *(barrier for barrier in barriers if barrier is not None)])
@@ -139,7 +148,8 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     after = settings.integrator.finish(plan, state, after, residual, workspace.conservation)
     if plan.place != 1.0 and system.rigid_bodies and outcome.status is Status.CONVERGED:
         after = rigid_ends(system, state, after, limits)
-    return Substep(after, outcome, contact, joints)
+    acted = state.positions + plan.place * (x - state.positions)
+    return Substep(after, outcome, contact, joints, tuple(actuator.forces(acted) for actuator in actuators))
 
 
 def _with_joints(objective: Objective, joints: JointStep | None) -> Objective:
@@ -154,6 +164,7 @@ def _objective(
     plan: Plan,
     forces: NDArray[np.float64],
     workspace: Workspace,
+    actuators: Sequence[ActuatorPotential],
 ) -> Objective:
     """All but contact and the inversion barrier, with the loads of `time` [s]; energies of loads are zero at x."""
     system = workspace.system
@@ -166,6 +177,8 @@ def _objective(
         terms.append(soft_targets_at(system, time))
     terms += pressures_at(system, x, time)
     terms += springs_at(system, time)
+    terms += muscles_at(system, time)
+    terms += actuators
     if plan.scale is not None and workspace.viscosity is not None:
         terms.append(Damping(workspace.viscosity, plan.strain_rate(workspace.viscosity)))
     if plan.scale is not None and workspace.quadratic_viscosity is not None:

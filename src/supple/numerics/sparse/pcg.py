@@ -22,6 +22,8 @@ from supple.numerics.threads import threads_for
 # Three short passes in each iteration: fewer blocks than this are worked on by one thread.
 _SERIAL_BLOCKS = 50_000
 
+NOTHING_MORE = np.zeros((0, 0, 3))
+
 
 @dataclass(frozen=True)
 class CGResult:
@@ -47,15 +49,18 @@ def conjugate_gradients(
     x: NDArray[np.float64],
     tolerance: float,
     max_iterations: int,
+    low_rank: NDArray[np.float64] = NOTHING_MORE,
 ) -> CGResult:
-    """Solve A x = b.
+    """Solve (A + sum g g^T) x = b.
 
     Parameters
     ----------
-    data : (blocks, 3, 3) of the matrix on `preconditioner.pattern`
+    data : (blocks, 3, 3) of A on `preconditioner.pattern`
     b : (n, 3); x : (n, 3) overwritten, the search starts at zero
     tolerance : on the residual's norm sqrt(r . M^-1 r), relative to that of b
     max_iterations : stop there, converged or not
+    low_rank : (k, n, 3) the vectors g. The preconditioner becomes the inverse of M + sum g g^T, so that k costs no
+        iterations
     """
     p = preconditioner.pattern
     with threads_for(p.blocks, _SERIAL_BLOCKS):
@@ -74,6 +79,7 @@ def conjugate_gradients(
             x,
             tolerance,
             max_iterations,
+            low_rank,
         )
     return CGResult(int(iterations), bool(converged), bool(indefinite), float(first))
 
@@ -152,6 +158,40 @@ def _direction(beta, group_start, fields, coefficients, z, p):
 
 
 @njit(cache=True, error_model="numpy")
+def _inner(a, b):
+    total = 0.0
+    for i in range(len(a)):
+        total += a[i, 0] * b[i, 0] + a[i, 1] * b[i, 1] + a[i, 2] * b[i, 2]
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def _add(factor, a, out):
+    for i in range(len(a)):
+        for k in range(3):
+            out[i, k] += factor * a[i, k]
+
+
+@njit(cache=True, error_model="numpy")
+def _inverse(a):
+    """Of a small positive definite matrix, by elimination."""
+    n = len(a)
+    out = np.eye(n)
+    for k in range(n):
+        pivot = a[k, k]
+        for j in range(n):
+            a[k, j] /= pivot
+            out[k, j] /= pivot
+        for i in range(n):
+            if i != k:
+                factor = a[i, k]
+                for j in range(n):
+                    a[i, j] -= factor * a[k, j]
+                    out[i, j] -= factor * out[k, j]
+    return out
+
+
+@njit(cache=True, error_model="numpy")
 def _solve(
     row_start,
     columns,
@@ -167,20 +207,36 @@ def _solve(
     x,
     tolerance,
     max_iterations,
+    low,
 ):
     groups = len(group_start) - 1
     sums = np.zeros(groups)
     restricted = np.zeros(12 * groups)
     coefficients = np.zeros(12 * groups)
-    r = np.empty_like(rhs)
+    r = np.zeros_like(rhs)
     for i in range(len(rhs)):
         for k in range(3):
-            r[i, k] = rhs[i, k]
             x[i, k] = 0.0
     z = np.zeros_like(r)
     p = np.zeros_like(r)
     Ap = np.zeros_like(r)
     alpha = 0.0
+    # (M + G G^T)^-1 = M^-1 - Y S^-1 Y^T with Y = M^-1 G and S = 1 + G^T Y.
+    Y = np.zeros_like(low)
+    S = np.eye(len(low))
+    for m in range(len(low)):
+        _add(1.0, low[m], r)
+        _smooth(alpha, group_start, columns, diagonal, inner, data, inverse, fields, p, Ap, x, r, z, restricted, sums)
+        for k in range(12 * groups):
+            coefficients[k] = restricted[k]
+        solve(coarse, first, coefficients)
+        _direction(0.0, group_start, fields, coefficients, z, Y[m])
+        _add(-1.0, low[m], r)
+        for n in range(len(low)):
+            S[n, m] += _inner(low[n], Y[m])
+    S_inverse = _inverse(S)
+    weights = np.zeros(len(low))
+    _add(1.0, rhs, r)
     first_norm = 0.0
     old = 0.0
     for iteration in range(max_iterations + 1):
@@ -193,6 +249,11 @@ def _solve(
             rz += sums[g]
         for k in range(12 * groups):
             rz += restricted[k] * coefficients[k]
+        for m in range(len(low)):
+            weights[m] = _inner(Y[m], r)
+        for m in range(len(low)):
+            for n in range(len(low)):
+                rz -= weights[m] * S_inverse[m, n] * weights[n]
         norm = rz**0.5 if rz > 0.0 else 0.0
         if iteration == 0:
             first_norm = norm
@@ -203,10 +264,19 @@ def _solve(
         beta = rz / old if iteration > 0 else 0.0
         old = rz
         _direction(beta, group_start, fields, coefficients, z, p)
+        for m in range(len(low)):
+            total = 0.0
+            for n in range(len(low)):
+                total += S_inverse[m, n] * weights[n]
+            _add(-total, Y[m], p)
         _product(group_start, row_start, columns, data, p, Ap, sums)
         curvature = 0.0
         for g in range(groups):
             curvature += sums[g]
+        for m in range(len(low)):
+            along = _inner(low[m], p)
+            _add(along, low[m], Ap)
+            curvature += along * along
         if not curvature > 0.0:
             return iteration, False, True, first_norm
         alpha = rz / curvature

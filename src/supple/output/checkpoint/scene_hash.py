@@ -39,6 +39,8 @@ def scene_hash(system: System, begin: float, duration: float) -> str:
         for joint in system.scene.joints:
             motor = joint.motor if isinstance(joint, AxisJoint) else None
             _add(digest, motor.at(time) if motor is not None and callable(motor.script) else None)
+        for actuator in system.actuators:
+            _add(digest, actuator.law.reached(time, actuator.start, 1.0))
         for target in system.soft_targets:
             _add(digest, target.targets(time) if _is_script(target.target.motion) else None)
         for obstacle in system.obstacles:

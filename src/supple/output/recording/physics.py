@@ -103,7 +103,7 @@ def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
         "flows": [None if tets.flow is None else tets.flow.name for tets in known],
         "internal": count_of(system.laws.material),
         "compliances": compliances,
-        "forces": len(system.loads),
+        "forces": len(system.loads) + sum(each.coordinate.is_anchored for each in system.actuators),
         "soft_targets": len(system.soft_targets),
         "scripted_pins": sum(part.pin.motion is not None for part in system.pins),
         "stitches": len(system.stitching),

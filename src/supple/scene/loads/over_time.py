@@ -77,6 +77,37 @@ def value_at(value: OverTime, time: float, what: str, shape: tuple[int, ...]) ->
     return _checked(value(time), f"{what}({time:g})", shape) if callable(value) else np.asarray(value)
 
 
+def checked_magnitude(value: OverTime, what: str, *, zero: bool = True) -> OverTime:
+    """`checked_over_time` of a number that is never below zero and, without `zero`, always above it.
+
+    Raises
+    ------
+    SceneError : where it is not.
+    """
+    given = checked_over_time(value, what, ())
+    known = given.values if isinstance(given, Curve) else () if callable(given) else given
+    for number in np.atleast_1d(np.asarray(known, dtype=np.float64)):
+        _check_magnitude(float(number), what, zero)
+    return given
+
+
+def magnitude_at(value: OverTime, time: float, what: str, *, zero: bool = True) -> float:
+    """The value of such a number at `time` [s].
+
+    Raises
+    ------
+    SceneError : where it is not finite, or below its limit.
+    """
+    number = float(value_at(value, time, what, ()))
+    _check_magnitude(number, f"{what}({time:g})", zero)
+    return number
+
+
+def _check_magnitude(number: float, what: str, zero: bool) -> None:
+    if number < 0.0 or (number == 0.0 and not zero):
+        raise SceneError(f"{what} is {number:g}; it must be {'zero or more' if zero else 'above zero'}")
+
+
 def _checked(value: ArrayLike, what: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
     array = float_array(value, what, "give a number" if shape == () else "give three numbers")
     if array.shape != shape:

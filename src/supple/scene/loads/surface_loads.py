@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from supple.scene.loads.load import OnSurface, Region
+from supple.errors import SceneError
+from supple.scene.body import PlacedBody
+from supple.scene.loads.load import OnSurface, Region, body_of
 from supple.scene.loads.over_time import OverTime, checked_over_time
+from supple.scene.rigid.rigid_body import RigidBody
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,3 +67,8 @@ class Pressure(OnSurface):
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "pressure", checked_over_time(self.pressure, f"{self.label}: pressure", ()))
+
+    def check(self, bodies: Sequence[PlacedBody]) -> None:
+        super().check(bodies)
+        if isinstance(body_of(self.body, bodies, self.label), RigidBody):
+            raise SceneError(f"{self.label}: the body is rigid, and pressure acts on soft ones; give a Traction")

@@ -8,13 +8,15 @@ from pydantic import Field
 
 from supple.scene.loads.body_force import BodyForce
 from supple.scene.loads.load import Load, Region
+from supple.scene.loads.muscle import Muscle
 from supple.scene.loads.over_time import Curve
-from supple.scene.loads.spring import Point, Spring
+from supple.scene.loads.points import Point
+from supple.scene.loads.spring import Spring
 from supple.scene.loads.surface_loads import Pressure, Traction
 from supple.scene.located import at
 from supple.scene.selection import InBox
 from supple.scene_file.entries.selections import InBoxModel
-from supple.scene_file.model import Index, Model, Name, Number, Positive, Vector
+from supple.scene_file.model import Index, Model, Name, NonNegative, Number, Positive, Vector
 
 
 class CurveModel(Model):
@@ -109,4 +111,36 @@ class SpringModel(Model):
         return Spring(self.first.point(), self.second.point(), self.stiffness, rest_length, self.name)
 
 
-LoadModel = Annotated[TractionModel | PressureModel | BodyForceModel | SpringModel, Field(discriminator="kind")]
+class ForceLengthModel(Model):
+    """A force-length curve, linear between stretches and constant outside."""
+
+    stretches: list[Positive] = Field(min_length=1, description="increasing")
+    values: list[NonNegative] = Field(min_length=1, description="one per stretch")
+
+
+class MuscleModel(Model):
+    """Fibres that pull along their direction."""
+
+    kind: Literal["muscle"]
+    body: Name = Field(description="name of the body")
+    strength: Positive = Field(description="largest stress per area at rest [Pa]")
+    direction: Vector = Field(description="of the fibres, in the coordinates of the mesh")
+    activation: NonNegative | CurveModel = Field(default=1.0, description="from 0 to 1, or a curve")
+    box: InBoxModel | None = Field(default=None, description="tets inside; without it, all")
+    tets: list[Index] | None = Field(default=None, min_length=1, description="instead of `box`: their numbers")
+    force_length: ForceLengthModel | None = Field(default=None, description="without it, 1 at all stretches")
+    name: Name | None = Field(default=None, description="used in messages")
+
+    def build(self) -> Load:
+        tets: Any = self.tets
+        if self.box is not None:
+            with at("box"):
+                tets = InBox(self.box.low, self.box.high)
+        curve = None if self.force_length is None else (self.force_length.stretches, self.force_length.values)
+        activation = over_time(self.activation, "activation")
+        return Muscle(self.body, self.strength, self.direction, activation, tets, curve, self.name)
+
+
+LoadModel = Annotated[
+    TractionModel | PressureModel | BodyForceModel | SpringModel | MuscleModel, Field(discriminator="kind")
+]

@@ -62,6 +62,22 @@ class CylinderShapeModel(Model):
         )
 
 
+class SphericalShellShapeModel(Model):
+    """A hollow ball."""
+
+    kind: Literal["spherical_shell"]
+    inner_radius: Positive = Field(default=0.3, description="[m]")
+    outer_radius: Positive = Field(default=0.5, description="[m]")
+    edge_length: Positive | None = Field(default=None, description="mean edge [m]; default: half of the wall")
+
+    def build(self) -> TetMesh:
+        edge_length = self.edge_length or 0.5 * (self.outer_radius - self.inner_radius)
+        return shapes.spherical_shell(self.inner_radius, self.outer_radius, edge_length)
+
+    def build_surface(self) -> SurfaceMesh:
+        return self.build().surface.compact()
+
+
 class TorusShapeModel(Model):
     """A ring about the y axis."""
 
@@ -89,7 +105,12 @@ class GummyBearShapeModel(Model):
 
 
 ShapeModel = Annotated[
-    BoxShapeModel | SphereShapeModel | CylinderShapeModel | TorusShapeModel | GummyBearShapeModel,
+    BoxShapeModel
+    | SphereShapeModel
+    | SphericalShellShapeModel
+    | CylinderShapeModel
+    | TorusShapeModel
+    | GummyBearShapeModel,
     Field(discriminator="kind"),
 ]
 

@@ -44,6 +44,8 @@ class EnergyBalance:
     def __init__(self, system: System, edge_length: float) -> None:
         self.system = system
         self.free = system.inverse_masses > 0.0
+        self._springs = [load for load in system.loads if isinstance(load, PointSpring)]
+        self._pushes = [load for load in system.loads if not isinstance(load, PointSpring)]
         self._masses = np.where(self.free, system.masses, 0.0)
         self._elastic = ElasticEnergy(system)
         self._moving_pins = [pin for pin in system.pins if pin.motion is not None]
@@ -89,20 +91,23 @@ class EnergyBalance:
 
         Over a substep of h [s] that ends at `end` [s].
         """
-        if self.system.loads:
+        for spring in self._springs:
+            before = previous + origins
+            self._work += spring.energy(before, end) - spring.energy(before, end - h)
+        if self._pushes:
             x, pushes = points[:, :3] + origins, np.zeros_like(previous)
-            for load in self.system.loads:
-                if isinstance(load, PointSpring):
-                    before = previous + origins
-                    self._work += load.energy(before, end) - load.energy(before, end - h)
-                else:
-                    load.add_forces(x, end, pushes)
+            for load in self._pushes:
+                load.add_forces(x, end, pushes)
             moved = np.where(self.free[:, None], points[:, :3] - previous, 0.0)
             self._work += float(np.einsum("ij,ij->", pushes, moved))
         for soft in self.system.soft_targets:
             x = previous[soft.vertices] + origins[soft.vertices]
             longer, shorter = soft.targets(end) - x, soft.targets(end - h) - x
             self._work += 0.5 * soft.target.stiffness * float((longer**2).sum() - (shorter**2).sum())
+
+    def note_work(self, work: float) -> None:
+        """Add work that is known [J]."""
+        self._work += work
 
     def note_contacts(self, count: int) -> None:
         """Take notice of the number of contacts in a substep."""
@@ -134,9 +139,8 @@ class EnergyBalance:
         for soft in self.system.soft_targets:
             x = points[soft.vertices, :3] + origins[soft.vertices]
             total += 0.5 * soft.target.stiffness * float(((soft.targets(moment.time) - x) ** 2).sum())
-        for load in self.system.loads:
-            if isinstance(load, PointSpring):
-                total += load.energy(points[:, :3] + origins, moment.time)
+        for spring in self._springs:
+            total += spring.energy(points[:, :3] + origins, moment.time)
         if len(self.system.stitching):
             total += stitch_energy(self.system.stitching, np.ascontiguousarray(moment.extended[:, :3]))
         return bodies, total

@@ -93,6 +93,7 @@ def reordered(system: System, layout: Layout) -> System:
         system,
         pins=tuple(replace(pin, vertices=new[pin.vertices]) for pin in system.pins),
         loads=tuple(load.renumbered(new) for load in system.loads),
+        actuators=tuple(actuator.renumbered(new) for actuator in system.actuators),
         soft_targets=tuple(replace(target, vertices=new[target.vertices]) for target in system.soft_targets),
         rest_positions=np.ascontiguousarray(system.rest_positions[old]),
         masses=np.ascontiguousarray(system.masses[old]),

@@ -9,6 +9,7 @@ from supple.output.check.frame_check import FrameCheck
 from supple.output.check.report import CheckResult
 from supple.output.check.snapshot import Snapshot
 from supple.output.recording.reader import Recording
+from supple.state import ACTUATOR_WORKS
 
 _UNKNOWN = "the recording does not contain what acts on its bodies: an older version wrote it"
 # Motion slower than this share of a body's size per step, and energy of the same share, is round-off.
@@ -101,7 +102,10 @@ class Spin(FrameCheck):
 
 
 class Energy(FrameCheck):
-    """The sum of kinetic, elastic, stitch and potential energy does not grow where nothing does work."""
+    """The sum of kinetic, elastic, stitch and potential energy does not grow by more than the work of actuators.
+
+    Not judged where anything else does work.
+    """
 
     name = "energy"
     good = "never above the start by more than {worst} of what is moved"
@@ -147,7 +151,16 @@ class Energy(FrameCheck):
         _, stored, height = np.array(self._rows).T
         weight = float(recording.masses.sum() * np.linalg.norm(recording.gravity))
         scale = float(stored.max() + np.ptp(height)) + _FLOOR * weight * self.scene.size + 1e-300
-        gains = (stored + height - stored[0] - height[0]) / scale
+        work = _work_of_actuators(recording)[[number for number, _, _ in self._rows]]
+        scale += float(np.abs(work).max())
+        gains = (stored + height - stored[0] - height[0] - (work - work[0])) / scale
         for (number, _, _), gain in zip(self._rows, gains, strict=True):
             self.tally.see(recording[number], float(gain), not gain <= self.settings.max_energy_gain)
         return super().result()
+
+
+def _work_of_actuators(recording: Recording) -> NDArray[np.float64]:
+    """(frames,) the work of all cavities since the start, as it was recorded [J]."""
+    recorded = [field.name for field in recording.details.fields if field.name in ACTUATOR_WORKS]
+    each = (recording.frame_values(f"details/{name}").sum(axis=1) for name in recorded)
+    return np.cumsum(sum(each, np.zeros(len(recording))))

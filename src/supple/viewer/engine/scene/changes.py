@@ -309,7 +309,7 @@ def _(command: commands.RemoveBody, live: LiveScene) -> None:
 
 
 def without_body(scene: Scene, name: str) -> Scene:
-    """The scene without a body and what refers to it: pins, loads, sensors, soft targets, stitches, contact pairs."""
+    """The scene without a body and all that refers to it."""
     bodies = [body for body in scene.bodies if body.name != name]
     return replace(
         scene,
@@ -317,6 +317,8 @@ def without_body(scene: Scene, name: str) -> Scene:
         pins=[pin for pin in scene.pins if pin.body != name],
         forces=[force for force in scene.forces if force.body != name],
         loads=[load for load in scene.loads if name not in load.bodies],
+        cavities=[cavity for cavity in scene.cavities if name not in cavity.bodies],
+        cables=[cable for cable in scene.cables if name not in cable.bodies],
         sensors=[sensor for sensor in scene.sensors if sensor.body != name],
         soft_targets=[target for target in scene.soft_targets if target.body != name],
         stitches=[stitch for stitch in scene.stitches if name not in (stitch.first, stitch.second)],

@@ -41,7 +41,7 @@ class SpringPotential(Potential):
             by_r = spring.stiffness * (along + across * (np.eye(3) - along))
             c, (i, j) = spring.coefficients, np.triu_indices(len(spring.vertices))
             blocks = (c[i] * c[j])[:, None, None] * by_r
-            out.couplings.append(Couplings(spring.vertices[i], spring.vertices[j], blocks))
+            out.loads.append(Couplings(spring.vertices[i], spring.vertices[j], blocks))
 
 
 def springs_at(system: System, time: float) -> list[SpringPotential]:

@@ -42,7 +42,7 @@ class PressurePotential(Potential):
         """With `project`, zero: the linear model. The true one has no diagonal, so that it is never definite."""
         if not project:
             rows, columns, blocks = self._swept(x).hessian()
-            out.couplings.append(Couplings(rows, columns, self.pressure * blocks))
+            out.loads.append(Couplings(rows, columns, self.pressure * blocks))
 
     def _swept(self, x: NDArray[np.float64]) -> SweptTriangles:
         return SweptTriangles(self.start, x, self.triangles)

@@ -1,0 +1,112 @@
+"""From the cavities and cables of a scene to actuators of a system."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.errors import SceneError
+from supple.loads.actuators.actuator import Actuator
+from supple.loads.actuators.cable_length import CableLength
+from supple.loads.actuators.enclosed_volume import EnclosedVolume
+from supple.loads.actuators.laws import ElasticCable, GivenForce, GivenGas, GivenValue, Law
+from supple.scene.actuators.cable import Cable
+from supple.scene.actuators.cavity import Cavity
+from supple.scene.actuators.gas import GAS_CONSTANT, Gas
+from supple.scene.body import PlacedBody
+from supple.scene.loads.over_time import Curve, OverTime, magnitude_at, value_at
+
+
+def actuators_of(
+    cavities: Sequence[Cavity],
+    cables: Sequence[Cable],
+    bodies: Sequence[PlacedBody],
+    begins: dict[str, int],
+    x: NDArray[np.float64],
+) -> tuple[Actuator, ...]:
+    """The cavities, then the cables of a scene; parameters as of `cavity_actuator`."""
+    filled = [cavity_actuator(cavity, bodies, begins, x) for cavity in cavities]
+    return (*filled, *(cable_actuator(cable, bodies, begins, x) for cable in cables))
+
+
+def cavity_actuator(
+    cavity: Cavity, bodies: Sequence[PlacedBody], begins: dict[str, int], x: NDArray[np.float64]
+) -> Actuator:
+    """A cavity of a scene.
+
+    Parameters
+    ----------
+    begins : by body name, the number of its first vertex; x : (n, 3) where the simulation begins [m]
+
+    Raises
+    ------
+    SceneError : where the cavity has no volume at the start.
+    """
+    coordinate = EnclosedVolume.of(cavity.surface(bodies) + begins[cavity.body])
+    start = coordinate.value(x[coordinate.vertices])
+    if start <= 0.0:
+        raise SceneError(f"{cavity.label}: its volume at the start is {start:.3g} m^3; it must be above zero")
+    return Actuator("cavity", str(cavity.name), coordinate, start, _law(cavity, start))
+
+
+def cable_actuator(
+    cable: Cable, bodies: Sequence[PlacedBody], begins: dict[str, int], x: NDArray[np.float64]
+) -> Actuator:
+    """A cable of a scene; parameters as of `cavity_actuator`."""
+    corners = cable.corners(bodies)
+    named = [(begins[name] + own, k, weights) for k, (name, own, weights, _) in enumerate(corners) if name is not None]
+    vertices, column = np.unique(np.concatenate([own for own, _, _ in named]), return_inverse=True)
+    weights = np.zeros((len(corners), len(vertices)))
+    for (_, k, shares), columns in zip(named, column.reshape(len(named), -1), strict=True):
+        np.add.at(weights[k], columns, shares)
+    used = weights.any(axis=0)
+    offsets = np.array([offset for _, _, _, offset in corners])
+    coordinate = CableLength(vertices[used].astype(np.int32), np.ascontiguousarray(weights[:, used]), offsets)
+    start = coordinate.value(x[coordinate.vertices])
+    return Actuator("cable", cable.name, coordinate, start, _cable_law(cable, start), cable.friction)
+
+
+def _cable_law(cable: Cable, start: float) -> Law:
+    if cable.tension is not None:
+        tension = partial(magnitude_at, cable.tension, what=f"{cable.label}: tension")
+        return GivenForce(lambda time: -tension(time), start)
+    assert cable.stiffness is not None
+    if cable.length is not None:
+        return ElasticCable(cable.stiffness, partial(magnitude_at, cable.length, what=f"{cable.label}: length"))
+    speed = cable.winch_speed
+    return ElasticCable(cable.stiffness, lambda time: max(start - _wound(speed, time), 0.0))
+
+
+def _wound(speed: float | Curve | None, time: float) -> float:
+    """What a winch of that speed has wound up since time 0 [m]."""
+    if not isinstance(speed, Curve):
+        return float(np.asarray(speed)) * time
+    # The integral of a piecewise linear function is exact by the trapezoidal rule on its corners.
+    corners = np.asarray(speed.times)
+    times = np.concatenate([[0.0], corners[(corners > 0.0) & (corners < time)], [time]])
+    return float(np.trapezoid([float(speed(t)) for t in times], times))
+
+
+def _law(cavity: Cavity, start: float) -> Law:
+    if cavity.pressure is not None:
+        return GivenForce(partial(_number, cavity.pressure, f"{cavity.label}: pressure"), start)
+    if cavity.volume is not None:
+        return GivenValue(partial(magnitude_at, cavity.volume, what=f"{cavity.label}: volume", zero=False))
+    gas = cavity.gas
+    assert gas is not None
+    energy = partial(_gas_energy, gas, start, f"{cavity.label}: gas: amount")
+    return GivenGas(energy, start, gas.gamma, gas.ambient)
+
+
+def _number(given: OverTime, what: str, time: float) -> float:
+    return float(value_at(given, time, what, ()))
+
+
+def _gas_energy(gas: Gas, start: float, what: str, time: float) -> float:
+    """n R T [J] at `time` [s]."""
+    if gas.amount is None:
+        return gas.ambient * start
+    return magnitude_at(gas.amount, time, what, zero=False) * GAS_CONSTANT * gas.temperature

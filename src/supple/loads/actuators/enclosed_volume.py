@@ -1,0 +1,86 @@
+"""The volume that a closed surface encloses, V = -1/6 sum det [a b c] over triangles a, b, c that face inward."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.loads.actuators.actuator import Coordinate
+from supple.numerics.geometry.cross_matrices import cross_matrices
+from supple.numerics.kernel_cache import njit
+from supple.numerics.sparse.couplings import Couplings
+
+
+@dataclass(frozen=True, eq=False)
+class EnclosedVolume(Coordinate):
+    """The volume of a cavity.
+
+    Attributes
+    ----------
+    vertices : (v,); triangles : (t, 3) rows of these, which face into the cavity
+    """
+
+    vertices: NDArray[np.int32]
+    triangles: NDArray[np.int32]
+
+    @classmethod
+    def of(cls, triangles: NDArray[np.integer]) -> EnclosedVolume:
+        """Inside of triangles (t, 3) of a system's vertices."""
+        vertices, local = np.unique(triangles, return_inverse=True)
+        return cls(vertices.astype(np.int32), np.ascontiguousarray(local.reshape(-1, 3), dtype=np.int32))
+
+    def renumbered(self, new: NDArray[np.int32]) -> EnclosedVolume:
+        return replace(self, vertices=new[self.vertices])
+
+    def parts(self, own: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.array([self.value(own)])
+
+    def part_gradients(self, own: NDArray[np.float64]) -> NDArray[np.float64]:
+        return self.gradient(own)[None]
+
+    def value(self, own: NDArray[np.float64]) -> float:
+        return float(_volume(own, self.triangles))
+
+    def gradient(self, own: NDArray[np.float64]) -> NDArray[np.float64]:
+        out = np.zeros_like(own)
+        _add_gradient(own, self.triangles, out)
+        return out
+
+    def hessian(self, own: NDArray[np.float64], factors: NDArray[np.float64], project: bool) -> Couplings | None:
+        """It has no diagonal, so that no part of it is definite."""
+        if project or factors[0] == 0.0:
+            return None
+        i, j, k = self.triangles.T
+        a, b, c = (own[corner] - own[0] for corner in (i, j, k))
+        blocks = factors[0] / 6.0 * cross_matrices(np.concatenate([c, a, b]))
+        rows, columns = np.concatenate([i, j, k]), np.concatenate([j, k, i])
+        return Couplings(self.vertices[rows], self.vertices[columns], blocks)
+
+
+@njit(cache=True, error_model="numpy")
+def _volume(x, triangles):
+    """About the first vertex, which keeps the digits of a small volume far from the origin."""
+    total = 0.0
+    for t in range(len(triangles)):
+        i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        a0, a1, a2 = x[i, 0] - x[0, 0], x[i, 1] - x[0, 1], x[i, 2] - x[0, 2]
+        b0, b1, b2 = x[j, 0] - x[0, 0], x[j, 1] - x[0, 1], x[j, 2] - x[0, 2]
+        c0, c1, c2 = x[k, 0] - x[0, 0], x[k, 1] - x[0, 1], x[k, 2] - x[0, 2]
+        total -= a0 * (b1 * c2 - b2 * c1) + a1 * (b2 * c0 - b0 * c2) + a2 * (b0 * c1 - b1 * c0)
+    return total / 6.0
+
+
+@njit(cache=True, error_model="numpy")
+def _add_gradient(x, triangles, out):
+    """A third of minus the area vector of each triangle to each of its corners."""
+    for t in range(len(triangles)):
+        i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        u0, u1, u2 = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
+        v0, v1, v2 = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
+        n0, n1, n2 = (u1 * v2 - u2 * v1) / 6.0, (u2 * v0 - u0 * v2) / 6.0, (u0 * v1 - u1 * v0) / 6.0
+        for corner in (i, j, k):
+            out[corner, 0] -= n0
+            out[corner, 1] -= n1
+            out[corner, 2] -= n2

@@ -1,0 +1,104 @@
+"""Cables through points of bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.errors import SceneError
+from supple.scene.body import PlacedBody
+from supple.scene.loads.over_time import Curve, OverTime, checked_magnitude, checked_over_time
+from supple.scene.loads.points import Point, checked_point, point_corners
+from supple.scene.values import check_name, non_negative, positive
+
+
+@dataclass(frozen=True, eq=False)
+class Cable:
+    """An elastic cable without mass. It is fixed at its first point, slides through eyelets at those in between, and
+    is wound up by a winch at its last point. It pulls and never pushes.
+
+    Parameters
+    ----------
+    points : two or more, each ("finger", 12), a vertex of a body's mesh; ("finger", (x, y, z)), a place inside of a
+        body in its own coordinates [m]; or (None, (x, y, z)), a fixed place in the world.
+    length : of the cable without tension [m]; a number, a `Curve`, or a function of time [s].
+    tension : at the winch [N], zero or more; likewise.
+    winch_speed : by which the length without tension decreases from the distances at the start [m/s], negative to
+        release the cable; a number or a `Curve`.
+    stiffness : force per elongation of the whole cable [N/m]; with length and winch_speed only.
+    friction : coefficient of friction at the eyelets.
+    name : under which reports have it.
+
+    Raises
+    ------
+    SceneError : where a value is of the wrong kind or out of range.
+    """
+
+    points: Sequence[Point]
+    length: OverTime | None = None
+    tension: OverTime | None = None
+    winch_speed: float | Curve | None = None
+    stiffness: float | None = None
+    friction: float = 0.0
+    name: str = "cable"
+
+    def __post_init__(self) -> None:
+        check_name(self.name, "cable")
+        try:
+            given = list(self.points)
+        except TypeError:
+            given = []
+        if len(given) < 2:
+            raise SceneError(f"{self.label}: points is {self.points!r}; give two or more")
+        points = tuple(checked_point(point, f"{self.label}: points[{i}]") for i, point in enumerate(given))
+        if all(name is None for name, _ in points):
+            raise SceneError(f"{self.label}: all points are fixed in the world; give at least one point of a body")
+        object.__setattr__(self, "points", points)
+        drives = [key for key in ("length", "tension", "winch_speed") if getattr(self, key) is not None]
+        if len(drives) != 1:
+            found = " and ".join(drives) or "none of them"
+            raise SceneError(f"{self.label}: {found} given; give exactly one of length, tension and winch_speed")
+        for key in ("length", "tension"):
+            if getattr(self, key) is not None:
+                object.__setattr__(self, key, checked_magnitude(getattr(self, key), f"{self.label}: {key}"))
+        if self.winch_speed is not None:
+            what = f"{self.label}: winch_speed"
+            if callable(self.winch_speed) and not isinstance(self.winch_speed, Curve):
+                raise SceneError(f"{what} is a function; give a number or a Curve, or the length as a function")
+            object.__setattr__(self, "winch_speed", checked_over_time(self.winch_speed, what, ()))
+        if (self.stiffness is None) != (self.tension is not None):
+            remedy = "give it" if self.stiffness is None else "it has no effect with tension; leave it out"
+            raise SceneError(f"{self.label}: stiffness is {self.stiffness!r}; {remedy}")
+        if self.stiffness is not None:
+            object.__setattr__(self, "stiffness", positive(self.stiffness, f"{self.label}: stiffness"))
+        object.__setattr__(self, "friction", non_negative(self.friction, f"{self.label}: friction"))
+
+    @property
+    def label(self) -> str:
+        """The name of this cable in messages."""
+        return f"cable {self.name!r}"
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """The names of the bodies that it acts on."""
+        return tuple(name for name, _ in self.points if name is not None)
+
+    def corners(
+        self, bodies: Sequence[PlacedBody]
+    ) -> list[tuple[str | None, NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]]:
+        """Its points; see `point_corners`.
+
+        Raises
+        ------
+        SceneError : where a body or a vertex does not exist, a place is outside of its body, or two points in a row are
+            the same.
+        """
+        found = [point_corners(point, bodies, f"{self.label}: points[{i}]") for i, point in enumerate(self.points)]
+        for i, (one, two) in enumerate(pairwise(found)):
+            if one[0] == two[0] and all(np.array_equal(a, b) for a, b in zip(one[1:], two[1:], strict=True)):
+                raise SceneError(f"{self.label}: points[{i}] and points[{i + 1}] are the same; give each once")
+        return found
