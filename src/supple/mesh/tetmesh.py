@@ -64,7 +64,7 @@ class TetMesh(Displayed):
 
     Attributes
     ----------
-    tets : (m, 4) the corners
+    tets : (m, 4) the corners, rows of `vertices`
     nodes : (m, 4), or (m, 10) of quadratic tets
     order : 1, or 2 of quadratic tets
     turned : int

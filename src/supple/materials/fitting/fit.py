@@ -35,8 +35,9 @@ class MaterialFit:
     ----------
     material : with these parameters
     names : of the parameters; values : (q,) [Pa], exponents without unit
-    standard_errors : (q,) of the values; not-a-number where the tests do not determine one
-    intervals : (q, 2) in which a parameter is with the probability `confidence`
+    standard_errors : (q,) in the units of the values [Pa or -]; not-a-number where the tests do not determine one
+    intervals : (q, 2) in which a parameter is with the probability `confidence`, in its unit [Pa or -]
+    confidence : of the intervals [-]
     residuals : by test, root mean square of the differences of stress, as a share of the test's largest stress
     curves : the tests
     """
@@ -96,7 +97,7 @@ def fit_material(
     terms : of `Ogden`, 1 to 3.
     bulk : bulk modulus of the result [Pa]; None: 500 times its shear modulus. Tests of shape do not determine it.
     stress_unit : what the unit of stress in the tests is [Pa]: 1e6 for MPa.
-    confidence : of the intervals, above 0 and below 1.
+    confidence : of the intervals [-], above 0 and below 1.
 
     Raises
     ------

@@ -25,9 +25,9 @@ class HolzapfelGasserOgden(ByLaw):
     ----------
     c10 : of the ground [Pa], above zero; its shear modulus is 2 c10. bulk : K [Pa].
     k1 : stiffness of the fibres [Pa]; k2 : how fast they stiffen [-], above zero.
-    kappa : dispersion of their directions, from 0 (parallel) to 1/3 (in all directions alike).
+    kappa : dispersion of their directions [-], from 0 (parallel) to 1/3 (in all directions alike).
     directions : (families, 3) mean directions in the mesh's coordinates at rest, or (n_tets, families, 3), one of each
-        family for every tet; of any length above zero.
+        family for every tet; of any length above zero [-].
 
     Raises
     ------

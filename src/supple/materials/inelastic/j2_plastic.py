@@ -25,10 +25,11 @@ class J2Plastic(Hyperelastic):
 
     Parameters
     ----------
-    youngs : E [Pa]; poisson : nu, above -1 and below 0.5; one number, or one per tetrahedron, as all others.
+    youngs : E [Pa]; poisson : nu [-], above -1 and below 0.5. One number, or one per tetrahedron, as all others.
     yield_stress : at first yield [Pa], above zero.
     hardening : H [Pa], zero or more.
-    saturation_stress : [Pa], at least `yield_stress`; None: as `yield_stress`. saturation_rate : [-], zero or more.
+    saturation_stress : [Pa], at least `yield_stress`; None: as `yield_stress`.
+    saturation_rate : delta [-], zero or more.
 
     Raises
     ------

@@ -28,7 +28,7 @@ class EnergyMaterial(ByLaw):
         made of +, -, *, /, ** and functions of SymPy such as `sympy.exp`. A constant in it is taken away.
     of : "invariants", then the variables are I1 = tr C, I2 = (I1^2 - tr C^2) / 2 and J = det F; or "stretches", then
         they are the principal stretches, in which psi must be symmetric.
-    parameters : by name; one number each, or one per tetrahedron.
+    parameters : by name; one number each, or one per tetrahedron, in the units of the formula [SI].
     bulk : K [Pa], zero or more. `integration="patches"` needs one above zero.
 
     Raises

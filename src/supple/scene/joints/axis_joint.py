@@ -23,9 +23,9 @@ class AxisJoint(Joint):
 
     Parameters
     ----------
-    axis : (3,) its direction in the world where the scene places everything; it moves with the second.
-    limits : the smallest and the largest coordinate, (low, high); for a slider, an end may be infinite. None: no
-        limits.
+    axis : (3,) its direction in the world where the scene places everything, of any length [-]; it moves with the second.
+    limits : the smallest and the largest coordinate, (low, high) [rad] or [m]; for a slider, an end may be infinite.
+        None: no limits.
     motor : `PositionMotor`, `VelocityMotor` or `ForceMotor`; None: it moves freely.
     """
 
