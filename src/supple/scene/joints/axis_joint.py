@@ -23,7 +23,8 @@ class AxisJoint(Joint):
 
     Parameters
     ----------
-    axis : (3,) its direction in the world where the scene places everything, of any length [-]; it moves with the second.
+    axis : (3,) its direction in the world where the scene places everything, of any length [-]; it moves with the
+        second.
     limits : the smallest and the largest coordinate, (low, high) [rad] or [m]; for a slider, an end may be infinite.
         None: no limits.
     motor : `PositionMotor`, `VelocityMotor` or `ForceMotor`; None: it moves freely.

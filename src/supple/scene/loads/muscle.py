@@ -35,8 +35,8 @@ class Muscle(Load):
     activation : a, from 0 to 1; a number, a `Curve`, or a function of time [s].
     tets : None for all tets of the body, an `InBox` that holds all four corners of a tet at the start, or rows of the
         mesh's tets.
-    force_length : f [-] at stretches, as (stretches, values): increasing numbers above zero, and numbers of zero or more.
-        Linear in between, constant outside. None: 1 at all stretches.
+    force_length : f [-] at stretches, as (stretches, values): increasing numbers above zero, and numbers of zero or
+        more. Linear in between, constant outside. None: 1 at all stretches.
     name : appears in messages.
 
     Raises
