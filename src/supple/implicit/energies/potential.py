@@ -32,7 +32,7 @@ class HessianBlocks:
     vertices : (n, 3, 3) one matrix for each vertex with itself [N/m]
     tet_count : m
     couplings : matrices of contacts, between vertices that no element joins [N/m]
-    patches : matrices of patches of tets, likewise [N/m]
+    patches : matrices of patches of tets and of quadratic tets, likewise [N/m]
     blank : whether nothing has been added to `elements`; the memory may then hold an earlier sum
     """
 
@@ -52,7 +52,7 @@ class HessianBlocks:
 
     @property
     def beyond_elements(self) -> list[Couplings]:
-        """The matrices of patches, then those of contacts."""
+        """The matrices of patches and quadratic tets, then those of contacts."""
         return [*self.patches, *self.couplings]
 
     @property
