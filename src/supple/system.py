@@ -25,7 +25,6 @@ from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.elastic_tets.edge_springs import EdgeSprings
 from supple.materials.elastic_tets.laws import TetLaws, joined_materials
 from supple.materials.elastic_tets.quadratic import QuadraticTets
-from supple.mesh.quadratic import node_volumes
 from supple.mesh.topology import graph_components
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.scene.body import PlacedBody
@@ -105,7 +104,7 @@ class System:
     Attributes
     ----------
     rest_positions : (n, 3) [m] rest shapes, each in its body's own coordinates, before placement
-    masses : (n,) lumped, rho V / 4 to each node of a tet; see `node_volumes` for quadratic tets [kg]
+    masses : (n,) lumped, rho V / 4 to each node of a tet; see `PlacedBody.lumped_masses` [kg]
     tets : (m, 4); rest_shape_inverse : (m, 3, 3) Dm^-1 [1/m]; rest_volumes : (m,) [m^3]
     edges : (e, 2); rest_lengths : (e,) [m]
     points : combinations of vertices that touch and are drawn; those of a soft body are its vertices
@@ -232,7 +231,7 @@ def build_system(scene: Scene, start: State | None = None) -> System:
         rows = [slice(begin, begin + count) for begin, count in zip((n, m, e, t, p), counts, strict=True)]
         ranges.append(BodyRange(body, *rows))
         rest.append(mesh.vertices)
-        masses.append(_lumped_masses(body))
+        masses.append(body.lumped_masses())
         tets.append(mesh.tets + n)
         Dm_inv.append(mesh.rest_shape_inverse)
         volumes.append(mesh.volumes)
@@ -295,19 +294,6 @@ def _start_states(scene: Scene, start: State | None) -> tuple[State, ...]:
         return (start,)
     begun = initial_state(scene)
     return (begun,) if start is None else (begun, start)
-
-
-def _lumped_masses(body: PlacedBody) -> NDArray[np.float64]:
-    """(n,) [kg]: of each tet's mass rho V, a quarter to each of its vertices, or parts of a quadratic tet's."""
-    mesh = body.mesh
-    if mesh.order == 2:
-        density = np.broadcast_to(np.asarray(body.material.density, dtype=np.float64), len(mesh.tets))
-        parts = density[:, None] * node_volumes(mesh.vertices, mesh.nodes)
-        masses = np.bincount(mesh.nodes.ravel(), weights=parts.ravel(), minlength=len(mesh.vertices))
-        return masses.astype(np.float64, copy=False)
-    quarters = np.broadcast_to(np.asarray(body.material.density, dtype=np.float64), len(mesh.tets)) * mesh.volumes / 4.0
-    masses = np.bincount(mesh.tets.ravel(), weights=np.repeat(quarters, 4), minlength=len(mesh.vertices))
-    return masses.astype(np.float64, copy=False)
 
 
 def _applied_force(force: Force, part: BodyRange) -> DeadLoad:
@@ -383,7 +369,7 @@ def _given(value: ArrayLike, body: PlacedBody, what: str, *, places: bool) -> ND
 
 
 def _rigid_velocity(body: PlacedBody, placed: NDArray[np.float64]) -> NDArray[np.float64]:
-    masses = _lumped_masses(body)
+    masses = body.lumped_masses()
     center = masses @ placed / masses.sum()
     return np.asarray(body.velocity) + np.cross(np.asarray(body.angular_velocity), placed - center)
 

@@ -180,6 +180,7 @@ INP = """*HEADING
 1, 1, 0, 0
 2, 0, 1, 0
 3, 0, 0, 1
+, ,
 *Element, type=S3
 1, 7, 1, 2
 *ELEMENT, TYPE=C3D4H, ELSET=E

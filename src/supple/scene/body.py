@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError
 from supple.materials.material import Material
 from supple.materials.per_tet import NO_REGION
+from supple.mesh.quadratic import node_volumes
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
@@ -62,6 +63,18 @@ class PlacedBody(ABC):
         """The same body with other values of its parameters."""
         this: Any = self
         return replace(this, **values)
+
+    def lumped_masses(self) -> NDArray[np.float64]:
+        """(n,) of the mesh's vertices [kg]: of each tet's mass rho V, a quarter to each corner, or the parts of a
+        quadratic tet's nodes."""
+        mesh = self.mesh
+        density = np.broadcast_to(np.asarray(self.material.density, dtype=np.float64), len(mesh.tets))
+        if mesh.order == 2:
+            parts = density[:, None] * node_volumes(mesh.vertices, mesh.nodes)
+        else:
+            parts = np.repeat(density * mesh.volumes / 4.0, 4)
+        masses = np.bincount(mesh.nodes.ravel(), weights=parts.ravel(), minlength=len(mesh.vertices))
+        return masses.astype(np.float64, copy=False)
 
     def _check_placement(self, owner: str, edges: NDArray[np.int32]) -> None:
         """Make vectors of the placement and the velocities; edges (e, 2) : rows of `points`.

@@ -33,7 +33,7 @@ class HessianBlocks:
     vertices : (n, 3, 3) one matrix for each vertex with itself [N/m]
     tet_count : m
     couplings : matrices of contacts and joints, between vertices that no element joins [N/m]
-    patches, loads : matrices of patches of tets and of loads, likewise [N/m]
+    patches, loads : matrices of patches of tets and of quadratic tets, and of loads, likewise [N/m]
     low_rank : matrices between all vertices of an actuator [N/m]
     blank : whether nothing has been added to `elements`; the memory may then hold an earlier sum
     """
@@ -58,7 +58,7 @@ class HessianBlocks:
 
     @property
     def beyond_elements(self) -> list[Couplings]:
-        """The matrices of patches and loads, then those of contacts and joints."""
+        """The matrices of patches, quadratic tets and loads, then those of contacts and joints."""
         return [*self.patches, *self.loads, *self.couplings]
 
     @property

@@ -80,7 +80,7 @@ def _blocks(text: str) -> Iterator[tuple[str, dict[str, str], list[tuple[int, li
             keyword, lines = words[0][1:].strip().upper(), []
             pairs = (word.partition("=") for word in words[1:])
             options = {name.strip().upper(): value.strip() for name, _, value in pairs}
-        elif keyword in ("NODE", "ELEMENT"):
+        elif keyword in ("NODE", "ELEMENT") and any(words):
             lines.append((number, [word for word in words if word]))
     yield keyword, options, lines
 
