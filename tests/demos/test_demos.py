@@ -32,6 +32,7 @@ def run(demo, kind, steps=None):
 
 def test_the_names_and_solvers_of_the_demos():
     names = {"squash", "stretch", "compliance", "bears", "cantilever", "twist", "stitch", "quilt", "dzhanibekov"}
+    names |= {"balloon", "muscle"}
     assert {name for name, _ in EVERY} == names
     assert {kind for _, kind in EVERY} == set(SOLVERS)
     assert {("squash", "implicit"), ("stretch", "implicit"), ("squash", "xpbd"), ("stretch", "xpbd")} <= set(EVERY)
