@@ -37,7 +37,7 @@ def scene() -> Scene:
 
 class _Measurement(Measurement):
     def values(self, frame: Frame) -> dict[str, Any]:
-        forces = {pin.pin.name: frame.reactions[pin.label] for pin in frame.system.pins}
+        forces = {str(pin.pin.name): frame.reactions[pin.label] for pin in frame.system.pins}
         length = float(np.ptp(frame.positions["free"][:, 0]))
         return {**super().values(frame), "time": frame.time, **forces, "length": length}
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from supple.loads.actuators.actuator import Actuator
 from supple.loads.actuators.cable_length import CableLength
-from supple.loads.actuators.eyelets import angles, span_forces
+from supple.loads.actuators.eyelets import angles, limits, span_forces
 from supple.numerics.kernel_cache import njit
 from supple.readings.actuator_readings import actuator_fields
 from supple.system import System
@@ -122,7 +122,7 @@ def _stop_slips(gradients, free, longer, turns, friction, tension, moved, grips)
         for k in range(e + 1):
             slip -= longer[k]
         if mobility > 0.0:
-            towards, away = -tension * np.expm1(-friction * turns[e]), tension * np.expm1(friction * turns[e])
+            towards, away = limits(tension, turns[e], friction)
             grips[e] = min(max(slip / mobility, -away), towards)
             for i in range(len(free)):
                 for j in range(3):
