@@ -32,7 +32,7 @@ def run(demo, kind, steps=None):
 
 
 def test_the_names_and_solvers_of_the_demos():
-    soft = {"squash", "stretch", "compliance", "bears", "cantilever", "twist", "stitch", "quilt"}
+    soft = {"squash", "stretch", "compliance", "bears", "cantilever", "twist", "stitch", "quilt", "balloon", "muscle"}
     rigid = {"dzhanibekov", "dominoes", "gripper", "ragdoll"}
     assert {name for name, _ in EVERY} == soft | rigid
     assert {kind for _, kind in EVERY} == set(SOLVERS)

@@ -143,3 +143,13 @@ def test_the_same_bits_every_time(make):
 def test_impossible_sizes_are_errors(make, words):
     with pytest.raises(MeshError, match=words):
         make()
+
+
+def test_a_spherical_shell_has_two_surfaces_on_its_radii():
+    shell = shapes.spherical_shell(0.1, 0.15, 0.03)
+    radii = np.linalg.norm(shell.vertices[shell.surface.used_vertices], axis=1)
+    assert set(radii.round(9)) == {0.1, 0.15}
+    assert shell.surface.components.count == 2
+    assert shell.volume == pytest.approx(4 / 3 * np.pi * (0.15**3 - 0.1**3), rel=0.03)
+    with pytest.raises(MeshError, match=r"inner_radius = 0.2 m is not below outer_radius = 0.15 m"):
+        shapes.spherical_shell(0.2, 0.15, 0.01)

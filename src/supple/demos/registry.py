@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from supple.demos.actuators.balloon import BALLOON
+from supple.demos.actuators.muscle import MUSCLE
 from supple.demos.bears import BEARS
 from supple.demos.cantilever import CANTILEVER
 from supple.demos.compliance import COMPLIANCE
@@ -19,8 +21,9 @@ from supple.demos.twist import TWIST
 from supple.errors import SceneError
 
 _TORTURE = [torture.full for torture in TORTURE.values()]
-_PLAIN = (SQUASH, STRETCH, COMPLIANCE, BEARS, CANTILEVER, TWIST, STITCH, QUILT, DZHANIBEKOV, DOMINOES, GRIPPER, RAGDOLL)
-DEMOS: dict[str, Demo] = {demo.name: demo for demo in (*_PLAIN, *_TORTURE)}
+_SOFT = (SQUASH, STRETCH, COMPLIANCE, BEARS, CANTILEVER, TWIST, STITCH, QUILT, BALLOON, MUSCLE)
+_RIGID = (DZHANIBEKOV, DOMINOES, GRIPPER, RAGDOLL)
+DEMOS: dict[str, Demo] = {demo.name: demo for demo in (*_SOFT, *_RIGID, *_TORTURE)}
 
 
 def find_demo(name: str) -> Demo:

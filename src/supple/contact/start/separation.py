@@ -13,8 +13,8 @@ from supple.contact.start.surfaces import StartSurfaces, start_surfaces
 from supple.errors import SceneError
 from supple.mesh.topology import graph_components
 from supple.scene.contact_pairs import PairTable, pair_table
-from supple.scene.loads.load import OnSurface
 from supple.scene.loads.muscle import Muscle
+from supple.scene.loads.surface_loads import Pressure, Traction
 from supple.scene.scene import Scene
 from supple.scene.selection import InBox
 from supple.system import PinRange, System, build_system, initial_state
@@ -119,7 +119,7 @@ def _applied(scene: Scene, given: Mapping[str, ArrayLike], total: NDArray[np.flo
                 if item.body == body.name:
                     items[k] = replace(item, vertices=item.select(body.place(body.points)))
         for k, load in enumerate(on_surfaces):
-            if isinstance(load, OnSurface) and load.body == body.name and isinstance(load.region, InBox):
+            if isinstance(load, (Pressure, Traction)) and load.body == body.name and isinstance(load.region, InBox):
                 on_surfaces[k] = replace(load, region=load.triangles(body))
             if isinstance(load, Muscle) and load.body == body.name and isinstance(load.tets, InBox):
                 on_surfaces[k] = replace(load, tets=load.fibres(body)[0])

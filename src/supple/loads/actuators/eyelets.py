@@ -18,6 +18,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.numerics.kernel_cache import njit
+
 # Of the length of the cable per second: slower slip counts as sticking.
 CREEP = 1e-3
 
@@ -28,9 +30,10 @@ def angles(directions: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.arccos(np.clip(cosines, -1.0, 1.0))
 
 
-def limits(tension: float, angle: float, friction: float) -> tuple[float, float]:
+@njit(cache=True, error_model="numpy")
+def limits(tension, angle, friction):
     """The largest f towards the winch and away from it, for the tension on the side of the winch [N]."""
-    return -tension * float(np.expm1(-friction * angle)), tension * float(np.expm1(friction * angle))
+    return -tension * np.expm1(-friction * angle), tension * np.expm1(friction * angle)
 
 
 def smooth_share(slip: float, reach: float) -> tuple[float, float, float]:

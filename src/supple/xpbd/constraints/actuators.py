@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from supple.loads.actuators.actuator import Actuator
 from supple.loads.actuators.cable_length import CableLength
 from supple.loads.actuators.eyelets import angles, limits, span_forces
+from supple.numerics.kernel_cache import njit
 from supple.readings.actuator_readings import actuator_fields
 from supple.system import System
 
@@ -79,39 +80,54 @@ class ActuatorProjection:
         return actuator_fields(self.system, means, self._parts, self._works)
 
     def _project(self, k: int, each: Actuator, points: Floats, origins: Floats, time: float, h: float) -> None:
-        own = _own(each, points, origins)
-        gradients = each.coordinate.part_gradients(own)
-        total = gradients.sum(axis=0)
-        mobility = self._mobility(each, points, total, h)
+        rows, own = each.coordinate.vertices, _own(each, points, origins)
+        gradients, parts = each.coordinate.part_gradients(own), each.coordinate.parts(own)
+        grips = np.zeros(len(parts) - 1)
         self._forces[k][:] = 0.0
+        total = gradients.sum(axis=0)
+        moved = h * h * points[rows, 3, None] * total
+        mobility = float(np.einsum("ij,ij->", moved, total))
         if mobility <= 0.0:
             return
-        force = each.law.reached(time, each.coordinate.value(own), mobility)
-        self._move(each, points, force * total, h)
-        grips = np.zeros(len(gradients) - 1)
+        force = each.law.reached(time, float(parts.sum()), mobility)
+        moved *= force
         if each.friction > 0.0 and isinstance(each.coordinate, CableLength):
-            tension = -force
             turns = angles(each.coordinate.spans(own)[1])
-            for e in reversed(range(len(grips))):
-                before = gradients[: e + 1].sum(axis=0)
-                mobility = self._mobility(each, points, before, h)
-                if mobility > 0.0:
-                    now = each.coordinate.parts(_own(each, points, origins))
-                    slip = float((self._parts[k] - now)[: e + 1].sum())
-                    towards, away = limits(tension, float(turns[e]), each.friction)
-                    grips[e] = min(max(slip / mobility, -away), towards)
-                    self._move(each, points, grips[e] * before, h)
-                tension -= grips[e]
+            free = points[rows, 3] * h * h
+            _stop_slips(gradients, free, parts - self._parts[k], turns, each.friction, -force, moved, grips)
+        points[rows, :3] += moved
         self._forces[k] = span_forces(force, grips)
 
-    @staticmethod
-    def _mobility(each: Actuator, points: Floats, gradient: Floats, h: float) -> float:
-        return h * h * float(np.einsum("i,ij,ij->", points[each.coordinate.vertices, 3], gradient, gradient))
 
-    @staticmethod
-    def _move(each: Actuator, points: Floats, forces: Floats, h: float) -> None:
-        rows = each.coordinate.vertices
-        points[rows, :3] += h * h * points[rows, 3, None] * forces
+@njit(cache=True, error_model="numpy")
+def _stop_slips(gradients, free, longer, turns, friction, tension, moved, grips):
+    """Friction at the eyelets of a cable, one after the other from the winch, with lengths linear in `moved`.
+
+    Parameters
+    ----------
+    gradients : (s, v, 3) of the lengths; free : (v,) inverse masses times h^2; longer : (s,) changes of the lengths
+        without the cable [m]; turns : (s - 1,) [rad]; tension : at the winch [N]
+    moved : (v, 3) by the tension [m], to which the motion by friction is added; grips : (s - 1,) f [N], set here
+    """
+    before = np.empty_like(moved)
+    for e in range(len(grips) - 1, -1, -1):
+        slip = mobility = 0.0
+        for i in range(len(free)):
+            for j in range(3):
+                before[i, j] = 0.0
+                for k in range(e + 1):
+                    before[i, j] += gradients[k, i, j]
+                slip -= before[i, j] * moved[i, j]
+                mobility += free[i] * before[i, j] ** 2
+        for k in range(e + 1):
+            slip -= longer[k]
+        if mobility > 0.0:
+            towards, away = limits(tension, turns[e], friction)
+            grips[e] = min(max(slip / mobility, -away), towards)
+            for i in range(len(free)):
+                for j in range(3):
+                    moved[i, j] += grips[e] * free[i] * before[i, j]
+        tension -= grips[e]
 
 
 def _own(each: Actuator, points: Floats, origins: Floats) -> Floats:
