@@ -32,7 +32,7 @@ from supple.scene.inputs import checked_values, drive_inputs, hold_inputs
 from supple.scene.rigid.pose import Pose, pose_of
 from supple.scene.scene import Scene
 from supple.scene.stitches.measures import largest_stitch_stretch, stitch_energy
-from supple.state import ContactPoints, SolverDetails, State, Status, StepReport
+from supple.state import ContactPoints, Problems, SolverDetails, State, Status, StepReport
 from supple.system import BodyRange, Solver, System, build_system, initial_state
 
 logger = logging.getLogger(__name__)
@@ -347,7 +347,7 @@ def _steps(
     wanted = dict(state.inputs)
     problems = Problems()
     with ExitStack() as ends:  # ends every sink, also where another sink fails
-        ends.callback(problems.warn)
+        ends.callback(_warn, problems)
         for sink in sinks:
             ends.callback(sink.end)
             sink.begin(first, dt, steps)
@@ -358,7 +358,7 @@ def _steps(
             state, step = advance(solver, system, state, dt, workspace, wanted)
             seconds = time.perf_counter() - began
             frame = Frame(index, state, system, completed_report(system, state, step, seconds), step.contacts, solver)
-            problems.note(frame.report)
+            problems.note(frame.report.status, frame.report.message)
             for sink in sinks:
                 sink.write(frame)
             sent = yield frame
@@ -367,34 +367,9 @@ def _steps(
                 break
 
 
-class Problems:
-    """The frames of a run that the solver could go on from although they did not converge.
-
-    Attributes
-    ----------
-    frames : number of frames; bad : how many of them did not converge
-    first : by status, the message of its first frame
-    """
-
-    def __init__(self) -> None:
-        self.frames = self.bad = 0
-        self.first: dict[Status, str] = {}
-
-    def note(self, report: Report) -> None:
-        """Take notice of a frame."""
-        self.frames += 1
-        if report.status is not Status.CONVERGED and report.status.can_go_on:
-            self.bad += 1
-            self.first.setdefault(report.status, report.message)
-
-    def __str__(self) -> str:
-        texts = "; ".join(f"{status}: {message}" if message else str(status) for status, message in self.first.items())
-        return f"{self.bad} of {self.frames} frames did not converge; first of each kind: {texts}" if self.bad else ""
-
-    def warn(self) -> None:
-        """Write a warning to the log, where there is something to warn of."""
-        if self.bad:
-            logger.warning("%s", self)
+def _warn(problems: Problems) -> None:
+    if problems.bad:
+        logger.warning("%s", problems)
 
 
 def completed_report(system: System, state: State, step: StepReport, seconds: float) -> Report:

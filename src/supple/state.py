@@ -202,3 +202,28 @@ class StepReport:
     min_distance: float | None = None
     details: SolverDetails = field(default_factory=SolverDetails)
     contacts: Callable[[], ContactPoints] | None = None
+
+
+class Problems:
+    """The frames of a run that the solver could go on from although they did not converge.
+
+    Attributes
+    ----------
+    frames : number of frames; bad : how many of them did not converge
+    first : by status, the message of its first frame
+    """
+
+    def __init__(self) -> None:
+        self.frames = self.bad = 0
+        self.first: dict[Status, str] = {}
+
+    def note(self, status: Status, message: str) -> None:
+        """Take notice of a frame."""
+        self.frames += 1
+        if status is not Status.CONVERGED and status.can_go_on:
+            self.bad += 1
+            self.first.setdefault(status, message)
+
+    def __str__(self) -> str:
+        texts = "; ".join(f"{status}: {message}" if message else str(status) for status, message in self.first.items())
+        return f"{self.bad} of {self.frames} frames did not converge; first of each kind: {texts}" if self.bad else ""

@@ -36,7 +36,6 @@ from supple.scene.pins import Pin
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.scene import Scene
 from supple.scene.stitches.stitching import Stitching, no_stitching
-from supple.scene.values import float_array
 from supple.state import SolverDetails, State, StepReport
 
 
@@ -345,33 +344,16 @@ def initial_state(
     x, v = [], []
     for body in scene.bodies:
         if positions is not None and body.name in positions:
-            placed = _given(positions[body.name], body, f"initial_positions[{body.name!r}]", places=True)
+            placed = body.vertex_values(positions[body.name], f"initial_positions[{body.name!r}]", places=True)
         else:
             placed = body.place(body.mesh.vertices)
         if velocities is not None and body.name in velocities:
-            moving = _given(velocities[body.name], body, f"initial_velocities[{body.name!r}]", places=False)
+            moving = body.vertex_values(velocities[body.name], f"initial_velocities[{body.name!r}]", places=False)
         else:
-            moving = _rigid_velocity(body, placed)
+            moving = body.velocities_at(placed)
         x.append(placed)
         v.append(moving)
     return State(0.0, np.ascontiguousarray(np.concatenate(x)), np.ascontiguousarray(np.concatenate(v)))
-
-
-def _given(value: ArrayLike, body: PlacedBody, what: str, *, places: bool) -> NDArray[np.float64]:
-    """Of the mesh's vertices, from values of the body's points: positions or velocities."""
-    array, count = float_array(value, what), len(body.points)
-    if array.shape != (count, 3):
-        raise SceneError(f"{what} has shape {array.shape}; the body's mesh needs ({count}, 3)")
-    if not np.isfinite(array).all():
-        row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
-        raise SceneError(f"{what}: row {row} is not finite")
-    return body.control_values(array, what, places=places) if isinstance(body, RigidBody) else array
-
-
-def _rigid_velocity(body: PlacedBody, placed: NDArray[np.float64]) -> NDArray[np.float64]:
-    masses = body.lumped_masses()
-    center = masses @ placed / masses.sum()
-    return np.asarray(body.velocity) + np.cross(np.asarray(body.angular_velocity), placed - center)
 
 
 # Of a simulation by XPBD, at most, for each tet and its share of vertices, edges and surface. Measured: 970 on a cube

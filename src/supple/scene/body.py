@@ -17,7 +17,7 @@ from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.scene.rotation import rotation_matrix
-from supple.scene.values import check_name, finite_vector, non_negative
+from supple.scene.values import check_name, finite_vector, float_array, non_negative
 
 
 class PlacedBody(ABC):
@@ -75,6 +75,35 @@ class PlacedBody(ABC):
             parts = np.repeat(density * mesh.volumes / 4.0, 4)
         masses = np.bincount(mesh.nodes.ravel(), weights=parts.ravel(), minlength=len(mesh.vertices))
         return masses.astype(np.float64, copy=False)
+
+    def velocities_at(self, placed: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n, 3) velocities at the start [m/s] of the mesh's vertices, which are placed at (n, 3) [m]."""
+        masses = self.lumped_masses()
+        center = masses @ placed / masses.sum()
+        return np.asarray(self.velocity) + np.cross(np.asarray(self.angular_velocity), placed - center)
+
+    def vertex_values(self, value: ArrayLike, what: str, *, places: bool) -> NDArray[np.float64]:
+        """Positions, or velocities, (n, 3) of the mesh's vertices from those of `points` (k, 3).
+
+        Parameters
+        ----------
+        what : for messages; places : whether the values are positions
+
+        Raises
+        ------
+        SceneError : where the values have another shape, are not finite, or do not fit a rigid body.
+        """
+        array, count = float_array(value, what), len(self.points)
+        if array.shape != (count, 3):
+            raise SceneError(f"{what} has shape {array.shape}; the body's mesh needs ({count}, 3)")
+        if not np.isfinite(array).all():
+            row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
+            raise SceneError(f"{what}: row {row} is not finite")
+        return self.control_values(array, what, places=places)
+
+    def control_values(self, values: NDArray[np.float64], what: str, *, places: bool) -> NDArray[np.float64]:
+        """`vertex_values` of values that are as they should be."""
+        return values
 
     def _check_placement(self, owner: str, edges: NDArray[np.int32]) -> None:
         """Make vectors of the placement and the velocities; edges (e, 2) : rows of `points`.
