@@ -154,11 +154,31 @@ def _scene(file: Path) -> None:
             rows.append((f"body {part.name}", _rigid_text(part.body)))
             continue
         mesh = part.body.mesh
-        text = f"{type(part.body.material).__name__}, {len(mesh.tets)} tets, {mesh.volume:.6g} m^3, {mass:.6g} kg"
+        text = f"{_material_text(part.body)}, {len(mesh.tets)} tets, {mesh.volume:.6g} m^3, {mass:.6g} kg"
         rows.append((f"body {part.name}", text))
         rows += _locking_rows(part.body)
     rows += _stitch_rows(system.stitching)
     print_table(rows, str(file))
+
+
+def _material_text(body: PlacedBody) -> str:
+    """The material, with the moduli of small strains where other parameters were given."""
+    import numpy as np
+
+    from supple.materials.hyperelastic.by_law import ByLaw
+    from supple.materials.inelastic.viscoelastic import Viscoelastic
+
+    material = body.material
+    name = type(material).__name__
+    if isinstance(material, Viscoelastic):
+        name = f"{name} {type(material.material).__name__}"
+    elif not isinstance(material, ByLaw):
+        return name
+    youngs, poisson = (
+        " to ".join(f"{value:.6g}" for value in sorted({np.min(of_tets), np.max(of_tets)}))
+        for of_tets in (material.youngs, material.poisson)
+    )
+    return f"{name} (small strains: E = {youngs} Pa, nu = {poisson})"
 
 
 def _rigid_text(body: RigidBody) -> str:

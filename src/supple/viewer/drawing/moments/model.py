@@ -150,7 +150,7 @@ class Moment:
     springs: Mapping[int, tuple[NDArray[np.float64], NDArray[np.float64]]] = field(default_factory=dict)
     pusher: tuple[NDArray[np.float64], float] | None = None
     tet_values: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
-    internal: NDArray[np.float64] = NEVER_FLOWED
+    internal: NDArray[np.float64] = field(default_factory=lambda: NEVER_FLOWED)
 
     @cached_property
     def deformation_gradients(self) -> NDArray[np.float64]:
