@@ -136,3 +136,18 @@ def test_a_thin_scene_that_locks(rows_of, tmp_path, divisions, poisson, more, wa
         share = 100 * 8 / (8 + 2 * 0.5)
         assert rows["warning bar"].startswith(f"{share:.0f} % of the surface has fewer than three tets across")
         assert "Poisson's ratio up to 0.45" in rows["warning bar"]
+
+
+def test_materials_with_other_parameters_show_their_moduli_of_small_strains(rows_of, tmp_path):
+    rubber = "{kind: mooney_rivlin, c10: 1e5, bulk: 2e6}"
+    slow = f"{{kind: viscoelastic, material: {rubber}, prony: [[0.5, 1]]}}"
+    (tmp_path / "s.yaml").write_text(
+        "bodies:\n"
+        f"  - {{name: quick, shape: {{kind: box}}, material: {rubber}}}\n"
+        f"  - {{name: slow, shape: {{kind: box}}, material: {slow}}}\n"
+        "solver: {kind: implicit}\n"
+    )
+    rows = rows_of("s.yaml")
+    moduli = f"(small strains: E = {9 * 2e6 * 2e5 / 6.2e6:.6g} Pa, nu = {(6e6 - 4e5) / 12.4e6:.6g})"
+    assert rows["body quick"].startswith(f"MooneyRivlin {moduli}, ")
+    assert rows["body slow"].startswith(f"Viscoelastic MooneyRivlin {moduli}, ")

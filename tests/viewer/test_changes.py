@@ -149,6 +149,27 @@ class TestSolvers:
 
 
 class TestBodies:
+    def test_what_has_flowed_is_kept_when_other_bodies_come_and_go(self):
+        slow = sp.Viscoelastic(material=sp.MooneyRivlin(c10=1e4, bulk=2e5), prony=[(0.5, 0.1)])
+        mesh = sp.shapes.box((0.2, 0.2, 0.2), (1, 1, 1))
+        places = ((0, 0, 0), (1, 0, 0), (2, 0, 0))
+        bodies = [sp.Body(name, mesh, slow, position=place) for name, place in zip("abc", places, strict=True)]
+        pins = [sp.Pin(name, [0, 1, 2, 3]) for name in "abc"]
+        scene = sp.Scene(bodies, pins=pins)
+        live = LiveScene(LiveSource("slow", scene, sp.Implicit(contact=None), 0.02))
+        run(live, 2)
+        count, flowed = len(mesh.tets), live.state.internal.copy()
+        assert (flowed[:, 10] > 0).all()
+        change(RemoveBody("b"), live)
+        np.testing.assert_array_equal(live.state.internal, np.delete(flowed, np.s_[count : 2 * count], axis=0))
+        change(AddBody("box", size=0.3, resolution=3), live)
+        np.testing.assert_array_equal(live.state.internal[: 2 * count], flowed[np.r_[:count, 2 * count : 3 * count]])
+        change(SetParameter("density", 700.0, "a"), live)
+        np.testing.assert_array_equal(live.state.internal[: 2 * count], flowed[np.r_[:count, 2 * count : 3 * count]])
+        run(live, 1)
+        change(Reset(), live)
+        assert (live.state.internal[:, 10] == 0).all()
+
     @pytest.mark.parametrize("shape", limits.SHAPES)
     def test_a_new_shape_is_placed_above_the_others_with_its_size(self, live, shape):
         top = live.state.positions[:, 1].max()

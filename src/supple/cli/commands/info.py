@@ -174,7 +174,7 @@ def _scene(file: Path, timed: bool) -> None:
             continue
         mesh = part.body.mesh
         tets = f"{len(mesh.tets)} {'tets' if mesh.order == 1 else 'quadratic tets'}"
-        text = f"{type(part.body.material).__name__}, {tets}, {mesh.volume:.6g} m^3, {mass:.6g} kg"
+        text = f"{_material_text(part.body)}, {tets}, {mesh.volume:.6g} m^3, {mass:.6g} kg"
         rows.append((f"body {part.name}", text))
         rows += _locking_rows(part.body)
     for each in system.actuators:
@@ -229,6 +229,26 @@ def _joint_text(joint: Joint) -> str:
             bound = "" if joint.motor.max_force is None else f" of at most {joint.motor.max_force:g}"
             text += f", {joint.motor.label}{bound}"
     return text
+
+
+def _material_text(body: PlacedBody) -> str:
+    """The material, with the moduli of small strains where other parameters were given."""
+    import numpy as np
+
+    from supple.materials.hyperelastic.by_law import ByLaw
+    from supple.materials.inelastic.viscoelastic import Viscoelastic
+
+    material = body.material
+    name = type(material).__name__
+    if isinstance(material, Viscoelastic):
+        name = f"{name} {type(material.material).__name__}"
+    elif not isinstance(material, ByLaw):
+        return name
+    youngs, poisson = (
+        " to ".join(f"{value:.6g}" for value in sorted({np.min(of_tets), np.max(of_tets)}))
+        for of_tets in (material.youngs, material.poisson)
+    )
+    return f"{name} (small strains: E = {youngs} Pa, nu = {poisson})"
 
 
 def _rigid_text(body: RigidBody) -> str:

@@ -19,7 +19,7 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
-from numba.np.unsafe.ndarray import to_fixed_tuple
+from numba.np.unsafe import ndarray
 
 from supple.errors import SceneError
 from supple.materials.laws.isotropic_law import IsotropicLaw
@@ -27,6 +27,7 @@ from supple.materials.laws.log_strains import exp_quotient, law_kernel, log_stra
 from supple.materials.stretch_energies.stretches import volume_change
 from supple.numerics.kernel_cache import njit
 
+to_fixed_tuple: Any = ndarray.to_fixed_tuple  # of an array, for a number of entries that the compiler knows
 _GAUSS = 0.5 * math.sqrt(0.6)
 VARIABLES = {"invariants": ("I1", "I2", "J"), "stretches": ("s0", "s1", "s2")}
 
