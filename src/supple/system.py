@@ -29,7 +29,7 @@ from supple.mesh.topology import graph_components
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.scene.body import PlacedBody
 from supple.scene.forces import Force, SoftTarget
-from supple.scene.joints.welding import Welding
+from supple.scene.joints.welding import Welding, linked_pieces
 from supple.scene.motion import Motion, moved_points, points_at_origin, rigid_pose
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.pins import Pin
@@ -183,12 +183,7 @@ class System:
         """(n,) the piece that a vertex belongs to; those that stitches, joints or welds join count as one."""
         pieces = self.stitching.joined_components(self.components)
         begins = {part.name: part.vertices.start for part in self.bodies}
-        pairs = [(begins[one.first], begins[one.second]) for one in self.scene.joints if one.second in begins]
-        pairs += zip(self.welding.vertices.tolist(), self.welding.control[:, 0].tolist(), strict=True)
-        if not pairs:
-            return pieces
-        first, second = np.array(pairs).T
-        return graph_components(int(pieces.max()) + 1, pieces[first], pieces[second])[pieces]
+        return linked_pieces(pieces, begins, self.scene.joints, self.welding)
 
     @cached_property
     def inverse_masses(self) -> NDArray[np.float64]:

@@ -6,7 +6,7 @@ import pytest
 import supple as sp
 from supple.viewer.engine.measurement.contact_points import contact_points
 from supple.viewer.engine.measurement.describe import describe, measures
-from supple.viewer.engine.scene.changes import change
+from supple.viewer.engine.scene.changes import change, without_body
 from supple.viewer.engine.scene.live_scene import LiveScene
 from supple.viewer.protocol import commands
 from supple.viewer.protocol.live_source import LiveSource
@@ -46,3 +46,15 @@ def test_friction_changes_a_pin_holds_it_and_a_grab_is_refused(live):
     before = live.body_positions("stone").copy()
     live.step()
     np.testing.assert_array_equal(live.body_positions("stone"), before)
+
+
+def test_joints_and_welds_go_with_their_bodies():
+    cube, box = sp.shapes.box_surface((0.1, 0.1, 0.1), (1, 1, 1)), sp.shapes.box((0.1, 0.1, 0.1), (1, 1, 1))
+    soft = sp.Body("soft", box, sp.StableNeoHookean(youngs=1e5, poisson=0.3), position=(0, 0, 0.1))
+    bodies = [sp.RigidBody("a", cube, mass=1.0), sp.RigidBody("b", cube, mass=1.0, position=(0.2, 0, 0)), soft]
+    joints = [sp.BallJoint("a", point=(0, 0.1, 0)), sp.HingeJoint("b", "a", point=(0.1, 0, 0))]
+    scene = sp.Scene(bodies, joints=joints, welds=[sp.Weld("soft", "a", max_distance=1e-6)])
+    assert [joint.name for joint in without_body(scene, "b").joints] == ["BallJoint 1"]
+    assert len(without_body(scene, "b").welds) == 1
+    alone = without_body(scene, "a")
+    assert (alone.joints, alone.welds) == ((), ())

@@ -148,5 +148,6 @@ def _welded(
     joined[tuple(welded.joined.T)] = joined[tuple(welded.joined[:, ::-1].T)] = True
     near_triangles, near_edges = touching_pairs(start, triangles, edges, owner, joined, reach)
     of_triangles = near[near_triangles[:, 0]] | near[triangles[near_triangles[:, 1]]].all(axis=1)
-    of_edges = near[edges[near_edges]].all(axis=2).any(axis=1)
+    whole = np.asarray(near[edges].all(axis=1))
+    of_edges = whole[near_edges[:, 0]] | whole[near_edges[:, 1]]
     return near_triangles[of_triangles], near_edges[of_edges]

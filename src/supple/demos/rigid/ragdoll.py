@@ -32,7 +32,7 @@ RIGHT = {
     "shin": ((0.055, 0.25, 0), (0.06, 0.22, 0.06)),
 }
 BEND = 2.2
-FALL = {"velocity": (0.3, 0.0, 0.8)}
+VELOCITY = (0.3, 0.0, 0.8)
 DAMPING = 0.02
 
 
@@ -46,10 +46,10 @@ def scene() -> Scene:
     welds = []
     for name, (center, size) in parts.items():
         divisions = tuple(4 if length > 0.12 else 2 for length in size)
-        bodies.append(Body(name, shapes.box(size, divisions), flesh, position=center, friction=0.5, **FALL))
+        bodies.append(Body(name, shapes.box(size, divisions), flesh, position=center, friction=0.5, velocity=VELOCITY))
         core = np.where(np.array(size) > 0.12, 0.6, 0.3) * size
         bone = shapes.box_surface(tuple(core), (1, 1, 1))
-        bodies.append(RigidBody(f"{name} bone", bone, density=1800.0, position=center, **FALL))
+        bodies.append(RigidBody(f"{name} bone", bone, density=1800.0, position=center, velocity=VELOCITY))
         box = InBox(center - 0.51 * core, center + 0.51 * core)
         welds.append(Weld(name, f"{name} bone", box, name=name))
     floor = HalfSpace(point=(0, 0, 0), normal=(0, 1, 0), friction=0.5, name="floor")

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
+from supple.mesh.topology import graph_components
 from supple.scene.body import PlacedBody
+from supple.scene.joints.joint import Joint
 from supple.scene.joints.weld import Weld
 from supple.scene.located import at
 from supple.scene.rotation import rotation_matrix
@@ -72,3 +74,21 @@ def weld_together(welds: Sequence[Weld], bodies: Sequence[PlacedBody]) -> Weldin
         np.ascontiguousarray(np.concatenate(weights)),
         np.array(weld, dtype=np.int64),
     )
+
+
+def linked_pieces(
+    pieces: NDArray[np.int32], begins: Mapping[str, int], joints: Sequence[Joint], welding: Welding
+) -> NDArray[np.int32]:
+    """(n,) the piece of each vertex, where those of `pieces` (n,) that joints or welds join count as one.
+
+    Parameters
+    ----------
+    begins : by name of the body, the number of its first vertex
+    """
+    ends = [(joint.first, joint.second) for joint in joints]
+    pairs = [(begins[one], begins[other]) for one, other in ends if other is not None and other in begins]
+    pairs += zip(welding.vertices.tolist(), welding.control[:, 0].tolist(), strict=True)
+    if not pairs:
+        return pieces
+    first, second = np.array(pairs).T
+    return graph_components(int(pieces.max()) + 1, pieces[first], pieces[second])[pieces]

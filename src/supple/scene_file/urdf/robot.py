@@ -249,12 +249,12 @@ def _joint(element: ElementTree.Element, links: dict[str, Link], ignored: dict[s
     kind = _attribute(element, "type", what)
     if kind not in JOINTS:
         raise _Problem(f"{what}: its type {printable(kind)!r} is not supported; there are {', '.join(JOINTS)}")
-    ends = [_attribute(_child(element, key, what), "link", what) for key in ("parent", "child")]
-    for end in ends:
+    parent, child = (_attribute(_child(element, key, what), "link", what) for key in ("parent", "child"))
+    for end in (parent, child):
         if end not in links:
             raise _Problem(f"{what}: there is no link {printable(end)!r}")
-    if ends[0] == ends[1]:
-        raise _Problem(f"{what}: it joins link {printable(ends[0])!r} to itself")
+    if parent == child:
+        raise _Problem(f"{what}: it joins link {printable(parent)!r} to itself")
     for key in ("mimic", "safety_controller", "calibration"):
         if element.find(key) is not None:
             ignored[f"<{key}> of {what}"] = None
@@ -270,7 +270,8 @@ def _joint(element: ElementTree.Element, links: dict[str, Link], ignored: dict[s
     )
     if damping < 0.0 or friction < 0.0:
         raise _Problem(f"{what}: its damping or friction is below zero")
-    return RobotJoint(name, kind, *ends, _origin(element, what), axis, _limits(element, kind, what), damping, friction)
+    limits = _limits(element, kind, what)
+    return RobotJoint(name, kind, parent, child, _origin(element, what), axis, limits, damping, friction)
 
 
 def _limits(element: ElementTree.Element, kind: str, what: str) -> tuple[float, float] | None:

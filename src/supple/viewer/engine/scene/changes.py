@@ -322,6 +322,8 @@ def without_body(scene: Scene, name: str) -> Scene:
         sensors=[sensor for sensor in scene.sensors if sensor.body != name],
         soft_targets=[target for target in scene.soft_targets if target.body != name],
         stitches=[stitch for stitch in scene.stitches if name not in (stitch.first, stitch.second)],
+        joints=[joint for joint in scene.joints if name not in (joint.first, joint.second)],
+        welds=[weld for weld in scene.welds if name not in (weld.body, weld.rigid)],
         contact_pairs=_pairs_among([thing.name for thing in (*bodies, *scene.obstacles)], scene.contact_pairs),
     )
 
