@@ -84,6 +84,27 @@ def test_derivatives_of_the_energy(material):
     assert_derivatives(elasticity, system, x, 1.0)
 
 
+def test_laws_act_at_the_points_of_quadratic_tets():
+    """Rubber, and tissue with a direction for each tet: derivatives, and the stress of a uniform stretch."""
+    rubber = sp.MooneyRivlin(c10=3e3, c01=1e3, bulk=2e5)
+    tissue = sp.HolzapfelGasserOgden(c10=3e3, bulk=2e5, k1=5e3, k2=1.0, directions=[[1.0, 0.5, 0.2]])
+    for material in (rubber, tissue):
+        system = build_system(bar_scene(material))
+        x = system.rest_positions + 0.01 * np.random.default_rng(1).normal(size=BAR.vertices.shape)
+        elasticity = elasticity_of(system)
+        assert elasticity.energies(x).sum() == pytest.approx(elasticity.value(x), rel=1e-12)
+        assert_derivatives(elasticity, system, x, 1.0)
+        stretched = system.rest_positions * [1.2, 0.95, 0.9]
+        linear = build_system(bar_scene(material, mesh=BAR.to_order(1)))
+        corners = linear.rest_positions * [1.2, 0.95, 0.9]
+        # The straight tets have another volume than the curved ones; the energy density is the same everywhere.
+        densities = [
+            elasticity_of(each).value(y) / each.laws.volumes.sum()
+            for each, y in ((system, stretched), (linear, corners))
+        ]
+        assert densities[0] == pytest.approx(densities[1], rel=1e-9)
+
+
 def test_derivatives_of_damping_and_of_the_barrier():
     system = build_system(bar_scene())
     random = np.random.default_rng(1)
