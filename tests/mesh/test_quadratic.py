@@ -54,7 +54,7 @@ def test_to_order_adds_the_middles_of_edges():
     linear = sp.shapes.box((1.0, 0.5, 0.5), (2, 1, 1))
     mesh = linear.to_order(2)
     assert (mesh.order, linear.order) == (2, 1)
-    assert repr(mesh) == "TetMesh(45 vertices, 12 quadratic tets)"
+    assert repr(mesh) == "TetMesh(vertices: 45, quadratic tets: 12, size: 1 x 0.5 x 0.5 m, volume: 0.25 m^3)"
     np.testing.assert_array_equal(mesh.nodes, BOX.nodes)
     assert len(mesh.vertices) == len(linear.vertices) + len(linear.edges)
     ends = mesh.vertices[mesh.tets[:, NODE_EDGES]].mean(axis=2)
@@ -197,7 +197,7 @@ def test_abaqus_files(tmp_path):
     assert mesh.volume == pytest.approx(1.0 / 6.0)
     for text, expected in (
         (INP.replace("C3D4H", "C3D8"), "only C3D4 and C3D10"),
-        (INP.replace("2, 7, 1,\n2, 3", "2, 7, 1, 2, 9"), "node 9, which does not exist"),
+        (INP.replace("2, 7, 1,\n2, 3", "2, 7, 1, 2, 9"), "node 9 is used, and does not exist"),
         (INP.replace("2, 7, 1,\n2, 3", "2, 7, 1, 2"), "do not have a number and 4 nodes each"),
         (INP.replace("1, 1, 0, 0", "7, 1, 0, 0"), "given twice"),
         (INP.replace("1, 1, 0, 0", "1, 1, zero, 0"), "not 3 numbers"),
