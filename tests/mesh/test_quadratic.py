@@ -226,6 +226,7 @@ def test_tetgen_files_are_refused(tmp_path):
     [
         (lambda order: sp.shapes.sphere(0.5, 0.2, order), 4 / 3 * np.pi * 0.5**3),
         (lambda order: sp.shapes.cylinder(0.5, 1.0, 0.25, order), np.pi * 0.25),
+        (lambda order: sp.shapes.spherical_shell(0.3, 0.5, 0.1, order), 4 / 3 * np.pi * (0.5**3 - 0.3**3)),
         (lambda order: sp.shapes.torus(0.5, 0.2, 0.15, order), 2 * np.pi**2 * 0.5 * 0.04),
     ],
 )

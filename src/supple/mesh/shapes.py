@@ -85,13 +85,16 @@ def sphere(radius: float = 0.5, edge_length: float = 0.1, order: int = 1) -> Tet
     return of_order(mesh, order, lambda x: x * (radius / np.linalg.norm(x, axis=1))[:, None])
 
 
-def spherical_shell(inner_radius: float = 0.3, outer_radius: float = 0.5, edge_length: float = 0.1) -> TetMesh:
+def spherical_shell(
+    inner_radius: float = 0.3, outer_radius: float = 0.5, edge_length: float = 0.1, order: int = 1
+) -> TetMesh:
     """A hollow ball: layers of prisms over the triangles of a sphere, each of three tets.
 
     Parameters
     ----------
     inner_radius, outer_radius : [m]
     edge_length : approximate length of edges on the outer surface and across the wall [m], at most `inner_radius`
+    order : 1 for linear tets, 2 for quadratic ones with curved sides on both surfaces
 
     Raises
     ------
@@ -107,7 +110,14 @@ def spherical_shell(inner_radius: float = 0.3, outer_radius: float = 0.5, edge_l
     not_too_many(owner, 3.0 * layers * len(surface.triangles), "make edge_length longer")
     radii = np.linspace(inner_radius, outer_radius, layers + 1)
     points = (radii[:, None, None] * surface.vertices).reshape(-1, 3)
-    return TetMesh(points, tets_between_layers(surface.triangles, len(surface.vertices), layers))
+    mesh = TetMesh(points, tets_between_layers(surface.triangles, len(surface.vertices), layers))
+
+    def onto(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        distance = np.linalg.norm(x, axis=1)
+        inner = distance < 0.5 * (inner_radius + outer_radius)
+        return x * (np.where(inner, inner_radius, outer_radius) / distance)[:, None]
+
+    return of_order(mesh, order, onto)
 
 
 def torus(radius: float = 0.5, tube_radius: float = 0.2, edge_length: float = 0.1, order: int = 1) -> TetMesh:

@@ -70,9 +70,9 @@ class SphericalShellShapeModel(Model):
     outer_radius: Positive = Field(default=0.5, description="[m]")
     edge_length: Positive | None = Field(default=None, description="mean edge [m]; default: half of the wall")
 
-    def build(self) -> TetMesh:
+    def build(self, order: int = 1) -> TetMesh:
         edge_length = self.edge_length or 0.5 * (self.outer_radius - self.inner_radius)
-        return shapes.spherical_shell(self.inner_radius, self.outer_radius, edge_length)
+        return shapes.spherical_shell(self.inner_radius, self.outer_radius, edge_length, order)
 
     def build_surface(self) -> SurfaceMesh:
         return self.build().surface.compact()

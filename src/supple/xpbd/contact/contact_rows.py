@@ -38,14 +38,14 @@ class LoadedRows(NamedTuple):
 
     def chosen(self, kept: NDArray[np.bool_]) -> LoadedRows:
         """Those rows (of k,) that are kept."""
-        return LoadedRows(*(values[kept] for values in self))
+        return LoadedRows._make(values[kept] for values in self)
 
     def joined(self, other: LoadedRows) -> LoadedRows:
         """The rows of both, whose keys differ, in the order of the keys."""
         if not len(other.keys):
             return self
         order = np.argsort(np.concatenate([self.keys, other.keys]))
-        return LoadedRows(*(np.concatenate(both)[order] for both in zip(self, other, strict=True)))
+        return LoadedRows._make(np.concatenate(both)[order] for both in zip(self, other, strict=True))
 
     @staticmethod
     def none() -> LoadedRows:

@@ -29,7 +29,7 @@ class ShapeLoads(NamedTuple):
 
     def chosen(self, kept: NDArray[np.bool_]) -> ShapeLoads:
         """Those contacts (of c,) that are kept."""
-        return ShapeLoads(*(values[kept] for values in self))
+        return ShapeLoads._make(values[kept] for values in self)
 
     @staticmethod
     def none() -> ShapeLoads:
@@ -99,10 +99,10 @@ class FrameForces:
         loads = loads.chosen(still[self.owners.of_vertices[loads.vertices]])
         chosen, contact = _same(rows.keys[:, None])
         forces = _sums(contact, rows.forces, len(chosen)) / max(self.substeps, 1)
-        rows = LoadedRows(*(values[chosen] for values in rows))._replace(forces=forces)
+        rows = LoadedRows._make(values[chosen] for values in rows)._replace(forces=forces)
         chosen, contact = _same(np.column_stack([loads.shapes, loads.vertices.astype(np.int64)]))
         means = _sums(contact, loads.loads, len(chosen)) / max(self.substeps, 1)
-        return rows, ShapeLoads(*(values[chosen] for values in loads))._replace(loads=means)
+        return rows, ShapeLoads._make(values[chosen] for values in loads)._replace(loads=means)
 
     def by_name(self) -> tuple[dict[str, NDArray[np.float64]], dict[str, NDArray[np.float64]]]:
         """The sums along the normals, and along the surfaces, on each body and obstacle: (3,) [N]; each add up to 0."""

@@ -240,16 +240,19 @@ class ObstacleContacts:
         self._standing = _no_loads()
         shapes = self.shapes
         if memory is not None and memory.matches(shapes.frames, shapes.parameters, x, tolerance):
-            known, still = (memory.shapes, memory.vertices, memory.loads), asleep[memory.vertices]
-            self._standing = tuple(values[still] for values in known)
-            touched, vertices, loads = (values[~still] for values in known)
-            self._enter(touched * len(self.inverse_masses) + vertices, loads)
+            still = asleep[memory.vertices]
+            self._standing = memory.shapes[still], memory.vertices[still], memory.loads[still]
+            keys = memory.shapes * len(self.inverse_masses) + memory.vertices
+            self._enter(keys[~still], memory.loads[~still])
 
     def memory(self, x: NDArray[np.float64]) -> ObstacleMemory:
         """What the next step needs; `x` (n, 3) are the positions at the end of this one [m]."""
-        both = [np.concatenate(arrays) for arrays in zip(self.forces()[:3], self._standing, strict=True)]
-        order = np.lexsort((both[1], both[0]))
-        return ObstacleMemory(self.shapes.frames, self.shapes.parameters, x.copy(), *(each[order] for each in both))
+        shapes, vertices, loads = self.forces()[:3]
+        more, of_them, their = self._standing
+        shapes, vertices = np.concatenate([shapes, more]), np.concatenate([vertices, of_them])
+        order, loads = np.lexsort((vertices, shapes)), np.concatenate([loads, their])
+        described = self.shapes.frames, self.shapes.parameters, x.copy()
+        return ObstacleMemory(*described, shapes[order], vertices[order], loads[order])
 
     def gather(self, x: NDArray[np.float64], reach: NDArray[np.float64], time: float) -> None:
         """List the vertices (of n) that may touch a shape before they have moved by `reach` (n,) [m], or are loaded."""

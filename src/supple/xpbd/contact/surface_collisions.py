@@ -324,8 +324,8 @@ class SurfaceCollisions:
             self._entered[:known] = memory.entered[:known]
             self._excursions[:known] = memory.excursions[:known]
             self._depth[:, :known] = memory.depth[:, :known]
-            loaded = memory.loaded.chosen((memory.loaded.vertices < known).all(axis=1))
-        standing = still[loaded.vertices].all(axis=1)
+            loaded = memory.loaded.chosen(np.asarray((memory.loaded.vertices < known).all(axis=1)))
+        standing = np.asarray(still[loaded.vertices].all(axis=1))
         self._standing, loaded = loaded.chosen(standing), loaded.chosen(~standing)
         self._rows.restore(loaded, loaded.keys)
         if known < len(self._x):
