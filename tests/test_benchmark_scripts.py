@@ -87,6 +87,7 @@ def test_times_of_the_parts_of_steps_with_contact():
     assert sum(result[part] for part in PARTS) <= 1.0
 
 
+@pytest.mark.slow
 def test_the_search_for_contact_is_measured_in_piles_of_bears(capsys):
     from benchmarks import candidate_search
 
@@ -116,6 +117,7 @@ def test_a_checkout_without_the_package_is_refused(tmp_path):
         contact_scenes.main(["slope:small"], against=tmp_path)
 
 
+@pytest.mark.slow
 def test_quadratic_tets_are_compared_with_linear_ones(capsys):
     from benchmarks import quadratic_tets
 

@@ -44,7 +44,7 @@ def stitched_system(vertices, triangle, **stitch):
     n = len(x)
     held = np.arange(count, n, dtype=np.int32)
     system = System(
-        scene=None,  # pyright: ignore[reportArgumentType]
+        scene=sp.Scene([sp.Body("unused", sp.shapes.box(), sp.NeoHookean(youngs=1.0, poisson=0.3))]),
         bodies=(),
         pins=(PinRange(sp.Pin("triangle", held - count), held, second.points),),
         rest_positions=x,

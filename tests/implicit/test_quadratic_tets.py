@@ -391,6 +391,7 @@ def test_what_cannot_be_simulated_is_refused_in_one_line():
     assert "quadratic tets" in str(error.value)
 
 
+@pytest.mark.slow
 def test_any_number_of_threads_gives_the_same_bits():
     mesh = wavy(sp.shapes.box((1, 1, 1), (4, 4, 4), order=2))
     system = build_system(sp.Scene([sp.Body("b", mesh, SOFT)]))

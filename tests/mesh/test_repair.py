@@ -147,7 +147,11 @@ BEYOND_REPAIR = {
 @needs_meshfix
 @pytest.mark.skipif(importlib.util.find_spec("pytetwild") is None, reason="needs pytetwild")
 @pytest.mark.parametrize(
-    ("case", "mesher"), [*((case, "auto") for case in BEYOND_REPAIR), ("two balls that overlap", "ftetwild")]
+    ("case", "mesher"),
+    [
+        *((case, "auto") for case in BEYOND_REPAIR),
+        pytest.param("two balls that overlap", "ftetwild", marks=pytest.mark.slow),
+    ],
 )
 def test_what_meshes_without_repair_meshes_with_it(case: str, mesher, caplog: pytest.LogCaptureFixture) -> None:
     """MeshFix cannot repair these surfaces; fTetWild needs no repair."""

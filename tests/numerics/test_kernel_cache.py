@@ -60,7 +60,8 @@ def test_a_kernel_is_compiled_again_when_a_function_of_another_file_changes(copi
     assert run().endswith(" 1")
 
 
-@pytest.mark.parametrize("content", [b"cmoved.module\nkernel\n.", pytest.param(b"\x80\x05", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("content", [b"cmoved.module\nkernel\n.", b"\x80\x05"])
+@pytest.mark.slow
 def test_a_cache_that_cannot_be_read_is_made_anew(copied_package, content):
     package, run = copied_package
     run()
@@ -73,6 +74,7 @@ def test_a_cache_that_cannot_be_read_is_made_anew(copied_package, content):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="only POSIX limits the size of files")
+@pytest.mark.slow
 def test_a_kernel_runs_where_its_cache_has_no_room(copied_package):
     _, run = copied_package
     limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))\n"

@@ -164,4 +164,4 @@ def test_vectors_over_all_rows_cost_no_iterations():
     assert result.iterations <= plain.iterations + 5
     G = low_rank.reshape(2, -1).T
     residual = pattern.to_scipy(data) @ x.ravel() + G @ (G.T @ x.ravel()) - b.ravel()
-    assert np.abs(residual).max() < 1e-6 * np.abs(b).max()
+    assert np.abs(residual).max() < 1e-5 * np.abs(b).max()

@@ -85,8 +85,8 @@ def test_the_page_draws_stitches_as_moving_segments(recorded, tmp_path, monkeypa
 
     original = page_module._add_stitches
 
-    def spy(server, recording, quantum):
-        handle = original(server, recording, quantum)
+    def spy(*arguments):
+        handle = original(*arguments)
         assert handle is not None
         drawn.append(("first", np.array(handle.points)))
         return Handle()

@@ -15,7 +15,7 @@ from supple.numerics.sparse.pcg import CGResult
 from supple.output.checkpoint.file import read_checkpoint
 from supple.runs.contents import RunPaths
 from supple.runs.journal import read_journal
-from supple.xpbd import solver as xpbd_solver
+from supple.xpbd.external_forces import ExternalForces
 
 from .conftest import DT, Drift, circling, drifting_scene, kept, same_bits, stitched_scene
 
@@ -137,13 +137,13 @@ def test_nan_within_a_solver_is_a_status_and_the_last_good_state_is_kept(out, mo
         good = next(frames)
     with monkeypatch.context() as patch:
         if name == "xpbd":
-            project = xpbd_solver.add_forces  # comes before the constraints
+            add_forces = ExternalForces.add_forces  # comes before the constraints
 
-            def spoiled(system, points, *rest):
-                project(system, points, *rest)
+            def spoiled(self, points, *rest):
+                add_forces(self, points, *rest)
                 points[0, 1] = np.nan
 
-            patch.setattr(xpbd_solver, "add_forces", spoiled)
+            patch.setattr(ExternalForces, "add_forces", spoiled)
         else:
             model = Elasticity.add_model
 

@@ -152,20 +152,26 @@ def piolas(F, kind, mu, lam, out):
         store_mat(first_piola(load_mat(F, e), kind[e], mu[e], lam[e]), out, e)
 
 
+@njit(error_model="numpy")
+def store_hessian(U, A, alpha, beta, V, out, e):
+    """Write the Hessian (9, 9) in F, from its parts in the principal axes U and V, to out[e]."""
+    for j in range(3):
+        g = (V[3 * j], V[3 * j + 1], V[3 * j + 2])
+        for k in range(j + 1):
+            K = hessian_block(U, A, alpha, beta, g, (V[3 * k], V[3 * k + 1], V[3 * k + 2]))
+            for i in range(3):
+                for n in range(3):
+                    out[e, 3 * i + j, 3 * n + k] = K[3 * i + n]
+                    out[e, 3 * n + k, 3 * i + j] = K[3 * i + n]
+
+
 @njit(cache=True, error_model="numpy")
 def hessians(F, kind, mu, lam, project, out):
     """Hessians (m, 9, 9) of F (m, 3, 3), into `out`."""
     for e in range(len(F)):
         U, s, V = decompose(load_mat(F, e))
         A, alpha, beta = principal_hessian(s, kind[e], mu[e], lam[e], project)
-        for j in range(3):
-            g = (V[3 * j], V[3 * j + 1], V[3 * j + 2])
-            for k in range(j + 1):
-                K = hessian_block(U, A, alpha, beta, g, (V[3 * k], V[3 * k + 1], V[3 * k + 2]))
-                for i in range(3):
-                    for n in range(3):
-                        out[e, 3 * i + j, 3 * n + k] = K[3 * i + n]
-                        out[e, 3 * n + k, 3 * i + j] = K[3 * i + n]
+        store_hessian(U, A, alpha, beta, V, out, e)
 
 
 def rest_lame_parameters(material: TetMaterial) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

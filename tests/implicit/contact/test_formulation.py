@@ -48,7 +48,9 @@ def pressure(gap):
     return -KAPPA * barrier_slopes(gap, DHAT)[0]
 
 
-@pytest.mark.parametrize("cells", [(1, 1), (2, 2), (3, 3), (4, 4), (8, 8), (3, 4), (2, 5)])
+@pytest.mark.parametrize(
+    "cells", [(1, 1), (2, 2), (3, 3), (4, 4), pytest.param((8, 8), marks=pytest.mark.slow), (3, 4), (2, 5)]
+)
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_aligned_boxes_do_not_push_each_other_sideways(cells, mirrored):
     model, x, rows = boxes(cube(cells[0]), cube(cells[1], mirrored))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from supple.errors import SolverError
 from supple.implicit.energies.laws.law_elasticity import LawElasticity, LawElements
 from supple.implicit.energies.patch_elasticity import PatchElasticity
-from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
+from supple.implicit.energies.potential import HessianBlocks, JointlyEvaluated, Projection
 from supple.implicit.energies.quadratic.gathering import Gathering
 from supple.implicit.energies.quadratic.term import OfQuadraticTets, VirtualTets
 from supple.materials.elastic_tets.laws import of_points
@@ -53,7 +53,7 @@ class QuadraticElasticity(OfQuadraticTets):
 
 
 @dataclass(frozen=True, eq=False)
-class Elasticity(Potential):
+class Elasticity(JointlyEvaluated):
     """The hyperelastic energy of every tet with its own material.
 
     Attributes
@@ -97,12 +97,6 @@ class Elasticity(Potential):
         with threads_for(len(s.tets), SERIAL_TETS):
             element_energies(x, s.tets, s.rest_shape_inverse, s.rest_volumes, *self._parameters, energies)
         return energies
-
-    def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-        self.add_model(x, out, None, project=False)
-
-    def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
-        self.add_model(x, np.zeros_like(x), out, project)
 
     def add_model(
         self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
+from supple.implicit.energies.potential import HessianBlocks, JointlyEvaluated, Projection
 from supple.materials.laws.isotropic_law import IsotropicLaw
 from supple.materials.patches.domains import Patches
 from supple.materials.patches.edge_kernels import FRAME, add_law_models, edge_models
@@ -25,7 +25,7 @@ from supple.numerics.threads import threads_for
 
 
 @dataclass(frozen=True, eq=False)
-class PatchElasticity(Potential):
+class PatchElasticity(JointlyEvaluated):
     """The sum of the energies of all patches.
 
     Attributes
@@ -46,17 +46,11 @@ class PatchElasticity(Potential):
         of_edges, of_vertices = patch_energies(self.patches, x)
         return float(of_edges.sum() + of_vertices.sum())
 
-    def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-        self.add_model(x, out, None, project=False)
-
-    def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
-        """With `project`, the sum of the projections of the edges' energies, of the pressures' second derivatives and
-        of the products of volume gradients."""
-        self.add_model(x, np.zeros_like(x), out, project)
-
     def add_model(
         self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
     ) -> float:
+        """With `project`, the Hessian is the sum of the projections of the edges' energies, of the pressures' second
+        derivatives and of the products of volume gradients."""
         patches, edges, vertices = self.patches, self.patches.edges, self.patches.vertices
         second = hessian is not None
         energies, forces = np.empty(len(edges.volumes)), np.empty((len(edges.vertices), 3))

@@ -149,6 +149,21 @@ class Potential(ABC):
         return
 
 
+class JointlyEvaluated(Potential):
+    """A potential whose gradient and Hessian come from `add_model`."""
+
+    def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+        self.add_model(x, out, None, project=False)
+
+    def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
+        self.add_model(x, np.zeros_like(x), out, project)
+
+    @abstractmethod
+    def add_model(
+        self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
+    ) -> float: ...
+
+
 class ContactPotential(Potential):
     """A term of contact or of joints: so stiff that a short Newton step can leave large forces."""
 

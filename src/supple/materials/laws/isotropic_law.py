@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.materials.isotropic import hessian_block, nearest_semidefinite
+from supple.materials.isotropic import nearest_semidefinite, store_hessian
 from supple.materials.laws.log_strains import VALUES
 from supple.materials.per_tet import Law
 from supple.numerics.kernel_cache import njit, prange
@@ -101,11 +101,4 @@ def _models(U, V, values, second, project, P, H):
         store_mat(mat_mul_transposed(scaled, v), P, e)
         if second:
             A, alpha, beta = principal_hessian_of(x, project)
-            for j in range(3):
-                g = (v[3 * j], v[3 * j + 1], v[3 * j + 2])
-                for k in range(j + 1):
-                    K = hessian_block(u, A, alpha, beta, g, (v[3 * k], v[3 * k + 1], v[3 * k + 2]))
-                    for i in range(3):
-                        for n in range(3):
-                            H[e, 3 * i + j, 3 * n + k] = K[3 * i + n]
-                            H[e, 3 * n + k, 3 * i + j] = K[3 * i + n]
+            store_hessian(u, A, alpha, beta, v, H, e)

@@ -21,6 +21,7 @@ schemes of the infinitesimal theory" (1992), for the derivatives by principal lo
 from __future__ import annotations
 
 import math
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -115,26 +116,34 @@ def put_values(s, psi, tau, c, b, out, e):
     out[e, 15] = (tau[0] * s[1] + tau[1] * s[0]) * u * v / (s[0] + s[1])
 
 
-def law_kernel(name: str, energy: Any, cache: bool = True) -> Any:
+def energy(s, p):
+    """Stands for the energy of a law in `_values`."""
+    raise NotImplementedError
+
+
+def _values(s, p, out):
+    for e in prange(len(s)):
+        if s[e, 2] > 0.0:
+            stretches = (s[e, 0], s[e, 1], s[e, 2])
+            psi, tau, c, b = energy(stretches, p[e])
+            put_values(stretches, psi, tau, c, b, out, e)
+        else:
+            out[e, 0] = np.inf
+            for k in range(1, VALUES):
+                out[e, k] = np.nan
+
+
+def law_kernel(name: str, function: Any, cache: bool = True) -> Any:
     """The kernel (s (k, 3), p (k, q), out (k, 16)) of a compiled function (s, p) -> psi, tau, c, b.
 
     Parameters
     ----------
     name : unique among the laws; Numba's cache distinguishes kernels by their names.
-    energy : of the principal stretches s (three numbers) and the parameters p (q,).
+    function : of the principal stretches s (three numbers) and the parameters p (q,).
     cache : whether the machine code is kept on disk.
     """
-
-    def values(s, p, out):
-        for e in prange(len(s)):
-            if s[e, 2] > 0.0:
-                stretches = (s[e, 0], s[e, 1], s[e, 2])
-                psi, tau, c, b = energy(stretches, p[e])
-                put_values(stretches, psi, tau, c, b, out, e)
-            else:
-                out[e, 0] = np.inf
-                for k in range(1, VALUES):
-                    out[e, k] = np.nan
-
-    values.__qualname__ = values.__name__ = f"values_of_{name}"
+    name = f"values_of_{name}"
+    # Not a closure: Numba gives these another name in each process where they hold a compiled function.
+    values = FunctionType(_values.__code__, {**_values.__globals__, "energy": function}, name)
+    values.__qualname__, values.__module__ = name, _values.__module__
     return njit(cache=cache, parallel=True, error_model="numpy")(values)

@@ -53,21 +53,16 @@ def body_of(name: str, bodies: Sequence[PlacedBody], label: str) -> PlacedBody:
 Region = ArrayLike | InBox | None
 
 
-class OnSurface(Load):
-    """The base class of loads on triangles of the surface of one body.
-
-    `region` : None for the whole surface, an `InBox` that holds all three corners of a triangle at the start, or rows
-    of `mesh.surface.triangles`.
-    """
+class OnBody(Load):
+    """The base class of loads on one body."""
 
     body: str
-    region: Region
 
-    def __post_init__(self) -> None:
+    def _check_names(self) -> None:
+        """Raise `SceneError` where the name of the body or that of the load is none."""
         check_name(self.body, f"{self.kind}: body")
         if self.name is not None:
             check_name(self.name, self.kind)
-        object.__setattr__(self, "region", checked_region(self.region, self.label))
 
     @property
     def label(self) -> str:
@@ -76,6 +71,20 @@ class OnSurface(Load):
     @property
     def bodies(self) -> tuple[str, ...]:
         return (self.body,)
+
+
+class OnSurface(OnBody):
+    """The base class of loads on triangles of the surface of one body.
+
+    `region` : None for the whole surface, an `InBox` that holds all three corners of a triangle at the start, or rows
+    of `mesh.surface.triangles`.
+    """
+
+    region: Region
+
+    def __post_init__(self) -> None:
+        self._check_names()
+        object.__setattr__(self, "region", checked_region(self.region, self.label))
 
     def check(self, bodies: Sequence[PlacedBody]) -> None:
         self.triangles(body_of(self.body, bodies, self.label))

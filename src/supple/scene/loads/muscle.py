@@ -11,15 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.scene.body import PlacedBody
-from supple.scene.loads.load import Load, body_of
+from supple.scene.loads.load import OnBody, body_of
 from supple.scene.loads.over_time import Curve, OverTime, checked_magnitude
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.selection import InBox
-from supple.scene.values import check_name, float_array, positive
+from supple.scene.values import float_array, positive
 
 
 @dataclass(frozen=True, eq=False)
-class Muscle(Load):
+class Muscle(OnBody):
     """Fibres in tets that pull along their direction: the first Piola stress a(t) S f(s) (F d / s) d^T.
 
     d is the direction at rest, s = |F d| the stretch of the fibre, S the strength, a the activation, and f the
@@ -55,9 +55,7 @@ class Muscle(Load):
     name: str | None = None
 
     def __post_init__(self) -> None:
-        check_name(self.body, f"{self.kind}: body")
-        if self.name is not None:
-            check_name(self.name, self.kind)
+        self._check_names()
         object.__setattr__(self, "strength", positive(self.strength, f"{self.label}: strength"))
         given = float_array(self.direction, f"{self.label}: direction", "give three numbers, or three for each tet")
         if given.shape != (3,) and (given.ndim != 2 or given.shape[1] != 3):
@@ -75,14 +73,6 @@ class Muscle(Load):
             object.__setattr__(self, "tets", self._checked_tets())
         if self.force_length is not None:
             object.__setattr__(self, "force_length", self._checked_curve())
-
-    @property
-    def label(self) -> str:
-        return f"{super().label} on body {self.body!r}"
-
-    @property
-    def bodies(self) -> tuple[str, ...]:
-        return (self.body,)
 
     def check(self, bodies: Sequence[PlacedBody]) -> None:
         self.fibres(body_of(self.body, bodies, self.label))

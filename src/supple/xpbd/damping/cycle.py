@@ -8,9 +8,6 @@ import numpy as np
 
 from supple.numerics.kernel_cache import njit
 
-# How much larger the viscosity of a body may be than in its placed shape, before the length of its step is computed.
-FAR = 1.05
-
 
 @njit(error_model="numpy")
 def _turn(frame, a):
@@ -69,12 +66,12 @@ def restrict(start, rows, fields, frames, H, forces, viscous, coarse):
 
 
 @njit(cache=True, error_model="numpy")
-def correct(start, rows, fields, frames, blocks, H, masses, placed, forces, viscous, coarse, motion, products, far):
+def correct(start, rows, fields, frames, blocks, H, masses, placed, forces, viscous, coarse, motion, products):
     """z <- P^-1 r with r = -H (f + K v) in `motion`, and r . z and z . M z of each group.
 
     `coarse` is the solution of the coarse system. The last column of `viscous` is the diagonal of
     K, `placed` (r,) that in the placed shape. Where the former is larger, the coarse part is divided by the ratio of
-    their sums over the body. Bodies with a ratio above `FAR` are marked in `far` (b,).
+    their sums over the body.
     """
     local = np.empty(3)
     for b in range(len(blocks) - 1):
@@ -83,7 +80,6 @@ def correct(start, rows, fields, frames, blocks, H, masses, placed, forces, visc
             now += viscous[rows[k], 3]
             before += placed[k]
         share = before / now if now > before else 1.0
-        far[b] = now > FAR * before
         for g in range(blocks[b], blocks[b + 1]):
             rz = zMz = 0.0
             for k in range(start[g], start[g + 1]):
@@ -103,27 +99,24 @@ def correct(start, rows, fields, frames, blocks, H, masses, placed, forces, visc
 
 
 @njit(cache=True, error_model="numpy")
-def step(start, rows, fields, frames, blocks, H, usual, far, masses, motion, viscous, products, forces):
-    """f += alpha M z / H, with `usual` for alpha; of the bodies that are `far`, the optimum, where it is shorter.
-
-    The optimum is r . z / z . (M + H K) z; `viscous` is K z of these bodies.
-    """
+def step(start, rows, fields, frames, blocks, H, longest, masses, motion, viscous, products, forces):
+    """f += alpha M z / H with alpha = r . z / z . (M + H K) z of each body, at most `longest`; `viscous` is K z."""
+    for g in range(len(frames)):
+        total = 0.0
+        for k in range(start[g], start[g + 1]):
+            for j in range(3):
+                total += motion[rows[k], 3 + j] * viscous[rows[k], j]
+        products[g, 2] = total
     for b in range(len(blocks) - 1):
-        alpha = usual
-        if far[b]:
-            rz = zMz = zKz = 0.0
-            for g in range(blocks[b], blocks[b + 1]):
-                rz += products[g, 0]
-                zMz += products[g, 1]
-                total = 0.0
-                for k in range(start[g], start[g + 1]):
-                    for j in range(3):
-                        total += motion[rows[k], 3 + j] * viscous[rows[k], j]
-                zKz += total
-            curvature = zMz + H * zKz
-            if not curvature > 0.0:
-                continue
-            alpha = min(rz / curvature, usual)
+        rz = zMz = zKz = 0.0
+        for g in range(blocks[b], blocks[b + 1]):
+            rz += products[g, 0]
+            zMz += products[g, 1]
+            zKz += products[g, 2]
+        curvature = zMz + H * zKz
+        if not curvature > 0.0:
+            continue
+        alpha = min(rz / curvature, longest)
         for k in range(start[blocks[b]], start[blocks[b + 1]]):
             factor = alpha * masses[rows[k]] / H
             for j in range(3):

@@ -48,23 +48,15 @@ class ForceSum:
         self._active[:] = (inverse_masses[self._corners] > 0.0).any(axis=(1, 2))
         self.rates[:] = 0.0
 
-    def add(
-        self,
-        motion: NDArray[np.float64],
-        h: float,
-        out: NDArray[np.float64],
-        parallel: bool,
-        chosen: NDArray[np.bool_] | None = None,
-    ) -> None:
-        """Add the forces to `out`; of all groups, or of those `chosen` (g,).
+    def add(self, motion: NDArray[np.float64], h: float, out: NDArray[np.float64], parallel: bool) -> None:
+        """Add the forces to `out`.
 
         Parameters
         ----------
         motion : (n, 6) positions [m] and velocities [m/s]; out : (n, 4) [N], and mean diagonal entries of the
             matrix [kg/s]; h : length of the substep [s]
         """
-        active = self._active if chosen is None else self._active & chosen
-        elements = (self._corners, self._counts, active, self._data, self._pointers)
+        elements = (self._corners, self._counts, self._active, self._data, self._pointers)
         self._kernels[parallel](motion, *elements, h, out, self.rates)
 
 

@@ -41,7 +41,7 @@ from supple.xpbd.sweeps.ordering import Layout
 LONGEST_CYCLE = 4
 # Of the conjugate gradients. The largest eigenvalue of P^-1 (M + H K) is about 2.5; longer steps, which one solution
 # may take, let the highest modes overshoot, cycle after cycle.
-STEP = 0.35
+LONGEST_STEP = 0.4
 # Change of strain in a cycle beyond which a body begins from f = 0: bodies that are released from random positions gain
 # energy without limit otherwise.
 LARGEST_STRAIN = 0.3
@@ -118,7 +118,7 @@ class Damping:
         r, g = len(rows), len(self._groups.start) - 1
         self._forces, self._local_forces, self._local_velocities = (np.zeros((r, 3)) for _ in range(3))
         self._frames, self._products = np.zeros((g, 3, 3)), np.zeros((g, 3))
-        self._coarse, self._far = np.zeros(12 * g), np.zeros(len(self._groups.blocks) - 1, dtype=np.bool_)
+        self._coarse = np.zeros(12 * g)
         body_of_group = np.repeat(np.arange(len(self._groups.blocks) - 1), np.diff(self._groups.blocks))
         # The bodies of the elements of each group; all vertices of an element that can move belong to one.
         group_of_element = [self._groups.group_of[vertices].max(axis=1) for vertices, *_ in self._elements]
@@ -181,11 +181,10 @@ class Damping:
         coarse.solve(self._coarse)
         motion[:, 3:] = 0.0
         where = groups.blocks, H, self._masses, k
-        cycle.correct(*shape, *where, self._forces, self._viscous, self._coarse, motion, self._products, self._far)
-        if self._far.any():
-            self._apply(h, parallel, self._far)
+        cycle.correct(*shape, *where, self._forces, self._viscous, self._coarse, motion, self._products)
+        self._apply(h, parallel)
         cycle.step(
-            *shape, groups.blocks, H, STEP, self._far, self._masses, motion, self._viscous, self._products, self._forces
+            *shape, groups.blocks, H, LONGEST_STEP, self._masses, motion, self._viscous, self._products, self._forces
         )
         cycle.keep(*shape, velocities, self._forces, self._local_forces, self._local_velocities)
         self._interval = 0.0
@@ -209,11 +208,10 @@ class Damping:
             fast[bodies[made.rates > (LARGEST_STRAIN / H) ** 2]] = True
         return fast
 
-    def _apply(self, h: float, parallel: bool, chosen: NDArray[np.bool_] | None = None) -> None:
-        """Sum the viscous forces of all bodies, or of those `chosen` (b,)."""
+    def _apply(self, h: float, parallel: bool) -> None:
         self._viscous[:] = 0.0
-        for made, bodies in zip(self._sums, self._bodies, strict=True):
-            made.add(self._motion, h, self._viscous, parallel, None if chosen is None else chosen[bodies[:, 0]])
+        for made in self._sums:
+            made.add(self._motion, h, self._viscous, parallel)
 
     def _preconditioner(self, substeps: int, h: float) -> tuple[NDArray[np.float64], CoarseMatrix]:
         """The diagonal k of the rows and the coarse matrix, for a length of substeps that is near enough."""

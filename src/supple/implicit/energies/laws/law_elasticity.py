@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
+from supple.implicit.energies.potential import HessianBlocks, JointlyEvaluated, Projection
 from supple.materials.flows.internal import inverse_flow
 from supple.materials.laws.elements import element_forces, element_stiffness
 from supple.materials.per_tet import Flow, Law, LawTets
@@ -50,7 +50,7 @@ class LawElements:
 
 
 @dataclass(frozen=True, eq=False)
-class LawElasticity(Potential):
+class LawElasticity(JointlyEvaluated):
     """The sum of V psi(F) over all tets of all laws.
 
     Attributes
@@ -91,12 +91,6 @@ class LawElasticity(Potential):
             F = deformation_gradients(x, each.tets, np.ascontiguousarray(each.B @ inverse_flow(internal[rows])))
             after[rows] = flow.advanced(F, each.parameters, internal[rows], h)
         return after
-
-    def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-        self.add_model(x, out, None, project=False)
-
-    def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
-        self.add_model(x, np.zeros_like(x), out, project)
 
     def add_model(
         self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
+from supple.implicit.energies.potential import HessianBlocks, JointlyEvaluated, Potential, Projection
 from supple.implicit.energies.quadratic.gathering import Gathering
 from supple.implicit.energies.quadratic.kernels import (
     add_by_vertex,
@@ -78,7 +78,7 @@ class VirtualTets:
 
 
 @dataclass(frozen=True, eq=False)
-class OfQuadraticTets(Potential):
+class OfQuadraticTets(JointlyEvaluated):
     """A potential of tets, acting on the virtual tets of quadratic ones.
 
     Parameters
@@ -101,12 +101,6 @@ class OfQuadraticTets(Potential):
 
     def value(self, x: NDArray[np.float64]) -> float:
         return self.inner.value(self.virtual.corners(x))
-
-    def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-        self.add_model(x, out, None, project=False)
-
-    def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
-        self.add_model(x, np.zeros_like(x), out, project)
 
     def add_model(
         self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
