@@ -116,7 +116,7 @@ def put_values(s, psi, tau, c, b, out, e):
     out[e, 15] = (tau[0] * s[1] + tau[1] * s[0]) * u * v / (s[0] + s[1])
 
 
-def energy(s, p):
+def energy(s: Any, p: Any) -> Any:
     """Stands for the energy of a law in `_values`."""
     raise NotImplementedError
 
