@@ -66,6 +66,7 @@ def test_the_sag_at_the_automatic_number_of_substeps_has_the_accuracy_asked_for(
     assert sag.case(1e3, 0.45, 10.0, 1 / 240, reference) is None
 
 
+@pytest.mark.slow
 def test_the_live_ball_is_simulated_with_and_without_its_page(capsys):
     from benchmarks import live
 

@@ -124,6 +124,7 @@ def test_a_vertex_in_the_plane_settles_at_the_separate_distance_along_the_normal
     assert np.abs(path[-1] - path[-2]).max() < 1e-6, "it has settled"
 
 
+@pytest.mark.slow
 @SOLVERS
 def test_three_of_four_stay_and_the_one_in_the_plane_settles_at_the_distance(solve, damping):
     triangle = [(0, 1, 0), (1, 1, 0), (0, 1, 1)]

@@ -67,6 +67,7 @@ def test_the_coarse_level_is_exact_for_its_own_fields():
     assert np.allclose(x, field, rtol=0.02, atol=0.02 * np.abs(field).max())
 
 
+@pytest.mark.slow
 def test_iterations_hardly_grow_with_refinement():
     counts = []
     for k in (1, 2, 3):

@@ -1,6 +1,7 @@
 """Studies whose cases need more memory than a worker's share."""
 
 import numpy as np
+import pytest
 
 import supple as sp
 
@@ -19,6 +20,7 @@ def needing_bytes():
     return make
 
 
+@pytest.mark.slow
 def test_a_case_too_large_for_its_share_of_the_memory_runs_on_fewer_workers(tmp_path, monkeypatch):
     from supple.studies import workers as module
 

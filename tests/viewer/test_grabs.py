@@ -65,7 +65,9 @@ class TestGrabs:
         assert np.ptp(forces, axis=0) == pytest.approx([0, 0, 0], abs=1e-12)
         assert forces[0] == pytest.approx([0, 0.3, 0])
 
-    @pytest.mark.parametrize("stiffness", [limits.WEAKEST_GRAB, limits.STRONGEST_GRAB])
+    @pytest.mark.parametrize(
+        "stiffness", [limits.WEAKEST_GRAB, pytest.param(limits.STRONGEST_GRAB, marks=pytest.mark.slow)]
+    )
     def test_the_stiffest_and_farthest_grab_leaves_a_finite_state(self, live, stiffness):
         change(corner_grab((9e3, 9e3, 9e3), stiffness=stiffness), live)
         for k in range(60):

@@ -61,7 +61,7 @@ def squashed(material, height, position, mesh=SPHERE):
         pytest.param(CLASSIC, 0.95, 5, id="edges+volume .95"),
         pytest.param(CLASSIC, 0.8, 40, id="edges+volume .8", marks=pytest.mark.slow),
         pytest.param(CLASSIC, 0.5, 20, id="edges+volume .5", marks=pytest.mark.slow),
-        pytest.param(CLASSIC, 0.02, 20, id="edges+volume pancake"),
+        pytest.param(CLASSIC, 0.02, 20, id="edges+volume pancake", marks=pytest.mark.slow),
     ],
 )
 def test_a_squashed_and_released_sphere_does_not_spin(material, height, substeps):
@@ -80,7 +80,7 @@ def test_a_sphere_spins_without_momentum_restore():
 
 @pytest.mark.parametrize(
     ("substeps", "seed", "seconds"),
-    [pytest.param(5, None, 60, marks=pytest.mark.slow), (20, 1, 20), (80, 2, 3)],
+    [pytest.param(5, None, 60, marks=pytest.mark.slow), pytest.param(20, 1, 20, marks=pytest.mark.slow), (80, 2, 3)],
     ids=["5 substeps", "20", "80"],
 )
 def test_frictionless_plates_cause_no_spin(substeps, seed, seconds):

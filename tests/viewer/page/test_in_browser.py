@@ -145,6 +145,7 @@ def test_a_slider_takes_effect(resting):
     screen.show_tab("Bodies")
 
 
+@pytest.mark.slow
 def test_a_squashed_ball_recovers(resting):
     screen = resting.screen
     before, seen = resting.height(), resting.red()[2]

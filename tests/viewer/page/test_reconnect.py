@@ -2,6 +2,8 @@
 
 import os
 
+import pytest
+
 from supple.output.viser_server import start_server, stop_server
 from supple.viewer.app import configure_page
 from supple.viewer.live_page import LivePage
@@ -14,6 +16,7 @@ def serve(port, simulation):
     return server, LivePage(server, simulation, simulation.snapshot)
 
 
+@pytest.mark.slow
 def test_the_page_reconnects_to_a_restarted_server(fake, look, spot):
     # Not a port that the system selects: another process may use it before the server restarts.
     server, page = serve(first_free_port("127.0.0.1", 20_000 + 50 * (os.getpid() % 200)), fake)
