@@ -104,8 +104,9 @@ def test_a_changed_state_wakes(settled):
         {"obstacles": [sp.HalfSpace(name="floor", friction=0.5, point=(0, -1, 0))]},
         {"obstacles": [sp.HalfSpace(name="floor", friction=0.5, motion=lambda t: (0.0, 0.1 * np.sin(40 * t), 0.0))]},
         {"forces": [sp.Force("high", [0], (0.0, 0.0, 40.0))]},
+        {"cables": [sp.Cable([("high", 0), (None, (0.0, 1.0, 0.0))], tension=40.0)]},
     ],
-    ids=["gravity", "another floor", "a floor that moves", "a force"],
+    ids=["gravity", "another floor", "a floor that moves", "a force", "a cable"],
 )
 def test_a_changed_scene_wakes(settled, changed):
     (frame,) = continued(settled, stack(**changed))
