@@ -6,6 +6,7 @@ The lowest layer describes; `supple.output.player` draws, and `supple/__init__.p
 from __future__ import annotations
 
 import html
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any
@@ -25,12 +26,12 @@ def supplied(what: str) -> Callable[..., Any]:
     return getattr(import_module(module), name)
 
 
-class Displayed:
+class Displayed(ABC):
     """An object with a short text, and a table in notebooks."""
 
+    @abstractmethod
     def _facts(self) -> Mapping[str, str]:
         """What is shown, by name; cheap to compute."""
-        raise NotImplementedError
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({', '.join(f'{name}: {value}' for name, value in self._facts().items())})"

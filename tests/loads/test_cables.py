@@ -8,6 +8,8 @@ from supple.implicit.energies.loads.actuators import actuators_at
 from supple.implicit.energies.potential import HessianBlocks
 from supple.system import build_system
 
+from .conftest import derivative_errors
+
 E, NU, RHO = 1e5, 0.3, 1000.0
 RUBBER = sp.StableNeoHookean(youngs=E, poisson=NU, density=RHO, damping=0.05)
 BAR = sp.shapes.box((0.4, 0.2, 0.2), (4, 2, 2))
@@ -32,22 +34,9 @@ def test_gradients_and_hessians_have_slope_two(drive):
     # Slips of about the size below which the cable sticks.
     x, d = start + 2e-4 * rng.normal(size=start.shape), rng.normal(size=start.shape)
     (potential,) = actuators_at(system, start, (0.0, 0.5), 1e-4, np.full(len(system.tets), 1e4))
-
-    def gradient(at):
-        out = np.zeros_like(at)
-        potential.add_gradient(at, out)
-        return out
-
-    blocks, product = HessianBlocks.zeros(len(system.tets), len(x)), np.zeros_like(x)
-    potential.add_hessian(x, blocks, False)
-    for part in (*blocks.beyond_elements, *blocks.low_rank):
-        part.add_product(d, product)
-    slope, errors = float((gradient(x) * d).sum()), []
     # Steps within which no eyelet changes from sticking to slipping.
-    for h in (2e-6, 1e-6) if "friction" in drive else (2e-5, 1e-5):
-        by_value = (potential.value(x + h * d) - potential.value(x - h * d)) / (2 * h)
-        by_force = (gradient(x + h * d) - gradient(x - h * d)) / (2 * h)
-        errors.append((abs(by_value - slope) / abs(slope), np.abs(by_force - product).max() / np.abs(product).max()))
+    steps = (2e-6, 1e-6) if "friction" in drive else (2e-5, 1e-5)
+    errors, product = derivative_errors(potential, len(system.tets), x, d, steps)
     for coarse, fine in zip(*errors, strict=True):
         assert fine < 1e-3
         assert fine < 0.3 * coarse or fine < 1e-7
