@@ -91,7 +91,9 @@ def grouped(pairs, features, triangles, owner):
             count[pairs[k, 0]] += 1
             total += 1
     first = 0
+    begin = np.empty(len(owner), dtype=np.int32)
     for g in range(vertices):
+        begin[order[g]] = first
         first, count[order[g]] = first + count[order[g]], first
     rows = np.empty(total, dtype=np.int32)
     for k in range(len(pairs)):
@@ -100,9 +102,8 @@ def grouped(pairs, features, triangles, owner):
             # Behind those of the vertex with the same owner, or a smaller one.
             place = count[v]
             while (
-                place > 0
-                and pairs[rows[place - 1], 0] == v
-                and _owner(pairs, rows[place - 1], triangles, owner) > (_owner(pairs, k, triangles, owner))
+                place > begin[v]  # rows of other vertices may not be written yet
+                and _owner(pairs, rows[place - 1], triangles, owner) > _owner(pairs, k, triangles, owner)
             ):
                 rows[place] = rows[place - 1]
                 place -= 1
