@@ -16,6 +16,7 @@ TESTS = Path(__file__).parent
 IMPORT_NAMES = {
     "arro3-core": "arro3",
     "arro3-io": "arro3",
+    "fast-simplification": "fast_simplification",
     "imageio-ffmpeg": "imageio_ffmpeg",
     "lazy-loader": "lazy_loader",
     "mapbox-earcut": "mapbox_earcut",

@@ -29,6 +29,7 @@ from .materials.regions import Regions as Regions
 from .materials.st_venant_kirchhoff import StVenantKirchhoff as StVenantKirchhoff
 from .materials.stable_neo_hookean import StableNeoHookean as StableNeoHookean
 from .mesh import shapes as shapes
+from .mesh.meshing.decimation import decimate_surface as decimate_surface
 from .mesh.meshing.repair import repair_surface as repair_surface
 from .mesh.meshing.tetrahedralize import tetrahedralize as tetrahedralize
 from .mesh.sets import MeshSets as MeshSets

@@ -35,6 +35,7 @@ def mesh(
     keep_surface: Annotated[bool, Parameter(negative="")] = False,
     mesher: Literal["auto", "tetgen", "ftetwild"] = "auto",
     repair: Annotated[bool, Parameter(negative="")] = False,
+    decimate: int | None = None,
     envelope: float = 1e-3,
     time_limit: float = 120.0,
     memory_limit: float = 4.0,
@@ -66,6 +67,8 @@ def mesh(
         "auto" uses TetGen for a clean surface, and fTetWild (an extra) for any other, and where TetGen fails.
     repair
         Repair a surface that is not clean first, and list the changes. Where that fails, fTetWild meshes it as it is.
+    decimate
+        Number of triangles to which the surface is reduced first: TetGen keeps all of them.
     envelope
         How far fTetWild may move the surface, as a fraction of the bounding box's diagonal.
     time_limit
@@ -111,6 +114,7 @@ def mesh(
                 keep_surface=keep_surface,
                 mesher=mesher,
                 repair=repair,
+                decimate=decimate,
                 envelope=envelope,
                 time_limit=time_limit,
                 memory_limit=_bytes(memory_limit),

@@ -66,7 +66,7 @@ class MesherFailure(MeshingError):
 def run_mesher(
     mesher: str, surface: SurfaceMesh, options: dict[str, Any], limits: Limits, remedy: str = ""
 ) -> MesherResult:
-    """Run "tetgen", "ftetwild" (elements are tets) or "meshfix" (triangles) on a surface, in a child process.
+    """Run "tetgen", "ftetwild" (elements are tets), "meshfix" or "decimation" (triangles) on a surface, in a child.
 
     `remedy` ends the message where the mesher failed or crashed.
 

@@ -1,4 +1,4 @@
-"""The program of the child process: TetGen, fTetWild or MeshFix on arrays from a file, within limits.
+"""The program of the child process: a mesher, MeshFix or decimation on arrays from a file, within limits.
 
 It is started by its path, not imported. It uses only NumPy and the mesher, so that it starts quickly and so that no
 part of the parent's program runs a second time. Job and answer are `.npz` and `.json` files in a folder.
@@ -29,7 +29,13 @@ def main(folder: Path) -> int:
 
         with np.load(folder / "surface.npz") as surface:
             vertices, triangles = surface["vertices"], surface["triangles"]
-        run = {"tetgen": _run_tetgen, "ftetwild": _run_ftetwild, "meshfix": _run_meshfix}[job["mesher"]]
+        runs = {
+            "tetgen": _run_tetgen,
+            "ftetwild": _run_ftetwild,
+            "meshfix": _run_meshfix,
+            "decimation": _run_decimation,
+        }
+        run = runs[job["mesher"]]
         points, elements, labels = run(vertices, triangles, job["options"], answer["notes"])
         with (folder / "mesh.npz").open("wb") as file:
             np.savez(file, vertices=points, elements=elements, labels=labels)
@@ -130,6 +136,21 @@ def _run_meshfix(vertices: Any, triangles: Any, options: dict[str, Any], notes: 
         labels.append(np.full(len(faces[-1]), float(k)))
         start += len(points[-1])
     return np.concatenate(points), np.concatenate(faces), np.concatenate(labels)
+
+
+def _run_decimation(vertices: Any, triangles: Any, options: dict[str, Any], notes: list[str]) -> tuple[Any, Any, Any]:
+    import fast_simplification
+    import numpy as np
+
+    # The library collapses all edges below an error that grows the faster, the more aggressive it is: with its default
+    # alone, a box of 1,584 triangles that lies at an angle loses a third of its volume on the way to 100.
+    for aggressiveness in range(1, 10):
+        if len(triangles) <= options["triangles"]:
+            break
+        vertices, triangles = fast_simplification.simplify(
+            vertices, triangles, target_count=options["triangles"], agg=float(aggressiveness)
+        )
+    return vertices, triangles, np.ones(len(triangles))
 
 
 def _below_volume(

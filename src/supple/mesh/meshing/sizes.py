@@ -13,6 +13,9 @@ logger = logging.getLogger(__name__)
 COUNT_TOLERANCE = 0.1
 MOST_TRIES = 6
 
+# Tets for each triangle of a coarse surface, at the usual quality: a ball of 100 to 300 triangles has 5 to 7.
+_TETS_OF_TRIANGLE = 6
+
 
 def volume_of_edge(edge: float) -> float:
     """The volume of a regular tetrahedron with edges of this length [m^3]."""
@@ -51,8 +54,9 @@ def mesh_with_count(make: Callable[[float], TetMesh], count: int, volume: float)
     assert best is not None
     if len(best.tets) > (1.0 + COUNT_TOLERANCE) * count:
         logger.warning(
-            "%d tets instead of %d: the triangles of the surface need so many; decimate the surface first",
+            "%d tets instead of %d: the triangles of the surface need so many; reduce them first with decimate=%d",
             len(best.tets),
             count,
+            max(100, count // _TETS_OF_TRIANGLE),
         )
     return best

@@ -10,6 +10,7 @@ import numpy as np
 
 from supple.errors import MeshError, MeshingError
 from supple.mesh.meshing.child_process import Limits, MesherFailure
+from supple.mesh.meshing.decimation import decimate_surface
 from supple.mesh.meshing.ftetwild import INSTALL, ftetwild_installed, mesh_with_ftetwild
 from supple.mesh.meshing.repair import RepairReport, repair_surface
 from supple.mesh.meshing.sizes import mesh_with_count, volume_of_edge
@@ -47,6 +48,7 @@ def tetrahedralize(
     keep_surface: bool = False,
     mesher: Mesher = "auto",
     repair: bool = False,
+    decimate: int | None = None,
     envelope: float = 1e-3,
     time_limit: float = 120.0,
     memory_limit: int | None = 4 * 2**30,
@@ -80,6 +82,8 @@ def tetrahedralize(
     repair : bool
         Repair a surface that is not clean first, see `repair_surface`. Where that fails, "auto" and "ftetwild" mesh the
         surface as it is with fTetWild, if that is installed, with a warning in the log.
+    decimate : int, optional
+        Number of triangles to which the surface is reduced first, see `decimate_surface`: TetGen keeps all of them.
     envelope : float
         How far fTetWild may move the surface, as a fraction of the bounding box's diagonal.
     time_limit : float [s]
@@ -106,6 +110,7 @@ def tetrahedralize_reported(
     keep_surface: bool = False,
     mesher: Mesher = "auto",
     repair: bool = False,
+    decimate: int | None = None,
     envelope: float = 1e-3,
     time_limit: float = 120.0,
     memory_limit: int | None = 4 * 2**30,
@@ -140,6 +145,9 @@ def tetrahedralize_reported(
             logger.warning("%s; meshing the surface without repair", failure)
         else:
             surface, report = _facing_outward(fixed)
+    if decimate is not None:
+        reduced = decimate_surface(surface, decimate, time_limit=time_limit, memory_limit=limits.memory)
+        surface, report = _facing_outward(reduced)
     chosen = _choose(mesher, report, repair)
     if chosen == "ftetwild":
         _check_ftetwild_options(quality, min_dihedral, keep_surface)

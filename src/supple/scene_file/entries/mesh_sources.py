@@ -27,6 +27,7 @@ MESHING_OPTIONS = (
     "keep_surface",
     "mesher",
     "repair",
+    "decimate",
     "time_limit",
 )
 
@@ -46,6 +47,9 @@ class MeshFileModel(Model):
     keep_surface: bool | None = Field(default=None, description="true: no new vertices on the surface")
     mesher: Literal["auto", "tetgen", "ftetwild"] | None = Field(default=None, description="program for the tetrahedra")
     repair: bool | None = Field(default=None, description="true: repair the surface first, if it has faults")
+    decimate: int | None = Field(
+        default=None, ge=4, le=10**8, description="number of triangles to which the surface is reduced first"
+    )
     time_limit: Positive | None = Field(default=None, description="of the mesher [s]")
 
     @property

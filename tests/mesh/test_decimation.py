@@ -1,0 +1,76 @@
+"""Surfaces with fewer triangles: their number, shape and faults."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+import pytest
+
+from supple.errors import MeshingError
+from supple.mesh.meshing.decimation import decimate_surface
+from supple.mesh.meshing.tetrahedralize import tetrahedralize
+from supple.mesh.primitives.surfaces import sphere_surface
+from supple.mesh.shapes import box
+from supple.mesh.surface import SurfaceMesh
+from supple.scene.rotation import rotation_matrix
+
+BALL = sphere_surface(radius=0.5, edge_length=0.07)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e3])
+def test_a_ball_stays_a_closed_ball_of_any_size(size: float) -> None:
+    reduced = decimate_surface(BALL.transformed(size), 400)
+    assert len(reduced.triangles) == 400
+    assert reduced.check().ok
+    assert reduced.volume == pytest.approx(np.pi / 6.0 * size**3, rel=0.03)
+    distances = np.linalg.norm(reduced.vertices, axis=1) / size
+    assert np.abs(distances - 0.5).max() < 0.01
+
+
+@pytest.mark.parametrize("rotation", [(0.0, 0.0, 0.0), (1.0, 2.0, 0.3)])
+def test_edges_and_corners_of_a_box_stay(rotation: tuple[float, float, float]) -> None:
+    turned = box((1.0, 2.0, 3.0), (6, 12, 18)).surface.compact().transformed(1.0, rotation_matrix(rotation))
+    reduced = decimate_surface(turned, 100)
+    assert len(reduced.triangles) == 100
+    assert reduced.check().ok
+    assert reduced.volume == pytest.approx(6.0, rel=1e-3)
+
+
+def test_tets_of_a_surface_that_is_too_fine(caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.INFO):
+        mesh = tetrahedralize(BALL, tets=800, decimate=133)
+    assert len(mesh.tets) == pytest.approx(800, rel=0.1)
+    assert f"decimated the surface: {len(BALL.triangles)} -> 132 triangles, volume" in caplog.text
+
+
+def test_without_it_the_log_gives_a_number(caplog: pytest.LogCaptureFixture) -> None:
+    tetrahedralize(BALL, tets=800)
+    assert "reduce them first with decimate=133" in caplog.text
+
+
+def test_a_surface_that_is_coarse_enough_is_returned() -> None:
+    assert decimate_surface(BALL, len(BALL.triangles)) is BALL
+
+
+@pytest.mark.parametrize("count", [3, 0, -5, 10.5, True])
+def test_numbers_that_no_surface_has_are_refused(count: object) -> None:
+    with pytest.raises(MeshingError, match="4 triangles or more"):
+        decimate_surface(BALL, count)  # pyright: ignore[reportArgumentType]
+
+
+def test_new_faults_are_refused() -> None:
+    # The two sides of a thin shell cross where each has few triangles of its own.
+    inside, outside = BALL.flipped(), BALL.transformed(1.02)
+    shell = SurfaceMesh(
+        np.vstack([outside.vertices, inside.vertices]),
+        np.vstack([outside.triangles, inside.triangles + len(outside.vertices)]),
+    )
+    assert shell.check().ok
+    with pytest.raises(MeshingError, match=r"to 300 triangles: .* intersecting .*; give a larger number"):
+        decimate_surface(shell, 300)
+
+
+def test_another_volume_is_refused() -> None:
+    with pytest.raises(MeshingError, match=r"to 12 triangles: the volume changes from 0.519\d* to .* m\^3"):
+        decimate_surface(BALL, 12)
