@@ -178,7 +178,7 @@ READERS = {
     ),
     **{
         f"tets {kind}": Reader(lambda folder, kind=kind: BODY.save(folder / f"t{kind}"), f"t{kind}", sp.TetMesh.load)
-        for kind in (".msh", ".vtu", ".vtk", ".inp")
+        for kind in (".msh", ".vtu", ".vtk", ".inp", ".usda")
     },
     **{
         f"TetGen's {kind}": Reader(

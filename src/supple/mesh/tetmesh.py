@@ -143,8 +143,8 @@ class TetMesh(Displayed):
 
     @classmethod
     def load(cls, path: str | Path) -> TetMesh:
-        """Read a tet mesh from TetGen's .node/.ele/.edge/.face, Gmsh .msh, .vtu, .vtk or Abaqus's .inp, selected by the
-        extension.
+        """Read a tet mesh from TetGen's .node/.ele/.edge/.face, Gmsh .msh, .vtu, .vtk, Abaqus's .inp or USD's .usd,
+        .usda or .usdc (the extra `usd`), selected by the extension.
 
         Tets of ten nodes stay quadratic; of TetGen's only the corners are used.
 
@@ -165,13 +165,13 @@ class TetMesh(Displayed):
         return mesh
 
     def save(self, path: str | Path) -> None:
-        """Write the mesh as TetGen's four files (.node, .ele, .edge or .face), .msh, .vtu, .vtk or .inp, by the
-        extension.
+        """Write the mesh as TetGen's four files (.node, .ele, .edge or .face), .msh, .vtu, .vtk, .inp, .usd, .usda or
+        .usdc, by the extension. USD keeps coordinates in single precision.
 
         Raises
         ------
         MeshError : where the extension is none of these, the file cannot be written, or quadratic tets shall go to
-            TetGen's files. No partial file is left.
+            TetGen's or USD's files. No partial file is left.
         """
         if is_tetgen_path(path):
             if self.order == 2:

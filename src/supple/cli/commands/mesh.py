@@ -48,7 +48,8 @@ def mesh(
     surface
         STL, OBJ, PLY, OFF, GLB, VTP, VTK or VTU file.
     output
-        One of TetGen's names (bear.1.node writes .node, .ele, .edge and .face), or a .msh, .vtu, .vtk or .inp file.
+        One of TetGen's names (bear.1.node writes .node, .ele, .edge and .face), or a .msh, .vtu, .vtk, .inp or
+        USD file.
     scale
         Factor of all coordinates: 0.001 for a surface in millimetres.
     tets

@@ -15,7 +15,7 @@ from supple.mesh.checked_arrays import vertex_array
 from supple.mesh.io import abaqus, msh, obj, off, ply, stl
 from supple.mesh.io.cells import CellSoup, FormatError, tets_of
 from supple.mesh.io.file_contents import file_contents
-from supple.mesh.io.models import glb
+from supple.mesh.io.models import glb, usd
 from supple.mesh.io.polygons import triangles_of
 from supple.mesh.io.tetgen_family import SUFFIXES, family_paths, is_tetgen_path, read_tetgen_family
 from supple.mesh.io.vtk import legacy as vtk_legacy
@@ -49,6 +49,7 @@ TET_READERS: dict[str, Callable[[bytes], CellSoup]] = {
     ".vtu": vtk_xml.read,
     ".vtk": vtk_legacy.read,
     ".inp": abaqus.read,
+    **dict.fromkeys(usd.USD_SUFFIXES, usd.read),
 }
 TET_WRITERS = {".vtu": vtk_xml.written_cells, ".vtk": vtk_legacy.written_cells, ".inp": abaqus.written}
 TET_EXTENSIONS = (*SUFFIXES, *TET_READERS)
@@ -120,11 +121,15 @@ def read_tets(path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.integer
 
 
 def write_tets(path: str | Path, vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> None:
-    """Write tets (m, 4) or (m, 10) to a `.msh`, `.vtu`, `.vtk` or `.inp` file; see `TetMesh.save`."""
+    """Write tets (m, 4) or (m, 10) to a `.msh`, `.vtu`, `.vtk`, `.inp` or USD file; see `TetMesh.save`."""
     path = Path(path)
     extension = path.suffix.lower()
-    if extension == ".msh":
-        _write_whole(path, lambda temporary: msh.write(temporary, vertices, tets))
+    if extension == ".msh" or extension in usd.USD_SUFFIXES:
+        write = msh.write if extension == ".msh" else usd.write
+        try:
+            _write_whole(path, lambda temporary: write(temporary, vertices, tets))
+        except FormatError as error:
+            raise _located(path, error) from None
     elif extension in TET_READERS:
         data = TET_WRITERS[extension](vertices, tets)
         _write_whole(path, lambda temporary: temporary.write_bytes(data))

@@ -17,7 +17,7 @@ from supple.scene_file.entries.shapes import GummyBearShapeModel, ShapeModel, Su
 from supple.scene_file.model import FilePath, Model, Positive, Vector
 
 SURFACE_FILES = (".stl", ".obj", ".ply", ".off", ".glb", ".vtp")
-TET_FILES = (".node", ".ele", ".edge", ".face", ".msh", ".inp")
+TET_FILES = (".node", ".ele", ".edge", ".face", ".msh", ".inp", ".usd", ".usda", ".usdc")
 MESHING_OPTIONS = (
     "tets",
     "edge",

@@ -1,0 +1,123 @@
+"""Tet meshes in files of Universal Scene Description: prims of the type TetMesh (OpenUSD 24.03 and newer).
+
+Source: OpenUSD, UsdGeomTetMesh (https://openusd.org/release/api/class_usd_geom_tet_mesh.html).
+"""
+
+# pyright: reportAttributeAccessIssue=false
+# (OpenUSD comes without types.)
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from importlib.util import find_spec
+from pathlib import Path
+from textwrap import shorten
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.mesh.io.cells import TETRA, CellSoup, FormatError
+
+USD_SUFFIXES = (".usd", ".usda", ".usdc")
+
+# OpenUSD trusts the numbers in binary files, and asks for terabytes where they are damaged: it reads them in a child.
+_CONVERSION = """
+import sys
+try:
+    import resource
+    resource.setrlimit(resource.RLIMIT_AS, (int(sys.argv[1]),) * 2)
+except (ImportError, ValueError, OSError):
+    pass
+from pxr import Sdf
+Sdf.Layer.FindOrOpen(sys.argv[2]).Export(sys.argv[3])
+"""
+_LEAST_MEMORY, _MEMORY_OF_A_BYTE = 2**31, 64  # [bytes]
+_SECONDS = 120
+
+INSTALL = "files of USD need OpenUSD, which is not installed; pip install 'supple[usd]'"
+
+
+def read(data: bytes) -> CellSoup:
+    """The tets of all TetMesh prims of a text or binary file, in the coordinates of its world, in metres.
+
+    Files that it refers to are not read.
+    """
+    if find_spec("pxr") is None:
+        raise FormatError(INSTALL)
+    from pxr import Tf, Usd
+
+    with tempfile.TemporaryDirectory(prefix="supple-usd-") as folder:
+        text = _as_text(data, Path(folder))
+        try:
+            text.read_text("utf-8")  # OpenUSD repeats what it cannot read in an error that Python cannot decode
+            return _tets_of(Usd.Stage.Open(str(text), Usd.Stage.LoadNone))
+        except UnicodeDecodeError as error:
+            raise FormatError(f"byte {error.start} is not UTF-8") from None
+        except Tf.ErrorException as error:
+            # The text is the place in USD's source, then the reason in quotes.
+            reason = str(error).rpartition(" : ")[2].strip("' \n").replace(str(text), "the file")
+            raise FormatError(f"OpenUSD cannot read it: {shorten(reason, 200)}") from None
+
+
+def _as_text(data: bytes, folder: Path) -> Path:
+    """A text file in `folder` with the contents of a text or binary file."""
+    text = folder / "mesh.usda"
+    if data.startswith(b"#usda"):
+        text.write_bytes(data)
+        return text
+    if not data.startswith(b"PXR-USDC"):
+        raise FormatError("it is no USD file: it begins with neither PXR-USDC nor #usda")
+    binary = folder / "mesh.usdc"
+    binary.write_bytes(data)
+    memory = _LEAST_MEMORY + _MEMORY_OF_A_BYTE * len(data)
+    command = [sys.executable, "-c", _CONVERSION, str(memory), str(binary), str(text)]
+    try:
+        done = subprocess.run(command, capture_output=True, timeout=_SECONDS, check=False)
+    except subprocess.TimeoutExpired:
+        raise FormatError(f"OpenUSD did not read it within {_SECONDS} s: it is damaged") from None
+    if done.returncode != 0 or not text.exists():
+        raise FormatError("OpenUSD cannot read it: it is damaged")
+    return text
+
+
+def _tets_of(stage) -> CellSoup:
+    from pxr import Usd, UsdGeom
+
+    unit, time = float(UsdGeom.GetStageMetersPerUnit(stage)), Usd.TimeCode.EarliestTime()
+    points, tets, count = [np.zeros((0, 3))], [np.zeros((0, 4), dtype=np.int64)], 0
+    for prim in stage.Traverse():
+        if not prim.IsA(UsdGeom.TetMesh):
+            continue
+        mesh = UsdGeom.TetMesh(prim)
+        x = np.array(mesh.GetPointsAttr().Get(time) or [], dtype=np.float64).reshape(-1, 3)
+        rows = np.array(mesh.GetTetVertexIndicesAttr().Get(time) or [], dtype=np.int64).reshape(-1, 4)
+        if len(rows) and not (rows.min() >= 0 and rows.max() < len(x)):
+            raise FormatError(f"{prim.GetPath()}: a tet names a point outside of 0 to {len(x) - 1}")
+        world = np.array(UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(time))
+        points.append(unit * (x @ world[:3, :3] + world[3, :3]))  # USD multiplies rows from the left
+        tets.append(rows + count)
+        count += len(x)
+    return CellSoup.of_rows(np.concatenate(points), np.concatenate(tets), TETRA)
+
+
+def write(path: Path, vertices: NDArray[np.float64], tets: NDArray[np.int32]) -> None:
+    """Write one TetMesh with its surface, in metres; coordinates are stored in single precision, as USD has them."""
+    if tets.shape[1] != 4:
+        raise FormatError("USD has linear tets only; save mesh.to_order(1)")
+    if find_spec("pxr") is None:
+        raise FormatError(INSTALL)
+    from pxr import Usd, UsdGeom, Vt
+
+    stage = Usd.Stage.CreateNew(str(path))
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    mesh = UsdGeom.TetMesh.Define(stage, "/mesh")
+    stage.SetDefaultPrim(mesh.GetPrim())
+    single = np.ascontiguousarray(vertices, dtype=np.float32)
+    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(single))
+    mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([single.min(axis=0), single.max(axis=0)])))
+    mesh.CreateTetVertexIndicesAttr(Vt.Vec4iArray.FromNumpy(np.ascontiguousarray(tets, dtype=np.int32)))
+    mesh.CreateSurfaceFaceVertexIndicesAttr(UsdGeom.TetMesh.ComputeSurfaceFaces(mesh, Usd.TimeCode.Default()))
+    stage.GetRootLayer().Save()
