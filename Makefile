@@ -14,7 +14,7 @@ endif
 # Bytecode is compiled now, so that no later start has to (it is 1.3 s of one).
 install = ($(BIN)/python -m uv pip install -q --compile-bytecode --python $(BIN)/python $(1) || $(BIN)/python -m pip install -q $(1))
 
-.PHONY: demo test test-all fuzz soak bench lint format docs dist lock clean
+.PHONY: demo test test-all fuzz soak bench blender lint format docs dist lock clean
 .DELETE_ON_ERROR:
 
 demo: .venv/.base
@@ -51,6 +51,13 @@ format: .venv/.dev
 # The documentation site in build/site; a warning, such as a broken link, is an error.
 docs: .venv/.dev
 	NO_MKDOCS_2_WARNING=1 PATH=$(CURDIR)/$(BIN):$$PATH $(BIN)/python -m mkdocs build
+
+# The add-on for Blender as a zip file to install, tested in Blender without a window (Debian: apt install blender python3-numpy).
+blender: .venv/.base
+	@command -v blender >/dev/null || { echo "make blender needs Blender 3.4 or newer on the path: apt install blender python3-numpy"; exit 2; }
+	SUPPLE_PYTHON=$(CURDIR)/$(BIN)/python blender --background --factory-startup --python-exit-code 1 --python blender/test_headless.py
+	mkdir -p dist
+	cd blender && $(CURDIR)/$(BIN)/python -m zipfile -c ../dist/supple_blender.zip supple_addon/*.py
 
 # The wheel and the sdist in dist/, checked: their contents, their page on an index, and a demo from the wheel alone.
 dist: .venv/.base

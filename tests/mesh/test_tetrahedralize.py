@@ -338,3 +338,10 @@ def test_two_threads_can_mesh_at_once() -> None:
     for thread in threads:
         thread.join()
     np.testing.assert_array_equal(meshes[0].tets, meshes[1].tets)
+
+
+@pytest.mark.skipif(not ftetwild.ftetwild_installed(), reason="needs pytetwild")
+def test_a_sheet_encloses_nothing() -> None:
+    sheet = SurfaceMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    with pytest.raises(MeshingError, match="fTetWild found nothing that the surface encloses"):
+        fill(sheet, tets=100, mesher="ftetwild")

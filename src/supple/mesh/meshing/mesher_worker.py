@@ -163,6 +163,8 @@ def _below_volume(
     if max_volume is None or bound is None:
         return answer
     for _ in range(VOLUME_ATTEMPTS - 1):
+        if len(answer[1]) == 0:
+            break
         corners = answer[0][answer[1]]
         largest = float(np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).max() / 6.0)
         if largest <= max_volume * (1.0 + 1e-9):

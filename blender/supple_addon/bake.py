@@ -1,0 +1,140 @@
+"""The simulation of a job that Blender wrote, in the Python that Supple is installed in.
+
+usage: python bake.py FOLDER
+
+FOLDER holds `job.json` and the arrays that it names (see `job.write`). `positions_K.npy` (f, n, 3) of each body and
+`report.json` are written to it; each frame prints a line. Exit code 2, with one line, for what cannot be simulated.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+import supple as sp
+
+# Vertices of Blender's mesh that a vertex of the tets follows: enough to determine a rotation on most meshes.
+_GUIDES = 12
+
+
+def main(folder: Path) -> int:
+    """Simulate the job in `folder`."""
+    job = json.loads((folder / "job.json").read_text("utf-8"))
+    try:
+        report = bake(job, folder)
+    except sp.SuppleError as error:
+        print(error, file=sys.stderr)
+        return 2
+    (folder / "report.json").write_text(json.dumps(report), "utf-8")
+    return 0
+
+
+def bake(job: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """Simulate a job and write the positions of its bodies' vertices; returns the contents of `report.json`."""
+    bodies, pins, skins = [], [], []
+    for described in job["bodies"]:
+        body, pin, skin = _body(described, folder, job["dt"])
+        bodies.append(body)
+        skins.append(skin)
+        pins += [pin] if pin is not None else []
+    obstacles: list[Any] = [_obstacle(described, folder, job["dt"]) for described in job["obstacles"]]
+    if job["floor"] is not None:
+        obstacles.append(sp.HalfSpace(point=(0.0, 0.0, job["floor"]), normal=(0.0, 0.0, 1.0), name="floor"))
+    scene = sp.Scene(bodies, obstacles, pins=pins, gravity=job["gravity"])
+    solver = sp.XPBD() if job["solver"] == "xpbd" else sp.Implicit()
+    positions = [[skin.apply(body.mesh.vertices).astype(np.float32)] for body, skin in zip(bodies, skins, strict=True)]
+    statuses: Counter[str] = Counter()
+    count = job["frames"]
+    for number, frame in enumerate(sp.simulate(scene, solver, job["dt"], count), start=1):
+        for k, (body, skin) in enumerate(zip(bodies, skins, strict=True)):
+            positions[k].append(skin.apply(frame.positions[body.name]).astype(np.float32))
+        statuses[str(frame.report.status)] += 1
+        print(f"frame {number} of {count}", flush=True)
+    for k, ways in enumerate(positions):
+        np.save(folder / f"positions_{k}.npy", np.array(ways))
+    tets = sum(len(body.mesh.tets) for body in bodies)
+    bad = [f"{number} of {count} frames are {status}" for status, number in statuses.items() if status != "converged"]
+    return {"summary": f"{count} frames of {len(bodies)} bodies, {tets} tets", "warnings": bad}
+
+
+def _body(described: dict[str, Any], folder: Path, dt: float) -> tuple[sp.Body, sp.Pin | None, sp.Embedding]:
+    """A soft body, the pin of its vertex group, and Blender's vertices in its tets."""
+    with np.load(folder / described["arrays"]) as arrays:
+        vertices, triangles, pinned, path = (arrays[key] for key in ("vertices", "triangles", "pinned", "path"))
+    name = described["name"]
+    surface = sp.SurfaceMesh(vertices, triangles)
+    try:
+        mesh = sp.tetrahedralize(surface.compact(), tets=described["tets"], repair=described["repair"])
+    except sp.MeshingError as error:
+        raise sp.MeshingError(f"{name}: {error}") from None
+    material = sp.StableNeoHookean(
+        youngs=described["youngs"],
+        poisson=described["poisson"],
+        density=described["density"],
+        damping=described["damping"],
+    )
+    body = sp.Body(name, mesh, material, friction=described["friction"])
+    skin = sp.Embedding.of(mesh, vertices)
+    if not pinned.any():
+        return body, None, skin
+    chosen = np.flatnonzero(pinned[KDTree(vertices).query(mesh.vertices)[1]])
+    shifts = carried(mesh.vertices[chosen], path) - mesh.vertices[chosen]
+    return body, sp.Pin(name, chosen, _motion(shifts, dt)), skin
+
+
+def carried(points: NDArray[np.float64], path: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Where points (k, 3) are in each frame (f, k, 3), if each moves rigidly with the guides nearest to it.
+
+    Parameters
+    ----------
+    path : (f, g, 3) positions of the guides in each frame [m]
+
+    The rotation is that of the least squares fit (Kabsch, "A solution for the best rotation to relate two sets of
+    vectors", 1976); where the guides do not determine it, it is the one nearest to none.
+    """
+    count = min(_GUIDES, path.shape[1])
+    _, near = KDTree(path[0]).query(points, k=count)
+    near = near.reshape(len(points), count)
+    begin = path[0][near]
+    center = begin.mean(axis=1)
+    out = np.empty((len(path), *points.shape))
+    for k, frame in enumerate(path):
+        now = frame[near]
+        moments = np.einsum("pgi,pgj->pij", now - now.mean(axis=1, keepdims=True), begin - center[:, None])
+        size = np.einsum("pgi,pgi->p", begin - center[:, None], begin - center[:, None])
+        moments += (1e-9 * size + np.finfo(float).tiny)[:, None, None] * np.eye(3)
+        left, _, right = np.linalg.svd(moments)
+        left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
+        out[k] = now.mean(axis=1) + np.einsum("pij,pj->pi", left @ right, points - center)
+    return out
+
+
+def _obstacle(described: dict[str, Any], folder: Path, dt: float) -> sp.TriangleObstacle:
+    with np.load(folder / described["arrays"]) as arrays:
+        surface, path = sp.SurfaceMesh(arrays["vertices"], arrays["triangles"]), arrays["path"]
+    shifts = path - path[0]
+    motion = sp.Keyframes(dt * np.arange(len(path)), shifts) if np.abs(shifts).max() > 0.0 else None
+    return sp.TriangleObstacle(surface=surface, name=described["name"], friction=described["friction"], motion=motion)
+
+
+def _motion(shifts: NDArray[np.float64], dt: float) -> Callable[[float], NDArray[np.float64]]:
+    """Displacements (k, 3) at any time, from those of each frame (f, k, 3)."""
+
+    def at(time: float) -> NDArray[np.float64]:
+        place = min(max(time / dt, 0.0), len(shifts) - 1.0)
+        k = min(int(place), len(shifts) - 2)
+        return shifts[k] + (place - k) * (shifts[k + 1] - shifts[k])
+
+    return at
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1])))
