@@ -55,9 +55,11 @@ docs: .venv/.dev
 # The add-on for Blender as a zip file to install, tested in Blender without a window (Debian: apt install blender python3-numpy).
 blender: .venv/.base
 	@command -v blender >/dev/null || { echo "make blender needs Blender 3.4 or newer on the path: apt install blender python3-numpy"; exit 2; }
-	SUPPLE_PYTHON=$(CURDIR)/$(BIN)/python blender --background --factory-startup --python-exit-code 1 --python blender/test_headless.py
 	mkdir -p dist
-	cd blender && $(CURDIR)/$(BIN)/python -m zipfile -c ../dist/supple_blender.zip supple_addon/*.py
+	rm -rf blender/supple_addon/__pycache__
+	cd blender && $(CURDIR)/$(BIN)/python -m zipfile -c ../dist/supple_blender.zip supple_addon
+	BLENDER_USER_SCRIPTS=$(CURDIR)/out/blender SUPPLE_PYTHON=$(CURDIR)/$(BIN)/python blender --background \
+	  --factory-startup --python-exit-code 1 --python blender/test_headless.py -- dist/supple_blender.zip
 
 # The wheel and the sdist in dist/, checked: their contents, their page on an index, and a demo from the wheel alone.
 dist: .venv/.base

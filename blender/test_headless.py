@@ -1,6 +1,6 @@
 """Blender without a window simulates with the add-on and plays the caches: run by `make blender`.
 
-usage: blender --background --factory-startup --python-exit-code 1 --python blender/test_headless.py
+usage: blender --background --factory-startup --python-exit-code 1 --python blender/test_headless.py -- ADDON.zip
 """
 
 import math
@@ -10,15 +10,12 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parent))
-import supple_addon
-
 FRAMES = 24
 
 
 def empty_scene():
     """A scene of 25 frames, one second long, without objects."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.data.batch_remove(bpy.data.objects)
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end, scene.render.fps = 1, FRAMES + 1, 24
     return scene
@@ -135,8 +132,9 @@ def expect(text):
     assert text in message, message
 
 
-supple_addon.register()
+bpy.ops.preferences.addon_install(filepath=str(Path(sys.argv[-1]).resolve()))
+assert bpy.ops.preferences.addon_enable(module="supple_addon") == {"FINISHED"}
 for test in (a_ball_falls_on_the_floor_and_a_lift, an_armature_drives_pins, mistakes_are_named):
     test()
     print(f"passed: {test.__name__}")
-supple_addon.unregister()
+bpy.ops.preferences.addon_disable(module="supple_addon")
