@@ -1,11 +1,14 @@
-"""The error of XPBD's automatic number of substeps: the static sag of a beam over stiffness, size, nu and frame length.
+"""The error of XPBD's automatic number of substeps: sag and first frequency of a beam.
 
 usage: python -m benchmarks.automatic_substeps [--quick]
 
-A beam four times as long as it is thick, 8 x 2 x 2 cells, fixed at one end. Gravity is chosen for a sag of about 2 % of
+A beam four times as long as it is thick, 8 x 2 x 3 cells, fixed at one end. Gravity is chosen for a sag of about 2 % of
 its length, so that all sizes and stiffnesses have the same shape, which `Implicit` gives with its static integrator.
 Cases that need more than 400 frames to come to rest are left out: their tets are so slow that the least number of
 substeps is exact. What needs more than `max_substeps` is counted, and must be called `softened`.
+
+The frequency is that of the undamped beam after gravity begins to act, over three periods, where frames resolve them;
+`Implicit` gives it with Newmark's method and 400 steps in a period.
 """
 
 from __future__ import annotations
@@ -13,23 +16,27 @@ from __future__ import annotations
 import logging
 import math
 import sys
+from collections.abc import Iterable
 
 import numpy as np
 
 import supple as sp
 
-CELLS, DENSITY = (8, 2, 2), 1000.0
+# Wider than thick: of a square beam, both bending modes have nearly the same frequency, and beat.
+CELLS, WIDTH, DENSITY = (8, 2, 3), 1.5, 1000.0
 YOUNGS = (1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9)
 POISSON = (0.0, 0.3, 0.45, 0.49)
 SIZES = (1e-3, 1e-2, 0.1, 1.0, 10.0)
 STEPS = (1 / 240, 1 / 60, 1 / 15)
 MOST_FRAMES = 400
 
+Found = tuple[str, int, float]
+
 
 def scene(youngs: float, poisson: float, size: float, tau: float = 0.0) -> sp.Scene:
     """The beam of this thickness [m], with damping tau [s]."""
     material = sp.StableNeoHookean(youngs=youngs, poisson=poisson, density=DENSITY, damping=tau)
-    body = sp.Body("beam", sp.shapes.box((4 * size, size, size), CELLS), material)
+    body = sp.Body("beam", sp.shapes.box((4 * size, size, WIDTH * size), CELLS), material)
     fixed = sp.Pin("beam", sp.InBox((-3 * size, -size, -size), (-1.999 * size, size, size)))
     return sp.Scene([body], pins=[fixed], gravity=(0, -2e-4 * youngs / (DENSITY * size), 0))
 
@@ -39,7 +46,7 @@ def sag(frame: sp.Frame, size: float) -> float:
     return -float(frame.positions["beam"][:, 1].min()) / size - 0.5
 
 
-def case(youngs: float, poisson: float, size: float, dt: float, reference: float) -> tuple[str, int, float] | None:
+def case(youngs: float, poisson: float, size: float, dt: float, reference: float) -> Found | None:
     """The status, the substeps and the error of the sag; None where the beam is too slow."""
     omega = 0.0634 * math.sqrt(youngs / DENSITY) / size
     frames = max(5, math.ceil(12.0 / (omega * dt)))
@@ -50,30 +57,60 @@ def case(youngs: float, poisson: float, size: float, dt: float, reference: float
     return str(last.report.status), last.report.iterations, sag(last, size) / reference - 1.0
 
 
+def period(frames: Iterable[sp.Frame], size: float, level: float) -> float:
+    """The mean time [s] between passages of the sag through `level` downward, the first and the last of the run."""
+    times, sags = np.transpose([(frame.time, sag(frame, size)) for frame in frames])
+    k = np.flatnonzero((sags[:-1] < level) & (sags[1:] >= level))
+    passed = times[k] + (level - sags[k]) / (sags[k + 1] - sags[k]) * (times[k + 1] - times[k])
+    return float((passed[-1] - passed[0]) / (len(passed) - 1)) if len(passed) > 1 else math.nan
+
+
+def frequency(youngs: float, poisson: float, size: float, dt: float, level: float, exact: float) -> Found | None:
+    """The status, the substeps and the error of the frequency; None where frames do not resolve it, or it is too slow.
+
+    exact : the period of a beam of E = 1e5 Pa and thickness 0.1 m [s]
+    """
+    expected = exact * size / 0.1 * math.sqrt(1e5 / youngs)
+    count = math.ceil(3.6 * expected / dt)
+    if expected < 12.0 * dt or count > MOST_FRAMES:
+        return None
+    frames = list(sp.simulate(scene(youngs, poisson, size), sp.XPBD(contact=None), dt, count))
+    report = frames[-1].report
+    return str(report.status), report.iterations, expected / period(frames, size, level) - 1.0
+
+
+def row(found: list[Found | None]) -> str:
+    """Errors of the cases that converged, substeps, softened cases and those that were left out."""
+    run = [each for each in found if each is not None]
+    good = np.array([abs(error) for status, _, error in run if status == "converged"])
+    soft = np.array([abs(error) for status, _, error in run if status == "softened"])
+    counts = [count for status, count, _ in run if status == "converged"]
+    others = sorted({status for status, _, _ in run} - {"converged", "softened"})
+    softened = f"{len(soft)}, {np.median(soft):.0%}" if len(soft) else "0"
+    errors = f"{np.median(good):.2%}, {good.max():.2%} | {min(counts)} to {max(counts)}" if len(good) else "none |"
+    return f"{len(run)} | {errors} | {softened} | {len(found) - len(run)} {' '.join(others)}"
+
+
 def main(quick: bool = False) -> None:
-    """Print a row for each nu."""
+    """Print two rows for each nu."""
     logging.disable(logging.WARNING)
-    print("nu | cases | errors of converged ones: median, largest | substeps | softened, median error | too slow")
+    print("nu | cases | errors of converged ones: median, largest | substeps | softened, median error | left out")
     for poisson in POISSON:
         *_, still = sp.simulate(scene(1e5, poisson, 0.1), sp.Implicit(integrator="static", contact=None), 1 / 60, 2)
         reference = sag(still, 0.1)
-        found, slow = [], 0
-        for youngs in YOUNGS[:: 3 if quick else 1]:
-            for size in SIZES[:: 2 if quick else 1]:
-                for dt in STEPS[:: 2 if quick else 1]:
-                    each = case(youngs, poisson, size, dt, reference)
-                    slow += each is None
-                    found += [] if each is None else [each]
-        good = np.array([abs(error) for status, _, error in found if status == "converged"])
-        soft = np.array([abs(error) for status, _, error in found if status == "softened"])
-        counts = [count for status, count, _ in found if status == "converged"]
-        others = sorted({status for status, _, _ in found} - {"converged", "softened"})
-        print(
-            f"{poisson:g} | {len(found)} | {np.median(good):.2%}, {good.max():.2%} | {min(counts)} to {max(counts)} | "
-            f"{len(soft)}, {np.median(soft):.0%} | {slow}",
-            *others,
-            flush=True,
-        )
+        guess = 2.0 * math.pi / (0.0634 * math.sqrt(1e5 / DENSITY) / 0.1)
+        newmark = sp.Implicit(integrator="newmark", contact=None)
+        exact = period(sp.simulate(scene(1e5, poisson, 0.1), newmark, guess / 400, 1200), 0.1, reference)
+        cases = [
+            (youngs, size, dt)
+            for youngs in YOUNGS[:: 3 if quick else 1]
+            for size in SIZES[:: 2 if quick else 1]
+            for dt in STEPS[:: 2 if quick else 1]
+        ]
+        sags = [case(youngs, poisson, size, dt, reference) for youngs, size, dt in cases]
+        print(f"{poisson:g} sag | {row(sags)}", flush=True)
+        tones = [frequency(youngs, poisson, size, dt, reference, exact) for youngs, size, dt in cases]
+        print(f"{poisson:g} frequency | {row(tones)}", flush=True)
 
 
 if __name__ == "__main__":

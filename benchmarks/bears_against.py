@@ -1,0 +1,72 @@
+"""The demo `bears` on two versions: `python -m benchmarks.bears_against OTHER/src [--substeps 40 640] [--frames 60]`.
+
+This version runs with its default solver, the other one with each of the numbers of substeps. Each run has a process
+of its own, one after the other. Rows: milliseconds a frame without the first, which compiles; frames in which surfaces
+cross, by this version's test of triangles against edges; the smallest J. Crossings and J need no quiet machine.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from supple.demos.bears import BEARS
+from supple.system import build_system
+from supple.xpbd.assessment.surfaces import SurfaceCheck, crossings
+from supple.xpbd.contact.collisions import mean_edge_length
+from supple.xpbd.solver import XPBD
+
+ROOT = Path(__file__).parents[1]
+
+# Runs in any version since 0.1.
+RUN = """
+import dataclasses, sys
+import numpy as np, supple as sp
+from supple.demos.bears import BEARS
+substeps, frames, file = int(sys.argv[1]), int(sys.argv[2]), sys.argv[3]
+solver = BEARS.solver() if callable(BEARS.solver) else BEARS.solver
+if substeps:
+    solver = dataclasses.replace(solver, substeps=substeps)
+run = list(sp.simulate(BEARS.scene(), solver, BEARS.dt, frames))
+seconds = [frame.report.wall_seconds for frame in run[1:]]
+J = min(frame.report.min_det_F for frame in run)
+np.savez(file, x=np.array([frame.state.positions for frame in run]), seconds=np.mean(seconds), J=J)
+"""
+
+
+def measured(package: Path, substeps: int, frames: int) -> tuple[float, int, float]:
+    """Seconds a frame, the number of frames with crossings, and the smallest J; substeps : 0 for the default solver."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "run.npz"
+        command = [sys.executable, "-c", RUN, str(substeps), str(frames), str(file)]
+        subprocess.run(command, check=True, env={**os.environ, "PYTHONPATH": str(package)}, cwd=package)
+        with np.load(file) as run:
+            x, seconds, J = run["x"], float(run["seconds"]), float(run["J"])
+    system = build_system(BEARS.scene())
+    check = SurfaceCheck(system, XPBD().contact, mean_edge_length(system))
+    crossed = sum(crossings(check.find(np.ascontiguousarray(each), k * BEARS.dt)) > 0 for k, each in enumerate(x))
+    return seconds, crossed, J
+
+
+def main(other: Path, substeps: list[int], frames: int) -> None:
+    """Print a row for each run."""
+    print(f"{'bears':<24}{'ms a frame':>11}{'crossing':>16}{'smallest J':>12}")
+    rows = [("this version", ROOT / "src", 0)] + [(f"other, {n} substeps", other, n) for n in substeps]
+    for name, package, n in rows:
+        seconds, crossed, J = measured(package, n, frames)
+        print(f"{name:<24}{1e3 * seconds:>11.0f}{f'{crossed} of {frames}':>16}{J:>12.2f}", flush=True)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("other", type=Path, help="the folder src of another checkout")
+    parser.add_argument("--substeps", type=int, nargs="+", default=[40, 640])
+    parser.add_argument("--frames", type=int, default=60)
+    given = parser.parse_args()
+    main(given.other.resolve(), given.substeps, given.frames)
