@@ -7,8 +7,8 @@ its length, so that all sizes and stiffnesses have the same shape, which `Implic
 Cases that need more than 400 frames to come to rest are left out: their tets are so slow that the least number of
 substeps is exact. What needs more than `max_substeps` is counted, and must be called `softened`.
 
-The frequency is that of the undamped beam after gravity begins to act, over three periods, where frames resolve them;
-`Implicit` gives it with Newmark's method and 400 steps in a period.
+The frequency is that of the undamped beam after gravity begins to act, over three and a half periods, where frames
+resolve them; `Implicit` gives it with Newmark's method and 400 steps in a period.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import sys
 from collections.abc import Iterable
 
 import numpy as np
+from scipy.optimize import curve_fit
 
 import supple as sp
 
@@ -29,6 +30,7 @@ POISSON = (0.0, 0.3, 0.45, 0.49)
 SIZES = (1e-3, 1e-2, 0.1, 1.0, 10.0)
 STEPS = (1 / 240, 1 / 60, 1 / 15)
 MOST_FRAMES = 400
+PERIODS = 3.5
 
 Found = tuple[str, int, float]
 
@@ -57,26 +59,30 @@ def case(youngs: float, poisson: float, size: float, dt: float, reference: float
     return str(last.report.status), last.report.iterations, sag(last, size) / reference - 1.0
 
 
-def period(frames: Iterable[sp.Frame], size: float, level: float) -> float:
-    """The mean time [s] between passages of the sag through `level` downward, the first and the last of the run."""
-    times, sags = np.transpose([(frame.time, sag(frame, size)) for frame in frames])
-    k = np.flatnonzero((sags[:-1] < level) & (sags[1:] >= level))
-    passed = times[k] + (level - sags[k]) / (sags[k + 1] - sags[k]) * (times[k + 1] - times[k])
-    return float((passed[-1] - passed[0]) / (len(passed) - 1)) if len(passed) > 1 else math.nan
+def period(frames: Iterable[sp.Frame], size: float, guess: float) -> float:
+    """The period [s] of a damped cosine that is fitted to the sag over `PERIODS` periods of about `guess` [s]."""
+    times, sags = np.transpose([(frame.time, sag(frame, size)) for frame in frames if frame.time <= PERIODS * guess])
+
+    def cosine(t: np.ndarray, omega: float, decay: float, a: float, b: float, c: float) -> np.ndarray:
+        return np.exp(-decay * t) * (a * np.cos(omega * t) + b * np.sin(omega * t)) + c
+
+    level = float(sags.mean())
+    found, _ = curve_fit(cosine, times, sags, p0=[2.0 * math.pi / guess, 0.0, -level, 0.0, level])
+    return 2.0 * math.pi / abs(float(found[0]))
 
 
-def frequency(youngs: float, poisson: float, size: float, dt: float, level: float, exact: float) -> Found | None:
+def frequency(youngs: float, poisson: float, size: float, dt: float, exact: float) -> Found | None:
     """The status, the substeps and the error of the frequency; None where frames do not resolve it, or it is too slow.
 
     exact : the period of a beam of E = 1e5 Pa and thickness 0.1 m [s]
     """
     expected = exact * size / 0.1 * math.sqrt(1e5 / youngs)
-    count = math.ceil(3.6 * expected / dt)
+    count = math.ceil(PERIODS * expected / dt)
     if expected < 12.0 * dt or count > MOST_FRAMES:
         return None
     frames = list(sp.simulate(scene(youngs, poisson, size), sp.XPBD(contact=None), dt, count))
     report = frames[-1].report
-    return str(report.status), report.iterations, expected / period(frames, size, level) - 1.0
+    return str(report.status), report.iterations, expected / period(frames, size, expected) - 1.0
 
 
 def row(found: list[Found | None]) -> str:
@@ -100,7 +106,8 @@ def main(quick: bool = False) -> None:
         reference = sag(still, 0.1)
         guess = 2.0 * math.pi / (0.0634 * math.sqrt(1e5 / DENSITY) / 0.1)
         newmark = sp.Implicit(integrator="newmark", contact=None)
-        exact = period(sp.simulate(scene(1e5, poisson, 0.1), newmark, guess / 400, 1200), 0.1, reference)
+        frames = list(sp.simulate(scene(1e5, poisson, 0.1), newmark, guess / 400, 1600))
+        exact = period(frames, 0.1, period(frames, 0.1, guess))
         cases = [
             (youngs, size, dt)
             for youngs in YOUNGS[:: 3 if quick else 1]
@@ -109,7 +116,7 @@ def main(quick: bool = False) -> None:
         ]
         sags = [case(youngs, poisson, size, dt, reference) for youngs, size, dt in cases]
         print(f"{poisson:g} sag | {row(sags)}", flush=True)
-        tones = [frequency(youngs, poisson, size, dt, reference, exact) for youngs, size, dt in cases]
+        tones = [frequency(youngs, poisson, size, dt, exact) for youngs, size, dt in cases]
         print(f"{poisson:g} frequency | {row(tones)}", flush=True)
 
 
