@@ -13,9 +13,6 @@ from supple.scene.joints.joint import Joint
 from supple.scene.joints.motors import Motor
 from supple.scene.values import finite_vector, float_array
 
-# A range of angles has to leave a gap in the full turn, in which it is clear which end is nearer.
-LARGEST_RANGE = 2.0 * np.pi - 0.1
-
 
 @dataclass(frozen=True, eq=False)
 class AxisJoint(Joint):
@@ -25,8 +22,7 @@ class AxisJoint(Joint):
     ----------
     axis : (3,) its direction in the world where the scene places everything, of any length [-]; it moves with the
         second.
-    limits : the smallest and the largest coordinate, (low, high) [rad] or [m]; for a slider, an end may be infinite.
-        None: no limits.
+    limits : the smallest and the largest coordinate, (low, high) [rad] or [m]; an end may be infinite. None: no limits.
     motor : `PositionMotor`, `VelocityMotor` or `ForceMotor`; None: it moves freely.
     """
 
@@ -60,8 +56,8 @@ class AxisJoint(Joint):
 class HingeJoint(AxisJoint):
     """Two bodies that turn against each other about an axis; see `Joint` and `AxisJoint`.
 
-    The coordinate is the angle [rad] by which the first has turned about the axis against the second, within half a
-    turn of the middle of the limits. Limits are less than a turn apart.
+    The coordinate is the angle [rad] by which the first has turned about the axis against the second, over all turns:
+    limits and targets may be many turns away. At a start it is the one nearest to zero of those between the limits.
 
     Raises
     ------
@@ -70,15 +66,6 @@ class HingeJoint(AxisJoint):
 
     kind: ClassVar[str] = "hinge"
     needs_point: ClassVar[bool] = True
-
-    def _checked_limits(self) -> tuple[float, float]:
-        low, high = super()._checked_limits()
-        if not high - low <= LARGEST_RANGE:
-            raise SceneError(
-                f"{self.label}: limits are ({low:g}, {high:g}); give two angles that are at most {LARGEST_RANGE:.4g} "
-                "rad apart, or none"
-            )
-        return low, high
 
 
 @dataclass(frozen=True, eq=False)

@@ -52,7 +52,7 @@ class Motor(ABC):
 class PositionMotor(Motor):
     """Pulls the coordinate q to a target: the effort k (target - q) + d (rate of the target - rate of q).
 
-    The rates are means over a time step. An angle is pulled along the shorter way around.
+    The rates are means over a time step. Angles count over all turns.
 
     Parameters
     ----------

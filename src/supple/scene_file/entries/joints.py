@@ -78,6 +78,8 @@ class BallJointModel(_JointModel):
 
     kind: Literal["ball"]
     point: Vector = Field(description="in the world at the start [m]")
+    axis: Vector | None = Field(default=None, description="of the cone of `max_swing`, in the world at the start")
+    max_swing: Positive | None = Field(default=None, description="largest angle of the first's axis to it [rad]")
 
     def build(self) -> Joint:
         return BallJoint(**self.model_dump(exclude={"kind"}))

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
-from supple.scene.joints.axis_joint import LARGEST_RANGE
 from supple.scene_file.urdf.robot import Geometry, Inertia, Link, Placement, Robot, RobotJoint
 
 # The edges of spheres and cylinders, as a share of the radius.
@@ -139,10 +138,7 @@ def _joint(joint: RobotJoint, second: str | None, frame: Placement, missing: lis
         return entry
     entry["axis"] = (frame.rotation @ joint.axis).tolist()
     if joint.limits is not None:
-        if joint.kind == "revolute" and joint.limits[1] - joint.limits[0] > LARGEST_RANGE:
-            missing.append(f"limits of joint {joint.name!r}, a full turn or more")
-        else:
-            entry["limits"] = list(joint.limits)
+        entry["limits"] = list(joint.limits)
     if joint.damping > 0.0:
         entry["motor"] = {"kind": "position", "target": 0.0, "stiffness": 0.0, "damping": joint.damping}
         if joint.friction > 0.0:
