@@ -20,7 +20,7 @@ bodies:
   - {BAR % ("slide", 2.5)}
   - {BAR % ("tool", 3.5)}
 joints:
-  - {{kind: ball, first: upper, point: [0, 1, 0], name: shoulder}}
+  - {{kind: ball, first: upper, point: [0, 1, 0], axis: [2, 0, 0], max_swing: 1, name: shoulder}}
   - kind: hinge
     first: lower
     second: upper
@@ -51,7 +51,7 @@ def test_a_scene_file_describes_joints(scene_file):
     assert (elbow.first, elbow.second, elbow.axis.tolist(), elbow.limits) == ("lower", "upper", [0, 0, 1], (-1, 2))
     assert (elbow.motor.at(0.5), elbow.motor.stiffness, elbow.motor.max_force) == (0.25, 100, 8)
     assert (slider.motor.at(0), slider.motor.max_force) == (1, 30)
-    assert (shoulder.second, fixed.point) == (None, None)
+    assert (shoulder.second, shoulder.max_swing, shoulder.axis.tolist(), fixed.point) == (None, 1, [1, 0, 0], None)
     data = read_yaml(scene_file).data
     Draft202012Validator(json_schema()).validate(data)
     again = scene_file.with_name("again.yaml")

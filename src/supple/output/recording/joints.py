@@ -42,13 +42,26 @@ class RecordedJoint:
     limits: tuple[float, float]
     max_force: float
 
+    def described(self) -> dict[str, Any]:
+        """As the header has it."""
+        return {
+            "name": self.name,
+            "kind": self.kind,
+            "sides": list(self.sides),
+            "placed": self.placed.tolist(),
+            "point": self.point.tolist(),
+            "axis": self.axis.tolist(),
+            "limits": [end if np.isfinite(end) else None for end in self.limits],
+            "max_force": self.max_force if np.isfinite(self.max_force) else None,
+        }
 
-def described_joints(system: System) -> list[dict[str, Any]]:
-    """The joints of a scene, as the header has them."""
+
+def joints_of(system: System) -> tuple[RecordedJoint, ...]:
+    """The joints of a scene."""
     bodies = {body.name: body for body in system.scene.bodies}
     obstacles = {str(obstacle.name): obstacle for obstacle in system.obstacles}
     number: dict[str | None, int] = {name: k for k, name in enumerate([*bodies, *obstacles])}
-    described = []
+    joints = []
     for joint in system.scene.joints:
         placed = []
         for name in (joint.first, joint.second):
@@ -57,7 +70,7 @@ def described_joints(system: System) -> list[dict[str, Any]]:
                 R, t = rotation_matrix(bodies[name].rotation), np.asarray(bodies[name].position)
             elif name in obstacles:
                 R, t = obstacles[name].pose(0.0)
-            placed.append(np.column_stack([R, t]).tolist())
+            placed.append(np.column_stack([R, t]))
         first = bodies[joint.first]
         assert isinstance(first, RigidBody)
         axis = joint.axis if isinstance(joint, AxisJoint | BallJoint) else None
@@ -65,19 +78,19 @@ def described_joints(system: System) -> list[dict[str, Any]]:
         if isinstance(joint, BallJoint) and joint.max_swing is not None:
             ends = 0.0, joint.max_swing
         most = joint.motor.max_force if isinstance(joint, AxisJoint) and joint.motor is not None else None
-        described.append(
-            {
-                "name": joint.name,
-                "kind": joint.kind,
-                "sides": [number[joint.first], number.get(joint.second)],
-                "placed": placed,
-                "point": joint.place(first).tolist(),
-                "axis": [1.0, 0.0, 0.0] if axis is None else np.asarray(axis).tolist(),
-                "limits": [float(end) if np.isfinite(end) else None for end in ends],
-                "max_force": most,
-            }
+        joints.append(
+            RecordedJoint(
+                str(joint.name),
+                joint.kind,
+                (number[joint.first], number.get(joint.second)),
+                np.array(placed),
+                np.asarray(joint.place(first), dtype=np.float64),
+                np.array([1.0, 0.0, 0.0] if axis is None else axis, dtype=np.float64),
+                ends,
+                np.inf if most is None else most,
+            )
         )
-    return described
+    return tuple(joints)
 
 
 def read_joints(file: CheckedFile, header: dict[str, Any]) -> tuple[RecordedJoint, ...]:

@@ -192,7 +192,7 @@ def _remove_from_pin(live: LiveScene, part: BodyRange, vertex: int) -> None:
     held = next((held for held in live.system.pins if row in held.vertices), None)
     if held is None:
         return
-    keep = held.vertices != row
+    keep = (held.vertices != row) & (not part.rigid)  # a rigid body is held as a whole
     pins = [pin for pin in live.setup.scene.pins if pin is not held.pin]
     anchors = {each.pin: each.anchors for each in live.system.pins}
     anchors |= {each.target: each.anchors for each in live.system.soft_targets}
@@ -224,10 +224,10 @@ def _(command: commands.Squash, live: LiveScene) -> None:
     free = [
         part.vertices
         for part in live.system.bodies
-        if pinned.isdisjoint(range(part.vertices.start, part.vertices.stop))
+        if not part.rigid and pinned.isdisjoint(range(part.vertices.start, part.vertices.stop))
     ]
     if not free:
-        raise CommandError("every body is pinned; unpin one to squash it")
+        raise CommandError("every body is pinned or rigid; unpin a soft one to squash it")
     rows = np.concatenate([np.arange(part.start, part.stop) for part in free])
     x, v = live.state.positions.copy(), live.state.velocities.copy()
     x[rows] = flattened(x[rows], live.up, command.factor)
