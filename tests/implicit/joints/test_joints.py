@@ -199,6 +199,49 @@ def test_limits_and_motors_count_whole_turns():
     assert last.report.joints["hinge"].coordinate == pytest.approx(1.0, abs=0.01)
 
 
+@pytest.mark.parametrize(
+    ("values", "end"),
+    [
+        ({"damping": 40.0}, None),
+        ({"friction": 13.0}, 0.0),
+        ({"friction": 10.0}, LIMITS[0]),
+        ({"motor": sp.VelocityMotor(0.0), "max_effort": 10.0}, LIMITS[0]),
+        ({"motor": sp.ForceMotor(20.0, max_force=30.0), "max_effort": 15.0}, LIMITS[1]),
+        ({"motor": sp.ForceMotor(13.0), "friction": 2.0}, 0.0),
+    ],
+)
+def test_damping_friction_and_the_largest_effort_of_a_joint(values, end):
+    """The weight turns the hinge with 12.26 N m; a damped one goes with 12.26 / 40 rad/s after a while."""
+    frames = run(sp.Scene([bar()], joints=[hinge(limits=LIMITS, **values)]), 0.01, 60 if end else 10)
+    readings = [frame.report.joints["hinge"] for frame in frames]
+    if end is not None:
+        assert readings[-1].coordinate == pytest.approx(end, abs=1e-5)
+        assert (readings[-1].motor_force is None) == ("motor" not in values)
+        assert max(abs(one.motor_force or 0.0) for one in readings) <= 15.0
+        return
+    # Backward Euler: q' = -(12.26 / d) (1 - (1 + d h / I)^-n), as long as the arm is horizontal.
+    rate = (readings[9].coordinate - readings[8].coordinate) / 0.01
+    inertia = bar().properties.inertia[2, 2] + 0.25 * MASS
+    exact = -MASS * G * 0.5 / 40.0 * (1.0 - (1.0 + 0.4 / inertia) ** -10)
+    assert rate == pytest.approx(exact, rel=0.005)
+
+
+def test_a_program_drives_motors_by_inputs():
+    motor = sp.PositionMotor(sp.MotorInput("elbow"), stiffness=2000.0, damping=200.0)
+    scene = sp.Scene([bar()], joints=[hinge()], gravity=(0, 0, 0)).with_motors({"hinge": motor})
+    assert set(scene.inputs) == {"elbow"}
+    frames = sp.simulate(scene, sp.Implicit(contact=None), 0.01, 60, control=lambda frame: {"elbow": 0.4})
+    assert list(frames)[-1].report.joints["hinge"].coordinate == pytest.approx(0.4, abs=1e-3)
+    own = scene.with_own_inputs()
+    assert own.motors["hinge"].script is not motor.script
+    assert own.motors["hinge"].stiffness == 2000.0
+    assert scene.with_motors({"hinge": None}).motors == {}
+    with pytest.raises(sp.SceneError, match="no hinge or slider has the name 'hing'; did you mean 'hinge'"):
+        scene.with_motors({"hing": None})
+    with pytest.raises(sp.SceneError, match=r"input 'elbow' is \[1.0, 2.0\]; give one finite number"):
+        sp.MotorInput("elbow", [1.0, 2.0])
+
+
 def test_the_swing_of_a_ball_is_limited():
     """A bar that falls from the horizontal stops at its cone, about which it may turn."""
     joint = sp.BallJoint("bar", point=(0, 0, 0), axis=(1, 0, 0), max_swing=0.5, name="ball")
@@ -271,6 +314,8 @@ SOFT = sp.Body("soft", sp.shapes.box((0.1, 0.1, 0.1), (1, 1, 1)), sp.StableNeoHo
         (lambda: sp.PositionMotor(1.0, stiffness=0.0), "stiffness and damping are both zero"),
         (lambda: sp.PositionMotor(1.0, stiffness=-1.0), "PositionMotor: stiffness is -1"),
         (lambda: sp.VelocityMotor(1.0, max_force=0.0), "VelocityMotor: max_force is 0; it must be above zero"),
+        (lambda: hinge(damping=-1.0), "joint 'hinge': damping is -1"),
+        (lambda: hinge(max_effort=0.0), "joint 'hinge': max_effort is 0; it must be above zero"),
         (lambda: sp.ForceMotor((1, 2, 3)), "ForceMotor: force has shape (3,)"),
         (lambda: sp.Scene([bar()], joints=[hinge("bat")]), "there is no body 'bat'; did you mean 'bar'?"),
         (lambda: sp.Scene([bar()], joints=[hinge(second="x")]), "there is no body or obstacle 'x'"),

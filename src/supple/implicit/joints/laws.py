@@ -5,9 +5,9 @@ Each is an energy psi of one number g whose derivative is a line that is cut off
     psi'(g) = clip(lambda + k (g - g0), low, high).
 
 A condition g = g0 has no ends, with the multiplier lambda; a limit pushes in one direction only; a motor that is to
-reach a velocity has g0 = g_n + h v, and its largest force as ends. Their multipliers are updated until the line gives
-the force that is needed at g0 (the method of multipliers). Where a motor has a stiffness K and a damping D, the line is
-that of an implicit step of h,
+reach a velocity has g0 = g_n + h v, and its largest force as ends, as dry friction has with v = 0. Their multipliers
+are updated until the line gives the force that is needed at g0 (the method of multipliers). Where a motor has a
+stiffness K and a damping D, the line is that of an implicit step of h,
 
     K (g - target) + D ((g - g_n) / h - v) = lambda + (K + D / h) (g - g_n),    lambda = K (g_n - target) - D v,
 
@@ -138,8 +138,15 @@ def laws_of(
         k = float(stiffness[j] * (geometry.sizes[j] / geometry.units[row]) ** 2)
         laws += [Law(row, k, low, high=0.0)] if np.isfinite(low) else []
         laws += [Law(row, k, high, low=0.0)] if np.isfinite(high) else []
-        if isinstance(joint, AxisJoint) and joint.motor is not None:
-            laws.append(_motor_law(joint.motor, row, k, float(start[row]), times, (low, high), moving=moving))
+        if not isinstance(joint, AxisJoint):
+            continue
+        here = float(start[row])
+        if joint.damping > 0.0 and moving:
+            laws.append(Law(row, joint.damping / (times[1] - times[0]), here, adapts=False))
+        if joint.friction > 0.0 and moving:
+            laws.append(Law(row, k, here, -joint.friction, joint.friction))
+        if joint.motor is not None:
+            laws.append(_motor_law(joint.motor, row, k, here, times, (low, high), moving=moving))
     return Laws.of(laws)
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from supple.errors import SceneError
 from supple.scene.joints.joint import Joint
 from supple.scene.joints.motors import Motor
-from supple.scene.values import finite_vector, float_array
+from supple.scene.values import finite_vector, float_array, non_negative, positive
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,11 +24,17 @@ class AxisJoint(Joint):
         second.
     limits : the smallest and the largest coordinate, (low, high) [rad] or [m]; an end may be infinite. None: no limits.
     motor : `PositionMotor`, `VelocityMotor` or `ForceMotor`; None: it moves freely.
+    damping : effort against each unit of its rate [N m s/rad] or [N s/m].
+    friction : largest effort of dry friction [N m] or [N], which holds the joint until the load exceeds it.
+    max_effort : largest effort of its motor [N m] or [N], beside the `max_force` of that motor; None: no bound.
     """
 
     axis: ArrayLike = (0.0, 0.0, 1.0)
     limits: tuple[float, float] | None = None
     motor: Motor | None = None
+    damping: float = 0.0
+    friction: float = 0.0
+    max_effort: float | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -38,6 +44,12 @@ class AxisJoint(Joint):
             object.__setattr__(self, "limits", self._checked_limits())
         if self.motor is not None and not isinstance(self.motor, Motor):
             raise SceneError(f"{self.label}: motor is {self.motor!r}; give PositionMotor(...) or another motor")
+        for key in ("damping", "friction"):
+            object.__setattr__(self, key, non_negative(getattr(self, key), f"{self.label}: {key}"))
+        if self.max_effort is not None:
+            object.__setattr__(self, "max_effort", positive(self.max_effort, f"{self.label}: max_effort"))
+            if self.motor is not None:
+                object.__setattr__(self, "motor", self.motor.bounded(self.max_effort))
 
     def _checked_limits(self) -> tuple[float, float]:
         ends = float_array(self.limits, f"{self.label}: limits", "give two numbers (low, high)")
