@@ -146,6 +146,7 @@ class Scene(Showable):
         if self.contact_pairs:
             pair_table(self)
         self.inputs  # noqa: B018 - raises where two have the same name
+        self._check_skins()
         check_names(self.stitches, list(pinned), [str(obstacle.name) for obstacle in self.obstacles])
 
     def _facts(self) -> dict[str, str]:
@@ -154,6 +155,19 @@ class Scene(Showable):
         facts["obstacles"] = short_list(obstacle.name for obstacle in self.obstacles)
         facts |= {key: str(len(getattr(self, key))) for key, _ in _PARTS[2:]}
         return {name: value for name, value in facts.items() if value not in ("", "0")}
+
+    def _check_skins(self) -> None:
+        """Raise for what acts on the surface of the tets of a body that touches with its skin."""
+        skins = {body.name for body in self.bodies if body.touches_with_skin and not isinstance(body, RigidBody)}
+        for key, names in (("stitches", ("first", "second")), ("welds", ("body",)), ("sensors", ("body",))):
+            for i, item in enumerate(getattr(self, key)):
+                for name in names:
+                    if getattr(item, name) in skins:
+                        with at(key, i, name):
+                            raise SceneError(
+                                f"{item.label}: body {getattr(item, name)!r} touches with its skin, on which there are "
+                                f"no {key}; give it collide='tets'"
+                            )
 
     def _check_joints(self) -> None:
         bodies = {body.name: body for body in self.bodies}
