@@ -153,13 +153,13 @@ def test_a_finer_ball_rolls_closer_to_five_sevenths():
     assert abs(errors[1]) < 0.03
 
 
-@pytest.mark.parametrize(("under", "above", "masses"), [("soft", "rigid", (1e-3, 1e3)), ("rigid", "soft", (1e-3, 1.0))])
+@pytest.mark.parametrize(("under", "above", "masses"), [("soft", "rigid", (1e-3, 1e3)), ("rigid", "soft", (1e-3, 1e3))])
 def test_heavy_on_light(under, above, masses):
-    """A million times, and a thousand times as heavy as what carries it, in kilograms."""
+    """A million times as heavy as what carries it, in kilograms."""
     made = {}
     for name, mass, height in ((under, masses[0], 0.0502), (above, masses[1], 0.1505)):
         values = {"density": 1e3 * mass, "position": (0, height, 0)}
-        made[name] = soft(youngs=1e8 if mass < 1.0 else 1e4, **values) if name == "soft" else rigid(**values)
+        made[name] = soft(youngs=1e8 if mass < 1.0 else 1e7, **values) if name == "soft" else rigid(**values)
     frames = run(sp.Scene(list(made.values()), obstacles=[FLOOR]), 1 / 60, 60)
     forces = frames[-1].report.details.contact_forces
     total = sum(masses) * G
