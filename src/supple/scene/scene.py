@@ -275,7 +275,7 @@ class Scene(Showable):
         ------
         SceneError : where no hinge or slider has a name.
         """
-        with_axis = {joint.name: joint for joint in self.joints if isinstance(joint, AxisJoint)}
+        with_axis = {str(joint.name): joint for joint in self.joints if isinstance(joint, AxisJoint)}
         for name in motors:
             if name not in with_axis:
                 raise SceneError(

@@ -98,9 +98,9 @@ def read_joints(file: CheckedFile, header: dict[str, Any]) -> tuple[RecordedJoin
 
     Raises
     ------
-    OutputError : where one is not described as it should be, or joins what does not exist.
+    OutputError : where one is not described as it should be, or joins what does not exist or is soft.
     """
-    bodies, owners = len(header["bodies"]), len(header["bodies"]) + len(header["obstacles"])
+    jointed = [body.get("rigid") is True for body in header["bodies"]] + [True] * len(header["obstacles"])
     joints = []
     try:
         for given in (header.get("physics") or {}).get("joints", []):
@@ -118,7 +118,8 @@ def read_joints(file: CheckedFile, header: dict[str, Any]) -> tuple[RecordedJoin
             )
             joints.append(joint)
             numbers = np.concatenate([joint.placed.ravel(), joint.point, joint.axis])
-            there = 0 <= first < bodies and (second is None or 0 <= int(second) < owners)
+            ends = [first] if second is None else [first, int(second)]
+            there = first < len(header["bodies"]) and min(ends) >= 0 and all(jointed[end] for end in ends)
             if joint.kind not in KINDS or not np.isfinite(numbers).all() or not joint.axis.any() or not there:
                 raise ValueError
     except (KeyError, TypeError, ValueError, IndexError, OverflowError):

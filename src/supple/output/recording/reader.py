@@ -65,7 +65,8 @@ class RecordedFrame(TetReadings):
         internal = self._rows(INTERNAL) if self.recording.internal_rows else NEVER_FLOWED
         vertices = self._rows("VTKHDF/Points"), self._rows("VTKHDF/PointData/velocities")
         joints = {joint.name for joint in self.recording.joints if joint.kind == "hinge"}
-        angles = {name: one.coordinate for name, one in self.report.joints.items() if name in joints}
+        known = self.report.joints.items()
+        angles = {name: one.coordinate for name, one in known if name in joints and one.coordinate is not None}
         return State(self.time, *vertices, internal=internal, hinge_angles=angles)
 
     @cached_property

@@ -90,7 +90,7 @@ class _Frame:
                 sizes.append(2.0 * np.linalg.norm(control - control.mean(axis=0)) / np.sqrt(len(control)))
         size = float(min(sizes))
         points = np.einsum("sji,sj->si", R, joint.point - t)
-        return cls(scene, joint, points, axes @ R, size, size if joint.kind == "slider" else 1.0)
+        return cls(scene, joint, points, (axes @ R).astype(np.float64), size, size if joint.kind == "slider" else 1.0)
 
     def error(self, at: Snapshot, near: float | None) -> tuple[float, float]:
         """The error and the coordinate; of an angle the one nearest to `near`, or to the middle of the limits."""
@@ -103,9 +103,9 @@ class _Frame:
         if kind == "slider":
             coordinate, *across = (second @ gap).tolist()
             gap = np.array(across)
-        errors = [np.linalg.norm(gap) / self.size]
+        errors = [float(np.linalg.norm(gap)) / self.size]
         if kind == "hinge":
-            errors.append(turned[0])
+            errors.append(float(turned[0]))
             angle = float(np.arctan2(first[1] @ second[2], first[1] @ second[1]))
             ends = [end for end in self.joint.limits if np.isfinite(end)]
             middle = sum(ends) / len(ends) if near is None and ends else near or 0.0
@@ -113,10 +113,10 @@ class _Frame:
         elif kind == "ball":
             coordinate = float(np.arccos(np.clip(first[0] @ second[0], -1.0, 1.0)))
         else:
-            errors.append(turned.max())
+            errors.append(float(turned.max()))
         low, high = self.joint.limits
         errors.append(max(low - coordinate, coordinate - high, 0.0) / self.unit)
-        return float(max(errors)), coordinate
+        return max(errors), coordinate
 
     def _side(self, at: Snapshot, k: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The linear part (3, 3) of the motion of a side from its own coordinates, and where the joint's point is."""
@@ -128,5 +128,5 @@ class _Frame:
             return pose[:, :3], pose[:, :3] @ self.points[k] + pose[:, 3]
         rows = bodies[side].vertices
         rest = self.scene.recording.rest_positions[rows]
-        affine = np.linalg.solve(np.column_stack([rest, np.ones(4)]), at.positions[rows])
+        affine = np.linalg.solve(np.column_stack([rest, np.ones(4)]), at.positions[rows]).astype(np.float64)
         return affine[:3].T, self.points[k] @ affine[:3] + affine[3]
