@@ -82,6 +82,14 @@ def test_a_robot_becomes_rigid_bodies_and_joints(robot_file, caplog):
         assert name in caplog.text
 
 
+def test_a_robot_is_shown_live(robot_file, monkeypatch):
+    shown = []
+    monkeypatch.setattr("supple.cli.live.serve_page", lambda source, *_: shown.append(source))
+    main(["view", str(robot_file), "--no-open"])
+    (source,) = shown
+    assert len(source.scene.joints) == 4
+
+
 def test_inertia_and_places_are_those_of_the_links(robot_file):
     base, upper, lower, finger = sp.load_scene(robot_file).bodies
     assert [body.properties.mass for body in (base, upper, lower, finger)] == [5, 2, 1, 0.1]
