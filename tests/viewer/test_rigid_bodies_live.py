@@ -7,7 +7,7 @@ import pytest
 
 import supple as sp
 from supple.viewer.controls.measures import measures_text
-from supple.viewer.drawing.layers.joints import _lines, joint_segments
+from supple.viewer.drawing.layers.joints import JointView
 from supple.viewer.drawing.moments.from_snapshot import MomentBuilder
 from supple.viewer.drawing.picking import nearest_surface_point, surface_point_on_ray
 from supple.viewer.engine.measurement.contact_points import contact_points
@@ -108,7 +108,9 @@ def test_a_drag_pulls_at_the_point_under_the_mouse_and_a_throw_keeps_the_velocit
 
 
 def test_a_dragged_bar_turns_about_its_hinge_and_stops_at_the_limit():
-    live = swinging()
+    live, page = swinging(), Page()
+    drawn = JointView(page, moment_of(live)[0])
+    before = page.points
     point = nearest_surface_point(moment_of(live)[0], (0.4, 0.02, 0.0))
     change(commands.Grab(1, "bar", tuple(point.vertices), tuple(point.weights), (0.2, 0.6, 0.0), 20.0), live)
     for _ in range(40):
@@ -119,10 +121,43 @@ def test_a_dragged_bar_turns_about_its_hinge_and_stops_at_the_limit():
     assert "hinge: at 0.5, force" in measures_text(replace(snapshot, description=describe(live)))
     (joint,) = moment.model.joints
     assert joint.limits == (-0.5, 0.5)
-    lines = joint_segments(moment, [_lines(joint, 0.4)])
+    drawn.update(moment)
+    lines = page.points
+    assert lines.shape == before.shape
     np.testing.assert_allclose(lines[:3].mean(axis=1), np.zeros((3, 3)), atol=1e-6)  # the cross
     hand, rim = lines[3, 1], lines[-1, 1]  # where the bar is, and the end of the arc
     np.testing.assert_allclose(hand / np.linalg.norm(hand), rim / np.linalg.norm(rim), atol=1e-4)
+    np.testing.assert_array_equal(lines[4:], before[4:])  # axis and arc stay in the world
+    assert np.abs(lines[3] - before[3]).max() > 0.01
+
+
+def test_joints_of_every_kind_are_drawn_where_their_limits_are():
+    bar = sp.shapes.box_surface((0.4, 0.05, 0.05), (1, 1, 1))
+    bodies = [sp.RigidBody(name, bar, mass=1.0, position=(0.2, 0, k)) for k, name in enumerate("abcd")]
+    joints = [
+        sp.BallJoint("a", point=(0, 0, 0), axis=(1, 0, 0), max_swing=0.5),
+        sp.SliderJoint("b", point=(0, 0, 1), axis=(0, 1, 0), limits=(-0.1, 0.3)),
+        sp.FixedJoint("c", "b", point=(0, 0, 2)),
+        sp.HingeJoint("d", "c", point=(0, 0, 3), limits=(0.0, np.inf)),
+    ]
+    live = LiveScene(LiveSource("all", sp.Scene(bodies, joints=joints), sp.Implicit(contact=None), 1 / 60))
+    page = Page()
+    JointView(page, moment_of(live)[0])
+    cone = page.points[4:39]  # after a cross and a hand: the rim, and lines to it
+    rims = cone[:31].reshape(-1, 3)
+    np.testing.assert_allclose(rims[:, 0] / np.linalg.norm(rims, axis=1), np.cos(0.5), atol=1e-6)
+    axis, low, high = page.points[42:45]
+    np.testing.assert_allclose(axis[:, [0, 2]], [[0, 1], [0, 1]], atol=1e-6)
+    np.testing.assert_allclose([low.mean(axis=0), high.mean(axis=0)], [[0, -0.1, 1], [0, 0.3, 1]], atol=1e-6)
+    assert len(page.points) == 45 + 3 + 4  # a cross for the fixed joint, a cross and an axis for the hinge
+
+
+class Page:
+    """Keeps the lines that a layer draws."""
+
+    def add_line_segments(self, name, points, color, **_):
+        self.points = points
+        return self
 
 
 def test_a_click_pins_the_whole_body_and_another_one_releases_it(live):
