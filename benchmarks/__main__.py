@@ -9,6 +9,7 @@ from benchmarks import (
     live,
     projections,
     quadratic_tets,
+    rigid_bodies,
     startup,
     work_precision,
 )
@@ -24,4 +25,5 @@ if __name__ == "__main__":
     candidate_search.main()
     contact_scenes.main()
     quadratic_tets.main()
+    rigid_bodies.main()
     live.main()

@@ -127,3 +127,12 @@ def test_quadratic_tets_are_compared_with_linear_ones(capsys):
     out = capsys.readouterr().out
     assert "Cook's membrane" in out
     assert "24 quadratic tets are as good as 96 linear ones" in out
+
+
+def test_plates_that_are_bodies_are_compared_with_obstacles(capsys):
+    from benchmarks import rigid_bodies
+
+    ratios = rigid_bodies.main(0.08, steps=4, skipped=2, rounds=1)
+    assert list(ratios) == ["obstacles", "scripted bodies", "free bodies"]
+    assert all(ratio > 0.0 for ratio in ratios.values())
+    assert "between two plates" in capsys.readouterr().out

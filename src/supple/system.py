@@ -1,8 +1,8 @@
 """A scene as flat arrays, the input of solvers, and the interface of solvers.
 
 The bodies' vertices, tets, edges, points and surface triangles are concatenated; a `BodyRange` has the rows of one.
-Vertices are what moves. Points are what touches and is drawn, combinations of vertices; those of a soft body are its
-vertices. This file does not depend on solvers, files or viewers.
+Vertices are what moves. Points are what touches, combinations of vertices; those of a soft body are its vertices, or
+the vertices of its skin. This file does not depend on solvers, files or viewers.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ class System:
     masses : (n,) lumped, rho V / 4 to each node of a tet; see `PlacedBody.lumped_masses` [kg]
     tets : (m, 4); rest_shape_inverse : (m, 3, 3) Dm^-1 [1/m]; rest_volumes : (m,) [m^3]
     edges : (e, 2); rest_lengths : (e,) [m]
-    points : combinations of vertices that touch and are drawn; those of a soft body are its vertices
+    points : combinations of vertices that touch; those of a soft body are its vertices, or those of its skin
     triangles : (t, 3) surfaces, rows of `points`, counter-clockwise from outside
     components : (n,) the connected piece of a mesh that a vertex belongs to
     gravity : (3,) [m/s^2]
@@ -207,7 +207,7 @@ class System:
         if not self.rigid_bodies:
             return {part.name: values[part.vertices] for part in self.bodies}
         points = self.points.positions(values)
-        return {part.name: points[part.points] for part in self.bodies}
+        return {part.name: points[part.points] if part.rigid else values[part.vertices] for part in self.bodies}
 
 
 def build_system(scene: Scene, start: State | None = None) -> System:
@@ -221,7 +221,8 @@ def build_system(scene: Scene, start: State | None = None) -> System:
     n = m = e = t = p = 0
     for body in scene.bodies:
         mesh = body.mesh
-        counts = len(mesh.vertices), len(mesh.tets), len(mesh.edges), len(body.triangles), len(body.points)
+        embedded, surface = body.touching
+        counts = len(mesh.vertices), len(mesh.tets), len(mesh.edges), len(surface), len(embedded)
         rows = [slice(begin, begin + count) for begin, count in zip((n, m, e, t, p), counts, strict=True)]
         ranges.append(BodyRange(body, *rows))
         rest.append(mesh.vertices)
@@ -230,8 +231,8 @@ def build_system(scene: Scene, start: State | None = None) -> System:
         Dm_inv.append(mesh.rest_shape_inverse)
         volumes.append(mesh.volumes)
         edges.append(mesh.edges + n)
-        triangles.append(body.triangles + p)
-        points.append(body.embedded.shifted(n))
+        triangles.append(surface + p)
+        points.append(embedded.shifted(n))
         n, m, e, t, p = (begin + count for begin, count in zip((n, m, e, t, p), counts, strict=True))
     rest_positions = np.concatenate(rest)
     all_edges = np.concatenate(edges).astype(np.int32)

@@ -153,13 +153,13 @@ def test_a_finer_ball_rolls_closer_to_five_sevenths():
     assert abs(errors[1]) < 0.03
 
 
-@pytest.mark.parametrize(("under", "above", "masses"), [("soft", "rigid", (1e-3, 1e3)), ("rigid", "soft", (1e-3, 1.0))])
+@pytest.mark.parametrize(("under", "above", "masses"), [("soft", "rigid", (1e-3, 1e3)), ("rigid", "soft", (1e-3, 1e3))])
 def test_heavy_on_light(under, above, masses):
-    """A million times, and a thousand times as heavy as what carries it, in kilograms."""
+    """A million times as heavy as what carries it, in kilograms."""
     made = {}
     for name, mass, height in ((under, masses[0], 0.0502), (above, masses[1], 0.1505)):
         values = {"density": 1e3 * mass, "position": (0, height, 0)}
-        made[name] = soft(youngs=1e8 if mass < 1.0 else 1e4, **values) if name == "soft" else rigid(**values)
+        made[name] = soft(youngs=1e8 if mass < 1.0 else 1e7, **values) if name == "soft" else rigid(**values)
     frames = run(sp.Scene(list(made.values()), obstacles=[FLOOR]), 1 / 60, 60)
     forces = frames[-1].report.details.contact_forces
     total = sum(masses) * G
@@ -202,8 +202,10 @@ def test_a_collision_keeps_momentum(other):
 
 
 @pytest.mark.slow
-def test_a_heap_of_boxes_never_intersects(tmp_path):
-    rng, places = np.random.default_rng(0), [(i, j, k) for i in range(3) for j in range(3) for k in range(3)]
+@pytest.mark.parametrize(("wide", "high", "dt", "steps"), [(3, 3, 1 / 60, 60), (5, 8, 1 / 120, 42)])
+def test_a_heap_of_boxes_never_intersects(tmp_path, wide, high, dt, steps):
+    """27 boxes come to rest; 200 fall into each other."""
+    rng, places = np.random.default_rng(0), np.ndindex(wide, wide, high)
     bodies = [
         rigid(
             f"{i}{j}{k}", position=(0.16 * i, 0.1 + 0.17 * k, 0.16 * j), rotation=0.3 * rng.normal(size=3), friction=0.4
@@ -211,10 +213,11 @@ def test_a_heap_of_boxes_never_intersects(tmp_path):
         for i, j, k in places
     ]
     path = tmp_path / "heap.vtkhdf"
-    frames = run(sp.Scene(bodies, obstacles=[FLOOR]), 1 / 60, 60, sinks=[sp.Recorder(path, solver=sp.Implicit())])
+    frames = run(sp.Scene(bodies, obstacles=[FLOOR]), dt, steps, sinks=[sp.Recorder(path, solver=sp.Implicit())])
     assert error_of(frames) < 1e-3
-    assert frames[-1].report.kinetic_energy < 1e-4
-    assert sp.check_recording(path).ok
+    assert wide > 3 or frames[-1].report.kinetic_energy < 1e-4
+    report = sp.check_recording(path)
+    assert report.ok, report.failures
 
 
 def test_a_ring_hangs_on_a_bar():

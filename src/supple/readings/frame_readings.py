@@ -31,7 +31,10 @@ class FrameReadings(TetReadings):
 
     @cached_property
     def contact_force(self) -> ByBody:
-        """Force of all contacts on each vertex, friction included: by body name, (n, 3) [N]."""
+        """Force of all contacts on each vertex, friction included: by body name, (n, 3) [N].
+
+        Of a body that touches with its skin, those on the skin's vertices.
+        """
         return self._by_vertex(contact_forces(self.contacts, len(self.system.points)))
 
     @cached_property

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from abc import ABC
 from dataclasses import dataclass, field, replace
-from typing import Any, Self
+from functools import cached_property
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,9 +14,11 @@ from supple.errors import SceneError
 from supple.materials.material import Material
 from supple.materials.per_tet import NO_REGION
 from supple.mesh.quadratic import node_volumes
+from supple.mesh.skin import Embedding
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
+from supple.scene.closed_surface import require_closed
 from supple.scene.rotation import rotation_matrix
 from supple.scene.values import check_name, finite_vector, float_array, non_negative
 
@@ -47,13 +50,23 @@ class PlacedBody(ABC):
 
     @property
     def triangles(self) -> NDArray[np.int32]:
-        """(t, 3) the surface that touches, rows of `points`, counter-clockwise from outside."""
+        """(t, 3) the surface, rows of `points`, counter-clockwise from outside."""
         return self.mesh.surface.triangles
 
     @property
     def embedded(self) -> EmbeddedPoints:
         """`points` as combinations of the mesh's vertices."""
         return EmbeddedPoints.at_vertices(np.arange(len(self.mesh.vertices), dtype=np.int32))
+
+    @property
+    def touching(self) -> tuple[EmbeddedPoints, NDArray[np.int32]]:
+        """The points of contact as combinations of the mesh's vertices, and triangles (t, 3) of them."""
+        return self.embedded, self.triangles
+
+    @property
+    def touches_with_skin(self) -> bool:
+        """Whether what touches is `skin`."""
+        return False
 
     def place(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """World positions (k, 3) [m] at the start of points (k, 3) given in the body's own coordinates."""
@@ -141,6 +154,8 @@ class Body(PlacedBody):
     angular_velocity : (3,) initial spin about the center of mass [rad/s].
     friction : Coulomb coefficient against other bodies and itself; a pair uses the geometric mean of its two.
     skin : a finer surface, in the mesh's coordinates, that follows the body in pages and exports.
+    collide : what touches other things: the surface of the "tets", or the "skin", closed and outward, which then may
+        reach out of the tets. Pins, forces and loads act on the tets in both cases.
 
     Raises
     ------
@@ -156,6 +171,7 @@ class Body(PlacedBody):
     angular_velocity: ArrayLike = (0.0, 0.0, 0.0)
     friction: float = 0.0
     skin: SurfaceMesh | None = field(default=None)
+    collide: Literal["tets", "skin"] = "tets"
 
     def __post_init__(self) -> None:
         check_name(self.name, "body")
@@ -166,10 +182,30 @@ class Body(PlacedBody):
             raise SceneError(f"{owner}: material is {self.material!r}; give a material such as StableNeoHookean(...)")
         if self.skin is not None and not isinstance(self.skin, SurfaceMesh):
             raise SceneError(f"{owner}: skin is a {type(self.skin).__name__}; give a SurfaceMesh")
+        if self.collide not in ("tets", "skin"):
+            raise SceneError(f"{owner}: collide is {self.collide!r}; give 'tets' or 'skin'")
+        if self.collide == "skin" and self.skin is None:
+            raise SceneError(f"{owner}: collide is 'skin', and it has no skin; give skin=SurfaceMesh(...)")
+        if self.collide == "skin" and self.skin is not None:
+            require_closed(self.skin, f"{owner}: skin")
+            if self.skin.volume <= 0.0:
+                raise SceneError(f"{owner}: skin: its surface is inside out; give surface.flipped()")
         self._check_placement(owner, self.mesh.edges)
         self._require_one_value_per_tet(owner)
         if self.mesh.order == 2 and (self.material.per_tet(len(self.mesh.tets)).region != NO_REGION).any():
             raise SceneError(f'{owner}: quadratic tets need no patches; give its material integration="tets"')
+
+    @cached_property
+    def touching(self) -> tuple[EmbeddedPoints, NDArray[np.int32]]:
+        if self.collide == "tets" or self.skin is None:
+            return super().touching
+        skin = self.skin.compact()
+        attached = Embedding.of(self.mesh, skin.vertices)
+        return EmbeddedPoints.in_rows(attached.corners, attached.weights), skin.triangles
+
+    @property
+    def touches_with_skin(self) -> bool:
+        return self.collide == "skin"
 
     def _require_one_value_per_tet(self, owner: str) -> None:
         try:

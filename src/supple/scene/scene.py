@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, TypeVar
@@ -19,7 +19,9 @@ from supple.scene.body import PlacedBody
 from supple.scene.contact_pairs import ContactPair, pair_table
 from supple.scene.forces import Force, SoftTarget
 from supple.scene.inputs import Input, inputs_among
+from supple.scene.joints.axis_joint import AxisJoint
 from supple.scene.joints.joint import Joint
+from supple.scene.joints.motors import Motor
 from supple.scene.joints.weld import Weld
 from supple.scene.joints.welding import Welding, weld_together
 from supple.scene.loads.load import Load
@@ -144,6 +146,7 @@ class Scene(Showable):
         if self.contact_pairs:
             pair_table(self)
         self.inputs  # noqa: B018 - raises where two have the same name
+        self._check_skins()
         check_names(self.stitches, list(pinned), [str(obstacle.name) for obstacle in self.obstacles])
 
     def _facts(self) -> dict[str, str]:
@@ -152,6 +155,19 @@ class Scene(Showable):
         facts["obstacles"] = short_list(obstacle.name for obstacle in self.obstacles)
         facts |= {key: str(len(getattr(self, key))) for key, _ in _PARTS[2:]}
         return {name: value for name, value in facts.items() if value not in ("", "0")}
+
+    def _check_skins(self) -> None:
+        """Raise for what acts on the surface of the tets of a body that touches with its skin."""
+        skins = {body.name for body in self.bodies if body.touches_with_skin and not isinstance(body, RigidBody)}
+        for key, names in (("stitches", ("first", "second")), ("welds", ("body",)), ("sensors", ("body",))):
+            for i, item in enumerate(getattr(self, key)):
+                for name in names:
+                    if getattr(item, name) in skins:
+                        with at(key, i, name):
+                            raise SceneError(
+                                f"{item.label}: body {getattr(item, name)!r} touches with its skin, on which there are "
+                                f"no {key}; give it collide='tets'"
+                            )
 
     def _check_joints(self) -> None:
         bodies = {body.name: body for body in self.bodies}
@@ -219,14 +235,21 @@ class Scene(Showable):
 
     @cached_property
     def inputs(self) -> dict[str, Input]:
-        """The inputs that move pins, soft targets and obstacles, and that are forces, by name.
+        """The inputs that move pins, soft targets and obstacles, and that are forces or drive motors, by name.
 
         Raises
         ------
         SceneError : where two of them have the same name.
         """
         moving = (*self.pins, *self.soft_targets, *self.obstacles)
-        return inputs_among([*(item.motion for item in moving), *(item.force for item in self.forces)])
+        forces = (item.force for item in self.forces)
+        return inputs_among([*(item.motion for item in moving), *forces, *(m.script for m in self.motors.values())])
+
+    @property
+    def motors(self) -> dict[str, Motor]:
+        """The motors of hinges and sliders, by name of the joint."""
+        driven = (joint for joint in self.joints if isinstance(joint, AxisJoint))
+        return {str(joint.name): joint.motor for joint in driven if joint.motor is not None}
 
     def with_own_inputs(self) -> Scene:
         """The same scene with copies of its inputs, or itself where it has none."""
@@ -243,7 +266,23 @@ class Scene(Showable):
             obstacles=[replace(one, motion=owned(one.motion)) for one in self.obstacles],
             forces=[replace(force, force=owned(force.force)) for force in self.forces],
             soft_targets=[replace(target, motion=owned(target.motion)) for target in self.soft_targets],
-        )
+        ).with_motors({name: motor.scripted(owned(motor.script)) for name, motor in self.motors.items()})
+
+    def with_motors(self, motors: Mapping[str, Motor | None]) -> Scene:
+        """The same scene with other motors of hinges and sliders, by name of the joint; None: no motor.
+
+        Raises
+        ------
+        SceneError : where no hinge or slider has a name.
+        """
+        with_axis = {str(joint.name): joint for joint in self.joints if isinstance(joint, AxisJoint)}
+        for name in motors:
+            if name not in with_axis:
+                raise SceneError(
+                    f"scene: no hinge or slider has the name {name!r}; {suggestion(name, list(with_axis))}"
+                )
+        changed = {name: replace(with_axis[name], motor=motor) for name, motor in motors.items()}
+        return replace(self, joints=[changed.get(str(joint.name), joint) for joint in self.joints])
 
     def body(self, name: str) -> PlacedBody:
         """The body of that name.

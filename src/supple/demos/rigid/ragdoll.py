@@ -15,7 +15,6 @@ from supple.scene.contact_pairs import ContactPair
 from supple.scene.joints.axis_joint import AxisJoint, HingeJoint
 from supple.scene.joints.ball_joint import BallJoint
 from supple.scene.joints.joint import Joint
-from supple.scene.joints.motors import PositionMotor
 from supple.scene.joints.weld import Weld
 from supple.scene.obstacles.half_space import HalfSpace
 from supple.scene.rigid.rigid_body import RigidBody
@@ -70,9 +69,8 @@ def _joints() -> list[Joint]:
 
 
 def _hinge(first: str, second: str, point: Any, axis: Any, name: str) -> HingeJoint:
-    friction = PositionMotor(0.0, stiffness=0.0, damping=DAMPING)
     first, second = f"{first} bone", f"{second} bone"
-    return HingeJoint(first, second, point=point, axis=axis, limits=(-0.05, BEND), motor=friction, name=name)
+    return HingeJoint(first, second, point=point, axis=axis, limits=(-0.05, BEND), damping=DAMPING, name=name)
 
 
 class _Measurement(Measurement):

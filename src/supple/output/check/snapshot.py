@@ -48,8 +48,8 @@ class Scene:
         return max(float(np.ptp(body.points(rest), axis=0).max()) for body in self.recording.bodies)
 
     def name(self, kind: Literal["vertex", "tet"], row: int) -> str:
-        """A vertex or tet as messages call it: its number within its body; of a rigid one, within its surface."""
-        for body, first in self.surfaces.rigid if kind == "vertex" else ():
+        """A vertex or tet as messages call it: its number within its body; of a skin, within that."""
+        for body, first in self.surfaces.skins if kind == "vertex" else ():
             if body.skin is not None and first <= row < first + len(body.skin.corners):
                 return f"vertex {row - first} of {body.name}"
         for body in self.recording.bodies:

@@ -38,7 +38,7 @@ class Surfaces:
     triangles : (t, 3) those of bodies first; owners : (t,); first_triangle : (p,) the first one of each owner
     allowed : (p, p) which owners' surfaces must stay apart; ignored : sorted keys of pairs of triangles that may meet
     stitched : (k, 4) points of each stitch, some of them twice where it has fewer
-    rigid : (body, its first row) of rigid bodies, whose surfaces' points follow their control points
+    skins : (body, its first row) of bodies that touch with their skin, whose points follow vertices
     fixed : (obstacle, its points at time 0, its first row) of obstacles made of triangles; points : number of all rows
     pieces : see `Piece`
     """
@@ -48,11 +48,11 @@ class Surfaces:
         self.names = tuple(thing.name for thing in (*recording.bodies, *recording.obstacles))
         triangles: list[NDArray[np.int64]] = []
         self.fixed: list[tuple[int, NDArray[np.float64], int]] = []
-        self.rigid: list[tuple[RecordedBody, int]] = []
+        self.skins: list[tuple[RecordedBody, int]] = []
         row = len(recording.rest_positions)
         for body in recording.bodies:
-            if body.rigid and body.skin is not None:
-                self.rigid.append((body, row))
+            if body.touches_with_skin and body.skin is not None:
+                self.skins.append((body, row))
                 triangles.append(body.skin.triangles.astype(np.int64) + row)
                 row += len(body.skin.corners)
             else:
@@ -76,10 +76,10 @@ class Surfaces:
         self.pieces = _pieces(recording, self.triangles, self.owners, row)
 
     def place(self, positions: NDArray[np.float64], poses: NDArray[np.float64]) -> NDArray[np.float64]:
-        """All points (n + rigid bodies' + obstacles' + 2, 3) of a frame; the last two rows are room for a ray."""
+        """All points (n + skins' + obstacles' + 2, 3) of a frame; the last two rows are room for a ray."""
         x = np.zeros((self.points + 2, 3))
         x[: len(positions)] = positions
-        for body, row in self.rigid:
+        for body, row in self.skins:
             assert body.skin is not None
             corners = positions[body.vertices][body.skin.corners]
             x[row : row + len(corners)] = np.einsum("kw,kwi->ki", body.skin.weights, corners)

@@ -269,13 +269,13 @@ class Recorder:
 
 
 def _recorded(field: Field, frame: Frame) -> NDArray[np.float64]:
-    """The field's values of tets or vertices; those of points, which a rigid body has on its surface, are then NaN."""
+    """The field's values of tets or vertices; of points of bodies that touch with their skin, NaN."""
     values, system = field.values(frame), frame.system
-    if field.at != "points" or not system.rigid_bodies:
+    if field.at != "points":
         return values
     out = np.full((len(frame.state.positions), *field.shape), np.nan)
     for part in system.bodies:
-        if not part.rigid:
+        if not part.body.touches_with_skin:
             out[part.vertices] = values[part.points]
     return out
 

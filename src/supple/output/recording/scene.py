@@ -41,6 +41,7 @@ class RecordedBody:
     triangles : (t, 3) its boundary, counter-clockwise from outside, rows of its own vertices
     skin : a finer surface that it carries, or None; its corners are rows of its own vertices
     rigid : whether its vertices are the control points of a rigid body, whose surface is the skin
+    touches_with_skin : whether the skin is what touches other things
     """
 
     name: str
@@ -50,6 +51,7 @@ class RecordedBody:
     triangles: NDArray[np.int32]
     skin: SkinnedSurface | None
     rigid: bool = False
+    touches_with_skin: bool = False
 
     @property
     def point_count(self) -> int:
@@ -175,6 +177,7 @@ def _described_bodies(system: System) -> list[dict[str, Any]]:
                 "triangles": [t, t + count],
                 "skin": body.skin is not None,
                 "rigid": rigid,
+                "collide": "skin" if body.touches_with_skin else "tets",
             }
         )
         t += count
@@ -241,7 +244,8 @@ def read_bodies(
             rigid = bool(described.get("rigid", False))
             if rigid and (skin is None or v1 - v0 != 4 or t1 - t0 != 1):
                 raise file.broken(f"rigid body {described['name']!r} does not have four vertices and a surface")
-            bodies.append(RecordedBody(*names, *rows, np.ascontiguousarray(own), skin, rigid))
+            touches = skin is not None and (rigid or described.get("collide") == "skin")
+            bodies.append(RecordedBody(*names, *rows, np.ascontiguousarray(own), skin, rigid, touches))
     except (KeyError, TypeError, ValueError):
         raise file.broken("the bodies in its header are not described as they should be") from None
     return tuple(bodies)

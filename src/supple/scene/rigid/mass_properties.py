@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.tetmesh import TetMesh
-from supple.mesh.topology import edge_keys
+from supple.scene.closed_surface import require_closed
 from supple.scene.values import float_array
 
 # Flatter than this, relative to its largest second moment, a body has no thickness: the motion across it would have
@@ -69,7 +69,7 @@ def of_solid(shape: SurfaceMesh | TetMesh, owner: str) -> MassProperties:
         corners = shape.vertices[shape.tets]
         low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
     else:
-        _require_closed(shape, owner)
+        require_closed(shape, owner)
         corners = shape.vertices[shape.triangles]
         low, high = shape.bounds
     least = _FLAT * float(np.linalg.norm(high - low)) ** 3
@@ -130,18 +130,3 @@ def _moments(corners: NDArray[np.float64]) -> tuple[float, NDArray[np.float64], 
     total = o + a + b + c
     second = sum(np.einsum("k,ki,kj->ij", six, x, x) for x in (total, o, a, b, c))
     return float(six.sum()) / 6.0, six @ total / 24.0, np.asarray(second) / 120.0
-
-
-def _require_closed(surface: SurfaceMesh, owner: str) -> None:
-    keys = edge_keys(surface.triangles, len(surface.vertices)).ravel()
-    starts, ends = surface.triangles.ravel(), surface.triangles[:, [1, 2, 0]].ravel()
-    signs = np.where(starts < ends, 1, -1)
-    order = np.argsort(keys, kind="stable")
-    first = np.flatnonzero(np.concatenate([[True], np.diff(keys[order]) != 0]))
-    unbalanced = np.add.reduceat(signs[order], first) != 0
-    if unbalanced.any():
-        count = int(np.count_nonzero(unbalanced))
-        raise SceneError(
-            f"{owner}: its surface is not closed, or its triangles do not all face the same way ({count} "
-            f"{'edge' if count == 1 else 'edges'}); repair it with sp.repair_surface, or give a TetMesh"
-        )

@@ -132,6 +132,10 @@ class RigidBody(PlacedBody):
         corners = np.broadcast_to(np.arange(4, dtype=np.int32), (len(self.weights), 4))
         return EmbeddedPoints.in_rows(corners, self.weights)
 
+    @property
+    def touches_with_skin(self) -> bool:
+        return True
+
     def weights_of(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
         """(k, 4) the weights of the control points in places (k, 3), given in the body's own coordinates [m]."""
         return control_points(self.properties, places).weights

@@ -120,6 +120,9 @@ class BodyModel(Model):
     skin: SurfaceModel | None = Field(
         default=None, description="a finer surface that follows the body in pages and exports"
     )
+    collide: Literal["tets", "skin"] | None = Field(
+        default=None, description="what touches other things: the surface of the tets (default), or the skin"
+    )
     copies: CopiesModel | None = Field(default=None, description="copies of the body")
     initial: InitialModel | None = Field(default=None, description="a deformed start")
 
@@ -128,7 +131,7 @@ class BodyModel(Model):
         if (self.material is None) == (self.rigid is None):
             raise ValueError("a body needs either `material` or `rigid`; give one of them")
         if self.rigid is not None:
-            for key in ("regions", "skin", "initial", "order"):
+            for key in ("regions", "skin", "collide", "initial", "order"):
                 if getattr(self, key) is not None:
                     raise ValueError(f"a rigid body has no `{key}`; remove it")
         return self
@@ -191,7 +194,7 @@ class BodyModel(Model):
         if self.regions is not None:
             with at("regions"):
                 material = with_regions(material, self.regions, mesh)
-        return Body(self.name, mesh, material, skin=skin, **self._placement())
+        return Body(self.name, mesh, material, skin=skin, collide=self.collide or "tets", **self._placement())
 
 
 def _scaled(body: PlacedBody, scale: list[float]) -> NDArray[np.float64]:
