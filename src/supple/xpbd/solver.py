@@ -5,7 +5,6 @@ Source: Macklin, Müller, Chentanez, "XPBD" (2016); Macklin et al., "Small Steps
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Literal
@@ -39,6 +38,8 @@ from supple.xpbd.limits.rigid_fallback import RigidFallback
 from supple.xpbd.limits.volume_guard import VolumeGuard
 from supple.xpbd.memory import XPBDMemory
 from supple.xpbd.momentum import MomentumRestore
+from supple.xpbd.refusals import check_count, is_number, lost_position_message, refuse_unsupported
+from supple.xpbd.rigid.bodies import RigidBodies
 from supple.xpbd.sleep import Sleep, SleepMemory
 from supple.xpbd.start import raise_if_inside
 from supple.xpbd.substep_limits import collide, keep_volumes, restore
@@ -89,22 +90,22 @@ class XPBD(Solver):
 
     def __post_init__(self) -> None:
         if self.substeps != "auto":
-            _check_count("substeps", self.substeps, ", or 'auto'")
-        _check_count("max_substeps", self.max_substeps)
+            check_count("substeps", self.substeps, ", or 'auto'")
+        check_count("max_substeps", self.max_substeps)
         if self.start not in ("refuse", "push_out"):
             raise SolverError(f"XPBD: start is {self.start!r}; give 'refuse' or 'push_out'")
         if not isinstance(self.momentum_restore, bool):
             raise SolverError(f"XPBD: momentum_restore is {self.momentum_restore!r}; give True or False")
         if self.contact is not None and not isinstance(self.contact, XPBDContact):
             raise SolverError(f"XPBD: contact is {self.contact!r}; give XPBDContact(...), or None to turn it off")
-        if not _is_number(self.accuracy) or not 0.0 < self.accuracy < 1.0:
+        if not is_number(self.accuracy) or not 0.0 < self.accuracy < 1.0:
             raise SolverError(f"XPBD: accuracy is {self.accuracy!r}; give a number above 0 and below 1, such as 0.02")
-        if self.sleep_after is not None and not (_is_number(self.sleep_after) and self.sleep_after > 0.0):
+        if self.sleep_after is not None and not (is_number(self.sleep_after) and self.sleep_after > 0.0):
             raise SolverError(
                 f"XPBD: sleep_after is {self.sleep_after!r}; give a time above zero [s], or None to keep all awake"
             )
         if self.threads is not None:
-            _check_count("threads", self.threads)
+            check_count("threads", self.threads)
             if self.threads > _MOST_THREADS:
                 raise SolverError(
                     f"XPBD: threads is {self.threads}; this process has {_MOST_THREADS}"
@@ -116,19 +117,10 @@ class XPBD(Solver):
 
         Raises
         ------
-        SolverError : where a body is rigid, has quadratic tets, or its material has no XPBD constraints; the text names
-            the body.
+        SolverError : where a body has quadratic tets, its material has no XPBD constraints, or there are joints or
+            welds; the text names them.
         """
-        if system.rigid_bodies:
-            raise SolverError(
-                f"XPBD: body {system.rigid_bodies[0].name!r} is rigid; simulate rigid bodies with Implicit"
-            )
-        quadratic = [part.name for part in system.bodies if part.body.mesh.order == 2]
-        if quadratic:
-            raise SolverError(
-                f"XPBD: body {quadratic[0]!r} has quadratic tets; simulate it with Implicit, or give linear tets: "
-                "mesh.to_order(1)"
-            )
+        refuse_unsupported(system)
         layout = make_layout(system)
         inner = reordered(system, layout)
         extended = np.zeros((len(system.masses) + len(inner.stitching.anchors), 4))
@@ -139,9 +131,11 @@ class XPBD(Solver):
         parallel = threads > 1 and (large or self.threads is not None)
         collisions = Collisions(inner, self.contact)
         assessment = Assessment(inner, self.contact, collisions.edge_length)
+        rigid = RigidBodies(inner)
         return XPBDWorkspace(
             system=inner,
             layout=layout,
+            rigid=rigid,
             sets=sets,
             damping=make_damping(inner, layout, extended[:, 3]),
             momentum=MomentumRestore(inner) if self.momentum_restore else None,
@@ -151,7 +145,7 @@ class XPBD(Solver):
             guard=VolumeGuard(inner),
             fallback=RigidFallback(inner, collisions.skin),
             assessment=assessment,
-            choice=SubstepChoice(inner, assessment.softening, bool(collisions)),
+            choice=SubstepChoice(inner, assessment.softening, bool(collisions), rigid),
             sleep=Sleep(inner, layout, self.sleep_after, self.accuracy),
             threads=self.threads or (None if large else 1),
             pace=ThreadTuner(choice=parallel and self.threads is None, parallel=parallel),
@@ -205,7 +199,7 @@ class XPBD(Solver):
             repeats += 1
             used = Substeps(min(2 * used.count, self.max_substeps), f"a repetition: {problem}")
         if lost >= 0:
-            message = _lost_position_message(ws, lost, time)
+            message = lost_position_message(ws.system, ws.layout, lost, time)
             details = self.initial_details(system, ws)
             return state, StepReport(Status.NOT_FINITE, used.count, message, details=details)
         return new, report
@@ -244,7 +238,7 @@ class XPBD(Solver):
             problem = Status.INTERSECTING
         elif problem is None and held_back:
             problem = Status.INVERTED
-        forces, old_from_new = ws.collisions.forces, ws.layout.old_from_new
+        forces, old_points = ws.collisions.forces, ws.layout.old_points
         x, v = ws.world[ws.layout.new_from_old], ws.velocities[ws.layout.new_from_old]
         sound = status in (Status.CONVERGED, Status.SOFTENED) and not held_back
         rest = ws.sleep.end(x, v, time, sleep, forces, sound)
@@ -272,14 +266,14 @@ class XPBD(Solver):
             friction_forces=friction,
             **ws.actuators.fields(h * used.count),
         )
-        world, surfaces = ws.world.copy(), ws.collisions.positions
+        world, surfaces = ws.collisions.obstacles.places(ws.world).copy(), ws.collisions.positions
         message = findings.message(time, self._remedy(ws, dt, findings, used.count))
         report = StepReport(
             status,
             used.count,
             message,
             details=details,
-            contacts=lambda: forces.points(world, surfaces, old_from_new),
+            contacts=lambda: forces.points(world, surfaces, old_points),
         )
         return State(time, x, v, memory=memory), report, problem
 
@@ -341,6 +335,7 @@ class XPBD(Solver):
             ws.loads.pull_to_targets(ws.points, ws.velocities, ws.origins, end, h)
             ws.loads.pull_springs(ws.points, ws.velocities, ws.origins, end, h)
             ws.actuators.project_between(ws.points, ws.velocities, ws.origins, end, h)
+            ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
             if collides and not collide(ws, end, h, parallel):
                 break
             held_back += keep_volumes(ws, end, h, parallel)
@@ -368,15 +363,6 @@ class XPBD(Solver):
         )
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def _check_count(name: str, value: object, otherwise: str = "") -> None:
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
-        raise SolverError(f"XPBD: {name} is {value!r}; give a whole number of one or more{otherwise}")
-
-
 def _overlaps(ws: XPBDWorkspace, time: float, sleep: SleepMemory) -> list[Overlap]:
     """What is through what at the world positions of the workspace."""
     return ws.assessment.overlaps(ws.world, time, sleep.asleep) if ws.collisions else []
@@ -389,12 +375,3 @@ def _disturbed(ws: XPBDWorkspace, time: float, sleep: SleepMemory) -> NDArray[np
     to_world(ws.points, ws.origins, ws.world)
     crossing = [overlap.numbers for overlap in _overlaps(ws, time, sleep)]
     return ws.sleep.disturbed(sleep, [*ws.collisions.forces.pairs(), *crossing])
-
-
-def _lost_position_message(ws: XPBDWorkspace, vertex: int, time: float) -> str:
-    part = next(p for p in ws.system.bodies if p.vertices.start <= vertex < p.vertices.stop)
-    number = int(ws.layout.old_from_new[vertex]) - part.vertices.start
-    return (
-        f"XPBD: body {part.name!r}, vertex {number}: its position is lost (not finite, or beyond 1e12 m) "
-        f"at t = {time:g} s; take more substeps or a shorter dt"
-    )

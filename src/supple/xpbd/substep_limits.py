@@ -24,7 +24,7 @@ def collide(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
     if not _to_world(ws):
         return False
     ws.collisions.project(ws.world, ws.world_previous, time, h, parallel)
-    apply_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
+    _apply(ws, h)
     return True
 
 
@@ -33,8 +33,13 @@ def collide_again(ws: XPBDWorkspace, time: float, h: float) -> bool:
     if not _to_world(ws):
         return False
     ws.collisions.project_again(ws.world, ws.world_previous, time, h)
-    apply_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
+    _apply(ws, h)
     return True
+
+
+def _apply(ws: XPBDWorkspace, h: float) -> None:
+    apply_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
+    ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
 
 
 def _to_world(ws: XPBDWorkspace) -> bool:
@@ -76,6 +81,7 @@ def _shorten(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
             break
         failed, groups = True, united(groups, passed.tolist())
         ws.fallback.apply(*arrays, [sorted(group) for group in groups], share)
+        ws.rigid.settle(ws.points, ws.velocities)
     ws.guard.measure(ws.points, parallel)
     ws.guard.accept()
     return failed
@@ -89,7 +95,8 @@ def _passed(ws: XPBDWorkspace) -> NDArray[np.int64]:
 
 
 def restore(ws: XPBDWorkspace, h: float, parallel: bool) -> None:
-    """The velocities of changed positions, with the momentum of the velocities before."""
+    """The velocities of changed positions, with the momentum of the velocities before; rigid bodies are rigid."""
+    ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
     if ws.momentum is not None:
         ws.momentum.apply(ws.points, ws.previous, ws.velocities, h, parallel)
     else:

@@ -2,8 +2,8 @@
 
 Kinetic, elastic and potential energy, and that of stitches and soft targets, of all vertices that are not pinned. Work
 is done by forces, by soft targets that move, and by pins that move. That of pins is the elastic energy which their
-motion adds in the prediction of a substep; the true work is never more. The work of obstacles that move is not known: a
-frame in which they touch something is not judged.
+motion adds in the prediction of a substep; the true work is never more. The work of obstacles and of rigid bodies that
+are moved is not known: a frame in which they touch something is not judged.
 
 What violated hard constraints can give out counts where it falls, and not where it rises: it is an upper bound.
 
@@ -54,8 +54,10 @@ class EnergyBalance:
             held[pin.vertices] = True
         self._held = np.flatnonzero(held)
         self._at_pins = ElasticEnergy(system, held) if self._moving_pins else None
-        self._obstacles_move = any(obstacle.motion is not None for obstacle in system.obstacles)
-        self._anchors_move = self._obstacles_move and len(system.stitching.anchors) > 0
+        driven = any(held[part.vertices].any() for part in system.rigid_bodies)
+        anchors_move = any(obstacle.motion is not None for obstacle in system.obstacles)
+        self._obstacles_move = anchors_move or driven
+        self._anchors_move = anchors_move and len(system.stitching.anchors) > 0
         fall = LEAST_FALL * edge_length * math.hypot(*system.gravity)
         self._least = LEAST_STRAIN**2 * _stiffness(system) + fall * float(self._masses.sum())
         self._begun = np.zeros(len(system.bodies))
@@ -150,6 +152,8 @@ def _stiffness(system: System) -> float:
     """The sum of shear modulus times volume, or of edge stiffness times squared length [J]."""
     total = 0.0
     for part in system.bodies:
+        if part.rigid:
+            continue
         material, volumes = part.body.material, system.rest_volumes[part.tets]
         compliance = getattr(material, "edge_compliance", None)
         if compliance is None:

@@ -63,7 +63,7 @@ class SurfaceCheck:
         self._poses = ObstaclePoses(system.obstacles)
         self._names = [f"body {part.name!r}" for part in system.bodies] + [o.label for o in system.obstacles]
         self._collide = colliding_pairs(system, settings)
-        bodies, n = len(system.bodies), len(system.masses)
+        bodies, n = len(system.bodies), len(system.points)
         triangles, points, self._owners = [system.triangles], [], []
         owner = [np.repeat(np.arange(bodies), [part.triangles.stop - part.triangles.start for part in system.bodies])]
         self._formulas = []
@@ -106,7 +106,7 @@ class SurfaceCheck:
     def _crossings(self, x: NDArray[np.float64], time: float, collide: NDArray[np.bool_]) -> list[Overlap]:
         R, t = self._poses.at(time)
         rows = np.array(self._owners, dtype=np.int64)
-        points = np.concatenate([x, np.einsum("kij,kj->ki", R[rows], self._fixed) + t[rows]])
+        points = np.concatenate([self.system.points.positions(x), np.einsum("kij,kj->ki", R[rows], self._fixed) + t[rows]])
         corners = points[self._triangles]
         low, high = corners.min(axis=1), corners.max(axis=1)
         chosen = self._near(low, high, collide)
@@ -134,6 +134,7 @@ class SurfaceCheck:
         """Bodies with vertices deep inside of obstacles that have no triangles, of the pairs `collide` (p, p)."""
         collide = self._collide if collide is None else collide
         R, t = self._poses.at(time)
+        x = self.system.points.positions(x)
         bodies, found = len(self.system.bodies), []
         for k in self._formulas:
             for number, rows in enumerate(self._surface):
