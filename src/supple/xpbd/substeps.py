@@ -5,7 +5,7 @@ The largest of:
 - what keeps every body's stiffness within the accuracy (`assessment.softening`);
 - what lets surfaces approach each other by less than half the mean height of a tet in a substep: contact may not find
   surfaces that pass each other within one substep, and the guard of volumes stops a compression by less than that;
-- what lets rigid bodies turn by less than a quarter of a radian in a substep;
+- what lets rigid bodies turn by less than a tenth of a radian in a substep;
 - after a frame that had to be repeated with more substeps: a number that falls back from there.
 """
 
@@ -26,7 +26,7 @@ FEWEST = 10
 # Of the mean height of a tet: how far surfaces may approach each other in a substep.
 APPROACH = 0.5
 # By how much a rigid body may turn in a substep [rad]; see `supple.xpbd.rigid.bodies`.
-MOST_TURN = 0.25
+MOST_TURN = 0.1
 # By which a number from an earlier frame falls in every frame.
 FALL = 0.8
 # How many times the number of the other criteria it may be: a blow that lasts for some frames must not raise it to any
@@ -82,7 +82,9 @@ class SubstepChoice:
             return Substeps(0, "")
         spins = self.rigid.spins(moment.points[:, :3], moment.velocities)
         fastest = int(spins.argmax())
-        return Substeps(_count(float(spins[fastest]) * dt / MOST_TURN), f"the spin of body {self.rigid.names[fastest]!r}")
+        return Substeps(
+            _count(float(spins[fastest]) * dt / MOST_TURN), f"the spin of body {self.rigid.names[fastest]!r}"
+        )
 
     def _closing_speed(self, moment: Moment, dt: float) -> float:
         """An upper bound of the speed at which surfaces approach each other in the frame [m/s]."""

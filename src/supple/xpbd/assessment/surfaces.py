@@ -106,7 +106,9 @@ class SurfaceCheck:
     def _crossings(self, x: NDArray[np.float64], time: float, collide: NDArray[np.bool_]) -> list[Overlap]:
         R, t = self._poses.at(time)
         rows = np.array(self._owners, dtype=np.int64)
-        points = np.concatenate([self.system.points.positions(x), np.einsum("kij,kj->ki", R[rows], self._fixed) + t[rows]])
+        points = np.concatenate(
+            [self.system.points.positions(x), np.einsum("kij,kj->ki", R[rows], self._fixed) + t[rows]]
+        )
         corners = points[self._triangles]
         low, high = corners.min(axis=1), corners.max(axis=1)
         chosen = self._near(low, high, collide)

@@ -32,6 +32,10 @@ REMOVED_PER_FRAME, NEAR, DEFAULT_THICKNESS = 0.05, 1.0, 0.05
 # Fraction of the thickness: the gap that vertices keep from simple shapes, so that what rests does not touch.
 SKIN = 0.01
 
+# How often contacts of surfaces and of simple shapes are solved again in turn, where bodies are rigid: without an
+# elastic body between them, a push has to pass from one contact to the next within a substep.
+RIGID_PASSES = 2
+
 
 class Collisions:
     """Contact during the substeps of a frame. Positions are projected in place.
@@ -52,6 +56,7 @@ class Collisions:
         self.system = system
         self.settings = settings
         rigid = RigidBodies(system)
+        self._any_rigid = len(rigid) > 0
         self.edge_length = mean_edge_length(system)
         self.poses = ObstaclePoses(system.obstacles)
         rates = response_rates(system)
@@ -62,7 +67,9 @@ class Collisions:
         switches = (False, False) if settings is None else (settings.body_collision, settings.self_collision)
         surfaces = build_surfaces(system, table, *switches, self.thickness, self.edge_length)
         self.surfaces = (
-            SurfaceCollisions(system, surfaces, self.poses, self.edge_length, rates, rigid) if surfaces.is_needed else None
+            SurfaceCollisions(system, surfaces, self.poses, self.edge_length, rates, rigid)
+            if surfaces.is_needed
+            else None
         )
         self.skin = SKIN * self.thickness
         self.contacts = 0
@@ -165,6 +172,8 @@ class Collisions:
         between = self.contacts
         self._project_obstacles(x, x_prev, time, h)
         if self.surfaces is not None and self.contacts > between:
+            for _ in range(RIGID_PASSES if self._any_rigid and between else 0):
+                self.project_again(x, x_prev, time, h)
             # What obstacles push may have passed through other bodies.
             self.surfaces.check_parted(x, x_prev)
         return self.contacts

@@ -32,9 +32,7 @@ def _combined(weights, e, p, q, r, s):
 def relative(x, movers, vertices, weights, e):
     """sum c_i x_i of contact e at the end of the substep [m], from points (k, 4) and weights (k, 4)."""
     p, q, r, s = vertices[e, 0], vertices[e, 1], vertices[e, 2], vertices[e, 3]
-    return _combined(
-        weights, e, place(x, movers, p), place(x, movers, q), place(x, movers, r), place(x, movers, s)
-    )
+    return _combined(weights, e, place(x, movers, p), place(x, movers, q), place(x, movers, r), place(x, movers, s))
 
 
 @njit
@@ -62,7 +60,7 @@ def is_rigid(movers, vertices, e):
 
 @njit
 def _on_body(movers, vertices, weights, e, i):
-    """The body of the i-th point where it is the first one on it, otherwise -1; the sum of c, and of c times the arm."""
+    """The body of the i-th point where that is the first one on it, or -1; the sums of c and of c times the arm."""
     b = movers.body[vertices[e, i]]
     share, x, y, z = 0.0, 0.0, 0.0, 0.0
     if b >= 0:
@@ -82,7 +80,7 @@ def _on_body(movers, vertices, weights, e, i):
 
 @njit
 def compliance(movers, vertices, weights, e, n):
-    """The change of r along the unit vector n for a unit impulse along it [1/kg]; sum w_i c_i^2 without rigid bodies."""
+    """The change of r along the unit vector n for a unit impulse along it [1/kg]; of vertices alone, sum w_i c_i^2."""
     total = 0.0
     for i in range(4):
         k = vertices[e, i]

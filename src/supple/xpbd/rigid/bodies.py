@@ -103,10 +103,12 @@ class RigidBodies:
             _advance(points, previous, velocities, self.control, h)
 
     def spins(self, x: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(b,) the largest speed of a control point about the center, over its distance from it [rad/s]."""
+        """(b,) how fast the bodies turn at positions x and velocities v (n, 3) [rad/s]."""
         r, u = x[self.control], v[self.control]
         r, u = r - r.mean(axis=1, keepdims=True), u - u.mean(axis=1, keepdims=True)
-        return np.sqrt((np.einsum("bki,bki->bk", u, u) / np.einsum("bki,bki->bk", r, r)).max(axis=1))
+        second = np.einsum("bki,bkj->bij", r, r)
+        inertia = np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second
+        return np.linalg.norm(np.linalg.solve(inertia, np.cross(r, u).sum(axis=1)[:, :, None])[:, :, 0], axis=1)
 
 
 @njit(cache=True)
@@ -217,9 +219,9 @@ def _advance(points, previous, velocities, control, h):
         mean, L = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         for i in control[b]:
             v = row(velocities, i)
-            l = cross(subtract(row(previous, i), center), v)
+            moment = cross(subtract(row(previous, i), center), v)
             mean = (mean[0] + 0.25 * v[0], mean[1] + 0.25 * v[1], mean[2] + 0.25 * v[2])
-            L = (L[0] + l[0], L[1] + l[1], L[2] + l[2])
+            L = (L[0] + moment[0], L[1] + moment[1], L[2] + moment[2])
         w, q = half_turn(S, (h * L[0], h * L[1], h * L[2]))
         shift, missing = (0.0, 0.0, 0.0), L
         for k in range(4):
@@ -229,9 +231,9 @@ def _advance(points, previous, velocities, control, h):
             u = cross(q, t)
             # Of the turn, as differences: velocities then have no round-off of the places divided by h.
             ends[k, 0], ends[k, 1], ends[k, 2] = w * t[0] + u[0], w * t[1] + u[1], w * t[2] + u[2]
-            l = cross(r, row(ends, k))
+            moment = cross(r, row(ends, k))
             shift = (shift[0] + 0.25 * ends[k, 0], shift[1] + 0.25 * ends[k, 1], shift[2] + 0.25 * ends[k, 2])
-            missing = (missing[0] - l[0] / h, missing[1] - l[1] / h, missing[2] - l[2] / h)
+            missing = (missing[0] - moment[0] / h, missing[1] - moment[1] / h, missing[2] - moment[2] / h)
         # What Newton's method has left over.
         rest = solve_symmetric(S, missing)
         for k in range(4):
@@ -251,8 +253,8 @@ def _keep_momenta(before, x, velocities, control):
         center, S = inertia_of(x, control, b)
         missing = (0.0, 0.0, 0.0)
         for i in control[b]:
-            l = cross(subtract(subtract(row(before, i), old), subtract(row(x, i), center)), row(velocities, i))
-            missing = (missing[0] + l[0], missing[1] + l[1], missing[2] + l[2])
+            moment = cross(subtract(subtract(row(before, i), old), subtract(row(x, i), center)), row(velocities, i))
+            missing = (missing[0] + moment[0], missing[1] + moment[1], missing[2] + moment[2])
         turn = solve_symmetric(S, missing)
         for i in control[b]:
             more = cross(turn, subtract(row(x, i), center))
