@@ -64,6 +64,7 @@ from .scene.forces import Force as Force
 from .scene.forces import SoftTarget as SoftTarget
 from .scene.inputs import ForceInput as ForceInput
 from .scene.inputs import MotionInput as MotionInput
+from .scene.inputs import MotorInput as MotorInput
 from .scene.joints.axis_joint import HingeJoint as HingeJoint
 from .scene.joints.axis_joint import SliderJoint as SliderJoint
 from .scene.joints.ball_joint import BallJoint as BallJoint

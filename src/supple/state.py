@@ -129,6 +129,8 @@ class State:
     internal : (k, 11) internal variables of materials that flow, in the order of the bodies and of their laws: of each
         tet and law F_i^-1 of F = F_e F_i (nine numbers), a measure of all flow so far, and the energy dissipated per
         rest volume [J/m^3]. (0, 11) where nothing flows, or has flowed.
+    hinge_angles : angles of hinges over all turns [rad], by name; those that are missing are as at a start, see
+        `HingeJoint`
     """
 
     time: float
@@ -137,6 +139,7 @@ class State:
     memory: Any = None
     inputs: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     internal: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 11)))
+    hinge_angles: Mapping[str, float] = field(default_factory=dict)
 
 
 # The fields of `SolverDetails` with the work of actuators, by name [J].

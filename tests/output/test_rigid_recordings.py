@@ -191,3 +191,99 @@ def test_usd_animates_the_transform_of_a_rigid_body(recorded, tmp_path):
         matrix = np.array(mesh.ComputeLocalToWorldTransform(Usd.TimeCode(frame.index))).T
         shown = transformed(np.array(points.Get(), dtype=float), matrix)
         np.testing.assert_allclose(shown, frame.positions["palm"], atol=2e-6)
+
+
+def jointed_scene():
+    """A bar that swings on a hinge with another on a ball, one in a slider with a motor, one clamped to a wheel."""
+    bar = sp.shapes.box_surface((0.2, 0.02, 0.02), (1, 1, 1))
+    places = {"a": (0.1, 0, 0), "b": (0.3, 0, 0), "c": (0, 0.5, 0), "d": (0.6, 0.5, 0)}
+    bodies = [sp.RigidBody(name, bar, density=1000.0, position=place) for name, place in places.items()]
+    wheel = sp.Sphere(radius=0.1, center=(0.7, 0.8, 0), name="wheel", motion=sp.Keyframes([0, 1], angles=[0, 2.0]))
+    motor = sp.PositionMotor(0.05, stiffness=50.0, damping=5.0, max_force=2.0)
+    joints = [
+        sp.HingeJoint("a", point=(0, 0, 0), limits=(-0.3, 8.0), name="hinge"),
+        sp.BallJoint("b", "a", point=(0.2, 0, 0), name="ball"),
+        sp.SliderJoint("c", axis=(1, 1, 0), motor=motor, limits=(-0.1, 0.1), name="slider"),
+        sp.FixedJoint("d", "wheel", name="clamp"),
+    ]
+    return sp.Scene(bodies, obstacles=[wheel], joints=joints)
+
+
+@pytest.fixture(scope="module")
+def jointed(tmp_path_factory):
+    path, solver = tmp_path_factory.mktemp("joints") / "r.vtkhdf", sp.Implicit()
+    list(sp.simulate(jointed_scene(), solver, 0.02, 12, sinks=[sp.Recorder(path, solver=solver)]))
+    return path
+
+
+def test_a_recording_keeps_its_joints_and_they_hold(jointed):
+    report = sp.check_recording(jointed)
+    assert report.ok, report.failures
+    assert 0.0 < report["joints"].worst < 1e-6
+    with sp.read_recording(jointed) as recording:
+        hinge, ball, slider, clamp = recording.joints
+        assert (hinge.name, hinge.kind, hinge.sides, hinge.limits) == ("hinge", "hinge", (0, None), (-0.3, 8.0))
+        assert (ball.sides, slider.max_force, clamp.sides) == ((1, 0), 2.0, (3, 4))
+        assert recording[-1].report.joints["hinge"].coordinate == pytest.approx(-0.3, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("body", "change", "where", "worst"),
+    [
+        # A bar of 0.2 m has a diameter of gyration of 0.1166 m.
+        ("b", lambda x: np.add(x, (0.0, 0.001, 0.0)), "ball", 0.001 / 0.1166),
+        ("a", lambda x: np.add(x, (0.0, 0.0, 0.001)), "hinge", 0.001 / 0.1166),
+        ("c", lambda x: np.add(x, (-0.002, 0.002, 0.0)), "slider", 0.002828 / 0.1166),
+        ("c", lambda x: np.add(x, (0.3, 0.3, 0.0)), "slider, its recorded coordinate", 0.4243 / 0.1166),
+        ("d", lambda x: x.mean(axis=0) + (x - x.mean(axis=0)) @ np.diag([1.0, -1.0, -1.0]), "clamp", 2.0),
+        ("a", lambda x: x * [1.0, -1.0, -1.0], "hinge, its recorded coordinate", np.pi),
+    ],
+)
+def test_joints_that_do_not_hold_are_found(jointed, tmp_path, body, change, where, worst):
+    copy = tmp_path / "corrupted.vtkhdf"
+    copy.write_bytes(jointed.read_bytes())
+    with h5py.File(copy, "r+") as file:
+        rows = slice(4 * "abcd".index(body), 4 * "abcd".index(body) + 4)
+        file[POINTS][rows] = change(file[POINTS][rows])
+    found = sp.check_recording(copy, sp.CheckSettings(only=["joints"]))["joints"]
+    assert (found.failed_frames, found.first_failure) == (1, 0)
+    assert found.where.startswith(where)
+    assert found.worst == pytest.approx(worst, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("number", "key", "value", "where"),
+    [
+        (2, "max_force", 1e-3, "slider, its motor exceeds its largest effort"),
+        (2, "limits", [-0.1, 0.01], "slider"),
+        (2, "axis", [1.0, 1.0, 0.1], "slider"),
+        (0, "axis", [0.0, 0.1, 1.0], "hinge"),
+        (1, "limits", [0.0, 0.01], "ball"),
+    ],
+)
+def test_joints_beyond_their_limits_and_efforts_are_found(jointed, tmp_path, number, key, value, where):
+    """The recording is left as it is, and what it says about a joint changed."""
+    changed = with_joint(jointed, tmp_path, number, key, value)
+    report = sp.check_recording(changed, sp.CheckSettings(only=["joints"]))
+    assert not report.ok
+    assert report["joints"].where == where
+
+
+def with_joint(recording, folder, number, key, value):
+    """A copy with another value in the description of a joint."""
+    copy = folder / "changed.vtkhdf"
+    copy.write_bytes(recording.read_bytes())
+    with h5py.File(copy, "r+") as file:
+        header = json.loads(file["supple/header"][()])
+        header["physics"]["joints"][number][key] = value
+        del file["supple/header"]
+        file["supple/header"] = json.dumps(header)
+    return copy
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("sides", [9, None]), ("kind", "spring"), ("limits", 3), ("axis", [0, 0, 0]), ("point", ["x"])]
+)
+def test_joints_that_make_no_sense_are_an_error(jointed, tmp_path, key, value):
+    with pytest.raises(sp.OutputError, match="its joints are not described as they should be"):
+        sp.read_recording(with_joint(jointed, tmp_path, 0, key, value))

@@ -20,13 +20,15 @@ bodies:
   - {BAR % ("slide", 2.5)}
   - {BAR % ("tool", 3.5)}
 joints:
-  - {{kind: ball, first: upper, point: [0, 1, 0], name: shoulder}}
+  - {{kind: ball, first: upper, point: [0, 1, 0], axis: [2, 0, 0], max_swing: 1, name: shoulder}}
   - kind: hinge
     first: lower
     second: upper
     point: [1, 1, 0]
     axis: [0, 0, 2]
     limits: [-1, 2]
+    damping: 0.5
+    max_effort: 7
     motor: {{kind: position, target: {{times: [0, 1], values: [0, 0.5]}}, stiffness: 100, damping: 10, max_force: 8}}
   - {{kind: slider, first: slide, second: lower, axis: [1, 0, 0], motor: {{kind: velocity, target: 1, max_force: 30}}}}
   - {{kind: fixed, first: tool, second: slide}}
@@ -49,9 +51,9 @@ def test_a_scene_file_describes_joints(scene_file):
     assert [type(joint) for joint in run.scene.joints] == [sp.BallJoint, sp.HingeJoint, sp.SliderJoint, sp.FixedJoint]
     assert [joint.name for joint in run.scene.joints] == ["shoulder", "HingeJoint 1", "SliderJoint 1", "FixedJoint 1"]
     assert (elbow.first, elbow.second, elbow.axis.tolist(), elbow.limits) == ("lower", "upper", [0, 0, 1], (-1, 2))
-    assert (elbow.motor.at(0.5), elbow.motor.stiffness, elbow.motor.max_force) == (0.25, 100, 8)
+    assert (elbow.motor.at(0.5), elbow.motor.stiffness, elbow.motor.max_force) == (0.25, 100, 7)
     assert (slider.motor.at(0), slider.motor.max_force) == (1, 30)
-    assert (shoulder.second, fixed.point) == (None, None)
+    assert (shoulder.second, shoulder.max_swing, shoulder.axis.tolist(), fixed.point) == (None, 1, [1, 0, 0], None)
     data = read_yaml(scene_file).data
     Draft202012Validator(json_schema()).validate(data)
     again = scene_file.with_name("again.yaml")
@@ -65,8 +67,8 @@ def test_a_scene_file_describes_joints(scene_file):
         ("second: upper", "second: uper", ":10: joints[1].second: joint 'HingeJoint 1': there is no body or obstacle"),
         ("limits: [-1, 2]", "limits: [2, -1]", ":13: joints[1].limits: "),
         ("[0, 0, 2]", "[0, 0, 0]", ":12: joints[1].axis: "),
-        ("kind: velocity", "kind: speed", ":15: joints[2].motor"),
-        ("damping: 10", "damping: -1", ":14: joints[1].motor"),
+        ("kind: velocity", "kind: speed", ":17: joints[2].motor"),
+        ("damping: 10", "damping: -1", ":16: joints[1].motor"),
     ],
 )
 def test_bad_joints_are_refused_with_their_line(scene_file, old, new, problem):
@@ -80,8 +82,11 @@ def test_bad_joints_are_refused_with_their_line(scene_file, old, new, problem):
 def test_info_run_recording_and_check_know_joints(scene_file, tmp_path, capsys):
     main(["info", str(scene_file)])
     printed = " ".join(capsys.readouterr().out.split())
-    assert "HingeJoint of lower and upper, from -1 to 2, PositionMotor of at most 8" in printed
-    assert "BallJoint of upper and the world" in printed
+    assert (
+        "HingeJoint of lower and upper, from -1 to 2, PositionMotor of at most 7, damping 0.5, largest effort 7"
+        in printed
+    )
+    assert "BallJoint of upper and the world, swings by 1 rad at most" in printed
     out = tmp_path / "out"
     main(["run", str(scene_file), "-o", str(out), "--quiet"])
     with sp.read_recording(out / "recording.vtkhdf") as recording:

@@ -75,8 +75,8 @@ def test_a_robot_becomes_rigid_bodies_and_joints(robot_file, caplog):
     np.testing.assert_allclose(elbow.point, [0.4, 0, 1.12], atol=1e-12)  # along the turned z axis
     np.testing.assert_allclose(grip.axis, [0, 0, -1], atol=1e-12)
     assert (shoulder.limits, elbow.limits, grip.limits) == ((-1, 1.5), None, (0, 0.04))
-    assert (type(shoulder.motor), shoulder.motor.damping) == (sp.PositionMotor, 0.2)
-    assert (type(elbow.motor), elbow.motor.max_force) == (sp.VelocityMotor, 0.3)
+    assert (shoulder.damping, shoulder.friction, shoulder.max_effort, shoulder.motor) == (0.2, 0.0, 10.0, None)
+    assert (elbow.damping, elbow.friction, elbow.max_effort) == (0.0, 0.3, None)
     assert scene.gravity.tolist() == [0, 0, -9.81]
     for name in ("<transmission>", "<mimic> of joint 'grip'", "1 of the 2 collision geometries of link 'lower'"):
         assert name in caplog.text
@@ -104,7 +104,7 @@ def test_a_robot_runs_and_its_run_folder_has_a_scene_file(robot_file, tmp_path, 
     with sp.read_recording(tmp_path / "out" / "recording.vtkhdf") as recording:
         assert {str(status) for status in recording.statuses} == {"converged"}
         assert recording[-1].report.joints["shoulder"].violation < 1e-6
-        assert recording[-1].report.joints["elbow"].motor_force is not None
+        assert recording[-1].report.joints["elbow"].motor_force is None
     (written,) = (tmp_path / "out").rglob("scene.yaml")
     again = load_run(written).scene
     assert [joint.name for joint in again.joints] == ["mount", "shoulder", "elbow", "grip"]
@@ -158,6 +158,7 @@ BAD = {
     "limits exchanged": ARM.replace('lower="-1" upper="1.5"', 'lower="1.5" upper="-1"'),
     "limits without the start": ARM.replace('lower="-1" upper="1.5"', 'lower="0.5" upper="1.5"'),
     "NaN limit": ARM.replace('lower="-1"', 'lower="nan"'),
+    "negative effort": ARM.replace('effort="10"', 'effort="-1"'),
     "negative damping": ARM.replace('damping="0.2"', 'damping="-1"'),
     "no mass": ARM.replace('<mass value="2"/>', ""),
     "zero mass": ARM.replace('mass value="2"', 'mass value="0"'),

@@ -37,7 +37,7 @@ class ImplicitDetails(SolverDetails):
     orthogonality_errors : |F^T F - 1| of the rigid bodies, by name [-]
     joint_forces, joint_torques : of the joints on their first bodies, limits and motors included, by name, (3,) [N],
         and (3,) about the joint's point [N m]
-    joint_coordinates : angles of hinges [rad] and travels of sliders [m], by name
+    joint_coordinates : angles of hinges [rad], travels of sliders [m], swings of balls with limits [rad], by name
     motor_forces : efforts of the motors [N], [N m], by name of their joint
     joint_violations : how far each joint is from holding, as a share of the diameter of gyration of its smaller body
     weld_forces : of the rigid bodies on the soft ones that are welded to them, by name of the weld, (3,) [N]

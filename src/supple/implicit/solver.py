@@ -205,7 +205,7 @@ class Implicit(Solver):
             refuse_apart(workspace.joints, state)
         if workspace.contact is not None:
             workspace.contact.raise_if_intersecting(workspace.with_obstacles(state).positions, state.time)
-        workspace.checked = state.positions
+        workspace.checked = state
 
     def initial_details(self, system: System, workspace: Workspace) -> ImplicitDetails:
         """No iterations, and all forces zero; see `Solver.initial_details`."""
@@ -217,7 +217,7 @@ class Implicit(Solver):
             reaction_forces=reaction_forces(system, zero)[0],
             weld_forces=weld_forces(system, zero),
             orthogonality_errors=dict.fromkeys((part.name for part in system.rigid_bodies), 0.0),
-            **initial_joint_details(workspace.joints),
+            **initial_joint_details(workspace.joints, workspace.checked or system.start_states[-1]),
             seconds=dict.fromkeys((*PARTS, "other"), 0.0),
             **actuator_fields(system, *start_of(system)),
         )
@@ -230,7 +230,7 @@ class Implicit(Solver):
         SceneError, SolverError : see `check`, which is called here for a state that is not known to pass it.
         """
         workspace.tools.clock.restart()
-        if state.positions is not workspace.checked:
+        if workspace.checked is None or state.positions is not workspace.checked.positions:
             self.check(system, state, workspace)
         state = replace(state, internal=checked(system.laws.material, state.internal))
         n = len(state.positions)
@@ -272,7 +272,7 @@ class Implicit(Solver):
             substeps += 1
             substepping.advance()
         now = replace(now, positions=now.positions[:n], velocities=now.velocities[:n])
-        workspace.checked = now.positions
+        workspace.checked = now
         details = ImplicitDetails.of_rows(rows, substeps)
         nearest, contacts = None, None
         if last is not None:

@@ -19,7 +19,7 @@ class JointReading:
     ----------
     force : (3,) on its first body, that of its limits and its motor included [N]
     torque : (3,) about the joint's point, likewise [N m]
-    coordinate : angle of a hinge [rad], or travel of a slider [m]; None for other joints
+    coordinate : angle of a hinge [rad], travel of a slider [m], swing of a ball with a limit [rad]; otherwise None
     motor_force : effort of its motor, torque [N m] or force [N]; None without a motor
     violation : how far it is from holding, as a share of the diameter of gyration of its smaller body [-]
     """

@@ -26,6 +26,15 @@ class Ramp:
     first: NDArray[np.float64]
     last: NDArray[np.float64]
 
+    def straight(self, time: float) -> NDArray[np.float64]:
+        """The value at `time` [s] on the straight way from the first to the last."""
+        if time >= self.end:
+            return self.last
+        if time <= self.begin:
+            return self.first
+        share = (time - self.begin) / (self.end - self.begin)
+        return (1.0 - share) * self.first + share * self.last
+
 
 class Input(ABC):
     """A function of time whose values are set while the simulation runs.
@@ -91,13 +100,28 @@ class MotionInput(Input):
     """
 
     def __call__(self, time: float) -> NDArray[np.float64]:
-        ramp = self.ramp
-        if time >= ramp.end:
-            return ramp.last
-        if time <= ramp.begin:
-            return ramp.first
-        share = (time - ramp.begin) / (ramp.end - ramp.begin)
-        return (1.0 - share) * ramp.first + share * ramp.last
+        return self.ramp.straight(time)
+
+
+class MotorInput(Input):
+    """A target or an effort of motors, one number: positions go straight to the next one within a frame; see `Input`.
+
+    Parameters
+    ----------
+    name : by which it is set; value : at the start [rad], [m], [rad/s], [m/s], [N m] or [N]
+    """
+
+    def __init__(self, name: str, value: float = 0.0) -> None:
+        super().__init__(name, value)
+
+    def __call__(self, time: float) -> NDArray[np.float64]:
+        return self.ramp.straight(time)
+
+    def _array(self, value: ArrayLike) -> NDArray[np.float64]:
+        array = float_array(value, f"input {self.name!r}")
+        if array.shape != () or not np.isfinite(array):
+            raise SceneError(f"input {self.name!r} is {np.asarray(value).tolist()}; give one finite number")
+        return array
 
 
 class ForceInput(Input):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, TypeVar
@@ -19,7 +19,9 @@ from supple.scene.body import PlacedBody
 from supple.scene.contact_pairs import ContactPair, pair_table
 from supple.scene.forces import Force, SoftTarget
 from supple.scene.inputs import Input, inputs_among
+from supple.scene.joints.axis_joint import AxisJoint
 from supple.scene.joints.joint import Joint
+from supple.scene.joints.motors import Motor
 from supple.scene.joints.weld import Weld
 from supple.scene.joints.welding import Welding, weld_together
 from supple.scene.loads.load import Load
@@ -219,14 +221,21 @@ class Scene(Showable):
 
     @cached_property
     def inputs(self) -> dict[str, Input]:
-        """The inputs that move pins, soft targets and obstacles, and that are forces, by name.
+        """The inputs that move pins, soft targets and obstacles, and that are forces or drive motors, by name.
 
         Raises
         ------
         SceneError : where two of them have the same name.
         """
         moving = (*self.pins, *self.soft_targets, *self.obstacles)
-        return inputs_among([*(item.motion for item in moving), *(item.force for item in self.forces)])
+        forces = (item.force for item in self.forces)
+        return inputs_among([*(item.motion for item in moving), *forces, *(m.script for m in self.motors.values())])
+
+    @property
+    def motors(self) -> dict[str, Motor]:
+        """The motors of hinges and sliders, by name of the joint."""
+        driven = (joint for joint in self.joints if isinstance(joint, AxisJoint))
+        return {str(joint.name): joint.motor for joint in driven if joint.motor is not None}
 
     def with_own_inputs(self) -> Scene:
         """The same scene with copies of its inputs, or itself where it has none."""
@@ -243,7 +252,23 @@ class Scene(Showable):
             obstacles=[replace(one, motion=owned(one.motion)) for one in self.obstacles],
             forces=[replace(force, force=owned(force.force)) for force in self.forces],
             soft_targets=[replace(target, motion=owned(target.motion)) for target in self.soft_targets],
-        )
+        ).with_motors({name: motor.scripted(owned(motor.script)) for name, motor in self.motors.items()})
+
+    def with_motors(self, motors: Mapping[str, Motor | None]) -> Scene:
+        """The same scene with other motors of hinges and sliders, by name of the joint; None: no motor.
+
+        Raises
+        ------
+        SceneError : where no hinge or slider has a name.
+        """
+        with_axis = {joint.name: joint for joint in self.joints if isinstance(joint, AxisJoint)}
+        for name in motors:
+            if name not in with_axis:
+                raise SceneError(
+                    f"scene: no hinge or slider has the name {name!r}; {suggestion(name, list(with_axis))}"
+                )
+        changed = {name: replace(with_axis[name], motor=motor) for name, motor in motors.items()}
+        return replace(self, joints=[changed.get(str(joint.name), joint) for joint in self.joints])
 
     def body(self, name: str) -> PlacedBody:
         """The body of that name.

@@ -176,8 +176,85 @@ def test_motors_reach_their_targets_and_never_exceed_their_maximum_and_limits_ho
 
 def test_a_velocity_motor_gives_its_rate_over_many_turns():
     frames = run(sp.Scene([bar()], joints=[hinge(axis=(0, 1, 0), motor=sp.VelocityMotor(30.0))]), 0.01, 50)
-    angles = np.unwrap([frame.report.joints["hinge"].coordinate for frame in frames])
+    angles = [frame.report.joints["hinge"].coordinate for frame in frames]
     np.testing.assert_allclose(angles, 0.3 * np.arange(1, 51), atol=1e-5)
+
+
+def test_limits_and_motors_count_whole_turns():
+    """A motor winds a hinge up to its limit after almost three turns; a run continues there with the same bits."""
+    upright = {"axis": (0, 1, 0), "limits": (-1.0, 18.0)}
+    scene = sp.Scene([bar()], joints=[hinge(**upright, motor=sp.VelocityMotor(60.0, max_force=1e4))])
+    solver = sp.Implicit(contact=None)
+    frames = run(scene, 0.01, 40)
+    angles = np.array([frame.report.joints["hinge"].coordinate for frame in frames])
+    assert angles[28] == pytest.approx(29 * 0.6, abs=1e-5)
+    np.testing.assert_allclose(angles[30:], 18.0, atol=1e-6)
+    assert frames[-1].state.hinge_angles == {"hinge": angles[-1]}
+    rest = list(sp.simulate(scene, solver, 0.01, 1, start=frames[-2]))
+    np.testing.assert_array_equal(rest[-1].state.positions, frames[-1].state.positions)
+    # A position motor goes back all the way.
+    back = sp.Scene([bar()], joints=[hinge(**upright, motor=sp.PositionMotor(1.0, 400.0, 80.0))])
+    first, *_, last = sp.simulate(back, solver, 0.05, 60, start=frames[-1].state)
+    assert first.report.joints["hinge"].coordinate < 18.0 - 1e-2
+    assert last.report.joints["hinge"].coordinate == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("values", "end"),
+    [
+        ({"damping": 40.0}, None),
+        ({"friction": 13.0}, 0.0),
+        ({"friction": 10.0}, LIMITS[0]),
+        ({"motor": sp.VelocityMotor(0.0), "max_effort": 10.0}, LIMITS[0]),
+        ({"motor": sp.ForceMotor(20.0, max_force=30.0), "max_effort": 15.0}, LIMITS[1]),
+        ({"motor": sp.ForceMotor(13.0), "friction": 2.0}, 0.0),
+    ],
+)
+def test_damping_friction_and_the_largest_effort_of_a_joint(values, end):
+    """The weight turns the hinge with 12.26 N m; a damped one goes with 12.26 / 40 rad/s after a while."""
+    frames = run(sp.Scene([bar()], joints=[hinge(limits=LIMITS, **values)]), 0.01, 60 if end else 10)
+    readings = [frame.report.joints["hinge"] for frame in frames]
+    if end is not None:
+        assert readings[-1].coordinate == pytest.approx(end, abs=1e-5)
+        assert (readings[-1].motor_force is None) == ("motor" not in values)
+        assert max(abs(one.motor_force or 0.0) for one in readings) <= 15.0
+        return
+    # Backward Euler: q' = -(12.26 / d) (1 - (1 + d h / I)^-n), as long as the arm is horizontal.
+    rate = (readings[9].coordinate - readings[8].coordinate) / 0.01
+    inertia = bar().properties.inertia[2, 2] + 0.25 * MASS
+    exact = -MASS * G * 0.5 / 40.0 * (1.0 - (1.0 + 0.4 / inertia) ** -10)
+    assert rate == pytest.approx(exact, rel=0.005)
+
+
+def test_a_program_drives_motors_by_inputs():
+    motor = sp.PositionMotor(sp.MotorInput("elbow"), stiffness=2000.0, damping=200.0)
+    scene = sp.Scene([bar()], joints=[hinge()], gravity=(0, 0, 0)).with_motors({"hinge": motor})
+    assert set(scene.inputs) == {"elbow"}
+    frames = sp.simulate(scene, sp.Implicit(contact=None), 0.01, 60, control=lambda frame: {"elbow": 0.4})
+    assert list(frames)[-1].report.joints["hinge"].coordinate == pytest.approx(0.4, abs=1e-3)
+    own = scene.with_own_inputs()
+    assert own.motors["hinge"].script is not motor.script
+    assert own.motors["hinge"].stiffness == 2000.0
+    assert scene.with_motors({"hinge": None}).motors == {}
+    with pytest.raises(sp.SceneError, match="no hinge or slider has the name 'hing'; did you mean 'hinge'"):
+        scene.with_motors({"hing": None})
+    with pytest.raises(sp.SceneError, match=r"input 'elbow' is \[1.0, 2.0\]; give one finite number"):
+        sp.MotorInput("elbow", [1.0, 2.0])
+
+
+def test_the_swing_of_a_ball_is_limited():
+    """A bar that falls from the horizontal stops at its cone, about which it may turn."""
+    joint = sp.BallJoint("bar", point=(0, 0, 0), axis=(1, 0, 0), max_swing=0.5, name="ball")
+    frames = run(sp.Scene([bar(angular_velocity=(3, 0, 0))], joints=[joint]), 0.01, 80)
+    swings = np.array([frame.report.joints["ball"].coordinate for frame in frames])
+    directions = np.array([frame.poses["bar"].rotation[:, 0] for frame in frames])
+    np.testing.assert_allclose(swings, np.arccos(directions[:, 0]), atol=1e-4)
+    assert swings.max() < 0.5 + 1e-6
+    assert swings[-1] == pytest.approx(0.5, abs=1e-6)
+    assert np.einsum("ij,ij->i", frames[-1].poses["bar"].rotation, frames[0].poses["bar"].rotation).sum() < 2.0
+    # At rest on the cone: the weight's torque about the joint is carried by the limit.
+    torque = frames[-1].report.joints["ball"].torque
+    assert torque @ (0, 0, 1) == pytest.approx(MASS * G * 0.5 * directions[-1, 0], rel=0.02)
 
 
 def test_a_joint_follows_an_obstacle():
@@ -214,6 +291,9 @@ def test_coordinates_are_measured_from_where_the_scene_places_the_bodies():
     turned = body.place(body.points) @ rotation_matrix((0, 0, 3.5)).T
     state = initial_state(scene, {"bar": turned})
     assert coordinates_at(JointGeometry.of(build_system(scene)), state) == pytest.approx([3.5])
+    for limits, angle in (((0.0, 10.0), 3.5), ((-9.0, -2.0), -2.783), (None, -2.783), ((8, 12), 9.783)):
+        geometry = JointGeometry.of(build_system(sp.Scene([body], joints=[hinge(limits=limits)])))
+        assert coordinates_at(geometry, state) == pytest.approx([angle], abs=1e-3)
 
 
 SOFT = sp.Body("soft", sp.shapes.box((0.1, 0.1, 0.1), (1, 1, 1)), sp.StableNeoHookean(youngs=1e5, poisson=0.3))
@@ -225,15 +305,17 @@ SOFT = sp.Body("soft", sp.shapes.box((0.1, 0.1, 0.1), (1, 1, 1)), sp.StableNeoHo
         (lambda: hinge(second="bar"), "joint 'hinge': it joins body 'bar' to itself"),
         (lambda: hinge(axis=(0, 0, 0)), "joint 'hinge': axis has no length"),
         (lambda: hinge(limits=(1, -1)), "limits are (1, -1), and the first is not below the second"),
-        (lambda: hinge(limits=(-4, 4)), "at most 6.183 rad apart"),
-        (lambda: hinge(limits=(-4, np.inf)), "at most 6.183 rad apart"),
         (lambda: hinge(limits=3), "give two numbers (low, high)"),
         (lambda: hinge(motor=3.0), "motor is 3.0; give PositionMotor"),
         (lambda: sp.BallJoint("bar"), "there is no point"),
+        (lambda: sp.BallJoint("bar", point=(0, 0, 0), axis=(1, 0, 0)), "a limit needs both axis and max_swing"),
+        (lambda: sp.BallJoint("bar", point=(0, 0, 0), axis=(1, 0, 0), max_swing=3.2), "give one from 0.01 to 3.132"),
         (lambda: sp.BallJoint("bar", point=(0, 0)), "point has shape (2,)"),
         (lambda: sp.PositionMotor(1.0, stiffness=0.0), "stiffness and damping are both zero"),
         (lambda: sp.PositionMotor(1.0, stiffness=-1.0), "PositionMotor: stiffness is -1"),
         (lambda: sp.VelocityMotor(1.0, max_force=0.0), "VelocityMotor: max_force is 0; it must be above zero"),
+        (lambda: hinge(damping=-1.0), "joint 'hinge': damping is -1"),
+        (lambda: hinge(max_effort=0.0), "joint 'hinge': max_effort is 0; it must be above zero"),
         (lambda: sp.ForceMotor((1, 2, 3)), "ForceMotor: force has shape (3,)"),
         (lambda: sp.Scene([bar()], joints=[hinge("bat")]), "there is no body 'bat'; did you mean 'bar'?"),
         (lambda: sp.Scene([bar()], joints=[hinge(second="x")]), "there is no body or obstacle 'x'"),

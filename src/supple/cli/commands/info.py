@@ -220,6 +220,7 @@ def _frame_time(run: Run) -> str:
 
 def _joint_text(joint: Joint) -> str:
     from supple.scene.joints.axis_joint import AxisJoint
+    from supple.scene.joints.ball_joint import BallJoint
 
     text = f"{type(joint).__name__} of {joint.first} and {joint.second or 'the world'}"
     if isinstance(joint, AxisJoint):
@@ -228,6 +229,10 @@ def _joint_text(joint: Joint) -> str:
         if joint.motor is not None:
             bound = "" if joint.motor.max_force is None else f" of at most {joint.motor.max_force:g}"
             text += f", {joint.motor.label}{bound}"
+        given = {"damping": joint.damping, "friction": joint.friction, "largest effort": joint.max_effort}
+        text += "".join(f", {key} {value:g}" for key, value in given.items() if value)
+    elif isinstance(joint, BallJoint) and joint.max_swing is not None:
+        text += f", swings by {joint.max_swing:g} rad at most"
     return text
 
 

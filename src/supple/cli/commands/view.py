@@ -6,7 +6,7 @@ from pathlib import Path
 
 from supple.cli.live import Host, Open, Port, UseToken
 
-SCENE_FILES = (".yaml", ".yml")
+SCENE_FILES = (".yaml", ".yml", ".urdf")
 RECORDINGS = (".vtkhdf", ".hdf", ".h5")
 
 
@@ -28,7 +28,7 @@ def view(
     Parameters
     ----------
     source
-        A scene file (.yaml), or a recording (.vtkhdf, or the folder that holds it).
+        A scene file (.yaml), a robot (.urdf), or a recording (.vtkhdf, or the folder that holds it).
     solver
         Kind of solver, instead of the file's, with its default parameters.
     host

@@ -1,6 +1,7 @@
 """The nonlinear functions of joints: of three vectors a, b and d each, with derivatives in closed form.
 
-A product is a . b. An angle is atan2(s, c) with s = a . d and c = a . b; with n = s^2 + c^2 its derivatives are
+A product, or a cosine, is a . b. An angle is atan2(s, c) with s = a . d and c = a . b; with n = s^2 + c^2 its
+derivatives are
 
     (c ds - s dc) / n,
     (c dds - s ddc) / n + ((s^2 - c^2) (ds dc + dc ds) + 2 s c (dc dc - ds ds)) / n^2.

@@ -20,6 +20,7 @@ of hinges and sliders, are functions of two or three such vectors, a, b and d:
              its travel is r . e for the axis e of the second
     hinge    its angle is atan2(a . d, a . b), with a direction a of the first across the axis, which was b of the
              second at angle zero, and d = axis x b of the second
+    ball     with a limit, the cosine a . b of its swing, with the axes a of the first and b of the second
 
 Source: Lan et al., "Affine Body Dynamics" (2022), section 5, for joints that are linear in affine coordinates.
 """
@@ -39,7 +40,7 @@ from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.rotation import rotation_matrix
 from supple.system import System
 
-ANGLE, PRODUCT = 0, 1
+ANGLE, PRODUCT, COSINE = 0, 1, 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +88,10 @@ class JointGeometry:
     stiffness : (j,) of the smaller body against strain [N/m]; masses : (j,) of the lighter one [kg]
     centers : where forces are reduced to, the joint's points
     differences : of the two sides, all of which vanish
-    functions : (s,) `ANGLE` or `PRODUCT` (a . b); triples : their vectors a, b and d
-    across, along : rows of `functions` that vanish; and the one that is each joint's coordinate, or -1
+    functions : (s,) `ANGLE`, `PRODUCT` (a . b) or `COSINE` (a . b); triples : their vectors a, b and d
+    units : (s,) changes of the functions that count as much as a motion by the joint's size
+    across, along : rows of `functions` that vanish; and the one that gives each joint's coordinate, or -1
+    limits : (j, 2) of the functions of `along`, infinite where there are none
     """
 
     joints: tuple[Joint, ...]
@@ -102,8 +105,10 @@ class JointGeometry:
     differences: Vectors
     functions: NDArray[np.int64]
     triples: tuple[Vectors, Vectors, Vectors]
+    units: NDArray[np.float64]
     across: NDArray[np.int64]
     along: NDArray[np.int64]
+    limits: NDArray[np.float64]
 
     @classmethod
     def of(cls, system: System) -> JointGeometry:
@@ -111,7 +116,8 @@ class JointGeometry:
         sides = [(_Side(system, one, one.first, 0), _Side(system, one, one.second, 4)) for one in system.scene.joints]
         centers, differences, functions = [], [], []
         triples: tuple[list, list, list] = ([], [], [])
-        across, along = [], np.full(len(sides), -1)
+        units, across, along = [], [], np.full(len(sides), -1)
+        limits = np.tile([-np.inf, np.inf], (len(sides), 1))
         for j, (joint, (first, second)) in enumerate(zip(system.scene.joints, sides, strict=True)):
             body = system.scene.body(joint.first)
             assert isinstance(body, RigidBody)
@@ -126,18 +132,26 @@ class JointGeometry:
                 differences.append((j, turned[0]))
             elif not isinstance(joint, BallJoint):
                 differences += [(j, one) for one in turned]
-            if isinstance(joint, AxisJoint):
+            rows = []
+            if isinstance(joint, HingeJoint):
+                vectors = first.direction(axes[1]), second.direction(axes[1]), second.direction(axes[2])
+                rows = [(ANGLE, 1.0, vectors)]
+            elif isinstance(joint, SliderJoint):
+                rows = [(PRODUCT, size, (apart, second.direction(e), second.direction(e))) for e in axes]
+                across += [len(functions) + 1, len(functions) + 2]
+            elif isinstance(joint, BallJoint) and joint.max_swing is not None:
+                vectors = first.direction(axes[0]), second.direction(axes[0]), second.direction(axes[0])
+                rows = [(COSINE, np.sin(joint.max_swing), vectors)]
+                limits[j, 0] = np.cos(joint.max_swing)
+            if isinstance(joint, AxisJoint) and joint.limits is not None:
+                limits[j] = joint.limits
+            if rows:
                 along[j] = len(functions)
-                if isinstance(joint, HingeJoint):
-                    vectors = first.direction(axes[1]), second.direction(axes[1]), second.direction(axes[2])
-                    rows = [(ANGLE, vectors)]
-                else:
-                    rows = [(PRODUCT, (apart, second.direction(e), second.direction(e))) for e in axes]
-                    across += [len(functions) + 1, len(functions) + 2]
-                for kind, vectors in rows:
-                    functions.append(kind)
-                    for column, vector in zip(triples, vectors, strict=True):
-                        column.append((j, vector))
+            for kind, unit, vectors in rows:
+                functions.append(kind)
+                units.append(unit)
+                for column, vector in zip(triples, vectors, strict=True):
+                    column.append((j, vector))
         return cls(
             joints=tuple(system.scene.joints),
             system=system,
@@ -150,8 +164,10 @@ class JointGeometry:
             differences=Vectors.of(differences),
             functions=np.array(functions, dtype=np.int64),
             triples=(Vectors.of(triples[0]), Vectors.of(triples[1]), Vectors.of(triples[2])),
+            units=np.array(units, dtype=np.float64),
             across=np.array(across, dtype=np.int64),
             along=along,
+            limits=limits,
         )
 
     def poses(self, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -224,7 +240,8 @@ def _corners(first: _Side, second: _Side) -> NDArray[np.int64]:
 
 def _axes(joint: Joint) -> NDArray[np.float64]:
     """Three perpendicular unit vectors (rows), right-handed; the first is the joint's axis."""
-    e = np.asarray(joint.axis) if isinstance(joint, AxisJoint) else np.array([1.0, 0.0, 0.0])
+    given = joint.axis if isinstance(joint, AxisJoint | BallJoint) else None
+    e = np.array([1.0, 0.0, 0.0]) if given is None else np.asarray(given)
     across = np.cross(e, np.eye(3)[np.argmin(np.abs(e))])
     across /= np.linalg.norm(across)
     return np.array([e, across, np.cross(e, across)])

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from supple.errors import SceneError
 from supple.implicit.details import ImplicitDetails
 from supple.implicit.joints.functions import values
-from supple.implicit.joints.geometry import ANGLE, JointGeometry
-from supple.implicit.joints.laws import laws_of, near_limits
+from supple.implicit.joints.geometry import ANGLE, COSINE, PRODUCT, JointGeometry
+from supple.implicit.joints.laws import followed, laws_of
 from supple.implicit.joints.potential import JointPotential
 from supple.implicit.newton.minimize import Outcome
 from supple.scene.joints.axis_joint import AxisJoint
@@ -102,9 +102,7 @@ class JointStep:
         if laws.adapts.any():
             missing = np.abs(potential.efforts(x) - potential.law_multipliers)[laws.adapts] / laws.k[laws.adapts]
             function = laws.function[laws.adapts]
-            joint = geometry.triples[0].joint[function]
-            size = np.where(geometry.functions[function] == ANGLE, 1.0, geometry.sizes[joint])
-            np.maximum.at(out, joint, missing / size)
+            np.maximum.at(out, geometry.triples[0].joint[function], missing / geometry.units[function])
         return out
 
     def measured(self, details: ImplicitDetails, x: NDArray[np.float64]) -> ImplicitDetails:
@@ -112,7 +110,7 @@ class JointStep:
         geometry, potential = self.geometry, self.potential
         forces, torques = potential.actions(x)
         names = [str(joint.name) for joint in geometry.joints]
-        g, efforts = near_limits(geometry, potential.coordinates(x)), potential.efforts(x)
+        efforts = potential.efforts(x)
         along = {name: int(row) for name, row in zip(names, geometry.along, strict=True) if row >= 0}
         laws = potential.laws
         motors = {int(laws.function[k]): -float(efforts[k]) for k in np.flatnonzero(laws.is_motor)}
@@ -120,30 +118,42 @@ class JointStep:
             details,
             joint_forces=dict(zip(names, forces, strict=True)),
             joint_torques=dict(zip(names, torques, strict=True)),
-            joint_coordinates={name: float(g[row]) for name, row in along.items()},
+            joint_coordinates=reported(geometry, potential.coordinates(x)),
             motor_forces={name: motors[row] for name, row in along.items() if row in motors},
             joint_violations=dict(zip(names, map(float, self.violations(x)), strict=True)),
         )
 
+    def hinge_angles(self, x: NDArray[np.float64]) -> dict[str, float]:
+        """As of `State`, of positions x (n, 3)."""
+        g, geometry = self.potential.coordinates(x), self.geometry
+        rows = zip(geometry.joints, geometry.along, strict=True)
+        return {str(joint.name): float(g[row]) for joint, row in rows if row >= 0 and geometry.functions[row] == ANGLE}
 
-def initial_joint_details(geometry: JointGeometry | None) -> dict[str, Any]:
-    """The entries of `ImplicitDetails` before any step: no forces."""
+
+def initial_joint_details(geometry: JointGeometry | None, start: State) -> dict[str, Any]:
+    """The entries of `ImplicitDetails` at a start: no forces."""
     if geometry is None:
         return {}
     names = [str(joint.name) for joint in geometry.joints]
-    with_axis = {str(joint.name): joint for joint in geometry.joints if isinstance(joint, AxisJoint)}
-    driven = [name for name, joint in with_axis.items() if joint.motor is not None]
+    driven = [str(one.name) for one in geometry.joints if isinstance(one, AxisJoint) and one.motor is not None]
     return {
         "joint_forces": {name: np.zeros(3) for name in names},
         "joint_torques": {name: np.zeros(3) for name in names},
-        "joint_coordinates": dict.fromkeys(with_axis, 0.0),
+        "joint_coordinates": reported(geometry, coordinates_at(geometry, start)),
         "motor_forces": dict.fromkeys(driven, 0.0),
         "joint_violations": dict.fromkeys(names, 0.0),
     }
 
 
+def reported(geometry: JointGeometry, g: NDArray[np.float64]) -> dict[str, float]:
+    """The coordinates of joints that have one, by name, of values g (s,) of the functions."""
+    g = np.where(geometry.functions == COSINE, np.arccos(np.clip(g, -1.0, 1.0)), g)
+    rows = zip(geometry.joints, geometry.along, strict=True)
+    return {str(joint.name): float(g[row]) for joint, row in rows if row >= 0}
+
+
 def coordinates_at(geometry: JointGeometry, state: State) -> NDArray[np.float64]:
-    """(s,) the functions' values at a state, angles near their limits."""
+    """(s,) the functions' values at a state, angles over all turns."""
     poses = geometry.poses(state.time)
     corners = state.positions[geometry.corners]
     triples = np.stack(
@@ -153,7 +163,7 @@ def coordinates_at(geometry: JointGeometry, state: State) -> NDArray[np.float64]
         ],
         axis=1,
     )
-    return near_limits(geometry, values(geometry.functions, triples))
+    return followed(geometry, values(geometry.functions, triples), state.hinge_angles, _APART)
 
 
 def refuse_apart(geometry: JointGeometry, state: State) -> None:
@@ -176,12 +186,13 @@ def refuse_apart(geometry: JointGeometry, state: State) -> None:
             raise SceneError(
                 f"{joint.label}: at the start it is off by {off[j]:.3g} m; start both sides where the joint holds"
             )
-        if isinstance(joint, AxisJoint) and joint.limits is not None:
-            unit = "rad" if geometry.functions[geometry.along[j]] == ANGLE else "m"
-            here, (low, high) = float(g[geometry.along[j]]), joint.limits
-            slack = _APART * (1.0 if unit == "rad" else geometry.sizes[j])
-            if not low - slack <= here <= high + slack:
-                raise SceneError(
-                    f"{joint.label}: at the start it is at {here:.4g} {unit}, outside of its limits ({low:g}, "
-                    f"{high:g}); give limits that contain it"
-                )
+        row, (low, high) = int(geometry.along[j]), geometry.limits[j]
+        slack = _APART * geometry.units[row] if row >= 0 else 0.0
+        if row >= 0 and not low - slack <= g[row] <= high + slack:
+            here = reported(geometry, g)[str(joint.name)]
+            unit = "m" if geometry.functions[row] == PRODUCT else "rad"
+            given = f"({low:g}, {high:g})" if isinstance(joint, AxisJoint) else f"(0, {np.arccos(low):g})"
+            raise SceneError(
+                f"{joint.label}: at the start it is at {here:.4g} {unit}, outside of its limits {given}; "
+                "give limits that contain it"
+            )

@@ -5,9 +5,9 @@ Each is an energy psi of one number g whose derivative is a line that is cut off
     psi'(g) = clip(lambda + k (g - g0), low, high).
 
 A condition g = g0 has no ends, with the multiplier lambda; a limit pushes in one direction only; a motor that is to
-reach a velocity has g0 = g_n + h v, and its largest force as ends. Their multipliers are updated until the line gives
-the force that is needed at g0 (the method of multipliers). Where a motor has a stiffness K and a damping D, the line is
-that of an implicit step of h,
+reach a velocity has g0 = g_n + h v, and its largest force as ends, as dry friction has with v = 0. Their multipliers
+are updated until the line gives the force that is needed at g0 (the method of multipliers). Where a motor has a
+stiffness K and a damping D, the line is that of an implicit step of h,
 
     K (g - target) + D ((g - g_n) / h - v) = lambda + (K + D / h) (g - g_n),    lambda = K (g_n - target) - D v,
 
@@ -18,7 +18,7 @@ Source: Nocedal, Wright, "Numerical Optimization" (2006), section 17.4.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -28,6 +28,8 @@ from numpy.typing import NDArray
 from supple.implicit.joints.geometry import ANGLE, JointGeometry
 from supple.scene.joints.axis_joint import AxisJoint
 from supple.scene.joints.motors import ForceMotor, Motor, PositionMotor, VelocityMotor
+
+TURN = 2.0 * np.pi
 
 
 class Law(NamedTuple):
@@ -88,18 +90,27 @@ class Laws:
 
 def wrapped(angle: NDArray[np.float64]) -> NDArray[np.float64]:
     """The angle within half a turn of zero [rad]."""
-    return angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
+    return angle - TURN * np.round(angle / TURN)
 
 
-def near_limits(geometry: JointGeometry, g: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values (s,) of the functions, with angles within half a turn of the middle of their joint's limits."""
+def followed(
+    geometry: JointGeometry, g: NDArray[np.float64], known: Mapping[str, float], slack: float
+) -> NDArray[np.float64]:
+    """Values (s,) of the functions, with angles over all turns: near those that are known [rad], by name of the joint.
+
+    Others are at a start: of the angles between the limits, up to `slack` [rad], that nearest to zero.
+    """
     out = g.copy()
     for j, joint in enumerate(geometry.joints):
         row = geometry.along[j]
-        if row >= 0 and geometry.functions[row] == ANGLE:
-            limits = joint.limits if isinstance(joint, AxisJoint) and joint.limits is not None else (0.0, 0.0)
-            middle = 0.5 * (limits[0] + limits[1])
-            out[row] = middle + float(wrapped(np.asarray(g[row] - middle)))
+        if row < 0 or geometry.functions[row] != ANGLE:
+            continue
+        near = known.get(str(joint.name))
+        out[row] = wrapped(g[row]) if near is None else near + wrapped(g[row] - near)
+        below, above = geometry.limits[j] + (-slack, slack) - out[row]
+        if near is None and not below <= 0.0 <= above:
+            turns = np.ceil(below / TURN) if below > 0.0 else np.floor(above / TURN)
+            out[row] += TURN * turns if below <= TURN * turns <= above else 0.0
     return out
 
 
@@ -115,24 +126,27 @@ def laws_of(
 
     Parameters
     ----------
-    stiffness : (j,) k of conditions, of each joint [N/m]; start : (s,) values at the beginning, see `near_limits`
+    stiffness : (j,) k of conditions, of each joint [N/m]; start : (s,) values at the beginning, see `followed`
     times : begin and end of the step [s]; moving : whether rates count; without them, as in equilibrium, motors do not
         damp
     """
     laws = [Law(int(row), float(stiffness[geometry.triples[0].joint[row]]), 0.0) for row in geometry.across]
-    for j, joint in enumerate(geometry.joints):
+    for j, (joint, (low, high)) in enumerate(zip(geometry.joints, geometry.limits.tolist(), strict=True)):
+        row = int(geometry.along[j])
+        if row < 0:
+            continue
+        k = float(stiffness[j] * (geometry.sizes[j] / geometry.units[row]) ** 2)
+        laws += [Law(row, k, low, high=0.0)] if np.isfinite(low) else []
+        laws += [Law(row, k, high, low=0.0)] if np.isfinite(high) else []
         if not isinstance(joint, AxisJoint):
             continue
-        row = int(geometry.along[j])
-        k = float(stiffness[j]) * (geometry.sizes[j] ** 2 if geometry.functions[row] == ANGLE else 1.0)
-        if joint.limits is not None:
-            low, high = joint.limits
-            laws += [Law(row, k, low, high=0.0)] if np.isfinite(low) else []
-            laws += [Law(row, k, high, low=0.0)] if np.isfinite(high) else []
+        here = float(start[row])
+        if joint.damping > 0.0 and moving:
+            laws.append(Law(row, joint.damping / (times[1] - times[0]), here, adapts=False))
+        if joint.friction > 0.0 and moving:
+            laws.append(Law(row, k, here, -joint.friction, joint.friction))
         if joint.motor is not None:
-            angle = geometry.functions[row] == ANGLE
-            limits = joint.limits or (-np.inf, np.inf)
-            laws.append(_motor_law(joint.motor, row, k, float(start[row]), times, limits, angle=angle, moving=moving))
+            laws.append(_motor_law(joint.motor, row, k, here, times, (low, high), moving=moving))
     return Laws.of(laws)
 
 
@@ -144,7 +158,6 @@ def _motor_law(
     times: tuple[float, float],
     limits: tuple[float, float],
     *,
-    angle: bool,
     moving: bool,
 ) -> Law:
     h = times[1] - times[0]
@@ -157,11 +170,8 @@ def _motor_law(
         return Law(row, k, end, -bound, bound, is_motor=True)
     assert isinstance(motor, PositionMotor)
     target = motor.at(times[1])
-    ahead = start - target
-    if angle:
-        ahead = float(wrapped(np.asarray(ahead)))
     rate = (target - motor.at(times[0])) / h if moving else 0.0
     damping = motor.damping if moving else 0.0
-    multiplier = motor.stiffness * ahead - damping * rate
+    multiplier = motor.stiffness * (start - target) - damping * rate
     stiffness = motor.stiffness + damping / h
     return Law(row, stiffness, start, -bound, bound, multiplier, adapts=False, is_motor=True)

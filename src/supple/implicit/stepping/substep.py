@@ -143,7 +143,8 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     if joints is not None:
         outcome = joints.verified(outcome)
     internal = workspace.elasticity.flowed(x, state.internal, h)
-    after = State(end, x, plan.velocity(x), plan.memory, internal=internal)
+    angles = {} if joints is None else joints.hinge_angles(x)
+    after = State(end, x, plan.velocity(x), plan.memory, internal=internal, hinge_angles=angles)
     residual = plan.place * outcome.end.gradient
     after = settings.integrator.finish(plan, state, after, residual, workspace.conservation)
     if plan.place != 1.0 and system.rigid_bodies and outcome.status is Status.CONVERGED:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from supple.contact.obstacle_vertices import obstacle_positions
 from supple.implicit.contact.model import ContactModel
@@ -29,7 +28,7 @@ class Workspace:
     ----------
     system : with the obstacles' vertices after the bodies'
     diagonal : of the smallest body's bounding box at rest [m]
-    checked : the positions that `Implicit.check` has accepted, or that the latest step ended with
+    checked : the state that `Implicit.check` has accepted, or that the latest step ended with
     """
 
     system: System
@@ -43,7 +42,7 @@ class Workspace:
     stitch_viscosity: StitchViscosity | None
     quadratic_viscosity: QuadraticViscosity | None
     joints: JointGeometry | None
-    checked: NDArray[np.float64] | None = None
+    checked: State | None = None
     conservation: Conservation = field(init=False)
 
     def __post_init__(self) -> None:

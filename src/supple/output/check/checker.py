@@ -9,6 +9,7 @@ import numpy as np
 
 from supple.output.check.checks.budgets import Energy, Momentum, Spin
 from supple.output.check.checks.contact import Containment, Distance, Intersection, Obstacles
+from supple.output.check.checks.joints import Joints
 from supple.output.check.checks.plain_values import CONSTANTS, Converged, Finite, Sequence
 from supple.output.check.checks.records import Records
 from supple.output.check.checks.rigidity import Rigidity
@@ -33,6 +34,7 @@ CHECKS: tuple[type[FrameCheck], ...] = (
     Distance,
     Rigidity,
     Welds,
+    Joints,
     Volume,
     Momentum,
     Spin,

@@ -21,6 +21,7 @@ NAMES = {
     "distance": "the distance of surfaces is above zero",
     "rigidity": "rigid bodies are neither deformed nor mirrored",
     "welds": "welded vertices stay in their places on rigid bodies",
+    "joints": "joints hold, within their limits; motors stay within their largest effort",
     "volume": "nearly incompressible bodies keep at least half of their volume",
     "momentum": "without loads, momentum changes by gravity alone",
     "spin": "without loads, angular momentum about the center of mass does not grow",
@@ -41,6 +42,8 @@ class CheckSettings:
         with a Poisson's ratio of 0.45 or more, unlimited for others.
     max_orthogonality_error : |F^T F - 1| that a rigid body may have [-].
     max_weld_error : how far a welded vertex may be from its place on the rigid body, over that body's size [-].
+    max_joint_error : how far a joint may be from holding, over the diameter of gyration of its smaller body, and in
+        radians [-]. None: 1e-6 for recordings of `Implicit`, 1e-3 for others.
     max_energy_gain : how far the energy may exceed that at the start, as a share of the energy in motion.
     max_momentum_change : how far momenta may change without a force, as a share of the momentum present.
 
@@ -55,6 +58,7 @@ class CheckSettings:
     max_volume_change: float | None = None
     max_orthogonality_error: float = 0.01
     max_weld_error: float = 1e-9
+    max_joint_error: float | None = None
     max_energy_gain: float = 0.05
     max_momentum_change: float = 1e-6
 
@@ -65,7 +69,7 @@ class CheckSettings:
         if isinstance(self.every, bool) or not isinstance(self.every, (int, np.integer)) or self.every < 1:
             raise OutputError(f"check: every is {self.every!r}; give a whole number of one or more")
         shares = ("max_orthogonality_error", "max_weld_error", "max_energy_gain", "max_momentum_change")
-        for key in ("max_volume_change", *shares):
+        for key in ("max_volume_change", "max_joint_error", *shares):
             value = getattr(self, key)
             if value is not None and not (isinstance(value, (int, float)) and value >= 0.0):
                 raise OutputError(f"check: {key} is {value!r}; give a number of zero or more")

@@ -148,6 +148,8 @@ def _is_a_state(state: object, like: State) -> bool:
         isinstance(state, State)
         and isinstance(state.time, float)
         and isinstance(state.inputs, dict)
+        and isinstance(state.hinge_angles, dict)
+        and all(isinstance(angle, float) for angle in state.hinge_angles.values())
         and isinstance(state.internal, np.ndarray)
         and state.internal.dtype == np.float64
         and state.internal.ndim == 2

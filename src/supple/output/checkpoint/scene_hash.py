@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from supple.errors import SuppleError
 from supple.loads.applied import AppliedLoad
 from supple.scene.inputs import Input
-from supple.scene.joints.axis_joint import AxisJoint
 from supple.system import System
 
 # Functions of time cannot be read; their values at so many times of a run are taken instead.
@@ -36,9 +35,8 @@ def scene_hash(system: System, begin: float, duration: float) -> str:
             _add(digest, _forces_of(load, system, time) if _is_script(force.force) else None)
         for load in system.loads[len(system.scene.forces) :]:
             _add(digest, _forces_of(load, system, time))
-        for joint in system.scene.joints:
-            motor = joint.motor if isinstance(joint, AxisJoint) else None
-            _add(digest, motor.at(time) if motor is not None and callable(motor.script) else None)
+        for motor in system.scene.motors.values():
+            _add(digest, motor.at(time) if _is_script(motor.script) else None)
         for actuator in system.actuators:
             _add(digest, actuator.law.reached(time, actuator.start, 1.0))
         for target in system.soft_targets:

@@ -20,6 +20,7 @@ from supple.materials.material import Hyperelastic
 from supple.materials.per_tet import BY_LAW, NO_REGION, NOT_ELASTIC, LawTets
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.output.recording.checked_hdf5 import CheckedFile
+from supple.output.recording.joints import joints_of
 from supple.scene.contact_pairs import pair_table
 from supple.scene.joints.axis_joint import AxisJoint
 from supple.system import System
@@ -112,6 +113,7 @@ def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
         "patches": bool((region != NO_REGION).any()),
         "untouching": _untouching(system),
         "welds": _welds(system),
+        "joints": [joint.described() for joint in joints_of(system)],
     }
 
 

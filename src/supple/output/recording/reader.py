@@ -18,6 +18,7 @@ from supple.materials.flows.internal import NEVER_FLOWED
 from supple.output.recording.checked_hdf5 import CheckedFile
 from supple.output.recording.details import RecordedDetails
 from supple.output.recording.file import WRITTEN
+from supple.output.recording.joints import RecordedJoint, read_joints
 from supple.output.recording.laws import recorded_laws
 from supple.output.recording.physics import RecordedPhysics, RecordedWeld, read_physics, read_untouching, read_welds
 from supple.output.recording.recorder import INTERNAL, REPORT_NUMBERS, REPORT_VECTORS, field_series, frame_layout
@@ -63,7 +64,9 @@ class RecordedFrame(TetReadings):
         """All vertices, in the order of the bodies."""
         internal = self._rows(INTERNAL) if self.recording.internal_rows else NEVER_FLOWED
         vertices = self._rows("VTKHDF/Points"), self._rows("VTKHDF/PointData/velocities")
-        return State(self.time, *vertices, internal=internal)
+        joints = {joint.name for joint in self.recording.joints if joint.kind == "hinge"}
+        angles = {name: one.coordinate for name, one in self.report.joints.items() if name in joints}
+        return State(self.time, *vertices, internal=internal, hinge_angles=angles)
 
     @cached_property
     def positions(self) -> dict[str, NDArray[np.float64]]:
@@ -182,7 +185,7 @@ class Recording(Showable, Sequence[RecordedFrame]):
     details : which fields of the solver's details are kept; fields : of tets and vertices that were recorded
     sensors : of the scene
     untouching : pairs that may pass through each other: numbers of bodies, then obstacles
-    welds : vertices of soft bodies that are points of rigid ones
+    welds : vertices of soft bodies that are points of rigid ones; joints : of the scene
     scene_text : the scene file's text, or None; solver : its description, or None; supple_version : of the writer
     """
 
@@ -225,6 +228,7 @@ class Recording(Showable, Sequence[RecordedFrame]):
         self.physics: RecordedPhysics | None = read_physics(file, header, m)
         self.untouching = read_untouching(file, header)
         self.welds: tuple[RecordedWeld, ...] = read_welds(file, header, n)
+        self.joints: tuple[RecordedJoint, ...] = read_joints(file, header)
         self.stitches: RecordedStitches = read_stitches(file, n, len(self.obstacles))
         self.dt = float(header["dt"])
         self.solver: str | None = header.get("solver")

@@ -11,10 +11,7 @@ from numpy.typing import ArrayLike
 from supple.errors import SceneError
 from supple.scene.joints.joint import Joint
 from supple.scene.joints.motors import Motor
-from supple.scene.values import finite_vector, float_array
-
-# A range of angles has to leave a gap in the full turn, in which it is clear which end is nearer.
-LARGEST_RANGE = 2.0 * np.pi - 0.1
+from supple.scene.values import finite_vector, float_array, non_negative, positive
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,14 +22,19 @@ class AxisJoint(Joint):
     ----------
     axis : (3,) its direction in the world where the scene places everything, of any length [-]; it moves with the
         second.
-    limits : the smallest and the largest coordinate, (low, high) [rad] or [m]; for a slider, an end may be infinite.
-        None: no limits.
+    limits : the smallest and the largest coordinate, (low, high) [rad] or [m]; an end may be infinite. None: no limits.
     motor : `PositionMotor`, `VelocityMotor` or `ForceMotor`; None: it moves freely.
+    damping : effort against each unit of its rate [N m s/rad] or [N s/m].
+    friction : largest effort of dry friction [N m] or [N], which holds the joint until the load exceeds it.
+    max_effort : largest effort of its motor [N m] or [N], beside the `max_force` of that motor; None: no bound.
     """
 
     axis: ArrayLike = (0.0, 0.0, 1.0)
     limits: tuple[float, float] | None = None
     motor: Motor | None = None
+    damping: float = 0.0
+    friction: float = 0.0
+    max_effort: float | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -42,6 +44,12 @@ class AxisJoint(Joint):
             object.__setattr__(self, "limits", self._checked_limits())
         if self.motor is not None and not isinstance(self.motor, Motor):
             raise SceneError(f"{self.label}: motor is {self.motor!r}; give PositionMotor(...) or another motor")
+        for key in ("damping", "friction"):
+            object.__setattr__(self, key, non_negative(getattr(self, key), f"{self.label}: {key}"))
+        if self.max_effort is not None:
+            object.__setattr__(self, "max_effort", positive(self.max_effort, f"{self.label}: max_effort"))
+            if self.motor is not None:
+                object.__setattr__(self, "motor", self.motor.bounded(self.max_effort))
 
     def _checked_limits(self) -> tuple[float, float]:
         ends = float_array(self.limits, f"{self.label}: limits", "give two numbers (low, high)")
@@ -60,8 +68,8 @@ class AxisJoint(Joint):
 class HingeJoint(AxisJoint):
     """Two bodies that turn against each other about an axis; see `Joint` and `AxisJoint`.
 
-    The coordinate is the angle [rad] by which the first has turned about the axis against the second, within half a
-    turn of the middle of the limits. Limits are less than a turn apart.
+    The coordinate is the angle [rad] by which the first has turned about the axis against the second, over all turns:
+    limits and targets may be many turns away. At a start it is the one nearest to zero of those between the limits.
 
     Raises
     ------
@@ -70,15 +78,6 @@ class HingeJoint(AxisJoint):
 
     kind: ClassVar[str] = "hinge"
     needs_point: ClassVar[bool] = True
-
-    def _checked_limits(self) -> tuple[float, float]:
-        low, high = super()._checked_limits()
-        if not high - low <= LARGEST_RANGE:
-            raise SceneError(
-                f"{self.label}: limits are ({low:g}, {high:g}); give two angles that are at most {LARGEST_RANGE:.4g} "
-                "rad apart, or none"
-            )
-        return low, high
 
 
 @dataclass(frozen=True, eq=False)

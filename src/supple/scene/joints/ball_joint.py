@@ -1,21 +1,54 @@
-"""A joint that allows all rotations."""
+"""A joint that allows rotations about all axes."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from supple.errors import SceneError
 from supple.scene.joints.joint import Joint
+from supple.scene.values import finite_vector, positive
+
+# The swing has no direction at zero and at half a turn: limits stay away from them.
+_SWINGS = (0.01, np.pi - 0.01)
 
 
 @dataclass(frozen=True, eq=False)
 class BallJoint(Joint):
-    """Two bodies that share a point and turn about it freely; see `Joint`.
+    """Two bodies that share a point and turn about it; see `Joint`.
+
+    Parameters
+    ----------
+    axis : (3,) a direction in the world where the scene places everything, of any length [-]; the first has it, and the
+        second. None: there is no limit.
+    max_swing : the largest angle between the two, from 0.01 to pi - 0.01 [rad]: the axis of the first stays in a cone
+        about that of the second. Turns about the axis are free. The coordinate is this angle.
 
     Raises
     ------
-    SceneError : where a value is of the wrong kind, there is no point, or both ends are one body.
+    SceneError : where a value is of the wrong kind, there is no point, both ends are one body, or only one of `axis`
+        and `max_swing` is given.
     """
 
     kind: ClassVar[str] = "ball"
     needs_point: ClassVar[bool] = True
+
+    axis: ArrayLike | None = None
+    max_swing: float | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if (self.axis is None) != (self.max_swing is None):
+            raise SceneError(f"{self.label}: a limit needs both axis and max_swing; give both, or none")
+        if self.axis is None or self.max_swing is None:
+            return
+        axis = finite_vector(self.axis, f"{self.label}: axis", nonzero=True)
+        object.__setattr__(self, "axis", axis / np.linalg.norm(axis))
+        object.__setattr__(self, "max_swing", positive(self.max_swing, f"{self.label}: max_swing"))
+        if not _SWINGS[0] <= self.max_swing <= _SWINGS[1]:
+            raise SceneError(
+                f"{self.label}: max_swing is {self.max_swing:g} rad; give one from {_SWINGS[0]:g} to {_SWINGS[1]:.4g}"
+            )

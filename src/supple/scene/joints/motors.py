@@ -7,7 +7,10 @@ are an angle [rad] and a torque [N m]. A positive effort pushes the first body t
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+import numpy as np
 
 from supple.errors import SceneError
 from supple.scene.loads.over_time import OverTime, checked_over_time, value_at
@@ -43,6 +46,15 @@ class Motor(ABC):
         """
         return float(value_at(self.script, time, f"{self.label}: its function of time", ()))
 
+    @abstractmethod
+    def scripted(self, script: OverTime) -> Motor:
+        """The same motor with another script."""
+
+    def bounded(self, most: float) -> Motor:
+        """The same motor with an effort of at most `most`."""
+        most = most if self.max_force is None else min(self.max_force, most)
+        return replace(cast(Any, self), max_force=most)
+
     def _check_max_force(self) -> None:
         if self.max_force is not None:
             object.__setattr__(self, "max_force", positive(self.max_force, f"{self.label}: max_force"))
@@ -52,7 +64,7 @@ class Motor(ABC):
 class PositionMotor(Motor):
     """Pulls the coordinate q to a target: the effort k (target - q) + d (rate of the target - rate of q).
 
-    The rates are means over a time step. An angle is pulled along the shorter way around.
+    The rates are means over a time step. Angles count over all turns.
 
     Parameters
     ----------
@@ -83,6 +95,9 @@ class PositionMotor(Motor):
     def script(self) -> OverTime:
         return self.target
 
+    def scripted(self, script: OverTime) -> Motor:
+        return replace(self, target=script)
+
 
 @dataclass(frozen=True, eq=False)
 class VelocityMotor(Motor):
@@ -112,6 +127,9 @@ class VelocityMotor(Motor):
     def script(self) -> OverTime:
         return self.target
 
+    def scripted(self, script: OverTime) -> Motor:
+        return replace(self, target=script)
+
 
 @dataclass(frozen=True, eq=False)
 class ForceMotor(Motor):
@@ -120,17 +138,27 @@ class ForceMotor(Motor):
     Parameters
     ----------
     force : [N] for a slider, a torque [N m] for a hinge; a number, a `Curve`, or a function of time [s].
+    max_force : where the effort is cut off [N] or [N m]; None: nowhere.
 
     Raises
     ------
-    SceneError : where the value is of the wrong kind.
+    SceneError : where a value is of the wrong kind or out of range.
     """
 
     force: OverTime
+    max_force: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "force", checked_over_time(self.force, f"{self.label}: force", ()))
+        self._check_max_force()
+
+    def at(self, time: float) -> float:
+        most = np.inf if self.max_force is None else self.max_force
+        return float(np.clip(super().at(time), -most, most))
 
     @property
     def script(self) -> OverTime:
         return self.force
+
+    def scripted(self, script: OverTime) -> Motor:
+        return replace(self, force=script)

@@ -48,9 +48,10 @@ class ForceMotorModel(Model):
 
     kind: Literal["force"]
     force: Number | CurveModel = Field(description="[N m] or [N], or a curve")
+    max_force: Positive | None = Field(default=None, description="where it is cut off [N m] or [N]")
 
     def build(self) -> Motor:
-        return ForceMotor(over_time(self.force, "force"))
+        return ForceMotor(over_time(self.force, "force"), self.max_force)
 
 
 MotorModel = Annotated[PositionMotorModel | VelocityMotorModel | ForceMotorModel, Field(discriminator="kind")]
@@ -78,6 +79,8 @@ class BallJointModel(_JointModel):
 
     kind: Literal["ball"]
     point: Vector = Field(description="in the world at the start [m]")
+    axis: Vector | None = Field(default=None, description="of the cone of `max_swing`, in the world at the start")
+    max_swing: Positive | None = Field(default=None, description="largest angle of the first's axis to it [rad]")
 
     def build(self) -> Joint:
         return BallJoint(**self.model_dump(exclude={"kind"}))
@@ -89,6 +92,9 @@ class _AxisJointModel(_JointModel):
         default=None, description="[smallest, largest] angle [rad] or travel [m]; at the start it is zero"
     )
     motor: MotorModel | None = None
+    damping: NonNegative = Field(default=0.0, description="effort for each unit of its rate [N m s/rad] or [N s/m]")
+    friction: NonNegative = Field(default=0.0, description="largest effort of dry friction [N m] or [N]")
+    max_effort: Positive | None = Field(default=None, description="largest effort of its motor [N m] or [N]")
 
     def values(self) -> dict[str, Any]:
         """The arguments of the joint."""

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
-from supple.scene.joints.axis_joint import LARGEST_RANGE
 from supple.scene_file.urdf.robot import Geometry, Inertia, Link, Placement, Robot, RobotJoint
 
 # The edges of spheres and cylinders, as a share of the radius.
@@ -46,7 +45,7 @@ def described(robot: Robot) -> tuple[dict[str, Any], list[str]]:
                 raise SceneError(f"link {joint.child!r} moves and has no mass; give it an <inertial>")
             continue
         if joint.kind != "floating":
-            joints.append(_joint(joint, _carrier(joint.parent, parents, robot), frames[joint.child], missing))
+            joints.append(_joint(joint, _carrier(joint.parent, parents, robot), frames[joint.child]))
     pairs = [{"first": unseen, "second": "*", "collide": False}] if unseen and len(bodies) > 1 else []
     solver = {"kind": "implicit"}
     data = {"bodies": bodies, "joints": joints, "contact_pairs": pairs, "gravity": [0.0, 0.0, -9.81], "solver": solver}
@@ -129,7 +128,7 @@ def _box_of(inertia: Inertia) -> Geometry:
     return Geometry("box", tuple(sides.tolist()), inertia.placement.then(Placement(axes)))
 
 
-def _joint(joint: RobotJoint, second: str | None, frame: Placement, missing: list[str]) -> dict[str, Any]:
+def _joint(joint: RobotJoint, second: str | None, frame: Placement) -> dict[str, Any]:
     kinds = {"fixed": "fixed", "revolute": "hinge", "continuous": "hinge", "prismatic": "slider"}
     entry: dict[str, Any] = {"kind": kinds[joint.kind], "first": joint.child, "name": joint.name}
     if second is not None:
@@ -139,17 +138,9 @@ def _joint(joint: RobotJoint, second: str | None, frame: Placement, missing: lis
         return entry
     entry["axis"] = (frame.rotation @ joint.axis).tolist()
     if joint.limits is not None:
-        if joint.kind == "revolute" and joint.limits[1] - joint.limits[0] > LARGEST_RANGE:
-            missing.append(f"limits of joint {joint.name!r}, a full turn or more")
-        else:
-            entry["limits"] = list(joint.limits)
-    if joint.damping > 0.0:
-        entry["motor"] = {"kind": "position", "target": 0.0, "stiffness": 0.0, "damping": joint.damping}
-        if joint.friction > 0.0:
-            missing.append(f"friction of joint {joint.name!r}, which has damping as well")
-    elif joint.friction > 0.0:
-        entry["motor"] = {"kind": "velocity", "target": 0.0, "max_force": joint.friction}
-    return entry
+        entry["limits"] = list(joint.limits)
+    given = {"damping": joint.damping, "friction": joint.friction, "max_effort": joint.effort}
+    return entry | {key: value for key, value in given.items() if value > 0.0}
 
 
 def _rotation_vector(R: NDArray[np.float64]) -> NDArray[np.float64]:

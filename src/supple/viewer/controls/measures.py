@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.readings.joint_readings import JointReading
 from supple.viewer.protocol.snapshots import Snapshot
 from supple.viewer.server.plain_markdown import plain
 
 _SECONDS = 10.0  # of simulated time in a plot
 _MOST_POINTS = 300
+_MOST_JOINTS = 12  # in the text
 _GAP = _SECONDS / _MOST_POINTS  # between two points [s]
 
 
@@ -75,9 +77,23 @@ def measures_text(snapshot: Snapshot) -> str:
         f"energy {total:.3g} J, spin {_fastest_spin(snapshot):.3g} rad/s",
         f"smallest J {measures.min_det_F:.3f}, contacts {measures.contacts}",
     ]
+    readings = list(measures.joints.items())
+    lines += [_joint_text(name, joint) for name, joint in readings[:_MOST_JOINTS]]
+    if len(readings) > _MOST_JOINTS:
+        lines.append(f"and {len(readings) - _MOST_JOINTS} more joints")
     if measures.status != "converged":
         lines.append(f'<span style="color: #d92b2b">{plain(measures.status)}: {plain(measures.message)}</span>')
     return "  \n".join(lines)
+
+
+def _joint_text(name: str, joint: JointReading) -> str:
+    """Where a joint is, and with what it holds; angles and torques, or ways and forces."""
+    text = f"{plain(name)}:"
+    if joint.coordinate is not None:
+        text += f" at {joint.coordinate:.3g},"
+    if joint.motor_force is not None:
+        text += f" motor {joint.motor_force:.3g},"
+    return f"{text} force {np.linalg.norm(joint.force):.3g} N"
 
 
 def _fastest_spin(snapshot: Snapshot) -> float:

@@ -17,7 +17,8 @@ class SurfacePoint:
     Attributes
     ----------
     body : the body
-    vertices : (3,) of the triangle that contains it, numbered in the body; weights : (3,) barycentric coordinates
+    vertices : (3,) of the triangle that contains it, numbered in the body, or in the surface of a rigid one
+    weights : (3,) barycentric coordinates
     place : (3,) its position [m]
     """
 
@@ -28,26 +29,40 @@ class SurfacePoint:
 
     @property
     def nearest_vertex(self) -> int:
-        """The vertex of the triangle with the largest weight, numbered in the body."""
-        return int(self.vertices[np.argmax(self.weights)])
+        """The vertex of the triangle with the largest weight, numbered in the body; 0 for a rigid one, held whole."""
+        return 0 if self.body.rigid else int(self.vertices[np.argmax(self.weights)])
 
 
-def _triangles(model: Model) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Triangles (t, 3) of all bodies, numbered in the model, and the body of each (t,)."""
-    rows = [body.triangles.astype(np.int64) + body.vertices.start for body in model.bodies]
-    return np.concatenate(rows), np.repeat(np.arange(len(rows)), [len(row) for row in rows])
+@dataclass(frozen=True, eq=False)
+class _Triangles:
+    """The boundaries of all bodies: `corners` (t, 3, 3) [m], `vertices` (t, 3) as of `SurfacePoint`, body (t,)."""
+
+    corners: NDArray[np.float64]
+    vertices: NDArray[np.int64]
+    body: NDArray[np.int64]
+
+
+def _triangles(moment: Moment) -> _Triangles:
+    corners, vertices = [], []
+    for body in moment.model.bodies:
+        points, triangles = moment.finite_positions[body.vertices], body.triangles
+        if body.rigid and body.skin is not None:
+            points, triangles = body.skin.positions(points), body.skin.triangles
+        corners.append(points[triangles])
+        vertices.append(triangles.astype(np.int64))
+    owners = np.repeat(np.arange(len(vertices)), [len(rows) for rows in vertices])
+    return _Triangles(np.concatenate(corners), np.concatenate(vertices), owners)
 
 
 def nearest_surface_point(moment: Moment, place: ArrayLike) -> SurfacePoint:
     """The point on any boundary that is nearest to a point (3,) [m]."""
     from trimesh.triangles import closest_point
 
-    rows, _ = _triangles(moment.model)
-    corners = moment.finite_positions[rows]
+    triangles = _triangles(moment)
     query = np.asarray(place, dtype=np.float64)
-    points = closest_point(corners, np.broadcast_to(query, (len(rows), 3)))
+    points = closest_point(triangles.corners, np.broadcast_to(query, (len(triangles.corners), 3)))
     nearest = int(np.argmin(np.linalg.norm(points - query, axis=1)))
-    return _on_triangle(moment, nearest, points[nearest])
+    return _on_triangle(moment.model, triangles, nearest, points[nearest])
 
 
 def surface_point_on_ray(moment: Moment, origin: ArrayLike, direction: ArrayLike) -> SurfacePoint | None:
@@ -55,8 +70,8 @@ def surface_point_on_ray(moment: Moment, origin: ArrayLike, direction: ArrayLike
 
     Source: Möller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection" (1997).
     """
-    rows, _ = _triangles(moment.model)
-    a, b, c = (moment.finite_positions[rows[:, k]] for k in range(3))
+    triangles = _triangles(moment)
+    a, b, c = (triangles.corners[:, k] for k in range(3))
     start, along = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
     h = np.cross(along, c - a)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -69,21 +84,19 @@ def surface_point_on_ray(moment: Moment, origin: ArrayLike, direction: ArrayLike
     if not met.any():
         return None
     first = int(np.argmin(np.where(met, t, np.inf)))
-    return _on_triangle(moment, first, start + t[first] * along)
+    return _on_triangle(moment.model, triangles, first, start + t[first] * along)
 
 
-def _on_triangle(moment: Moment, triangle: int, place: NDArray[np.float64]) -> SurfacePoint:
+def _on_triangle(model: Model, triangles: _Triangles, row: int, place: NDArray[np.float64]) -> SurfacePoint:
     from trimesh.triangles import points_to_barycentric
 
-    rows, owner = _triangles(moment.model)
-    body = moment.model.bodies[owner[triangle]]
-    corners = moment.finite_positions[rows[triangle]]
+    corners = triangles.corners[row]
     with np.errstate(all="ignore"):
         weights = points_to_barycentric(corners[None], place[None], method="cross")[0]
     if not np.isfinite(weights).all():  # a triangle without area
         weights = (np.arange(3) == np.argmin(np.linalg.norm(corners - place, axis=1))).astype(np.float64)
     weights = np.clip(weights, 0.0, 1.0)
-    return SurfacePoint(body, rows[triangle] - body.vertices.start, weights / weights.sum(), place)
+    return SurfacePoint(model.bodies[triangles.body[row]], triangles.vertices[row], weights / weights.sum(), place)
 
 
 def point_on_camera_plane(

@@ -13,6 +13,7 @@ from supple.viewer.drawing.camera import set_initial_camera
 from supple.viewer.drawing.coloring.fields import FIELDS, Field
 from supple.viewer.drawing.layers.dots import Dots
 from supple.viewer.drawing.layers.ground import Ground
+from supple.viewer.drawing.layers.joints import JointView
 from supple.viewer.drawing.layers.obstacles import ObstacleView
 from supple.viewer.drawing.layers.primitives.layer import Layer
 from supple.viewer.drawing.layers.skin import SkinView
@@ -93,6 +94,7 @@ class Stage:
         self._bodies = self._make_bodies()
         self._layers = [self._bodies, Ground(scene, moment), ObstacleView(scene, moment), SpringView(scene, moment)]
         self._layers += [PusherView(scene, moment), Dots(scene, moment, "/pins", _PIN_COLOR, 0.04, _pins)]
+        self._layers.append(JointView(scene, moment))
         if options.velocities:
             self._layers.append(VelocityView(scene, moment))
         if options.contacts:

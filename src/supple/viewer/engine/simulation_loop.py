@@ -185,9 +185,8 @@ class SimulationLoop:
         live = self.live
         state = self._displayed_state(now)
         system, setup = live.system, live.setup
-        grabs = [
-            spring.state(state.positions[live.part(spring.command.body).vertices]) for spring in setup.grabs.values()
-        ]
+        points = system.split(state.positions)
+        grabs = [spring.drawn(points[spring.command.body]) for spring in setup.grabs.values()]
         pusher = setup.pusher
         contacts = self._requested("contacts", lambda: contact_points(system, state.positions, state.time))
         quantity = self.view.tet_values or ""

@@ -138,7 +138,7 @@ class Grab(Command):
     ----------
     grab : a number that the page chooses. A grab that has this number already is replaced.
     body : its name.
-    vertices : one to four vertices of the body's mesh, numbered from 0 in the body.
+    vertices : one to four vertices of the body's mesh, of a rigid body of its surface, numbered from 0 in the body.
     weights : one for each vertex, scaled so that their sum is 1: (1,) for a vertex, or the barycentric coordinates of a
         point on a triangle or in a tet.
     target : (3,) the point to which the spring pulls [m].

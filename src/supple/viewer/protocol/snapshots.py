@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.output.recording.joints import RecordedJoint
 from supple.output.recording.scene import RecordedObstacle
+from supple.readings.joint_readings import JointReading
 from supple.simulate import Diagnostics
 from supple.viewer.protocol.parameters import Value
 
+RIGID = "rigid"  # in place of a material
 PUSHER = "pusher"  # name of the obstacle that the mouse moves
 
 
@@ -25,7 +29,7 @@ class BodyDescription:
     triangles : (t, 3) surface, counter-clockwise from outside; nodes : (m, 4) or (m, 10) of the tets; both numbered
         from 0 in the body
     skin : vertices (s, 3) in the coordinates of the mesh [m] and triangles (u, 3) of the finer surface, or None
-    material : name of its class; values : of the parameters that a page can change, by name
+    material : name of its class, or `RIGID`; values : of the parameters that a page can change, by name
     mass : [kg]
     added : whether it was added on the page
     """
@@ -56,6 +60,7 @@ class SceneDescription:
     up : (3,) unit vector against gravity
     low, high : (3,) corners of the bounding box of the bodies at the start [m]
     stitches : (k, 4) global vertices: a vertex and the three of the triangle that it is stitched to
+    joints : of rigid bodies
     n_vertices, n_tets, n_constraints : of the whole scene; constraints are the solver's, 0 where it has none
     """
 
@@ -72,6 +77,7 @@ class SceneDescription:
     n_vertices: int
     n_tets: int
     n_constraints: int
+    joints: tuple[RecordedJoint, ...] = ()
 
     def body(self, name: str) -> BodyDescription:
         """The body of that name; raises `KeyError` where there is none."""
@@ -110,6 +116,7 @@ class Measures(Diagnostics):
     spin : (bodies, 3) angular velocity of each body about its own center of mass [rad/s]
     contacts : number of active contacts; min_distance : smallest gap [m] or None
     iterations : of the last step
+    joints : what joints do, by name
     """
 
     status: str
@@ -118,6 +125,7 @@ class Measures(Diagnostics):
     contacts: int
     min_distance: float | None
     iterations: int
+    joints: Mapping[str, JointReading] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

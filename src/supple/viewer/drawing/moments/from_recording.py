@@ -12,7 +12,7 @@ from supple.viewer.drawing.moments.model import Model, ModelBody, Moment
 def model_of_recording(recording: Recording) -> Model:
     """The constant data of a recording."""
     bodies = tuple(
-        ModelBody(body.name, body.vertices, body.tets, body.triangles, body.skin, i)
+        ModelBody(body.name, body.vertices, body.tets, body.triangles, body.skin, i, body.rigid)
         for i, body in enumerate(recording.bodies)
     )
     tets = np.ascontiguousarray(recording.tets, dtype=np.int32)
@@ -23,6 +23,7 @@ def model_of_recording(recording: Recording) -> Model:
         tets,
         view_of(recording),
         recorded_stitches=recording.stitches,
+        joints=recording.joints,
         laws=recording.laws,
     )
 

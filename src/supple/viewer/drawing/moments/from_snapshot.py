@@ -14,7 +14,7 @@ from supple.output.drawing import View
 from supple.output.recording.scene import RecordedObstacle
 from supple.output.recording.skinned_surface import SkinnedSurface
 from supple.viewer.drawing.moments.model import Model, ModelBody, Moment
-from supple.viewer.protocol.snapshots import PUSHER, BodyDescription, SceneDescription, Snapshot
+from supple.viewer.protocol.snapshots import PUSHER, RIGID, BodyDescription, SceneDescription, Snapshot
 
 
 class MomentBuilder:
@@ -56,7 +56,9 @@ class MomentBuilder:
 
     def _model_of(self, scene: SceneDescription) -> Model:
         bodies = tuple(
-            ModelBody(body.name, body.vertices, body.tet_rows, body.triangles, self._skin_of(body), i)
+            ModelBody(
+                body.name, body.vertices, body.tet_rows, body.triangles, self._skin_of(body), i, body.material == RIGID
+            )
             for i, body in enumerate(scene.bodies)
         )
         tets = np.concatenate([body.nodes[:, :4] + body.vertices.start for body in scene.bodies])
@@ -67,6 +69,7 @@ class MomentBuilder:
             np.ascontiguousarray(tets, dtype=np.int32),
             _view_of(scene),
             np.asarray(scene.stitches).reshape(-1, 4),
+            joints=scene.joints,
         )
 
     def _skin_of(self, body: BodyDescription) -> SkinnedSurface | None:
@@ -90,7 +93,12 @@ def _scene_obstacles(scene: SceneDescription) -> tuple[RecordedObstacle, ...]:
 def _model_key(scene: SceneDescription) -> tuple[Any, ...]:
     """A key that is equal for scenes with the same things to draw, apart from their positions."""
     bodies = ((b.name, _fingerprint(b.rest_positions), _fingerprint(b.nodes), b.skin is None) for b in scene.bodies)
-    return (*bodies, *((o.name, o.kind) for o in _scene_obstacles(scene)), _fingerprint(scene.stitches))
+    return (
+        *bodies,
+        *((o.name, o.kind) for o in _scene_obstacles(scene)),
+        _fingerprint(scene.stitches),
+        len(scene.joints),
+    )
 
 
 def _view_of(scene: SceneDescription) -> View:

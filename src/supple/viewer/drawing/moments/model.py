@@ -17,6 +17,7 @@ from supple.materials.flows.internal import NEVER_FLOWED
 from supple.mesh.topology import TET_FACETS, facet_keys
 from supple.numerics.deformation import deformation_gradients
 from supple.output.drawing import BODY_COLORS, View
+from supple.output.recording.joints import RecordedJoint
 from supple.output.recording.scene import RecordedObstacle
 from supple.output.recording.skinned_surface import SkinnedSurface
 from supple.output.recording.stitches import RecordedStitches
@@ -33,6 +34,7 @@ class ModelBody:
     triangles : (t, 3) its boundary, numbered in the body, counter-clockwise from outside
     skin : a finer surface that follows its tets, or None
     number : place among the bodies, which selects the color
+    rigid : whether its vertices are the control points of a rigid body, whose surface is the skin
     """
 
     name: str
@@ -41,6 +43,7 @@ class ModelBody:
     triangles: NDArray[np.int32]
     skin: SkinnedSurface | None
     number: int
+    rigid: bool = False
 
     @property
     def color(self) -> tuple[int, int, int]:
@@ -60,6 +63,7 @@ class Model:
     view : bounds of the motion, and the up direction
     stitches : (k, 4) a vertex, and the three vertices of the triangle that it is stitched to
     recorded_stitches : stitches of a recording, of any kind
+    joints : of rigid bodies
     laws : the elastic laws of a recording's tets; None of a live simulation, which sends what follows from them
     """
 
@@ -70,6 +74,7 @@ class Model:
     view: View
     stitches: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 4), dtype=np.int32))
     recorded_stitches: RecordedStitches | None = None
+    joints: tuple[RecordedJoint, ...] = ()
     laws: TetLaws | None = None
 
     @cached_property

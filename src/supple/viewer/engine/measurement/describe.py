@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.output.recording.joints import joints_of
 from supple.output.recording.scene import RecordedObstacle
+from supple.readings.joint_readings import joint_readings
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.simulate import measure
@@ -17,7 +19,7 @@ from supple.system import BodyRange, System
 from supple.viewer.engine.scene.live_scene import LiveScene
 from supple.viewer.engine.scene.solvers import kind_of, solver_values
 from supple.viewer.protocol.parameters import PARAMETERS, Value
-from supple.viewer.protocol.snapshots import BodyDescription, Measures, SceneDescription
+from supple.viewer.protocol.snapshots import RIGID, BodyDescription, Measures, SceneDescription
 from supple.xpbd.details import XPBDDetails
 
 
@@ -40,6 +42,7 @@ def describe(live: LiveScene) -> SceneDescription:
         n_vertices=len(live.state.positions),
         n_tets=len(system.tets),
         n_constraints=sum(int(made.count) for made in getattr(live.workspace, "sets", ())),
+        joints=joints_of(system),
     )
 
 
@@ -54,7 +57,7 @@ def _body(part: BodyRange, masses: NDArray[np.float64], added: frozenset[str]) -
         triangles=body.mesh.surface.triangles.astype(np.int32),
         nodes=body.mesh.nodes.astype(np.int32),
         skin=None if skin is None else (skin.vertices, skin.triangles.astype(np.int32)),
-        material="rigid" if isinstance(body, RigidBody) else type(body.material).__name__,
+        material=RIGID if isinstance(body, RigidBody) else type(body.material).__name__,
         values={"friction": body.friction, **({} if isinstance(body, RigidBody) else _material_values(body.material))},
         mass=float(masses[part.vertices].sum()),
         added=body.name in added,
@@ -90,6 +93,7 @@ def measures(live: LiveScene) -> Measures:
         contacts=details.contacts,
         min_distance=details.smallest_gap if isinstance(details, XPBDDetails) else report.min_distance,
         iterations=int(report.iterations),
+        joints=joint_readings(details),
     )
 
 

@@ -192,7 +192,7 @@ def _remove_from_pin(live: LiveScene, part: BodyRange, vertex: int) -> None:
     held = next((held for held in live.system.pins if row in held.vertices), None)
     if held is None:
         return
-    keep = held.vertices != row
+    keep = (held.vertices != row) & (not part.rigid)  # a rigid body is held as a whole
     pins = [pin for pin in live.setup.scene.pins if pin is not held.pin]
     anchors = {each.pin: each.anchors for each in live.system.pins}
     anchors |= {each.target: each.anchors for each in live.system.soft_targets}
@@ -224,15 +224,15 @@ def _(command: commands.Squash, live: LiveScene) -> None:
     free = [
         part.vertices
         for part in live.system.bodies
-        if pinned.isdisjoint(range(part.vertices.start, part.vertices.stop))
+        if not part.rigid and pinned.isdisjoint(range(part.vertices.start, part.vertices.stop))
     ]
     if not free:
-        raise CommandError("every body is pinned; unpin one to squash it")
+        raise CommandError("every body is pinned or rigid; unpin a soft one to squash it")
     rows = np.concatenate([np.arange(part.start, part.stop) for part in free])
     x, v = live.state.positions.copy(), live.state.velocities.copy()
     x[rows] = flattened(x[rows], live.up, command.factor)
     v[rows] = 0.0
-    live.adopt_checked(live.setup, State(live.state.time, x, v, internal=live.state.internal))
+    live.adopt_checked(live.setup, replace(live.state, positions=x, velocities=v, memory=None))
 
 
 def flattened(points: NDArray[np.float64], up: NDArray[np.float64], factor: float) -> NDArray[np.float64]:
@@ -279,6 +279,7 @@ def _add(live: LiveScene, body: PlacedBody) -> None:
         np.concatenate([live.state.positions, alone.positions]),
         np.concatenate([live.state.velocities, alone.velocities]),
         internal=np.concatenate([_internal(live), at_rest(count_of(body.material.per_tet(len(body.mesh.tets))))]),
+        hinge_angles=live.state.hinge_angles,
     )
     live.adopt_checked(replace(live.setup, scene=grown, added=live.setup.added | {body.name}), state)
 
@@ -297,7 +298,8 @@ def _(command: commands.RemoveBody, live: LiveScene) -> None:
     keep[part.vertices] = False
     owners = tets_of(live.system.laws.material)
     internal = _internal(live)[(owners < part.tets.start) | (owners >= part.tets.stop)]
-    state = State(live.state.time, live.state.positions[keep], live.state.velocities[keep], internal=internal)
+    x, v, angles = live.state.positions[keep], live.state.velocities[keep], live.state.hinge_angles
+    state = State(live.state.time, x, v, internal=internal, hinge_angles=angles)
     smaller = replace(
         setup,
         scene=without_body(setup.scene, part.name),

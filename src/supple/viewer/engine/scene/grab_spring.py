@@ -1,17 +1,20 @@
-"""Grabs: springs that pull at a patch of the surface of a body."""
+"""Grabs: springs that pull at the surface of a body."""
 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import CommandError
-from supple.scene.forces import SoftTarget
+from supple.scene.forces import Force, SoftTarget
+from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.scene import Scene
-from supple.system import BodyRange
+from supple.state import State
+from supple.system import BodyRange, System
 from supple.viewer.protocol import limits
 from supple.viewer.protocol.commands import Grab
 from supple.viewer.protocol.snapshots import GrabState
@@ -24,30 +27,61 @@ PATCH = 0.06
 
 
 @dataclass(eq=False)
-class GrabSpring:
-    """One grab. The spring pulls at the point p = sum w_i x_i with k |target - p|, distributed equally to the patch.
-
-    In every step each vertex of the patch is pulled towards x_i + (target - p), with x_i and p at the start of the
-    step. So the force causes no torque about p, and the motion of the patch is slightly damped, as by a dashpot k dt.
+class GrabSpring(ABC):
+    """One grab: a spring from the point p = sum w_i x_i of a body to a target, which the page moves.
 
     Attributes
     ----------
     command : the command that created it; target : (3,) its present target [m]
-    patch : (k,) vertices of the body that it pulls at; stiffness : total [N/m]
-    longest : largest distance over which it pulls [m]
+    stiffness : k [N/m]; longest : largest distance over which it pulls [m]
+    load : what it is in the scene
     """
 
     command: Grab
-    patch: NDArray[np.int32]
     stiffness: float
     longest: float
     target: NDArray[np.float64]
-    soft_target: SoftTarget = field(init=False)
+    load: SoftTarget | Force = field(init=False)
+
+    @abstractmethod
+    def begin_step(self, system: System, state: State, dt: float, anchors: NDArray[np.float64] | None) -> None:
+        """Set the load for the next step of dt [s].
+
+        Parameters
+        ----------
+        anchors : (k, 3) where the load is a soft target, its own in the system [m]
+        """
+
+    def point(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(3,) the point to which the spring is attached, or its velocity, from those of its body's points (n, 3)."""
+        return np.asarray(self.command.weights) @ points[list(self.command.vertices)]
+
+    def way(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(3,) from the point to the target, as far as it pulls [m]."""
+        way = self.target - self.point(points)
+        length = float(np.linalg.norm(way))
+        return way * (self.longest / length) if length > self.longest else way
+
+    def drawn(self, points: NDArray[np.float64]) -> GrabState:
+        """The spring to draw, with the points (n, 3) of the body [m]."""
+        point, target = self.point(points).tolist(), self.target.tolist()
+        return GrabState(self.command.grab, self.command.body, tuple(point), tuple(target))
+
+
+@dataclass(eq=False)
+class SoftGrab(GrabSpring):
+    """Pulls with k |target - p| at a patch of a soft body, (k,) `patch` of its vertices, equally.
+
+    In every step each vertex of the patch is pulled towards x_i + (target - p), with x_i and p at the start of the
+    step. So the force causes no torque about p, and the motion of the patch is slightly damped, as by a dashpot k dt.
+    """
+
+    patch: NDArray[np.int32]
     _displacements: NDArray[np.float64] = field(init=False)
 
     def __post_init__(self) -> None:
         self._displacements = np.zeros((len(self.patch), 3))
-        self.soft_target = SoftTarget(
+        self.load = SoftTarget(
             self.command.body,
             self.patch,
             self.stiffness / len(self.patch),
@@ -55,27 +89,36 @@ class GrabSpring:
             name=f"grab {self.command.grab}",
         )
 
-    def point(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(3,) the point to which the spring is attached, from the vertices (n, 3) of the body [m]."""
-        return np.asarray(self.command.weights) @ positions[list(self.command.vertices)]
+    def begin_step(self, system: System, state: State, dt: float, anchors: NDArray[np.float64] | None) -> None:
+        x = system.split(state.positions)[self.command.body]
+        assert anchors is not None
+        self._displacements = x[self.patch] + self.way(x) - anchors
 
-    def pull(self, positions: NDArray[np.float64], anchors: NDArray[np.float64]) -> None:
-        """Set the displacements of the soft target for the next step.
 
-        Parameters
-        ----------
-        positions : (n, 3) of the body [m]; anchors : (k, 3) of the soft target in the system [m]
-        """
-        way = self.target - self.point(positions)
-        length = float(np.linalg.norm(way))
-        if length > self.longest:
-            way *= self.longest / length
-        self._displacements = positions[self.patch] + way - anchors
+@dataclass(eq=False)
+class RigidGrab(GrabSpring):
+    """Pulls at a point of the surface of a rigid body, with the force of a spring at the end of the step.
 
-    def state(self, positions: NDArray[np.float64]) -> GrabState:
-        """The spring to draw, with the vertices (n, 3) of the body [m]."""
-        point, target = self.point(positions).tolist(), self.target.tolist()
-        return GrabState(self.command.grab, self.command.body, tuple(point), tuple(target))
+    With the mass m that the point has as part of the free body, 1 / m = sum c_j^2 / m_j over the control points, and
+    its velocity v, a step of backward Euler gives k (target - p - h v) / (1 + k h^2 / m): stable for every h, and
+    damped as by a dashpot k h.
+    """
+
+    _forces: NDArray[np.float64] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._forces = np.zeros((len(self.command.vertices), 3))
+        self.load = Force(
+            self.command.body, self.command.vertices, lambda time: self._forces, name=f"grab {self.command.grab}"
+        )
+
+    def begin_step(self, system: System, state: State, dt: float, anchors: NDArray[np.float64] | None) -> None:
+        part = next(part for part in system.rigid_bodies if part.name == self.command.body)
+        x, v = (system.split(values)[part.name] for values in (state.positions, state.velocities))
+        assert isinstance(part.body, RigidBody)
+        inverse = float(self.point(part.body.weights) ** 2 @ (1.0 / system.masses[part.vertices]))
+        force = self.stiffness * (self.way(x) - dt * self.point(v)) / (1.0 + self.stiffness * dt * dt * inverse)
+        self._forces = np.outer(self.command.weights, force)
 
 
 def make_spring(
@@ -91,18 +134,18 @@ def make_spring(
     ------
     CommandError : where the body has no such vertex.
     """
-    mesh = part.body.mesh
-    count = len(mesh.vertices)
-    if max(command.vertices) >= count:
-        raise CommandError(f"body {part.name!r} has no vertex {max(command.vertices)}; it has {count}")
-    rest = mesh.vertices
+    rest = part.body.points
+    if max(command.vertices) >= len(rest):
+        raise CommandError(f"body {part.name!r} has no vertex {max(command.vertices)}; it has {len(rest)}")
     diagonal = float(np.linalg.norm(np.ptp(rest, axis=0)))
-    center = np.asarray(command.weights) @ rest[list(command.vertices)]
-    skin = np.unique(mesh.surface.triangles)
-    near = skin[np.linalg.norm(rest[skin] - center, axis=1) <= PATCH * diagonal]
-    patch = np.union1d(near, command.vertices).astype(np.int32)
     g = float(np.linalg.norm(np.asarray(scene.gravity)))
     squared = max((2.0 * math.pi * FREQUENCY) ** 2, g / (SAG * diagonal))
     stiffness = command.stiffness * float(masses[part.vertices].sum()) * squared
     size = float(np.linalg.norm(np.ptp(positions, axis=0)))
-    return GrabSpring(command, patch, stiffness, limits.LONGEST_GRAB * size, np.array(command.target))
+    values = command, stiffness, limits.LONGEST_GRAB * size, np.array(command.target)
+    if part.rigid:
+        return RigidGrab(*values)
+    center = np.asarray(command.weights) @ rest[list(command.vertices)]
+    skin = np.unique(part.body.mesh.surface.triangles)
+    near = skin[np.linalg.norm(rest[skin] - center, axis=1) <= PATCH * diagonal]
+    return SoftGrab(*values, np.union1d(near, command.vertices).astype(np.int32))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import CommandError, SolverError
-from supple.scene.forces import SoftTarget
+from supple.scene.forces import Force, SoftTarget
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.simulate import first_frame
@@ -49,10 +49,12 @@ class Setup:
         """The scene with pins, grabs and pusher of the page."""
         if not self.page_pins and not self.grabs and self.pusher is None:
             return self.scene
+        pulls = [spring.load for spring in self.grabs.values()]
         return replace(
             self.scene,
             pins=(*self.scene.pins, *self.page_pins.values()),
-            soft_targets=(*self.scene.soft_targets, *(spring.soft_target for spring in self.grabs.values())),
+            forces=(*self.scene.forces, *(load for load in pulls if isinstance(load, Force))),
+            soft_targets=(*self.scene.soft_targets, *(load for load in pulls if isinstance(load, SoftTarget))),
             obstacles=(*self.scene.obstacles, *([self.pusher.obstacle] if self.pusher else [])),
         )
 
@@ -155,7 +157,8 @@ class LiveScene:
         if setup.pusher is not None:
             setup.pusher.begin_step(self.state.time, setup.dt)
         for spring in setup.grabs.values():
-            spring.pull(self.body_positions(spring.command.body), self._anchors[spring.soft_target])
+            anchors = self._anchors[spring.load] if isinstance(spring.load, SoftTarget) else None
+            spring.begin_step(self.system, self.state, setup.dt, anchors)
         state, report = self._stepped()
         if not report.status.can_go_on and setup.pusher is not None and setup.pusher.moves:
             setup.pusher.stay()  # it is blocked
