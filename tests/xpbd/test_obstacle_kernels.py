@@ -26,7 +26,8 @@ for name in sys.argv[1:]:
     frames = shape.frame[None]
     none = np.zeros((0, 3))
     body = np.full(1, -1, dtype=np.int32)
-    movers = Movers(np.ones(1), body, np.zeros((1, 3)), np.zeros(0), np.zeros((0, 3, 3)), np.zeros((0, 9)), none)
+    nobody = (np.zeros(0), np.zeros((0, 3, 3)), np.zeros(0), np.zeros((0, 9)), none)
+    movers = Movers(np.ones(1), body, np.zeros((1, 3)), *nobody)
     points = (x.copy(), np.zeros(1), movers)
     ends = (0, 1, 1.0, np.ones(1), (0.0, 1.0), False)
     kernels_of(shape.contact)[1](x, x.copy(), points, found, arrays, rules, frames, frames, *ends)

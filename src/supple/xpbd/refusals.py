@@ -12,7 +12,7 @@ from supple.xpbd.sweeps.ordering import Layout
 
 
 def refuse_unsupported(system: System) -> None:
-    """Check that XPBD can simulate the bodies of a system, and what joins them.
+    """Check that XPBD can simulate the bodies of a system, and what welds them.
 
     Raises
     ------
@@ -24,8 +24,8 @@ def refuse_unsupported(system: System) -> None:
             f"XPBD: body {quadratic[0]!r} has quadratic tets; simulate it with Implicit, or give linear tets: "
             "mesh.to_order(1)"
         )
-    for joining in (*system.scene.joints, *system.scene.welds):
-        raise SolverError(f"XPBD: it has no {joining.kind} joints or welds ({joining.label}); simulate with Implicit")
+    if system.scene.welds:
+        raise SolverError(f"XPBD: it cannot simulate welds ({system.scene.welds[0].label}); simulate with Implicit")
 
 
 def is_number(value: object) -> bool:

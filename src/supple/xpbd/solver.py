@@ -5,7 +5,7 @@ Source: Macklin, Müller, Chentanez, "XPBD" (2016); Macklin et al., "Small Steps
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import Literal
 
@@ -40,9 +40,10 @@ from supple.xpbd.memory import XPBDMemory
 from supple.xpbd.momentum import MomentumRestore
 from supple.xpbd.refusals import check_count, is_number, lost_position_message, refuse_unsupported
 from supple.xpbd.rigid.bodies import RigidBodies
+from supple.xpbd.rigid.joints import JointProjection
 from supple.xpbd.sleep import Sleep, SleepMemory
 from supple.xpbd.start import raise_if_inside
-from supple.xpbd.substep_limits import collide, keep_volumes, restore
+from supple.xpbd.substep_limits import collide, hold_in_contact, hold_joints, keep_volumes, restore
 from supple.xpbd.substep_start import begin_substep, cycles, load, pin_targets, push_contacts
 from supple.xpbd.substeps import FALL, SubstepChoice, Substeps
 from supple.xpbd.sweeps.ordering import make_layout, reordered
@@ -117,8 +118,8 @@ class XPBD(Solver):
 
         Raises
         ------
-        SolverError : where a body has quadratic tets, its material has no XPBD constraints, or there are joints or
-            welds; the text names them.
+        SolverError : where a body has quadratic tets, its material has no XPBD constraints, or there are welds; the
+            text names them.
         """
         refuse_unsupported(system)
         layout = make_layout(system)
@@ -136,6 +137,7 @@ class XPBD(Solver):
             system=inner,
             layout=layout,
             rigid=rigid,
+            joints=JointProjection(system, layout, rigid),
             sets=sets,
             damping=make_damping(inner, layout, extended[:, 3]),
             momentum=MomentumRestore(inner) if self.momentum_restore else None,
@@ -154,13 +156,16 @@ class XPBD(Solver):
         )
 
     def check(self, system: System, state: State, workspace: XPBDWorkspace) -> None:
-        """Raise where a body begins inside of something; a state of XPBD's own may be continued in any case.
+        """Raise where a body begins inside of something, or a joint does not hold; a state of XPBD may be continued.
 
         Raises
         ------
         SceneError : names the things, the depth and the remedy.
         """
-        if self.start == "refuse" and not isinstance(state.memory, XPBDMemory):
+        if isinstance(state.memory, XPBDMemory):
+            return
+        workspace.joints.check(state)
+        if self.start == "refuse":
             edge_length = workspace.collisions.edge_length
             raise_if_inside(system, state.positions, state.time, self.contact, edge_length)
 
@@ -232,6 +237,7 @@ class XPBD(Solver):
         findings, ledger = ws.assessment.end(
             ws.moment(time), ws.world, ws.guard.J, h, self.accuracy, held_back / used.count, sleep.asleep
         )
+        findings = replace(findings, apart=ws.joints.apart(ws.world, time, self.accuracy))
         status = findings.status
         problem = status if status in (Status.INVERTED, Status.ENERGY_GAINED) else None
         if crossings(findings.overlaps) > crossings(overlaps):
@@ -265,6 +271,7 @@ class XPBD(Solver):
             contact_forces=pushes,
             friction_forces=friction,
             **ws.actuators.fields(h * used.count),
+            **ws.joints.fields(ws.world, time),
         )
         world, surfaces = ws.collisions.obstacles.places(ws.world).copy(), ws.collisions.positions
         message = findings.message(time, self._remedy(ws, dt, findings, used.count))
@@ -275,7 +282,7 @@ class XPBD(Solver):
             details=details,
             contacts=lambda: forces.points(world, surfaces, old_points),
         )
-        return State(time, x, v, memory=memory), report, problem
+        return State(time, x, v, memory=memory, hinge_angles=ws.joints.hinge_angles()), report, problem
 
     def _remedy(self, ws: XPBDWorkspace, dt: float, findings: Findings, used: int) -> str:
         """What helps against what was found."""
@@ -309,6 +316,7 @@ class XPBD(Solver):
         ws.guard.accept()
         balance = ws.assessment.balance
         ws.actuators.begin_frame(ws.points, ws.origins)
+        ws.joints.begin_frame(state, sleep.asleep)
         damping = self._damping(ws, h)
         lengths = cycles(substeps)
         if damping is not None:
@@ -336,11 +344,14 @@ class XPBD(Solver):
             ws.loads.pull_springs(ws.points, ws.velocities, ws.origins, end, h)
             ws.actuators.project_between(ws.points, ws.velocities, ws.origins, end, h)
             ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
+            balance.note_work(hold_joints(ws, end, h))
             if collides and not collide(ws, end, h, parallel):
                 break
+            hold_in_contact(ws, end, h)
             held_back += keep_volumes(ws, end, h, parallel)
             if collides:
                 ws.collisions.end_substep()
+            ws.joints.end_substep(ws.points, ws.origins, end)
             balance.note_loads(ws.points, ws.previous, ws.origins, end, h)
             balance.note_work(ws.actuators.end_substep(ws.points, ws.origins, h))
             balance.note_contacts(ws.collisions.contacts)
@@ -360,6 +371,7 @@ class XPBD(Solver):
             contact_forces=pushes,
             friction_forces=friction,
             **actuator_fields(system, *start_of(system)),
+            **workspace.joints.initial_fields(system.start_states[-1]),
         )
 
 

@@ -15,8 +15,28 @@ from supple.xpbd.workspace import XPBDWorkspace
 MOST_PROJECTIONS = 10
 # After how many of these projections contacts of surfaces are searched, which costs about ten times as much.
 SEARCH_EACH = 3
+# How often joints and contacts are projected in turn in a substep with contact.
+JOINT_PASSES = 3
 # Of the motion of components that have passed through each other in spite of that: the shares that are tried.
 SHARES = (0.5, 0.25, 0.1, 0.0, 0.0)
+
+
+def hold_joints(ws: XPBDWorkspace, time: float, h: float) -> float:
+    """Project the joints of a substep; returns the work of their motors [J]."""
+    if not len(ws.joints):
+        return 0.0
+    work = ws.joints.project(ws.points, ws.previous, ws.velocities, ws.origins, time, h)
+    ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
+    return work
+
+
+def hold_in_contact(ws: XPBDWorkspace, time: float, h: float) -> None:
+    """Project joints and contacts in turn, where contacts have moved what joints hold."""
+    for _ in range(JOINT_PASSES if len(ws.joints) and ws.collisions.contacts else 0):
+        ws.joints.project_again(ws.points, ws.previous, ws.velocities, ws.origins, time, h)
+        ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
+        if not collide_again(ws, time, h):
+            return
 
 
 def collide(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:

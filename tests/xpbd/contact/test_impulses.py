@@ -28,7 +28,7 @@ def free(w):
     """What moves points that are vertices."""
     none = np.zeros((0, 3))
     body = np.full(len(w), -1, dtype=np.int32)
-    return Movers(w, body, np.zeros((len(w), 3)), np.zeros(0), np.zeros((0, 3, 3)), np.zeros((0, 9)), none)
+    return Movers(w, body, np.zeros((len(w), 3)), np.zeros(0), np.zeros((0, 3, 3)), np.zeros(0), np.zeros((0, 9)), none)
 
 
 def shift(x, before, movers, *contact):

@@ -95,8 +95,17 @@ def compliance(movers, vertices, weights, e, n):
 
 @njit
 def shift_compliance(movers, vertices, weights, e):
-    """`compliance` where rigid bodies do not turn."""
-    return compliance(movers, vertices, weights, e, (0.0, 0.0, 0.0))
+    """The change of r for a unit shift, where rigid bodies do not turn [1/kg]."""
+    total = 0.0
+    for i in range(4):
+        k = vertices[e, i]
+        if movers.body[k] < 0:
+            total += movers.inverse_masses[k] * weights[e, i] * weights[e, i]
+            continue
+        b, share, _ = _on_body(movers, vertices, weights, e, i)
+        if b >= 0:
+            total += movers.loose[b] * share * share
+    return total
 
 
 @njit
@@ -199,7 +208,7 @@ def shift_both(x, x_prev, predicted, movers, vertices, weights, e, d):
         if b < 0:
             step = subtract(row(x, k), row(x_prev, k))
         else:
-            f = movers.w[b] * c
+            f = movers.loose[b] * c
             for j in range(3):
                 movers.twists[b, 6 + j] += f * d[j]
             step = (

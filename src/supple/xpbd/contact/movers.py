@@ -37,6 +37,8 @@ class Movers(NamedTuple):
     body : (n,) the rigid body of each point, or -1
     arms : (n, 3) from the center of its body, at the beginning of the substep [m]
     w : (b,) inverse masses of the bodies [1/kg]; J : (b, 3, 3) their inverse inertia [1/(kg m^2)]; zero where held
+    loose : (b,) inverse masses for shifts [1/kg], zero where joints hold the body: they would take a shift back, with
+        the velocity of that
     twists : (b, 9) u [m], th, and s [m]; see the module
     steps : (b, 3) how far each center has moved in the substep, without the twists [m]
     """
@@ -46,6 +48,7 @@ class Movers(NamedTuple):
     arms: NDArray[np.float64]
     w: NDArray[np.float64]
     J: NDArray[np.float64]
+    loose: NDArray[np.float64]
     twists: NDArray[np.float64]
     steps: NDArray[np.float64]
 
@@ -73,6 +76,7 @@ class MovedPoints:
             np.zeros((count, 3)),
             np.zeros(bodies),
             np.zeros((bodies, 3, 3)),
+            np.zeros(bodies),
             np.zeros((bodies, 9)),
             np.zeros((bodies, 3)),
         )
@@ -91,7 +95,9 @@ class MovedPoints:
         """Begin to move the points whose places at the beginning of the substep are `before`; x, x_prev (n, 3) [m]."""
         if len(self._rigid):
             self._total[:] = 0.0
-            _begin(x, x_prev, before, self._rigid.control, self._rigid.masses, self._free, self.movers)
+            _begin(
+                x, x_prev, before, self._rigid.control, self._rigid.masses, self._free, self._rigid.joined, self.movers
+            )
 
     def settle(self, *places: NDArray[np.float64]) -> None:
         """Apply the twists to places of the points: at the end of the substep, then any at its beginning, in place."""
@@ -194,7 +200,7 @@ def collect(movers, total):
 
 
 @njit(cache=True)
-def _begin(x, x_prev, before, control, masses, free, movers):
+def _begin(x, x_prev, before, control, masses, free, joined, movers):
     movers.twists[:] = 0.0
     centers = np.empty((len(control), 3))
     for b in range(len(control)):
@@ -206,6 +212,7 @@ def _begin(x, x_prev, before, control, masses, free, movers):
             for j in range(3):
                 movers.steps[b, j] += 0.25 * x[i, j]
         movers.w[b] = 1.0 / masses[b] if free[b] else 0.0
+        movers.loose[b] = 0.0 if joined[b] else movers.w[b]
         f = 4.0 / masses[b] if free[b] else 0.0
         for j in range(3):
             column = solve_symmetric(S, (1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2)))

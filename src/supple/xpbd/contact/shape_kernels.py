@@ -125,7 +125,8 @@ def _project_shapes(
             # A vertex moves by its load; a point of a rigid body by what the body makes of a force.
             soft = softness(movers, movers.body[i], 1.0, cross(row(movers.arms, i), n)) if is_rigid else 1.0
             old = max(0.0, skin - gap_before)
-            shift = 0.0 if rigid_only else min(old, limits[i])
+            stays = rigid_only or (is_rigid and movers.loose[movers.body[i]] == 0.0)
+            shift = 0.0 if stays else min(old, limits[i])
             push = max(0.0, pushed + (skin - gap - old) / soft)
             carried = p  # position, at the beginning, of the obstacle's point that is now at p
             if moving[k]:

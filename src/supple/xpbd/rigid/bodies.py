@@ -47,7 +47,7 @@ class RigidBodies:
     control : (b, 4) their control points; masses : (b,) [kg]
     numbers : (b,) of the bodies in the scene
     of_vertex : (n,) the rigid body of each vertex, or -1
-    held : (b,) those that pins hold or move
+    held : (b,) those that pins hold or move; joined : (b,) those with joints
     """
 
     def __init__(self, system: System) -> None:
@@ -62,6 +62,8 @@ class RigidBodies:
         self._rest = rest - rest.mean(axis=1, keepdims=True)
         self.held = system.inverse_masses[self.control[:, 0]] == 0.0
         self.names = [part.name for part in parts]
+        ends = {name for joint in system.scene.joints for name in (joint.first, joint.second)}
+        self.joined = np.array([name in ends for name in self.names], dtype=np.bool_)
 
     def __len__(self) -> int:
         return len(self.control)
