@@ -256,7 +256,7 @@ def test_starts_inside_of_something_are_refused():
         next(iter(sp.simulate(scene, sp.XPBD(), 1 / 60, 1)))
 
 
-def test_joints_are_refused():
-    scene = sp.Scene([rigid()], joints=[sp.BallJoint("rigid", point=(0, 0, 0), name="shoulder")])
-    with pytest.raises(sp.SolverError, match=r"joint 'shoulder'.*simulate with Implicit"):
+def test_welds_are_refused():
+    scene = sp.Scene([rigid(), soft(position=(0.1, 0, 0))], welds=[sp.Weld("soft", "rigid", max_distance=0.01)])
+    with pytest.raises(sp.SolverError, match=r"cannot simulate welds \(weld.*; simulate with Implicit"):
         next(iter(sp.simulate(scene, sp.XPBD(), 1 / 60, 1)))
