@@ -22,7 +22,7 @@ LAYERS = (
     ("output", "scene_file"),
     ("simulate",),
     ("xpbd", "implicit"),
-    ("contact", "readings"),
+    ("contact", "joints", "readings"),
     ("system",),
     ("loads",),
     ("scene",),

@@ -160,6 +160,11 @@ class SolverDetails:
     cavity_pressure, cavity_volume, cavity_work : by name [Pa], [m^3], [J]; see `Report.cavities`
     cable_tension, cable_length, cable_work : by name, with ".k" for span k of the first one [N], [m], [J]; see
         `Report.cables`
+    joint_forces, joint_torques : of the joints on their first bodies, limits and motors included, by name, (3,) [N],
+        and (3,) about the joint's point [N m]
+    joint_coordinates : angles of hinges [rad], travels of sliders [m], swings of balls with limits [rad], by name
+    motor_forces : efforts of the motors [N], [N m], by name of their joint
+    joint_violations : how far each joint is from holding, as a share of the diameter of gyration of its smaller body
     """
 
     contacts: int = 0
@@ -169,6 +174,11 @@ class SolverDetails:
     cable_tension: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     cable_length: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     cable_work: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+    joint_forces: Mapping[str, NDArray[np.float64]] = field(default_factory=dict, kw_only=True)
+    joint_torques: Mapping[str, NDArray[np.float64]] = field(default_factory=dict, kw_only=True)
+    joint_coordinates: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+    motor_forces: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+    joint_violations: Mapping[str, float] = field(default_factory=dict, kw_only=True)
 
     def __eq__(self, other: object) -> bool:
         if type(self) is not type(other):

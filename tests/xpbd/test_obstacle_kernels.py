@@ -11,7 +11,8 @@ import sys
 import numpy as np
 import supple as sp
 from supple.scene.obstacles.registry import KINDS
-from supple.xpbd.contact.obstacle_contacts import kernels_of
+from supple.xpbd.contact.movers import Movers
+from supple.xpbd.contact.shape_kernels import kernels_of
 
 for name in sys.argv[1:]:
     obstacle = sp.Sphere(radius=0.5) if name == "Sphere" else KINDS[name]()
@@ -21,11 +22,15 @@ for name in sys.argv[1:]:
     numbers[0, : len(shape.parameters)] = shape.parameters
     arrays = (numbers, np.zeros(1, dtype=np.bool_))
     rules = (np.zeros(1, np.int32), np.ones((1, 1), np.bool_), np.zeros((1, 1)))
-    found = (np.array([0, 1]), np.zeros(1, np.int32), np.zeros((1, 3)), np.zeros(1))
+    found = (np.array([0, 1]), np.zeros(1, np.int32), np.zeros((1, 3)), np.zeros(1), np.zeros((1, 4)))
     frames = shape.frame[None]
-    points = (x.copy(), np.zeros(1))
-    scales = (1.0, 0.0, 1.0)
-    kernels_of(shape.contact)[1](x, x.copy(), points, found, arrays, rules, frames, frames, 0, 1, 1.0, scales)
+    none = np.zeros((0, 3))
+    body = np.full(1, -1, dtype=np.int32)
+    nobody = (np.zeros(0), np.zeros((0, 3, 3)), np.zeros(0), np.zeros((0, 9)), none)
+    movers = Movers(np.ones(1), body, np.zeros((1, 3)), *nobody)
+    points = (x.copy(), np.zeros(1), movers)
+    ends = (0, 1, 1.0, np.ones(1), (0.0, 1.0), False)
+    kernels_of(shape.contact)[1](x, x.copy(), points, found, arrays, rules, frames, frames, *ends)
     print(name, *np.round(x[0], 6) + 0.0)
 """
 PUSHED = {

@@ -35,11 +35,6 @@ class ImplicitDetails(SolverDetails):
     contact_forces, friction_forces : by name of the body or obstacle, (3,) [N]; each sum to zero
     reaction_forces : of the pins on their bodies, by label of the pin, (3,) [N]
     orthogonality_errors : |F^T F - 1| of the rigid bodies, by name [-]
-    joint_forces, joint_torques : of the joints on their first bodies, limits and motors included, by name, (3,) [N],
-        and (3,) about the joint's point [N m]
-    joint_coordinates : angles of hinges [rad], travels of sliders [m], swings of balls with limits [rad], by name
-    motor_forces : efforts of the motors [N], [N m], by name of their joint
-    joint_violations : how far each joint is from holding, as a share of the diameter of gyration of its smaller body
     weld_forces : of the rigid bodies on the soft ones that are welded to them, by name of the weld, (3,) [N]
     seconds : of wall time, by part of the step; see `supple.implicit.timings`
     reaction_forces_by_vertex : by label of the pin, (k, 3) [N]
@@ -59,11 +54,6 @@ class ImplicitDetails(SolverDetails):
     friction_forces: Forces = field(default_factory=dict)
     reaction_forces: Forces = field(default_factory=dict)
     orthogonality_errors: Mapping[str, float] = field(default_factory=dict)
-    joint_forces: Forces = field(default_factory=dict)
-    joint_torques: Forces = field(default_factory=dict)
-    joint_coordinates: Mapping[str, float] = field(default_factory=dict)
-    motor_forces: Mapping[str, float] = field(default_factory=dict)
-    joint_violations: Mapping[str, float] = field(default_factory=dict)
     weld_forces: Forces = field(default_factory=dict)
     seconds: Mapping[str, float] = field(default_factory=dict)
     reaction_forces_by_vertex: Forces = field(default_factory=dict, compare=False)

@@ -20,8 +20,6 @@ from supple.implicit.energies.potential import HessianBlocks
 from supple.implicit.energies.regularization import regularization_of
 from supple.implicit.energies.stitch_damping import StitchViscosity
 from supple.implicit.energies.stitches import StitchEnergy
-from supple.implicit.joints.geometry import JointGeometry
-from supple.implicit.joints.joint_step import initial_joint_details, refuse_apart
 from supple.implicit.limits.inversion_guard import refuse_inverted
 from supple.implicit.newton.direction import Tools
 from supple.implicit.newton.free_motion import FreeMotion
@@ -35,6 +33,8 @@ from supple.implicit.stepping.substep import StepSettings, Substep, take_substep
 from supple.implicit.stepping.substepping import Substepping
 from supple.implicit.stepping.workspace import Workspace
 from supple.implicit.timings import PARTS
+from supple.joints.at_state import initial_joint_details, refuse_apart
+from supple.joints.geometry import JointGeometry
 from supple.materials.flows.internal import checked
 from supple.materials.per_tet import NO_REGION
 from supple.numerics.noninverting_step import KEEP

@@ -52,8 +52,10 @@ class FrameReadings(TetReadings):
         exact = getattr(self.report.details, "reaction_forces", None)
         if exact is not None:
             return dict(exact)
+        rigid = {part.name for part in self.system.rigid_bodies}
         for pin in self.system.pins:
-            self.first_piola[pin.pin.body]  # raises where it is not defined
+            if pin.pin.body not in rigid:
+                self.first_piola[pin.pin.body]  # raises where it is not defined
         P = self.first_piola.values_of_all
         return balanced_reactions(self.system, self._x, self.state.time, P, self.contacts, self.report.details)
 

@@ -13,7 +13,7 @@ from supple.state import SolverDetails
 
 @dataclass(frozen=True, eq=False)
 class JointReading:
-    """A joint at the end of a step.
+    """A joint at the end of a step; of `XPBD`, forces are means over the step.
 
     Attributes
     ----------
@@ -33,14 +33,13 @@ class JointReading:
 
 def joint_readings(details: SolverDetails) -> Mapping[str, JointReading]:
     """By name of the joint; empty where the solver has none."""
-    forces = getattr(details, "joint_forces", {})
     return {
         name: JointReading(
             force,
-            getattr(details, "joint_torques")[name],  # noqa: B009 - of the same solver
-            getattr(details, "joint_coordinates").get(name),  # noqa: B009
-            getattr(details, "motor_forces").get(name),  # noqa: B009
-            getattr(details, "joint_violations")[name],  # noqa: B009
+            details.joint_torques[name],
+            details.joint_coordinates.get(name),
+            details.motor_forces.get(name),
+            details.joint_violations[name],
         )
-        for name, force in forces.items()
+        for name, force in details.joint_forces.items()
     }

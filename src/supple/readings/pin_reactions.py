@@ -50,7 +50,8 @@ def balanced_reactions(
         load.add_forces(x, time, forces)
     add_actuator_forces(system, details, x, forces)
     if contacts is not None:
-        forces += contacts.on_vertices(contacts.forces + contacts.friction, len(x))
+        on_points = contacts.on_vertices(contacts.forces + contacts.friction, len(system.points))
+        system.points.add_forces(on_points, forces)
     _add_elastic_forces(system, P, forces)
     stitched = system.stitching.nodes()
     found = {}
@@ -62,9 +63,11 @@ def balanced_reactions(
 
 
 def _add_elastic_forces(system: System, P: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-    """Add -V P Dm^-T of the tets that have a pinned vertex to their vertices' rows of `out` (n, 3)."""
+    """Add -V P Dm^-T of the soft tets that have a pinned vertex to their vertices' rows of `out` (n, 3)."""
     held = np.zeros(len(out), dtype=bool)
     held[system.pinned_vertices] = True
+    for part in system.rigid_bodies:
+        held[part.vertices] = False
     rows = np.flatnonzero(held[system.tets].any(axis=1))
     tets, inverse = system.tets[rows], system.rest_shape_inverse[rows]
     forces = -system.rest_volumes[rows, None, None] * P[rows] @ np.swapaxes(inverse, 1, 2)

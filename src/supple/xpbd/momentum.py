@@ -31,7 +31,10 @@ _SUMS = 21
 
 
 class MomentumRestore:
-    """The components of a system, and which of them are free. Bodies joined by stitches are one component."""
+    """The components of a system, and which of them are free. Bodies joined by stitches are one component.
+
+    Rigid bodies are no members: `RigidBodies.advance` keeps their momenta.
+    """
 
     def __init__(self, system: System) -> None:
         labels = system.joined_components
@@ -39,15 +42,19 @@ class MomentumRestore:
         self.free = np.ones(count, dtype=np.bool_)
         self.free[labels[system.inverse_masses == 0.0]] = False
         self.free[labels[system.stitching.anchored_vertices()]] = False
-        self.members = np.argsort(labels, kind="stable").astype(np.uint32)
-        ends = np.cumsum(np.bincount(labels, minlength=count))
+        soft = np.ones(len(labels), dtype=np.bool_)
+        for part in system.rigid_bodies:
+            soft[part.vertices] = False
+        order = np.argsort(labels, kind="stable")
+        self.members = order[soft[order]].astype(np.uint32)
+        ends = np.cumsum(np.bincount(labels[soft], minlength=count))
         starts = np.append(0, ends[:-1])
         self.blocks = np.array(
             [(k, lo, min(lo + BLOCK, ends[k])) for k in range(count) for lo in range(starts[k], ends[k], BLOCK)],
             dtype=np.int64,
-        )
+        ).reshape(-1, 3)
         self.masses = np.ascontiguousarray(system.masses)
-        self.totals = np.bincount(labels, weights=self.masses, minlength=count)
+        self.totals = np.bincount(labels[soft], weights=self.masses[soft], minlength=count)
         self._sums = np.zeros((len(self.blocks), _SUMS))
         self._motion = np.zeros((count, 9))
 

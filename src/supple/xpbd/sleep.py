@@ -14,7 +14,7 @@ of one place, with l the mean length of the body's edges. What is less than that
 
 An island wakes where something awake pushes it or has passed into it (the frame is then undone and simulated with the
 island awake), where its state was changed from outside, where an obstacle moves, and where anything in the scene is
-another than in the frame before. Bodies with loads, actuators, soft targets or moving pins do not sleep.
+another than in the frame before. Bodies with loads, actuators, motors, soft targets or moving pins do not sleep.
 
 Source of the name and of islands: Catto, "Box2D" manual, "Simulation islands".
 """
@@ -187,6 +187,9 @@ class Sleep:
             held[load.acts_on()] = True
         for actuator in system.actuators:
             held[actuator.coordinate.vertices] = True
+        driven = {joint.first for joint in system.scene.joints if getattr(joint, "motor", None) is not None}
+        for part in system.bodies:
+            held[part.vertices] |= part.name in driven
         return np.logical_or.reduceat(held, self._starts)
 
     def _largest(self, values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -5,8 +5,7 @@ Source: Macklin, Müller, Chentanez, "XPBD" (2016); Macklin et al., "Small Steps
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import Literal
 
@@ -39,9 +38,12 @@ from supple.xpbd.limits.rigid_fallback import RigidFallback
 from supple.xpbd.limits.volume_guard import VolumeGuard
 from supple.xpbd.memory import XPBDMemory
 from supple.xpbd.momentum import MomentumRestore
+from supple.xpbd.refusals import check_count, is_number, lost_position_message, refuse_unsupported
+from supple.xpbd.rigid.bodies import RigidBodies
+from supple.xpbd.rigid.joints import JointProjection
 from supple.xpbd.sleep import Sleep, SleepMemory
 from supple.xpbd.start import raise_if_inside
-from supple.xpbd.substep_limits import collide, keep_volumes, restore
+from supple.xpbd.substep_limits import collide, hold_in_contact, hold_joints, keep_volumes, restore
 from supple.xpbd.substep_start import begin_substep, cycles, load, pin_targets, push_contacts
 from supple.xpbd.substeps import FALL, SubstepChoice, Substeps
 from supple.xpbd.sweeps.ordering import make_layout, reordered
@@ -89,22 +91,22 @@ class XPBD(Solver):
 
     def __post_init__(self) -> None:
         if self.substeps != "auto":
-            _check_count("substeps", self.substeps, ", or 'auto'")
-        _check_count("max_substeps", self.max_substeps)
+            check_count("substeps", self.substeps, ", or 'auto'")
+        check_count("max_substeps", self.max_substeps)
         if self.start not in ("refuse", "push_out"):
             raise SolverError(f"XPBD: start is {self.start!r}; give 'refuse' or 'push_out'")
         if not isinstance(self.momentum_restore, bool):
             raise SolverError(f"XPBD: momentum_restore is {self.momentum_restore!r}; give True or False")
         if self.contact is not None and not isinstance(self.contact, XPBDContact):
             raise SolverError(f"XPBD: contact is {self.contact!r}; give XPBDContact(...), or None to turn it off")
-        if not _is_number(self.accuracy) or not 0.0 < self.accuracy < 1.0:
+        if not is_number(self.accuracy) or not 0.0 < self.accuracy < 1.0:
             raise SolverError(f"XPBD: accuracy is {self.accuracy!r}; give a number above 0 and below 1, such as 0.02")
-        if self.sleep_after is not None and not (_is_number(self.sleep_after) and self.sleep_after > 0.0):
+        if self.sleep_after is not None and not (is_number(self.sleep_after) and self.sleep_after > 0.0):
             raise SolverError(
                 f"XPBD: sleep_after is {self.sleep_after!r}; give a time above zero [s], or None to keep all awake"
             )
         if self.threads is not None:
-            _check_count("threads", self.threads)
+            check_count("threads", self.threads)
             if self.threads > _MOST_THREADS:
                 raise SolverError(
                     f"XPBD: threads is {self.threads}; this process has {_MOST_THREADS}"
@@ -116,22 +118,10 @@ class XPBD(Solver):
 
         Raises
         ------
-        SolverError : where a body is rigid, touches with its skin, has quadratic tets, or its material has no XPBD
-            constraints; the text names the body.
+        SolverError : where a body touches with its skin, has quadratic tets, its material has no XPBD constraints, or
+            there are welds; the text names them.
         """
-        if system.rigid_bodies:
-            raise SolverError(
-                f"XPBD: body {system.rigid_bodies[0].name!r} is rigid; simulate rigid bodies with Implicit"
-            )
-        for part in system.bodies:
-            if part.body.touches_with_skin:
-                raise SolverError(f"XPBD: body {part.name!r} touches with its skin; simulate it with Implicit")
-        quadratic = [part.name for part in system.bodies if part.body.mesh.order == 2]
-        if quadratic:
-            raise SolverError(
-                f"XPBD: body {quadratic[0]!r} has quadratic tets; simulate it with Implicit, or give linear tets: "
-                "mesh.to_order(1)"
-            )
+        refuse_unsupported(system)
         layout = make_layout(system)
         inner = reordered(system, layout)
         extended = np.zeros((len(system.masses) + len(inner.stitching.anchors), 4))
@@ -142,9 +132,12 @@ class XPBD(Solver):
         parallel = threads > 1 and (large or self.threads is not None)
         collisions = Collisions(inner, self.contact)
         assessment = Assessment(inner, self.contact, collisions.edge_length)
+        rigid = RigidBodies(inner)
         return XPBDWorkspace(
             system=inner,
             layout=layout,
+            rigid=rigid,
+            joints=JointProjection(system, layout, rigid),
             sets=sets,
             damping=make_damping(inner, layout, extended[:, 3]),
             momentum=MomentumRestore(inner) if self.momentum_restore else None,
@@ -154,7 +147,7 @@ class XPBD(Solver):
             guard=VolumeGuard(inner),
             fallback=RigidFallback(inner, collisions.skin),
             assessment=assessment,
-            choice=SubstepChoice(inner, assessment.softening, bool(collisions)),
+            choice=SubstepChoice(inner, assessment.softening, bool(collisions), rigid),
             sleep=Sleep(inner, layout, self.sleep_after, self.accuracy),
             threads=self.threads or (None if large else 1),
             pace=ThreadTuner(choice=parallel and self.threads is None, parallel=parallel),
@@ -163,13 +156,16 @@ class XPBD(Solver):
         )
 
     def check(self, system: System, state: State, workspace: XPBDWorkspace) -> None:
-        """Raise where a body begins inside of something; a state of XPBD's own may be continued in any case.
+        """Raise where a body begins inside of something, or a joint does not hold; a state of XPBD may be continued.
 
         Raises
         ------
         SceneError : names the things, the depth and the remedy.
         """
-        if self.start == "refuse" and not isinstance(state.memory, XPBDMemory):
+        if isinstance(state.memory, XPBDMemory):
+            return
+        workspace.joints.check(state)
+        if self.start == "refuse":
             edge_length = workspace.collisions.edge_length
             raise_if_inside(system, state.positions, state.time, self.contact, edge_length)
 
@@ -208,7 +204,7 @@ class XPBD(Solver):
             repeats += 1
             used = Substeps(min(2 * used.count, self.max_substeps), f"a repetition: {problem}")
         if lost >= 0:
-            message = _lost_position_message(ws, lost, time)
+            message = lost_position_message(ws.system, ws.layout, lost, time)
             details = self.initial_details(system, ws)
             return state, StepReport(Status.NOT_FINITE, used.count, message, details=details)
         return new, report
@@ -241,13 +237,14 @@ class XPBD(Solver):
         findings, ledger = ws.assessment.end(
             ws.moment(time), ws.world, ws.guard.J, h, self.accuracy, held_back / used.count, sleep.asleep
         )
+        findings = replace(findings, apart=ws.joints.apart(ws.world, time, self.accuracy))
         status = findings.status
         problem = status if status in (Status.INVERTED, Status.ENERGY_GAINED) else None
         if crossings(findings.overlaps) > crossings(overlaps):
             problem = Status.INTERSECTING
         elif problem is None and held_back:
             problem = Status.INVERTED
-        forces, old_from_new = ws.collisions.forces, ws.layout.old_from_new
+        forces, old_points = ws.collisions.forces, ws.layout.old_points
         x, v = ws.world[ws.layout.new_from_old], ws.velocities[ws.layout.new_from_old]
         sound = status in (Status.CONVERGED, Status.SOFTENED) and not held_back
         rest = ws.sleep.end(x, v, time, sleep, forces, sound)
@@ -274,17 +271,18 @@ class XPBD(Solver):
             contact_forces=pushes,
             friction_forces=friction,
             **ws.actuators.fields(h * used.count),
+            **ws.joints.fields(ws.world, time),
         )
-        world, surfaces = ws.world.copy(), ws.collisions.positions
+        world, surfaces = ws.collisions.obstacles.places(ws.world).copy(), ws.collisions.positions
         message = findings.message(time, self._remedy(ws, dt, findings, used.count))
         report = StepReport(
             status,
             used.count,
             message,
             details=details,
-            contacts=lambda: forces.points(world, surfaces, old_from_new),
+            contacts=lambda: forces.points(world, surfaces, old_points),
         )
-        return State(time, x, v, memory=memory), report, problem
+        return State(time, x, v, memory=memory, hinge_angles=ws.joints.hinge_angles()), report, problem
 
     def _remedy(self, ws: XPBDWorkspace, dt: float, findings: Findings, used: int) -> str:
         """What helps against what was found."""
@@ -318,6 +316,7 @@ class XPBD(Solver):
         ws.guard.accept()
         balance = ws.assessment.balance
         ws.actuators.begin_frame(ws.points, ws.origins)
+        ws.joints.begin_frame(state, sleep.asleep)
         damping = self._damping(ws, h)
         lengths = cycles(substeps)
         if damping is not None:
@@ -344,11 +343,15 @@ class XPBD(Solver):
             ws.loads.pull_to_targets(ws.points, ws.velocities, ws.origins, end, h)
             ws.loads.pull_springs(ws.points, ws.velocities, ws.origins, end, h)
             ws.actuators.project_between(ws.points, ws.velocities, ws.origins, end, h)
+            ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
+            balance.note_work(hold_joints(ws, end, h))
             if collides and not collide(ws, end, h, parallel):
                 break
+            hold_in_contact(ws, end, h)
             held_back += keep_volumes(ws, end, h, parallel)
             if collides:
                 ws.collisions.end_substep()
+            ws.joints.end_substep(ws.points, ws.origins, end)
             balance.note_loads(ws.points, ws.previous, ws.origins, end, h)
             balance.note_work(ws.actuators.end_substep(ws.points, ws.origins, h))
             balance.note_contacts(ws.collisions.contacts)
@@ -368,16 +371,8 @@ class XPBD(Solver):
             contact_forces=pushes,
             friction_forces=friction,
             **actuator_fields(system, *start_of(system)),
+            **workspace.joints.initial_fields(system.start_states[-1]),
         )
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def _check_count(name: str, value: object, otherwise: str = "") -> None:
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
-        raise SolverError(f"XPBD: {name} is {value!r}; give a whole number of one or more{otherwise}")
 
 
 def _overlaps(ws: XPBDWorkspace, time: float, sleep: SleepMemory) -> list[Overlap]:
@@ -392,12 +387,3 @@ def _disturbed(ws: XPBDWorkspace, time: float, sleep: SleepMemory) -> NDArray[np
     to_world(ws.points, ws.origins, ws.world)
     crossing = [overlap.numbers for overlap in _overlaps(ws, time, sleep)]
     return ws.sleep.disturbed(sleep, [*ws.collisions.forces.pairs(), *crossing])
-
-
-def _lost_position_message(ws: XPBDWorkspace, vertex: int, time: float) -> str:
-    part = next(p for p in ws.system.bodies if p.vertices.start <= vertex < p.vertices.stop)
-    number = int(ws.layout.old_from_new[vertex]) - part.vertices.start
-    return (
-        f"XPBD: body {part.name!r}, vertex {number}: its position is lost (not finite, or beyond 1e12 m) "
-        f"at t = {time:g} s; take more substeps or a shorter dt"
-    )

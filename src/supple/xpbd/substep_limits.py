@@ -15,8 +15,28 @@ from supple.xpbd.workspace import XPBDWorkspace
 MOST_PROJECTIONS = 10
 # After how many of these projections contacts of surfaces are searched, which costs about ten times as much.
 SEARCH_EACH = 3
+# How often joints and contacts are projected in turn in a substep with contact.
+JOINT_PASSES = 3
 # Of the motion of components that have passed through each other in spite of that: the shares that are tried.
 SHARES = (0.5, 0.25, 0.1, 0.0, 0.0)
+
+
+def hold_joints(ws: XPBDWorkspace, time: float, h: float) -> float:
+    """Project the joints of a substep; returns the work of their motors [J]."""
+    if not len(ws.joints):
+        return 0.0
+    work = ws.joints.project(ws.points, ws.previous, ws.velocities, ws.origins, time, h)
+    ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
+    return work
+
+
+def hold_in_contact(ws: XPBDWorkspace, time: float, h: float) -> None:
+    """Project joints and contacts in turn, where contacts have moved what joints hold."""
+    for _ in range(JOINT_PASSES if len(ws.joints) and ws.collisions.contacts else 0):
+        ws.joints.project_again(ws.points, ws.previous, ws.velocities, ws.origins, time, h)
+        ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
+        if not collide_again(ws, time, h):
+            return
 
 
 def collide(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
@@ -24,7 +44,7 @@ def collide(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
     if not _to_world(ws):
         return False
     ws.collisions.project(ws.world, ws.world_previous, time, h, parallel)
-    apply_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
+    _apply(ws, h)
     return True
 
 
@@ -33,8 +53,13 @@ def collide_again(ws: XPBDWorkspace, time: float, h: float) -> bool:
     if not _to_world(ws):
         return False
     ws.collisions.project_again(ws.world, ws.world_previous, time, h)
-    apply_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
+    _apply(ws, h)
     return True
+
+
+def _apply(ws: XPBDWorkspace, h: float) -> None:
+    apply_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
+    ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
 
 
 def _to_world(ws: XPBDWorkspace) -> bool:
@@ -76,6 +101,7 @@ def _shorten(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
             break
         failed, groups = True, united(groups, passed.tolist())
         ws.fallback.apply(*arrays, [sorted(group) for group in groups], share)
+        ws.rigid.settle(ws.points, ws.velocities)
     ws.guard.measure(ws.points, parallel)
     ws.guard.accept()
     return failed
@@ -89,7 +115,8 @@ def _passed(ws: XPBDWorkspace) -> NDArray[np.int64]:
 
 
 def restore(ws: XPBDWorkspace, h: float, parallel: bool) -> None:
-    """The velocities of changed positions, with the momentum of the velocities before."""
+    """The velocities of changed positions, with the momentum of the velocities before; rigid bodies are rigid."""
+    ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
     if ws.momentum is not None:
         ws.momentum.apply(ws.points, ws.previous, ws.velocities, h, parallel)
     else:

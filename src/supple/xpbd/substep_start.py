@@ -19,6 +19,7 @@ def load(ws: XPBDWorkspace, state: State) -> None:
     old = ws.layout.old_from_new
     np.take(state.positions, old, axis=0, out=ws.world)
     np.take(state.velocities, old, axis=0, out=ws.velocities)
+    ws.rigid.place(ws.world)
     origins_of_components(ws.world, ws.system.joined_components, ws.origins)
     np.subtract(ws.world, ws.origins, out=ws.points[:, :3])
     ws.anchors.place(ws.extended, ws.origins, state.time)

@@ -5,6 +5,7 @@ The largest of:
 - what keeps every body's stiffness within the accuracy (`assessment.softening`);
 - what lets surfaces approach each other by less than half the mean height of a tet in a substep: contact may not find
   surfaces that pass each other within one substep, and the guard of volumes stops a compression by less than that;
+- what lets rigid bodies turn by less than a tenth of a radian in a substep;
 - after a frame that had to be repeated with more substeps: a number that falls back from there.
 """
 
@@ -18,11 +19,14 @@ import numpy as np
 from supple.system import System
 from supple.xpbd.assessment.moment import Moment
 from supple.xpbd.assessment.softening import Softening
+from supple.xpbd.rigid.bodies import RigidBodies
 
 # Fewer substeps damp slow oscillations too much: a mode of frequency w decays at h w^2 / 2.
 FEWEST = 10
 # Of the mean height of a tet: how far surfaces may approach each other in a substep.
 APPROACH = 0.5
+# By how much a rigid body may turn in a substep [rad]; see `supple.xpbd.rigid.bodies`.
+MOST_TURN = 0.1
 # By which a number from an earlier frame falls in every frame.
 FALL = 0.8
 # How many times the number of the other criteria it may be: a blow that lasts for some frames must not raise it to any
@@ -43,10 +47,11 @@ class SubstepChoice:
     Parameters
     ----------
     system : in the solver's numbering; softening : of its bodies; touches : whether there is any contact
+    rigid : its rigid bodies
     """
 
-    def __init__(self, system: System, softening: Softening, touches: bool) -> None:
-        self.system, self.softening, self.touches = system, softening, touches
+    def __init__(self, system: System, softening: Softening, touches: bool, rigid: RigidBodies) -> None:
+        self.system, self.softening, self.touches, self.rigid = system, softening, touches, rigid
         Dm_inv = system.rest_shape_inverse
         b = np.concatenate([-Dm_inv.sum(axis=1, keepdims=True), Dm_inv], axis=1)
         heights = 1.0 / np.linalg.norm(b, axis=2).max(axis=1)
@@ -61,27 +66,37 @@ class SubstepChoice:
         earlier : what the frame before asks for, zero or more
         """
         stiff, body = self.softening.substeps(dt, accuracy)
-        fast = math.ceil(self._closing_speed(moment, dt) * dt / (APPROACH * self.height)) if self.touches else 0
+        fast = _count(self._closing_speed(moment, dt) * dt / (APPROACH * self.height)) if self.touches else 0
         found = max(
             Substeps(FEWEST, "the least number"),
             Substeps(stiff, f"the stiffness of body {body!r}"),
             Substeps(fast, "the speed of approach"),
+            self._for_spins(moment, dt),
             key=lambda each: each.count,
         )
         kept = min(math.ceil(FALL * earlier), MOST_KEPT * found.count)
         return found if found.count >= kept else Substeps(kept, "the frame before")
 
+    def _for_spins(self, moment: Moment, dt: float) -> Substeps:
+        if not len(self.rigid):
+            return Substeps(0, "")
+        spins = self.rigid.spins(moment.points[:, :3], moment.velocities)
+        fastest = int(spins.argmax())
+        return Substeps(
+            _count(float(spins[fastest]) * dt / MOST_TURN), f"the spin of body {self.rigid.names[fastest]!r}"
+        )
+
     def _closing_speed(self, moment: Moment, dt: float) -> float:
         """An upper bound of the speed at which surfaces approach each other in the frame [m/s]."""
-        v = moment.velocities
+        v = self.system.points.positions(moment.velocities)
         falling = math.hypot(*self.system.gravity) * dt
         fastest = 0.0
         if self.system.obstacles:
             fastest = float(np.sqrt(np.einsum("ij,ij->i", v, v).max())) + self._obstacle_speed(moment, dt) + falling
         if len(self.system.bodies) > 1:
-            relative = v - (self.system.masses @ v) / self.system.masses.sum()
+            relative = v - (self.system.masses @ moment.velocities) / self.system.masses.sum()
             fastest = max(fastest, 2.0 * float(np.sqrt(np.einsum("ij,ij->i", relative, relative).max())))
-        return fastest if math.isfinite(fastest) else 0.0
+        return fastest
 
     def _obstacle_speed(self, moment: Moment, dt: float) -> float:
         """The largest mean speed of an obstacle over the frame, at the corners of the box about all bodies [m/s]."""
@@ -93,3 +108,7 @@ class SubstepChoice:
         corners = np.array([[(low, high)[k >> a & 1][a] for a in range(3)] for k in range(8)])
         ends = [obstacle.carried(corners, moment.time, moment.time + dt) for obstacle in moving]
         return max(float(np.linalg.norm(end - corners, axis=1).max()) for end in ends) / dt
+
+
+def _count(number: float) -> int:
+    return math.ceil(number) if math.isfinite(number) else 0

@@ -20,6 +20,8 @@ from supple.xpbd.external_forces import ExternalForces
 from supple.xpbd.limits.rigid_fallback import RigidFallback
 from supple.xpbd.limits.volume_guard import VolumeGuard
 from supple.xpbd.momentum import MomentumRestore
+from supple.xpbd.rigid.bodies import RigidBodies
+from supple.xpbd.rigid.joints import JointProjection
 from supple.xpbd.sleep import Sleep
 from supple.xpbd.substeps import SubstepChoice
 from supple.xpbd.sweeps.ordering import Layout
@@ -42,6 +44,8 @@ class XPBDWorkspace:
 
     system: System
     layout: Layout
+    rigid: RigidBodies
+    joints: JointProjection
     sets: list[ConstraintSet]
     damping: Damping | None
     momentum: MomentumRestore | None

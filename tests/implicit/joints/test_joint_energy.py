@@ -5,9 +5,9 @@ import pytest
 
 import supple as sp
 from supple.implicit.energies.potential import HessianBlocks
-from supple.implicit.joints.geometry import JointGeometry
 from supple.implicit.joints.joint_step import JointStep
-from supple.implicit.joints.laws import Law, Laws
+from supple.joints.geometry import JointGeometry
+from supple.joints.laws import Law, Laws
 from supple.system import build_system, initial_state
 
 BOX = sp.shapes.box_surface((0.4, 0.2, 0.1), (1, 1, 1))

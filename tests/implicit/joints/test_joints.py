@@ -6,8 +6,8 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 import supple as sp
-from supple.implicit.joints.geometry import JointGeometry
 from supple.implicit.joints.joint_step import coordinates_at
+from supple.joints.geometry import JointGeometry
 from supple.scene.rotation import rotation_matrix
 from supple.system import build_system, initial_state
 

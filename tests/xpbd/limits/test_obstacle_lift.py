@@ -26,7 +26,7 @@ def test_the_deepest_vertices_come_to_the_skin_of_each_shape():
     np.testing.assert_allclose(d, [-0.0301, 0.0701, 0], atol=1e-15)
     np.testing.assert_array_equal(lift.displacement(x + np.array([0.3, -0.3, 0]), x, rows, (0.0, 0.01)), 0.0)
     inner = np.setdiff1d(rows, system.triangles)
-    np.testing.assert_array_equal(lift.displacement(x[inner] - 1.0, x[inner], inner, (0.0, 0.01)), 0.0)
+    np.testing.assert_array_equal(lift.displacement(x - 1.0, x, inner, (0.0, 0.01)), 0.0)
 
 
 def test_an_old_overlap_remains_and_a_moving_shape_carries_its_own():

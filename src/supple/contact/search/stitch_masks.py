@@ -49,7 +49,7 @@ def _touching(system: System, surfaces: ContactSurfaces, poses: ObstaclePoses, n
         return nothing, nothing
     placed = np.concatenate([part.body.place(system.rest_positions[part.vertices]) for part in system.bodies])
     start = np.zeros((len(surfaces.point_piece), 3))
-    start[: len(surfaces.rows)] = placed[surfaces.rows]
+    start[: len(surfaces.rows)] = surfaces.embedded.positions(placed)
     surfaces.place_obstacles(poses, 0.0, start)
     points, triangles = pairs_closer_than(surfaces, start, float(surfaces.gaps[joined].max()), joined)
     stitched = np.zeros(len(start), dtype=np.bool_)
@@ -62,7 +62,8 @@ def _points_of_vertices(system: System, surfaces: ContactSurfaces) -> NDArray[np
     """(n + a,) the point of each vertex and anchor; -1 for vertices inside bodies."""
     anchors = system.stitching.anchors
     point = np.full(len(system.masses) + len(anchors), -1, dtype=np.int64)
-    point[surfaces.rows] = np.arange(len(surfaces.rows))
+    vertices = surfaces.embedded.single
+    point[vertices[vertices >= 0]] = np.flatnonzero(vertices >= 0)
     for k in np.unique(anchors.owner):
         mesh = anchors.obstacles[k].surface_mesh
         assert mesh is not None  # others cannot be stitched to

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from supple.contact.obstacle_poses import ObstaclePoses
 from supple.mesh.surface import SurfaceMesh
 from supple.mesh.topology import connected_components
+from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.scene.contact_pairs import PairTable
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.system import System
@@ -26,9 +27,10 @@ class ContactSurfaces:
 
     Attributes
     ----------
-    rows : (nb,) vertices of the system that are the bodies' points
+    rows : (nb,) points of the system that are on the bodies' surfaces
+    embedded : (nb,) these as combinations of the system's vertices
     fixed_points : (no, 3) obstacles' points at time 0 [m]; fixed_owners : (no,) the obstacle of each
-    inverse_masses : (n,) 1/m [1/kg] with n = nb + no
+    inverse_masses : (n,) 1/m [1/kg] with n = nb + no; zero for points of rigid bodies
     point_piece : (n,)
     triangles : (t, 3) indices of points, sorted by piece, those of bodies first; triangle_piece : (t,)
     body_triangles : number of triangles of bodies
@@ -39,6 +41,7 @@ class ContactSurfaces:
     """
 
     rows: NDArray[np.int32]
+    embedded: EmbeddedPoints
     fixed_points: NDArray[np.float64]
     fixed_owners: NDArray[np.int32]
     inverse_masses: NDArray[np.float64]
@@ -113,11 +116,17 @@ def build_surfaces(
     all_triangles = np.ascontiguousarray(np.concatenate(triangles), dtype=np.int32)
     fixed_points = np.concatenate([np.zeros((0, 3)), *(part.points for part in fixed)])
     allowed, gaps, friction = _rules(pieces, table, body_collision, self_collision, thickness)
+    for piece in range(len(bodies.pieces)):
+        # A rigid body does not fold.
+        allowed[piece, piece] &= not system.bodies[pieces[piece].owner].rigid
+    embedded = system.points.taken(rows)
+    inverse = np.where(embedded.single < 0, 0.0, system.inverse_masses[embedded.single])
     return ContactSurfaces(
         rows=rows,
+        embedded=embedded,
         fixed_points=fixed_points,
         fixed_owners=np.repeat(np.arange(len(fixed), dtype=np.int32), [len(part.points) for part in fixed]),
-        inverse_masses=np.concatenate([system.inverse_masses[rows], np.zeros(len(fixed_points))]),
+        inverse_masses=np.concatenate([inverse, np.zeros(len(fixed_points))]),
         point_piece=piece_of,
         triangles=all_triangles,
         triangle_piece=piece_of[all_triangles[:, 0]],
@@ -131,16 +140,17 @@ def build_surfaces(
 
 
 def _body_part(system: System) -> tuple[NDArray[np.int32], _Part]:
-    """The vertices that are points of the bodies' surfaces, and these surfaces."""
+    """The points of the system that are on the bodies' surfaces, and these surfaces."""
     rows = np.unique(system.triangles).astype(np.int32)
-    index = np.full(len(system.masses), -1, dtype=np.int32)
+    index = np.full(len(system.points), -1, dtype=np.int32)
     index[rows] = np.arange(len(rows), dtype=np.int32)
-    _, first, piece = np.unique(system.components[rows], return_index=True, return_inverse=True)
-    ends = [part.vertices.stop for part in system.bodies]
+    components = system.components[system.points.vertices[system.points.start[rows]]]
+    _, first, piece = np.unique(components, return_index=True, return_inverse=True)
+    ends = [part.points.stop for part in system.bodies]
     pieces = [_Piece(int(owner)) for owner in np.searchsorted(ends, rows[first], side="right")]
     triangles = index[system.triangles]
     order = np.argsort(piece[triangles[:, 0]], kind="stable")
-    return rows, _Part(pieces, system.rest_positions[rows], piece.astype(np.int32), triangles[order])
+    return rows, _Part(pieces, system.rest_points[rows], piece.astype(np.int32), triangles[order])
 
 
 def _obstacle_part(owner: int, obstacle: Obstacle, edge_length: float) -> _Part:

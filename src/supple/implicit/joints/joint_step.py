@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.errors import SceneError
 from supple.implicit.details import ImplicitDetails
-from supple.implicit.joints.functions import values
-from supple.implicit.joints.geometry import ANGLE, COSINE, PRODUCT, JointGeometry
-from supple.implicit.joints.laws import followed, laws_of
 from supple.implicit.joints.potential import JointPotential
 from supple.implicit.newton.minimize import Outcome
-from supple.scene.joints.axis_joint import AxisJoint
+from supple.joints.at_state import coordinates_at, reported
+from supple.joints.geometry import ANGLE, JointGeometry
+from supple.joints.laws import laws_of
 from supple.state import State, Status
 
 # The stiffness of a joint in multiples of that of its bodies against strain, and of inertia in a step. Each update of
@@ -28,9 +25,6 @@ _HELD = 1e-7
 _MOST_UPDATES = 12
 # An update that does not reduce the largest violation below this share of it leads nowhere.
 _GAIN = 0.9
-
-# At the start, the sides of a joint are placed up to round-off in what a user computed. A share of the joint's size.
-_APART = 1e-3
 
 
 @dataclass(eq=False)
@@ -128,71 +122,3 @@ class JointStep:
         g, geometry = self.potential.coordinates(x), self.geometry
         rows = zip(geometry.joints, geometry.along, strict=True)
         return {str(joint.name): float(g[row]) for joint, row in rows if row >= 0 and geometry.functions[row] == ANGLE}
-
-
-def initial_joint_details(geometry: JointGeometry | None, start: State) -> dict[str, Any]:
-    """The entries of `ImplicitDetails` at a start: no forces."""
-    if geometry is None:
-        return {}
-    names = [str(joint.name) for joint in geometry.joints]
-    driven = [str(one.name) for one in geometry.joints if isinstance(one, AxisJoint) and one.motor is not None]
-    return {
-        "joint_forces": {name: np.zeros(3) for name in names},
-        "joint_torques": {name: np.zeros(3) for name in names},
-        "joint_coordinates": reported(geometry, coordinates_at(geometry, start)),
-        "motor_forces": dict.fromkeys(driven, 0.0),
-        "joint_violations": dict.fromkeys(names, 0.0),
-    }
-
-
-def reported(geometry: JointGeometry, g: NDArray[np.float64]) -> dict[str, float]:
-    """The coordinates of joints that have one, by name, of values g (s,) of the functions."""
-    g = np.where(geometry.functions == COSINE, np.arccos(np.clip(g, -1.0, 1.0)), g)
-    rows = zip(geometry.joints, geometry.along, strict=True)
-    return {str(joint.name): float(g[row]) for joint, row in rows if row >= 0}
-
-
-def coordinates_at(geometry: JointGeometry, state: State) -> NDArray[np.float64]:
-    """(s,) the functions' values at a state, angles over all turns."""
-    poses = geometry.poses(state.time)
-    corners = state.positions[geometry.corners]
-    triples = np.stack(
-        [
-            np.einsum("fk,fki->fi", column.coefficients, corners[column.joint]) + column.offsets(poses)
-            for column in geometry.triples
-        ],
-        axis=1,
-    )
-    return followed(geometry, values(geometry.functions, triples), state.hinge_angles, _APART)
-
-
-def refuse_apart(geometry: JointGeometry, state: State) -> None:
-    """Check that the joints hold where a simulation starts.
-
-    Raises
-    ------
-    SceneError : where the two sides of one are apart, or its coordinate is outside of its limits; the text names it.
-    """
-    g = coordinates_at(geometry, state)
-    poses = geometry.poses(state.time)
-    vectors = geometry.differences
-    corners = state.positions[geometry.corners[vectors.joint]]
-    q = np.einsum("fk,fki->fi", vectors.coefficients, corners) + vectors.offsets(poses)
-    off = np.zeros(len(geometry.joints))
-    np.maximum.at(off, vectors.joint, np.linalg.norm(q, axis=1))
-    np.maximum.at(off, geometry.triples[0].joint[geometry.across], np.abs(g[geometry.across]))
-    for j, joint in enumerate(geometry.joints):
-        if off[j] > _APART * geometry.sizes[j]:
-            raise SceneError(
-                f"{joint.label}: at the start it is off by {off[j]:.3g} m; start both sides where the joint holds"
-            )
-        row, (low, high) = int(geometry.along[j]), geometry.limits[j]
-        slack = _APART * geometry.units[row] if row >= 0 else 0.0
-        if row >= 0 and not low - slack <= g[row] <= high + slack:
-            here = reported(geometry, g)[str(joint.name)]
-            unit = "m" if geometry.functions[row] == PRODUCT else "rad"
-            given = f"({low:g}, {high:g})" if isinstance(joint, AxisJoint) else f"(0, {np.arccos(low):g})"
-            raise SceneError(
-                f"{joint.label}: at the start it is at {here:.4g} {unit}, outside of its limits {given}; "
-                "give limits that contain it"
-            )

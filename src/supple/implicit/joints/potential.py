@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.implicit.energies.potential import ContactPotential, HessianBlocks, Projection
-from supple.implicit.joints.functions import derivatives, values
-from supple.implicit.joints.geometry import ANGLE, JointGeometry, Vectors
-from supple.implicit.joints.laws import Laws, wrapped
+from supple.joints.functions import derivatives, values
+from supple.joints.geometry import ANGLE, JointGeometry, Vectors
+from supple.joints.laws import Laws, wrapped
 from supple.numerics.sparse.couplings import Couplings
 
 _PAIRS = np.triu_indices(8)

@@ -13,9 +13,9 @@ from supple.implicit.energies.elasticity import Elasticity
 from supple.implicit.energies.regularization import Regularization
 from supple.implicit.energies.stitch_damping import StitchViscosity
 from supple.implicit.energies.stitches import StitchEnergy
-from supple.implicit.joints.geometry import JointGeometry
 from supple.implicit.newton.direction import Tools
 from supple.implicit.stepping.conservation import Conservation
+from supple.joints.geometry import JointGeometry
 from supple.state import State
 from supple.system import System
 

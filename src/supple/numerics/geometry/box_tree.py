@@ -244,3 +244,21 @@ def _overlapping(nodes, labels, order, boxes, start, found):
                 count += 1
         if len(found) == 0:
             start[q + 1] = count
+
+
+@njit(cache=True)
+def near_boxes(boxes, together):
+    """For each of a few boxes (p, 6) the others that overlap it, of those that are `together` (p, p): starts, found."""
+    count = len(boxes)
+    starts = np.zeros(count + 1, dtype=np.int64)
+    found = np.empty(64, dtype=np.int64)
+    total = 0
+    for k in range(count):
+        for other in range(count):
+            if other != k and together[k, other] and overlap(boxes, other, boxes[k]):
+                if total == len(found):
+                    found = np.concatenate((found, np.empty(total, dtype=np.int64)))
+                found[total] = other
+                total += 1
+        starts[k + 1] = total
+    return starts, found

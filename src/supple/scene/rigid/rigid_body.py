@@ -39,7 +39,7 @@ _STRAIN = 1e-2
 
 @dataclass(frozen=True, eq=False)
 class RigidBody(PlacedBody):
-    """One rigid body of a scene; simulated by `Implicit`.
+    """One rigid body of a scene.
 
     Parameters
     ----------
@@ -55,8 +55,8 @@ class RigidBody(PlacedBody):
     velocity : (3,) initial velocity of the center of mass [m/s].
     angular_velocity : (3,) initial spin about the center of mass [rad/s].
     friction : Coulomb coefficient against other bodies; a pair uses the geometric mean of its two.
-    stiffness : kappa [Pa] of the energy that keeps the body rigid. None: from the heaviest load of the scene, see
-        `supple.scene.rigid.stiffness` and docs/rigid_bodies.md.
+    stiffness : kappa [Pa] of the energy that keeps the body rigid in `Implicit`; in `XPBD` it is exactly rigid. None:
+        from the heaviest load of the scene, see `supple.scene.rigid.stiffness` and docs/rigid_bodies.md.
 
     Attributes
     ----------

@@ -50,7 +50,7 @@ class ElasticEnergy:
                 else:
                     slopes = system.inverse_masses[system.edges[part.edges]].sum(axis=1)
                     hard_stiffness[part.edges] = np.where(slopes > 0.0, 1.0 / np.maximum(slopes, 1e-300), 0.0)
-            elif isinstance(material, Elastic):
+            elif isinstance(material, Elastic) and not part.rigid:
                 each = material.per_tet(len(volumes))
                 mu[part.tets], lam[part.tets] = each.mu, each.lam
         tets, edges = (mu > 0.0) | (lam > 0.0) | (hard_lam > 0.0), (stiffness > 0.0) | (hard_stiffness > 0.0)

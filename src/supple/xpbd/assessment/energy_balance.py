@@ -1,9 +1,10 @@
 """The balance of energy of a frame: what the bodies gained, less the work that was done on them.
 
 Kinetic, elastic and potential energy, and that of stitches and soft targets, of all vertices that are not pinned. Work
-is done by forces, by soft targets that move, and by pins that move. That of pins is the elastic energy which their
-motion adds in the prediction of a substep; the true work is never more. The work of obstacles that move is not known: a
-frame in which they touch something is not judged.
+is done by forces, by motors, by soft targets that move, and by pins that move. That of pins is the elastic energy which
+their motion adds in the prediction of a substep; the true work is never more. The work of obstacles and of rigid bodies
+that are moved is not known: a frame in which they touch something, or in which stitches or joints hold to them, is not
+judged.
 
 What violated hard constraints can give out counts where it falls, and not where it rises: it is an upper bound.
 
@@ -54,8 +55,11 @@ class EnergyBalance:
             held[pin.vertices] = True
         self._held = np.flatnonzero(held)
         self._at_pins = ElasticEnergy(system, held) if self._moving_pins else None
-        self._obstacles_move = any(obstacle.motion is not None for obstacle in system.obstacles)
-        self._anchors_move = self._obstacles_move and len(system.stitching.anchors) > 0
+        driven = {part.name for part in system.rigid_bodies if held[part.vertices].any()}
+        moving = {str(obstacle.name) for obstacle in system.obstacles if obstacle.motion is not None}
+        self._obstacles_move = bool(moving or driven)
+        joined = {name for joint in system.scene.joints for name in (joint.first, joint.second)}
+        self._anchors_move = bool(joined & (moving | driven)) or (bool(moving) and len(system.stitching.anchors) > 0)
         fall = LEAST_FALL * edge_length * math.hypot(*system.gravity)
         self._least = LEAST_STRAIN**2 * _stiffness(system) + fall * float(self._masses.sum())
         self._begun = np.zeros(len(system.bodies))
@@ -150,6 +154,8 @@ def _stiffness(system: System) -> float:
     """The sum of shear modulus times volume, or of edge stiffness times squared length [J]."""
     total = 0.0
     for part in system.bodies:
+        if part.rigid:
+            continue
         material, volumes = part.body.material, system.rest_volumes[part.tets]
         compliance = getattr(material, "edge_compliance", None)
         if compliance is None:

@@ -27,6 +27,7 @@ class Findings:
     gained : energy from nowhere over the energy of the scene [-]; gains : whether it grew in this frame
     gainer : the body whose energy rose most
     softened : (share, body) for each body that is softer than the accuracy allows
+    apart : (share of its size, joint) for each joint whose sides are farther apart than that
     """
 
     inverted: dict[str, int] = field(default_factory=dict)
@@ -36,6 +37,7 @@ class Findings:
     gains: bool = False
     gainer: str = ""
     softened: list[tuple[float, str]] = field(default_factory=list)
+    apart: list[tuple[float, str]] = field(default_factory=list)
 
     @property
     def status(self) -> Status:
@@ -61,6 +63,8 @@ class Findings:
             found.append((Status.ENERGY_GAINED, text))
         for share, name in self.softened:
             found.append((Status.SOFTENED, f"body {name!r} about {_percent(share)} too soft"))
+        for share, label in self.apart:
+            found.append((Status.SOFTENED, f"{label} is off by {_percent(share)} of its size"))
         return found
 
 

@@ -10,7 +10,8 @@ exceeds the converged one by at most
 
 with the mean over the volume; it is within 15 % of this for the coarsest beams at nu = 0.45 and 0.49, and several times
 smaller for fine meshes at nu = 0.3 (docs/xpbd.md). For `EdgesAndVolume`, the mean of (w_1 + w_2) / compliance over the
-edges stands for the bracket; hard constraints have no stiffness that could be compared.
+edges stands for the bracket; hard constraints and rigid bodies have no
+stiffness that could be compared.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ def _mean_square_frequency(system: System, part: BodyRange) -> float:
         if material.edge_compliance == 0.0:
             return 0.0
         return float(w[system.edges[part.edges]].sum(axis=1).mean()) / material.edge_compliance
-    if not isinstance(material, Elastic):
+    if part.rigid or not isinstance(material, Elastic):
         return 0.0
     volumes, Dm_inv = system.rest_volumes[part.tets], system.rest_shape_inverse[part.tets]
     b = np.concatenate([-Dm_inv.sum(axis=1, keepdims=True), Dm_inv], axis=1)

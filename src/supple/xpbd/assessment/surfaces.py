@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.obstacle_poses import ObstaclePoses
-from supple.numerics.geometry.box_tree import overlap
+from supple.numerics.geometry.box_tree import near_boxes, overlap
 from supple.numerics.geometry.triangle_crossings import CROSSING, crossing_triangles
 from supple.numerics.kernel_cache import njit
 from supple.scene.contact_pairs import pair_table
@@ -63,7 +63,7 @@ class SurfaceCheck:
         self._poses = ObstaclePoses(system.obstacles)
         self._names = [f"body {part.name!r}" for part in system.bodies] + [o.label for o in system.obstacles]
         self._collide = colliding_pairs(system, settings)
-        bodies, n = len(system.bodies), len(system.masses)
+        bodies, n = len(system.bodies), len(system.points)
         triangles, points, self._owners = [system.triangles], [], []
         owner = [np.repeat(np.arange(bodies), [part.triangles.stop - part.triangles.start for part in system.bodies])]
         self._formulas = []
@@ -85,7 +85,8 @@ class SurfaceCheck:
         self._last: tuple[NDArray[np.float64], float, NDArray[np.bool_], list[Overlap]]
         self._last = (np.zeros((0, 3)), -np.inf, np.zeros(0, dtype=np.bool_), [])
         self._obstacles_move = bool(self._poses.moving.any())
-        self._surface = [np.unique(system.triangles[part.triangles]) for part in system.bodies]
+        own = [np.unique(system.triangles[part.triangles]) for part in system.bodies]
+        self._surface, self._begins = np.concatenate(own), np.cumsum([0, *map(len, own[:-1])])
 
     def find(self, x: NDArray[np.float64], time: float, asleep: NDArray[np.bool_] | None = None) -> list[Overlap]:
         """What is through what, at world positions x (n, 3) [m] and a time [s].
@@ -106,7 +107,9 @@ class SurfaceCheck:
     def _crossings(self, x: NDArray[np.float64], time: float, collide: NDArray[np.bool_]) -> list[Overlap]:
         R, t = self._poses.at(time)
         rows = np.array(self._owners, dtype=np.int64)
-        points = np.concatenate([x, np.einsum("kij,kj->ki", R[rows], self._fixed) + t[rows]])
+        points = np.concatenate(
+            [self.system.points.positions(x), np.einsum("kij,kj->ki", R[rows], self._fixed) + t[rows]]
+        )
         corners = points[self._triangles]
         low, high = corners.min(axis=1), corners.max(axis=1)
         chosen = self._near(low, high, collide)
@@ -134,15 +137,14 @@ class SurfaceCheck:
         """Bodies with vertices deep inside of obstacles that have no triangles, of the pairs `collide` (p, p)."""
         collide = self._collide if collide is None else collide
         R, t = self._poses.at(time)
+        x = self.system.points.positions(x)
         bodies, found = len(self.system.bodies), []
         for k in self._formulas:
-            for number, rows in enumerate(self._surface):
-                if not collide[number, bodies + k]:
-                    continue
-                local = (x[rows] - t[k]) @ R[k]
-                deepest = -float(self.system.obstacles[k].signed_distance(local)[0].min())
-                if deepest > self.tolerated:
-                    found.append(Overlap(self._names[number], self._names[bodies + k], depth=deepest))
+            # Of all points at once: a scene may have many bodies of a few points each.
+            depth = -self.system.obstacles[k].signed_distance((x[self._surface] - t[k]) @ R[k])[0]
+            deepest = np.maximum.reduceat(depth, self._begins)
+            for number in np.flatnonzero((deepest > self.tolerated) & collide[:bodies, bodies + k]):
+                found.append(Overlap(self._names[number], self._names[bodies + k], depth=float(deepest[number])))
         return found
 
 
@@ -156,11 +158,16 @@ def _note_near(low, high, owner, collide, boxes, chosen):
         for j in range(3):
             boxes[owner[t], j] = min(boxes[owner[t], j], low[t, j])
             boxes[owner[t], 3 + j] = max(boxes[owner[t], 3 + j], high[t, j])
+    starts, near = near_boxes(boxes, collide)
     for t in range(len(owner)):
+        k = owner[t]
+        chosen[t] = collide[k, k]
         for j in range(3):
             box[j], box[3 + j] = low[t, j], high[t, j]
-        for k in range(len(boxes)):
-            chosen[t] = chosen[t] or (collide[owner[t], k] and (k == owner[t] or overlap(boxes, k, box)))
+        for i in range(starts[k], starts[k + 1]):
+            if chosen[t]:
+                break
+            chosen[t] = overlap(boxes, near[i], box)
 
 
 def colliding_pairs(system: System, settings: XPBDContact | None) -> NDArray[np.bool_]:

@@ -63,7 +63,7 @@ CONSTRAINT_SETS = (
 
 
 def build_constraint_sets(system: System, layout: Layout) -> list[ConstraintSet]:
-    """The constraint sets of all bodies: one of each kind, for all bodies that need it.
+    """The constraint sets of all soft bodies: one of each kind, for all bodies that need it.
 
     Parameters
     ----------
@@ -74,7 +74,8 @@ def build_constraint_sets(system: System, layout: Layout) -> list[ConstraintSet]
     ------
     SolverError : where a body's material has no constraints; the text names the body.
     """
-    for part in system.bodies:
+    soft = [part for part in system.bodies if not part.rigid]
+    for part in soft:
         material = part.body.material
         if not any(entry.takes(material) for entry in CONSTRAINT_SETS):
             raise SolverError(f"XPBD: {_why_not(part.name, material)}, or simulate with Implicit")
@@ -85,7 +86,7 @@ def build_constraint_sets(system: System, layout: Layout) -> list[ConstraintSet]
             )
     sets = []
     for entry in CONSTRAINT_SETS:
-        parts = [part for part in system.bodies if entry.takes(part.body.material)]
+        parts = [part for part in soft if entry.takes(part.body.material)]
         if parts:
             sets += [build(system, parts, layout) for build in entry.sets]
     return [made for made in sets if made.count > 0]

@@ -18,10 +18,11 @@ from supple.system import System
 from supple.xpbd.contact.frame_forces import FrameForces, Owners
 from supple.xpbd.contact.memory import ContactMemory
 from supple.xpbd.contact.obstacle_contacts import ObstacleContacts
-from supple.xpbd.contact.obstacle_shapes import ObstacleShapes, build_shapes
+from supple.xpbd.contact.obstacle_shapes import build_shapes
 from supple.xpbd.contact.response_rates import response_rates
 from supple.xpbd.contact.settings import XPBDContact
 from supple.xpbd.contact.surface_collisions import SurfaceCollisions
+from supple.xpbd.rigid.bodies import RigidBodies
 
 # Fraction of the mean surface edge that a vertex at rest may move before lists are renewed.
 LEAST_REACH = 0.1
@@ -30,6 +31,10 @@ LEAST_REACH = 0.1
 REMOVED_PER_FRAME, NEAR, DEFAULT_THICKNESS = 0.05, 1.0, 0.05
 # Fraction of the thickness: the gap that vertices keep from simple shapes, so that what rests does not touch.
 SKIN = 0.01
+
+# How often contacts of surfaces and of simple shapes are solved again in turn, where bodies are rigid: without an
+# elastic body between them, a push has to pass from one contact to the next within a substep.
+RIGID_PASSES = 2
 
 
 class Collisions:
@@ -50,25 +55,29 @@ class Collisions:
     def __init__(self, system: System, settings: XPBDContact | None) -> None:
         self.system = system
         self.settings = settings
+        rigid = RigidBodies(system)
+        self._any_rigid = len(rigid) > 0
         self.edge_length = mean_edge_length(system)
         self.poses = ObstaclePoses(system.obstacles)
         rates = response_rates(system)
         table = pair_table(system.scene)
-        self.obstacles = ObstacleContacts(build_shapes(system.obstacles), self.poses, system, table, rates)
+        self.obstacles = ObstacleContacts(build_shapes(system.obstacles), self.poses, system, table, rates, rigid)
         thickness = settings.thickness if settings is not None else None
         self.thickness = thickness if thickness is not None else DEFAULT_THICKNESS * self.edge_length
         switches = (False, False) if settings is None else (settings.body_collision, settings.self_collision)
         surfaces = build_surfaces(system, table, *switches, self.thickness, self.edge_length)
         self.surfaces = (
-            SurfaceCollisions(system, surfaces, self.poses, self.edge_length, rates) if surfaces.is_needed else None
+            SurfaceCollisions(system, surfaces, self.poses, self.edge_length, rates, rigid)
+            if surfaces.is_needed
+            else None
         )
         self.skin = SKIN * self.thickness
         self.contacts = 0
-        self._owners = _owners(system, self.obstacles.shapes, surfaces)
+        self._owners = _owners(system, self.obstacles, surfaces)
         self.forces = FrameForces(self._owners)
         self._smallest = math.inf
         self._dt = self._removed = 0.0
-        count = len(system.masses)
+        count = len(self.obstacles.embedded)
         self._reach = np.zeros(count)
         self._gathered, self._before = np.zeros((count, 3)), np.zeros((count, 3))
         self._limits = np.zeros(count)
@@ -110,7 +119,7 @@ class Collisions:
             self.surfaces.begin_step(x, v, time, dt, None if memory is None else memory.surfaces, crossing, asleep)
         if self.obstacles:
             known = None if memory is None else memory.obstacles
-            self.obstacles.begin_step(known, x, LEAST_REACH * self.edge_length, asleep[self._owners.of_vertices])
+            self.obstacles.begin_step(known, x, LEAST_REACH * self.edge_length, asleep)
             if not asleep.all():
                 self._gather_obstacles(x, v, time)
 
@@ -126,7 +135,7 @@ class Collisions:
         """
         self._removed = REMOVED_PER_FRAME * self.edge_length * min(1.0, h / self._dt)
         bodies = self.surfaces is not None and self.surfaces.begin_substep(x, x_prev, h)
-        return self.obstacles.begin_substep(x, h) or bodies
+        return self.obstacles.begin_substep(x, x_prev, h) or bodies
 
     def end_substep(self) -> None:
         """Take notice of the forces, and keep what the next substep begins with."""
@@ -156,13 +165,15 @@ class Collisions:
         limit, self._removed = self._removed, 0.0
         self._limits[:] = limit
         if self.surfaces is not None:
-            self._before[:] = x_prev
+            self._before[:] = self.obstacles.places(x_prev)
             self._count(self.surfaces.project(x, x_prev, (time - h, time), limit, parallel))
             # What other bodies moved into an obstacle is no old overlap.
-            add_distances(self._before, x_prev, self._limits)
+            add_distances(self._before, self.obstacles.places(x_prev), self._limits)
         between = self.contacts
         self._project_obstacles(x, x_prev, time, h)
         if self.surfaces is not None and self.contacts > between:
+            for _ in range(RIGID_PASSES if self._any_rigid and between else 0):
+                self.project_again(x, x_prev, time, h)
             # What obstacles push may have passed through other bodies.
             self.surfaces.check_parted(x, x_prev)
         return self.contacts
@@ -176,7 +187,7 @@ class Collisions:
 
     def _project_obstacles(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], time: float, h: float) -> None:
         if self.obstacles:
-            if any_beyond_reach(x, self._gathered, self._reach):
+            if any_beyond_reach(self.obstacles.places(x), self._gathered, self._reach):
                 self._gather_obstacles(x, (x - x_prev) / h, time)
             scales = (self.skin, NEAR * self.edge_length)
             self._count(self.obstacles.project(x, x_prev, (time - h, time), self._limits, scales))
@@ -217,6 +228,7 @@ class Collisions:
     def _gather_obstacles(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float) -> None:
         falling = 0.5 * math.hypot(*self.system.gravity) * self._dt**2
         least = LEAST_REACH * self.edge_length + falling
+        x, v = self.obstacles.places(x), self.obstacles.places(v)
         self._reach = least + 1.2 * self._dt * np.sqrt(np.einsum("ij,ij->i", v, v))
         self._gathered[:] = x
         self.obstacles.gather(x, self._reach, time)
@@ -234,22 +246,25 @@ def add_distances(x, y, out):
         out[i] += math.sqrt(dot(d, d))
 
 
-def _owners(system: System, shapes: ObstacleShapes, surfaces: ContactSurfaces) -> Owners:
+def _owners(system: System, obstacles: ObstacleContacts, surfaces: ContactSurfaces) -> Owners:
     names = tuple(part.name for part in system.bodies) + tuple(str(o.name) for o in system.obstacles)
-    of_vertices = np.zeros(len(system.masses), dtype=np.int32)
-    for k, part in enumerate(system.bodies):
-        of_vertices[part.vertices] = k
+    vertex = obstacles.embedded.single
+    # The points of soft bodies are their vertices; a control point is no point.
+    points, single = np.full(len(obstacles.embedded), -1, dtype=np.int32), system.points.single
+    points[single[single >= 0]] = np.flatnonzero(single >= 0)
+    points[vertex < 0] = np.flatnonzero(single < 0)
     return Owners(
         names=names,
         of_points=surfaces.owner[surfaces.point_piece].astype(np.int32),
-        of_shapes=(len(system.bodies) + np.asarray(shapes.owners)).astype(np.int32),
-        of_vertices=of_vertices,
+        of_shapes=(len(system.bodies) + np.asarray(obstacles.shapes.owners)).astype(np.int32),
+        of_vertices=obstacles.owner,
         rows=surfaces.rows,
-        masses=system.masses,
+        tested=points,
+        masses=np.where(vertex < 0, 1.0, system.masses[vertex]),
     )
 
 
 def mean_edge_length(system: System) -> float:
     """Mean edge length of all the bodies' surfaces at rest [m]."""
-    a, b, c = system.rest_positions[system.triangles].transpose(1, 0, 2)
+    a, b, c = system.rest_points[system.triangles].transpose(1, 0, 2)
     return float(np.mean([np.linalg.norm(a - b, axis=1), np.linalg.norm(b - c, axis=1), np.linalg.norm(c - a, axis=1)]))

@@ -1,6 +1,6 @@
 """The contacts of surfaces as rows of arrays, and the Gauss-Seidel sweeps over them.
 
-A row keeps a gap: n . r >= offset, with r = sum c_i x_i over four vertices (see `impulses`). Its impulse in total is a
+A row keeps a gap: n . r >= offset, with r = sum c_i x_i over four points (see `impulses`). Its impulse in total is a
 push along n and friction perpendicular to n. A substep begins with the force that was kept of the substep before. It is
 applied to the prediction, before the elastic constraints, so that these see the load that contact transmits. After
 them, sweeps change the impulse by what is missing, or too much, as long as the push remains zero or more. They may be
@@ -13,6 +13,7 @@ starting).
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +22,15 @@ from numpy.typing import NDArray
 from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import dot, row, subtract
 from supple.xpbd.contact.friction import along_surface, friction_total
-from supple.xpbd.contact.impulses import apply_impulse, compliance, displace, relative, shift_both
+from supple.xpbd.contact.impulses import (
+    apply_impulse,
+    compliance,
+    is_rigid,
+    relative,
+    relative_before,
+    shift_both,
+    shift_compliance,
+)
 from supple.xpbd.contact.response_rates import keep_shares, kept_share
 
 
@@ -153,14 +162,14 @@ def deactivate(active):
 
 
 @njit(cache=True)
-def choose_rows(x, x_prev, inverse_masses, rows, first_obstacle, kind, h):
+def choose_rows(x, x_prev, movers, rows, first_obstacle, kind, h):
     """The active rows of one kind: with triangles and edges of bodies (0), or of obstacles (1).
 
     A row that is not active and holds a force has lost its pair: its impulse is taken back.
 
     Parameters
     ----------
-    x, x_prev, inverse_masses, h : see `push_rows`
+    x, x_prev, movers, h : see `push_rows`
     rows : `ContactRows.described`; first_obstacle : the first point of an obstacle
     """
     vertices, weights, _, _, _, forces, _, active, _ = rows
@@ -174,18 +183,19 @@ def choose_rows(x, x_prev, inverse_masses, rows, first_obstacle, kind, h):
             count += 1
         elif forces[e, 0] != 0.0 or forces[e, 1] != 0.0 or forces[e, 2] != 0.0:
             d = (-h * h * forces[e, 0], -h * h * forces[e, 1], -h * h * forces[e, 2])
-            apply_impulse(x, x_prev, inverse_masses, vertices, weights, e, d)
+            apply_impulse(x, x_prev, movers, vertices, weights, e, d)
             forces[e, :] = 0.0
     return chosen[:count]
 
 
 @njit(cache=True)
-def push_rows(x, x_prev, inverse_masses, rows, h):
+def push_rows(x, x_prev, movers, rows, h):
     """Apply the forces of the substep before to the prediction x (n, 3), as impulses of this substep.
 
     Parameters
     ----------
     x, x_prev : (n, 3) prediction, and positions at the beginning of the substep [m]
+    movers : of the points, see `Movers`
     rows : `ContactRows.described`
     h : length of the substep [s]
     """
@@ -194,7 +204,7 @@ def push_rows(x, x_prev, inverse_masses, rows, h):
         f = row(forces, e)
         if f[0] != 0.0 or f[1] != 0.0 or f[2] != 0.0:
             d = (h * h * f[0], h * h * f[1], h * h * f[2])
-            apply_impulse(x, x_prev, inverse_masses, vertices, weights, e, d)
+            apply_impulse(x, x_prev, movers, vertices, weights, e, d)
 
 
 @njit(cache=True)
@@ -209,7 +219,7 @@ def solve_rows(x, x_prev, predicted, points, chosen, rows, h, limit, sweeps):
     ----------
     x, x_prev : (n, 3) at the end and at the beginning of the substep [m]; x includes the forces' impulses
     predicted : (n, 3) the prediction, before forces and constraints [m]
-    points : inverse_masses (n,) [1/kg], rates (n,) see `response_rates` [1/s^2]
+    points : movers, see `Movers`; rates (n,) see `response_rates` [1/s^2]
     chosen : (c,) rows, in the order of a sweep
     rows : `ContactRows.described`; forces are those that x contains, and shares are set
     h : length of the substep [s]
@@ -217,7 +227,7 @@ def solve_rows(x, x_prev, predicted, points, chosen, rows, h, limit, sweeps):
     sweeps : number of sweeps
     """
     vertices, weights, normals, offsets, friction, forces, shares, _, _ = rows
-    inverse_masses, rates = points
+    movers, rates = points
     h2 = h * h
     smallest = np.inf
     pushes, holds = np.zeros(len(chosen)), np.zeros((len(chosen), 3))
@@ -229,31 +239,40 @@ def solve_rows(x, x_prev, predicted, points, chosen, rows, h, limit, sweeps):
         t = along_surface(force, n)
         for j in range(3):
             holds[k, j] = h2 * t[j]
-        before = dot(relative(x_prev, vertices, weights, e), n)
+        before = dot(relative_before(x_prev, movers, vertices, weights, e), n)
         smallest = min(smallest, before)
-        total = compliance(inverse_masses, vertices, weights, e)
+        total = shift_compliance(movers, vertices, weights, e)
         old = min(offsets[e] - before, limit)
         if old > 0.0 and total > 0.0:
             s = old / total
-            d = (s * n[0], s * n[1], s * n[2])
-            shift_both(x, x_prev, inverse_masses, vertices, weights, e, d)
-            displace(predicted, inverse_masses, vertices, weights, e, d)
+            shift_both(x, x_prev, predicted, movers, vertices, weights, e, (s * n[0], s * n[1], s * n[2]))
     for _ in range(sweeps):
         for k in range(len(chosen)):
             e = chosen[k]
-            total = compliance(inverse_masses, vertices, weights, e)
+            n = row(normals, e)
+            total = compliance(movers, vertices, weights, e, n)
             if not total > 0.0:
                 continue
-            n = row(normals, e)
-            r, r_prev = relative(x, vertices, weights, e), relative(x_prev, vertices, weights, e)
+            r = relative(x, movers, vertices, weights, e)
+            r_prev = relative_before(x_prev, movers, vertices, weights, e)
             missing = min(0.0, dot(r_prev, n) - offsets[e]) - (dot(r, n) - offsets[e])
             push = max(0.0, pushes[k] + missing / total)
+            more = push - pushes[k]
+            slip = subtract(r, r_prev)
+            if is_rigid(movers, vertices, e):
+                # The push turns bodies, and they answer differently along the surface.
+                apply_impulse(x, x_prev, movers, vertices, weights, e, (more * n[0], more * n[1], more * n[2]))
+                more = 0.0
+                slip = along_surface(subtract(relative(x, movers, vertices, weights, e), r_prev), n)
+                length = math.sqrt(dot(slip, slip))
+                if length > 0.0:
+                    along = (slip[0] / length, slip[1] / length, slip[2] / length)
+                    total = compliance(movers, vertices, weights, e, along)
             held = row(holds, k)
             # Corrections of positions in place of impulses: divided by the same inverse masses.
             scaled = (held[0] * total, held[1] * total, held[2] * total)
-            hold = friction_total(scaled, subtract(r, r_prev), n, friction[e] * push * total)
+            hold = friction_total(scaled, slip, n, friction[e] * push * total)
             hold = (hold[0] / total, hold[1] / total, hold[2] / total)
-            more = push - pushes[k]
             d = (
                 more * n[0] + hold[0] - held[0],
                 more * n[1] + hold[1] - held[1],
@@ -262,14 +281,14 @@ def solve_rows(x, x_prev, predicted, points, chosen, rows, h, limit, sweeps):
             pushes[k] = push
             for j in range(3):
                 holds[k, j] = hold[j]
-            apply_impulse(x, x_prev, inverse_masses, vertices, weights, e, d)
+            apply_impulse(x, x_prev, movers, vertices, weights, e, d)
     contacts = 0
     for k in range(len(chosen)):
         e = chosen[k]
         contacts += pushes[k] > 0.0
         share = 0.0
         if pushes[k] > 0.0:
-            share = _sustained(x_prev, predicted, inverse_masses, (vertices, weights, normals, offsets), e, pushes[k])
+            share = _sustained(x_prev, predicted, movers, (vertices, weights, normals, offsets), e, pushes[k])
             share *= kept_share(h2 * _fastest(rates, vertices, weights, e))
         shares[e] = share
         for j in range(3):
@@ -278,13 +297,13 @@ def solve_rows(x, x_prev, predicted, points, chosen, rows, h, limit, sweeps):
 
 
 @njit
-def _sustained(x_prev, predicted, inverse_masses, rows, e, push):
+def _sustained(x_prev, predicted, movers, rows, e, push):
     """The part of a push that did not stop the approach with which the substep began: that part does not return."""
     vertices, weights, normals, offsets = rows
     n = row(normals, e)
-    before = dot(relative(x_prev, vertices, weights, e), n) - offsets[e]
-    approach = min(0.0, before) - (dot(relative(predicted, vertices, weights, e), n) - offsets[e])
-    impact = max(0.0, approach) / compliance(inverse_masses, vertices, weights, e)
+    before = dot(relative_before(x_prev, movers, vertices, weights, e), n) - offsets[e]
+    approach = min(0.0, before) - (dot(relative_before(predicted, movers, vertices, weights, e), n) - offsets[e])
+    impact = max(0.0, approach) / compliance(movers, vertices, weights, e, n)
     return max(0.0, 1.0 - impact / push)
 
 
@@ -299,10 +318,10 @@ def _fastest(rates, vertices, weights, e):
 
 
 @njit(cache=True)
-def note_depths(x, chosen, rows, depth):
+def note_depths(x, movers, chosen, rows, depth):
     """Increase depth (n,) to how deep points are inside other pieces, after all contacts are resolved [m]."""
     vertices, weights, normals, _, _, _, _, _, deep = rows
     for e in chosen:
         if deep[e]:
             p = vertices[e, 0]
-            depth[p] = max(depth[p], -dot(relative(x, vertices, weights, e), row(normals, e)))
+            depth[p] = max(depth[p], -dot(relative(x, movers, vertices, weights, e), row(normals, e)))

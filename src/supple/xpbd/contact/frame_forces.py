@@ -41,9 +41,10 @@ class Owners(NamedTuple):
 
     Attributes
     ----------
-    names : of all; of_points : (p,) of the points of `ContactSurfaces`; of_shapes : (s,); of_vertices : (n,)
-    rows : (nb,) vertices of the system that are the bodies' points, which come first among the points
-    masses : (n,) of the vertices [kg]
+    names : of all; of_points : (p,) of the points of `ContactSurfaces`; of_shapes : (s,)
+    of_vertices : (t,) of what simple shapes are tested with, see `ObstacleContacts`
+    rows : (nb,) points of the system that are the bodies' points, which come first among the points
+    tested : (t,) points of the system that are tested; masses : (t,) of vertices [kg], 1 on rigid bodies
     """
 
     names: tuple[str, ...]
@@ -51,6 +52,7 @@ class Owners(NamedTuple):
     of_shapes: NDArray[np.int32]
     of_vertices: NDArray[np.int32]
     rows: NDArray[np.int32]
+    tested: NDArray[np.int32]
     masses: NDArray[np.float64]
 
 
@@ -115,21 +117,20 @@ class FrameForces:
         return dict(zip(names, normal, strict=True)), dict(zip(names, tangential, strict=True))
 
     def points(
-        self, x: NDArray[np.float64], at_end: NDArray[np.float64], old_from_new: NDArray[np.int32]
+        self, x: NDArray[np.float64], at_end: NDArray[np.float64], old_points: NDArray[np.int32]
     ) -> ContactPoints:
         """All contacts of the frame, one by one. Those of the same vertices in several substeps are one.
 
         Parameters
         ----------
-        x : (n, 3) positions of the solver's vertices at the end of the frame; at_end : (p, 3) of the surfaces' points
-            [m]
-        old_from_new : (n,) the scene's number of each of the solver's vertices
+        x : (t, 3) positions at the end of the frame of what is tested; at_end : (p, 3) of the surfaces' points [m]
+        old_points : (s,) the scene's number of each of the solver's points
         """
         return _joined(
             self.owners.names,
             [
-                self._surface_points(at_end, old_from_new),
-                self._shape_points(x, old_from_new),
+                self._surface_points(at_end, old_points),
+                self._shape_points(x, old_points),
             ],
         )
 
@@ -143,7 +144,7 @@ class FrameForces:
         parts = [*self.shapes, standing._replace(loads=max(self.substeps, 1) * standing.loads)]
         return ShapeLoads(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
-    def _surface_points(self, x: NDArray[np.float64], old_from_new: NDArray[np.int32]) -> ContactPoints:
+    def _surface_points(self, x: NDArray[np.float64], old_points: NDArray[np.int32]) -> ContactPoints:
         rows, bodies = self._rows(), len(self.owners.rows)
         entries = _of_rows(rows, self)
         places = np.column_stack([rows.keys, rows.vertices.astype(np.int64)])
@@ -167,11 +168,11 @@ class FrameForces:
             second=entries.second[chosen],
             names=self.owners.names,
             rows=k,
-            vertices=old_from_new[self.owners.rows[vertices[k, slot]]],
+            vertices=old_points[self.owners.rows[vertices[k, slot]]],
             weights=weights[k, slot],
         )
 
-    def _shape_points(self, x: NDArray[np.float64], old_from_new: NDArray[np.int32]) -> ContactPoints:
+    def _shape_points(self, x: NDArray[np.float64], old_points: NDArray[np.int32]) -> ContactPoints:
         loads = self._loads()
         entries = _of_shapes(loads, self)
         chosen, contact = _same(np.column_stack([loads.shapes, loads.vertices.astype(np.int64)]))
@@ -188,7 +189,7 @@ class FrameForces:
             second=entries.second[chosen],
             names=self.owners.names,
             rows=np.arange(len(chosen)),
-            vertices=old_from_new[vertices],
+            vertices=old_points[self.owners.tested[vertices]],
             weights=np.ones(len(chosen)),
         )
 

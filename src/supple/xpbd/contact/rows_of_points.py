@@ -4,16 +4,25 @@ from supple.numerics.kernel_cache import njit
 
 
 @njit(cache=True)
-def take_rows(x, rows, out):
-    """Copy the vertices `rows` (b,) of x (n, 3) to the first b points of `out`."""
-    for i in range(len(rows)):
-        for j in range(3):
-            out[i, j] = x[rows[i], j]
+def take_points(x, start, vertices, weights, out):
+    """Write the places of points (b,) on the vertices x (n, 3), see `EmbeddedPoints`, to the first rows of `out`."""
+    for i in range(len(start) - 1):
+        first = start[i]
+        if start[i + 1] == first + 1:
+            for j in range(3):
+                out[i, j] = x[vertices[first], j]
+        else:
+            for j in range(3):
+                total = 0.0
+                for k in range(first, start[i + 1]):
+                    total += weights[k] * x[vertices[k], j]
+                out[i, j] = total
 
 
 @njit(cache=True)
-def give_rows(points, rows, x):
-    """Copy the first b of the points back to the vertices `rows` (b,) of x (n, 3)."""
-    for i in range(len(rows)):
-        for j in range(3):
-            x[rows[i], j] = points[i, j]
+def give_rows(points, start, vertices, x):
+    """Copy those of the points back that are vertices of x (n, 3)."""
+    for i in range(len(start) - 1):
+        if start[i + 1] == start[i] + 1:
+            for j in range(3):
+                x[vertices[start[i]], j] = points[i, j]

@@ -41,7 +41,8 @@ from supple.xpbd.contact.detection.surface_contacts import (
 )
 from supple.xpbd.contact.detection.surface_edges import surface_edges
 from supple.xpbd.contact.memory import SurfaceMemory
-from supple.xpbd.contact.rows_of_points import give_rows, take_rows
+from supple.xpbd.contact.movers import MovedPoints
+from supple.xpbd.rigid.bodies import RigidBodies
 
 # Of the mean surface edge: the least and the largest motion of a point that lists of candidates allow for, and the
 # largest gap that is reported.
@@ -69,12 +70,13 @@ class SurfaceCollisions:
         poses: ObstaclePoses,
         edge_length: float,
         rates: NDArray[np.float64],
+        rigid: RigidBodies,
     ) -> None:
         self.surfaces = s = surfaces
         self.poses = poses
         self.edge_length = edge_length
         n, pieces = len(s.point_piece), len(s.closed)
-        rest = np.concatenate([system.rest_positions[s.rows], s.fixed_points])
+        rest = np.concatenate([system.rest_points[s.rows], s.fixed_points])
         widest = float(np.diagonal(s.gaps).max(initial=0.0))
         excluded = excluded_pairs(s, rest, 2.0 * min(widest, 0.5 * edge_length))
         self._stitched = stitched_points(system, s, poses)
@@ -95,7 +97,12 @@ class SurfaceCollisions:
         self._pieces = (s.point_piece, s.triangles, s.triangle_piece, s.closed, s.gaps, s.friction)
         self._predicted = np.zeros((n, 3))
         self._inverse_masses = s.inverse_masses.copy()
-        self._points = (self._inverse_masses, np.concatenate([rates[s.rows], np.zeros(len(s.fixed_points))]))
+        self._moved = MovedPoints(s.embedded, len(s.fixed_points), rigid, self._inverse_masses)
+        self._movers, self._rigid = self._moved.movers, rigid
+        own = rates[s.embedded.vertices[s.embedded.start[:-1]]]
+        self._points = (self._movers, np.concatenate([own, np.zeros(len(s.fixed_points))]))
+        # How far gravity moves the prediction of rigid bodies [m/s^2]; see `begin_substep`.
+        self._falling = np.where(self._movers.body >= 0, 1.0, 0.0)[:, None] * system.gravity
         self._runs = PieceRuns(self._finder, n, s.triangle_piece)
         self._rows = ContactRows()
         # The contacts between pieces that sleep.
@@ -139,12 +146,13 @@ class SurfaceCollisions:
             self._apart &= ~(both | both.T)
         bodies = len(self.surfaces.rows)
         self._dt = dt
-        take_rows(x, self.surfaces.rows, self._x)
+        self._moved.begin_step(asleep[self._rigid.numbers] | self._rigid.held)
+        self._moved.take(x, self._x)
         self.surfaces.place_obstacles(self.poses, time, self._x)
         motions = np.zeros_like(self._x)
         self.surfaces.place_obstacles(self.poses, time + dt, motions)
         motions[bodies:] -= self._x[bodies:]
-        motions[:bodies] = v[self.surfaces.rows] * dt
+        self._moved.take(v * dt, motions)
         self._before[:] = self._x
         self._recall(memory, still[s.point_piece])
         if not still.all():
@@ -154,11 +162,15 @@ class SurfaceCollisions:
     def begin_substep(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> bool:
         """See `Collisions.begin_substep`."""
         rows = self._rows
-        take_rows(x, self.surfaces.rows, self._predicted)
+        self._moved.take(x, self._predicted)
+        if len(self._rigid):
+            # What rests on a point approaches it in every substep by its fall; this is no impact.
+            self._predicted -= h * h * self._falling
         if rows.loads:
             self._take(x, x_prev)
-            push_rows(self._x, self._before, self._inverse_masses, rows.described, h)
-            give_rows(self._x, self.surfaces.rows, x)
+            push_rows(self._x, self._before, self._movers, rows.described, h)
+            self._settle()
+            self._give(x, x_prev)
         return rows.loads
 
     def project(
@@ -223,7 +235,7 @@ class SurfaceCollisions:
         """(p,) the label of each piece, of the labels of all vertices; -1 for obstacles."""
         s = self.surfaces
         found = np.full(len(s.owner), -1, dtype=np.int64)
-        found[s.point_piece[: len(s.rows)]] = labels[s.rows]
+        found[s.point_piece[: len(s.rows)]] = labels[s.embedded.vertices[s.embedded.start[:-1]]]
         return found
 
     def forces(self) -> LoadedRows:
@@ -248,18 +260,22 @@ class SurfaceCollisions:
         self._near_pairs = self._edges.swept(self._before, self._way, self._slack)
 
     def _take(self, x: NDArray[np.float64], x_prev: NDArray[np.float64]) -> None:
-        take_rows(x, self.surfaces.rows, self._x)
-        take_rows(x_prev, self.surfaces.rows, self._before)
+        self._moved.take(x, self._x)
+        self._moved.take(x_prev, self._before)
+        self._moved.begin(x, x_prev, self._before)
+
+    def _settle(self) -> None:
+        self._moved.settle(self._x, self._before, self._predicted)
 
     def _give(self, x: NDArray[np.float64], x_prev: NDArray[np.float64]) -> None:
-        give_rows(self._x, self.surfaces.rows, x)
-        give_rows(self._before, self.surfaces.rows, x_prev)
+        self._moved.give(self._x, self._before, x, x_prev)
 
     def _solve(self, kind: int, h: float, limit: float) -> tuple[int, float]:
         """Project the chosen rows of one kind; returns what `solve_rows` does."""
         chosen, described = self._chosen[kind], self._rows.described
         found = solve_rows(self._x, self._before, self._predicted, self._points, chosen, described, h, limit, SWEEPS)
-        note_depths(self._x, chosen, described, self._depth[kind])
+        note_depths(self._x, self._movers, chosen, described, self._depth[kind])
+        self._settle()
         return found
 
     def _find_passages(self, kind: int, part: tuple[int, int], h: float) -> bool:
@@ -270,9 +286,7 @@ class SurfaceCollisions:
         found = (self._x, self._before, self._pairs, self._near_pairs, self._edges.arrays[0], self._edge_rules)
         passed += find_edge_passages(*found, len(s.rows), kind, described)
         if passed:
-            self._chosen[kind] = choose_rows(
-                self._x, self._before, self._inverse_masses, described, len(s.rows), kind, h
-            )
+            self._chosen[kind] = choose_rows(self._x, self._before, self._movers, described, len(s.rows), kind, h)
         return passed > 0
 
     def _find(self, kind: int, part: tuple[int, int], h: float, parallel: bool) -> float:
@@ -294,13 +308,13 @@ class SurfaceCollisions:
             which = (near, bodies, kind)
             found = (self._x, self._before, self._pairs, self._near_pairs, self._edges.arrays, self._edge_rules)
             smallest = min(smallest, find_edge_contacts(*found, *which, described))
-        self._chosen[kind] = choose_rows(self._x, self._before, self._inverse_masses, described, bodies, kind, h)
+        self._chosen[kind] = choose_rows(self._x, self._before, self._movers, described, bodies, kind, h)
         return float(smallest)
 
     def memory(self, x: NDArray[np.float64]) -> SurfaceMemory:
         """What the next step needs; `x` (n, 3) are the positions at the end of this one, after all contacts [m]."""
         s = self.surfaces
-        positions = np.concatenate([x[s.rows], self._x[len(s.rows) :]])
+        positions = np.concatenate([s.embedded.positions(x), self._x[len(s.rows) :]])
         return SurfaceMemory(
             s.triangles[: s.body_triangles],
             positions,

@@ -27,7 +27,8 @@ class ObstacleLift:
         self._shapes = [k for k, obstacle in enumerate(system.obstacles) if obstacle.surface_mesh is None]
         collide = pair_table(system.scene).collide
         bodies = len(system.bodies)
-        self._collide = np.zeros((len(system.obstacles), len(system.masses)), dtype=np.bool_)
+        self._points = system.points
+        self._collide = np.zeros((len(system.obstacles), len(system.points)), dtype=np.bool_)
         for number, part in enumerate(system.bodies):
             self._collide[:, np.unique(system.triangles[part.triangles])] = collide[bodies:, number][:, None]
 
@@ -38,18 +39,20 @@ class ObstacleLift:
         rows: NDArray[np.intp],
         times: tuple[float, float],
     ) -> NDArray[np.float64]:
-        """What is to be added to the vertices x so that none is deeper in a shape than at the beginning: (3,) [m].
+        """What is to be added to vertices so that no point is deeper in a shape than at the beginning: (3,) [m].
 
         Parameters
         ----------
-        x, x_prev : (k, 3) world positions at the end and at the beginning of the substep [m]
-        rows : (k,) the numbers of these vertices; times : of the beginning and of the end [s]
+        x, x_prev : (n, 3) world positions of all vertices at the end and at the beginning of the substep [m]
+        rows : (k,) the vertices that are moved; times : of the beginning and of the end [s]
         """
+        moved_points = np.isin(self._points.vertices[self._points.start[:-1]], rows)
+        x, x_prev = self._points.positions(x), self._points.positions(x_prev)
         d = np.zeros(3)
         for _ in range(MOST_ROUNDS):
             moved = False
             for k in self._shapes:
-                mine = self._collide[k, rows]
+                mine = self._collide[k] & moved_points
                 if not mine.any():
                     continue
                 before, _ = self._gaps(k, x_prev[mine], times[0])

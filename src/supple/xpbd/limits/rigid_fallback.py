@@ -106,7 +106,7 @@ class RigidFallback:
                 moved[rows] -= h * change
                 if (volume_signs(moved, tets) > 0.0).all():
                     points[rows, :3] = moved[rows]
-                shown = (points[rows, :3] + origins[rows], start[rows] + origins[rows])
+                shown = (points[:, :3] + origins, start + origins)
                 lift = self._lift.displacement(*shown, rows, (time - h, time))
                 points[rows, :3] += lift
                 v += lift / h

@@ -31,6 +31,7 @@ class Layout:
     Attributes
     ----------
     old_from_new, new_from_old : (n,) int32, between the System's vertex numbers and the solver's.
+    old_points : (p,) int32, the System's number of each of the solver's points.
     rank : (n,) int32, position of each vertex (solver's number) along the levels.
     chunk : (n,) int32, the chunk of each vertex (solver's number); a constraint belongs to its lowest vertex's chunk.
     body : (n,) int32, the body of each vertex (solver's number).
@@ -39,6 +40,7 @@ class Layout:
 
     old_from_new: NDArray[np.int32]
     new_from_old: NDArray[np.int32]
+    old_points: NDArray[np.int32]
     rank: NDArray[np.int32]
     chunk: NDArray[np.int32]
     body: NDArray[np.int32]
@@ -79,6 +81,7 @@ def make_layout(system: System) -> Layout:
     return Layout(
         old_from_new=old_from_new,
         new_from_old=new_from_old,
+        old_points=_old_points(system, old_from_new),
         rank=rank_of_old[old_from_new],
         chunk=chunk_of_level[levels],
         body=body_of_old[old_from_new],
@@ -86,9 +89,22 @@ def make_layout(system: System) -> Layout:
     )
 
 
+def _old_points(system: System, old_from_new: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Points of soft bodies follow their vertices; those of rigid bodies keep their order."""
+    parts = []
+    for part in system.bodies:
+        begin, end = part.points.start, part.points.stop
+        own = old_from_new[part.vertices] - part.vertices.start
+        parts.append(np.arange(begin, end) if part.rigid else own + begin)
+    return np.concatenate(parts).astype(np.int32)
+
+
 def reordered(system: System, layout: Layout) -> System:
     """The same system in the solver's numbering: vertices are permuted within their bodies, nothing else changes."""
     old, new = layout.old_from_new, layout.new_from_old
+    points = system.points.taken(layout.old_points)
+    new_points = np.empty(len(points), dtype=np.int32)
+    new_points[layout.old_points] = np.arange(len(points), dtype=np.int32)
     return replace(
         system,
         pins=tuple(replace(pin, vertices=new[pin.vertices]) for pin in system.pins),
@@ -99,7 +115,8 @@ def reordered(system: System, layout: Layout) -> System:
         masses=np.ascontiguousarray(system.masses[old]),
         tets=np.ascontiguousarray(new[system.tets]),
         edges=np.ascontiguousarray(new[system.edges]),
-        triangles=np.ascontiguousarray(new[system.triangles]),
+        triangles=np.ascontiguousarray(new_points[system.triangles]),
+        points=replace(points, vertices=new[points.vertices]),
         components=np.ascontiguousarray(system.components[old]),
         stitching=system.stitching.renumbered(new),
     )

@@ -10,7 +10,7 @@ from supple.contact.search.room import Room
 from supple.contact.search.surfaces import ContactSurfaces
 from supple.contact.surface.distances import edge_edge_square
 from supple.numerics.adjacency import in_list
-from supple.numerics.geometry.box_tree import STACK, BoxTree, after_leaf, next_leaf, overlap
+from supple.numerics.geometry.box_tree import STACK, BoxTree, after_leaf, near_boxes, next_leaf, overlap
 from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import dot, row, subtract
 from supple.xpbd.contact.detection.piece_runs import EDGE_EDGE, key_of
@@ -100,11 +100,13 @@ def boxes_of_edges(x, ends, margin, pieces, together, boxes, piece_boxes):
             boxes[e, j], boxes[e, 3 + j] = min(a, b) - margin[e], max(a, b) + margin[e]
             piece_boxes[k, j] = min(piece_boxes[k, j], boxes[e, j])
             piece_boxes[k, 3 + j] = max(piece_boxes[k, 3 + j], boxes[e, 3 + j])
+    starts, near = near_boxes(piece_boxes, together)
     meets = np.zeros(len(ends), dtype=np.bool_)
     for e in range(len(ends)):
-        for k in range(len(together)):
-            other = k != pieces[e] and together[pieces[e], k]
-            meets[e] = meets[e] or (other and overlap(piece_boxes, k, boxes[e]))
+        for i in range(starts[pieces[e]], starts[pieces[e] + 1]):
+            if overlap(piece_boxes, near[i], boxes[e]):
+                meets[e] = True
+                break
     return meets
 
 

@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.joints.geometry import ANGLE, JointGeometry
+from supple.joints.geometry import ANGLE, JointGeometry
 from supple.scene.joints.axis_joint import AxisJoint
 from supple.scene.joints.motors import ForceMotor, Motor, PositionMotor, VelocityMotor
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.joints.geometry import ANGLE
+from supple.joints.geometry import ANGLE
 
 _I = np.eye(3)
 

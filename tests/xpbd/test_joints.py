@@ -1,0 +1,218 @@
+"""Joints of rigid bodies in `XPBD`: pendulums, a gyroscope, a chain, limits, motors, reactions."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.special import ellipk
+
+import supple as sp
+
+G = 9.81
+BAR = sp.shapes.box_surface((1.0, 0.05, 0.05), (1, 1, 1))
+MASS = 2.5
+
+
+def bar(name="bar", **values):
+    return sp.RigidBody(name, BAR, **({"density": 1000.0, "position": (0.5, 0, 0)} | values))
+
+
+def hinge(first="bar", second=None, **values):
+    return sp.HingeJoint(first, second, **({"point": (0, 0, 0), "name": "hinge"} | values))
+
+
+def run(scene, steps, substeps=20, dt=1 / 60, *, violation=1e-4, contact=None, **more):
+    frames = list(sp.simulate(scene, sp.XPBD(substeps=substeps, contact=contact, sleep_after=None), dt, steps, **more))
+    assert {frame.report.status for frame in frames} == {"converged"}, [f.report.message for f in frames][-1]
+    assert max(max(one.violation for one in frame.report.joints.values()) for frame in frames) < violation
+    return frames
+
+
+def test_a_compound_pendulum_has_its_period():
+    """Released at 60 degrees; the exact period is that of the elliptic integral."""
+    a = np.radians(60.0)
+    down = np.array([np.sin(a), -np.cos(a), 0.0])
+    body = bar(position=0.5 * down, rotation=(0, 0, a - np.pi / 2))
+    frames = run(sp.Scene([body], joints=[hinge()]), 60)
+    inertia = body.properties.inertia[2, 2] + 0.25 * MASS
+    quarter = np.sqrt(inertia / (MASS * G * 0.5)) * ellipk(np.sin(a / 2) ** 2)
+    sides = np.array([frame.poses["bar"].translation[0] for frame in frames])
+    at = np.flatnonzero(sides[1:] * sides[:-1] < 0.0)[0]
+    crossed = (at + 1 + sides[at] / (sides[at] - sides[at + 1])) / 60
+    assert crossed == pytest.approx(quarter, rel=0.002)
+    # At the bottom, the hinge carries the weight and the centripetal force.
+    rate2 = 2.0 * MASS * G * 0.5 * (1.0 - np.cos(a)) / inertia
+    assert frames[at].report.joints["hinge"].force[1] == pytest.approx(MASS * (G + rate2 * 0.5), rel=0.01)
+
+
+@pytest.mark.parametrize(("substeps", "drift"), [(10, 0.03), (40, 0.008)])
+def test_a_double_pendulum_keeps_its_energy(substeps, drift):
+    """Of first order in the substep."""
+    scene = sp.Scene(
+        [bar("a"), bar("b", position=(1.5, 0, 0))],
+        joints=[hinge("a"), hinge("b", "a", point=(1, 0, 0), name="elbow")],
+    )
+    frames = run(scene, 48, substeps)
+    energies = np.array([frame.report.kinetic_energy + frame.report.potential_energy for frame in frames])
+    assert np.ptp(energies) < drift * np.ptp([frame.report.kinetic_energy for frame in frames])
+
+
+def test_a_gyroscope_precesses():
+    """With a horizontal axis the steady precession is m g l / (I w), exactly."""
+    length, spin = 0.1, 50.0
+    disk = sp.shapes.box_surface((0.2, 0.02, 0.2), (1, 1, 1))
+    inertia = sp.RigidBody("disk", disk, density=2700.0).properties
+    rate = inertia.mass * G * length / (inertia.inertia[1, 1] * spin)
+    body = sp.RigidBody(
+        "disk",
+        disk,
+        density=2700.0,
+        position=(length, 0, 0),
+        rotation=(0, 0, -np.pi / 2),
+        velocity=(0, 0, -rate * length),
+        angular_velocity=(spin, rate, 0),
+    )
+    frames = run(sp.Scene([body], joints=[sp.BallJoint("disk", point=(0, 0, 0), name="tip")]), 60)
+    centers = np.array([frame.poses["disk"].translation for frame in frames])
+    angles = np.unwrap(np.arctan2(-centers[:, 2], centers[:, 0]))
+    assert (angles[-1] - angles[0]) * 60 / 59 == pytest.approx(rate, rel=0.01)
+    assert np.abs(centers[:, 1]).max() < 1e-3
+
+
+def chain(count):
+    """A chain of links of 0.1 m that hangs by its first one, horizontal at the start."""
+    link = sp.shapes.box_surface((0.1, 0.01, 0.01), (1, 1, 1))
+    bodies = [sp.RigidBody(f"{i}", link, density=1000.0, position=(0.1 * i + 0.05, 0, 0)) for i in range(count)]
+    joints = [
+        sp.HingeJoint(f"{i}", f"{i - 1}" if i else None, point=(0.1 * i, 0, 0), damping=2e-3, name=f"{i}")
+        for i in range(count)
+    ]
+    return bodies, joints
+
+
+@pytest.mark.parametrize(("count", "steps"), [(5, 75), pytest.param(20, 300, marks=pytest.mark.slow)])
+def test_a_chain_hangs_in_its_catenary(count, steps):
+    """Of damped links, whose end a pin brings nearer."""
+    span = 0.075 * count
+    bodies, joints = chain(count)
+    joints[0] = sp.HingeJoint("0", point=(0, 0, 0), damping=2e-3, name="0")
+    block = sp.shapes.box_surface((0.02, 0.02, 0.02), (1, 1, 1))
+    bodies.append(sp.RigidBody("end", block, density=1000.0, position=(0.1 * count, 0, 0)))
+    joints.append(sp.HingeJoint(f"{count - 1}", "end", point=(0.1 * count, 0, 0), damping=2e-3, name="last"))
+    motion = sp.Keyframes([0.0, 0.3], displacements=[(0, 0, 0), (span - 0.1 * count, 0, 0)])
+    frames = run(sp.Scene(bodies, joints=joints, pins=[sp.Pin("end", motion=motion)]), steps, violation=1e-3)
+    # Forces along a chain of equal links: the slope grows by the same from middle to middle.
+    rises = np.arange(count) - 0.5 * (count - 1)
+    slopes = rises / brentq(lambda pull: (0.1 / np.hypot(1.0, rises / pull)).sum() - span, 1e-3, 1e3)
+    ways = 0.1 * np.column_stack([np.ones(count), slopes]) / np.hypot(1.0, slopes)[:, None]
+    expected = np.cumsum(ways, axis=0) - 0.5 * ways
+    found = np.array([frames[-1].poses[f"{i}"].translation[:2] for i in range(count)])
+    assert np.abs(found - expected).max() < 0.01 * np.ptp(expected[:, 1])
+    weight = count * 0.01 * G
+    assert frames[-1].report.joints["0"].force[1] == pytest.approx(weight / 2, rel=0.01)
+
+
+def test_joints_between_bodies_keep_momentum():
+    turning = np.array([0.0, 2.0, 3.0])
+    first = bar("a", angular_velocity=turning)
+    second = bar("b", position=(1.5, 0, 0), velocity=np.cross(turning, (0.5, 0, 0)))
+    for joint in (sp.BallJoint("a", "b", point=(1, 0, 0)), sp.FixedJoint("a", "b"), sp.SliderJoint("a", "b")):
+        frames = run(sp.Scene([first, second], joints=[joint], gravity=(0, 0, 0)), 30)
+        P, L = (np.array([getattr(f.report, key) for f in frames]) for key in ("linear_momentum", "angular_momentum"))
+        assert np.abs(P - P[0]).max() < 1e-11 * np.linalg.norm(P[0])
+        assert np.abs(L - L[0]).max() < 1e-10 * np.linalg.norm(L[0])
+
+
+def test_what_the_fixed_joint_of_a_cantilever_carries():
+    clamp = run(sp.Scene([bar()], joints=[sp.FixedJoint("bar", point=(0, 0, 0), name="clamp")]), 3)[-1]
+    reading = clamp.report.joints["clamp"]
+    np.testing.assert_allclose(reading.force, [0, MASS * G, 0], atol=1e-4 * MASS * G)
+    np.testing.assert_allclose(reading.torque, [0, 0, MASS * G * 0.5], atol=1e-4 * MASS * G)
+    assert (reading.coordinate, reading.motor_force) == (None, None)
+
+
+LIMITS = (-0.5, 0.4)
+UP = (0, 0, np.pi / 2)
+
+
+@pytest.mark.parametrize(
+    ("values", "end"),
+    [
+        ({"motor": None}, LIMITS[0]),
+        ({"motor": sp.PositionMotor(0.2, stiffness=1e4, damping=1e3)}, 0.2),
+        ({"motor": sp.PositionMotor(0.2, stiffness=1e4, damping=1e2, max_force=10.0)}, LIMITS[0]),
+        ({"motor": sp.VelocityMotor(sp.Curve([0.0, 0.3], [0.0, 1.0]))}, LIMITS[1]),
+        ({"motor": sp.VelocityMotor(0.0, max_force=10.0)}, LIMITS[0]),
+        ({"motor": sp.VelocityMotor(0.0, max_force=13.0)}, 0.0),
+        ({"motor": sp.ForceMotor(lambda t: 20.0)}, LIMITS[1]),
+        ({"friction": 13.0}, 0.0),
+        ({"friction": 10.0}, LIMITS[0]),
+        ({"damping": 40.0}, -12.26 / 40.0),
+    ],
+)
+def test_motors_reach_their_targets_and_never_exceed_their_maximum_and_limits_hold(values, end):
+    """The weight turns the hinge with 12.26 N m; a damped one goes with 12.26 / 40 rad/s."""
+    frames = run(sp.Scene([bar()], joints=[hinge(limits=LIMITS, **values)]), 60)
+    readings = [frame.report.joints["hinge"] for frame in frames]
+    assert readings[-1].coordinate == pytest.approx(end, abs=2e-2 if "damping" in values else 2e-3)
+    assert all(LIMITS[0] - 1e-5 < one.coordinate < LIMITS[1] + 1e-5 for one in readings)
+    if values.get("motor") is not None:
+        largest = values["motor"].max_force
+        assert max(abs(one.motor_force) for one in readings) <= (largest or np.inf) * (1 + 1e-12)
+        if largest == 10.0:  # on the way down
+            assert readings[5].motor_force == pytest.approx(10.0)
+
+
+def test_a_slider_lifts_a_bar_and_follows_turns_of_its_obstacle():
+    """Its motor carries the weight; the obstacle that it is on turns about its axis."""
+    motor = sp.PositionMotor(sp.Curve([0.0, 0.5], [0.0, 0.1]), stiffness=1e4, damping=1e3)
+    turn = sp.Keyframes([0.0, 1.0], angles=[0.0, 1.0], axis=(0, 1, 0))
+    post = sp.HalfSpace(point=(0, -3, 0), normal=(0, 1, 0), motion=turn, name="post")
+    slider = sp.SliderJoint("bar", "post", axis=(0, 1, 0), motor=motor, limits=(0, 0.2), name="lift")
+    last = run(sp.Scene([bar()], joints=[slider], obstacles=[post]), 60)[-1]
+    reading = last.report.joints["lift"]
+    assert reading.coordinate == pytest.approx(0.1 - MASS * G / 1e4, abs=1e-4)
+    assert reading.motor_force == pytest.approx(MASS * G, rel=1e-3)
+    np.testing.assert_allclose(last.poses["bar"].rotation[:, 0], [np.cos(1), 0, -np.sin(1)], atol=1e-4)
+
+
+def test_the_swing_of_a_ball_is_limited_and_a_wheel_counts_its_turns():
+    ball = sp.BallJoint("bar", point=(0, 0, 0), axis=(1, 0, 0), max_swing=0.5, name="ball")
+    axle = sp.HingeJoint("wheel", point=(0.5, 3, 0), axis=(0, 1, 0), motor=sp.VelocityMotor(30.0), name="axle")
+    wheel = bar("wheel", position=(0.5, 3, 0))
+    frames = run(sp.Scene([bar(angular_velocity=(3, 0, 0)), wheel], joints=[ball, axle]), 60)
+    swings = np.array([frame.report.joints["ball"].coordinate for frame in frames])
+    assert swings.max() < 0.5 + 1e-4
+    assert swings[-1] == pytest.approx(0.5, abs=1e-4)
+    angles = [frame.report.joints["axle"].coordinate for frame in frames]
+    np.testing.assert_allclose(angles, 0.5 * np.arange(1, 61), atol=1e-4)
+    assert frames[-1].state.hinge_angles == {"axle": angles[-1]}
+    rest = run(sp.Scene([bar(angular_velocity=(3, 0, 0)), wheel], joints=[ball, axle]), 1, start=frames[-2])
+    np.testing.assert_array_equal(rest[-1].state.positions, frames[-1].state.positions)
+
+
+def test_a_cradle_of_bars_hands_its_momentum_on():
+    """Without friction between the bars: in a perfectly inelastic collision both go on together."""
+    first = bar("first", position=(0, -0.5, 0), rotation=UP, angular_velocity=(0, 0, -2.0), velocity=(-1, 0, 0))
+    second = bar("second", position=(-0.06, -0.5, 0), rotation=UP)
+    joints = [hinge("first", name="a"), hinge("second", point=(-0.06, 0, 0), name="b")]
+    settings = sp.XPBDContact(thickness=1e-3)
+    last = run(sp.Scene([first, second], joints=joints, gravity=(0, 0, 0)), 4, contact=settings, violation=1e-3)[-1]
+    spins = [last.poses[name].angular_velocity[2] for name in ("first", "second")]
+    assert sum(spins) == pytest.approx(-2.0, rel=0.01)
+    np.testing.assert_allclose(spins, -1.0, rtol=0.01)
+
+
+def test_a_start_at_which_the_sides_are_apart_is_refused():
+    shifted = [bar(position=(0.6, 0, 0)), bar("b", position=(1.5, 0, 0))]
+    joint = sp.HingeJoint("bar", "b", point=(1, 0, 0), limits=(0.1, 0.5), name="elbow")
+    with pytest.raises(sp.SceneError, match=r"joint 'elbow': at the start it is at 0 rad, outside of its limits"):
+        run(sp.Scene(shifted, joints=[joint]), 1)
+
+
+def test_joints_that_contradict_each_other_are_named():
+    """A bar on two balls, of which one moves away with its obstacle."""
+    away = sp.HalfSpace(point=(0, -3, 0), normal=(0, 1, 0), motion=lambda t: (t, 0, 0), name="away")
+    joints = [sp.BallJoint("bar", point=(0, 0, 0)), sp.BallJoint("bar", "away", point=(1, 0, 0), name="far")]
+    frames = list(sp.simulate(sp.Scene([bar()], joints=joints, obstacles=[away]), sp.XPBD(substeps=10), 1 / 60, 20))
+    assert frames[-1].report.status == "softened"
+    assert "is off by" in frames[-1].report.message

@@ -1,0 +1,262 @@
+"""Rigid bodies in `XPBD`: laws of free motion, contact with everything else, pins that hold and move them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import supple as sp
+
+G = 9.81
+FLOOR = sp.HalfSpace(point=(0, 0, 0), normal=(0, 1, 0), friction=0.5, name="floor")
+CUBE = sp.shapes.box_surface((0.1, 0.1, 0.1), (1, 1, 1))
+BOX = sp.shapes.box_surface((0.1, 0.2, 0.3), (1, 1, 1))
+
+
+def rigid(name="rigid", shape=CUBE, **values):
+    return sp.RigidBody(name, shape, **({"density": 1000.0, "friction": 0.5} | values))
+
+
+def soft(name="soft", youngs=1e5, density=1000.0, **values):
+    material = sp.StableNeoHookean(youngs=youngs, poisson=0.3, density=density)
+    return sp.Body(name, sp.shapes.box((0.1, 0.1, 0.1), (2, 2, 2)), material, **values)
+
+
+def run(scene, steps, substeps=20, dt=1 / 60, *, statuses=("converged",), **more):
+    frames = list(sp.simulate(scene, sp.XPBD(substeps=substeps, **({"sleep_after": None} | more)), dt, steps))
+    assert {frame.report.status for frame in frames} <= set(statuses), [
+        f.report.message for f in frames if f.report.message
+    ]
+    return frames
+
+
+def rigidity(frames, name="rigid", shape=CUBE):
+    """The largest error of a distance between two vertices of the surface [m]."""
+    sides = np.linalg.norm(shape.vertices[:, None] - shape.vertices, axis=2)
+    found = (np.linalg.norm(f.positions[name][:, None] - f.positions[name], axis=2) for f in frames)
+    return max(np.abs(each - sides).max() for each in found)
+
+
+def momenta(frames):
+    return (np.array([getattr(f.report, key) for f in frames]) for key in ("linear_momentum", "angular_momentum"))
+
+
+def test_a_free_body_keeps_its_momenta_and_its_energy_over_10000_substeps():
+    body = rigid(shape=BOX, velocity=(1, 2, 3), angular_velocity=(1, 4, 2))
+    frames = run(sp.Scene([body], gravity=(0, 0, 0)), 125, substeps=80)
+    P, L = momenta(frames)
+    assert np.abs(P - P[0]).max() <= 1e-12 * np.linalg.norm(P[0])
+    assert np.abs(L - L[0]).max() <= 1e-10 * np.linalg.norm(L[0])
+    energies = np.array([frame.report.kinetic_energy for frame in frames])
+    assert np.ptp(energies) < 1e-11 * energies[0]
+    assert rigidity(frames, shape=BOX) < 1e-13
+
+
+SPIN = np.array([0.5, 10.0, 0.5])
+
+
+def changes_of_sign(times, values):
+    k = np.flatnonzero(values[1:] * values[:-1] < 0.0)
+    return times[k] + (times[k + 1] - times[k]) * values[k] / (values[k] - values[k + 1])
+
+
+def flips_of_eulers_equations(inertia, end, dt=1e-3):
+    """Runge-Kutta's method of fourth order."""
+    a, b, c = inertia
+
+    def rate(w):
+        return np.array([(b - c) * w[1] * w[2] / a, (c - a) * w[2] * w[0] / b, (a - b) * w[0] * w[1] / c])
+
+    path = [SPIN]
+    for _ in range(round(end / dt)):
+        w = path[-1]
+        k1 = rate(w)
+        k2 = rate(w + 0.5 * dt * k1)
+        k3 = rate(w + 0.5 * dt * k2)
+        path.append(w + dt / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + rate(w + dt * k3)))
+    return changes_of_sign(dt * np.arange(len(path)), np.array(path)[:, 1])
+
+
+@pytest.mark.parametrize(("substeps", "late"), [(10, 1e-3), (80, 2e-4)])
+def test_the_intermediate_axis_turns_over_when_eulers_equations_say(substeps, late):
+    """The Dzhanibekov effect, twice."""
+    body = rigid(shape=BOX, angular_velocity=SPIN)
+    exact = flips_of_eulers_equations(np.diag(body.properties.inertia), 2.8)
+    assert len(exact) == 2
+    poses = [frame.poses["rigid"] for frame in run(sp.Scene([body], gravity=(0, 0, 0)), 168, substeps)]
+    along = np.array([10.0, *((pose.rotation.T @ pose.angular_velocity)[1] for pose in poses)])
+    np.testing.assert_allclose(changes_of_sign(np.arange(169) / 60, along), exact, rtol=late)
+
+
+def test_a_dropped_cube_comes_to_rest_and_presses_with_its_weight():
+    scene = sp.Scene([rigid(position=(0, 0.12, 0), rotation=(0.3, 0.2, 0))], obstacles=[FLOOR])
+    frames = run(scene, 60)
+    assert min(frame.positions["rigid"][:, 1].min() for frame in frames) > 0.0
+    assert rigidity(frames) < 1e-13
+    last = frames[-1]
+    assert last.report.kinetic_energy < 1e-20
+    np.testing.assert_allclose(last.report.details.contact_forces["rigid"], [0, G, 0], atol=1e-9)
+    np.testing.assert_allclose(last.report.details.contact_forces["floor"], [0, -G, 0], atol=1e-9)
+    np.testing.assert_allclose(last.contact_force["rigid"].sum(axis=0), [0, G, 0], atol=1e-9)
+    assert np.ptp(np.sort(last.positions["rigid"][:, 1])[:4]) < 1e-9  # one face is on the floor
+    assert last.report.details.softening == {"rigid": 0.0}
+
+
+@pytest.mark.parametrize(("friction", "slides"), [(0.5, False), (0.3, True)])
+def test_a_cube_on_a_slope_sticks_or_slides_with_coulombs_acceleration(friction, slides):
+    slope = np.arctan(0.4)
+    normal, down = np.array([np.sin(slope), np.cos(slope), 0.0]), np.array([np.cos(slope), -np.sin(slope), 0.0])
+    plane = sp.HalfSpace(point=(0, 0, 0), normal=normal, friction=friction)
+    frames = run(sp.Scene([rigid(position=0.05006 * normal, rotation=(0, 0, -slope))], obstacles=[plane]), 60)
+    way = frames[-1].poses["rigid"].translation @ down
+    expected = 0.5 * G * (np.sin(slope) - friction * np.cos(slope))
+    assert way == pytest.approx(expected, rel=2e-3) if slides else way < 2e-6
+
+
+def wheel(count, radius, half=0.02):
+    """A prism of `count` sides."""
+    angle, i = 2.0 * np.pi * np.arange(count) / count, np.arange(count)
+    ring = [np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.full(count, z)]) for z in (-half, half)]
+    j, low, high = (i + 1) % count, np.full(count, 2 * count), np.full(count, 2 * count + 1)
+    corners = [(i, j, count + j), (i, count + j, count + i), (low, j, i), (high, count + i, count + j)]
+    triangles = np.concatenate([np.column_stack(each) for each in corners])
+    return sp.SurfaceMesh(np.concatenate([*ring, [[0, 0, -half], [0, 0, half]]]), triangles)
+
+
+def acceleration_of_a_wheel(sides, friction):
+    """With a ball's inertia, down 15 degrees, over 5/7 g sin a; and the share that its spin has of rolling."""
+    slope, radius = np.radians(15.0), 0.1
+    normal, down = np.array([np.sin(slope), np.cos(slope), 0.0]), np.array([np.cos(slope), -np.sin(slope), 0.0])
+    plane = sp.HalfSpace(point=(0, 0, 0), normal=normal, friction=friction)
+    inertia = np.full(3, 0.4 * radius**2)
+    body = sp.RigidBody("wheel", wheel(sides, radius), mass=1, inertia=inertia, position=(radius + 1e-5) * normal)
+    poses = [f.poses["wheel"] for f in run(sp.Scene([body], obstacles=[plane]), 45)]
+    rate, spin = (
+        60.0 * np.polyfit(np.arange(40), values[5:], 1)[0]
+        for values in (np.array([p.velocity @ down for p in poses]), np.array([-p.angular_velocity[2] for p in poses]))
+    )
+    return rate / (5 / 7 * G * np.sin(slope)), spin * radius / rate
+
+
+def test_a_wheel_slides_on_a_smooth_slope_and_rolls_like_a_ball_on_a_rough_one():
+    """Each side that hits the slope takes energy, in proportion to its length: rolling is approached from below."""
+    sliding, _ = acceleration_of_a_wheel(60, 0.03)
+    assert sliding == pytest.approx(1.4 * (1.0 - 0.03 / np.tan(np.radians(15.0))), rel=2e-3)
+    coarse, fine = acceleration_of_a_wheel(60, 0.3), acceleration_of_a_wheel(240, 0.3)
+    assert fine[1] == pytest.approx(1.0, rel=2e-3)
+    assert 0.95 < fine[0] < 1.0
+    assert 1.0 - fine[0] < 0.4 * (1.0 - coarse[0])
+
+
+@pytest.mark.parametrize("other", [rigid("other", BOX), soft("other", friction=0.5)], ids=["rigid", "soft"])
+def test_a_collision_keeps_both_momenta(other):
+    """Off the center, with spin and friction."""
+    first = rigid(velocity=(1, 0, 0), angular_velocity=(1, 5, 2))
+    hit = replace(other, position=(0.2, 0.04, 0.03), rotation=(0.3, 0.4, 0.5), angular_velocity=(3, 1, -4))
+    frames = run(sp.Scene([first, hit], gravity=(0, 0, 0)), 30)
+    P, L = momenta(frames)
+    assert max(frame.report.details.contacts for frame in frames) > 0
+    assert np.abs(P - P[0]).max() <= 1e-11 * np.linalg.norm(P[0])
+    assert np.abs(L - L[0]).max() <= 1e-10 * np.linalg.norm(L[0])
+    assert frames[-1].report.kinetic_energy < 0.9 * frames[0].report.kinetic_energy
+    assert rigidity(frames) < 1e-13
+
+
+def test_a_heavy_body_on_a_light_one_gains_no_energy():
+    """50:1, dropped by a centimetre."""
+    low, high = (
+        rigid("low", density=20.0, position=(0, 0.0501, 0)),
+        rigid("high", density=1000.0, position=(0, 0.16, 0)),
+    )
+    frames = run(sp.Scene([low, replace(high, rotation=(0, 0.4, 0))], obstacles=[FLOOR]), 25, substeps=80)
+    assert max(frame.report.details.energy_gained for frame in frames) < 0.01
+    forces = frames[-1].report.details.contact_forces
+    assert forces["high"][1] == pytest.approx(G, rel=0.01)
+    assert -forces["floor"][1] == pytest.approx(1.02 * G, rel=0.01)
+    assert frames[-1].poses["high"].translation[1] > 0.15
+
+
+@pytest.mark.parametrize("below", ["rigid", "soft"])
+def test_soft_and_rigid_bodies_lie_on_each_other(below):
+    """Faces that are aligned; both weights arrive at the floor."""
+    places = {"rigid": (0, 0.0501, 0), "soft": (0, 0.16, 0)}
+    if below == "soft":
+        places = {"rigid": (0, 0.16, 0), "soft": (0, 0.0501, 0)}
+    bodies = [rigid(position=places["rigid"]), soft(position=places["soft"], friction=0.5)]
+    frames = run(sp.Scene(bodies, obstacles=[FLOOR]), 60)
+    forces = np.mean([frame.report.details.contact_forces["floor"] for frame in frames[-30:]], axis=0)
+    assert forces[1] == pytest.approx(-2.0 * G, rel=0.02)
+    heights = {name: frames[-1].positions[name][:, 1].min() for name in places}
+    assert heights[below] < 1e-3 < 0.09 < max(heights.values())
+    assert rigidity(frames) < 1e-13
+
+
+def test_pins_hold_and_move_rigid_bodies_exactly():
+    motion = sp.Keyframes([0.0, 1.0], displacements=[(0, 0, 0), (0.1, 0, 0)], angles=[0.0, 1.0])
+    scene = sp.Scene(
+        [rigid("held", position=(0.5, 0, 0)), rigid("driven")],
+        pins=[sp.Pin("held"), sp.Pin("driven", motion=motion)],
+    )
+    last = run(scene, 60)[-1]
+    np.testing.assert_allclose(last.poses["held"].translation, [0.5, 0, 0], atol=1e-14)
+    np.testing.assert_allclose(last.poses["driven"].translation, [0.1, 0, 0], atol=1e-13)
+    np.testing.assert_allclose(last.poses["driven"].angular_velocity, [0, 0, 1], atol=1e-5)
+
+
+def test_a_held_body_carries_its_weight_and_what_lies_on_it():
+    scene = sp.Scene([rigid("low"), rigid("high", position=(0, 0.106, 0))], pins=[sp.Pin("low")])
+    last = run(scene, 20)[-1]
+    (reaction,) = last.reactions.values()
+    np.testing.assert_allclose(reaction, [0, 2 * G, 0], atol=1e-3 * G)
+
+
+def test_a_force_off_the_center_turns_a_body():
+    corner = int(np.argmax(CUBE.vertices @ np.ones(3)))
+    force = sp.Force("rigid", vertices=[corner], force=(0, 0, 1e-5))
+    last = run(sp.Scene([rigid()], forces=[force], gravity=(0, 0, 0)), 30)[-1]
+    pose, time = last.poses["rigid"], 0.5
+    np.testing.assert_allclose(pose.velocity, [0, 0, 1e-5 * time], rtol=1e-9, atol=1e-15)
+    spin = time * np.cross(CUBE.vertices[corner], [0, 0, 1e-5]) / (0.1**2 / 6.0)
+    np.testing.assert_allclose(pose.angular_velocity, spin, rtol=1e-3, atol=1e-8)
+
+
+def test_a_body_at_rest_sleeps_and_wakes():
+    scene = sp.Scene([rigid("low", position=(0, 0.0501, 0)), rigid("high", position=(0, 1.4, 0))], obstacles=[FLOOR])
+    frames = run(scene, 40, substeps="auto", sleep_after=0.2)
+    asleep = [frame.report.details.asleep["low"] for frame in frames]
+    assert any(asleep)
+    assert not asleep[-1]
+    slept = asleep.index(True)
+    np.testing.assert_array_equal(frames[slept + 2].positions["low"], frames[slept + 1].positions["low"])
+
+
+def test_a_run_that_continues_has_the_same_bits():
+    bodies = [rigid("low", position=(0, 0.0501, 0)), rigid("high", position=(0.01, 0.155, 0), rotation=(0, 0.3, 0))]
+    scene, solver = sp.Scene(bodies, obstacles=[FLOOR]), sp.XPBD(substeps=10)
+    whole = list(sp.simulate(scene, solver, 1 / 60, 16))
+    rest = list(sp.simulate(scene, solver, 1 / 60, 8, start=whole[7]))
+    np.testing.assert_array_equal(rest[-1].positions["high"], whole[-1].positions["high"])
+    np.testing.assert_array_equal(rest[-1].velocities["high"], whole[-1].velocities["high"])
+
+
+def test_fast_spin_asks_for_substeps():
+    body = rigid(shape=BOX, angular_velocity=(0, 300.0, 1.0))
+    frames = run(sp.Scene([body], gravity=(0, 0, 0)), 4, substeps="auto")
+    details = frames[0].report.details
+    assert details.substeps >= 300.0 / 60.0 / 0.1
+    assert details.substeps_reason == "the spin of body 'rigid'"
+    # Five radians in a substep: the energy is wrong, which is said, and the angular momentum is right.
+    _, L = momenta(run(sp.Scene([body], gravity=(0, 0, 0)), 4, substeps=1, statuses=("converged", "energy_gained")))
+    assert np.abs(L - L[0]).max() <= 1e-10 * np.linalg.norm(L[0])
+
+
+def test_starts_inside_of_something_are_refused():
+    scene = sp.Scene([rigid(), soft(position=(0.05, 0, 0))])
+    with pytest.raises(sp.SceneError, match=r"body 'soft'.*deep; move it out"):
+        next(iter(sp.simulate(scene, sp.XPBD(), 1 / 60, 1)))
+
+
+def test_welds_are_refused():
+    scene = sp.Scene([rigid(), soft(position=(0.1, 0, 0))], welds=[sp.Weld("soft", "rigid", max_distance=0.01)])
+    with pytest.raises(sp.SolverError, match=r"cannot simulate welds \(weld.*; simulate with Implicit"):
+        next(iter(sp.simulate(scene, sp.XPBD(), 1 / 60, 1)))
