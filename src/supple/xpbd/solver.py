@@ -119,13 +119,10 @@ class XPBD(Solver):
         SolverError : where a body is rigid, touches with its skin, has quadratic tets, or its material has no XPBD
             constraints; the text names the body.
         """
-        if system.rigid_bodies:
-            raise SolverError(
-                f"XPBD: body {system.rigid_bodies[0].name!r} is rigid; simulate rigid bodies with Implicit"
-            )
         for part in system.bodies:
             if part.body.touches_with_skin:
-                raise SolverError(f"XPBD: body {part.name!r} touches with its skin; simulate it with Implicit")
+                what = "is rigid" if part.rigid else "touches with its skin"
+                raise SolverError(f"XPBD: body {part.name!r} {what}; simulate it with Implicit")
         quadratic = [part.name for part in system.bodies if part.body.mesh.order == 2]
         if quadratic:
             raise SolverError(
