@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from supple.errors import SolverError
-from supple.scene.rigid.rigid_body import RigidBody
 from supple.system import System
 from supple.xpbd.sweeps.ordering import Layout
 
@@ -20,7 +19,7 @@ def refuse_unsupported(system: System) -> None:
     SolverError : where it cannot.
     """
     for part in system.bodies:
-        if part.body.touches_with_skin and not isinstance(part.body, RigidBody):
+        if part.body.touches_with_skin and not part.rigid:
             raise SolverError(f"XPBD: body {part.name!r} touches with its skin; simulate it with Implicit")
     quadratic = [part.name for part in system.bodies if part.body.mesh.order == 2]
     if quadratic:

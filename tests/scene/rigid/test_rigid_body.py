@@ -236,5 +236,5 @@ def test_a_motion_that_would_deform_the_body():
 
 
 def test_xpbd_refuses_rigid_bodies():
-    with pytest.raises(sp.SolverError, match="XPBD: body 'palm' is rigid; simulate rigid bodies with Implicit"):
+    with pytest.raises(sp.SolverError, match="XPBD: body 'palm' is rigid; simulate it with Implicit"):
         sp.simulate(sp.Scene([soft(), body()]), sp.XPBD(), 0.01, 1)
