@@ -183,8 +183,8 @@ def test_soft_and_rigid_bodies_lie_on_each_other(below):
     if below == "soft":
         places = {"rigid": (0, 0.16, 0), "soft": (0, 0.0501, 0)}
     bodies = [rigid(position=places["rigid"]), soft(position=places["soft"], friction=0.5)]
-    frames = run(sp.Scene(bodies, obstacles=[FLOOR]), 60)
-    forces = np.mean([frame.report.details.contact_forces["floor"] for frame in frames[-30:]], axis=0)
+    frames = run(sp.Scene(bodies, obstacles=[FLOOR]), 50)
+    forces = np.mean([frame.report.details.contact_forces["floor"] for frame in frames[-25:]], axis=0)
     assert forces[1] == pytest.approx(-2.0 * G, rel=0.02)
     heights = {name: frames[-1].positions[name][:, 1].min() for name in places}
     assert heights[below] < 1e-3 < 0.09 < max(heights.values())

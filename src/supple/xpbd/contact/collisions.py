@@ -202,6 +202,11 @@ class Collisions:
         """Whether nothing had passed through anything after the last `project`."""
         return self.surfaces is None or self.surfaces.parted
 
+    def check_parted(self, x: NDArray[np.float64], begun: NDArray[np.float64]) -> None:
+        """Take notice of what has passed through something from `begun` to x (n, 3) [m]; see `parted`."""
+        if self.surfaces is not None:
+            self.surfaces.check_parted(x, begun)
+
     def passed(
         self, x: NDArray[np.float64], begun: NDArray[np.float64], labels: NDArray[np.integer]
     ) -> NDArray[np.int64]:
