@@ -139,10 +139,6 @@ class State:
     internal: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 11)))
 
 
-# The fields of `SolverDetails` with the work of actuators, by name [J].
-ACTUATOR_WORKS = ("cavity_work", "cable_work")
-
-
 @dataclass(frozen=True, eq=False)
 class SolverDetails:
     """What one solver reports of a step beyond what all solvers do. Each solver has a subclass of its own.
@@ -157,6 +153,8 @@ class SolverDetails:
     cavity_pressure, cavity_volume, cavity_work : by name [Pa], [m^3], [J]; see `Report.cavities`
     cable_tension, cable_length, cable_work : by name, with ".k" for span k of the first one [N], [m], [J]; see
         `Report.cables`
+    work : on the bodies over the step, by what does it [J]; see `Report.work`
+    energy_residual : what the forces of the step leave open [J]; see `Report.energy_residual`
     """
 
     contacts: int = 0
@@ -166,6 +164,8 @@ class SolverDetails:
     cable_tension: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     cable_length: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     cable_work: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+    work: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+    energy_residual: float = field(default=0.0, kw_only=True)
 
     def __eq__(self, other: object) -> bool:
         if type(self) is not type(other):

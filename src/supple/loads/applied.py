@@ -19,9 +19,11 @@ class AppliedLoad(ABC):
     Attributes
     ----------
     is_internal : whether its forces act between vertices of one body, so that they change no momentum
+    work : the name under which its work is counted, see `Report.work`
     """
 
     is_internal: ClassVar[bool] = False
+    work: str
 
     @abstractmethod
     def renumbered(self, new: NDArray[np.int32]) -> Self:
@@ -42,6 +44,7 @@ class DeadLoad(AppliedLoad):
 
     vertices: NDArray[np.int32]
     per_vertex: Callable[[float], NDArray[np.float64]]
+    work: str
 
     def renumbered(self, new: NDArray[np.int32]) -> DeadLoad:
         return replace(self, vertices=new[self.vertices])
@@ -60,6 +63,8 @@ class MassLoad(AppliedLoad):
     load: BodyForce
     vertices: NDArray[np.int32]
     masses: NDArray[np.float64]
+
+    work = "body_forces"
 
     def renumbered(self, new: NDArray[np.int32]) -> MassLoad:
         return replace(self, vertices=new[self.vertices])

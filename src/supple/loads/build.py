@@ -50,7 +50,8 @@ def applied(
             shares += np.bincount(triangles.ravel(), np.repeat(areas, 3), len(body.points))
         touched = np.unique(np.concatenate([triangles for triangles, _ in parts]))
         at = _over_time(load.traction, f"{load.label}: traction", (3,))
-        return [_on_points(body, begins[load.body], touched, lambda time: shares[touched, None] * at(time))]
+        place = body, begins[load.body], touched
+        return [_on_points(*place, lambda time: shares[touched, None] * at(time), "tractions")]
     if isinstance(load, Pressure):
         body = named[load.body]
         at, begin = _over_time(load.pressure, f"{load.label}: pressure", ()), begins[load.body]
@@ -89,20 +90,20 @@ def _weighted_triangles(body: PlacedBody, rows: NDArray[np.int64]) -> list[tuple
 
 def applied_force(force: Force, body: PlacedBody, begin: int, rows: NDArray[np.integer]) -> DeadLoad:
     """A force on some of its body's points (k,); begin : the number of the body's first vertex."""
-    return _on_points(body, begin, rows, lambda time: force.per_vertex(time, len(rows)))
+    return _on_points(body, begin, rows, lambda time: force.per_vertex(time, len(rows)), "forces")
 
 
 def _on_points(
-    body: PlacedBody, begin: int, rows: NDArray[np.integer], forces: Callable[[float], NDArray[np.float64]]
+    body: PlacedBody, begin: int, rows: NDArray[np.integer], forces: Callable[[float], NDArray[np.float64]], work: str
 ) -> DeadLoad:
     """Forces, time -> (k, 3) [N], on the points (k,) of a body."""
     points = body.embedded.taken(rows)
     if points.are_vertices:
-        return DeadLoad((points.vertices + begin).astype(np.int32), forces)
+        return DeadLoad((points.vertices + begin).astype(np.int32), forces, work)
     vertices, column = np.unique(points.vertices, return_inverse=True)
     weights = np.zeros((len(rows), len(vertices)))
     np.add.at(weights, (np.repeat(np.arange(len(rows)), np.diff(points.start)), column.ravel()), points.weights)
-    return DeadLoad((vertices + begin).astype(np.int32), lambda time: weights.T @ forces(time))
+    return DeadLoad((vertices + begin).astype(np.int32), lambda time: weights.T @ forces(time), work)
 
 
 def _muscle(muscle: Muscle, body: PlacedBody, begin: int) -> FibreTension:

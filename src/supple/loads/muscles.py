@@ -34,6 +34,7 @@ class FibreTension(AppliedLoad):
     curve: tuple[NDArray[np.float64], NDArray[np.float64]]
 
     is_internal = True
+    work = "muscles"
 
     def renumbered(self, new: NDArray[np.int32]) -> FibreTension:
         return replace(self, tets=new[self.tets])

@@ -20,11 +20,13 @@ from supple.numerics.interruption import interruption_point
 from supple.numerics.thread_tuning import ThreadTuner
 from supple.numerics.threads import numba_threads
 from supple.readings.actuator_readings import actuator_fields, start_of
+from supple.readings.energy_balance import no_works
 from supple.state import State, Status, StepReport
 from supple.system import Solver, System
 from supple.xpbd.assessment.assessment import Assessment
 from supple.xpbd.assessment.findings import Findings
 from supple.xpbd.assessment.surfaces import Overlap, crossings
+from supple.xpbd.assessment.works import Works
 from supple.xpbd.constraints.actuators import ActuatorProjection
 from supple.xpbd.constraints.registry import build_constraint_sets
 from supple.xpbd.constraints.stitch_anchors import StitchAnchors
@@ -41,7 +43,7 @@ from supple.xpbd.memory import XPBDMemory
 from supple.xpbd.momentum import MomentumRestore
 from supple.xpbd.sleep import Sleep, SleepMemory
 from supple.xpbd.start import raise_if_inside
-from supple.xpbd.substep_limits import collide, keep_volumes, restore
+from supple.xpbd.substep_limits import collide, keep_volumes, note_works, restore
 from supple.xpbd.substep_start import begin_substep, cycles, load, pin_targets, push_contacts
 from supple.xpbd.substeps import FALL, SubstepChoice, Substeps
 from supple.xpbd.sweeps.ordering import make_layout, reordered
@@ -151,6 +153,7 @@ class XPBD(Solver):
             guard=VolumeGuard(inner),
             fallback=RigidFallback(inner, collisions.skin),
             assessment=assessment,
+            works=Works(inner),
             choice=SubstepChoice(inner, assessment.softening, bool(collisions)),
             sleep=Sleep(inner, layout, self.sleep_after, self.accuracy),
             threads=self.threads or (None if large else 1),
@@ -205,7 +208,7 @@ class XPBD(Solver):
             repeats += 1
             used = Substeps(min(2 * used.count, self.max_substeps), f"a repetition: {problem}")
         if lost >= 0:
-            message = _lost_position_message(ws, lost, time)
+            message = ws.lost_position(lost, time)
             details = self.initial_details(system, ws)
             return state, StepReport(Status.NOT_FINITE, used.count, message, details=details)
         return new, report
@@ -235,8 +238,10 @@ class XPBD(Solver):
         h = dt / used.count
         to_world(ws.points, ws.origins, ws.world)
         ws.guard.measure(ws.points, False)
+        ws.works.end_frame(ws.velocities, ws.actuators.works())
+        held, works = held_back / used.count, ws.works.by_name
         findings, ledger = ws.assessment.end(
-            ws.moment(time), ws.world, ws.guard.J, h, self.accuracy, held_back / used.count, sleep.asleep
+            ws.moment(time), ws.world, ws.guard.J, h, self.accuracy, held, sleep.asleep, works
         )
         status = findings.status
         problem = status if status in (Status.INVERTED, Status.ENERGY_GAINED) else None
@@ -271,6 +276,8 @@ class XPBD(Solver):
             contact_forces=pushes,
             friction_forces=friction,
             **ws.actuators.fields(h * used.count),
+            work=works,
+            energy_residual=ws.works.residual,
         )
         world, surfaces = ws.world.copy(), ws.collisions.positions
         message = findings.message(time, self._remedy(ws, dt, findings, used.count))
@@ -314,7 +321,8 @@ class XPBD(Solver):
         ws.guard.guarded[:] = ws.assessment.begin(ws.moment(state.time), ws.guard.J, h, memory.ledger)
         ws.guard.accept()
         balance = ws.assessment.balance
-        ws.actuators.begin_frame(ws.points, ws.origins)
+        ws.actuators.begin_frame(ws.substep(state.time, h))
+        ws.works.begin_frame(ws.velocities)
         damping = self._damping(ws, h)
         lengths = cycles(substeps)
         if damping is not None:
@@ -328,26 +336,26 @@ class XPBD(Solver):
                 moving = ws.anchors.velocities(end - h, h)
                 damping.begin_cycle(ws.extended, ws.velocities, moving, lengths[k], h, parallel)
             begin_substep(ws, targets[k], end, h, parallel)
-            ws.loads.add_forces(ws.points, ws.velocities, ws.origins, end, h)
+            at = ws.substep(end, h)
+            ws.loads.add_forces(at)
             if damping is not None:
                 damping.push(ws.points, h)
             if collides:
                 push_contacts(ws, h)
             for constraints in ws.sets:
                 constraints.project(ws.extended, h, parallel)
-            ws.actuators.project_within(ws.points, ws.origins, end, h)
+            ws.actuators.project_within(at)
             restore(ws, h, parallel)
             ws.pace.note(parallel, perf_counter() - started)
-            ws.loads.pull_to_targets(ws.points, ws.velocities, ws.origins, end, h)
-            ws.loads.pull_springs(ws.points, ws.velocities, ws.origins, end, h)
-            ws.actuators.project_between(ws.points, ws.velocities, ws.origins, end, h)
+            ws.loads.pull_to_targets(at)
+            ws.loads.pull_springs(at)
+            ws.actuators.project_between(at)
             if collides and not collide(ws, end, h, parallel):
                 break
             held_back += keep_volumes(ws, end, h, parallel)
             if collides:
                 ws.collisions.end_substep()
-            balance.note_loads(ws.points, ws.previous, ws.origins, end, h)
-            balance.note_work(ws.actuators.end_substep(ws.points, ws.origins, h))
+            note_works(ws, at, damping)
             balance.note_contacts(ws.collisions.contacts)
         return held_back
 
@@ -365,6 +373,7 @@ class XPBD(Solver):
             contact_forces=pushes,
             friction_forces=friction,
             **actuator_fields(system, *start_of(system)),
+            work=no_works(system),
         )
 
 
@@ -389,12 +398,3 @@ def _disturbed(ws: XPBDWorkspace, time: float, sleep: SleepMemory) -> NDArray[np
     to_world(ws.points, ws.origins, ws.world)
     crossing = [overlap.numbers for overlap in _overlaps(ws, time, sleep)]
     return ws.sleep.disturbed(sleep, [*ws.collisions.forces.pairs(), *crossing])
-
-
-def _lost_position_message(ws: XPBDWorkspace, vertex: int, time: float) -> str:
-    part = next(p for p in ws.system.bodies if p.vertices.start <= vertex < p.vertices.stop)
-    number = int(ws.layout.old_from_new[vertex]) - part.vertices.start
-    return (
-        f"XPBD: body {part.name!r}, vertex {number}: its position is lost (not finite, or beyond 1e12 m) "
-        f"at t = {time:g} s; take more substeps or a shorter dt"
-    )

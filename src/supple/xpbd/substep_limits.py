@@ -1,11 +1,13 @@
-"""The end of a substep: contacts, then volumes and contacts in turn, and the last resort where that is not enough."""
+"""The end of a substep: contacts, then volumes and contacts in turn, the last resort, and works."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.xpbd.integration import apply_changes, to_world, update_velocities
+from supple.xpbd.assessment.substep import Substep
+from supple.xpbd.damping.kelvin_voigt import Damping
+from supple.xpbd.integration import to_world, update_velocities
 from supple.xpbd.limits.rigid_fallback import united
 from supple.xpbd.limits.volume_guard import ENOUGH
 from supple.xpbd.workspace import XPBDWorkspace
@@ -24,7 +26,7 @@ def collide(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
     if not _to_world(ws):
         return False
     ws.collisions.project(ws.world, ws.world_previous, time, h, parallel)
-    apply_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
+    ws.apply_changes(h)
     return True
 
 
@@ -33,7 +35,7 @@ def collide_again(ws: XPBDWorkspace, time: float, h: float) -> bool:
     if not _to_world(ws):
         return False
     ws.collisions.project_again(ws.world, ws.world_previous, time, h)
-    apply_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
+    ws.apply_changes(h)
     return True
 
 
@@ -94,3 +96,12 @@ def restore(ws: XPBDWorkspace, h: float, parallel: bool) -> None:
         ws.momentum.apply(ws.points, ws.previous, ws.velocities, h, parallel)
     else:
         update_velocities(ws.points, ws.previous, ws.velocities, h)
+
+
+def note_works(ws: XPBDWorkspace, at: Substep, damping: Damping | None) -> None:
+    """Add up the works of a substep that has ended."""
+    ws.actuators.end_substep(at)
+    forces = list(ws.loads.acting)
+    if damping is not None:
+        forces.append(("damping", *damping.acting))
+    ws.works.end_substep(at, forces, ws.collisions.forces, ws.extended, ws.actuators.acting)

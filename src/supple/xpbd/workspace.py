@@ -11,12 +11,15 @@ from supple.numerics.thread_tuning import ThreadTuner
 from supple.system import System
 from supple.xpbd.assessment.assessment import Assessment
 from supple.xpbd.assessment.moment import Moment
+from supple.xpbd.assessment.substep import Substep
+from supple.xpbd.assessment.works import Works
 from supple.xpbd.constraints.actuators import ActuatorProjection
 from supple.xpbd.constraints.registry import ConstraintSet
 from supple.xpbd.constraints.stitch_anchors import StitchAnchors
 from supple.xpbd.contact.collisions import Collisions
 from supple.xpbd.damping.kelvin_voigt import Damping
 from supple.xpbd.external_forces import ExternalForces
+from supple.xpbd.integration import apply_changes
 from supple.xpbd.limits.rigid_fallback import RigidFallback
 from supple.xpbd.limits.volume_guard import VolumeGuard
 from supple.xpbd.momentum import MomentumRestore
@@ -51,6 +54,7 @@ class XPBDWorkspace:
     guard: VolumeGuard
     fallback: RigidFallback
     assessment: Assessment
+    works: Works
     choice: SubstepChoice
     sleep: Sleep
     threads: int | None
@@ -81,6 +85,24 @@ class XPBDWorkspace:
             if self.damping is not None:
                 self.damping.choose(self.extended[:, 3])
 
+    def substep(self, time: float, h: float) -> Substep:
+        """The arrays of a substep of h [s] that ends at `time` [s]."""
+        return Substep(self.points, self.velocities, self.origins, self.begun, time, h)
+
+    def apply_changes(self, h: float) -> None:
+        """Apply what contacts changed in `world` and `world_previous`."""
+        places = self.origins, self.previous, self.world, self.world_previous
+        apply_changes(self.points, self.velocities, h, *places, self.works.impulses)
+
     def moment(self, time: float) -> Moment:
         """What the assessment reads, at `time` [s]."""
         return Moment(self.points, self.extended, self.velocities, self.origins, time)
+
+    def lost_position(self, vertex: int, time: float) -> str:
+        """What is wrong where the position of a vertex is lost at `time` [s]."""
+        part = next(p for p in self.system.bodies if p.vertices.start <= vertex < p.vertices.stop)
+        number = int(self.layout.old_from_new[vertex]) - part.vertices.start
+        return (
+            f"XPBD: body {part.name!r}, vertex {number}: its position is lost (not finite, or beyond 1e12 m) "
+            f"at t = {time:g} s; take more substeps or a shorter dt"
+        )

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.numerics.kernel_cache import njit
 from supple.state import ContactPoints
 from supple.xpbd.contact.contact_rows import LoadedRows
 
@@ -79,6 +80,18 @@ class FrameForces:
     shapes: list[ShapeLoads] = field(default_factory=list)
     substeps: int = 0
     standing: tuple[LoadedRows, ShapeLoads] = field(default_factory=lambda: (LoadedRows.none(), ShapeLoads.none()))
+
+    def latest(self, count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The forces of the latest substep along normals and along surfaces on the vertices, (count, 3) [N] each."""
+        normal, tangential = np.zeros((2, count, 3))
+        if self.surfaces:
+            rows = self.surfaces[-1]
+            add_rows(self.owners.rows, rows.vertices, rows.weights, rows.normals, rows.forces, normal, tangential)
+        if self.shapes:
+            loads = self.shapes[-1]
+            forces = self.owners.masses[loads.vertices, None] * loads.loads
+            add_vertices(loads.vertices, loads.places, forces, normal, tangential)
+        return normal, tangential
 
     def pairs(self) -> list[tuple[int, int]]:
         """The pairs of bodies and obstacles (counted after the bodies) whose surfaces push each other."""
@@ -191,6 +204,30 @@ class FrameForces:
             vertices=old_from_new[vertices],
             weights=np.ones(len(chosen)),
         )
+
+
+@njit(cache=True)
+def add_rows(owners, vertices, weights, normals, forces, normal, tangential):
+    """Add forces (k, 3) on points (k, 4) with weights to those of the vertices that are bodies' points."""
+    for k in range(len(forces)):
+        along = forces[k, 0] * normals[k, 0] + forces[k, 1] * normals[k, 1] + forces[k, 2] * normals[k, 2]
+        for slot in range(4):
+            if vertices[k, slot] < len(owners):
+                i = owners[vertices[k, slot]]
+                for j in range(3):
+                    normal[i, j] += weights[k, slot] * along * normals[k, j]
+                    tangential[i, j] += weights[k, slot] * (forces[k, j] - along * normals[k, j])
+
+
+@njit(cache=True)
+def add_vertices(vertices, places, forces, normal, tangential):
+    """Add forces (k, 3) on vertices (k,), with normals in the first columns of `places`."""
+    for k in range(len(vertices)):
+        i = vertices[k]
+        along = forces[k, 0] * places[k, 0] + forces[k, 1] * places[k, 1] + forces[k, 2] * places[k, 2]
+        for j in range(3):
+            normal[i, j] += along * places[k, j]
+            tangential[i, j] += forces[k, j] - along * places[k, j]
 
 
 def _of_rows(rows: LoadedRows, frame: FrameForces) -> _Entries:

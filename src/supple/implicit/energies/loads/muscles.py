@@ -20,6 +20,7 @@ class MusclePotential(Potential):
     rows: NDArray[np.int64]
     time: float
     projection = Projection.RELEASED_FIRST
+    work = "muscles"
 
     def value(self, x: NDArray[np.float64]) -> float:
         return self.muscle.energy(x, self.time)
