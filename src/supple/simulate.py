@@ -133,9 +133,9 @@ class Frame(FrameReadings):
     def _x(self) -> NDArray[np.float64]:
         return self.state.positions
 
-    @property
+    @cached_property
     def _laws(self) -> TetLaws:
-        return self.system.laws
+        return self.system.laws_at(self.state.time)
 
     @property
     def _internal(self) -> NDArray[np.float64]:
@@ -238,7 +238,7 @@ def simulate(
     first = first_frame(scene, start, solver)
     workspace = solver.prepare(first.system)
     solver.check(first.system, first.state, workspace)
-    details = solver.initial_details(first.system, workspace)
+    details = _with_active(solver.initial_details(first.system, workspace), first.system, first.time)
     first = replace(first, report=replace(first.report, details=details))
     shown = [supplied("progress")()] if progress else []
     return _steps(first, solver, float(dt), int(steps), workspace, control, [*sinks, *shown])
@@ -365,8 +365,15 @@ def completed_report(
     measured = measure(system, state)
     values = vars(measured) | vars(step)
     del values["contacts"]  # made when they are asked for: `Frame.contacts`
-    if energy_before is not None and step.details.work:
-        details, change = step.details, measured.energy - energy_before
-        works = completed_works(details.work, details.energy_residual, change)
-        values["details"] = replace(details, work=works)
-    return Report(**values, wall_seconds=seconds)
+    details = _with_active(step.details, system, state.time)
+    if energy_before is not None and details.work:
+        works = completed_works(details.work, details.energy_residual, measured.energy - energy_before)
+        details = replace(details, work=works)
+    return Report(**values | {"details": details}, wall_seconds=seconds)
+
+
+def _with_active(details: SolverDetails, system: System, time: float) -> SolverDetails:
+    """The details with the values of growths and muscles."""
+    active = system.laws_at(time).active
+    values = {f"{each.kind}.{k}": each.value for k, each in enumerate(active)}
+    return replace(details, active=values) if values else details

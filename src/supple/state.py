@@ -155,6 +155,7 @@ class SolverDetails:
         `Report.cables`
     work : on the bodies over the step, by what does it [J]; see `Report.work`
     energy_residual : what the forces of the step leave open [J]; see `Report.energy_residual`
+    active : stretch of each growth and activation of each muscle at the end, by kind and number: "growth.0" [-]
     """
 
     contacts: int = 0
@@ -166,6 +167,7 @@ class SolverDetails:
     cable_work: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     work: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     energy_residual: float = field(default=0.0, kw_only=True)
+    active: Mapping[str, float] = field(default_factory=dict, kw_only=True)
 
     def __eq__(self, other: object) -> bool:
         if type(self) is not type(other):

@@ -10,6 +10,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.materials.elastic_tets.active import ActiveTets
 from supple.scene.loads.body_force import BodyForce
 
 
@@ -74,3 +75,13 @@ class MassLoad(AppliedLoad):
 
     def add_forces(self, x: NDArray[np.float64], time: float, out: NDArray[np.float64]) -> None:
         out[self.vertices] += self.masses[:, None] * self.load.at(x[self.vertices], time)
+
+
+class ActiveLoad(AppliedLoad):
+    """A load of tets that act by themselves."""
+
+    is_internal = True
+
+    @abstractmethod
+    def active(self, time: float) -> ActiveTets:
+        """What it is at `time` [s]."""

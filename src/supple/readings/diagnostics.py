@@ -53,7 +53,7 @@ def measure(system: System, state: State) -> Diagnostics:
     m, x, v = system.masses, state.positions, state.velocities
     center = m @ x / m.sum()
     momentum = m @ v
-    laws, stitching = system.laws, system.stitching
+    laws, stitching = system.laws_at(state.time), system.stitching
     F = mean_deformation_gradients(laws, x)
     points = stitching.points(x, state.time)
     return Diagnostics(

@@ -18,7 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.laws import TetLaws
+from supple.materials.elastic_tets.stress import elastic_energy
 from supple.materials.flows.internal import DISSIPATED, tets_of
+from supple.state import State
 from supple.system import System
 
 NUMERICAL = "numerical"
@@ -49,6 +51,18 @@ def works_of_actuators(system: System, works: Sequence[NDArray[np.float64]]) -> 
     for each, work in zip(system.actuators, works, strict=True):
         add_works(named, {each.work: float(work.sum())})
     return named
+
+
+def work_of_growth(system: System, before: State, after: State) -> dict[str, float]:
+    """What growth between two states adds to the elastic energy, the mean of that at the positions of both [J]."""
+    grown = [system.laws_at(state.time) for state in (before, after)]
+    if grown[0].growth is None or grown[0].growth.equals(grown[1].growth):
+        return {}
+    work = 0.0
+    for at in (before, after):
+        one, other = (elastic_energy(laws, at.positions, at.internal) for laws in grown)
+        work += 0.5 * (other - one)
+    return {"growth": work}
 
 
 def completed_works(works: Mapping[str, float], residual: float, change: float) -> dict[str, float]:

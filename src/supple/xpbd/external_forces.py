@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.loads.applied import DeadLoad
+from supple.loads.growth import GrownTets
 from supple.loads.springs import PointSpring
 from supple.numerics.kernel_cache import njit
 from supple.system import System
@@ -23,7 +24,7 @@ class ExternalForces:
     def __init__(self, system: System) -> None:
         loads = system.loads
         self._springs = [load for load in loads if isinstance(load, PointSpring)]
-        self._pushes = [load for load in loads if not isinstance(load, PointSpring)]
+        self._pushes = [load for load in loads if not isinstance(load, (PointSpring, GrownTets))]
         self._need_places = not all(isinstance(load, DeadLoad) for load in self._pushes)
         self._targets = system.soft_targets
         self.acting: list[tuple[str, NDArray[np.integer] | slice, NDArray[np.float64]]] = []

@@ -321,8 +321,7 @@ class XPBD(Solver):
         ws.guard.guarded[:] = ws.assessment.begin(ws.moment(state.time), ws.guard.J, h, memory.ledger)
         ws.guard.accept()
         balance = ws.assessment.balance
-        ws.actuators.begin_frame(ws.substep(state.time, h))
-        ws.works.begin_frame(ws.velocities)
+        ws.begin_frame(state.time, state.time + dt, h)
         damping = self._damping(ws, h)
         lengths = cycles(substeps)
         if damping is not None:

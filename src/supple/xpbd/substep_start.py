@@ -22,6 +22,7 @@ def load(ws: XPBDWorkspace, state: State) -> None:
     origins_of_components(ws.world, ws.system.joined_components, ws.origins)
     np.subtract(ws.world, ws.origins, out=ws.points[:, :3])
     ws.anchors.place(ws.extended, ws.origins, state.time)
+    ws.grow(state.time)
 
 
 def cycles(substeps: int) -> dict[int, int]:

@@ -102,7 +102,8 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     forces = total_forces(system, state.positions, middle)
     guard = InversionGuard.at(system, state.positions, settings.volume_kept)
     limits = StepLimits(guard, workspace.contact, tools.clock)
-    elasticity = workspace.elasticity.in_step(state.internal, h)
+    grown = workspace.elasticity_at(middle)
+    elasticity = grown.in_step(state.internal, h)
     mu = workspace.elasticity.material.mu
     actuators = actuators_at(system, state.positions, (state.time, middle), plan.scale, mu)
     base = _objective(elasticity, state.positions, middle, plan, forces, workspace, actuators)
@@ -145,7 +146,7 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     outcome = contact.verified(replace(outcome, rows=rows))
     if joints is not None:
         outcome = joints.verified(outcome)
-    internal = workspace.elasticity.flowed(x, state.internal, h)
+    internal = grown.flowed(x, state.internal, h)
     after = State(end, x, plan.velocity(x), plan.memory, internal=internal)
     residual = plan.place * outcome.end.gradient
     after = settings.integrator.finish(plan, state, after, residual, workspace.conservation)
@@ -153,7 +154,7 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
         after = rigid_ends(system, state, after, limits)
     acted = state.positions + plan.place * (x - state.positions)
     forces_of_actuators = tuple(actuator.forces(acted) for actuator in actuators)
-    works, residual = works_of_step(problem.objective, outcome, state, internal, plan, middle, workspace)
+    works, residual = works_of_step(problem.objective, outcome, state, internal, plan, middle, end, workspace)
     return Substep(after, outcome, contact, joints, forces_of_actuators, works, residual)
 
 

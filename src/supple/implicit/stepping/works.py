@@ -15,7 +15,7 @@ from supple.implicit.newton.minimize import Outcome
 from supple.implicit.newton.objective import Objective
 from supple.implicit.stepping.integrators import Plan
 from supple.implicit.stepping.workspace import Workspace
-from supple.readings.energy_balance import add_works, dissipated_energy
+from supple.readings.energy_balance import add_works, dissipated_energy, work_of_growth
 from supple.state import State
 
 
@@ -26,6 +26,7 @@ def works_of_step(
     internal: NDArray[np.float64],
     plan: Plan,
     middle: float,
+    time: float,
     ws: Workspace,
 ) -> tuple[dict[str, float], float]:
     """The works by name, and that of the forces which Newton's method left over [J].
@@ -33,12 +34,14 @@ def works_of_step(
     Parameters
     ----------
     objective : whose minimum the outcome is; before : the state where the step begins
-    internal : (k, 11) internal variables at the end; middle : the time of the loads [s]
+    internal : (k, 11) internal variables at the end; middle, time : of the loads, and of the end [s]
     """
     system, x, n = ws.system, outcome.end.positions, ws.bodies_end
     moved = x - before.positions
     moved[n:] = 0.0  # obstacles
     works = works_of_loads(system, before.positions, moved, middle)
+    end = State(time, x, before.velocities, internal=internal)
+    add_works(works, work_of_growth(system, before, end))
     for term in objective.terms:
         if term.work is not None:
             gradient = np.zeros_like(x)

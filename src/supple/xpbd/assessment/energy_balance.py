@@ -39,13 +39,14 @@ class EnergyBalance:
 
     Attributes
     ----------
+    elastic : energy of the bodies
     is_judged : whether the work of everything that moved in the frame is known
     """
 
     def __init__(self, system: System, edge_length: float) -> None:
         self.system = system
         self._masses = system.masses
-        self._elastic = ElasticEnergy(system)
+        self.elastic = ElasticEnergy(system)
         self._obstacles_move = any(obstacle.motion is not None for obstacle in system.obstacles)
         self._anchors_move = self._obstacles_move and len(system.stitching.anchors) > 0
         fall = LEAST_FALL * edge_length * math.hypot(*system.gravity)
@@ -78,9 +79,9 @@ class EnergyBalance:
 
     def _in_hard_constraints(self, moment: Moment) -> float:
         """The most that violated hard constraints can give out [J]."""
-        if not self._elastic.has_hard:
+        if not self.elastic.has_hard:
             return 0.0
-        soft, both = (self._elastic.of(moment.points, False, h).sum() for h in (math.inf, self._h))
+        soft, both = (self.elastic.of(moment.points, False, h).sum() for h in (math.inf, self._h))
         return float(both - soft)
 
     def _measure(self, moment: Moment) -> tuple[NDArray[np.float64], float]:
@@ -88,7 +89,7 @@ class EnergyBalance:
         points, velocities = moment.points, moment.velocities
         squares = self._masses * np.einsum("ij,ij->i", velocities, velocities)
         starts = [part.vertices.start for part in self.system.bodies]
-        bodies = self._elastic.of(points, False) + 0.5 * np.add.reduceat(squares, starts)
+        bodies = self.elastic.of(points, False) + 0.5 * np.add.reduceat(squares, starts)
         total = float(bodies.sum()) - float((self._masses @ points[:, :3]) @ self.system.gravity)
         if len(self.system.stitching):
             total += stitch_energy(self.system.stitching, np.ascontiguousarray(moment.extended[:, :3]))

@@ -30,6 +30,7 @@ class Works:
     Attributes
     ----------
     by_name : so far in the frame [J]; residual : see `Report.energy_residual`
+    at_pins : elastic energy of the tets at pins that move, or None
     impulses : (n, 3) changes of velocities by contact in the present substep [m/s]
     """
 
@@ -43,15 +44,16 @@ class Works:
             if pin.motion is not None:
                 held[pin.vertices] = True
         self._held = np.flatnonzero(held)
-        self._at_pins = ElasticEnergy(system, held) if len(self._held) else None
+        self.at_pins = ElasticEnergy(system, held) if len(self._held) else None
         self._on_pins = np.zeros((len(system.masses), 3))
         moving = any(obstacle.motion is not None for obstacle in system.obstacles)
         self._anchors = len(system.stitching.anchors) if moving else 0
         self._anchored = np.zeros((self._anchors, 3))
 
-    def begin_frame(self, velocities: Floats) -> None:
-        """Begin a frame with velocities (n, 3) [m/s]."""
+    def begin_frame(self, velocities: Floats, growth: float) -> None:
+        """Begin a frame with velocities (n, 3) [m/s], and with the work of growth in it [J]."""
         self.by_name, self.residual = no_works(self.system), 0.0
+        add_works(self.by_name, {"growth": growth} if growth else {})
         self._add_inertia(velocities, -1.0)
 
     def begin_substep(self, extended: Floats) -> None:
@@ -80,7 +82,7 @@ class Works:
         self._on_pins[:] = 0.0
         for name, rows, acting in forces:
             add_works(self.by_name, {name: float(np.einsum("ij,ij->", acting, moved[rows]))})
-            if self._at_pins is not None:
+            if self.at_pins is not None:
                 self._on_pins[rows] += acting
         if contact.surfaces or contact.shapes:
             normal, tangential = contact.latest(len(moved))
@@ -88,9 +90,9 @@ class Works:
             add_works(self.by_name, {"contact": works[0], "friction": works[1]})
             self._on_pins += normal + tangential
             self.residual += _work_of_impulses(at.points, self.system.masses, self.impulses, moved, at.h) - sum(works)
-        if self._at_pins is not None:
+        if self.at_pins is not None:
             self._on_pins += of_actuators(at)
-            self._add_pins(self._at_pins, at, moved)
+            self._add_pins(self.at_pins, at, moved)
         if self._anchors:
             self._add_anchors(at, extended)
 
