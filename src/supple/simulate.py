@@ -369,7 +369,8 @@ def completed_report(
     if energy_before is not None and details.work:
         works = completed_works(details.work, details.energy_residual, measured.energy - energy_before)
         details = replace(details, work=works)
-    return Report(**values | {"details": details}, wall_seconds=seconds)
+    values["details"] = details
+    return Report(**values, wall_seconds=seconds)
 
 
 def _with_active(details: SolverDetails, system: System, time: float) -> SolverDetails:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -61,18 +60,19 @@ def plot_recording(recording: Recording | str | Path, output: str | Path) -> Pat
         rows = 3 + (len(more) + 1) // 2
         figure = Figure(figsize=(12.0, 3.0 * rows), layout="constrained", dpi=110)
         FigureCanvasAgg(figure)
-        axes = figure.subplots(rows, 2, sharex=True)
-        _draw(source, axes[:3])
-        for axis, draw in zip_longest(axes[3:].flat, more):
-            if draw is None:
-                axis.remove()
-            else:
-                draw(axis, source)
+        axes = np.array([figure.add_subplot(rows, 2, k + 1) for k in range(6)]).reshape(3, 2)
+        for axis in axes.flat[1:]:
+            axis.sharex(axes[0, 0])
+        _draw(source, axes)
+        for k, draw in enumerate(more):
+            axis = figure.add_subplot(rows, 2, 7 + k, sharex=None if draw is _strokes else axes[0, 0])
+            draw(axis, source)
         for axis in figure.axes:
             axis.grid(alpha=0.25, linewidth=0.6)
             axis.spines[["top", "right"]].set_visible(False)
-        for axis in axes[-1]:
-            axis.set_xlabel("time [s]")
+        for axis in figure.axes[-2:] if more else axes[-1]:
+            if not axis.get_xlabel():
+                axis.set_xlabel("time [s]")
         names = ", ".join(body.name for body in source.bodies[:6]) + (", …" if len(source.bodies) > 6 else "")
         figure.suptitle(f"{source.path.name}: {names} ({len(source)} frames)")
         with whole_file(output) as fresh:
@@ -128,7 +128,8 @@ def _panels(recording: Recording) -> list[Callable[[Any, Recording], None]]:
     for name, label in _MAPPINGS.items():
         if name in mappings:
             panels.append(partial(_mapping, name=name, label=label))
-    return [*panels, _sensors] if recording.sensors else panels
+    panels += [_sensors] if recording.sensors else []
+    return [*panels, _strokes] if any(not sensor.is_grid for sensor in recording.sensors) else panels
 
 
 def _works(axis, recording: Recording) -> None:
@@ -157,6 +158,19 @@ def _sensors(axis, recording: Recording) -> None:
         normal = values[..., 0].sum(axis=(1, 2)) if sensor.is_grid else values[:, 3]
         axis.plot(recording.times, normal, label=sensor.name)
     axis.set_ylabel("normal force on sensors [N]")
+    axis.legend(**_LEGEND)
+
+
+def _strokes(axis, recording: Recording) -> None:
+    """The normal force on each force sensor against the way of its center of pressure since it was first pushed."""
+    for sensor in recording.sensors:
+        if not sensor.is_grid:
+            values = recording.frame_values(f"sensors/{sensor.number}")
+            pushed = values[values[:, 3] > 0.0]
+            way = np.linalg.norm(pushed[:, 4:] - pushed[:1, 4:], axis=1)
+            axis.plot(way, pushed[:, 3], marker=".", label=sensor.name)
+    axis.set_xlabel("displacement of the center of pressure [m]")
+    axis.set_ylabel("normal force [N]")
     axis.legend(**_LEGEND)
 
 

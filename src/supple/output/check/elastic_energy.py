@@ -98,7 +98,7 @@ def growth_of(active: Sequence[ActiveTets], m: int) -> tuple[NDArray[np.float64]
             d = each.directions
             stretched = np.einsum("ki,kj->kij", d, d) if len(d) else np.eye(3)
             F_g[each.rows] = F_g[each.rows] @ (np.eye(3) + (each.value - 1.0) * stretched)
-    return np.linalg.inv(F_g), np.linalg.det(F_g)
+    return np.asarray(np.linalg.inv(F_g), dtype=np.float64), np.asarray(np.linalg.det(F_g), dtype=np.float64)
 
 
 def _gradients(x, tets, rest_inverse):

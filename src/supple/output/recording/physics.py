@@ -188,8 +188,8 @@ def read_physics(file: CheckedFile, header: dict[str, Any], m: int) -> RecordedP
     if internal != sum(len(tets.rows) for tets in known if tets.flow is not None):
         raise file.broken("its number of internal variables is not that of its materials")
     active = _read_active(file, physics, m)
-    given = {"region": region, "laws": tuple(known), "internal": internal, "active": active}
-    return RecordedPhysics(kind, mu, lam, compliances, *counts, **given)
+    here = kind, mu, lam, compliances, *counts
+    return RecordedPhysics(*here, region=region, laws=tuple(known), internal=internal, active=active)
 
 
 def _read_active(file: CheckedFile, physics: dict[str, Any], m: int) -> tuple[ActiveTets, ...]:
