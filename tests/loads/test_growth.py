@@ -1,10 +1,13 @@
 """Growth: no stress where it is free, the stress of closed forms where it is not, derivatives, recordings, errors."""
 
+import json
+
+import h5py
 import numpy as np
 import pytest
 
 import supple as sp
-from supple.errors import SceneError
+from supple.errors import OutputError, SceneError
 from supple.implicit.energies.elasticity import elasticity_of
 from supple.output.recording.reader import read_recording
 from supple.scene_file.loader import load_scene
@@ -120,6 +123,23 @@ def test_gradient_and_hessian_have_slope_two():
         by_value = (potential.value(x + h * d) - potential.value(x - h * d)) / (2 * h)
         errors.append(abs(by_value - float((gradient(x) * d).sum())))
     assert errors[1] < 0.3 * errors[0]
+
+
+@pytest.mark.parametrize(
+    ("described", "message"),
+    [([["melting", 0.0]], "'melting' that this version does not know"), ([3], "growths and muscles are not described")],
+)
+def test_recordings_of_what_is_not_known_are_refused(tmp_path, described, message):
+    path = tmp_path / "run.vtkhdf"
+    scene = sp.Scene([sp.Body("bar", BAR, RUBBER)], loads=[sp.Growth("bar", 1.1)], **STILL)
+    last_of(scene, sp.XPBD(substeps=1, contact=None), 1, sinks=[sp.Recorder(path)])
+    with h5py.File(path, "r+") as file:
+        header = json.loads(file["supple/header"][()])
+        header["physics"]["active"] = described
+        del file["supple/header"]
+        file["supple/header"] = json.dumps(header)
+    with pytest.raises(OutputError, match=message):
+        read_recording(path)
 
 
 def test_what_is_refused():

@@ -35,7 +35,7 @@ def force(stretch: float) -> float:
         J = side * side * stretch
         return mu * side - mu * side * stretch + lam * (J - 1.0) * side * stretch
 
-    side = brentq(side_stress, 0.5, 2.0)
+    side: Any = brentq(side_stress, 0.5, 2.0)
     J = side * side * stretch
     return -(mu * stretch - mu * side**2 + lam * (J - 1.0) * side**2) * SIDE**2
 
