@@ -75,6 +75,7 @@ from .scene.joints.motors import PositionMotor as PositionMotor
 from .scene.joints.motors import VelocityMotor as VelocityMotor
 from .scene.joints.weld import Weld as Weld
 from .scene.loads.body_force import BodyForce as BodyForce
+from .scene.loads.growth import Growth as Growth
 from .scene.loads.muscle import Muscle as Muscle
 from .scene.loads.over_time import Curve as Curve
 from .scene.loads.spring import Spring as Spring

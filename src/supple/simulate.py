@@ -17,21 +17,16 @@ from numpy.typing import ArrayLike, NDArray
 from supple.displayed import DisplayedReport, supplied
 from supple.errors import SceneError, SolverError
 from supple.materials.elastic_tets.laws import TetLaws, joined_materials
-from supple.materials.elastic_tets.stress import (
-    energy_densities,
-    mean_deformation_gradients,
-    smallest_ratio,
-    volume_ratios,
-)
 from supple.materials.flows.internal import checked
 from supple.numerics.memory import require_memory
 from supple.readings.actuator_readings import CableReading, CavityReading, cable_readings, cavity_readings
+from supple.readings.diagnostics import Diagnostics, measure
+from supple.readings.energy_balance import completed_works
 from supple.readings.frame_readings import FrameReadings
 from supple.readings.joint_readings import JointReading, joint_readings
 from supple.scene.inputs import checked_values, drive_inputs, hold_inputs
 from supple.scene.rigid.pose import Pose, pose_of
 from supple.scene.scene import Scene
-from supple.scene.stitches.measures import largest_stitch_stretch, stitch_energy
 from supple.state import ContactPoints, Problems, SolverDetails, State, Status, StepReport
 from supple.system import BodyRange, Solver, System, build_system, initial_state
 
@@ -39,30 +34,6 @@ logger = logging.getLogger(__name__)
 
 # Beyond these, dt^2 and 1 / dt^2 leave what float64 can hold.
 _DT_RANGE = (1e-30, 1e30)
-
-
-@dataclass(frozen=True, eq=False)
-class Diagnostics:
-    """Measured on one state.
-
-    Attributes
-    ----------
-    min_det_F : smallest J over all tets, of quadratic ones at their nodes and quadrature points [-]
-    kinetic_energy, elastic_energy : [J], elastic from the rest state
-    potential_energy : of gravity [J], zero where all mass is at the origin
-    stitch_energy : of all stitches, from their rest state [J]
-    largest_stitch_stretch : see `supple.scene.stitches.measures`; None without stitches
-    linear_momentum : (3,) [kg m/s]; angular_momentum : (3,) about the center of mass [kg m^2/s]
-    """
-
-    min_det_F: float
-    kinetic_energy: float
-    elastic_energy: float
-    potential_energy: float
-    stitch_energy: float
-    largest_stitch_stretch: float | None
-    linear_momentum: NDArray[np.float64]
-    angular_momentum: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -86,6 +57,16 @@ class Report(DisplayedReport, Diagnostics):
     def softening(self) -> Mapping[str, float]:
         """By body, the share of its stiffness that it lacks, estimated; empty where the solver does not soften."""
         return getattr(self.details, "softening", {})
+
+    @property
+    def work(self) -> Mapping[str, float]:
+        """The works on the bodies over the frame by what does them, see `supple.readings.energy_balance` [J]."""
+        return self.details.work
+
+    @property
+    def energy_residual(self) -> float:
+        """The change of `energy` over the frame that the sum of `work` leaves open [J]."""
+        return self.details.energy_residual
 
     @property
     def joints(self) -> Mapping[str, JointReading]:
@@ -152,9 +133,9 @@ class Frame(FrameReadings):
     def _x(self) -> NDArray[np.float64]:
         return self.state.positions
 
-    @property
+    @cached_property
     def _laws(self) -> TetLaws:
-        return self.system.laws
+        return self.system.laws_at(self.state.time)
 
     @property
     def _internal(self) -> NDArray[np.float64]:
@@ -257,7 +238,7 @@ def simulate(
     first = first_frame(scene, start, solver)
     workspace = solver.prepare(first.system)
     solver.check(first.system, first.state, workspace)
-    details = solver.initial_details(first.system, workspace)
+    details = _with_active(solver.initial_details(first.system, workspace), first.system, first.time)
     first = replace(first, report=replace(first.report, details=details))
     shown = [supplied("progress")()] if progress else []
     return _steps(first, solver, float(dt), int(steps), workspace, control, [*sinks, *shown])
@@ -357,7 +338,8 @@ def _steps(
             began = time.perf_counter()
             state, step = advance(solver, system, state, dt, workspace, wanted)
             seconds = time.perf_counter() - began
-            frame = Frame(index, state, system, completed_report(system, state, step, seconds), step.contacts, solver)
+            report = completed_report(system, state, step, seconds, frame.report.energy)
+            frame = Frame(index, state, system, report, step.contacts, solver)
             problems.note(frame.report.status, frame.report.message)
             for sink in sinks:
                 sink.write(frame)
@@ -372,29 +354,27 @@ def _warn(problems: Problems) -> None:
         logger.warning("%s", problems)
 
 
-def completed_report(system: System, state: State, step: StepReport, seconds: float) -> Report:
-    """The report of a step that took so many seconds, with what is measured on its state."""
-    values = vars(measure(system, state)) | vars(step)
+def completed_report(
+    system: System, state: State, step: StepReport, seconds: float, energy_before: float | None = None
+) -> Report:
+    """The report of a step that took so many seconds, with what is measured on its state.
+
+    energy_before : `energy` where the step began [J]; None where there was no step. Works of a solver that reports
+        some get the numerical one.
+    """
+    measured = measure(system, state)
+    values = vars(measured) | vars(step)
     del values["contacts"]  # made when they are asked for: `Frame.contacts`
+    details = _with_active(step.details, system, state.time)
+    if energy_before is not None and details.work:
+        works = completed_works(details.work, details.energy_residual, measured.energy - energy_before)
+        details = replace(details, work=works)
+    values["details"] = details
     return Report(**values, wall_seconds=seconds)
 
 
-@np.errstate(over="ignore", invalid="ignore")
-def measure(system: System, state: State) -> Diagnostics:
-    """Measure a state. Where its numbers are too large for double precision, the results are not finite."""
-    m, x, v = system.masses, state.positions, state.velocities
-    center = m @ x / m.sum()
-    momentum = m @ v
-    laws, stitching = system.laws, system.stitching
-    F = mean_deformation_gradients(laws, x)
-    points = stitching.points(x, state.time)
-    return Diagnostics(
-        min_det_F=smallest_ratio(laws, x, volume_ratios(laws, x, F)),
-        kinetic_energy=0.5 * float(m @ np.einsum("ij,ij->i", v, v)),
-        elastic_energy=float((energy_densities(laws, x, F, state.internal) * laws.volumes)[laws.known].sum()),
-        potential_energy=-float((m @ x) @ system.gravity),
-        stitch_energy=stitch_energy(stitching, points) if len(stitching) else 0.0,
-        largest_stitch_stretch=largest_stitch_stretch(stitching, points) if len(stitching) else None,
-        linear_momentum=momentum,
-        angular_momentum=m @ np.cross(x - center, v - momentum / m.sum()),
-    )
+def _with_active(details: SolverDetails, system: System, time: float) -> SolverDetails:
+    """The details with the values of growths and muscles."""
+    active = system.laws_at(time).active
+    values = {f"{each.kind}.{k}": each.value for k, each in enumerate(active)}
+    return replace(details, active=values) if values else details

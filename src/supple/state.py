@@ -142,10 +142,6 @@ class State:
     hinge_angles: Mapping[str, float] = field(default_factory=dict)
 
 
-# The fields of `SolverDetails` with the work of actuators, by name [J].
-ACTUATOR_WORKS = ("cavity_work", "cable_work")
-
-
 @dataclass(frozen=True, eq=False)
 class SolverDetails:
     """What one solver reports of a step beyond what all solvers do. Each solver has a subclass of its own.
@@ -165,6 +161,9 @@ class SolverDetails:
     joint_coordinates : angles of hinges [rad], travels of sliders [m], swings of balls with limits [rad], by name
     motor_forces : efforts of the motors [N], [N m], by name of their joint
     joint_violations : how far each joint is from holding, as a share of the diameter of gyration of its smaller body
+    work : on the bodies over the step, by what does it [J]; see `Report.work`
+    energy_residual : what the forces of the step leave open [J]; see `Report.energy_residual`
+    active : stretch of each growth and activation of each muscle at the end, by kind and number: "growth.0" [-]
     """
 
     contacts: int = 0
@@ -179,6 +178,9 @@ class SolverDetails:
     joint_coordinates: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     motor_forces: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     joint_violations: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+    work: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+    energy_residual: float = field(default=0.0, kw_only=True)
+    active: Mapping[str, float] = field(default_factory=dict, kw_only=True)
 
     def __eq__(self, other: object) -> bool:
         if type(self) is not type(other):

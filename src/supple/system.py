@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from supple.errors import SceneError
 from supple.loads.actuators.actuator import Actuator
 from supple.loads.actuators.build import actuators_of
-from supple.loads.applied import AppliedLoad, DeadLoad
+from supple.loads.applied import ActiveLoad, AppliedLoad, DeadLoad
 from supple.loads.build import applied, applied_force
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.elastic_tets.edge_springs import EdgeSprings
@@ -177,6 +177,11 @@ class System:
         joined = joined_materials(materials)
         rest = self.rest_shape_inverse, self.rest_volumes
         return TetLaws(self.tets, *rest, joined, tuple(springs), self.quadratic)
+
+    def laws_at(self, time: float) -> TetLaws:
+        """`laws` with the growths and muscles as they are at `time` [s]."""
+        active = tuple(load.active(time) for load in self.loads if isinstance(load, ActiveLoad))
+        return replace(self.laws, active=active) if active else self.laws
 
     @cached_property
     def joined_components(self) -> NDArray[np.int32]:

@@ -8,6 +8,7 @@ import pytest
 from supple.cli.app import main
 from supple.cli.exit_codes import ExitCode
 from supple.demos import cantilever, quilt
+from supple.demos.actuators import pneunet
 from supple.demos.demo import Claim, Demo, Measurement
 from supple.demos.motion_measures import stitch_lengths
 from supple.demos.registry import DEMOS, find_demo
@@ -33,6 +34,7 @@ def run(demo, kind, steps=None):
 
 def test_the_names_and_solvers_of_the_demos():
     soft = {"squash", "stretch", "compliance", "bears", "cantilever", "twist", "stitch", "quilt", "balloon", "muscle"}
+    soft |= {"pneunet", "tendon_finger", "foam_press"}
     rigid = {"dzhanibekov", "dominoes", "gripper", "ragdoll"}
     assert {name for name, _ in EVERY} == soft | rigid
     assert {kind for _, kind in EVERY} == set(SOLVERS)
@@ -52,7 +54,7 @@ def test_the_solver_of_each_kind_accepts_the_scene(name, kind):
 
 
 # The first steps of these take long: a fine mesh, and patches that are compiled.
-LONG = {("cantilever", "implicit"), ("balloon", "implicit")}
+LONG = {("cantilever", "implicit"), ("balloon", "implicit"), ("pneunet", "implicit")}
 
 
 @pytest.mark.parametrize(("name", "kind"), [pair for pair in EVERY if pair not in LONG])
@@ -187,3 +189,9 @@ def test_newton_iterations_go_to_the_log_at_debug(caplog):
     rows = [row for row in frames[0].report.details.newton if row.kind == "newton"]
     assert len(rows) >= 1
     assert sum("iteration=" in line for line in logged) == len(rows)
+
+
+@pytest.mark.slow
+def test_the_reference_of_the_bellows_finger_is_that_of_a_finer_mesh():
+    frames = simulate(pneunet.scene(pneunet.FINER), DEMOS["pneunet"].solver(), 1.0, pneunet.STEPS)
+    np.testing.assert_allclose([pneunet.bend(frame) for frame in frames], pneunet.REFERENCE, rtol=2e-3)

@@ -198,7 +198,7 @@ AT = [("bar", 0), ("bar", (0.1, 0, 0))]
         (lambda: sp.Cable(AT, tension=-1.0), "tension is -1; it must be zero or more"),
         (lambda: sp.Cable(AT, length=1.0), "stiffness is None; give it"),
         (lambda: sp.Cable(AT, tension=1.0, stiffness=2.0), "it has no effect with tension; leave it out"),
-        (lambda: sp.Cable(AT, winch_speed=np.sin, stiffness=1.0), "winch_speed is a function; give a number or a"),
+        (lambda: sp.Cable(AT, winch_speed=np.nan, stiffness=1.0), "winch_speed"),
         (lambda: sp.Cable(AT, tension=1.0, friction=-1.0), "friction is -1; it must be zero or more"),
         (lambda: sp.Cable(AT[:1], tension=1.0), "give two or more"),
         (lambda: sp.Cable(3, tension=1.0), "points is 3; give two or more"),
@@ -213,3 +213,25 @@ def test_bad_cables_are_one_line(make, message):
     with pytest.raises(sp.SceneError, match=message) as error:
         sp.Scene(bodies(), cables=[make()])
     assert "\n" not in str(error.value)
+
+
+def _ramp(time):
+    """The integral of the curve from 0 at 3 ms to 0.2 at 17.1 ms."""
+    t = np.clip(time - 0.003, 0.0, 0.0141)
+    return 0.5 * t * t * 0.2 / 0.0141 + 0.2 * max(time - 0.0171, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("speed", "wound"),
+    [
+        (0.3, lambda t: 0.3 * t),
+        (lambda t: np.sin(20.0 * t), lambda t: (1.0 - np.cos(20.0 * t)) / 20.0),
+        (sp.Curve([0.003, 0.0171], [0.0, 0.2]), _ramp),
+    ],
+    ids=["number", "function", "curve"],
+)
+def test_a_winch_winds_up_the_integral_of_its_speed(speed, wound):
+    cable = sp.Cable([("cube", 0), (None, (5, 0, 0))], winch_speed=speed, stiffness=1.0)
+    (actuator,) = build_system(sp.Scene([sp.Body("cube", CUBE, RUBBER)], cables=[cable])).actuators
+    for time in (0.5, 0.0, 0.0137, 0.02, 0.01):
+        assert actuator.start - actuator.law.length(time) == pytest.approx(wound(time), abs=1e-9)

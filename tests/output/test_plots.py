@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import supple as sp
 from supple.errors import OutputError
 from supple.output import plots
 from supple.output.plots import plot_recording, volume_ratios
@@ -22,6 +23,31 @@ def test_a_plot_is_a_picture_with_lines(tmp_path, recorded):
         for column in range(2 if row < 2 else 1):
             panel = colored[row * 320 : (row + 1) * 330, column * 660 : (column + 1) * 660]
             assert np.count_nonzero(panel) > 100
+
+
+def test_works_cavities_cables_and_sensors_have_panels(tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    shell = sp.shapes.spherical_shell(inner_radius=0.1, outer_radius=0.15, edge_length=0.1)
+    scene = sp.Scene(
+        [sp.Body("ball", shell, sp.StableNeoHookean(youngs=1e5, poisson=0.4), position=(0, 0.16, 0))],
+        [sp.HalfSpace()],
+        cavities=[sp.Cavity("ball", pressure=1e3)],
+        cables=[sp.Cable([("ball", 0), (None, (0, 1, 0))], tension=1.0)],
+        sensors=[sp.ForceSensor("skin", "ball"), sp.Taxels("palm", "ball", (-1, -1, 0), (2, 0, 0), (0, 2, 0), (2, 2))],
+    )
+    path = tmp_path / "r.vtkhdf"
+    list(sp.simulate(scene, sp.XPBD(substeps=4), 1 / 60, 3, sinks=[sp.Recorder(path)]))
+    with image.open(plot_recording(path, tmp_path / "plot.png")) as opened:
+        pixels = np.asarray(opened.convert("RGB")).astype(int)
+    assert pixels.shape == (
+        2310,
+        1320,
+        3,
+    )  # works, four of cavities and cables, two of sensors
+    colored = np.ptp(pixels, axis=2) > 60
+    for row in range(3, 6):
+        for column in range(2):
+            assert np.count_nonzero(colored[row * 330 : (row + 1) * 330, column * 660 : (column + 1) * 660]) > 100
 
 
 def test_volume_ratios_are_those_of_the_motion(recording):

@@ -47,15 +47,37 @@ def errors(radial, around, layers, integration="tets"):
         (centers, frame.stress["ring"], mesh.volumes),
         (mesh.vertices, frame.stress.at_vertices["ring"], shares),
     ):
-        r = np.linalg.norm(x[:, :2], axis=1)
-        out = np.column_stack([x[:, 0] / r, x[:, 1] / r, np.zeros(len(r))])
-        along = np.column_stack([-out[:, 1], out[:, 0], out[:, 2]])
-        base, change = P * INNER**2 / (OUTER**2 - INNER**2), OUTER**2 / r**2
-        square = 0.0
-        for direction, exact in ((out, base * (1 - change)), (along, base * (1 + change))):
-            square += (np.einsum("ei,eij,ej->e", direction, stress, direction) - exact) ** 2
-        found.append(float(np.sqrt(weights @ square / weights.sum())) / P)
+        found.append(difference(x, stress, weights))
     return found
+
+
+def difference(x, stress, weights):
+    """Of the radial and the hoop stress (k, 3, 3) at x (k, 3) from Lame's, in the mean square, over the pressure."""
+    r = np.linalg.norm(x[:, :2], axis=1)
+    out = np.column_stack([x[:, 0] / r, x[:, 1] / r, np.zeros(len(r))])
+    along = np.column_stack([-out[:, 1], out[:, 0], out[:, 2]])
+    base, change = P * INNER**2 / (OUTER**2 - INNER**2), OUTER**2 / r**2
+    square = 0.0
+    for direction, exact in ((out, base * (1 - change)), (along, base * (1 + change))):
+        square += (np.einsum("ei,eij,ej->e", direction, stress, direction) - exact) ** 2
+    return float(np.sqrt(weights @ square / weights.sum())) / P
+
+
+def quadratic_error(radial, around):
+    """Of quadratic tets with curved sides, in one layer."""
+    quad = ring(radial, around, 1)[0].to_order(2)
+    x, nodes, radii = quad.vertices.copy(), quad.nodes, np.linalg.norm(quad.vertices[:, :2], axis=1)
+    for k, (a, b) in enumerate([(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)]):
+        middle = nodes[:, 4 + k]
+        wanted = 0.5 * (radii[nodes[:, a]] + radii[nodes[:, b]]) / radii[middle]
+        x[middle, :2] = quad.vertices[middle, :2] * wanted[:, None]
+    mesh = sp.TetMesh(x, nodes)
+    body = sp.Body("ring", mesh, sp.StableNeoHookean(youngs=E, poisson=NU))
+    distances = np.linalg.norm(body.points[:, :2], axis=1)
+    inner = np.flatnonzero((distances[body.triangles] < INNER * 1.0001).all(axis=1))
+    scene = sp.Scene([body], loads=[sp.Pressure("ring", P, region=inner)], gravity=(0.0, 0.0, 0.0))
+    *_, frame = sp.simulate(scene, sp.Implicit(contact=None, tolerance=1e-7), dt=0.05, steps=4)
+    return difference(mesh.vertices[nodes].mean(axis=1), frame.stress["ring"], mesh.volumes)
 
 
 def test_stresses_converge_to_lames():
@@ -69,3 +91,12 @@ def test_stresses_converge_to_lames():
 @pytest.mark.slow
 def test_stresses_of_patches_are_within_a_percent_on_a_fine_mesh():
     assert errors(12, 80, 4, "patches")[0] < 0.01
+
+
+def test_stresses_of_quadratic_tets_converge_with_second_order():
+    assert quadratic_error(3, 20) < 0.55 * quadratic_error(2, 14)  # with second order 0.44
+
+
+@pytest.mark.slow
+def test_stresses_of_quadratic_tets_are_within_half_a_percent():
+    assert quadratic_error(6, 40) < 0.005

@@ -139,9 +139,9 @@ def test_nan_within_a_solver_is_a_status_and_the_last_good_state_is_kept(out, mo
         if name == "xpbd":
             add_forces = ExternalForces.add_forces  # comes before the constraints
 
-            def spoiled(self, points, *rest):
-                add_forces(self, points, *rest)
-                points[0, 1] = np.nan
+            def spoiled(self, at):
+                add_forces(self, at)
+                at.points[0, 1] = np.nan
 
             patch.setattr(ExternalForces, "add_forces", spoiled)
         else:

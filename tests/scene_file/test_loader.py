@@ -288,7 +288,7 @@ def test_the_manual_lists_every_kind(kinds):
 
 
 def _family(name):
-    if name in ("TractionModel", "PressureModel", "BodyForceModel", "SpringModel", "MuscleModel"):
+    if name in ("TractionModel", "PressureModel", "BodyForceModel", "SpringModel", "MuscleModel", "GrowthModel"):
         return "load"
     if name in ("ForceSensorModel", "TaxelsModel"):
         return "sensor"

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from supple.demos.actuators.balloon import BALLOON
+from supple.demos.actuators.foam_press import FOAM_PRESS
 from supple.demos.actuators.muscle import MUSCLE
+from supple.demos.actuators.pneunet import PNEUNET
+from supple.demos.actuators.tendon_finger import TENDON_FINGER
 from supple.demos.bears import BEARS
 from supple.demos.cantilever import CANTILEVER
 from supple.demos.compliance import COMPLIANCE
@@ -21,9 +24,10 @@ from supple.demos.twist import TWIST
 from supple.errors import SceneError
 
 _TORTURE = [torture.full for torture in TORTURE.values()]
-_SOFT = (SQUASH, STRETCH, COMPLIANCE, BEARS, CANTILEVER, TWIST, STITCH, QUILT, BALLOON, MUSCLE)
+_SOFT = (SQUASH, STRETCH, COMPLIANCE, BEARS, CANTILEVER, TWIST, STITCH, QUILT)
+_DRIVEN = (BALLOON, MUSCLE, PNEUNET, TENDON_FINGER, FOAM_PRESS)
 _RIGID = (DZHANIBEKOV, DOMINOES, GRIPPER, RAGDOLL)
-DEMOS: dict[str, Demo] = {demo.name: demo for demo in (*_SOFT, *_RIGID, *_TORTURE)}
+DEMOS: dict[str, Demo] = {demo.name: demo for demo in (*_SOFT, *_DRIVEN, *_RIGID, *_TORTURE)}
 
 
 def find_demo(name: str) -> Demo:

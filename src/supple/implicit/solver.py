@@ -40,6 +40,7 @@ from supple.materials.per_tet import NO_REGION
 from supple.numerics.noninverting_step import KEEP
 from supple.numerics.threads import threads_for
 from supple.readings.actuator_readings import actuator_fields, start_of
+from supple.readings.energy_balance import add_works, no_works, works_of_actuators
 from supple.scene.scene import Scene
 from supple.state import State, Status, StepReport
 from supple.system import Solver, System
@@ -220,6 +221,7 @@ class Implicit(Solver):
             **initial_joint_details(workspace.joints, workspace.checked or system.start_states[-1]),
             seconds=dict.fromkeys((*PARTS, "other"), 0.0),
             **actuator_fields(system, *start_of(system)),
+            work=no_works(system),
         )
 
     def step(self, system: System, state: State, dt: float, workspace: Workspace) -> tuple[State, StepReport]:
@@ -253,6 +255,7 @@ class Implicit(Solver):
         last: Substep | None = None
         forces, parts, works = start_of(system)
         parts = [each.parts(now.positions) for each in system.actuators]
+        energy, residual = no_works(system), 0.0
         while not substepping.over:
             # For a small scene all at once: changing the number of threads takes longer than its kernels.
             with threads_for(len(system.tets), SERIAL_TETS):
@@ -269,11 +272,14 @@ class Implicit(Solver):
             before, parts = parts, [each.parts(now.positions) for each in system.actuators]
             forces = list(taken.actuators)
             works = [w + Q * (s - t) for w, Q, s, t in zip(works, forces, parts, before, strict=True)]
+            add_works(energy, taken.works)
+            residual += taken.residual
             substeps += 1
             substepping.advance()
+        add_works(energy, works_of_actuators(system, works))
         now = replace(now, positions=now.positions[:n], velocities=now.velocities[:n])
         workspace.checked = now
-        details = ImplicitDetails.of_rows(rows, substeps)
+        details = replace(ImplicitDetails.of_rows(rows, substeps), work=energy, energy_residual=residual)
         nearest, contacts = None, None
         if last is not None:
             gradient = last.outcome.end.gradient / last.contact.weight

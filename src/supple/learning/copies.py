@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from supple.errors import SceneError
 from supple.scene.scene import Scene
-from supple.simulate import Frame, advance, completed_report, first_frame
+from supple.simulate import Frame, advance, completed_report, first_frame, measure
 from supple.state import State, Status, StepReport
 from supple.system import Solver, System, initial_state
 
@@ -23,12 +23,13 @@ class Moment:
     Attributes
     ----------
     index : number of steps since the start
-    step : how the last one ended
+    step : how the last one ended; before : the state where it began, None at the start
     """
 
     index: int
     state: State
     step: StepReport
+    before: State | None = None
 
 
 @dataclass(eq=False)
@@ -55,12 +56,13 @@ class Copy:
         if not now.step.status.can_go_on:
             return now
         state, step = advance(self.solver, self.system, now.state, dt, self.workspace, {**now.state.inputs, **wanted})
-        return Moment(now.index + 1, state, step)
+        return Moment(now.index + 1, state, step, now.state)
 
     def frame(self) -> Frame:
         """The frame of `now`, measured."""
         now = self.now
-        report = completed_report(self.system, now.state, now.step, 0.0)
+        before = None if now.before is None else measure(self.system, now.before).energy
+        report = completed_report(self.system, now.state, now.step, 0.0, before)
         return Frame(now.index, now.state, self.system, report, now.step.contacts, self.solver)
 
 

@@ -10,6 +10,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.materials.elastic_tets.active import ActiveTets
 from supple.scene.loads.body_force import BodyForce
 
 
@@ -19,9 +20,11 @@ class AppliedLoad(ABC):
     Attributes
     ----------
     is_internal : whether its forces act between vertices of one body, so that they change no momentum
+    work : the name under which its work is counted, see `Report.work`
     """
 
     is_internal: ClassVar[bool] = False
+    work: str
 
     @abstractmethod
     def renumbered(self, new: NDArray[np.int32]) -> Self:
@@ -42,6 +45,7 @@ class DeadLoad(AppliedLoad):
 
     vertices: NDArray[np.int32]
     per_vertex: Callable[[float], NDArray[np.float64]]
+    work: str
 
     def renumbered(self, new: NDArray[np.int32]) -> DeadLoad:
         return replace(self, vertices=new[self.vertices])
@@ -61,6 +65,8 @@ class MassLoad(AppliedLoad):
     vertices: NDArray[np.int32]
     masses: NDArray[np.float64]
 
+    work = "body_forces"
+
     def renumbered(self, new: NDArray[np.int32]) -> MassLoad:
         return replace(self, vertices=new[self.vertices])
 
@@ -69,3 +75,13 @@ class MassLoad(AppliedLoad):
 
     def add_forces(self, x: NDArray[np.float64], time: float, out: NDArray[np.float64]) -> None:
         out[self.vertices] += self.masses[:, None] * self.load.at(x[self.vertices], time)
+
+
+class ActiveLoad(AppliedLoad):
+    """A load of tets that act by themselves."""
+
+    is_internal = True
+
+    @abstractmethod
+    def active(self, time: float) -> ActiveTets:
+        """What it is at `time` [s]."""

@@ -10,12 +10,15 @@ from numpy.typing import NDArray
 
 from supple.errors import SceneError
 from supple.loads.applied import AppliedLoad, DeadLoad, MassLoad
+from supple.loads.growth import GrownTets
 from supple.loads.muscles import FibreTension
 from supple.loads.pressure import FollowerPressure, area_vectors
 from supple.loads.springs import PointSpring
+from supple.materials.elastic_tets.active import GROWTH, MUSCLE, ActiveTets
 from supple.scene.body import PlacedBody
 from supple.scene.forces import Force
 from supple.scene.loads.body_force import BodyForce
+from supple.scene.loads.growth import Growth
 from supple.scene.loads.load import Load
 from supple.scene.loads.muscle import Muscle, check_activation
 from supple.scene.loads.over_time import OverTime, magnitude_at, value_at
@@ -50,7 +53,8 @@ def applied(
             shares += np.bincount(triangles.ravel(), np.repeat(areas, 3), len(body.points))
         touched = np.unique(np.concatenate([triangles for triangles, _ in parts]))
         at = _over_time(load.traction, f"{load.label}: traction", (3,))
-        return [_on_points(body, begins[load.body], touched, lambda time: shares[touched, None] * at(time))]
+        place = body, begins[load.body], touched
+        return [_on_points(*place, lambda time: shares[touched, None] * at(time), "tractions")]
     if isinstance(load, Pressure):
         body = named[load.body]
         at, begin = _over_time(load.pressure, f"{load.label}: pressure", ()), begins[load.body]
@@ -66,7 +70,9 @@ def applied(
     if isinstance(load, Spring):
         return [_spring(load, bodies, begins, x)]
     if isinstance(load, Muscle):
-        return [_muscle(load, named[load.body], begins[load.body])]
+        return [_muscle(load, named[load.body], begins[load.body], _first_tet(load.body, bodies))]
+    if isinstance(load, Growth):
+        return [_growth(load, named[load.body], begins[load.body], _first_tet(load.body, bodies))]
     raise SceneError(f"{load.label}: a {type(load).__name__} is not a load that solvers know")
 
 
@@ -89,23 +95,35 @@ def _weighted_triangles(body: PlacedBody, rows: NDArray[np.int64]) -> list[tuple
 
 def applied_force(force: Force, body: PlacedBody, begin: int, rows: NDArray[np.integer]) -> DeadLoad:
     """A force on some of its body's points (k,); begin : the number of the body's first vertex."""
-    return _on_points(body, begin, rows, lambda time: force.per_vertex(time, len(rows)))
+    return _on_points(body, begin, rows, lambda time: force.per_vertex(time, len(rows)), "forces")
 
 
 def _on_points(
-    body: PlacedBody, begin: int, rows: NDArray[np.integer], forces: Callable[[float], NDArray[np.float64]]
+    body: PlacedBody, begin: int, rows: NDArray[np.integer], forces: Callable[[float], NDArray[np.float64]], work: str
 ) -> DeadLoad:
     """Forces, time -> (k, 3) [N], on the points (k,) of a body."""
     points = body.embedded.taken(rows)
     if points.are_vertices:
-        return DeadLoad((points.vertices + begin).astype(np.int32), forces)
+        return DeadLoad((points.vertices + begin).astype(np.int32), forces, work)
     vertices, column = np.unique(points.vertices, return_inverse=True)
     weights = np.zeros((len(rows), len(vertices)))
     np.add.at(weights, (np.repeat(np.arange(len(rows)), np.diff(points.start)), column.ravel()), points.weights)
-    return DeadLoad((vertices + begin).astype(np.int32), lambda time: weights.T @ forces(time))
+    return DeadLoad((vertices + begin).astype(np.int32), lambda time: weights.T @ forces(time), work)
 
 
-def _muscle(muscle: Muscle, body: PlacedBody, begin: int) -> FibreTension:
+def _first_tet(name: str, bodies: Sequence[PlacedBody]) -> int:
+    """The number of a body's first tet among those of all bodies."""
+    return sum(len(body.mesh.tets) for body in bodies[: [body.name for body in bodies].index(name)])
+
+
+def _growth(growth: Growth, body: PlacedBody, begin: int, first: int) -> GrownTets:
+    rows, directions = growth.growing(body)
+    vertices = np.unique(body.mesh.nodes[rows]) + begin
+    stretch = partial(magnitude_at, growth.stretch, what=f"{growth.label}: stretch", zero=False)
+    return GrownTets(ActiveTets(GROWTH, rows + first, directions), vertices, stretch)
+
+
+def _muscle(muscle: Muscle, body: PlacedBody, begin: int, first: int) -> FibreTension:
     rows, directions = muscle.fibres(body)
     inner = np.einsum("mki,mi->mk", body.mesh.rest_shape_inverse[rows], directions)
     coefficients = np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)
@@ -117,14 +135,14 @@ def _muscle(muscle: Muscle, body: PlacedBody, begin: int) -> FibreTension:
         return value
 
     stretches, values = muscle.force_length or ([1.0], [1.0])
+    curve = np.array([stretches, values], dtype=np.float64)
     return FibreTension(
-        muscle.body,
-        rows,
+        ActiveTets(MUSCLE, rows + first, np.ascontiguousarray(directions), 0.0, muscle.strength, curve.T),
         (body.mesh.tets[rows] + begin).astype(np.int32),
         coefficients,
         muscle.strength * body.mesh.volumes[rows],
         activation,
-        (np.asarray(stretches, dtype=np.float64), np.asarray(values, dtype=np.float64)),
+        (curve[0], curve[1]),
     )
 
 

@@ -11,29 +11,29 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.loads.applied import AppliedLoad
+from supple.loads.applied import ActiveLoad
+from supple.materials.elastic_tets.active import ActiveTets
 
 
 @dataclass(frozen=True, eq=False)
-class FibreTension(AppliedLoad):
+class FibreTension(ActiveLoad):
     """The fibres of one muscle, one in each of its tets.
 
     Attributes
     ----------
-    body : name of it; rows : (m,) numbers of the tets in the body; tets : (m, 4) their vertices
+    fibres_at_rest : without activation; tets : (m, 4) their vertices
     coefficients : (m, 4) c [1/m]; strengths : (m,) S times the volumes at rest [J]
     activation : time -> a; curve : stretches and values of f
     """
 
-    body: str
-    rows: NDArray[np.int64]
+    fibres_at_rest: ActiveTets
     tets: NDArray[np.int32]
     coefficients: NDArray[np.float64]
     strengths: NDArray[np.float64]
     activation: Callable[[float], float]
     curve: tuple[NDArray[np.float64], NDArray[np.float64]]
 
-    is_internal = True
+    work = "muscles"
 
     def renumbered(self, new: NDArray[np.int32]) -> FibreTension:
         return replace(self, tets=new[self.tets])
@@ -47,6 +47,9 @@ class FibreTension(AppliedLoad):
         for corner, c in zip(self.tets.T, self.coefficients.T, strict=True):
             for axis in range(3):
                 out[:, axis] += np.bincount(corner, c * pull[:, axis], len(out))
+
+    def active(self, time: float) -> ActiveTets:
+        return self.fibres_at_rest.at(self.activation(time))
 
     def fibres(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Stretches (m,) and unit vectors (m, 3) of the fibres at x (n, 3); zero for a fibre without length."""

@@ -29,6 +29,8 @@ class FollowerPressure(AppliedLoad):
     triangles: NDArray[np.int32]
     pressure: Callable[[float], float]
 
+    work = "pressures"
+
     def renumbered(self, new: NDArray[np.int32]) -> FollowerPressure:
         return replace(self, triangles=new[self.triangles])
 

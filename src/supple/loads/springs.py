@@ -28,6 +28,8 @@ class PointSpring(AppliedLoad):
     stiffness: float
     rest_length: Callable[[float], float]
 
+    work = "springs"
+
     @property
     def is_anchored(self) -> bool:
         """Whether an end is fixed in the world: the coefficients then do not add up to zero."""

@@ -24,9 +24,16 @@ from numpy.typing import NDArray
 
 from supple.materials.kinds import STRETCH_ENERGIES
 from supple.materials.per_tet import BY_LAW, TetMaterial
-from supple.materials.stretch_energies.stretches import UNKNOWN_ONE, UNKNOWN_SIX, UNKNOWN_THREE, dispatch
+from supple.materials.stretch_energies import stable_neo_hookean
+from supple.materials.stretch_energies.stretches import (
+    UNKNOWN_ONE,
+    UNKNOWN_SIX,
+    UNKNOWN_THREE,
+    dispatch,
+    shape_and_volume,
+)
 from supple.numerics.kernel_cache import njit, prange
-from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed, store_mat, symmetric_eigen
+from supple.numerics.mat3 import cross, load_mat, mat_mul, mat_mul_transposed, store_mat, symmetric_eigen
 from supple.numerics.svd3 import svd3 as decompose
 
 density = dispatch("density", [energy.density for energy in STRETCH_ENERGIES], UNKNOWN_ONE)
@@ -34,6 +41,7 @@ gradient = dispatch("gradient", [energy.gradient for energy in STRETCH_ENERGIES]
 curvature = dispatch("curvature", [energy.curvature for energy in STRETCH_ENERGIES], UNKNOWN_SIX)
 quotients = dispatch("quotients", [energy.quotients for energy in STRETCH_ENERGIES], UNKNOWN_SIX)
 volume_term = dispatch("volume_term", [energy.volume_term for energy in STRETCH_ENERGIES], UNKNOWN_THREE)
+_STABLE = STRETCH_ENERGIES.index(stable_neo_hookean.FUNCTIONS)
 _OF_STRETCHES = np.array([energy.density_of_stretches for energy in STRETCH_ENERGIES])
 
 
@@ -64,7 +72,22 @@ def stress(U, s, V, kind, mu, lam):
 
 @njit(error_model="numpy")
 def first_piola(F, kind, mu, lam):
-    """P of one F, nine numbers."""
+    """P of one F, nine numbers; of Stable Neo-Hookean material mu F + (lam (J - 1) - mu) cof F, without stretches."""
+    if kind == _STABLE:
+        c = lam * shape_and_volume(F)[1] - mu
+        a, b, d = F[0:3], F[3:6], F[6:9]
+        u, v, w = cross(b, d), cross(d, a), cross(a, b)
+        return (
+            mu * a[0] + c * u[0],
+            mu * a[1] + c * u[1],
+            mu * a[2] + c * u[2],
+            mu * b[0] + c * v[0],
+            mu * b[1] + c * v[1],
+            mu * b[2] + c * v[2],
+            mu * d[0] + c * w[0],
+            mu * d[1] + c * w[1],
+            mu * d[2] + c * w[2],
+        )
     U, s, V = decompose(F)
     return stress(U, s, V, kind, mu, lam)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,11 +25,20 @@ _LEGEND: dict[str, Any] = {  # above the axes
     "fontsize": "small",
 }
 STITCH_LINE = "#c77700"
+_MAPPINGS = {
+    "cavity_pressure": "pressure in cavities [Pa]",
+    "cavity_volume": "volume of cavities [m³]",
+    "cable_tension": "tension of spans [N]",
+    "cable_length": "length of cables [m]",
+}
 _AXES = (("x", "#d1495b"), ("y", "#3a7d44"), ("z", "#30638e"))
 
 
 def plot_recording(recording: Recording | str | Path, output: str | Path) -> Path:
-    """Draw energies, momenta, volumes, the smallest J and the time of each step to a PNG (or PDF, SVG) file.
+    """Draw what a recording has measured over time to a PNG (or PDF, SVG) file.
+
+    Energies, works, momenta, volumes, the smallest J, the time of each step; cavities, cables and sensors where there
+    are some.
 
     Parameters
     ----------
@@ -45,15 +56,23 @@ def plot_recording(recording: Recording | str | Path, output: str | Path) -> Pat
     if kind not in _KINDS and not output.is_dir():
         raise OutputError(f"{output}: there is no picture format {output.suffix!r}; take .png, .pdf or .svg")
     with opened(recording) as source:
-        figure = Figure(figsize=(12.0, 9.0), layout="constrained", dpi=110)
+        more = _panels(source)
+        rows = 3 + (len(more) + 1) // 2
+        figure = Figure(figsize=(12.0, 3.0 * rows), layout="constrained", dpi=110)
         FigureCanvasAgg(figure)
-        axes = figure.subplots(3, 2, sharex=True)
+        axes = np.array([figure.add_subplot(rows, 2, k + 1) for k in range(6)]).reshape(3, 2)
+        for axis in axes.flat[1:]:
+            axis.sharex(axes[0, 0])
         _draw(source, axes)
-        for axis in axes.flat:
+        for k, draw in enumerate(more):
+            axis = figure.add_subplot(rows, 2, 7 + k, sharex=None if draw is _strokes else axes[0, 0])
+            draw(axis, source)
+        for axis in figure.axes:
             axis.grid(alpha=0.25, linewidth=0.6)
             axis.spines[["top", "right"]].set_visible(False)
-        for axis in axes[-1]:
-            axis.set_xlabel("time [s]")
+        for axis in figure.axes[-2:] if more else axes[-1]:
+            if not axis.get_xlabel():
+                axis.set_xlabel("time [s]")
         names = ", ".join(body.name for body in source.bodies[:6]) + (", …" if len(source.bodies) > 6 else "")
         figure.suptitle(f"{source.path.name}: {names} ({len(source)} frames)")
         with whole_file(output) as fresh:
@@ -100,6 +119,59 @@ def _draw(recording: Recording, axes) -> None:
     if stopped:
         wall.plot(t[stopped], ms[stopped], "x", color="#d1495b", label="not converged")
         wall.legend(**_LEGEND)
+
+
+def _panels(recording: Recording) -> list[Callable[[Any, Recording], None]]:
+    """What is drawn beside the measurements that every recording has."""
+    mappings = {field.name for field in recording.details.fields if field.keys}
+    panels: list[Callable[[Any, Recording], None]] = [_works] if "work" in mappings else []
+    for name, label in _MAPPINGS.items():
+        if name in mappings:
+            panels.append(partial(_mapping, name=name, label=label))
+    panels += [_sensors] if recording.sensors else []
+    return [*panels, _strokes] if any(not sensor.is_grid for sensor in recording.sensors) else panels
+
+
+def _works(axis, recording: Recording) -> None:
+    names = next(field.keys for field in recording.details.fields if field.name == "work") or ()
+    sums = np.cumsum(recording.frame_values("details/work"), axis=0)
+    for name, values in zip(names, sums.T, strict=True):
+        if values.any():
+            axis.plot(recording.times, values, label=name)
+    residual = np.cumsum(recording.frame_values("details/energy_residual"))
+    axis.plot(recording.times, residual, color="0.2", linewidth=1.0, linestyle="--", label="residual")
+    axis.set_ylabel("work since the start [J]")
+    axis.legend(**_LEGEND)
+
+
+def _mapping(axis, recording: Recording, name: str, label: str) -> None:
+    keys = next(field.keys for field in recording.details.fields if field.name == name) or ()
+    for key, values in zip(keys, recording.frame_values(f"details/{name}").T, strict=True):
+        axis.plot(recording.times, values, label=key)
+    axis.set_ylabel(label)
+    axis.legend(**_LEGEND)
+
+
+def _sensors(axis, recording: Recording) -> None:
+    for sensor in recording.sensors:
+        values = recording.frame_values(f"sensors/{sensor.number}")
+        normal = values[..., 0].sum(axis=(1, 2)) if sensor.is_grid else values[:, 3]
+        axis.plot(recording.times, normal, label=sensor.name)
+    axis.set_ylabel("normal force on sensors [N]")
+    axis.legend(**_LEGEND)
+
+
+def _strokes(axis, recording: Recording) -> None:
+    """The normal force on each force sensor against the way of its center of pressure since it was first pushed."""
+    for sensor in recording.sensors:
+        if not sensor.is_grid:
+            values = recording.frame_values(f"sensors/{sensor.number}")
+            pushed = values[values[:, 3] > 0.0]
+            way = np.linalg.norm(pushed[:, 4:] - pushed[:1, 4:], axis=1)
+            axis.plot(way, pushed[:, 3], marker=".", label=sensor.name)
+    axis.set_xlabel("displacement of the center of pressure [m]")
+    axis.set_ylabel("normal force [N]")
+    axis.legend(**_LEGEND)
 
 
 def _momentum(axis, t: NDArray[np.float64], values: NDArray[np.float64], label: str) -> None:

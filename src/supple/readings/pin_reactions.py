@@ -47,7 +47,8 @@ def balanced_reactions(
     """
     forces = system.masses[:, None] * system.gravity
     for load in system.loads:
-        load.add_forces(x, time, forces)
+        if not load.is_internal:  # those are in the stress
+            load.add_forces(x, time, forces)
     add_actuator_forces(system, details, x, forces)
     if contacts is not None:
         on_points = contacts.on_vertices(contacts.forces + contacts.friction, len(system.points))

@@ -68,7 +68,7 @@ class Scene(Showable):
     gravity : (3,) acceleration [m/s^2].
     forces : loads on vertices; soft_targets : springs to places.
     stitches : joints of bodies with each other, and with triangle obstacles.
-    loads : tractions, pressures, forces per mass, springs between points, and muscles.
+    loads : tractions, pressures, forces per mass, springs between points, muscles, and growths.
     sensors : of contact on surfaces; no two have the same name.
     cavities : closed inner surfaces filled with gas or liquid; cables : through points of bodies. No two cavities and
         no two cables have the same name.

@@ -101,10 +101,11 @@ def to_world(points, origins, world):
 
 
 @njit(cache=True)
-def apply_changes(points, velocities, h, origins, previous, world, world_previous):
+def apply_changes(points, velocities, h, origins, previous, world, world_previous, impulses):
     """Apply what contacts changed since `to_world`; what they did not change keeps every bit.
 
-    Positions at the end and at the beginning of the substep may both have changed; the velocity gets the difference.
+    Positions at the end and at the beginning of the substep may both have changed; the velocity gets the difference,
+    and so does `impulses` (n, 3).
     """
     for i in range(len(world)):
         for j in range(3):
@@ -112,4 +113,6 @@ def apply_changes(points, velocities, h, origins, previous, world, world_previou
             change_before = world_previous[i, j] - (origins[i, j] + previous[i, j])
             points[i, j] += change
             previous[i, j] += change_before
-            velocities[i, j] += (change - change_before) / h
+            kick = (change - change_before) / h
+            velocities[i, j] += kick
+            impulses[i, j] += kick

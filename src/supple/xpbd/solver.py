@@ -19,11 +19,13 @@ from supple.numerics.interruption import interruption_point
 from supple.numerics.thread_tuning import ThreadTuner
 from supple.numerics.threads import numba_threads
 from supple.readings.actuator_readings import actuator_fields, start_of
+from supple.readings.energy_balance import no_works
 from supple.state import State, Status, StepReport
 from supple.system import Solver, System
 from supple.xpbd.assessment.assessment import Assessment
 from supple.xpbd.assessment.findings import Findings
 from supple.xpbd.assessment.surfaces import Overlap, crossings
+from supple.xpbd.assessment.works import Works
 from supple.xpbd.constraints.actuators import ActuatorProjection
 from supple.xpbd.constraints.registry import build_constraint_sets
 from supple.xpbd.constraints.stitch_anchors import StitchAnchors
@@ -43,7 +45,7 @@ from supple.xpbd.rigid.bodies import RigidBodies
 from supple.xpbd.rigid.joints import JointProjection
 from supple.xpbd.sleep import Sleep, SleepMemory
 from supple.xpbd.start import raise_if_inside
-from supple.xpbd.substep_limits import collide, hold_in_contact, hold_joints, keep_volumes, restore
+from supple.xpbd.substep_limits import collide, hold_in_contact, hold_joints, keep_volumes, note_works, restore
 from supple.xpbd.substep_start import begin_substep, cycles, load, pin_targets, push_contacts
 from supple.xpbd.substeps import FALL, SubstepChoice, Substeps
 from supple.xpbd.sweeps.ordering import make_layout, reordered
@@ -147,6 +149,7 @@ class XPBD(Solver):
             guard=VolumeGuard(inner),
             fallback=RigidFallback(inner, collisions.skin),
             assessment=assessment,
+            works=Works(inner),
             choice=SubstepChoice(inner, assessment.softening, bool(collisions), rigid),
             sleep=Sleep(inner, layout, self.sleep_after, self.accuracy),
             threads=self.threads or (None if large else 1),
@@ -234,8 +237,10 @@ class XPBD(Solver):
         h = dt / used.count
         to_world(ws.points, ws.origins, ws.world)
         ws.guard.measure(ws.points, False)
+        ws.works.end_frame(ws.velocities, ws.actuators.works())
+        held, works = held_back / used.count, ws.works.by_name
         findings, ledger = ws.assessment.end(
-            ws.moment(time), ws.world, ws.guard.J, h, self.accuracy, held_back / used.count, sleep.asleep
+            ws.moment(time), ws.world, ws.guard.J, h, self.accuracy, held, sleep.asleep, works
         )
         findings = replace(findings, apart=ws.joints.apart(ws.world, time, self.accuracy))
         status = findings.status
@@ -272,6 +277,8 @@ class XPBD(Solver):
             friction_forces=friction,
             **ws.actuators.fields(h * used.count),
             **ws.joints.fields(ws.world, time),
+            work=works,
+            energy_residual=ws.works.residual,
         )
         world, surfaces = ws.collisions.obstacles.places(ws.world).copy(), ws.collisions.positions
         message = findings.message(time, self._remedy(ws, dt, findings, used.count))
@@ -315,7 +322,7 @@ class XPBD(Solver):
         ws.guard.guarded[:] = ws.assessment.begin(ws.moment(state.time), ws.guard.J, h, memory.ledger)
         ws.guard.accept()
         balance = ws.assessment.balance
-        ws.actuators.begin_frame(ws.points, ws.origins)
+        ws.begin_frame(state.time, state.time + dt, h)
         ws.joints.begin_frame(state, sleep.asleep)
         damping = self._damping(ws, h)
         lengths = cycles(substeps)
@@ -330,21 +337,22 @@ class XPBD(Solver):
                 moving = ws.anchors.velocities(end - h, h)
                 damping.begin_cycle(ws.extended, ws.velocities, moving, lengths[k], h, parallel)
             begin_substep(ws, targets[k], end, h, parallel)
-            ws.loads.add_forces(ws.points, ws.velocities, ws.origins, end, h)
+            at = ws.substep(end, h)
+            ws.loads.add_forces(at)
             if damping is not None:
                 damping.push(ws.points, h)
             if collides:
                 push_contacts(ws, h)
             for constraints in ws.sets:
                 constraints.project(ws.extended, h, parallel)
-            ws.actuators.project_within(ws.points, ws.origins, end, h)
+            ws.actuators.project_within(at)
             restore(ws, h, parallel)
             ws.pace.note(parallel, perf_counter() - started)
-            ws.loads.pull_to_targets(ws.points, ws.velocities, ws.origins, end, h)
-            ws.loads.pull_springs(ws.points, ws.velocities, ws.origins, end, h)
-            ws.actuators.project_between(ws.points, ws.velocities, ws.origins, end, h)
+            ws.loads.pull_to_targets(at)
+            ws.loads.pull_springs(at)
+            ws.actuators.project_between(at)
             ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
-            balance.note_work(hold_joints(ws, end, h))
+            hold_joints(ws, end, h)
             if collides and not collide(ws, end, h, parallel):
                 break
             hold_in_contact(ws, end, h)
@@ -352,8 +360,7 @@ class XPBD(Solver):
             if collides:
                 ws.collisions.end_substep()
             ws.joints.end_substep(ws.points, ws.origins, end)
-            balance.note_loads(ws.points, ws.previous, ws.origins, end, h)
-            balance.note_work(ws.actuators.end_substep(ws.points, ws.origins, h))
+            note_works(ws, at, damping)
             balance.note_contacts(ws.collisions.contacts)
         return held_back
 
@@ -372,6 +379,7 @@ class XPBD(Solver):
             friction_forces=friction,
             **actuator_fields(system, *start_of(system)),
             **workspace.joints.initial_fields(system.start_states[-1]),
+            work=no_works(system),
         )
 
 

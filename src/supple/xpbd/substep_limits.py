@@ -1,11 +1,14 @@
-"""The end of a substep: contacts, then volumes and contacts in turn, and the last resort where that is not enough."""
+"""The end of a substep: contacts, then volumes and contacts in turn, the last resort, and works."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.xpbd.integration import apply_changes, to_world, update_velocities
+from supple.readings.energy_balance import add_works
+from supple.xpbd.assessment.substep import Substep
+from supple.xpbd.damping.kelvin_voigt import Damping
+from supple.xpbd.integration import to_world, update_velocities
 from supple.xpbd.limits.rigid_fallback import united
 from supple.xpbd.limits.volume_guard import ENOUGH
 from supple.xpbd.workspace import XPBDWorkspace
@@ -21,13 +24,13 @@ JOINT_PASSES = 3
 SHARES = (0.5, 0.25, 0.1, 0.0, 0.0)
 
 
-def hold_joints(ws: XPBDWorkspace, time: float, h: float) -> float:
-    """Project the joints of a substep; returns the work of their motors [J]."""
+def hold_joints(ws: XPBDWorkspace, time: float, h: float) -> None:
+    """Project the joints of a substep."""
     if not len(ws.joints):
-        return 0.0
+        return
     work = ws.joints.project(ws.points, ws.previous, ws.velocities, ws.origins, time, h)
+    add_works(ws.works.by_name, {"joints": work})
     ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
-    return work
 
 
 def hold_in_contact(ws: XPBDWorkspace, time: float, h: float) -> None:
@@ -58,7 +61,7 @@ def collide_again(ws: XPBDWorkspace, time: float, h: float) -> bool:
 
 
 def _apply(ws: XPBDWorkspace, h: float) -> None:
-    apply_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
+    ws.apply_changes(h)
     if len(ws.rigid):
         # Contacts turn bodies by small rotations; the turn that follows from their momenta ends a little elsewhere.
         ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
@@ -125,3 +128,12 @@ def restore(ws: XPBDWorkspace, h: float, parallel: bool) -> None:
         ws.momentum.apply(ws.points, ws.previous, ws.velocities, h, parallel)
     else:
         update_velocities(ws.points, ws.previous, ws.velocities, h)
+
+
+def note_works(ws: XPBDWorkspace, at: Substep, damping: Damping | None) -> None:
+    """Add up the works of a substep that has ended."""
+    ws.actuators.end_substep(at)
+    forces = list(ws.loads.acting)
+    if damping is not None:
+        forces.append(("damping", *damping.acting))
+    ws.works.end_substep(at, forces, ws.collisions.forces, ws.extended, ws.actuators.acting)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from supple.state import State
 from supple.system import System
 from supple.xpbd.damping.kelvin_voigt import cycle_lengths
-from supple.xpbd.integration import apply_changes, hold, origins_of_components, predict, to_world
+from supple.xpbd.integration import hold, origins_of_components, predict, to_world
 from supple.xpbd.workspace import XPBDWorkspace
 
 
@@ -23,6 +23,7 @@ def load(ws: XPBDWorkspace, state: State) -> None:
     origins_of_components(ws.world, ws.system.joined_components, ws.origins)
     np.subtract(ws.world, ws.origins, out=ws.points[:, :3])
     ws.anchors.place(ws.extended, ws.origins, state.time)
+    ws.grow(state.time)
 
 
 def cycles(substeps: int) -> dict[int, int]:
@@ -37,7 +38,7 @@ def begin_substep(ws: XPBDWorkspace, targets: NDArray[np.float64], end: float, h
     ws.begun[:] = ws.previous
     if len(targets):
         hold(ws.points, ws.system.pinned_vertices, targets, ws.origins)
-        ws.assessment.balance.note_pins(ws.points, ws.previous, parallel)
+    ws.works.begin_substep(ws.extended)
     ws.anchors.place(ws.extended, ws.origins, end)
 
 
@@ -46,7 +47,7 @@ def push_contacts(ws: XPBDWorkspace, h: float) -> None:
     if to_world(ws.points, ws.origins, ws.world):
         to_world(ws.previous, ws.origins, ws.world_previous)
         if ws.collisions.begin_substep(ws.world, ws.world_previous, h):
-            apply_changes(ws.points, ws.velocities, h, ws.origins, ws.previous, ws.world, ws.world_previous)
+            ws.apply_changes(h)
 
 
 def pin_targets(system: System, time: float, h: float, substeps: int) -> NDArray[np.float64]:

@@ -7,16 +7,22 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.materials.elastic_tets.active import Growth
 from supple.numerics.thread_tuning import ThreadTuner
 from supple.system import System
 from supple.xpbd.assessment.assessment import Assessment
+from supple.xpbd.assessment.elastic_energy import ElasticEnergy
 from supple.xpbd.assessment.moment import Moment
+from supple.xpbd.assessment.substep import Substep
+from supple.xpbd.assessment.works import Works
 from supple.xpbd.constraints.actuators import ActuatorProjection
 from supple.xpbd.constraints.registry import ConstraintSet
+from supple.xpbd.constraints.stable_neo_hookean import StableNeoHookeanConstraints
 from supple.xpbd.constraints.stitch_anchors import StitchAnchors
 from supple.xpbd.contact.collisions import Collisions
 from supple.xpbd.damping.kelvin_voigt import Damping
 from supple.xpbd.external_forces import ExternalForces
+from supple.xpbd.integration import apply_changes
 from supple.xpbd.limits.rigid_fallback import RigidFallback
 from supple.xpbd.limits.volume_guard import VolumeGuard
 from supple.xpbd.momentum import MomentumRestore
@@ -35,6 +41,7 @@ class XPBDWorkspace:
 
     Attributes
     ----------
+    growth : which the elastic constants have now
     threads : of Numba's parallel kernels; None leaves their number as it is
     extended : (n + a, 4) positions about the component's origin [m] and inverse masses [1/kg], of the vertices and then
         of the anchors (inverse mass 0); points : the rows of the vertices
@@ -55,12 +62,14 @@ class XPBDWorkspace:
     guard: VolumeGuard
     fallback: RigidFallback
     assessment: Assessment
+    works: Works
     choice: SubstepChoice
     sleep: Sleep
     threads: int | None
     pace: ThreadTuner
     anchors: StitchAnchors
     extended: NDArray[np.float64]
+    growth: Growth | None = None
     points: NDArray[np.float64] = field(init=False)
     previous: NDArray[np.float64] = field(init=False)
     begun: NDArray[np.float64] = field(init=False)
@@ -84,6 +93,35 @@ class XPBDWorkspace:
                 constraints.sweep.choose(self.extended[:, 3])
             if self.damping is not None:
                 self.damping.choose(self.extended[:, 3])
+
+    def grow(self, time: float) -> None:
+        """Take the stress-free shapes of the tets at `time` [s]."""
+        laws = self.system.laws_at(time)
+        if laws.growth is None or laws.growth.equals(self.growth):
+            return
+        self.growth = laws.growth
+        shapes = laws.stress_free.Dm_inv, laws.stress_free.volumes
+        for each in (*self.sets, self.assessment.balance.elastic, self.works.at_pins):
+            if isinstance(each, (StableNeoHookeanConstraints, ElasticEnergy)):
+                each.grow(*shapes)
+
+    def begin_frame(self, time: float, end: float, h: float) -> None:
+        """Begin a frame from `time` to `end` [s]: what grows in it has grown at its beginning."""
+        elastic = self.assessment.balance.elastic
+        before = float(elastic.of(self.points, False).sum()) if self.growth is not None else 0.0
+        self.grow(end)
+        work = float(elastic.of(self.points, False).sum()) - before if self.growth is not None else 0.0
+        self.actuators.begin_frame(self.substep(time, h))
+        self.works.begin_frame(self.velocities, work)
+
+    def substep(self, time: float, h: float) -> Substep:
+        """The arrays of a substep of h [s] that ends at `time` [s]."""
+        return Substep(self.points, self.velocities, self.origins, self.begun, time, h)
+
+    def apply_changes(self, h: float) -> None:
+        """Apply what contacts changed in `world` and `world_previous`."""
+        places = self.origins, self.previous, self.world, self.world_previous
+        apply_changes(self.points, self.velocities, h, *places, self.works.impulses)
 
     def moment(self, time: float) -> Moment:
         """What the assessment reads, at `time` [s]."""

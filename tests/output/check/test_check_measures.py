@@ -24,7 +24,7 @@ def test_momentum_without_a_force(free, corrupted):
     def push(file, n):
         consistently(file, n, 6, file[V][6 * n : 7 * n] + np.array([1e-4, 0, 0]))
 
-    assert failures(corrupted(free, push)) == {"momentum": 6}
+    assert failures(corrupted(free, push)) == {"momentum": 6, "balance": 6}
 
 
 def test_spin_without_a_torque(free, corrupted):
@@ -33,7 +33,7 @@ def test_spin_without_a_torque(free, corrupted):
         m = file["supple/masses"][:]
         consistently(file, n, 6, v + np.cross([0, 1e-3, 0], x - m @ x / m.sum()))
 
-    assert failures(corrupted(free, turn)) == {"spin": 6}
+    assert failures(corrupted(free, turn)) == {"spin": 6, "balance": 6}
 
 
 def test_energy_without_work(free, corrupted):
@@ -43,6 +43,20 @@ def test_energy_without_work(free, corrupted):
 
     assert failures(corrupted(free, stir), only=["energy", "records"]) == {"energy": 4}
     assert failures(corrupted(free, stir), only=["energy"], max_energy_gain=1e3) == {}
+
+
+def test_works_that_do_not_add_up(free, corrupted):
+    def change(file, n):
+        file["supple/frames/details/work"][3] += 1e-6
+
+    def leave_open(file, n):
+        works = file["supple/frames/details/work"]
+        works[3] -= [0.0] * (works.shape[1] - 1) + [1e3]
+        file["supple/frames/details/energy_residual"][3] += 1e3
+
+    assert failures(corrupted(free, change)) == {"balance": 3}
+    assert failures(corrupted(free, leave_open)) == {"balance": 3}
+    assert failures(corrupted(free, leave_open), max_energy_gain=1e3) == {}
 
 
 def test_a_velocity_that_was_not_measured(free, corrupted):

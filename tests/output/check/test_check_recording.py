@@ -23,11 +23,10 @@ def test_a_good_recording_passes_everything_that_can_be_checked(free, around):
     assert verdicts(free) == {
         name: "skipped" if name in ("obstacles", "rigidity", "welds", "joints") else "pass" for name in NAMES
     }
-    why_not = dict.fromkeys(("momentum", "spin", "energy", "rigidity", "welds", "joints"), "skipped")
+    why_not = dict.fromkeys(("momentum", "spin", "rigidity", "welds", "joints"), "skipped")
     assert verdicts(around) == {name: why_not.get(name, "pass") for name in NAMES}
     report = sp.check_recording(around)
     assert (report.frames, report.frames_checked) == (FRAMES, FRAMES)
-    assert report["energy"].message == "obstacles move, which does work"
     assert (report["intersection"].worst, report["intersection"].frame) == (0.0, None)
     # The cube falls a few centimetres; the ball is nearest to it at the start, or the floor later.
     assert 0.0 < report["distance"].worst < 1.0
@@ -58,6 +57,18 @@ def test_bodies_of_edges_and_volumes_pass(tmp_path):
     path = recorded(tmp_path / "r.vtkhdf", scene, sp.XPBD(substeps=5), initial_positions=start)
     assert failures(path) == {}
     assert sp.check_recording(path)["records"].worst < 1e-12
+
+
+def test_without_works_energy_is_judged_only_where_nothing_does_work(free, around, corrupted):
+    def forget(file, n):
+        def drop(header):
+            header["details"]["fields"] = [f for f in header["details"]["fields"] if f["name"] != "work"]
+
+        set_header(file, drop)
+
+    assert verdicts(corrupted(free, forget), only=["energy", "balance"]) == {"energy": "pass", "balance": "skipped"}
+    report = sp.check_recording(corrupted(around, forget), sp.CheckSettings(only=["energy"]))
+    assert report["energy"].message == "obstacles move, which does work"
 
 
 def test_a_recording_without_physics_is_read_and_unknown_checks_are_skipped(free, corrupted):

@@ -14,7 +14,8 @@ def plot(
     *,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
 ) -> None:
-    """Plot the measurements of a recording: energies, momenta, volumes, smallest J, and time per step.
+    """Plot the measurements of a recording: energies, works, momenta, volumes, smallest J, time per step; cavities,
+    cables and sensors.
 
     Parameters
     ----------

@@ -41,6 +41,7 @@ class Friction(ContactPotential):
     reach: float
     duals: NDArray[np.float64] = field(init=False)
     projection = Projection.UNNEEDED
+    work = "friction"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "duals", np.zeros((len(self.slips.forces), 3)))

@@ -113,6 +113,7 @@ class Damping(Potential):
     viscosity: Viscosity
     rate: StrainRate
     label = "elasticity"
+    work = "damping"
     projection = Projection.RELEASED_FIRST
 
     def value(self, x: NDArray[np.float64]) -> float:

@@ -111,10 +111,13 @@ class Potential(ABC):
     ----------
     label : the name under which the time that it takes is counted
     projection : when its Hessian is projected
+    work : the name under which the work of its forces is counted, see `Report.work`; None for energies that bodies
+        store, for actuators, whose work is that of their generalized forces, and for numerical aids
     """
 
     label: ClassVar[str] = "other"
     projection: ClassVar[Projection]
+    work: ClassVar[str | None] = None
 
     @abstractmethod
     def value(self, x: NDArray[np.float64]) -> float:
@@ -168,4 +171,5 @@ class ContactPotential(Potential):
     """A term of contact or of joints: so stiff that a short Newton step can leave large forces."""
 
     label = "contact"
+    work = "contact"
     projection = Projection.RELEASED_LAST

@@ -67,6 +67,7 @@ class StitchDamping(Potential):
     tets: Damping
     springs: Springs
     projection = Projection.RELEASED_FIRST
+    work = "damping"
 
     @classmethod
     def of(cls, viscosity: StitchViscosity, rate: StrainRate) -> StitchDamping:

@@ -34,6 +34,7 @@ class JointPotential(ContactPotential):
     """
 
     label = "joints"
+    work = "joints"
     projection = Projection.RELEASED_FIRST
 
     geometry: JointGeometry

@@ -32,6 +32,11 @@ class ActingWithin(Potential):
         return self.term.label
 
     @property
+    def work(self) -> str | None:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """That of V."""
+        return self.term.work
+
+    @property
     def projection(self) -> Projection:  # pyright: ignore[reportIncompatibleVariableOverride]
         """That of V."""
         return self.term.projection

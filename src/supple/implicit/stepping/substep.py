@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,7 @@ from supple.implicit.stepping.dirichlet import move_pins
 from supple.implicit.stepping.integrators import Integrator, Plan, Static
 from supple.implicit.stepping.midpoint import ActingWithin
 from supple.implicit.stepping.rigid_bodies import rigid_ends, with_rigid_bodies
+from supple.implicit.stepping.works import works_of_step
 from supple.implicit.stepping.workspace import Workspace
 from supple.state import State, Status
 from supple.system import System
@@ -76,7 +77,7 @@ class StepSettings:
 class Substep:
     """The result of a step: the state at its end, the course of Newton's method, contact and joints at the end.
 
-    actuators : generalized forces of each actuator, as they acted in the step
+    actuators : generalized forces of each actuator, as they acted in the step; works, residual : see `works_of_step`
     """
 
     state: State
@@ -84,6 +85,8 @@ class Substep:
     contact: ContactStep
     joints: JointStep | None
     actuators: tuple[NDArray[np.float64], ...] = ()
+    works: dict[str, float] = field(default_factory=dict)
+    residual: float = 0.0
 
 
 def take_substep(state: State, end: float, h: float, settings: StepSettings, workspace: Workspace) -> Substep:
@@ -99,7 +102,8 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     forces = total_forces(system, state.positions, middle)
     guard = InversionGuard.at(system, state.positions, settings.volume_kept)
     limits = StepLimits(guard, workspace.contact, tools.clock)
-    elasticity = workspace.elasticity.in_step(state.internal, h)
+    grown = workspace.elasticity_at(middle)
+    elasticity = grown.in_step(state.internal, h)
     mu = workspace.elasticity.material.mu
     actuators = actuators_at(system, state.positions, (state.time, middle), plan.scale, mu)
     base = _objective(elasticity, state.positions, middle, plan, forces, workspace, actuators)
@@ -142,7 +146,7 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     outcome = contact.verified(replace(outcome, rows=rows))
     if joints is not None:
         outcome = joints.verified(outcome)
-    internal = workspace.elasticity.flowed(x, state.internal, h)
+    internal = grown.flowed(x, state.internal, h)
     angles = {} if joints is None else joints.hinge_angles(x)
     after = State(end, x, plan.velocity(x), plan.memory, internal=internal, hinge_angles=angles)
     residual = plan.place * outcome.end.gradient
@@ -150,7 +154,9 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     if plan.place != 1.0 and system.rigid_bodies and outcome.status is Status.CONVERGED:
         after = rigid_ends(system, state, after, limits)
     acted = state.positions + plan.place * (x - state.positions)
-    return Substep(after, outcome, contact, joints, tuple(actuator.forces(acted) for actuator in actuators))
+    forces_of_actuators = tuple(actuator.forces(acted) for actuator in actuators)
+    works, residual = works_of_step(problem.objective, outcome, state, internal, plan, middle, end, workspace)
+    return Substep(after, outcome, contact, joints, forces_of_actuators, works, residual)
 
 
 def _with_joints(objective: Objective, joints: JointStep | None) -> Objective:

@@ -9,13 +9,14 @@ import numpy as np
 from supple.contact.obstacle_vertices import obstacle_positions
 from supple.implicit.contact.model import ContactModel
 from supple.implicit.energies.damping import QuadraticViscosity, Viscosity
-from supple.implicit.energies.elasticity import Elasticity
+from supple.implicit.energies.elasticity import Elasticity, elasticity_of
 from supple.implicit.energies.regularization import Regularization
 from supple.implicit.energies.stitch_damping import StitchViscosity
 from supple.implicit.energies.stitches import StitchEnergy
 from supple.implicit.newton.direction import Tools
 from supple.implicit.stepping.conservation import Conservation
 from supple.joints.geometry import JointGeometry
+from supple.materials.elastic_tets.active import Growth
 from supple.state import State
 from supple.system import System
 
@@ -29,6 +30,7 @@ class Workspace:
     system : with the obstacles' vertices after the bodies'
     diagonal : of the smallest body's bounding box at rest [m]
     checked : the state that `Implicit.check` has accepted, or that the latest step ended with
+    grown : the latest growth, and the elastic energy with it
     """
 
     system: System
@@ -43,6 +45,7 @@ class Workspace:
     quadratic_viscosity: QuadraticViscosity | None
     joints: JointGeometry | None
     checked: State | None = None
+    grown: tuple[Growth, Elasticity] | None = None
     conservation: Conservation = field(init=False)
 
     def __post_init__(self) -> None:
@@ -52,6 +55,18 @@ class Workspace:
     def bodies_end(self) -> int:
         """The first vertex that is an obstacle's."""
         return max(part.vertices.stop for part in self.system.bodies)
+
+    def elasticity_at(self, time: float) -> Elasticity:
+        """The elastic energy of the stress-free shapes at `time` [s]."""
+        laws = self.system.laws_at(time)
+        if laws.growth is None:
+            return self.elasticity
+        if self.grown is None or not laws.growth.equals(self.grown[0]):
+            free = laws.stress_free
+            shapes = {"rest_shape_inverse": free.Dm_inv, "rest_volumes": free.volumes, "quadratic": free.quadratic}
+            self.grown = laws.growth, elasticity_of(replace(self.system, **shapes))
+            self.conservation = replace(self.conservation, elasticity=self.grown[1], latest=None)
+        return self.grown[1]
 
     def with_obstacles(self, state: State) -> State:
         """The state with the obstacles' vertices after the bodies'."""

@@ -78,6 +78,11 @@ class Actuator:
     law: Law
     friction: float = 0.0
 
+    @property
+    def work(self) -> str:
+        """The name under which its work is counted, see `Report.work`."""
+        return {"cavity": "cavities", "cable": "cables"}[self.kind]
+
     def parts(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(p,) of s at the positions x (n, 3) of all vertices [m]."""
         return self.coordinate.parts(x[self.coordinate.vertices])

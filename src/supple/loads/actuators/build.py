@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,18 +77,39 @@ def _cable_law(cable: Cable, start: float) -> Law:
     assert cable.stiffness is not None
     if cable.length is not None:
         return ElasticCable(cable.stiffness, partial(magnitude_at, cable.length, what=f"{cable.label}: length"))
-    speed = cable.winch_speed
-    return ElasticCable(cable.stiffness, lambda time: max(start - _wound(speed, time), 0.0))
+    wound = Wound(partial(_number, cable.winch_speed, f"{cable.label}: winch_speed"), cable.winch_speed)
+    return ElasticCable(cable.stiffness, lambda time: max(start - wound(time), 0.0))
 
 
-def _wound(speed: float | Curve | None, time: float) -> float:
-    """What a winch of that speed has wound up since time 0 [m]."""
-    if not isinstance(speed, Curve):
-        return float(np.asarray(speed)) * time
-    # The integral of a piecewise linear function is exact by the trapezoidal rule on its corners.
-    corners = np.asarray(speed.times)
-    times = np.concatenate([[0.0], corners[(corners > 0.0) & (corners < time)], [time]])
-    return float(np.trapezoid([float(speed(t)) for t in times], times))
+class Wound:
+    """What a winch has wound up since time 0 [m], as a function of time: the integral of its speed.
+
+    Exact for numbers and curves; of functions by Gauss's rule with three points in each of `PANEL` [s].
+    """
+
+    PANEL = 0.01
+    _PLACES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
+
+    def __init__(self, speed: Callable[[float], float], given: OverTime | None) -> None:
+        self._speed = speed
+        # A piecewise linear function has corners, up to which the rule is exact.
+        self._corners = np.asarray(given.times) if isinstance(given, Curve) else np.zeros(0)
+        self._whole = [0.0]  # until the end of each panel that was needed so far
+
+    def __call__(self, time: float) -> float:
+        panels = int(time / self.PANEL)
+        for k in range(len(self._whole) - 1, panels):
+            self._whole.append(self._whole[k] + self._integral(k * self.PANEL, (k + 1) * self.PANEL))
+        return self._whole[panels] + self._integral(panels * self.PANEL, time)
+
+    def _integral(self, begin: float, end: float) -> float:
+        inside = self._corners[(self._corners > begin) & (self._corners < end)]
+        total = 0.0
+        for low, high in pairwise([begin, *inside, end]):
+            half = 0.5 * (high - low)
+            speeds = [self._speed(low + half * (1.0 + place)) for place in self._PLACES]
+            total += half * float(self._WEIGHTS @ speeds)
+        return total
 
 
 def _law(cavity: Cavity, start: float) -> Law:
@@ -101,7 +123,8 @@ def _law(cavity: Cavity, start: float) -> Law:
     return GivenGas(energy, start, gas.gamma, gas.ambient)
 
 
-def _number(given: OverTime, what: str, time: float) -> float:
+def _number(given: OverTime | None, what: str, time: float) -> float:
+    assert given is not None
     return float(value_at(given, time, what, ()))
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.loads.actuators.actuator import Coordinate
+from supple.numerics.kernel_cache import njit
 from supple.numerics.sparse.couplings import Couplings
 
 
@@ -24,6 +26,11 @@ class CableLength(Coordinate):
     weights: NDArray[np.float64]
     offsets: NDArray[np.float64]
 
+    @cached_property
+    def _differences(self) -> NDArray[np.float64]:
+        """(p - 1, v) of the weights of the two ends of each span."""
+        return np.diff(self.weights, axis=0)
+
     @property
     def is_anchored(self) -> bool:
         return bool((self.weights.sum(axis=1) < 0.5).any())
@@ -33,17 +40,15 @@ class CableLength(Coordinate):
 
     def spans(self, own: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Lengths (p - 1,) [m] and unit vectors (p - 1, 3), zero where two points coincide."""
-        points = self.weights @ own + self.offsets
-        ways = points[1:] - points[:-1]
-        lengths = np.sqrt(np.einsum("ij,ij->i", ways, ways))
-        return lengths, ways / np.where(lengths > 0.0, lengths, np.inf)[:, None]
+        lengths, directions = np.empty(len(self.weights) - 1), np.empty((len(self.weights) - 1, 3))
+        _spans(self.weights, self.offsets, own, lengths, directions)
+        return lengths, directions
 
     def parts(self, own: NDArray[np.float64]) -> NDArray[np.float64]:
         return self.spans(own)[0]
 
     def part_gradients(self, own: NDArray[np.float64]) -> NDArray[np.float64]:
-        directions = self.spans(own)[1]
-        return np.diff(self.weights, axis=0)[:, :, None] * directions[:, None, :]
+        return self._differences[:, :, None] * self.spans(own)[1][:, None, :]
 
     def hessian(self, own: NDArray[np.float64], factors: NDArray[np.float64], project: bool) -> Couplings | None:
         """Positive semi-definite for factors of zero or more: (1 - n n^T) / l between the ends of each span."""
@@ -53,7 +58,28 @@ class CableLength(Coordinate):
             return None
         i, j = np.triu_indices(len(self.vertices))
         blocks = np.zeros((len(i), 3, 3))
-        for k, c in zip(pulled, np.diff(self.weights, axis=0)[pulled], strict=True):
+        for k, c in zip(pulled, self._differences[pulled], strict=True):
             across = factors[k] / lengths[k] * (np.eye(3) - np.outer(directions[k], directions[k]))
             blocks += (c[i] * c[j])[:, None, None] * across
         return Couplings(self.vertices[i], self.vertices[j], blocks)
+
+
+@njit(cache=True, error_model="numpy")
+def _spans(weights, offsets, own, lengths, directions):
+    """Not by matrix products, which take longer to begin than to compute for so few vertices."""
+    before = np.zeros(3)
+    for p in range(len(weights)):
+        x, y, z = offsets[p, 0], offsets[p, 1], offsets[p, 2]
+        for i in range(len(own)):
+            w = weights[p, i]
+            if w != 0.0:
+                x += w * own[i, 0]
+                y += w * own[i, 1]
+                z += w * own[i, 2]
+        if p > 0:
+            dx, dy, dz = x - before[0], y - before[1], z - before[2]
+            length = np.sqrt(dx * dx + dy * dy + dz * dz)
+            factor = 1.0 / length if length > 0.0 else 0.0
+            lengths[p - 1] = length
+            directions[p - 1, 0], directions[p - 1, 1], directions[p - 1, 2] = dx * factor, dy * factor, dz * factor
+        before[0], before[1], before[2] = x, y, z

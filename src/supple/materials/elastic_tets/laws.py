@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.materials.elastic_tets.active import ActiveTets, Growth
 from supple.materials.elastic_tets.edge_springs import EdgeSprings
 from supple.materials.elastic_tets.quadratic import QuadraticTets
 from supple.materials.patches.domains import Patches, patches_of
@@ -24,6 +25,7 @@ class TetLaws:
     material : of the tets; its kind is `NOT_ELASTIC` where a tet is of none of the elastic materials
     springs : of the tets of bodies that are made of edges and volumes
     quadratic : those of the tets that are quadratic; `tets` and `Dm_inv` are then those of the corners
+    active : growths and muscles, as they are at one time
     """
 
     tets: NDArray[np.int32]
@@ -32,6 +34,21 @@ class TetLaws:
     material: TetMaterial
     springs: tuple[EdgeSprings, ...] = ()
     quadratic: QuadraticTets | None = None
+    active: tuple[ActiveTets, ...] = ()
+
+    @cached_property
+    def growth(self) -> Growth | None:
+        """What the growths have made of the tets; None without growth."""
+        return Growth.of(self.active, len(self.tets))
+
+    @cached_property
+    def stress_free(self) -> TetLaws:
+        """The same laws of the stress-free shapes of what has grown, without muscles."""
+        if self.growth is None:
+            return replace(self, active=()) if self.active else self
+        Dm_inv, volumes = self.growth.shapes(self.Dm_inv, self.volumes)
+        curved = self.growth.quadratic(self.quadratic)
+        return replace(self, Dm_inv=Dm_inv, volumes=volumes, quadratic=curved, active=())
 
     @cached_property
     def patches(self) -> Patches | None:

@@ -16,6 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.materials.elastic_tets.active import add_active_piolas
 from supple.materials.elastic_tets.edge_springs import cofactors
 from supple.materials.elastic_tets.laws import TetLaws, of_points
 from supple.materials.elastic_tets.quadratic import QuadraticTets
@@ -43,6 +44,8 @@ def energy_densities(
     x : (n, 3) positions [m]; F : (m, 3, 3) deformation gradients of the tets at x
     internal : (k, 11) internal variables of what flows, or (0, 11) where nothing has flowed, see `State`
     """
+    if laws.growth is not None:
+        return laws.growth.ratios * energy_densities(laws.stress_free, x, F @ laws.growth.inverses, internal)
     out = densities_at(laws.material, F)
     if laws.patches is not None:
         out[laws.patches.rows] = tet_shares(laws.patches, x) / laws.patches.tet_volumes
@@ -55,13 +58,28 @@ def energy_densities(
     return out
 
 
+def elastic_energy(laws: TetLaws, x: NDArray[np.float64], internal: NDArray[np.float64]) -> float:
+    """Of all tets with a law [J]; parameters as of `energy_densities`."""
+    densities = energy_densities(laws, x, mean_deformation_gradients(laws, x), internal)
+    return float((densities * laws.volumes)[laws.known].sum())
+
+
 def first_piolas(
     laws: TetLaws, x: NDArray[np.float64], F: NDArray[np.float64], internal: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """(m, 3, 3) first Piola stress of the elastic forces [Pa], without viscous ones.
+    """(m, 3, 3) first Piola stress of the elastic forces and of muscles [Pa], without viscous ones.
 
     NaN where a tet has no law, or holds something rigid. Parameters as of `energy_densities`.
     """
+    if laws.active:
+        growth, free = laws.growth, laws.stress_free
+        if growth is None:
+            out = first_piolas(free, x, F, internal)
+        else:
+            grown = first_piolas(free, x, F @ growth.inverses, internal)
+            out = growth.ratios[:, None, None] * grown @ np.swapaxes(growth.inverses, 1, 2)
+        add_active_piolas(laws.active, F, out)
+        return out
     out = piolas_at(laws.material, F)
     if laws.patches is not None:
         out[laws.patches.rows] = _of_patches(laws.patches, x, F[laws.patches.rows])
@@ -141,11 +159,16 @@ def cauchy_of_tets(
     """(m, 3, 3) Cauchy stress of every tet at x (n, 3), with its P and F (m, 3, 3) [Pa]."""
     stresses = cauchy_stresses(P, F)
     if laws.quadratic is not None:
-        quadratic = laws.quadratic
-        at, stress = _at_points(laws, quadratic, x)
+        free = laws.stress_free
+        quadratic = free.quadratic
+        assert quadratic is not None
+        at, stress = _at_points(free, quadratic, x)
         forces = quadratic.quadrature.means(stress @ np.swapaxes(at, 2, 3))
         J = quadratic.quadrature.means(np.linalg.det(at))
-        stresses[quadratic.rows] = 0.5 * (forces + np.swapaxes(forces, 1, 2)) / J[:, None, None]
+        pulls = np.zeros_like(F)
+        add_active_piolas(laws.active, F, pulls)
+        pulls = cauchy_stresses(pulls, F)[quadratic.rows]
+        stresses[quadratic.rows] = 0.5 * (forces + np.swapaxes(forces, 1, 2)) / J[:, None, None] + pulls
     return stresses
 
 

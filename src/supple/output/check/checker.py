@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from supple.output.check.checks.budgets import Energy, Momentum, Spin
+from supple.output.check.checks.budgets import Balance, Energy, Momentum, Spin
 from supple.output.check.checks.contact import Containment, Distance, Intersection, Obstacles
 from supple.output.check.checks.joints import Joints
 from supple.output.check.checks.plain_values import CONSTANTS, Converged, Finite, Sequence
@@ -39,6 +39,7 @@ CHECKS: tuple[type[FrameCheck], ...] = (
     Momentum,
     Spin,
     Energy,
+    Balance,
     Records,
 )
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from supple.materials.elastic_tets.active import GROWTH, ActiveTets
 from supple.materials.isotropic import densities, rest_lame_parameters
 from supple.materials.kinds import needs_positive_volume
 from supple.materials.per_tet import BY_LAW, NO_REGION, LawTets, TetMaterial
@@ -25,27 +28,31 @@ def elastic_energy(
     J: NDArray[np.float64],
     rest_inverse: NDArray[np.float64],
     internal: NDArray[np.float64],
+    active: Sequence[ActiveTets] = (),
 ) -> float | None:
     """[J], zero at rest; None where the recording does not contain the law of a body.
 
     Parameters
     ----------
     x : (n, 3) positions [m]; J : (m,) determinants of F; rest_inverse : (m, 3, 3) Dm^-1 [1/m]
-    internal : (k, 11) internal variables of the frame, see `State`
+    internal : (k, 11) internal variables of the frame, see `State`; active : growths of the frame
     """
     physics = recording.physics
     if physics is None:
         return None
-    total = _flowing(physics, _gradients(x, recording.tets, rest_inverse), recording.rest_volumes, internal)
+    grown, ratios = growth_of(active, len(J))
+    rest_inverse, J, all_volumes = rest_inverse @ grown, J / ratios, recording.rest_volumes * ratios
+    total = _flowing(physics, _gradients(x, recording.tets, rest_inverse), all_volumes, internal)
     for k, body in enumerate(recording.bodies):
         if not physics.knows_law(k, body.tets):
             return None
         tets = np.ascontiguousarray(recording.tets[body.tets])
-        volumes = recording.rest_volumes[body.tets]
+        volumes = all_volumes[body.tets]
         pair = physics.compliances[k]
         nodes = recording.nodes_of(body)
         if nodes.shape[1] == 10:
             F, parts = at_quadrature_points(x[nodes], recording.rest_positions[nodes])
+            F, parts = F @ grown[body.tets, None], parts * ratios[body.tets, None]
             laws = physics.tet_kinds[body.tets], physics.mu[body.tets], physics.lam[body.tets]
             of_points = np.empty(parts.size)
             densities(F.reshape(-1, 3, 3), *(np.repeat(law, parts.shape[1]) for law in laws), of_points)
@@ -81,6 +88,17 @@ def elastic_energy(
             change = (J[body.tets] - 1.0) * volumes
             total += 0.5 * float(change @ change) / pair[1]
     return total
+
+
+def growth_of(active: Sequence[ActiveTets], m: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(m, 3, 3) the inverses of all growths together, and (m,) their determinants."""
+    F_g = np.tile(np.eye(3), (m, 1, 1))
+    for each in active:
+        if each.kind == GROWTH:
+            d = each.directions
+            stretched = np.einsum("ki,kj->kij", d, d) if len(d) else np.eye(3)
+            F_g[each.rows] = F_g[each.rows] @ (np.eye(3) + (each.value - 1.0) * stretched)
+    return np.asarray(np.linalg.inv(F_g), dtype=np.float64), np.asarray(np.linalg.det(F_g), dtype=np.float64)
 
 
 def _gradients(x, tets, rest_inverse):

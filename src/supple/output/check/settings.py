@@ -25,7 +25,8 @@ NAMES = {
     "volume": "nearly incompressible bodies keep at least half of their volume",
     "momentum": "without loads, momentum changes by gravity alone",
     "spin": "without loads, angular momentum about the center of mass does not grow",
-    "energy": "energy does not grow by more than the work of actuators, where nothing else does work",
+    "energy": "energy does not grow by more than the recorded works",
+    "balance": "recorded works and residuals add up to the change of energy, and the residual is small",
     "records": "recorded determinants, energies and momenta are those of the recorded positions and velocities",
 }
 
@@ -44,7 +45,8 @@ class CheckSettings:
     max_weld_error : how far a welded vertex may be from its place on the rigid body, over that body's size [-].
     max_joint_error : how far a joint may be from holding, over the diameter of gyration of its smaller body, and in
         radians [-]. None: 1e-6 for recordings of `Implicit`, 1e-3 for others.
-    max_energy_gain : how far the energy may exceed that at the start, as a share of the energy in motion.
+    max_energy_gain : how far the energy may exceed that at the start and the works, as a share of the energy in motion;
+        also how large the sum of residuals may be.
     max_momentum_change : how far momenta may change without a force, as a share of the momentum present.
 
     Raises

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.materials.elastic_tets.active import ActiveTets
 from supple.output.check.elastic_energy import elastic_energy
 from supple.output.check.geometry import quadratic_tets
 from supple.output.check.geometry.box_tree import build_tree, triangle_boxes
@@ -67,7 +68,7 @@ class Snapshot:
     ----------
     scene : of the frame; number, time : of the frame, [s]
     positions, velocities : (n, 3) [m], [m/s]; det_F : (m,) as recorded; poses : (obstacles, 3, 4)
-    internal : (k, 11) internal variables of materials that flow, see `State`
+    internal : (k, 11) internal variables of materials that flow, see `State`; active : growths and muscles
     """
 
     scene: Scene
@@ -78,6 +79,7 @@ class Snapshot:
     det_F: NDArray[np.float64]
     poses: NDArray[np.float64]
     internal: NDArray[np.float64]
+    active: tuple[ActiveTets, ...] = ()
 
     @classmethod
     def of(cls, scene: Scene, frame: RecordedFrame) -> Snapshot:
@@ -91,6 +93,7 @@ class Snapshot:
             frame.det_F,
             frame.obstacle_poses,
             frame.state.internal,
+            frame.active,
         )
 
     @cached_property
@@ -135,7 +138,8 @@ class Snapshot:
     @cached_property
     def elastic_energy(self) -> float | None:
         """[J], zero at rest; None where the recording does not contain the law of a body."""
-        return elastic_energy(self.scene.recording, self.positions, self.J, self.scene.rest_inverse, self.internal)
+        recording, inverse = self.scene.recording, self.scene.rest_inverse
+        return elastic_energy(recording, self.positions, self.J, inverse, self.internal, self.active)
 
     @cached_property
     def stitch_energy(self) -> float | None:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.edges_and_volume import EdgesAndVolume
+from supple.materials.elastic_tets.active import GROWTH, MUSCLE, ActiveTets
 from supple.materials.flows.internal import count_of
 from supple.materials.flows.registry import RECORDED_FLOWS
 from supple.materials.laws.registry import RECORDED_LAWS
@@ -40,6 +41,7 @@ class RecordedPhysics:
     kind : (m,) row of `registry.ELASTIC_MATERIALS` of each tet, `GIVEN_BY_LAW` or `NOT_KNOWN`; mu, lam : (m,) [Pa]
     laws : whose energies are added to those of `kind`
     internal : number of rows of internal variables of a frame
+    active : growths and muscles; each frame has their values, see `SolverDetails`
     compliances : for each body those of its edges [m/N] and volumes [m^5/N], or None for a body of another law
     forces, soft_targets, scripted_pins, stitches : numbers of them in the scene
     held_joints, motors : numbers of the joints with the world or an obstacle, and of motors of joints
@@ -58,6 +60,7 @@ class RecordedPhysics:
     region: NDArray[np.int32]
     laws: tuple[LawTets, ...] = ()
     internal: int = 0
+    active: tuple[ActiveTets, ...] = ()
 
     @property
     def tet_kinds(self) -> NDArray[np.int32]:
@@ -98,7 +101,12 @@ def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
     for k, tets in enumerate(known):
         group[f"law_{k}/rows"] = tets.rows.astype(np.int32)[:, None]
         group[f"law_{k}/parameters"] = tets.parameters
+    active = system.laws_at(system.start_states[-1].time).active
+    for k, each in enumerate(active):
+        group[f"active_{k}/rows"] = each.rows.astype(np.int32)[:, None]
+        group[f"active_{k}/directions"], group[f"active_{k}/curve"] = each.directions, each.curve
     return {
+        "active": [[each.kind, each.strength] for each in active],
         "laws": [law.__name__ for law in ELASTIC_MATERIALS],
         "by_law": [tets.law.name for tets in known],
         "flows": [None if tets.flow is None else tets.flow.name for tets in known],
@@ -181,7 +189,27 @@ def read_physics(file: CheckedFile, header: dict[str, Any], m: int) -> RecordedP
             kind[tets] = NOT_KNOWN
     if internal != sum(len(tets.rows) for tets in known if tets.flow is not None):
         raise file.broken("its number of internal variables is not that of its materials")
-    return RecordedPhysics(kind, mu, lam, compliances, *counts, region=region, laws=tuple(known), internal=internal)
+    active = _read_active(file, physics, m)
+    here = kind, mu, lam, compliances, *counts
+    return RecordedPhysics(*here, region=region, laws=tuple(known), internal=internal, active=active)
+
+
+def _read_active(file: CheckedFile, physics: dict[str, Any], m: int) -> tuple[ActiveTets, ...]:
+    try:
+        described = [(str(kind), float(strength)) for kind, strength in physics.get("active", [])]
+    except (TypeError, ValueError):
+        raise file.broken("its growths and muscles are not described as they should be") from None
+    found = []
+    for k, (kind, strength) in enumerate(described):
+        if kind not in (GROWTH, MUSCLE):
+            raise file.newer(f"tets act by a {kind!r} that this version does not know")
+        rows = file.indices(f"{_GROUP}/active_{k}/rows", 1, m)[:, 0].astype(np.int64)
+        directions = file.array(f"{_GROUP}/active_{k}/directions", "f", (None, 3))
+        curve = file.array(f"{_GROUP}/active_{k}/curve", "f", (None, 2))
+        if len(directions) not in (len(rows), 0) or len(curve) == 0 or (kind == MUSCLE and len(directions) == 0):
+            raise file.broken("a growth or muscle has another number of directions than of tets")
+        found.append(ActiveTets(kind, rows, directions, 1.0, strength, curve))
+    return tuple(found)
 
 
 def read_untouching(file: CheckedFile, header: dict[str, Any]) -> tuple[tuple[int, int], ...]:

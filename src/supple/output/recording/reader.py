@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, overload
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from supple.displayed import Showable, short_list
 from supple.errors import OutputError
+from supple.materials.elastic_tets.active import ActiveTets
 from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.flows.internal import NEVER_FLOWED
 from supple.output.recording.checked_hdf5 import CheckedFile
@@ -88,9 +89,15 @@ class RecordedFrame(TetReadings):
     def _x(self) -> NDArray[np.float64]:
         return self.state.positions
 
-    @property
+    @cached_property
     def _laws(self) -> TetLaws:
-        return self.recording.laws
+        return replace(self.recording.laws, active=self.active)
+
+    @cached_property
+    def active(self) -> tuple[ActiveTets, ...]:
+        """Growths and muscles with their values in this frame."""
+        physics, values = self.recording.physics, self.report.details.active.values()
+        return () if physics is None else tuple(map(ActiveTets.at, physics.active, values))
 
     @property
     def _internal(self) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from supple.errors import SceneError
 from supple.scene.body import PlacedBody
-from supple.scene.loads.over_time import Curve, OverTime, checked_magnitude, checked_over_time
+from supple.scene.loads.over_time import OverTime, checked_magnitude, checked_over_time
 from supple.scene.loads.points import Point, checked_point, point_corners
 from supple.scene.values import check_name, non_negative, positive
 
@@ -28,7 +28,7 @@ class Cable:
     length : of the cable without tension [m]; a number, a `Curve`, or a function of time [s].
     tension : at the winch [N], zero or more; likewise.
     winch_speed : by which the length without tension decreases from the distances at the start [m/s], negative to
-        release the cable; a number or a `Curve`.
+        release the cable; likewise. It is integrated from time 0 on.
     stiffness : force per elongation of the whole cable [N/m]; with length and winch_speed only.
     friction : coefficient of friction at the eyelets.
     name : under which reports have it.
@@ -41,7 +41,7 @@ class Cable:
     points: Sequence[Point]
     length: OverTime | None = None
     tension: OverTime | None = None
-    winch_speed: float | Curve | None = None
+    winch_speed: OverTime | None = None
     stiffness: float | None = None
     friction: float = 0.0
     name: str = "cable"
@@ -66,10 +66,8 @@ class Cable:
             if getattr(self, key) is not None:
                 object.__setattr__(self, key, checked_magnitude(getattr(self, key), f"{self.label}: {key}"))
         if self.winch_speed is not None:
-            what = f"{self.label}: winch_speed"
-            if callable(self.winch_speed) and not isinstance(self.winch_speed, Curve):
-                raise SceneError(f"{what} is a function; give a number or a Curve, or the length as a function")
-            object.__setattr__(self, "winch_speed", checked_over_time(self.winch_speed, what, ()))
+            speed = checked_over_time(self.winch_speed, f"{self.label}: winch_speed", ())
+            object.__setattr__(self, "winch_speed", speed)
         if (self.stiffness is None) != (self.tension is not None):
             remedy = "give it" if self.stiffness is None else "it has no effect with tension; leave it out"
             raise SceneError(f"{self.label}: stiffness is {self.stiffness!r}; {remedy}")

@@ -13,8 +13,8 @@ from supple.errors import SceneError
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import OnBody, body_of
 from supple.scene.loads.over_time import Curve, OverTime, checked_magnitude
+from supple.scene.loads.tet_region import TetRegion, checked_directions, checked_tets, directions_of, tets_in
 from supple.scene.rigid.rigid_body import RigidBody
-from supple.scene.selection import InBox
 from supple.scene.values import float_array, positive
 
 
@@ -50,27 +50,20 @@ class Muscle(OnBody):
     strength: float
     direction: ArrayLike
     activation: OverTime = 1.0
-    tets: ArrayLike | InBox | None = None
+    tets: TetRegion = None
     force_length: tuple[ArrayLike, ArrayLike] | None = None
     name: str | None = None
 
     def __post_init__(self) -> None:
         self._check_names()
         object.__setattr__(self, "strength", positive(self.strength, f"{self.label}: strength"))
-        given = float_array(self.direction, f"{self.label}: direction", "give three numbers, or three for each tet")
-        if given.shape != (3,) and (given.ndim != 2 or given.shape[1] != 3):
-            raise SceneError(f"{self.label}: direction has shape {given.shape}; give (3,), or (m, 3) for m tets")
-        lengths = np.linalg.norm(given, axis=-1)
-        if not (np.isfinite(lengths).all() and (lengths > 0.0).all()):
-            raise SceneError(f"{self.label}: direction is zero or not finite; give vectors of any length above zero")
-        object.__setattr__(self, "direction", given / lengths[..., None])
+        object.__setattr__(self, "direction", checked_directions(self.direction, self.label))
         what = f"{self.label}: activation"
         object.__setattr__(self, "activation", checked_magnitude(self.activation, what))
         known = self.activation.values if isinstance(self.activation, Curve) else self.activation
         if not callable(known):
             check_activation(float(np.max(np.asarray(known))), what)
-        if self.tets is not None and not isinstance(self.tets, InBox):
-            object.__setattr__(self, "tets", self._checked_tets())
+        object.__setattr__(self, "tets", checked_tets(self.tets, self.label))
         if self.force_length is not None:
             object.__setattr__(self, "force_length", self._checked_curve())
 
@@ -86,33 +79,8 @@ class Muscle(OnBody):
         """
         if isinstance(body, RigidBody):
             raise SceneError(f"{self.label}: the body is rigid; a muscle acts in soft bodies")
-        count = len(body.mesh.tets)
-        if self.tets is None:
-            rows = np.arange(count)
-        elif isinstance(self.tets, InBox):
-            inside = np.zeros(len(body.mesh.vertices), dtype=bool)
-            inside[self.tets.select(body.place(body.mesh.vertices))] = True
-            rows = np.flatnonzero(inside[body.mesh.tets].all(axis=1))
-            if len(rows) == 0:
-                raise SceneError(f"{self.label}: its box holds no tet; make it larger, or give numbers of tets")
-        else:
-            rows = np.asarray(self.tets)
-            if rows.max() >= count:
-                raise SceneError(f"{self.label}: tet {rows.max()} does not exist; the body has {count}")
-        directions = np.asarray(self.direction)
-        if directions.ndim == 2 and len(directions) != len(rows):
-            raise SceneError(
-                f"{self.label}: there are {len(directions)} directions for {len(rows)} tets; give one each"
-            )
-        return rows, np.broadcast_to(directions, (len(rows), 3))
-
-    def _checked_tets(self) -> NDArray[np.int64]:
-        rows = np.atleast_1d(np.asarray(self.tets))
-        if rows.ndim != 1 or rows.size == 0 or not np.issubdtype(rows.dtype, np.integer) or rows.min() < 0:
-            raise SceneError(f"{self.label}: tets must be a non-empty list of whole numbers from 0, an InBox, or None")
-        if len(np.unique(rows)) != len(rows):
-            raise SceneError(f"{self.label}: tets names a tet twice; name each once")
-        return rows.astype(np.int64)
+        rows = tets_in(self.tets, body, self.label)
+        return rows, directions_of(self.direction, rows, self.label)
 
     def _checked_curve(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         what = f"{self.label}: force_length"

@@ -7,12 +7,14 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from supple.scene.loads.body_force import BodyForce
+from supple.scene.loads.growth import Growth
 from supple.scene.loads.load import Load, Region
 from supple.scene.loads.muscle import Muscle
 from supple.scene.loads.over_time import Curve
 from supple.scene.loads.points import Point
 from supple.scene.loads.spring import Spring
 from supple.scene.loads.surface_loads import Pressure, Traction
+from supple.scene.loads.tet_region import TetRegion
 from supple.scene.located import at
 from supple.scene.selection import InBox
 from supple.scene_file.entries.selections import InBoxModel
@@ -118,29 +120,48 @@ class ForceLengthModel(Model):
     values: list[NonNegative] = Field(min_length=1, description="one per stretch")
 
 
-class MuscleModel(Model):
+class InTetsModel(Model):
+    """What acts in tets of a body."""
+
+    body: Name = Field(description="name of the body")
+    box: InBoxModel | None = Field(default=None, description="tets inside; without it, all")
+    tets: list[Index] | None = Field(default=None, min_length=1, description="instead of `box`: their numbers")
+    name: Name | None = Field(default=None, description="used in messages")
+
+    def region(self) -> TetRegion:
+        if self.box is None:
+            return self.tets
+        with at("box"):
+            return InBox(self.box.low, self.box.high)
+
+
+class MuscleModel(InTetsModel):
     """Fibres that pull along their direction."""
 
     kind: Literal["muscle"]
-    body: Name = Field(description="name of the body")
     strength: Positive = Field(description="largest stress per area at rest [Pa]")
     direction: Vector = Field(description="of the fibres, in the coordinates of the mesh")
     activation: NonNegative | CurveModel = Field(default=1.0, description="from 0 to 1, or a curve")
-    box: InBoxModel | None = Field(default=None, description="tets inside; without it, all")
-    tets: list[Index] | None = Field(default=None, min_length=1, description="instead of `box`: their numbers")
     force_length: ForceLengthModel | None = Field(default=None, description="without it, 1 at all stretches")
-    name: Name | None = Field(default=None, description="used in messages")
 
     def build(self) -> Load:
-        tets: Any = self.tets
-        if self.box is not None:
-            with at("box"):
-                tets = InBox(self.box.low, self.box.high)
         curve = None if self.force_length is None else (self.force_length.stretches, self.force_length.values)
         activation = over_time(self.activation, "activation")
-        return Muscle(self.body, self.strength, self.direction, activation, tets, curve, self.name)
+        return Muscle(self.body, self.strength, self.direction, activation, self.region(), curve, self.name)
+
+
+class GrowthModel(InTetsModel):
+    """A stretch of the stress-free shape."""
+
+    kind: Literal["growth"]
+    stretch: Positive | CurveModel = Field(description="of lengths [-], or a curve")
+    direction: Vector | None = Field(default=None, description="in the coordinates of the mesh; without it, all")
+
+    def build(self) -> Load:
+        return Growth(self.body, over_time(self.stretch, "stretch"), self.direction, self.region(), self.name)
 
 
 LoadModel = Annotated[
-    TractionModel | PressureModel | BodyForceModel | SpringModel | MuscleModel, Field(discriminator="kind")
+    TractionModel | PressureModel | BodyForceModel | SpringModel | MuscleModel | GrowthModel,
+    Field(discriminator="kind"),
 ]

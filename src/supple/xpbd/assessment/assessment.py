@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,6 +79,7 @@ class Assessment:
         accuracy: float,
         held: float,
         asleep: NDArray[np.bool_],
+        works: Mapping[str, float],
     ) -> tuple[Findings, Ledger]:
         """Judge the end of a frame.
 
@@ -86,11 +88,11 @@ class Assessment:
         world : (n, 3) positions in the world [m]; J : (m,) of all tets
         h : length of the substeps [s]; accuracy : how much stiffness a body may lack
         held : the share of the substeps in which the motion of bodies was shortened
-        asleep : (b,) bodies that did not move
+        asleep : (b,) bodies that did not move; works : of the frame, by name [J]
         """
         before = self._ledger
         tangled = before.tangled & tangled_bodies(self.system, J)
-        gain, energy, gainer = self.balance.end(moment)
+        gain, energy, gainer = self.balance.end(moment, works)
         excess, scale = max(0.0, before.excess + gain), max(before.scale, energy)
         lacks = zip(self.softening.shares(h).tolist(), self.softening.names, strict=True)
         findings = Findings(

@@ -59,16 +59,19 @@ class ElasticEnergy:
             edges &= vertices[system.edges].any(axis=1)
         self.has_hard = bool((hard_lam > 0.0).any() or (hard_stiffness > 0.0).any())
         self._tets = np.ascontiguousarray(system.tets[tets], dtype=np.uint32)
-        V = system.rest_volumes
-        self._data = np.column_stack(
-            [system.rest_shape_inverse[tets].reshape(-1, 9), (mu * V)[tets], (lam * V)[tets], (hard_lam * V)[tets]]
-        )
+        self._rows, self._moduli = np.flatnonzero(tets), np.column_stack([mu, lam, hard_lam])[tets]
+        self.grow(system.rest_shape_inverse, system.rest_volumes)
         self._edges = np.ascontiguousarray(system.edges[edges], dtype=np.uint32)
         self._springs = np.column_stack([system.rest_lengths[edges], stiffness[edges], hard_stiffness[edges]])
         self._of_tets, self._of_edges = np.zeros(len(self._tets)), np.zeros(len(self._edges))
         starts = [part.tets.start for part in system.bodies], [part.edges.start for part in system.bodies]
         self._tet_starts = np.searchsorted(np.flatnonzero(tets), starts[0])
         self._edge_starts = np.searchsorted(np.flatnonzero(edges), starts[1])
+
+    def grow(self, Dm_inv: NDArray[np.float64], volumes: NDArray[np.float64]) -> None:
+        """Take other stress-free shapes of all tets of the system: (m, 3, 3) [1/m], (m,) [m^3]."""
+        shapes = Dm_inv[self._rows].reshape(-1, 9)
+        self._data = np.hstack([shapes, self._moduli * volumes[self._rows, None]])
 
     def of(self, points: NDArray[np.float64], parallel: bool, h: float = math.inf) -> NDArray[np.float64]:
         """Energy of each body (b,) at points (n, 3 or more columns) [J], zero at rest.

@@ -21,7 +21,9 @@ from supple.loads.actuators.cable_length import CableLength
 from supple.loads.actuators.eyelets import angles, limits, span_forces
 from supple.numerics.kernel_cache import njit
 from supple.readings.actuator_readings import actuator_fields
+from supple.readings.energy_balance import works_of_actuators
 from supple.system import System
+from supple.xpbd.assessment.substep import Substep
 
 Floats = NDArray[np.float64]
 
@@ -29,8 +31,7 @@ Floats = NDArray[np.float64]
 class ActuatorProjection:
     """The actuators of a system in the substeps of one frame.
 
-    Points are (n, 4) about origins (n, 3) [m], times of ends of substeps in [s], h is their length [s]. For each
-    actuator, arrays are of the parts of its coordinate (p,).
+    For each actuator, arrays are of the parts of its coordinate (p,).
     """
 
     def __init__(self, system: System) -> None:
@@ -42,60 +43,68 @@ class ActuatorProjection:
         ]
         self._impulses, self._works, self._parts, self._forces = ([] for _ in range(4))
 
-    def begin_frame(self, points: Floats, origins: Floats) -> None:
-        """Begin a frame."""
-        self._parts = [each.coordinate.parts(_own(each, points, origins)) for each in self.system.actuators]
+    def begin_frame(self, at: Substep) -> None:
+        """Begin a frame, with the arrays of its beginning."""
+        self._parts = [each.coordinate.parts(_own(each, at)) for each in self.system.actuators]
         self._impulses, self._works, self._forces = ([np.zeros_like(part) for part in self._parts] for _ in range(3))
 
-    def project_within(self, points: Floats, origins: Floats, time: float, h: float) -> None:
+    def project_within(self, at: Substep) -> None:
         """Move the vertices of the actuators within one piece, in place."""
         for k, each in enumerate(self.system.actuators):
             if self._inner[k]:
-                self._project(k, each, points, origins, time, h)
+                self._project(k, each, at)
 
-    def project_between(self, points: Floats, velocities: Floats, origins: Floats, time: float, h: float) -> None:
-        """Move the vertices of all other actuators, in place, and change their velocities (n, 3) [m/s]."""
+    def project_between(self, at: Substep) -> None:
+        """Move the vertices of all other actuators, in place, and change their velocities."""
         for k, each in enumerate(self.system.actuators):
             if not self._inner[k]:
                 rows = each.coordinate.vertices
-                before = points[rows, :3].copy()
-                self._project(k, each, points, origins, time, h)
-                velocities[rows] += (points[rows, :3] - before) / h
+                before = at.points[rows, :3].copy()
+                self._project(k, each, at)
+                at.velocities[rows] += (at.points[rows, :3] - before) / at.h
 
-    def end_substep(self, points: Floats, origins: Floats, h: float) -> float:
-        """The work on the bodies in a substep [J]."""
-        total = 0.0
+    def end_substep(self, at: Substep) -> None:
+        """Add up impulses and works."""
         for k, each in enumerate(self.system.actuators):
-            ended = each.coordinate.parts(_own(each, points, origins))
-            work = self._forces[k] * (ended - self._parts[k])
-            self._impulses[k] += h * self._forces[k]
-            self._works[k] += work
+            ended = each.coordinate.parts(_own(each, at))
+            self._impulses[k] += at.h * self._forces[k]
+            self._works[k] += self._forces[k] * (ended - self._parts[k])
             self._parts[k] = ended
-            total += float(work.sum())
-        return total
 
     def fields(self, duration: float) -> Mapping[str, Any]:
         """What the details of a frame of this duration [s] have, with the mean forces."""
         means = [impulse / duration for impulse in self._impulses]
         return actuator_fields(self.system, means, self._parts, self._works)
 
-    def _project(self, k: int, each: Actuator, points: Floats, origins: Floats, time: float, h: float) -> None:
-        rows, own = each.coordinate.vertices, _own(each, points, origins)
+    def works(self) -> dict[str, float]:
+        """Those of the frame so far, by name [J]."""
+        return works_of_actuators(self.system, self._works)
+
+    def acting(self, at: Substep) -> Floats:
+        """(n, 3) the forces of the substep on all vertices, at their places at its end [N]."""
+        out = np.zeros_like(at.velocities)
+        for forces, each in zip(self._forces, self.system.actuators, strict=True):
+            gradients = each.coordinate.part_gradients(_own(each, at))
+            out[each.coordinate.vertices] += np.einsum("p,pij->ij", forces, gradients)
+        return out
+
+    def _project(self, k: int, each: Actuator, at: Substep) -> None:
+        rows, own = each.coordinate.vertices, _own(each, at)
         gradients, parts = each.coordinate.part_gradients(own), each.coordinate.parts(own)
         grips = np.zeros(len(parts) - 1)
         self._forces[k][:] = 0.0
         total = gradients.sum(axis=0)
-        moved = h * h * points[rows, 3, None] * total
+        moved = at.h**2 * at.points[rows, 3, None] * total
         mobility = float(np.einsum("ij,ij->", moved, total))
         if mobility <= 0.0:
             return
-        force = each.law.reached(time, float(parts.sum()), mobility)
+        force = each.law.reached(at.time, float(parts.sum()), mobility)
         moved *= force
         if each.friction > 0.0 and isinstance(each.coordinate, CableLength):
             turns = angles(each.coordinate.spans(own)[1])
-            free = points[rows, 3] * h * h
+            free = at.points[rows, 3] * at.h**2
             _stop_slips(gradients, free, parts - self._parts[k], turns, each.friction, -force, moved, grips)
-        points[rows, :3] += moved
+        at.points[rows, :3] += moved
         self._forces[k] = span_forces(force, grips)
 
 
@@ -130,6 +139,5 @@ def _stop_slips(gradients, free, longer, turns, friction, tension, moved, grips)
         tension -= grips[e]
 
 
-def _own(each: Actuator, points: Floats, origins: Floats) -> Floats:
-    rows = each.coordinate.vertices
-    return points[rows, :3] + origins[rows]
+def _own(each: Actuator, at: Substep) -> Floats:
+    return at.world(each.coordinate.vertices)

@@ -46,18 +46,22 @@ class BlocksOfTwo:
         inverse_masses: NDArray[np.float64],
         groups: Groups,
     ) -> None:
-        (corners, Dm_inv, V), (mu, lam) = tets, moduli
+        (corners, Dm_inv, V), self._moduli = tets, moduli
         self.count = len(corners)
         # The projection of one of these tets costs about three times as much as that of an edge or a volume.
         self.work = 3 * self.count
-        w = inverse_masses[corners]
+        self._masses = inverse_masses[corners]
+        self.sweep = Sweep(project_blocks_of_two, corners, self.constants(Dm_inv, V), groups)
+        self._warned_for = 0.0
+
+    def constants(self, Dm_inv: NDArray[np.float64], V: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(m, c) what the projection reads of each tet."""
+        (mu, lam), w = self._moduli, self._masses
         gradients, curvatures = _principal_axes(Dm_inv, w)
         # The longest step, phi h^2, with which a tet cannot overshoot.
         self._longest = 1.0 / np.maximum(2.0 * mu * V * curvatures[:, 2], np.finfo(float).tiny)
         material = np.column_stack([mu * V, lam * V, 1.0 + mu / lam, self._longest])
-        constants = np.hstack([gradients.reshape(-1, 9), material, curvatures, w])
-        self.sweep = Sweep(project_blocks_of_two, corners, constants, groups)
-        self._warned_for = 0.0
+        return np.hstack([gradients.reshape(-1, 9), material, curvatures, w])
 
     def project(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:
         """See `ConstraintSet.project`."""
@@ -91,7 +95,12 @@ class StableNeoHookeanConstraints(BlocksOfTwo):
         movable = (system.inverse_masses[system.tets[rows]] > 0.0).any(axis=1)
         rows, mu, lam = rows[movable], mu[movable], lam[movable]
         tets = system.tets[rows], system.rest_shape_inverse[rows], system.rest_volumes[rows]
+        self._rows = rows
         super().__init__(tets, (mu, lam), system.inverse_masses, make_groups(layout, tets[0]))
+
+    def grow(self, Dm_inv: NDArray[np.float64], volumes: NDArray[np.float64]) -> None:
+        """Take other stress-free shapes of all tets of the system: (m, 3, 3) [1/m], (m,) [m^3]."""
+        self.sweep.change(self.constants(Dm_inv[self._rows], volumes[self._rows]))
 
 
 def _principal_axes(

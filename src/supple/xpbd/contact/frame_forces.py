@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.numerics.geometry.embedded_points import EmbeddedPoints
+from supple.numerics.kernel_cache import njit
 from supple.state import ContactPoints
 from supple.xpbd.contact.contact_rows import LoadedRows
 
@@ -81,6 +83,26 @@ class FrameForces:
     shapes: list[ShapeLoads] = field(default_factory=list)
     substeps: int = 0
     standing: tuple[LoadedRows, ShapeLoads] = field(default_factory=lambda: (LoadedRows.none(), ShapeLoads.none()))
+
+    def latest(self, points: EmbeddedPoints, count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The forces of the latest substep along normals and along surfaces on the vertices, (count, 3) [N] each.
+
+        Parameters
+        ----------
+        points : those of the system; count : of its vertices
+        """
+        at_points = np.zeros((2, len(points), 3))
+        if self.surfaces:
+            rows = self.surfaces[-1]
+            add_rows(self.owners.rows, rows.vertices, rows.weights, rows.normals, rows.forces, *at_points)
+        if self.shapes:
+            loads = self.shapes[-1]
+            forces = self.owners.masses[loads.vertices, None] * loads.loads
+            add_vertices(self.owners.tested[loads.vertices], loads.places, forces, *at_points)
+        normal, tangential = np.zeros((2, count, 3))
+        points.add_forces(at_points[0], normal)
+        points.add_forces(at_points[1], tangential)
+        return normal, tangential
 
     def pairs(self) -> list[tuple[int, int]]:
         """The pairs of bodies and obstacles (counted after the bodies) whose surfaces push each other."""
@@ -192,6 +214,30 @@ class FrameForces:
             vertices=old_points[self.owners.tested[vertices]],
             weights=np.ones(len(chosen)),
         )
+
+
+@njit(cache=True)
+def add_rows(owners, vertices, weights, normals, forces, normal, tangential):
+    """Add forces (k, 3) on points (k, 4) of surfaces with weights to those of the system's points."""
+    for k in range(len(forces)):
+        along = forces[k, 0] * normals[k, 0] + forces[k, 1] * normals[k, 1] + forces[k, 2] * normals[k, 2]
+        for slot in range(4):
+            if vertices[k, slot] < len(owners):
+                i = owners[vertices[k, slot]]
+                for j in range(3):
+                    normal[i, j] += weights[k, slot] * along * normals[k, j]
+                    tangential[i, j] += weights[k, slot] * (forces[k, j] - along * normals[k, j])
+
+
+@njit(cache=True)
+def add_vertices(vertices, places, forces, normal, tangential):
+    """Add forces (k, 3) on points (k,), with normals in the first columns of `places`."""
+    for k in range(len(vertices)):
+        i = vertices[k]
+        along = forces[k, 0] * places[k, 0] + forces[k, 1] * places[k, 1] + forces[k, 2] * places[k, 2]
+        for j in range(3):
+            normal[i, j] += along * places[k, j]
+            tangential[i, j] += forces[k, j] - along * places[k, j]
 
 
 def _of_rows(rows: LoadedRows, frame: FrameForces) -> _Entries:

@@ -194,6 +194,11 @@ class Damping:
         cycle.push(self._groups.rows, points, self._forces, h)
         self._interval += h
 
+    @property
+    def acting(self) -> tuple[NDArray[np.integer], NDArray[np.float64]]:
+        """The damped vertices (k,) and the present viscous forces on them (k, 3) [N]."""
+        return self._groups.rows, self._forces
+
     def memory(self, state_velocities: NDArray[np.float64]) -> ViscousMemory:
         """Of a state with these velocities (n, 3), in the scene's numbering."""
         old = self._layout.old_from_new[self._groups.rows]

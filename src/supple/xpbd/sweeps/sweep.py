@@ -39,6 +39,7 @@ class Sweep:
     ) -> None:
         # With unsigned indices the kernel needs no test for negative ones.
         self._corners = np.ascontiguousarray(constraints[groups.members], dtype=np.uint32)
+        self._groups = groups
         self._data = groups.lanes(constants)
         self._counts, self._pointers = groups.counts, groups.pointers
         self._active = np.ones(len(self._counts), dtype=np.bool_)
@@ -47,6 +48,10 @@ class Sweep:
     def choose(self, inverse_masses: NDArray[np.float64]) -> None:
         """Project only the groups with a vertex that can move, of inverse masses (n,) [1/kg]."""
         self._active[:] = (inverse_masses[self._corners] > 0.0).any(axis=(1, 2))
+
+    def change(self, constants: NDArray[np.float64]) -> None:
+        """Replace the constants (m, c)."""
+        self._data = self._groups.lanes(constants)
 
     def run(self, points: NDArray[np.float64], h: float, parallel: bool) -> None:
         """Project every constraint once: see `ConstraintSet.project`."""

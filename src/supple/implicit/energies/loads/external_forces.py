@@ -35,6 +35,19 @@ class ExternalForces(Potential):
         """Zero."""
 
 
+def works_of_loads(
+    system: System, x: NDArray[np.float64], displacements: NDArray[np.float64], time: float
+) -> dict[str, float]:
+    """The work of the loads that `total_forces` adds up, over displacements (n, 3) [m], by its name [J]."""
+    works: dict[str, float] = {}
+    for load in system.loads:
+        if isinstance(load, (DeadLoad, MassLoad)):
+            forces = np.zeros_like(x)
+            load.add_forces(x, time, forces)
+            works[load.work] = works.get(load.work, 0.0) + float(np.einsum("ij,ij->", forces, displacements))
+    return works
+
+
 def total_forces(system: System, x: NDArray[np.float64], time: float) -> NDArray[np.float64]:
     """(n, 3) weight and sum of the loads on each vertex at `time` [N], without those that have a potential.
 

@@ -14,12 +14,12 @@ from supple.system import System
 
 @dataclass(frozen=True, eq=False)
 class MusclePotential(Potential):
-    """One muscle at one time; rows : (m,) of its tets among all."""
+    """One muscle at one time."""
 
     muscle: FibreTension
-    rows: NDArray[np.int64]
     time: float
     projection = Projection.RELEASED_FIRST
+    work = "muscles"
 
     def value(self, x: NDArray[np.float64]) -> float:
         return self.muscle.energy(x, self.time)
@@ -40,11 +40,9 @@ class MusclePotential(Potential):
         by_way = (factors * (along - across))[:, None, None] * n[:, :, None] * n[:, None, :]
         by_way += (factors * across)[:, None, None] * np.eye(3)
         blocks = np.einsum("mp,mq,mij->mpiqj", m.coefficients, m.coefficients, by_way)
-        out.tets[self.rows] += blocks.reshape(-1, 12, 12)
+        out.tets[m.fibres_at_rest.rows] += blocks.reshape(-1, 12, 12)
 
 
 def muscles_at(system: System, time: float) -> list[MusclePotential]:
     """The muscles of a system at `time` [s]."""
-    starts = {part.name: part.tets.start for part in system.bodies}
-    muscles = (load for load in system.loads if isinstance(load, FibreTension))
-    return [MusclePotential(load, load.rows + starts[load.body], time) for load in muscles]
+    return [MusclePotential(load, time) for load in system.loads if isinstance(load, FibreTension)]

@@ -31,6 +31,7 @@ class PressurePotential(Potential):
     pressure: float
     start: NDArray[np.float64]
     projection = Projection.RELEASED_FIRST
+    work = "pressures"
 
     def value(self, x: NDArray[np.float64]) -> float:
         return self.pressure * self._swept(x).volume()

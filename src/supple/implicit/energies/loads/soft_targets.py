@@ -24,6 +24,7 @@ class SoftTargets(Potential):
     stiffness: NDArray[np.float64]
     targets: NDArray[np.float64]
     projection = Projection.UNNEEDED
+    work = "soft_targets"
 
     def value(self, x: NDArray[np.float64]) -> float:
         d = x[self.vertices] - self.targets

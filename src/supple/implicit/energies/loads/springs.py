@@ -20,6 +20,7 @@ class SpringPotential(Potential):
     springs: tuple[PointSpring, ...]
     time: float
     projection = Projection.RELEASED_FIRST
+    work = "springs"
 
     def value(self, x: NDArray[np.float64]) -> float:
         return sum(spring.energy(x, self.time) for spring in self.springs)

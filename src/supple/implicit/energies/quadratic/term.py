@@ -95,6 +95,11 @@ class OfQuadraticTets(JointlyEvaluated):
         return self.inner.label
 
     @property
+    def work(self) -> str | None:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """That of the inner potential."""
+        return self.inner.work
+
+    @property
     def projection(self) -> Projection:  # pyright: ignore[reportIncompatibleVariableOverride]
         """That of the inner potential."""
         return self.inner.projection

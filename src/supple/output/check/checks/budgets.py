@@ -5,15 +5,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.output.check.elastic_energy import stiffness_scale
 from supple.output.check.frame_check import FrameCheck
 from supple.output.check.report import CheckResult
-from supple.output.check.snapshot import Snapshot
+from supple.output.check.snapshot import Scene, Snapshot
 from supple.output.recording.reader import Recording
-from supple.state import ACTUATOR_WORKS
 
+_NO_STITCHES = "the recording does not contain the laws of its stitches: an older version wrote it"
 _UNKNOWN = "the recording does not contain what acts on its bodies: an older version wrote it"
 # Motion slower than this share of a body's size per step, and energy of the same share, is round-off.
 _FLOOR = 1e-9
+# Energies are recorded and computed here in double precision, each up to round-off of the energies of its elements.
+_CLOSED = 1e-9
 
 
 def external_action(recording: Recording) -> str | None:
@@ -102,65 +105,131 @@ class Spin(FrameCheck):
 
 
 class Energy(FrameCheck):
-    """The sum of kinetic, elastic, stitch and potential energy does not grow by more than the work of actuators.
+    """The sum of kinetic, elastic, stitch and potential energy does not grow by more than the recorded works.
 
-    Not judged where anything else does work.
+    Of a recording without works, not judged where anything but gravity does work.
     """
 
     name = "energy"
-    good = "never above the start by more than {worst} of what is moved"
+    good = "never above the start and the works by more than {worst} of what is moved"
     bad = "grows by {worst}"
 
     def begin(self) -> None:
         recording = self.scene.recording
         physics = recording.physics
+        self._works = recorded_works(recording)
         if physics is None:
             self.why_not = _UNKNOWN
-        elif physics.forces or physics.soft_targets:
-            self.why_not = "forces or soft targets do work"
-        elif physics.scripted_pins:
-            self.why_not = "scripted pins do work"
-        elif physics.motors:
-            self.why_not = "motors do work"
         elif physics.stitches and recording.stitches.laws is None:
-            self.why_not = "the recording does not contain the laws of its stitches: an older version wrote it"
+            self.why_not = _NO_STITCHES
+        elif self._works is None:
+            self.why_not = self._unrecorded()
         self._first: Snapshot | None = None
         self._rows: list[tuple[int, float, float]] = []
 
+    def _unrecorded(self) -> str | None:
+        physics = self.scene.recording.physics
+        if physics is None or physics.forces or physics.soft_targets:
+            return "forces or soft targets do work"
+        if physics.scripted_pins:
+            return "scripted pins do work"
+        return "motors do work" if physics.motors else None
+
     def see(self, at: Snapshot) -> None:
-        recording = self.scene.recording
         self._first = self._first or at
-        held = recording.pinned_vertices
-        if not np.array_equal(at.positions[held], self._first.positions[held]):
+        held = self.scene.recording.pinned_vertices
+        if self._works is None and not np.array_equal(at.positions[held], self._first.positions[held]):
             self.why_not = "pinned vertices move, which does work"
-        elif not np.array_equal(at.poses, self._first.poses):
+        elif self._works is None and not np.array_equal(at.poses, self._first.poses):
             self.why_not = "obstacles move, which does work"
         else:
-            m, v = recording.masses, at.velocities
-            elastic = at.elastic_energy
-            if elastic is None:
-                elastic = float(recording.series("elastic_energy")[at.number])
-            moved = 0.5 * float(m @ np.einsum("ij,ij->i", v, v)) + elastic + (at.stitch_energy or 0.0)
-            fallen = at.positions - self._first.positions
-            self._rows.append((at.number, moved, -float((m @ fallen) @ recording.gravity)))
+            self._rows.append((at.number, *moved_and_height(at, self._first)))
 
     def result(self) -> CheckResult:
         if self.why_not is not None:
             return super().result()
         recording = self.scene.recording
-        _, stored, height = np.array(self._rows).T
-        weight = float(recording.masses.sum() * np.linalg.norm(recording.gravity))
-        scale = float(stored.max() + np.ptp(height)) + _FLOOR * weight * self.scene.size + 1e-300
-        work = _work_of_actuators(recording)[[number for number, _, _ in self._rows]]
-        scale += float(np.abs(work).max())
+        numbers, stored, height = np.array(self._rows).T
+        work = np.zeros(len(numbers))
+        if self._works is not None:
+            work = np.cumsum(sum(self._works.values(), np.zeros(len(recording))))[numbers.astype(int)]
+        scale = energy_scale(self.scene, stored, height) + float(np.abs(work).max())
         gains = (stored + height - stored[0] - height[0] - (work - work[0])) / scale
         for (number, _, _), gain in zip(self._rows, gains, strict=True):
             self.tally.see(recording[number], float(gain), not gain <= self.settings.max_energy_gain)
         return super().result()
 
 
-def _work_of_actuators(recording: Recording) -> NDArray[np.float64]:
-    """(frames,) the work of all cavities since the start, as it was recorded [J]."""
-    recorded = [field.name for field in recording.details.fields if field.name in ACTUATOR_WORKS]
-    each = (recording.frame_values(f"details/{name}").sum(axis=1) for name in recorded)
-    return np.cumsum(sum(each, np.zeros(len(recording))))
+class Balance(FrameCheck):
+    """The energy of the positions and velocities changes by the sum of the recorded works, frame by frame."""
+
+    name = "balance"
+    good = "works close the balance of energy within {worst}"
+    bad = "works miss the change of energy by {worst}"
+
+    def begin(self) -> None:
+        recording = self.scene.recording
+        self._works = recorded_works(recording, numerical=True)
+        if self._works is None:
+            self.why_not = "the recording does not contain works"
+        self._first: Snapshot | None = None
+        self._rows: list[tuple[int, float, float]] = []
+
+    def see(self, at: Snapshot) -> None:
+        self._first = self._first or at
+        self._rows.append((at.number, *moved_and_height(at, self._first)))
+
+    def result(self) -> CheckResult:
+        if self.why_not is not None or self._works is None:
+            return super().result()
+        recording = self.scene.recording
+        numbers, stored, height = np.array(self._rows).T
+        rows = numbers.astype(int)
+        residual = recording.frame_values("details/energy_residual")
+        each = np.array([*self._works.values(), residual])
+        sums, sizes = np.cumsum(each.sum(axis=0))[rows], np.cumsum(np.abs(each).sum(axis=0))[rows]
+        scale = energy_scale(self.scene, stored, height) + sizes + stiffness_scale(recording)
+        open_ = np.abs(stored + height - stored[0] - height[0] - (sums - sums[0])) / scale
+        left = np.abs(np.cumsum(residual)[rows]) / scale
+        for number, miss, rest in zip(rows, open_, left, strict=True):
+            at = recording[int(number)]
+            self.tally.see(at, float(miss), not miss <= _CLOSED)
+            if not rest <= self.settings.max_energy_gain:
+                self.tally.see(at, float(rest), True, "forces that are not balanced")
+        for kind, names in (("cavities", "cavity_work"), ("cables", "cable_work")):
+            if kind in self._works:
+                apart = np.abs(recording.frame_values(f"details/{names}").sum(axis=1) - self._works[kind])
+                worst = int(np.argmax(apart))
+                share = float(apart[worst] / scale.max())
+                self.tally.see(recording[worst], share, not share <= _CLOSED, f"work of {kind}")
+        return super().result()
+
+
+def recorded_works(recording: Recording, numerical: bool = False) -> dict[str, NDArray[np.float64]] | None:
+    """By name, (frames,) [J], without what is numerical; None where the recording has none."""
+    for field in recording.details.fields:
+        if field.name == "work" and field.keys:
+            values = recording.frame_values("details/work").T
+            named = dict(zip(field.keys, values, strict=True))
+            return {name: work for name, work in named.items() if numerical or name != "numerical"}
+    return None
+
+
+def moved_and_height(at: Snapshot, first: Snapshot) -> tuple[float, float]:
+    """The kinetic, elastic and stitch energy of a frame, and the potential one since the first [J]."""
+    recording = at.scene.recording
+    m, v = recording.masses, at.velocities
+    elastic = at.elastic_energy
+    if elastic is None:
+        elastic = float(recording.series("elastic_energy")[at.number])
+    stitches = at.stitch_energy
+    if stitches is None:
+        stitches = float(recording.series("stitch_energy")[at.number])
+    moved = 0.5 * float(m @ np.einsum("ij,ij->i", v, v)) + elastic + stitches
+    return moved, -float((m @ (at.positions - first.positions)) @ recording.gravity)
+
+
+def energy_scale(scene: Scene, stored: NDArray[np.float64], height: NDArray[np.float64]) -> float:
+    """The energy in motion [J], never below round-off."""
+    weight = float(scene.recording.masses.sum() * np.linalg.norm(scene.recording.gravity))
+    return float(stored.max() + np.ptp(height)) + _FLOOR * weight * scene.size + 1e-300

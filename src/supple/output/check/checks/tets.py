@@ -6,6 +6,7 @@ import numpy as np
 
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.materials.stable_neo_hookean import StableNeoHookean
+from supple.output.check.elastic_energy import growth_of
 from supple.output.check.frame_check import FrameCheck
 from supple.output.check.geometry import quadratic_tets
 from supple.output.check.geometry.orientation import volume_signs
@@ -67,7 +68,7 @@ class Inversion(FrameCheck):
 
 
 class Volume(FrameCheck):
-    """The change of each body's volume from that at rest."""
+    """The change of each body's volume from that of its stress-free shape."""
 
     name = "volume"
     good = "largest change {worst} of a body's volume"
@@ -97,6 +98,7 @@ class Volume(FrameCheck):
 
     def see(self, at: Snapshot) -> None:
         for k, body in enumerate(self.scene.recording.bodies):
-            volume = float(self.scene.recording.rest_volumes[body.tets] @ at.J[body.tets])
-            change = abs(volume / self._rest[k] - 1.0)
+            volumes = self.scene.recording.rest_volumes[body.tets]
+            rest = float(volumes @ growth_of(at.active, len(at.J))[1][body.tets]) if at.active else self._rest[k]
+            change = abs(float(volumes @ at.J[body.tets]) / rest - 1.0)
             self.tally.see(at, change, not change <= self._limits[k], body.name)

@@ -1,0 +1,78 @@
+"""Growth: a prescribed stretch of the stress-free shape, as of swelling or heat."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from supple.errors import SceneError
+from supple.materials.edges_and_volume import EdgesAndVolume
+from supple.scene.body import PlacedBody
+from supple.scene.loads.load import OnBody, body_of
+from supple.scene.loads.over_time import OverTime, checked_magnitude
+from supple.scene.loads.tet_region import TetRegion, checked_directions, checked_tets, directions_of, tets_in
+from supple.scene.rigid.rigid_body import RigidBody
+
+
+@dataclass(frozen=True, eq=False)
+class Growth(OnBody):
+    """Tets whose stress-free shape is stretched: F = F_e F_g, and stresses are those of F_e.
+
+    Several growths of the same tets multiply. The mass stays.
+
+    Parameters
+    ----------
+    body : name of the soft body.
+    stretch : of lengths, above zero [-]; a number, a `Curve`, or a function of time [s]. For heat, 1 + alpha (T - T0).
+    direction : None for all directions alike; (3,) for one, or (m, 3) for one of each tet, in the body's own
+        coordinates; of any length [-].
+    tets : None for all tets of the body, an `InBox` that holds all four corners of a tet at the start, or rows of the
+        mesh's tets.
+    name : appears in messages.
+
+    Raises
+    ------
+    SceneError : where a value is of the wrong kind or out of range.
+    """
+
+    kind: ClassVar[str] = "growth"
+
+    body: str
+    stretch: OverTime
+    direction: ArrayLike | None = None
+    tets: TetRegion = None
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        self._check_names()
+        object.__setattr__(self, "stretch", checked_magnitude(self.stretch, f"{self.label}: stretch", zero=False))
+        if self.direction is not None:
+            object.__setattr__(self, "direction", checked_directions(self.direction, self.label))
+        object.__setattr__(self, "tets", checked_tets(self.tets, self.label))
+
+    def check(self, bodies: Sequence[PlacedBody]) -> None:
+        self.growing(body_of(self.body, bodies, self.label))
+
+    def growing(self, body: PlacedBody) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """The numbers (m,) of its tets, and their directions at rest (m, 3), or (0, 3) for all directions.
+
+        Raises
+        ------
+        SceneError : where the body is rigid or not elastic, a tet does not exist, or there are other numbers of tets
+            and directions.
+        """
+        if isinstance(body, RigidBody):
+            raise SceneError(f"{self.label}: the body is rigid; growth acts in soft bodies")
+        if isinstance(body.material, EdgesAndVolume):
+            raise SceneError(
+                f"{self.label}: EdgesAndVolume has no deformation gradient that could grow; give the body an elastic "
+                "material such as StableNeoHookean"
+            )
+        rows = tets_in(self.tets, body, self.label)
+        if self.direction is None:
+            return rows, np.zeros((0, 3))
+        return rows, directions_of(self.direction, rows, self.label)

@@ -1,0 +1,82 @@
+"""Tets of a body that a load acts in, and a direction in each of them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from supple.errors import SceneError
+from supple.scene.body import PlacedBody
+from supple.scene.selection import InBox
+from supple.scene.values import float_array
+
+TetRegion = ArrayLike | InBox | None
+
+
+def checked_tets(tets: TetRegion, label: str) -> TetRegion:
+    """None, an `InBox`, or different whole numbers from 0.
+
+    Raises
+    ------
+    SceneError : where it is something else.
+    """
+    if tets is None or isinstance(tets, InBox):
+        return tets
+    rows = np.atleast_1d(np.asarray(tets))
+    if rows.ndim != 1 or rows.size == 0 or not np.issubdtype(rows.dtype, np.integer) or rows.min() < 0:
+        raise SceneError(f"{label}: tets must be a non-empty list of whole numbers from 0, an InBox, or None")
+    if len(np.unique(rows)) != len(rows):
+        raise SceneError(f"{label}: tets names a tet twice; name each once")
+    return rows.astype(np.int64)
+
+
+def tets_in(tets: TetRegion, body: PlacedBody, label: str) -> NDArray[np.int64]:
+    """The numbers (m,) of the tets: all, those with all four corners in the box at the start, or those given.
+
+    Raises
+    ------
+    SceneError : where there is none, or one does not exist.
+    """
+    count = len(body.mesh.tets)
+    if tets is None:
+        return np.arange(count)
+    if isinstance(tets, InBox):
+        inside = np.zeros(len(body.mesh.vertices), dtype=bool)
+        inside[tets.select(body.place(body.mesh.vertices))] = True
+        rows = np.flatnonzero(inside[body.mesh.tets].all(axis=1))
+        if len(rows) == 0:
+            raise SceneError(f"{label}: its box holds no tet; make it larger, or give numbers of tets")
+        return rows
+    rows = np.asarray(tets)
+    if rows.max() >= count:
+        raise SceneError(f"{label}: tet {rows.max()} does not exist; the body has {count}")
+    return rows
+
+
+def checked_directions(direction: ArrayLike, label: str) -> NDArray[np.float64]:
+    """(3,) or (m, 3) unit vectors.
+
+    Raises
+    ------
+    SceneError : where the shape is another one, or a vector is zero or not finite.
+    """
+    given = float_array(direction, f"{label}: direction", "give three numbers, or three for each tet")
+    if given.shape != (3,) and (given.ndim != 2 or given.shape[1] != 3):
+        raise SceneError(f"{label}: direction has shape {given.shape}; give (3,), or (m, 3) for m tets")
+    lengths = np.linalg.norm(given, axis=-1)
+    if not (np.isfinite(lengths).all() and (lengths > 0.0).all()):
+        raise SceneError(f"{label}: direction is zero or not finite; give vectors of any length above zero")
+    return given / lengths[..., None]
+
+
+def directions_of(direction: ArrayLike, rows: NDArray[np.int64], label: str) -> NDArray[np.float64]:
+    """(m, 3) one direction for each of the tets.
+
+    Raises
+    ------
+    SceneError : where there is another number of directions.
+    """
+    directions = np.asarray(direction)
+    if directions.ndim == 2 and len(directions) != len(rows):
+        raise SceneError(f"{label}: there are {len(directions)} directions for {len(rows)} tets; give one each")
+    return np.broadcast_to(directions, (len(rows), 3))
