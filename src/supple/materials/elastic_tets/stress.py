@@ -23,7 +23,7 @@ from supple.materials.flows.internal import add_densities, add_piolas
 from supple.materials.isotropic import piolas
 from supple.materials.laws.pointwise import densities_at, piolas_at
 from supple.materials.patches.domains import Patches
-from supple.materials.patches.energy import tet_shares, vertex_states
+from supple.materials.patches.energy import star_states, tet_shares
 from supple.numerics.deformation import deformation_gradients, determinants
 from supple.numerics.quadratic_tets.bernstein import determinant_coefficients
 from supple.numerics.threads import threads_for
@@ -75,7 +75,7 @@ def first_piolas(
 
 
 def _of_patches(patches: Patches, x: NDArray[np.float64], F: NDArray[np.float64]) -> NDArray[np.float64]:
-    edges, vertices = patches.edges, patches.vertices
+    edges = patches.edges
     numbers = edges.of_tet.ravel()
     shares = np.repeat(patches.tet_volumes / 6.0, 6)
     means = np.empty((len(edges.volumes), 9))
@@ -86,9 +86,8 @@ def _of_patches(patches: Patches, x: NDArray[np.float64], F: NDArray[np.float64]
         piolas(means.reshape(-1, 3, 3), edges.kind, edges.mu, edges.lam, P)
         for part in edges.laws:
             P[part.rows] += part.law.models(means[part.rows].reshape(-1, 3, 3), part.parameters, False, False)[1]
-        pressures = vertex_states(patches, x)[1]
-    mean_pressure = pressures[vertices.of_tet].mean(axis=1)
-    return P[edges.of_tet].mean(axis=1) + mean_pressure[:, None, None] * cofactors(F)
+        pressures = star_states(patches, x)[1][patches.stars.of_tet]
+    return P[edges.of_tet].mean(axis=1) + pressures[:, None, None] * cofactors(F)
 
 
 def mean_deformation_gradients(laws: TetLaws, x: NDArray[np.float64]) -> NDArray[np.float64]:

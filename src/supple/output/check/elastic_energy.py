@@ -8,6 +8,7 @@ from scipy import sparse
 
 from supple.materials.isotropic import densities, rest_lame_parameters
 from supple.materials.kinds import needs_positive_volume
+from supple.materials.patches.domains import partition, volume_share
 from supple.materials.per_tet import BY_LAW, NO_REGION, LawTets, TetMaterial
 from supple.materials.tet_energies import element_energies
 from supple.numerics.threads import threads_for
@@ -107,10 +108,10 @@ def _of_body(part: LawTets, tets: slice) -> LawTets:
 
 
 def _averaged(tets, volumes, F, J, laws, by_law: LawTets | None) -> float:
-    """The energy of one region's tets, averaged over edges and vertices (see `materials.patches`)."""
+    """The energy of one region's tets, averaged over edges and stars (see `materials.patches`)."""
     kind, mu, lam = laws
     mu_L, lam_L = rest_lame_parameters(TetMaterial(mu, mu, kind, mu, lam, kind))
-    rest = np.maximum(lam_L - mu_L, 0.0)
+    rest = volume_share(mu_L, lam_L)
     ends = np.sort(tets[:, _EDGES], axis=2).reshape(-1, 2)
     _, first, edge = np.unique(ends, axis=0, return_index=True, return_inverse=True)
     shares = sparse.coo_array((np.repeat(volumes / 6.0, 6), (edge.ravel(), np.repeat(np.arange(len(tets)), 6)))).tocsr()
@@ -125,12 +126,12 @@ def _averaged(tets, volumes, F, J, laws, by_law: LawTets | None) -> float:
         p[:, by_law.law.bulk] -= rest
         out = by_law.law.densities(F_mean, (shares @ p) / around[:, None])
     total = float(out @ around)
-    quarters = np.repeat(volumes / 4.0, 4)
-    _, first, vertex = np.unique(tets.ravel(), return_index=True, return_inverse=True)
-    around = np.bincount(vertex, weights=quarters)
-    J_mean = np.bincount(vertex, weights=quarters * np.repeat(J, 4)) / around
-    factor = np.bincount(vertex, weights=quarters * np.repeat(rest, 4)) / around
-    logarithmic = needs_positive_volume(kind)[first // 4]
+    star = partition(tets, np.zeros(len(tets), dtype=np.int32), edge.reshape(-1, 6).astype(np.int32))
+    _, first = np.unique(star, return_index=True)
+    around = np.bincount(star, weights=volumes)
+    J_mean = np.bincount(star, weights=volumes * J) / around
+    factor = np.bincount(star, weights=volumes * rest) / around
+    logarithmic = needs_positive_volume(kind)[first]
     with np.errstate(invalid="ignore", divide="ignore"):
         change = np.where(logarithmic, np.log(J_mean), J_mean - 1.0)
     return total + 0.5 * float((around * factor) @ change**2)
