@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.displayed import DisplayedReport, supplied
 from supple.errors import SceneError, SolverError
-from supple.materials.elastic_tets.laws import TetLaws, joined_materials
+from supple.materials.elastic_tets.laws import TetLaws, joined_materials, tet_material
 from supple.materials.elastic_tets.stress import (
     energy_densities,
     mean_deformation_gradients,
@@ -306,7 +306,8 @@ def start_frame(system: System, state: State, index: int, solver: Solver | None)
 
 def _with_internal(scene: Scene, state: State) -> State:
     """The state with the internal variables of the scene's materials, at rest where it has none."""
-    material = joined_materials([body.material.per_tet(len(body.mesh.tets)) for body in scene.bodies])
+    parts = [tet_material(body.material, len(body.mesh.tets), body.mesh.order) for body in scene.bodies]
+    material = joined_materials(parts)
     return replace(state, internal=checked(material, state.internal)) if material.flowing_laws else state
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.edge_springs import cofactors
-from supple.materials.elastic_tets.laws import TetLaws, of_points
+from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.elastic_tets.quadratic import QuadraticTets
 from supple.materials.flows.internal import add_densities, add_piolas
 from supple.materials.isotropic import piolas
@@ -48,7 +48,9 @@ def energy_densities(
         out[laws.patches.rows] = tet_shares(laws.patches, x) / laws.patches.tet_volumes
     add_densities(laws.material, F, internal, out)
     if laws.quadratic is not None:
-        out[laws.quadratic.rows] = quadratic_energies(laws, laws.quadratic, x) / laws.volumes[laws.quadratic.rows]
+        out[laws.quadratic.rows] = (
+            quadratic_energies(laws, laws.quadratic, x, internal) / laws.volumes[laws.quadratic.rows]
+        )
     for springs in laws.springs:
         volumes = laws.volumes[springs.rows]
         out[springs.rows] = springs.energies(x, determinants(F[springs.rows]), volumes) / volumes
@@ -67,7 +69,7 @@ def first_piolas(
         out[laws.patches.rows] = _of_patches(laws.patches, x, F[laws.patches.rows])
     add_piolas(laws.material, F, internal, out)
     if laws.quadratic is not None:
-        out[laws.quadratic.rows] = laws.quadratic.quadrature.means(_at_points(laws, laws.quadratic, x)[1])
+        out[laws.quadratic.rows] = laws.quadratic.quadrature.means(_at_points(laws, laws.quadratic, x, internal)[1])
     for springs in laws.springs:
         own = F[springs.rows]
         out[springs.rows] = springs.first_piolas(x, own, determinants(own), laws.volumes[springs.rows])
@@ -117,31 +119,40 @@ def smallest_ratio(laws: TetLaws, x: NDArray[np.float64], J: NDArray[np.float64]
     return float(smallest.min())
 
 
-def quadratic_energies(laws: TetLaws, tets: QuadraticTets, x: NDArray[np.float64]) -> NDArray[np.float64]:
+def quadratic_energies(
+    laws: TetLaws, tets: QuadraticTets, x: NDArray[np.float64], internal: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """(k,) of every quadratic tet [J]."""
-    F = tets.quadrature.deformation_gradients(x)
-    material = of_points(laws.material, tets.rows, F.shape[1])
-    at_points = densities_at(material, F.reshape(-1, 3, 3)).reshape(tets.quadrature.volumes.shape)
-    return (at_points * tets.quadrature.volumes).sum(axis=1)
+    F = tets.quadrature.deformation_gradients(x).reshape(-1, 3, 3)
+    material, own = laws.at_points(tets, internal)
+    at_points = densities_at(material, F)
+    add_densities(material, F, own, at_points)
+    return (at_points.reshape(tets.quadrature.volumes.shape) * tets.quadrature.volumes).sum(axis=1)
 
 
 def _at_points(
-    laws: TetLaws, tets: QuadraticTets, x: NDArray[np.float64]
+    laws: TetLaws, tets: QuadraticTets, x: NDArray[np.float64], internal: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(k, s, 3, 3) F and first Piola stress at the quadrature points."""
     F = tets.quadrature.deformation_gradients(x)
-    material = of_points(laws.material, tets.rows, F.shape[1])
-    return F, piolas_at(material, F.reshape(-1, 3, 3)).reshape(F.shape)
+    material, own = laws.at_points(tets, internal)
+    P = piolas_at(material, F.reshape(-1, 3, 3))
+    add_piolas(material, F.reshape(-1, 3, 3), own, P)
+    return F, P.reshape(F.shape)
 
 
 def cauchy_of_tets(
-    laws: TetLaws, x: NDArray[np.float64], P: NDArray[np.float64], F: NDArray[np.float64]
+    laws: TetLaws,
+    x: NDArray[np.float64],
+    P: NDArray[np.float64],
+    F: NDArray[np.float64],
+    internal: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """(m, 3, 3) Cauchy stress of every tet at x (n, 3), with its P and F (m, 3, 3) [Pa]."""
+    """(m, 3, 3) Cauchy stress of every tet at x (n, 3), with its P and F (m, 3, 3) [Pa] and internal variables."""
     stresses = cauchy_stresses(P, F)
     if laws.quadratic is not None:
         quadratic = laws.quadratic
-        at, stress = _at_points(laws, quadratic, x)
+        at, stress = _at_points(laws, quadratic, x, internal)
         forces = quadratic.quadrature.means(stress @ np.swapaxes(at, 2, 3))
         J = quadratic.quadrature.means(np.linalg.det(at))
         stresses[quadratic.rows] = 0.5 * (forces + np.swapaxes(forces, 1, 2)) / J[:, None, None]

@@ -37,7 +37,7 @@ def elastic_energy(
     physics = recording.physics
     if physics is None:
         return None
-    total = _flowing(physics, _gradients(x, recording.tets, rest_inverse), recording.rest_volumes, internal)
+    total = _flowing(recording, physics, x, rest_inverse, internal)
     for k, body in enumerate(recording.bodies):
         if not physics.knows_law(k, body.tets):
             return None
@@ -90,14 +90,24 @@ def _gradients(x, tets, rest_inverse):
     return np.einsum("eki,ekj->eij", x_of[:, 1:] - x_of[:, :1], rest_inverse)
 
 
-def _flowing(physics: RecordedPhysics, F, volumes, internal) -> float:
+def _flowing(recording: Recording, physics: RecordedPhysics, x, rest_inverse, internal) -> float:
     """The energy of what is left of F after flow, F F_i^-1."""
     total, begin = 0.0, 0
+    F = _gradients(x, recording.tets, rest_inverse)[:, None]
+    parts = recording.rest_volumes[:, None]
     for part in physics.laws:
-        if part.flow is not None:
-            inverse = internal[begin : begin + len(part.rows), :9].reshape(-1, 3, 3)
-            total += float(volumes[part.rows] @ part.law.densities(F[part.rows] @ inverse, part.parameters))
-            begin += len(part.rows)
+        if part.flow is None:
+            continue
+        of, volumes = F[part.rows], parts[part.rows]
+        if part.points > 1 and recording.quadratic is not None:
+            rows, all_nodes = recording.quadratic
+            nodes = all_nodes[np.searchsorted(rows, part.rows)]
+            of, volumes = at_quadrature_points(x[nodes], recording.rest_positions[nodes])
+        inverse = internal[begin : begin + volumes.size, :9].reshape(*volumes.shape, 3, 3)
+        for point in range(part.points):
+            psi = part.law.densities(of[:, point] @ inverse[:, point], part.parameters)
+            total += float(volumes[:, point] @ psi)
+        begin += volumes.size
     return total
 
 
