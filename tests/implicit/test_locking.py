@@ -130,7 +130,9 @@ def pressure_jump(cells, material, sideways):
     ends = np.flatnonzero(np.abs(vertices[:, 1]) > 0.5 - 1e-9)
     move = vertices[ends] * [sideways, -0.3, sideways]
     scene = sp.Scene([sp.Body("b", mesh, material)], pins=[sp.Pin("b", ends, lambda t: t * move)], gravity=(0, 0, 0))
-    pressure = -np.trace(equilibrium(scene).stress["b"], axis1=1, axis2=2) / 3.0
+    frame = equilibrium(scene)
+    assert frame.report.iterations < 60  # 279 with the whole term of pressure projected tet by tet
+    pressure = -np.trace(frame.stress["b"], axis1=1, axis2=2) / 3.0
     tet, facet = np.nonzero(mesh.adjacency >= 0)
     jumps = np.abs(pressure[tet] - pressure[mesh.adjacency[tet, facet]])
     return jumps.mean() / abs(np.average(pressure, weights=mesh.volumes))

@@ -44,9 +44,9 @@ class PatchElasticity(JointlyEvaluated):
     def add_model(
         self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
     ) -> float:
-        """With `project`, the Hessian is the sum of the projections of the edges' energies and of the products of
-        volume gradients. The pressures' second derivatives are left out: within a star those of its inner facets
-        cancel, so that the sum of their projections tet by tet is far too stiff."""
+        """With `project`, the Hessian is the sum of the projections of the edges' energies, of the products of volume
+        gradients, and of half of the pressures' second derivatives: within a star those of its inner facets cancel, so
+        that the sum of all their projections, tet by tet, is far too stiff. Without any, it is too soft."""
         patches, edges, stars = self.patches, self.patches.edges, self.patches.stars
         second = hessian is not None
         energies, forces = np.empty(len(edges.volumes)), np.empty((len(edges.vertices), 3))
@@ -88,10 +88,10 @@ class PatchElasticity(JointlyEvaluated):
     ) -> None:
         patches, stars, pairs = self.patches, self.patches.stars, self.pairs
         pressure, stiffness, of_tets = of_stars
-        if not project:
-            blocks = np.empty((len(patches.tets), 12, 12))
-            pressure_hessians(x, patches.tets, patches.Dm_inv, patches.tet_volumes, pressure, blocks)
-            out.tets[patches.rows] += blocks
+        blocks = np.empty((len(patches.tets), 12, 12))
+        acting = 0.5 * pressure if project else pressure
+        pressure_hessians(x, patches.tets, patches.Dm_inv, patches.tet_volumes, acting, project, blocks)
+        out.tets[patches.rows] += blocks
         directions = np.empty((len(stars.vertices), 3))
         slot_gradients(stars.tet_start, stars.tets, stars.start, stars.slots, of_tets, directions)
         sums = np.empty((len(pairs.rows), 3, 3))

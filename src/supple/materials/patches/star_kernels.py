@@ -8,7 +8,7 @@ With J_a the mean of J over a patch and v_e the volume of tet e,
 
 from __future__ import annotations
 
-from supple.materials.isotropic import volume_term
+from supple.materials.isotropic import nearest_semidefinite, volume_term
 from supple.materials.tet_energies import deformation_gradient, edge_matrix, put_gradient, put_hessian
 from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import cross, det, load_mat
@@ -53,12 +53,17 @@ def slot_gradients(tet_start, patch_tets, start, slots, of_tets, out):
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def pressure_hessians(x, tets, Dm_inv, volumes, pressures, out):
+def pressure_hessians(x, tets, Dm_inv, volumes, pressures, project, out):
     """p_e d^2 v_e of every tet into out (m, 12, 12); in principal stretches, p d^2 J is p s_k between the stretches i
     and j, -p s_k against an in-plane change of shape and p s_k against a twist."""
     for e in prange(len(tets)):
         U, s, V = decompose(deformation_gradient(x, tets, Dm_inv, e))
         p = pressures[e]
         a, b, c = p * s[0], p * s[1], p * s[2]
-        A, beta = (0.0, 0.0, 0.0, a, b, c), (-a, -b, -c)
-        put_hessian(U, A, (0.0, 0.0, 0.0), beta, V, load_mat(Dm_inv, e), volumes[e], out, e)
+        A = (0.0, 0.0, 0.0, a, b, c)
+        if project:
+            A = nearest_semidefinite(A)
+            alpha, beta = (0.5 * abs(a), 0.5 * abs(b), 0.5 * abs(c)), (-0.5 * a, -0.5 * b, -0.5 * c)
+        else:
+            alpha, beta = (0.0, 0.0, 0.0), (-a, -b, -c)
+        put_hessian(U, A, alpha, beta, V, load_mat(Dm_inv, e), volumes[e], out, e)
