@@ -306,8 +306,7 @@ def start_frame(system: System, state: State, index: int, solver: Solver | None)
 
 def _with_internal(scene: Scene, state: State) -> State:
     """The state with the internal variables of the scene's materials, at rest where it has none."""
-    parts = [tet_material(body.material, len(body.mesh.tets), body.mesh.order) for body in scene.bodies]
-    material = joined_materials(parts)
+    material = joined_materials([tet_material(b.material, len(b.mesh.tets), b.mesh.order) for b in scene.bodies])
     return replace(state, internal=checked(material, state.internal)) if material.flowing_laws else state
 
 
