@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.displayed import DisplayedReport, supplied
 from supple.errors import SceneError, SolverError
-from supple.materials.elastic_tets.laws import TetLaws, joined_materials
+from supple.materials.elastic_tets.laws import TetLaws, joined_materials, tet_material
 from supple.materials.flows.internal import checked
 from supple.numerics.memory import require_memory
 from supple.readings.actuator_readings import CableReading, CavityReading, cable_readings, cavity_readings
@@ -287,7 +287,7 @@ def start_frame(system: System, state: State, index: int, solver: Solver | None)
 
 def _with_internal(scene: Scene, state: State) -> State:
     """The state with the internal variables of the scene's materials, at rest where it has none."""
-    material = joined_materials([body.material.per_tet(len(body.mesh.tets)) for body in scene.bodies])
+    material = joined_materials([tet_material(b.material, len(b.mesh.tets), b.mesh.order) for b in scene.bodies])
     return replace(state, internal=checked(material, state.internal)) if material.flowing_laws else state
 
 

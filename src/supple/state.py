@@ -127,8 +127,8 @@ class State:
     memory : what a solver must know of earlier steps (BDF2, contact of XPBD); None for a state that comes from outside.
     inputs : values of the scene's inputs at that time, by name, see `supple.scene.inputs`
     internal : (k, 11) internal variables of materials that flow, in the order of the bodies and of their laws: of each
-        tet and law F_i^-1 of F = F_e F_i (nine numbers), a measure of all flow so far, and the energy dissipated per
-        rest volume [J/m^3]. (0, 11) where nothing flows, or has flowed.
+        law and tet, or point of a quadratic tet, F_i^-1 of F = F_e F_i (nine numbers), a measure of all flow so far,
+        and the energy dissipated per rest volume [J/m^3]. (0, 11) where nothing flows, or has flowed.
     hinge_angles : angles of hinges over all turns [rad], by name; those that are missing are as at a start, see
         `HingeJoint`
     """

@@ -23,7 +23,7 @@ from supple.loads.applied import ActiveLoad, AppliedLoad, DeadLoad
 from supple.loads.build import applied, applied_force
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.elastic_tets.edge_springs import EdgeSprings
-from supple.materials.elastic_tets.laws import TetLaws, joined_materials
+from supple.materials.elastic_tets.laws import TetLaws, joined_materials, tet_material
 from supple.materials.elastic_tets.quadratic import QuadraticTets
 from supple.mesh.topology import graph_components
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
@@ -166,7 +166,7 @@ class System:
     @cached_property
     def laws(self) -> TetLaws:
         """The elastic laws of all tets."""
-        materials = [part.body.material.per_tet(part.tets.stop - part.tets.start) for part in self.bodies]
+        materials = [tet_material(p.body.material, p.tets.stop - p.tets.start, p.body.mesh.order) for p in self.bodies]
         springs = []
         for part in self.bodies:
             law, rows = part.body.material, part.tets

@@ -7,9 +7,7 @@ import supple as sp
 from supple.errors import SolverError
 from supple.implicit.solver import Implicit
 from supple.materials.neo_hookean import NeoHookean
-from supple.materials.patches.energy import vertex_states
 from supple.scene.forces import Force
-from supple.system import build_system
 
 STATIC = Implicit(integrator="static", contact=None)
 COOK_LOAD = 1e-4
@@ -48,7 +46,7 @@ def cook_deflection(cells, material):
     return moved[corner, 1].mean() / COOK_LOAD
 
 
-@pytest.mark.parametrize(("poisson", "converged", "error"), [(1 / 3, 25.0, 0.03), (0.499, 24.9, 0.055)])
+@pytest.mark.parametrize(("poisson", "converged", "error"), [(1 / 3, 25.0, 0.03), (0.499, 24.9, 0.03)])
 def test_cooks_membrane(poisson, converged, error):
     """`converged` is extrapolated (docs/locking.md)."""
     assert cook_deflection(16, rubber(poisson)) == pytest.approx(converged, rel=error)
@@ -119,34 +117,32 @@ def test_convergence_order():
     assert np.log2(errors[0] / errors[1]) > 1.75
 
 
-def test_pressure_of_a_compressed_block_has_no_checkerboard():
-    """Compressed by 30 % between smooth plates at nu = 0.4999: the jump of pressure between neighbours."""
-    unit = sp.shapes.box((1, 1, 1), (5, 5, 5))
-    rng = np.random.default_rng(1)
-    hull = np.unique(unit.surface.triangles)
-    inner = np.setdiff1d(np.arange(len(unit.vertices)), hull)
+def pressure_jump(cells, material, sideways):
+    """Mean jump of pressure between neighbours over the mean pressure, of a block that is compressed by 30 %.
+
+    The vertices of its plates move sideways by this share of their places.
+    """
+    unit = sp.shapes.box((1, 1, 1), (cells, cells, cells))
+    inner = np.setdiff1d(np.arange(len(unit.vertices)), np.unique(unit.surface.triangles))
     vertices = unit.vertices.copy()
-    vertices[inner] += 0.04 * rng.uniform(-1, 1, (len(inner), 3))
+    vertices[inner] += 0.2 / cells * np.random.default_rng(1).uniform(-1, 1, (len(inner), 3))
     mesh = sp.TetMesh(vertices, unit.tets)
     ends = np.flatnonzero(np.abs(vertices[:, 1]) > 0.5 - 1e-9)
-    # Plates that let the block slide: their vertices follow the exact, isochoric motion.
-    wide = 0.7**-0.5
-    move = vertices[ends] * [wide - 1, -0.3, wide - 1]
-    body = sp.Body("block", mesh, rubber(0.4999))
-    scene = sp.Scene([body], pins=[sp.Pin("block", ends, lambda t: t * move)], gravity=(0, 0, 0))
-    system = build_system(scene)
-    patches = system.laws.patches
-    assert patches is not None
-    x = equilibrium(scene, steps=1).positions["block"]
-    _, pressures, _ = vertex_states(patches, x)
-    of_tets = pressures[patches.vertices.of_tet].mean(axis=1)
-    faces = {}
-    for e, tet in enumerate(mesh.tets):
-        for k in range(4):
-            faces.setdefault(tuple(sorted(np.delete(tet, k))), []).append(e)
-    pairs = np.array([pair for pair in faces.values() if len(pair) == 2])
-    jumps = np.abs(of_tets[pairs[:, 0]] - of_tets[pairs[:, 1]])
-    assert jumps.mean() < 0.05 * abs(of_tets.mean())
+    move = vertices[ends] * [sideways, -0.3, sideways]
+    scene = sp.Scene([sp.Body("b", mesh, material)], pins=[sp.Pin("b", ends, lambda t: t * move)], gravity=(0, 0, 0))
+    frame = equilibrium(scene)
+    assert frame.report.iterations < 60  # 279 with the whole term of pressure projected tet by tet
+    pressure = -np.trace(frame.stress["b"], axis1=1, axis2=2) / 3.0
+    tet, facet = np.nonzero(mesh.adjacency >= 0)
+    jumps = np.abs(pressure[tet] - pressure[mesh.adjacency[tet, facet]])
+    return jumps.mean() / abs(np.average(pressure, weights=mesh.volumes))
+
+
+def test_pressure_of_a_compressed_block_has_no_checkerboard():
+    """At nu = 0.4999. Between smooth plates it is constant; near bonded plates it varies (docs/locking.md)."""
+    assert pressure_jump(5, rubber(0.4999), 0.7**-0.5 - 1.0) < 0.05
+    assert pressure_jump(5, rubber(0.4999), 0.0) < 0.3
+    assert pressure_jump(5, rubber(0.4999, "tets"), 0.0) > 4.0
 
 
 def test_a_fall_is_recorded_and_checked(tmp_path):

@@ -4,10 +4,16 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy import sparse
+from scipy.sparse.linalg import spsolve
 
 import supple as sp
+from supple.implicit.energies.elasticity import elasticity_of
+from supple.implicit.energies.loads.external_forces import total_forces
+from supple.implicit.energies.potential import HessianBlocks
 from supple.numerics.quadratic_tets.shape_functions import conical_rule, reference_gradients, shape_functions
 from supple.scene.forces import Force
+from supple.system import build_system
 
 STATIC = sp.Implicit(integrator="static", contact=None)
 SOFT = sp.StableNeoHookean(youngs=1e4, poisson=0.4, density=1000.0, damping=0.01)
@@ -67,6 +73,41 @@ def test_cantilever():
     assert len(mesh.tets) == 1080
     share = deflection / (4 * load * length**3 / (youngs * side**4) + shear)
     assert share == pytest.approx(0.9935, abs=0.003)
+
+
+def test_cantilever_with_the_support_of_the_theory():
+    """Plane at the wall, but free to contract sideways, under the shear of the load: 99.5 % with 336 tets."""
+    length, side, nu = 1.0, 0.1, 0.3
+    linear = sp.shapes.box((1, side, side), (14, 2, 2))
+    x = linear.vertices.copy()
+    x[:, 0] = length * (x[:, 0] + 0.5) ** 1.5
+    mesh = sp.TetMesh(x, linear.tets).to_order(2)
+    x, triangles = mesh.vertices, mesh.surface.triangles
+    loads = []
+    for at, sign in ((length, -1.0), (0.0, 1.0)):
+        rows = np.flatnonzero((np.abs(x[triangles][:, :, 0] - at) < 1e-9).all(axis=1))
+        loads.append(sp.Traction("bar", (0, sign / side**2, 0), rows))
+    material = sp.StableNeoHookean(youngs=1.0, poisson=nu)
+    system = build_system(sp.Scene([sp.Body("bar", mesh, material)], loads=loads, gravity=(0, 0, 0)))
+    blocks, n = HessianBlocks.zeros(len(mesh.tets), len(x)), len(x)
+    elasticity_of(system).add_hessian(x, blocks, False)
+    (part,) = blocks.patches
+    i, j = np.indices((3, 3))
+    rows, columns = 3 * part.rows[:, None, None] + i, 3 * part.columns[:, None, None] + j
+    K = sparse.coo_array((part.blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * n, 3 * n)).tocsc()
+    K = (sparse.triu(K) + sparse.triu(K, 1).T).tocsc()
+    wall = np.flatnonzero(np.abs(x[:, 0]) < 1e-9)
+    middle = wall[np.argmin(np.abs(x[wall, 1:]).max(axis=1))]
+    edge = wall[np.argmin(np.abs(x[wall, 1:] - [0.0, side / 2]).max(axis=1))]
+    held = np.concatenate([3 * wall, [3 * middle + 1, 3 * middle + 2, 3 * edge + 1]])
+    free = np.setdiff1d(np.arange(3 * n), held)
+    force = total_forces(system, x, 0.0)
+    moved = np.zeros(3 * n)
+    moved[free] = spsolve(K[free][:, free], force.ravel()[free])
+    work = (moved.reshape(-1, 3) * force).sum()
+    kappa = 10 * (1 + nu) / (12 + 11 * nu)
+    theory = 4 * length**3 / side**4 + length / (kappa * side**2 / (2 * (1 + nu)))
+    assert work == pytest.approx(theory, rel=0.002)
 
 
 def test_torsion_constant_at_three_elements_across():
@@ -130,7 +171,10 @@ def manufactured_errors(n):
     )
 
 
-def test_manufactured_solution_converges_with_orders_three_and_two():
-    (coarse, coarse_slope), (fine, fine_slope) = manufactured_errors(3), manufactured_errors(6)
-    assert np.log2(coarse / fine) > 2.8
-    assert np.log2(coarse_slope / fine_slope) > 1.85
+@pytest.mark.parametrize(
+    ("cells", "orders"), [((3, 6), (2.9, 1.8)), pytest.param((8, 12), (2.97, 1.96), marks=pytest.mark.slow)]
+)
+def test_manufactured_solution_converges_with_orders_three_and_two(cells, orders):
+    coarse, fine = (np.array(manufactured_errors(n)) for n in cells)
+    slopes = np.log(coarse / fine) / np.log(cells[1] / cells[0])
+    assert (slopes > orders).all()

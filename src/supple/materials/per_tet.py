@@ -85,12 +85,14 @@ class LawTets:
     rows : (k,) numbers of the tets
     parameters : (k, q) of the law
     flow : how the tets flow; None where they are elastic
+    points : at how many points of each tet the law is evaluated; what flows has internal variables at each of them
     """
 
     law: Law
     rows: NDArray[np.int64]
     parameters: NDArray[np.float64]
     flow: Flow | None = None
+    points: int = 1
 
     def of(self, rows: NDArray[np.int64], parameters: NDArray[np.float64]) -> LawTets:
         """The same law for other tets."""
@@ -134,12 +136,13 @@ class TetMaterial:
 
     @property
     def flowing_laws(self) -> tuple[tuple[LawTets, slice], ...]:
-        """Those that flow, each with its rows of the internal variables."""
-        found, begin = [], 0
+        """Those that flow, each with its rows of the internal variables: point after point, tet after tet."""
+        found: list[tuple[LawTets, slice]] = []
+        begin = 0
         for tets in self.laws:
             if tets.flow is not None:
-                found.append((tets, slice(begin, begin + len(tets.rows))))
-                begin += len(tets.rows)
+                found.append((tets, slice(begin, begin + len(tets.rows) * tets.points)))
+                begin = found[-1][1].stop
         return tuple(found)
 
     def with_laws(self, *laws: LawTets) -> TetMaterial:

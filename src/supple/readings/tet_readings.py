@@ -70,7 +70,8 @@ class TetReadings(DisplayedFrame, ABC):
     def stress(self) -> TetField:
         """Cauchy stress P F^T / J (m, 3, 3) [Pa]: force per area as it is, symmetric."""
         with np.errstate(all="ignore"):
-            return self._field(cauchy_of_tets(self._laws, self._x, self.first_piola.values_of_all, self._F), "stress")
+            P = self.first_piola.values_of_all
+            return self._field(cauchy_of_tets(self._laws, self._x, P, self._F, self._internal), "stress")
 
     @cached_property
     def von_mises(self) -> TetField:
@@ -107,7 +108,7 @@ class TetReadings(DisplayedFrame, ABC):
         internal = checked(material, self._internal)
         for tets, rows in material.flowing_laws:
             if chosen(tets):
-                out[tets.rows] += internal[rows, column]
+                out[tets.rows] += self._laws.means(tets, internal[rows, column])
         return TetField(out, self._bodies, self._refused_of_rigid, self._to_vertices)
 
     @cached_property

@@ -11,11 +11,13 @@ from supple.implicit.energies.inversion_barrier import inversion_barrier
 from supple.implicit.energies.potential import HessianBlocks
 from supple.materials.fixed_corotated import FixedCorotated
 from supple.materials.neo_hookean import NeoHookean
+from supple.materials.patches.stars import star_patches
 from supple.system import build_system
 
+EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 MESH = sp.shapes.box((0.3, 0.2, 0.2), (2, 2, 2))
 MATERIALS = [sp.StableNeoHookean, NeoHookean, FixedCorotated]
-RATIOS = [0.1, 0.49]  # without and with energies of vertex patches
+RATIOS = [0.1, 0.49]  # without and with energies of stars
 
 
 def energy_of(material, mesh=MESH):
@@ -106,6 +108,25 @@ def test_no_force_at_rest_and_none_on_the_whole():
     g = gradient_of(energy, x)
     assert np.abs(g.sum(axis=0)).max() < 1e-12 * np.abs(g).sum()
     assert np.abs(np.cross(x, g).sum(axis=0)).max() < 1e-12 * np.abs(g).sum()
+
+
+@pytest.mark.parametrize("cells", [(1, 1, 1), (16, 1, 1), (12, 4, 1), (5, 5, 5)])
+def test_stars_are_connected_and_of_like_size(cells):
+    """Thin bodies have no vertex with twelve tets around it; nothing is left over, and nothing grows along them."""
+    mesh = sp.shapes.box(cells, cells)
+    edges = np.sort(mesh.tets[:, EDGES], axis=2).reshape(-1, 2)
+    numbers = np.unique(edges, axis=0, return_inverse=True)[1].reshape(-1, 6).astype(np.int32)
+    star = star_patches(mesh.tets.astype(np.int32), numbers)
+    sizes = np.bincount(star)
+    assert sizes.min() >= min(6, len(star))
+    assert sizes.max() <= 48
+    for k in range(len(sizes)):
+        own = [set(row) for row in mesh.tets[star == k]]
+        found = own.pop()
+        while touching := [row for row in own if row & found]:
+            own = [row for row in own if not row & found]
+            found = found.union(*touching)
+        assert not own
 
 
 def test_patches_do_not_reach_into_another_region():

@@ -15,7 +15,8 @@ from supple.implicit.energies.potential import HessianBlocks, JointlyEvaluated, 
 from supple.implicit.energies.quadratic.gathering import Gathering
 from supple.implicit.energies.quadratic.term import OfQuadraticTets, VirtualTets
 from supple.materials.elastic_tets.laws import of_points
-from supple.materials.elastic_tets.quadratic import QuadraticTets
+from supple.materials.elastic_tets.quadratic import QUADRATURE_POINTS, QuadraticTets
+from supple.materials.flows.internal import rows_of_points
 from supple.materials.material import Hyperelastic
 from supple.materials.patches.energy import tet_shares
 from supple.materials.per_tet import BY_LAW, NO_REGION, TetMaterial
@@ -32,24 +33,41 @@ SERIAL_TETS = 2_000
 
 @dataclass(frozen=True, eq=False)
 class QuadraticElasticity(OfQuadraticTets):
-    """The energy of the quadratic tets `rows` (k,), at their quadrature points."""
+    """The energy of the quadratic tets `rows` (k,), at their quadrature points.
+
+    Attributes
+    ----------
+    internal : the rows of the internal variables of all tets that belong to these points
+    """
 
     rows: NDArray[np.int64]
     at_points: Elasticity
+    internal: NDArray[np.int64]
 
     @classmethod
     def of(cls, tets: QuadraticTets, material: TetMaterial, vertices: int) -> QuadraticElasticity:
         """With the material (m,) of all tets; `vertices` : their number."""
         virtual = VirtualTets(tets.quadrature, Gathering.of(tets.nodes, vertices))
-        own = of_points(material, tets.rows, tets.quadrature.volumes.shape[1])
+        own = of_points(material, tets.rows, QUADRATURE_POINTS)
         each = np.arange(4 * virtual.count + 1, dtype=np.int32)
         system = virtual.system()
         at_points = Elasticity(system, own, each, each[:-1], laws=_law_elasticity(system, own, own.region == NO_REGION))
-        return cls(at_points, virtual, tets.rows, at_points)
+        return cls(at_points, virtual, tets.rows, at_points, rows_of_points(material))
 
     def energies(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(k,) of each element [J]."""
         return self.at_points.energies(self.virtual.corners(x)).reshape(len(self.rows), -1).sum(axis=1)
+
+    def in_step(self, internal: NDArray[np.float64], h: float) -> QuadraticElasticity:
+        """As of `Elasticity`, with the internal variables of all tets."""
+        if not len(self.internal):
+            return self
+        stepping = self.at_points.in_step(internal[self.internal], h)
+        return replace(self, inner=stepping, at_points=stepping)
+
+    def flowed(self, x: NDArray[np.float64], internal: NDArray[np.float64], h: float) -> NDArray[np.float64]:
+        """The rows `internal` at the end of a step, from the internal variables of all tets."""
+        return self.at_points.flowed(self.virtual.corners(x), internal[self.internal], h)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,11 +134,17 @@ class Elasticity(JointlyEvaluated):
 
     def in_step(self, internal: NDArray[np.float64], h: float) -> Elasticity:
         """The energy of a step of h [s] from these internal variables (k, 11), at whose end its forces act."""
-        return self if self.laws is None else replace(self, laws=self.laws.in_step(internal, h))
+        laws = None if self.laws is None else self.laws.in_step(internal, h)
+        quadratic = None if self.quadratic is None else self.quadratic.in_step(internal, h)
+        return replace(self, laws=laws, quadratic=quadratic)
 
     def flowed(self, x: NDArray[np.float64], internal: NDArray[np.float64], h: float) -> NDArray[np.float64]:
         """(k, 11) the internal variables at the end of a step of h [s] to x (n, 3)."""
-        return internal if self.laws is None else self.laws.flowed(x, internal, h)
+        after = internal if self.laws is None else self.laws.flowed(x, internal, h)
+        if self.quadratic is not None and len(self.quadratic.internal):
+            after = after.copy()
+            after[self.quadratic.internal] = self.quadratic.flowed(x, internal, h)
+        return after
 
     @cached_property
     def own(self) -> NDArray[np.bool_]:
@@ -149,18 +173,13 @@ def elasticity_of(system: System) -> Elasticity:
 
     Raises
     ------
-    SolverError : where a body's material has no elastic energy, or flows in quadratic tets; the text names the body.
+    SolverError : where a body's material has no elastic energy; the text names the body.
     """
     for part in system.bodies:
         if not isinstance(part.body.material, Hyperelastic):
             raise SolverError(
                 f"body {part.name!r}: {type(part.body.material).__name__} is a material for XPBD only; for Implicit, "
                 "give it an elastic one such as StableNeoHookean"
-            )
-        if part.body.mesh.order == 2 and part.body.material.per_tet(part.tets.stop - part.tets.start).flowing_laws:
-            raise SolverError(
-                f"body {part.name!r}: {type(part.body.material).__name__} cannot be simulated with quadratic tets; "
-                "give mesh.to_order(1), or an elastic material"
             )
     start, incidence = incidences(system.tets, len(system.rest_positions))
     patches = None if system.laws.patches is None else PatchElasticity.of(system.laws.patches)
@@ -179,7 +198,7 @@ def _law_elasticity(system: System, material: TetMaterial, own: NDArray[np.bool_
     flowing = [
         (LawElements.of(part, *arrays), part.flow, rows)
         for part, rows in material.flowing_laws
-        if part.flow is not None
+        if part.flow is not None and part.points == 1 and len(part.rows)
     ]
     elements = tuple(each for each in elastic if len(each.rows))
     return LawElasticity(elements, tuple(flowing)) if elements or flowing else None

@@ -11,15 +11,10 @@ from supple.implicit.energies.potential import HessianBlocks, JointlyEvaluated, 
 from supple.materials.laws.isotropic_law import IsotropicLaw
 from supple.materials.patches.domains import Patches
 from supple.materials.patches.edge_kernels import FRAME, add_law_models, edge_models
-from supple.materials.patches.energy import SERIAL_TETS, edge_gradients, patch_energies, vertex_states
+from supple.materials.patches.energy import SERIAL_TETS, edge_gradients, patch_energies, star_states
 from supple.materials.patches.pair_kernel import pair_blocks
 from supple.materials.patches.pairs import Pairs
-from supple.materials.patches.vertex_kernels import (
-    pressure_hessians,
-    slot_gradients,
-    tet_pressures,
-    volume_gradients,
-)
+from supple.materials.patches.star_kernels import pressure_hessians, slot_gradients, volume_gradients
 from supple.numerics.sparse.couplings import Couplings
 from supple.numerics.threads import threads_for
 
@@ -43,20 +38,21 @@ class PatchElasticity(JointlyEvaluated):
         return cls(patches, patches.pairs())
 
     def value(self, x: NDArray[np.float64]) -> float:
-        of_edges, of_vertices = patch_energies(self.patches, x)
-        return float(of_edges.sum() + of_vertices.sum())
+        of_edges, of_stars = patch_energies(self.patches, x)
+        return float(of_edges.sum() + of_stars.sum())
 
     def add_model(
         self, x: NDArray[np.float64], gradient: NDArray[np.float64], hessian: HessianBlocks | None, project: bool
     ) -> float:
-        """With `project`, the Hessian is the sum of the projections of the edges' energies, of the pressures' second
-        derivatives and of the products of volume gradients."""
-        patches, edges, vertices = self.patches, self.patches.edges, self.patches.vertices
+        """With `project`, the Hessian is the sum of the projections of the edges' energies, of the products of volume
+        gradients, and of half of the pressures' second derivatives: within a star those of its inner facets cancel, so
+        that the sum of all their projections, tet by tet, is far too stiff. Without any, it is too soft."""
+        patches, edges, stars = self.patches, self.patches.edges, self.patches.stars
         second = hessian is not None
         energies, forces = np.empty(len(edges.volumes)), np.empty((len(edges.vertices), 3))
         frames = np.empty((len(energies) if second else 0, FRAME))
         turned = np.empty_like(forces) if second else forces[:0]
-        of_tets, pressure = np.empty((len(patches.tets), 4, 3)), np.empty(len(patches.tets))
+        of_tets = np.empty((len(patches.tets), 4, 3))
         law = edges.kind, edges.mu, edges.lam
         with threads_for(len(patches.tets), SERIAL_TETS):
             edge_models(
@@ -71,8 +67,8 @@ class PatchElasticity(JointlyEvaluated):
                     part.rows, edges.start, edges.gradients, edges.volumes, U, V, values, second, project, energies,
                     forces, frames,
                 )  # fmt: skip
-            of_vertices, pressures, stiffness = vertex_states(patches, x)
-            tet_pressures(vertices.of_tet, pressures, pressure)
+            of_stars, pressures, stiffness = star_states(patches, x)
+            pressure = pressures[stars.of_tet]
             volume_gradients(x, patches.tets, patches.Dm_inv, patches.tet_volumes, of_tets)
             if hessian is not None:
                 if project:
@@ -80,27 +76,28 @@ class PatchElasticity(JointlyEvaluated):
                 self._add_hessian(x, (frames, turned), (pressure, stiffness, of_tets), hessian, project)
         _add_by_vertex(edges.vertices, forces, gradient)
         _add_by_vertex(patches.tets.ravel(), (pressure[:, None, None] * of_tets).reshape(-1, 3), gradient)
-        return float(energies.sum() + of_vertices.sum())
+        return float(energies.sum() + of_stars.sum())
 
     def _add_hessian(
         self,
         x: NDArray[np.float64],
         of_edges: tuple[NDArray[np.float64], NDArray[np.float64]],
-        of_vertices: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+        of_stars: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
         out: HessianBlocks,
         project: bool,
     ) -> None:
-        patches, vertices, pairs = self.patches, self.patches.vertices, self.pairs
-        pressure, stiffness, of_tets = of_vertices
+        patches, stars, pairs = self.patches, self.patches.stars, self.pairs
+        pressure, stiffness, of_tets = of_stars
         blocks = np.empty((len(patches.tets), 12, 12))
-        pressure_hessians(x, patches.tets, patches.Dm_inv, patches.tet_volumes, pressure, project, blocks)
+        acting = 0.5 * pressure if project else pressure
+        pressure_hessians(x, patches.tets, patches.Dm_inv, patches.tet_volumes, acting, project, blocks)
         out.tets[patches.rows] += blocks
-        directions = np.empty((len(vertices.vertices), 3))
-        slot_gradients(vertices.tet_start, vertices.tet_nodes, vertices.start, vertices.slots, of_tets, directions)
+        directions = np.empty((len(stars.vertices), 3))
+        slot_gradients(stars.tet_start, stars.tets, stars.start, stars.slots, of_tets, directions)
         sums = np.empty((len(pairs.rows), 3, 3))
         pair_blocks(
-            pairs.rows, pairs.columns, pairs.edge_start, pairs.edge_slots, pairs.vertex_start, pairs.vertex_slots,
-            patches.edges.owner, *of_edges, vertices.owner, stiffness, directions, sums,
+            pairs.rows, pairs.columns, pairs.edge_start, pairs.edge_slots, pairs.star_start, pairs.star_slots,
+            patches.edges.owner, *of_edges, stars.owner, stiffness, directions, sums,
         )  # fmt: skip
         out.patches.append(Couplings(pairs.rows, pairs.columns, sums))
 

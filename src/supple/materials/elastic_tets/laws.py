@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.active import ActiveTets, Growth
 from supple.materials.elastic_tets.edge_springs import EdgeSprings
-from supple.materials.elastic_tets.quadratic import QuadraticTets
+from supple.materials.elastic_tets.quadratic import QUADRATURE_POINTS, QuadraticTets
+from supple.materials.flows.internal import checked, rows_of_points
+from supple.materials.material import Material
 from supple.materials.patches.domains import Patches, patches_of
-from supple.materials.per_tet import NO_REGION, NOT_ELASTIC, TetMaterial
+from supple.materials.per_tet import NO_REGION, NOT_ELASTIC, LawTets, TetMaterial
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +60,18 @@ class TetLaws:
         # Patches must not reach from body to body or into another region of the same body.
         return patches_of(self.tets, self.Dm_inv, self.volumes, self.material)
 
+    def at_points(self, tets: QuadraticTets, internal: NDArray[np.float64]) -> tuple[TetMaterial, NDArray[np.float64]]:
+        """The material of each quadrature point, and the internal variables there, from those of the scene."""
+        own = of_points(self.material, tets.rows, QUADRATURE_POINTS)
+        return own, checked(self.material, internal)[rows_of_points(self.material)]
+
+    def means(self, part: LawTets, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(k,) means over each of the k tets of a law, from values (k s,) at its s points in each."""
+        if self.quadratic is None or part.points == 1:
+            return values
+        volumes = self.quadratic.quadrature.volumes[np.searchsorted(self.quadratic.rows, part.rows)]
+        return (volumes * values.reshape(volumes.shape)).sum(axis=1) / volumes.sum(axis=1)
+
     def vertex_means(self, values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
         """(count, ...) means of values (m, ...) over the tets around each vertex, weighted with their rest volumes.
 
@@ -92,6 +106,14 @@ class TetLaws:
         return stressed
 
 
+def tet_material(material: Material, count: int, order: int) -> TetMaterial:
+    """The material of a body's `count` tets of this order."""
+    rows = material.per_tet(count)
+    if order == 1:
+        return rows
+    return replace(rows, laws=tuple(replace(part, points=QUADRATURE_POINTS) for part in rows.laws))
+
+
 def joined_materials(parts: list[TetMaterial]) -> TetMaterial:
     """The materials of several bodies as one, in their order."""
     names = ("density", "damping", "kind", "mu", "lam", "region")
@@ -114,5 +136,6 @@ def of_points(material: TetMaterial, rows: NDArray[np.int64], points: int) -> Te
     for part in material.laws:
         own = place[part.rows] >= 0
         numbers = place[part.rows[own], None] * points + np.arange(points)
-        laws.append(part.of(numbers.ravel(), np.repeat(part.parameters[own], points, axis=0)))
+        parameters = np.repeat(part.parameters[own], points, axis=0)
+        laws.append(replace(part.of(numbers.ravel(), parameters), points=1))
     return replace(material, **taken, laws=tuple(laws))

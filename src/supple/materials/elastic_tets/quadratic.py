@@ -16,6 +16,8 @@ from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.quadratic_tets.bernstein import determinant_coefficients
 from supple.numerics.quadratic_tets.shape_functions import NODE_COORDINATES, four_point_rule, reference_gradients
 
+QUADRATURE_POINTS = 4
+
 
 @dataclass(frozen=True, eq=False)
 class PointsInTets:

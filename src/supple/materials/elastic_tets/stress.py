@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.active import add_active_piolas
 from supple.materials.elastic_tets.edge_springs import cofactors
-from supple.materials.elastic_tets.laws import TetLaws, of_points
+from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.elastic_tets.quadratic import QuadraticTets
 from supple.materials.flows.internal import add_densities, add_piolas
 from supple.materials.isotropic import piolas
 from supple.materials.laws.pointwise import densities_at, piolas_at
 from supple.materials.patches.domains import Patches
-from supple.materials.patches.energy import tet_shares, vertex_states
+from supple.materials.patches.energy import star_states, tet_shares
 from supple.numerics.deformation import deformation_gradients, determinants
 from supple.numerics.quadratic_tets.bernstein import determinant_coefficients
 from supple.numerics.threads import threads_for
@@ -51,7 +51,9 @@ def energy_densities(
         out[laws.patches.rows] = tet_shares(laws.patches, x) / laws.patches.tet_volumes
     add_densities(laws.material, F, internal, out)
     if laws.quadratic is not None:
-        out[laws.quadratic.rows] = quadratic_energies(laws, laws.quadratic, x) / laws.volumes[laws.quadratic.rows]
+        out[laws.quadratic.rows] = (
+            quadratic_energies(laws, laws.quadratic, x, internal) / laws.volumes[laws.quadratic.rows]
+        )
     for springs in laws.springs:
         volumes = laws.volumes[springs.rows]
         out[springs.rows] = springs.energies(x, determinants(F[springs.rows]), volumes) / volumes
@@ -85,7 +87,7 @@ def first_piolas(
         out[laws.patches.rows] = _of_patches(laws.patches, x, F[laws.patches.rows])
     add_piolas(laws.material, F, internal, out)
     if laws.quadratic is not None:
-        out[laws.quadratic.rows] = laws.quadratic.quadrature.means(_at_points(laws, laws.quadratic, x)[1])
+        out[laws.quadratic.rows] = laws.quadratic.quadrature.means(_at_points(laws, laws.quadratic, x, internal)[1])
     for springs in laws.springs:
         own = F[springs.rows]
         out[springs.rows] = springs.first_piolas(x, own, determinants(own), laws.volumes[springs.rows])
@@ -93,7 +95,7 @@ def first_piolas(
 
 
 def _of_patches(patches: Patches, x: NDArray[np.float64], F: NDArray[np.float64]) -> NDArray[np.float64]:
-    edges, vertices = patches.edges, patches.vertices
+    edges = patches.edges
     numbers = edges.of_tet.ravel()
     shares = np.repeat(patches.tet_volumes / 6.0, 6)
     means = np.empty((len(edges.volumes), 9))
@@ -104,9 +106,8 @@ def _of_patches(patches: Patches, x: NDArray[np.float64], F: NDArray[np.float64]
         piolas(means.reshape(-1, 3, 3), edges.kind, edges.mu, edges.lam, P)
         for part in edges.laws:
             P[part.rows] += part.law.models(means[part.rows].reshape(-1, 3, 3), part.parameters, False, False)[1]
-        pressures = vertex_states(patches, x)[1]
-    mean_pressure = pressures[vertices.of_tet].mean(axis=1)
-    return P[edges.of_tet].mean(axis=1) + mean_pressure[:, None, None] * cofactors(F)
+        pressures = star_states(patches, x)[1][patches.stars.of_tet]
+    return P[edges.of_tet].mean(axis=1) + pressures[:, None, None] * cofactors(F)
 
 
 def mean_deformation_gradients(laws: TetLaws, x: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -136,33 +137,42 @@ def smallest_ratio(laws: TetLaws, x: NDArray[np.float64], J: NDArray[np.float64]
     return float(smallest.min())
 
 
-def quadratic_energies(laws: TetLaws, tets: QuadraticTets, x: NDArray[np.float64]) -> NDArray[np.float64]:
+def quadratic_energies(
+    laws: TetLaws, tets: QuadraticTets, x: NDArray[np.float64], internal: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """(k,) of every quadratic tet [J]."""
-    F = tets.quadrature.deformation_gradients(x)
-    material = of_points(laws.material, tets.rows, F.shape[1])
-    at_points = densities_at(material, F.reshape(-1, 3, 3)).reshape(tets.quadrature.volumes.shape)
-    return (at_points * tets.quadrature.volumes).sum(axis=1)
+    F = tets.quadrature.deformation_gradients(x).reshape(-1, 3, 3)
+    material, own = laws.at_points(tets, internal)
+    at_points = densities_at(material, F)
+    add_densities(material, F, own, at_points)
+    return (at_points.reshape(tets.quadrature.volumes.shape) * tets.quadrature.volumes).sum(axis=1)
 
 
 def _at_points(
-    laws: TetLaws, tets: QuadraticTets, x: NDArray[np.float64]
+    laws: TetLaws, tets: QuadraticTets, x: NDArray[np.float64], internal: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(k, s, 3, 3) F and first Piola stress at the quadrature points."""
     F = tets.quadrature.deformation_gradients(x)
-    material = of_points(laws.material, tets.rows, F.shape[1])
-    return F, piolas_at(material, F.reshape(-1, 3, 3)).reshape(F.shape)
+    material, own = laws.at_points(tets, internal)
+    P = piolas_at(material, F.reshape(-1, 3, 3))
+    add_piolas(material, F.reshape(-1, 3, 3), own, P)
+    return F, P.reshape(F.shape)
 
 
 def cauchy_of_tets(
-    laws: TetLaws, x: NDArray[np.float64], P: NDArray[np.float64], F: NDArray[np.float64]
+    laws: TetLaws,
+    x: NDArray[np.float64],
+    P: NDArray[np.float64],
+    F: NDArray[np.float64],
+    internal: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """(m, 3, 3) Cauchy stress of every tet at x (n, 3), with its P and F (m, 3, 3) [Pa]."""
+    """(m, 3, 3) Cauchy stress of every tet at x (n, 3), with its P and F (m, 3, 3) [Pa] and internal variables."""
     stresses = cauchy_stresses(P, F)
     if laws.quadratic is not None:
         free = laws.stress_free
         quadratic = free.quadratic
         assert quadratic is not None
-        at, stress = _at_points(free, quadratic, x)
+        at, stress = _at_points(free, quadratic, x, internal)
         forces = quadratic.quadrature.means(stress @ np.swapaxes(at, 2, 3))
         J = quadratic.quadrature.means(np.linalg.det(at))
         pulls = np.zeros_like(F)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
-from supple.materials.per_tet import TetMaterial
+from supple.materials.per_tet import LawTets, TetMaterial
 
 # F_i^-1, a measure of all flow so far, and the energy dissipated per rest volume.
 COLUMNS = 11
@@ -23,7 +23,7 @@ def at_rest(count: int) -> NDArray[np.float64]:
 
 def count_of(material: TetMaterial) -> int:
     """How many rows of internal variables these tets have."""
-    return sum(len(tets.rows) for tets, _ in material.flowing_laws)
+    return sum(len(tets.rows) * tets.points for tets, _ in material.flowing_laws)
 
 
 def checked(material: TetMaterial, internal: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -45,7 +45,14 @@ def checked(material: TetMaterial, internal: NDArray[np.float64]) -> NDArray[np.
 
 def tets_of(material: TetMaterial) -> NDArray[np.int64]:
     """(k,) the tet of every row."""
-    return np.concatenate([np.zeros(0, dtype=np.int64), *(tets.rows for tets, _ in material.flowing_laws)])
+    each = (np.repeat(tets.rows, tets.points) for tets, _ in material.flowing_laws)
+    return np.concatenate([np.zeros(0, dtype=np.int64), *each])
+
+
+def rows_of_points(material: TetMaterial) -> NDArray[np.int64]:
+    """(k,) the rows that belong to points of quadratic tets, in their order."""
+    each = (np.arange(rows.start, rows.stop) for tets, rows in material.flowing_laws if tets.points > 1)
+    return np.concatenate([np.zeros(0, dtype=np.int64), *each])
 
 
 def inverse_flow(internal: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -61,21 +68,25 @@ def flowed(internal: NDArray[np.float64], V: NDArray[np.float64], strains: NDArr
 def add_densities(
     material: TetMaterial, F: NDArray[np.float64], internal: NDArray[np.float64], out: NDArray[np.float64]
 ) -> None:
-    """Add the stored energy densities [Pa] of what flows to `out` (m,), from F (m, 3, 3)."""
+    """Add the stored energy densities [Pa] of what flows in linear tets to `out` (m,), from F (m, 3, 3)."""
     rows = checked(material, internal)
-    for tets, own in material.flowing_laws:
+    for tets, own in _in_linear_tets(material):
         out[tets.rows] += tets.law.densities(F[tets.rows] @ inverse_flow(rows[own]), tets.parameters)
 
 
 def add_piolas(
     material: TetMaterial, F: NDArray[np.float64], internal: NDArray[np.float64], out: NDArray[np.float64]
 ) -> None:
-    """Add the first Piola stresses [Pa] of what flows to `out` (m, 3, 3): P = P_e F_i^-T."""
+    """Add the first Piola stresses [Pa] of what flows in linear tets to `out` (m, 3, 3): P = P_e F_i^-T."""
     rows = checked(material, internal)
-    for tets, own in material.flowing_laws:
+    for tets, own in _in_linear_tets(material):
         G = inverse_flow(rows[own])
         P = tets.law.models(F[tets.rows] @ G, tets.parameters, False, False)[1]
         out[tets.rows] += P @ np.swapaxes(G, 1, 2)
+
+
+def _in_linear_tets(material: TetMaterial) -> list[tuple[LawTets, slice]]:
+    return [(tets, own) for tets, own in material.flowing_laws if tets.points == 1]
 
 
 def add_resting_densities(material: TetMaterial, F: NDArray[np.float64], out: NDArray[np.float64]) -> None:

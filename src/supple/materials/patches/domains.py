@@ -1,20 +1,20 @@
-"""Patches: the tets around each edge and around each vertex, over which strains and volumes are averaged.
+"""Patches: the tets around each edge, and a partition into stars, over which strains and volumes are averaged.
 
 A linear tet has one F. With one volume condition for each tet, and about five tets for each vertex, a mesh of a nearly
 incompressible material cannot bend: it locks. Its energy is therefore split into two sums,
 
     sum_k V_k psi'(F_k)  +  sum_a V_a l_a U(J_a),
 
-k over edges and a over vertices. Each tet belongs with a sixth of its volume to its edges and with a quarter to its
-vertices; F_k and J_a are the means over these shares, and V_k and V_a their sums. psi' is the energy density with the
-first Lamé parameter lam_L lowered to mu, as of Poisson's ratio 1/4, and l_a U the rest of its volume term. Materials
-with lam_L <= mu are averaged over edges alone. For an affine motion both sums together are the energy of the tets.
+k over edges and a over stars. Each tet belongs with a sixth of its volume to its edges, and as a whole to one star;
+F_k and J_a are the means over these shares, and V_k and V_a their sums. psi' is the energy density with the
+first Lamé parameter lam_L lowered to 2 mu, as of Poisson's ratio 1/3, and l_a U the rest of its volume term. Materials
+with lam_L <= 2 mu are averaged over edges alone. For an affine motion both sums together are the energy of the tets.
 
 A patch contains tets of one body and one region.
 
 Sources: Nguyen-Xuan, Liu, Nguyen-Thoi, "An edge-based smoothed finite element method for analysis of two-dimensional
-piezoelectric structures" (2009) for edges; Bonet, Burton, "A simple average nodal pressure tetrahedral element" (1998)
-for vertices; Onishi, Iida, Amaya, "F-bar aided edge-based smoothed finite element method" (2017) for both.
+piezoelectric structures" (2009) for edges; de Souza Neto, Andrade Pires, Owen, "F-bar-based linear triangles and
+tetrahedra for finite strain analysis of nearly incompressible solids" (2005) for a partition, here as an energy.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from supple.materials.isotropic import rest_lame_parameters
 from supple.materials.kinds import STRETCH_ENERGIES
 from supple.materials.patches.pairs import Pairs, pairs_of
+from supple.materials.patches.stars import star_patches
 from supple.materials.per_tet import BY_LAW, LawTets, TetMaterial
 from supple.materials.stretch_energies import stable_neo_hookean
 
@@ -59,23 +60,23 @@ class EdgePatches:
 
 
 @dataclass(frozen=True, eq=False)
-class VertexPatches:
-    """The patches of v vertices, with slots as of `EdgePatches`.
+class StarPatches:
+    """The patches of v stars, with slots as of `EdgePatches`.
 
     Attributes
     ----------
     start : (v + 1,); vertices : (s,); owner : (s,) the patch of each slot
-    tet_start : (v + 1,) and tet_nodes : the (tet, node) pairs at the middle of each patch, coded 4 tet + node
-    slots : (m, 4, 4) for node p of a tet, in whose patch the tet is, the slots of its four nodes there
+    tet_start : (v + 1,) and tets : (m,) the tets of each patch
+    slots : (m, 4) of the nodes of each tet in its patch
     volumes : (v,) [m^3]; kind : (v,); lam : (v,) factor l_a of the volume term [Pa]
-    of_tet : (m, 4) the patches that each tet belongs to
+    of_tet : (m,) the patch of each tet
     """
 
     start: NDArray[np.int32]
     vertices: NDArray[np.int32]
     owner: NDArray[np.int32]
     tet_start: NDArray[np.int32]
-    tet_nodes: NDArray[np.int32]
+    tets: NDArray[np.int32]
     slots: NDArray[np.int32]
     volumes: NDArray[np.float64]
     kind: NDArray[np.int32]
@@ -98,12 +99,12 @@ class Patches:
     Dm_inv: NDArray[np.float64]
     tet_volumes: NDArray[np.float64]
     edges: EdgePatches
-    vertices: VertexPatches
+    stars: StarPatches
 
     def pairs(self) -> Pairs:
         """The pairs of vertices that patches couple."""
-        edges, vertices = self.edges, self.vertices
-        return pairs_of((edges.start, edges.vertices), (vertices.start, vertices.vertices))
+        edges, stars = self.edges, self.stars
+        return pairs_of((edges.start, edges.vertices), (stars.start, stars.vertices))
 
 
 def patches_of(
@@ -121,7 +122,7 @@ def patches_of(
     tets, Dm_inv, volumes = np.ascontiguousarray(tets[rows]), np.ascontiguousarray(Dm_inv[rows]), volumes[rows]
     rest_mu, rest_lam = (values[rows] for values in rest_lame_parameters(material))
     kind, mu, lam, region = (getattr(material, key)[rows] for key in ("kind", "mu", "lam", "region"))
-    rest = np.maximum(rest_lam - rest_mu, 0.0)
+    rest = volume_share(rest_mu, rest_lam)
     by_law = kind == BY_LAW
     if by_law.any():
         # Their volume term is (J - 1)^2 / 2, too; with mu = lam = 0 that energy is zero for every F.
@@ -130,7 +131,8 @@ def patches_of(
     edges = _edge_patches(tets, Dm_inv, volumes, region, (kind, mu, lam - rest))
     laws = tuple(_edge_law(part, rows, volumes, rest, edges.of_tet) for part in material.elastic_laws)
     edges = replace(edges, laws=tuple(part for part in laws if len(part.rows)))
-    return Patches(rows, tets, Dm_inv, volumes, edges, _vertex_patches(tets, volumes, region, kind, rest))
+    stars = partition(tets, region, edges.of_tet)
+    return Patches(rows, tets, Dm_inv, volumes, edges, _star_patches(tets, volumes, stars, kind, rest))
 
 
 def _edge_law(part: LawTets, rows, volumes, rest, of_tet) -> LawTets:
@@ -191,21 +193,30 @@ def _edge_patches(tets, Dm_inv, volumes, region, law) -> EdgePatches:
     )
 
 
-def _vertex_patches(tets, volumes, region, kind, rest) -> VertexPatches:
-    m = len(tets)
-    first, patch = _numbered(np.column_stack([tets.ravel(), np.repeat(region, 4)]).astype(np.int64))
-    shares = np.repeat(volumes / 4.0, 4)
-    start, vertices, owner, slot = _slots(patch, np.repeat(tets, 4, axis=0))
-    order = np.argsort(patch, kind="stable")
-    return VertexPatches(
+def volume_share(mu: NDArray[np.float64], lam: NDArray[np.float64]) -> NDArray[np.float64]:
+    """l, the part of the first Lamé parameter that is averaged over stars [Pa], from both parameters at rest."""
+    return np.maximum(lam - 2.0 * mu, 0.0)
+
+
+def partition(tets: NDArray[np.int32], region: NDArray[np.int32], of_edge: NDArray[np.int32]) -> NDArray[np.int32]:
+    """(m,) the star that each of the tets (m, 4) is in; none reaches into another region. `of_edge` : (m, 6)."""
+    _, of_vertex = _numbered(np.column_stack([tets.ravel(), np.repeat(region, 4)]).astype(np.int64))
+    return star_patches(of_vertex.reshape(-1, 4), of_edge)
+
+
+def _star_patches(tets, volumes, of_tet, kind, rest) -> StarPatches:
+    start, vertices, owner, slot = _slots(of_tet, tets)
+    order = np.argsort(of_tet, kind="stable")
+    tet_start = np.searchsorted(of_tet[order], np.arange(len(start)))
+    return StarPatches(
         start,
         vertices,
         owner,
-        np.searchsorted(patch[order], np.arange(len(start))).astype(np.int32),
+        tet_start.astype(np.int32),
         order.astype(np.int32),
-        slot.reshape(m, 4, 4),
-        np.bincount(patch, weights=shares).astype(np.float64),
-        np.repeat(kind, 4)[first],
-        _means(patch, shares, np.repeat(rest, 4)),
-        patch.reshape(m, 4),
+        slot.reshape(-1, 4),
+        np.bincount(of_tet, weights=volumes).astype(np.float64),
+        kind[order[tet_start[:-1]]],
+        _means(of_tet, volumes, rest),
+        of_tet,
     )

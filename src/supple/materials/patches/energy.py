@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from supple.materials.patches.domains import EdgePatches, Patches
 from supple.materials.patches.edge_kernels import edge_energies, mean_gradients
-from supple.materials.patches.vertex_kernels import vertex_pressures
+from supple.materials.patches.star_kernels import star_pressures
 from supple.numerics.threads import threads_for
 
 # Fewer tets than this are processed by one thread.
@@ -15,7 +15,7 @@ SERIAL_TETS = 1_000
 
 
 def patch_energies(patches: Patches, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(k,) of the patches of edges and (v,) of vertices [J], for positions x (n, 3) [m]."""
+    """(k,) of the patches of edges and (v,) of stars [J], for positions x (n, 3) [m]."""
     p = patches.edges
     of_edges = np.empty(len(p.volumes))
     with threads_for(len(patches.tets), SERIAL_TETS):
@@ -23,7 +23,7 @@ def patch_energies(patches: Patches, x: NDArray[np.float64]) -> tuple[NDArray[np
         for part in p.laws:
             psi = part.law.densities(edge_gradients(p, x, part.rows), part.parameters)
             of_edges[part.rows] += p.volumes[part.rows] * psi
-        return of_edges, vertex_states(patches, x)[0]
+        return of_edges, star_states(patches, x)[0]
 
 
 def edge_gradients(edges: EdgePatches, x: NDArray[np.float64], rows: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -35,19 +35,16 @@ def edge_gradients(edges: EdgePatches, x: NDArray[np.float64], rows: NDArray[np.
 
 def tet_shares(patches: Patches, x: NDArray[np.float64]) -> NDArray[np.float64]:
     """(m,) the patches' energy [J], of each patch in proportion to the volumes of its tets."""
-    of_edges, of_vertices = patch_energies(patches, x)
+    of_edges, of_stars = patch_energies(patches, x)
     edges = (of_edges / patches.edges.volumes)[patches.edges.of_tet].mean(axis=1)
-    vertices = (of_vertices / patches.vertices.volumes)[patches.vertices.of_tet].mean(axis=1)
-    return patches.tet_volumes * (edges + vertices)
+    return patches.tet_volumes * (edges + (of_stars / patches.stars.volumes)[patches.stars.of_tet])
 
 
-def vertex_states(
+def star_states(
     patches: Patches, x: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """(v,) energies [J], pressures [Pa] and stiffnesses [Pa/m^3] of the patches of vertices (`vertex_pressures`)."""
-    p = patches.vertices
+    """(v,) energies [J], pressures [Pa] and stiffnesses [Pa/m^3] of stars (`star_pressures`)."""
+    p = patches.stars
     energies, pressures, stiffness = (np.empty(len(p.volumes)) for _ in range(3))
-    vertex_pressures(
-        x, patches.tets, p.tet_start, p.tet_nodes, p.volumes, p.kind, p.lam, energies, pressures, stiffness
-    )
+    star_pressures(x, patches.tets, p.tet_start, p.tets, p.volumes, p.kind, p.lam, energies, pressures, stiffness)
     return energies, pressures, stiffness

@@ -19,14 +19,14 @@ def _edge_block(frames, turned, k, b, c):
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def pair_blocks(
-    rows, columns, edge_start, edge_slots, vertex_start, vertex_slots, edge_owner, frames, turned, vertex_owner,
+    rows, columns, edge_start, edge_slots, star_start, star_slots, edge_owner, frames, turned, star_owner,
     stiffness, directions, out,
 ):  # fmt: skip
     """Sum the blocks of each pair into out (p, 3, 3), those of edges first, in the order of the patches.
 
     Parameters
     ----------
-    frames, turned : of `edge_models`; stiffness : of `vertex_pressures`; directions : of `slot_gradients`
+    frames, turned : of `edge_models`; stiffness : of `star_pressures`; directions : of `slot_gradients`
     """
     for n in prange(len(rows)):
         d0 = d1 = d2 = d3 = d4 = d5 = d6 = d7 = d8 = 0.0
@@ -42,9 +42,9 @@ def pair_blocks(
             d6 += K[6]
             d7 += K[7]
             d8 += K[8]
-        for p in range(vertex_start[n], vertex_start[n + 1]):
-            b, c = vertex_slots[p, 0], vertex_slots[p, 1]
-            w = stiffness[vertex_owner[b]]
+        for p in range(star_start[n], star_start[n + 1]):
+            b, c = star_slots[p, 0], star_slots[p, 1]
+            w = stiffness[star_owner[b]]
             u, v, t = w * directions[b, 0], w * directions[b, 1], w * directions[b, 2]
             x, y, z = directions[c, 0], directions[c, 1], directions[c, 2]
             d0 += u * x

@@ -15,27 +15,27 @@ class Pairs:
     Attributes
     ----------
     rows, columns : (p,) the vertices i and j
-    edge_start, vertex_start : (p + 1,) first entry of each pair in `edge_slots` and `vertex_slots`
-    edge_slots, vertex_slots : (r, 2) slots of i and j in one patch
+    edge_start, star_start : (p + 1,) first entry of each pair in `edge_slots` and `star_slots`
+    edge_slots, star_slots : (r, 2) slots of i and j in one patch
     """
 
     rows: NDArray[np.int32]
     columns: NDArray[np.int32]
     edge_start: NDArray[np.int32]
     edge_slots: NDArray[np.int32]
-    vertex_start: NDArray[np.int32]
-    vertex_slots: NDArray[np.int32]
+    star_start: NDArray[np.int32]
+    star_slots: NDArray[np.int32]
 
 
 def pairs_of(
-    edges: tuple[NDArray[np.int32], NDArray[np.int32]], vertices: tuple[NDArray[np.int32], NDArray[np.int32]]
+    edges: tuple[NDArray[np.int32], NDArray[np.int32]], stars: tuple[NDArray[np.int32], NDArray[np.int32]]
 ) -> Pairs:
-    """The pairs in the patches of edges and vertices, each given by `start` and `vertices` of its slots."""
-    n = int(vertices[1].max()) + 1
-    of_edges, of_vertices = _slot_pairs(edges[0]), _slot_pairs(vertices[0])
+    """The pairs in the patches of edges and stars, each given by `start` and `vertices` of its slots."""
+    n = int(stars[1].max()) + 1
+    of_edges, of_stars = _slot_pairs(edges[0]), _slot_pairs(stars[0])
     keys = [
         part[pairs[:, 0]] * np.int64(n) + part[pairs[:, 1]]
-        for (_, part), pairs in ((edges, of_edges), (vertices, of_vertices))
+        for (_, part), pairs in ((edges, of_edges), (stars, of_stars))
     ]
     both, number = np.unique(np.concatenate(keys), return_inverse=True)
     rows, columns = np.divmod(both, n)
@@ -43,7 +43,7 @@ def pairs_of(
         rows.astype(np.int32),
         columns.astype(np.int32),
         *_by_pair(number[: len(of_edges)], of_edges, len(both)),
-        *_by_pair(number[len(of_edges) :], of_vertices, len(both)),
+        *_by_pair(number[len(of_edges) :], of_stars, len(both)),
     )
 
 

@@ -11,6 +11,7 @@ from scipy import sparse
 from supple.materials.elastic_tets.active import GROWTH, ActiveTets
 from supple.materials.isotropic import densities, rest_lame_parameters
 from supple.materials.kinds import needs_positive_volume
+from supple.materials.patches.domains import partition, volume_share
 from supple.materials.per_tet import BY_LAW, NO_REGION, LawTets, TetMaterial
 from supple.materials.tet_energies import element_energies
 from supple.numerics.threads import threads_for
@@ -42,7 +43,7 @@ def elastic_energy(
         return None
     grown, ratios = growth_of(active, len(J))
     rest_inverse, J, all_volumes = rest_inverse @ grown, J / ratios, recording.rest_volumes * ratios
-    total = _flowing(physics, _gradients(x, recording.tets, rest_inverse), all_volumes, internal)
+    total = _flowing(recording, physics, x, rest_inverse, internal, (grown, ratios))
     for k, body in enumerate(recording.bodies):
         if not physics.knows_law(k, body.tets):
             return None
@@ -107,14 +108,26 @@ def _gradients(x, tets, rest_inverse):
     return np.einsum("eki,ekj->eij", x_of[:, 1:] - x_of[:, :1], rest_inverse)
 
 
-def _flowing(physics: RecordedPhysics, F, volumes, internal) -> float:
-    """The energy of what is left of F after flow, F F_i^-1."""
+def _flowing(recording: Recording, physics: RecordedPhysics, x, rest_inverse, internal, growth) -> float:
+    """The energy of what is left of F after growth and flow, F F_g^-1 F_i^-1; rest_inverse is that after growth."""
     total, begin = 0.0, 0
+    grown, ratios = growth
+    F = _gradients(x, recording.tets, rest_inverse)[:, None]
+    parts = (recording.rest_volumes * ratios)[:, None]
     for part in physics.laws:
-        if part.flow is not None:
-            inverse = internal[begin : begin + len(part.rows), :9].reshape(-1, 3, 3)
-            total += float(volumes[part.rows] @ part.law.densities(F[part.rows] @ inverse, part.parameters))
-            begin += len(part.rows)
+        if part.flow is None:
+            continue
+        of, volumes = F[part.rows], parts[part.rows]
+        if part.points > 1 and recording.quadratic is not None:
+            rows, all_nodes = recording.quadratic
+            nodes = all_nodes[np.searchsorted(rows, part.rows)]
+            of, volumes = at_quadrature_points(x[nodes], recording.rest_positions[nodes])
+            of, volumes = of @ grown[part.rows, None], volumes * ratios[part.rows, None]
+        inverse = internal[begin : begin + volumes.size, :9].reshape(*volumes.shape, 3, 3)
+        for point in range(part.points):
+            psi = part.law.densities(of[:, point] @ inverse[:, point], part.parameters)
+            total += float(volumes[:, point] @ psi)
+        begin += volumes.size
     return total
 
 
@@ -125,10 +138,10 @@ def _of_body(part: LawTets, tets: slice) -> LawTets:
 
 
 def _averaged(tets, volumes, F, J, laws, by_law: LawTets | None) -> float:
-    """The energy of one region's tets, averaged over edges and vertices (see `materials.patches`)."""
+    """The energy of one region's tets, averaged over edges and stars (see `materials.patches`)."""
     kind, mu, lam = laws
     mu_L, lam_L = rest_lame_parameters(TetMaterial(mu, mu, kind, mu, lam, kind))
-    rest = np.maximum(lam_L - mu_L, 0.0)
+    rest = volume_share(mu_L, lam_L)
     ends = np.sort(tets[:, _EDGES], axis=2).reshape(-1, 2)
     _, first, edge = np.unique(ends, axis=0, return_index=True, return_inverse=True)
     shares = sparse.coo_array((np.repeat(volumes / 6.0, 6), (edge.ravel(), np.repeat(np.arange(len(tets)), 6)))).tocsr()
@@ -143,12 +156,12 @@ def _averaged(tets, volumes, F, J, laws, by_law: LawTets | None) -> float:
         p[:, by_law.law.bulk] -= rest
         out = by_law.law.densities(F_mean, (shares @ p) / around[:, None])
     total = float(out @ around)
-    quarters = np.repeat(volumes / 4.0, 4)
-    _, first, vertex = np.unique(tets.ravel(), return_index=True, return_inverse=True)
-    around = np.bincount(vertex, weights=quarters)
-    J_mean = np.bincount(vertex, weights=quarters * np.repeat(J, 4)) / around
-    factor = np.bincount(vertex, weights=quarters * np.repeat(rest, 4)) / around
-    logarithmic = needs_positive_volume(kind)[first // 4]
+    star = partition(tets, np.zeros(len(tets), dtype=np.int32), edge.reshape(-1, 6).astype(np.int32))
+    _, first = np.unique(star, return_index=True)
+    around = np.bincount(star, weights=volumes)
+    J_mean = np.bincount(star, weights=volumes * J) / around
+    factor = np.bincount(star, weights=volumes * rest) / around
+    logarithmic = needs_positive_volume(kind)[first]
     with np.errstate(invalid="ignore", divide="ignore"):
         change = np.where(logarithmic, np.log(J_mean), J_mean - 1.0)
     return total + 0.5 * float((around * factor) @ change**2)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.elastic_tets.active import GROWTH, MUSCLE, ActiveTets
+from supple.materials.elastic_tets.quadratic import QUADRATURE_POINTS
 from supple.materials.flows.internal import count_of
 from supple.materials.flows.registry import RECORDED_FLOWS
 from supple.materials.laws.registry import RECORDED_LAWS
@@ -110,6 +111,7 @@ def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
         "laws": [law.__name__ for law in ELASTIC_MATERIALS],
         "by_law": [tets.law.name for tets in known],
         "flows": [None if tets.flow is None else tets.flow.name for tets in known],
+        "points": [tets.points for tets in known],
         "internal": count_of(system.laws.material),
         "compliances": compliances,
         "forces": len(system.loads) + sum(each.coordinate.is_anchored for each in system.actuators),
@@ -141,8 +143,8 @@ def _welds(system: System) -> list[tuple[int, int, list[int]]]:
     return [(number[weld.body], number[weld.rigid], vertices[weld_of == k].tolist()) for k, weld in welds]
 
 
-def read_physics(file: CheckedFile, header: dict[str, Any], m: int) -> RecordedPhysics | None:
-    """The laws of a recording with m tets, or None where it does not contain them.
+def read_physics(file: CheckedFile, header: dict[str, Any], quadratic: NDArray[np.bool_]) -> RecordedPhysics | None:
+    """The laws of a recording, or None where it does not contain them; quadratic : (m,) which tets are.
 
     Raises
     ------
@@ -157,6 +159,7 @@ def read_physics(file: CheckedFile, header: dict[str, Any], m: int) -> RecordedP
         laws = [str(law) for law in physics["laws"]]
         names = [str(name) for name in physics.get("by_law", [])]
         flows = list(physics.get("flows", [None] * len(names)))
+        points = [int(number) for number in physics.get("points", [1] * len(names))]
         internal = int(physics.get("internal", 0))
         compliances = tuple(
             None if pair is None else (float(pair[0]), float(pair[1])) for pair in physics["compliances"]
@@ -165,6 +168,7 @@ def read_physics(file: CheckedFile, header: dict[str, Any], m: int) -> RecordedP
         raise file.broken("the physics in its header is not described as it should be") from None
     if len(compliances) != len(header["bodies"]):
         raise file.broken("its header describes the physics of another number of bodies")
+    m = len(quadratic)
     here = [law.__name__ for law in ELASTIC_MATERIALS]
     number = np.full(256, NOT_KNOWN, dtype=np.uint8)
     for k, law in enumerate(laws[:NOT_KNOWN]):
@@ -176,18 +180,20 @@ def read_physics(file: CheckedFile, header: dict[str, Any], m: int) -> RecordedP
     if physics.get("patches", False):
         region = file.array(f"{_GROUP}/region", "i", (m,)).astype(np.int32)
     known = []
-    for k, (name, flow) in enumerate(zip(names, flows, strict=False)):
+    for k, (name, flow, at) in enumerate(zip(names, flows, points, strict=False)):
         tets = file.indices(f"{_GROUP}/law_{k}/rows", 1, m)[:, 0].astype(np.int64)
         parameters = file.array(f"{_GROUP}/law_{k}/parameters", "f", (len(tets), None))
+        if at != (QUADRATURE_POINTS if quadratic[tets].all() else 1) or quadratic[tets].any() != quadratic[tets].all():
+            raise file.broken("a law is not evaluated at the points of its tets")
         if flow is not None and flow not in RECORDED_FLOWS:
             raise file.newer(f"a material flows by a law {flow!r} that this version does not know")
         law = RECORDED_LAWS.get(name)
         if law is not None and parameters.shape[1] in law.counts:
             parameters = np.ascontiguousarray(parameters)
-            known.append(LawTets(law, tets, parameters, None if flow is None else RECORDED_FLOWS[flow]))
+            known.append(LawTets(law, tets, parameters, None if flow is None else RECORDED_FLOWS[flow], at))
         else:
             kind[tets] = NOT_KNOWN
-    if internal != sum(len(tets.rows) for tets in known if tets.flow is not None):
+    if internal != sum(len(tets.rows) * tets.points for tets in known if tets.flow is not None):
         raise file.broken("its number of internal variables is not that of its materials")
     active = _read_active(file, physics, m)
     here = kind, mu, lam, compliances, *counts

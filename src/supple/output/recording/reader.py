@@ -233,7 +233,10 @@ class Recording(Showable, Sequence[RecordedFrame]):
         self.pinned_vertices = file.array("supple/pinned_vertices", "i", (None,))
         self.bodies: tuple[RecordedBody, ...] = read_bodies(file, header, n, m, self.triangles)
         self.obstacles: tuple[RecordedObstacle, ...] = read_obstacles(file, header)
-        self.physics: RecordedPhysics | None = read_physics(file, header, m)
+        curved = np.zeros(m, dtype=bool)
+        if self.quadratic is not None:
+            curved[self.quadratic[0]] = True
+        self.physics: RecordedPhysics | None = read_physics(file, header, curved)
         self.untouching = read_untouching(file, header)
         self.welds: tuple[RecordedWeld, ...] = read_welds(file, header, n)
         self.joints: tuple[RecordedJoint, ...] = read_joints(file, header)

@@ -35,4 +35,4 @@ def tet_values(
         return volume_ratios(laws, x, F)
     if quantity == "energy":
         return energy_densities(laws, x, F, internal)
-    return von_mises(cauchy_of_tets(laws, x, first_piolas(laws, x, F, internal), F))
+    return von_mises(cauchy_of_tets(laws, x, first_piolas(laws, x, F, internal), F, internal))

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import CommandError
+from supple.materials.elastic_tets.laws import tet_material
 from supple.materials.flows.internal import at_rest, checked, count_of, tets_of
 from supple.materials.inelastic.viscoelastic import Viscoelastic
 from supple.materials.material import Material
@@ -274,11 +275,12 @@ def _add(live: LiveScene, body: PlacedBody) -> None:
     check_size(scene, body.mesh)
     grown = replace(scene, bodies=(*scene.bodies, body))
     alone = initial_state(Scene([body]))
+    laws = tet_material(body.material, len(body.mesh.tets), body.mesh.order)
     state = State(
         live.state.time,
         np.concatenate([live.state.positions, alone.positions]),
         np.concatenate([live.state.velocities, alone.velocities]),
-        internal=np.concatenate([_internal(live), at_rest(count_of(body.material.per_tet(len(body.mesh.tets))))]),
+        internal=np.concatenate([_internal(live), at_rest(count_of(laws))]),
         hinge_angles=live.state.hinge_angles,
     )
     live.adopt_checked(replace(live.setup, scene=grown, added=live.setup.added | {body.name}), state)

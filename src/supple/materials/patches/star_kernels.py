@@ -1,12 +1,9 @@
-"""The volume energies of vertex patches, and their derivatives.
+"""The volume energies of stars, and their derivatives.
 
 With J_a the mean of J over a patch and v_e the volume of tet e,
 
-    d (V_a l_a U(J_a)) = p_a sum_e dv_e / 4,    p_a = l_a U'(J_a),
-
-so that each tet is under the mean pressure of its four nodes, and
-
-    d^2 (V_a l_a U(J_a)) = p_a sum_e d^2 v_e / 4 + (l_a U'' / V_a) (sum_e dv_e / 4) (sum_e dv_e / 4)^T.
+    d (V_a l_a U(J_a)) = p_a sum_e dv_e,    p_a = l_a U'(J_a),
+    d^2 (V_a l_a U(J_a)) = p_a sum_e d^2 v_e + (l_a U'' / V_a) (sum_e dv_e) (sum_e dv_e)^T.
 """
 
 from __future__ import annotations
@@ -29,41 +26,30 @@ def volume_gradients(x, tets, Dm_inv, volumes, out):
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def vertex_pressures(x, tets, tet_start, tet_nodes, volumes, kind, lam, energies, pressures, stiffness):
+def star_pressures(x, tets, tet_start, patch_tets, volumes, kind, lam, energies, pressures, stiffness):
     """V_a l_a U [J], p_a = l_a U' [Pa] and l_a U'' / V_a [Pa/m^3] of every patch, into three arrays (v,)."""
     for a in prange(len(volumes)):
         total = 0.0
         for p in range(tet_start[a], tet_start[a + 1]):
-            total += det(edge_matrix(x, tets, tet_nodes[p] >> 2))
-        U, first, second = volume_term(kind[a], total / (24.0 * volumes[a]))
+            total += det(edge_matrix(x, tets, patch_tets[p]))
+        U, first, second = volume_term(kind[a], total / (6.0 * volumes[a]))
         energies[a] = volumes[a] * lam[a] * U
         pressures[a] = lam[a] * first
         stiffness[a] = lam[a] * second / volumes[a]
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def tet_pressures(of_tet, pressures, out):
-    """The mean pressure of each tet's four patches into out (m,)."""
-    for e in prange(len(of_tet)):
-        total = 0.0
-        for p in range(4):
-            total += pressures[of_tet[e, p]]
-        out[e] = 0.25 * total
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def slot_gradients(tet_start, tet_nodes, start, slots, of_tets, out):
-    """sum_e dv_e / 4 of every patch by its slots, into out (s, 3); of_tets : (m, 4, 3) of `volume_gradients`."""
+def slot_gradients(tet_start, patch_tets, start, slots, of_tets, out):
+    """sum_e dv_e of every patch by its slots, into out (s, 3); of_tets : (m, 4, 3) of `volume_gradients`."""
     for a in prange(len(start) - 1):
         for s in range(start[a], start[a + 1]):
             for i in range(3):
                 out[s, i] = 0.0
         for p in range(tet_start[a], tet_start[a + 1]):
-            e, node = tet_nodes[p] >> 2, tet_nodes[p] & 3
+            e = patch_tets[p]
             for q in range(4):
-                s = slots[e, node, q]
                 for i in range(3):
-                    out[s, i] += 0.25 * of_tets[e, q, i]
+                    out[slots[e, q], i] += of_tets[e, q, i]
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
