@@ -242,7 +242,7 @@ def upload_two_files(resting, spot, tmp_path):
 def test_the_pusher_pushes_a_body(resting):
     screen, controls = resting.screen, resting.panel.mouse_controls
     screen.choose(controls.mode, "push")
-    screen.wait(lambda: controls.radius_input.visible, "the ball's size")
+    screen.wait(lambda: controls.radius_input.handle.visible, "the ball's size")
     middle = resting.middle()
     x, y = screen.place(middle)
     mouse = screen.tab.mouse

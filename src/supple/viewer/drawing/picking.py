@@ -51,15 +51,23 @@ def nearest_surface_point(moment: Moment, place: ArrayLike) -> SurfacePoint:
 
 
 def surface_point_on_ray(moment: Moment, origin: ArrayLike, direction: ArrayLike) -> SurfacePoint | None:
-    """The first intersection of a ray from `origin` (3,) in `direction` (3,) with any boundary, or None.
+    """The first intersection of a ray from `origin` (3,) in `direction` (3,) with any boundary, or None."""
+    rows, _ = _triangles(moment.model)
+    hit = first_hit(moment.finite_positions[rows], origin, direction)
+    if hit is None:
+        return None
+    return _on_triangle(moment, hit[0], np.asarray(origin, dtype=np.float64) + hit[1] * np.asarray(direction))
+
+
+def first_hit(corners: NDArray[np.float64], origin: ArrayLike, direction: ArrayLike) -> tuple[int, float] | None:
+    """The triangle of `corners` (t, 3, 3) that a ray meets first, and the multiple of `direction` to it, or None.
 
     Source: Möller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection" (1997).
     """
-    rows, _ = _triangles(moment.model)
-    a, b, c = (moment.finite_positions[rows[:, k]] for k in range(3))
+    a, b, c = (corners[:, k] for k in range(3))
     start, along = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
     h = np.cross(along, c - a)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         inverse = 1.0 / np.einsum("ij,ij->i", b - a, h)
         u = inverse * np.einsum("ij,ij->i", start - a, h)
         q = np.cross(start - a, b - a)
@@ -69,7 +77,7 @@ def surface_point_on_ray(moment: Moment, origin: ArrayLike, direction: ArrayLike
     if not met.any():
         return None
     first = int(np.argmin(np.where(met, t, np.inf)))
-    return _on_triangle(moment, first, start + t[first] * along)
+    return first, float(t[first])
 
 
 def _on_triangle(moment: Moment, triangle: int, place: NDArray[np.float64]) -> SurfacePoint:
