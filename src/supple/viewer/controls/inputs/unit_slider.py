@@ -87,7 +87,13 @@ class UnitSlider:
         self._lock, self._removed = threading.RLock(), False
         # There is little space below a slider: units that take no prefix are only beside it.
         unit = scale.unit if scale.unit in WITH_PREFIX else ""
-        ends = tuple((scale.position(end), written(end, unit, 3)) for end in (scale.low, scale.high))
+        ends = tuple(
+            (
+                scale.position(end),
+                f"{end:.0e}".replace("e+0", "e") if end >= 1e5 and not unit else written(end, unit, 3),
+            )
+            for end in (scale.low, scale.high)
+        )
         self.handle = gui.add_slider(
             label,
             scale.position(scale.low),

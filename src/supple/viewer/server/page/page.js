@@ -173,11 +173,10 @@
     if (!globalThis.suppleViewer || suppleViewer.messageSource !== "websocket") return setTimeout(begin, 50);
     layer = document.body.appendChild(Object.assign(document.createElement("div"), { id: "supple-layer" }));
     follow();
-    suppleViewer.useGui.subscribe(() => { follow(); findOverlays(); });
+    suppleViewer.useGui.subscribe(follow);
     dark.addEventListener("change", follow);
-    findOverlays();
     addEventListener("resize", place);
-    setInterval(() => { place(); sendPointer(); findValues(); }, 80);
+    setInterval(() => { findOverlays(); place(); sendPointer(); findValues(); }, 80);
     attachKeys();
   }
   addEventListener("DOMContentLoaded", begin);
