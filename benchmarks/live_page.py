@@ -149,4 +149,4 @@ def main(sizes: tuple[int, ...] = (5_000, 60_000), rounds: int = 20, seconds: fl
 
 
 if __name__ == "__main__":
-    main(*([tuple(int(each) for each in sys.argv[1:])] if len(sys.argv) > 1 else []))
+    main(tuple(int(each) for each in sys.argv[1:]) or (5_000, 60_000))

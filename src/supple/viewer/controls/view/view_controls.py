@@ -135,12 +135,14 @@ class ViewControls:
         center = self._followed()
         with self._lock:
             before = self._center
-            far = before is not None and center is not None and np.linalg.norm(center - before)
-            if not far or far < 1e-3 * self._stage.model.view.radius:
+            if before is None or center is None:
+                return
+            way = center - before
+            if float(np.linalg.norm(way)) < 1e-3 * self._stage.model.view.radius:
                 return
             self._center = center
         for client in self._server.get_clients().values():
-            follow(client, center - before)
+            follow(client, way)
 
     def _bodies(self) -> tuple[str, ...]:
         return _NOTHING, *(body.name for body in self._stage.model.bodies)

@@ -122,5 +122,5 @@ def _facing(made: Triangles, model: Model, axis: int, begin: int) -> Triangles:
     turned = np.cross(b - a, c - a)[:, axis] < 0.0
     turned[:begin] = False
     order = np.where(turned[:, None], [0, 2, 1], [0, 1, 2])
-    start, end, share = (np.take_along_axis(each, order, axis=1) for each in (made.start, made.end, made.share))
-    return Triangles(start, end, share, made.owner)
+    start, end = (np.take_along_axis(each, order, axis=1) for each in (made.start, made.end))
+    return Triangles(start, end, np.take_along_axis(made.share, order, axis=1), made.owner)
