@@ -211,6 +211,6 @@ class Replay:
         if event.client is not None:
             self.export.disabled = True
             try:
-                event.client.send_file_download("supple.html", self.page().encode())
+                event.client.send_file_download("supple.html", self.page().encode(), save_immediately=True)
             finally:
                 self.export.disabled = False
