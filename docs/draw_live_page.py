@@ -65,7 +65,7 @@ def draw_live(tab, page) -> None:
         settle()
         save(tab, name)
 
-    tab.get_by_role("button", name="Play").click()
+    tab.get_by_role("button", name="Play", exact=True).click()
     while controller.snapshot.time < 0.5:
         settle(0.1)
     bear = controller.snapshot.body_positions("bear")
@@ -75,7 +75,7 @@ def draw_live(tab, page) -> None:
     settle(3.0)
     save(tab, "live.png")
     controller.simulation.send(ReleaseGrab(1))
-    tab.get_by_role("button", name="Pause").click()
+    tab.get_by_role("button", name="Pause", exact=True).click()
     settle(1.0)
     for command in (Reset(), SetParameter("youngs", 1.5e4), Step(15)):
         controller.simulation.send(command)
@@ -87,13 +87,13 @@ def draw_live(tab, page) -> None:
     for command in (Reset(), SetParameter("youngs", 6e4), Step(9)):
         controller.simulation.send(command)
     show("live_velocities.png", surface="skin", color_by="body", velocities=True)
-    tab.get_by_role("button", name="Play").click()
+    tab.get_by_role("button", name="Play", exact=True).click()
     settle(2.0)
-    tab.get_by_role("button", name="Pause").click()
+    tab.get_by_role("button", name="Pause", exact=True).click()
     show("live_stitches.png", surface="wireframe", velocities=False, contacts=True)
     show("live_skin.png", surface="skin", contacts=False)
     tab.get_by_role("tab", name="Solver").click()
-    tab.get_by_role("button", name="Play").click()
+    tab.get_by_role("button", name="Play", exact=True).click()
     settle(4.0)
     tab.get_by_text("Spin [rad/s]").scroll_into_view_if_needed()
     save(tab, "live_solver.png")

@@ -49,13 +49,16 @@ class Collected:
     """An outbox that stores what it gets."""
 
     def __init__(self):
-        self.descriptions, self.snapshots = [], []
+        self.descriptions, self.snapshots, self.progress = [], [], []
 
     def put_description(self, description):
         self.descriptions.append(description)
 
     def put_snapshot(self, snapshot):
         self.snapshots.append(snapshot)
+
+    def put_progress(self, progress):
+        self.progress.append(progress)
 
 
 @pytest.fixture

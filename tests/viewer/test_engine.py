@@ -197,6 +197,16 @@ def test_a_killed_process_is_reported_and_nothing_blocks():
     assert engine.latest() is not None
     with pytest.raises(TimeoutError, match="unexpectedly"):
         engine.wait_for(10**9, TIMEOUT)
+    # It is started again from its source.
+    engine.restart()
+    assert engine.error is None
+    first = engine.latest()
+    assert (first.frame, first.paused) == (0, True)
+    number = engine.send(Step(2))
+    end = time.monotonic() + TIMEOUT
+    while engine.latest().frame < 2 and time.monotonic() < end:
+        time.sleep(0.01)
+    assert (engine.latest().frame, engine.latest().applied) == (2, number)
     engine.close()
 
 

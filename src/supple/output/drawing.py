@@ -5,6 +5,7 @@ Pages, videos and exports use it, so that all show the same.
 
 from __future__ import annotations
 
+import colorsys
 from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
@@ -27,6 +28,18 @@ BODY_COLORS = (
     (120, 200, 235),
     (160, 120, 80),
 )
+
+
+def body_color(number: int) -> tuple[int, int, int]:
+    """The color (r, g, b) of the body at a place among all, from 0 to 255. The first 64 have different ones."""
+    if number < len(BODY_COLORS):
+        return BODY_COLORS[number]
+    # Hues in steps of the golden section, in turns bright and dark.
+    hue, bright = 0.86 + 0.618034 * number, (0.95, 0.6, 0.8)[number % 3]
+    r, g, b = colorsys.hsv_to_rgb(hue % 1.0, (0.5, 0.95)[number % 2], bright)
+    return round(255 * r), round(255 * g), round(255 * b)
+
+
 OBSTACLE_COLOR = (176, 180, 188)
 STITCH_COLOR = (214, 40, 90)
 # A room is one surface between the eye and the bodies; walls can overlap, so that each must be more transparent.
@@ -65,7 +78,7 @@ def pictures(recording: Recording) -> list[Picture]:
     """One for each body: its skin, or its boundary where it has no skin."""
     made = []
     for i, body in enumerate(recording.bodies):
-        color = BODY_COLORS[i % len(BODY_COLORS)]
+        color = body_color(i)
         if body.skin is not None:
             made.append(Picture(body, body.skin.triangles, color, np.zeros(0, dtype=np.int64)))
         else:
@@ -125,7 +138,10 @@ def view_of(recording: Recording) -> View:
 
 @dataclass(frozen=True, eq=False)
 class ObstaclePicture:
-    """An obstacle's triangles at time 0; `RecordedFrame.obstacle_poses[number]` moves them."""
+    """An obstacle's triangles at time 0; `RecordedFrame.obstacle_poses[number]` moves them.
+
+    Of a room they face outwards: a page draws only their backs, so that one looks into it as into an open bowl.
+    """
 
     number: int
     name: str
@@ -133,6 +149,7 @@ class ObstaclePicture:
     triangles: NDArray[np.int32]
     opacity: float
     smooth: bool
+    room: bool = False
     color: ClassVar[tuple[int, int, int]] = OBSTACLE_COLOR
 
     def moves(self, frames: Iterable[RecordedFrame]) -> bool:
@@ -158,8 +175,18 @@ def obstacle_pictures(obstacles: Sequence[RecordedObstacle], view: View) -> list
         is_wall = obstacle.plane is not None and float(obstacle.plane[1] @ view.up) < 0.5
         opacity = WALL_OPACITY if is_wall else ROOM_OPACITY if obstacle.is_room else 1.0
         triangles = triangles.astype(np.int32)
-        made.append(ObstaclePicture(number, recorded.name, vertices, triangles, opacity, obstacle.smooth))
+        if obstacle.is_room and _volume(vertices, triangles) < 0.0:
+            triangles = triangles[:, ::-1].copy()
+        made.append(
+            ObstaclePicture(number, recorded.name, vertices, triangles, opacity, obstacle.smooth, obstacle.is_room)
+        )
     return made
+
+
+def _volume(x: NDArray[np.float64], triangles: NDArray[np.int32]) -> float:
+    """Of what a closed surface encloses [m^3]; below zero where its triangles face inwards."""
+    a, b, c = (x[triangles[:, k]] for k in range(3))
+    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
 
 
 def vertex_normals(x: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from supple.errors import OutputError
 from supple.files.replacing import whole_file
-from supple.output.drawing import BODY_COLORS, opened
+from supple.output.drawing import body_color, opened
 from supple.output.recording.reader import Recording
 
 _KINDS = ("png", "pdf", "svg")
@@ -94,7 +94,7 @@ def _draw(recording: Recording, axes) -> None:
     _momentum(angular, t, recording.series("angular_momentum"), "angular momentum\nabout the center [kg m²/s]")
     ratios = volume_ratios(recording)
     for i, body in enumerate(recording.bodies):
-        color = np.array(BODY_COLORS[i % len(BODY_COLORS)]) / 255.0
+        color = np.array(body_color(i)) / 255.0
         volume.plot(t, ratios[:, i], color=tuple(color), label=body.name if i < 8 else None)
     volume.set_ylabel("volume / rest volume")
     volume.legend(**_LEGEND)

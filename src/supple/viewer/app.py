@@ -22,6 +22,7 @@ from supple.viewer.protocol.live_source import LiveSource
 from supple.viewer.replay import Replay
 from supple.viewer.server.gate import gate, new_token, require_free_port
 from supple.viewer.server.input_check import guard_inputs
+from supple.viewer.server.page.served_page import ServedPage
 from supple.viewer.server.uploads.transfers import refuse_transfers
 
 
@@ -73,7 +74,7 @@ def opened_page(source: LiveSource | str | Path, address: Address | None = None)
         else:
             draw = partial(Replay, recording=ends.enter_context(read_recording(source)))
         require_free_port(address.host, address.port)  # viser would silently use the next port
-        with gate(address.host, address.token):
+        with gate(address.host, address.token, ServedPage(title_of(source))):
             server = start_server(address.host, address.port)
         ends.callback(stop_server, server)
         configure_page(server)
@@ -82,6 +83,14 @@ def opened_page(source: LiveSource | str | Path, address: Address | None = None)
         host = socket.gethostname() if address.host in ("", "0.0.0.0", "::") else address.host
         query = f"/?token={address.token}" if address.token else ""
         yield OpenPage(f"http://{host}:{server.get_port()}{query}", server, content)
+
+
+def title_of(source: LiveSource | str | Path) -> str:
+    """The title of the page: that of a live scene, or the name of a recording or of its folder."""
+    if isinstance(source, LiveSource):
+        return source.title
+    path = Path(source).resolve()
+    return path.name if path.is_dir() or path.stem != "recording" else path.parent.name
 
 
 def serve(source: LiveSource | str | Path, address: Address | None = None, *, open_browser: bool = True) -> None:

@@ -10,15 +10,18 @@ from supple.viewer.controls.controller import Controller, notify
 from supple.viewer.controls.measures import Measures
 from supple.viewer.controls.mouse import Mouse
 from supple.viewer.controls.mouse_controls import MouseControls
-from supple.viewer.controls.record_controls import RecordControls
+from supple.viewer.controls.sensors import Sensors
 from supple.viewer.controls.solver_controls import SolverControls
 from supple.viewer.controls.time_controls import TimeControls
 from supple.viewer.controls.upload_controls import UploadControls
-from supple.viewer.controls.view_controls import ViewControls
+from supple.viewer.controls.view.keys import add_keys
+from supple.viewer.controls.view.overlay import Overlay
+from supple.viewer.controls.view.record_controls import RecordControls
+from supple.viewer.controls.view.view_controls import ViewControls
 from supple.viewer.drawing.coloring.fields import FIELDS
 from supple.viewer.drawing.options import ViewOptions
 from supple.viewer.drawing.stage import Stage
-from supple.viewer.protocol.commands import SetView
+from supple.viewer.protocol.commands import Reset, SetView, Step
 from supple.viewer.protocol.snapshots import Snapshot
 
 _NUMBERS_EVERY = 0.15  # [s]; numbers that change faster cannot be read
@@ -37,7 +40,8 @@ class Panel:
     def __init__(self, server: Any, controller: Controller) -> None:
         self._server, self._controller = server, controller
         gui, snapshot = server.gui, controller.snapshot
-        self.time = TimeControls(gui, controller)
+        self.overlay = Overlay(gui)
+        self.time = TimeControls(gui, controller, self.overlay)
         tabs = gui.add_tab_group()
         self._bodies_tab, self._view_tab, self._solver_tab = (tabs.add_tab(name) for name in TABS)
         with self._bodies_tab:
@@ -58,12 +62,23 @@ class Panel:
             with bodies.new:
                 self.upload = UploadControls(self._server, self._controller, bodies.new_size, bodies.new_youngs)
         with self._view_tab:
-            self.views = ViewControls(self._server, stage, self._view_changed)
+            self.views = ViewControls(self._server, stage, self.overlay, self.request_view)
             self.record = RecordControls(self._server, stage)
         with self._solver_tab:
             self.solver = SolverControls(gui, self._controller)
-            self.measures = Measures(gui, self._controller.snapshot)
+            self.measures = Measures(gui, self._controller.snapshot, self.overlay)
+            self.sensors = Sensors(gui, self._controller.snapshot)
         self.mouse.attach(stage)
+        send = self._controller.send
+        add_keys(
+            gui,
+            stage,
+            {
+                "space": ("Play or pause", self.time.toggle),
+                "arrowright": ("One frame", lambda client: send(client, Step)),
+                "R": ("Back to the start", lambda client: send(client, Reset)),
+            },
+        )
         self.show(self._controller.snapshot)
         self.refresh()
 
@@ -75,6 +90,7 @@ class Panel:
         """Store a snapshot; `refresh` displays it."""
         self._controller.snapshot = snapshot
         self.measures.note(snapshot)
+        self.sensors.note(snapshot)
         self._notify(snapshot)
 
     def refresh(self) -> None:
@@ -89,6 +105,7 @@ class Panel:
         if snapshot is not self._plots_of and now - self._plots_at >= _PLOTS_EVERY:
             self._plots_at, self._plots_of = now, snapshot
             self.measures.show(snapshot)
+            self.sensors.show()
 
     def _notify(self, snapshot: Snapshot) -> None:
         """Display new notices."""
@@ -99,7 +116,7 @@ class Panel:
                     error = notice.level == "error"
                     notify(client, "Simulation", notice.text, "red" if error else "blue")
 
-    def _view_changed(self, options: ViewOptions) -> None:
+    def request_view(self, options: ViewOptions) -> None:
         """Request the values to draw from the simulation, which computes no others."""
         field = FIELDS.get(options.color_by)
         key = field.key if field is not None and options.surface != "wireframe" else None

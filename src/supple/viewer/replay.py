@@ -12,8 +12,10 @@ from typing import Any
 import numpy as np
 
 from supple.output.recording.reader import Recording
-from supple.viewer.controls.record_controls import RecordControls
-from supple.viewer.controls.view_controls import ViewControls
+from supple.viewer.controls.view.keys import add_keys
+from supple.viewer.controls.view.overlay import Overlay, button
+from supple.viewer.controls.view.record_controls import RecordControls
+from supple.viewer.controls.view.view_controls import ViewControls
 from supple.viewer.drawing.frame_rate import FrameRate
 from supple.viewer.drawing.moments.from_recording import model_of_recording, moment_of_frame
 from supple.viewer.drawing.moments.model import Moment
@@ -24,6 +26,7 @@ from supple.viewer.server.browser_values import number
 
 _SLOWEST, _FASTEST = 0.05, 4.0
 _KEPT = 64  # frames
+_RESTS = 0.05  # between two looks at the inputs, while it does not play [s]
 _SETTLES = 0.3  # time after the last slider input of a visitor [s]
 
 
@@ -49,16 +52,36 @@ class Replay:
         first, last = float(times[0]), float(times[-1])
         gui = server.gui
         with gui.add_folder("Replay"):
-            self.play = gui.add_button("Pause" if last > first else "Play")
+            self.play = gui.add_button("Pause" if last > first else "Play", hint="Start or stop the time (space bar)")
             step = (last - first) / max(1, len(times) - 1)
             self.slider = gui.add_slider(
-                "Time [s]", first, last, step if step > 0.0 else 1.0, initial_value=first, disabled=last == first
+                "Time [s]",
+                first,
+                last,
+                step if step > 0.0 else 1.0,
+                initial_value=first,
+                disabled=last == first,
+                hint="The frame that is drawn (right arrow: the next one)",
             )
-            self.speed = gui.add_slider("Speed", _SLOWEST, _FASTEST, 0.05, initial_value=1.0)
+            self.speed = gui.add_slider(
+                "Speed", _SLOWEST, _FASTEST, 0.05, initial_value=1.0, hint="Recorded seconds in a second"
+            )
             self.message = gui.add_markdown(self._facts(0))
-            self.export = gui.add_button("Export as page (HTML)")
-        self.controls = ViewControls(server, self.stage)
+            self.export = gui.add_button(
+                "Export as page (HTML)", hint="One file with all frames in this view, for any browser"
+            )
+        self.overlay = Overlay(gui)
+        self.controls = ViewControls(server, self.stage, self.overlay)
         self.record = RecordControls(server, self.stage)
+        add_keys(
+            gui,
+            self.stage,
+            {
+                "space": ("Play or pause", lambda client: self._toggle()),
+                "arrowright": ("One frame", lambda client: self._go_to(self.frame_at(self._time) + 1)),
+                "R": ("Back to the start", lambda client: self._go_to(0)),
+            },
+        )
         self.playing = last > first
         self._time = first
         # The slider value that playing has set last. Another value comes from a visitor, whose event arrives soon.
@@ -68,6 +91,7 @@ class Replay:
         self.slider.on_update(self._seek)
         self.play.on_click(lambda _: self._toggle())
         self.export.on_click(self._send_page)
+        self._show_transport()
         self._frame_rate = FrameRate(server)
         self._thread = threading.Thread(target=self._run, name="supple replay", daemon=True)
         self._thread.start()
@@ -102,6 +126,7 @@ class Replay:
         moment = self.moment(frame)
         if moment is not self.stage.moment:
             self.stage.show(moment)
+            self.controls.move_cameras()
             self.record.note(moment)
             self.controls.refresh()
             self.message.content = self._facts(frame)
@@ -109,21 +134,33 @@ class Replay:
     def _toggle(self) -> None:
         self.playing = not self.playing
         self.play.label = "Pause" if self.playing else "Play"
+        self._show_transport()
+
+    def _show_transport(self) -> None:
+        self.overlay.show("transport", button("❚❚" if self.playing else "▶", self.play, label=self.play.label))
 
     def _seek(self, event: Any) -> None:
         """Handle slider input of a visitor; updates by playing have no client."""
         if event.client is not None:
-            with self._turn:
-                if self.playing:
-                    self._toggle()
-                self._settle_at = time.monotonic() + _SETTLES
-                times = self._recording.times
-                self._put = self.slider.value
-                self.show(number(self.slider.value, float(times[0]), float(times[-1])))
+            times = self._recording.times
+            self._pause_at(number(self.slider.value, float(times[0]), float(times[-1])))
+
+    def _go_to(self, frame: int) -> None:
+        seconds = float(self._recording.times[min(frame, len(self._recording) - 1)])
+        self.slider.value = seconds
+        self._pause_at(seconds)
+
+    def _pause_at(self, seconds: float) -> None:
+        with self._turn:
+            if self.playing:
+                self._toggle()
+            self._settle_at = time.monotonic() + _SETTLES
+            self._put = self.slider.value
+            self.show(seconds)
 
     def _run(self) -> None:
         before = time.monotonic()
-        while not self._end.wait(self._frame_rate.pause()):
+        while not self._end.wait(self._frame_rate.pause() if self.playing else _RESTS):
             now = time.monotonic()
             passed, before = now - before, now
             times = self._recording.times
@@ -174,6 +211,6 @@ class Replay:
         if event.client is not None:
             self.export.disabled = True
             try:
-                event.client.send_file_download("supple.html", self.page().encode())
+                event.client.send_file_download("supple.html", self.page().encode(), save_immediately=True)
             finally:
                 self.export.disabled = False

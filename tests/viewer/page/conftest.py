@@ -12,13 +12,8 @@ import pytest
 
 import supple as sp
 from supple.output.recording.scene import RecordedObstacle
-from supple.viewer.protocol.snapshots import (
-    BodyDescription,
-    Measures,
-    SceneDescription,
-    Snapshot,
-    Timing,
-)
+from supple.viewer.protocol.commands import Watch
+from supple.viewer.protocol.snapshots import BodyDescription, Measures, SceneDescription, Snapshot, Timing
 
 
 class FakeSimulation:
@@ -27,8 +22,22 @@ class FakeSimulation:
     def __init__(self, snapshot: Snapshot) -> None:
         self.snapshot, self.received, self.error = snapshot, [], None
         self.sent = 0  # number of commands; the test sets `snapshot.applied`
+        self.progress, self.watched, self.starts = None, True, 0
+
+    @property
+    def heard_at(self) -> float:
+        return time.monotonic()
+
+    def wait_for_news(self, seconds: float) -> None:
+        time.sleep(0.002)
+
+    def restart(self) -> None:
+        self.error, self.starts = None, self.starts + 1
 
     def send(self, command):
+        if isinstance(command, Watch):
+            self.watched = command.watched
+            return 0
         self.received.append(command)
         self.sent += 1
         return self.sent
@@ -101,12 +110,17 @@ def snapshot_of(description: SceneDescription, **changes) -> Snapshot:
     return replace(made, **changes)
 
 
-@pytest.fixture
-def fake():
+def two_boxes() -> FakeSimulation:
     """A fake simulation of two small boxes above a floor."""
     mesh = sp.shapes.box(size=(1.0, 1.0, 1.0), divisions=(2, 2, 2))
     other = sp.TetMesh(mesh.vertices + np.array([2.0, 0.0, 0.0]), mesh.tets)
     return FakeSimulation(snapshot_of(describe(mesh, other)))
+
+
+@pytest.fixture
+def fake():
+    """See `two_boxes`."""
+    return two_boxes()
 
 
 class Visitor:
@@ -302,9 +316,10 @@ class Screen:
         right = np.cross(ahead, np.asarray(camera.up_direction))
         right /= np.linalg.norm(right)
         away = np.asarray(point) - eye
-        scale = 0.5 * camera.image_height / np.tan(0.5 * camera.fov) / (away @ ahead)
+        box = self.tab.locator("canvas").first.bounding_box()
+        scale = 0.5 * box["height"] / np.tan(0.5 * camera.fov) / (away @ ahead)
         x, y = scale * (away @ right), scale * (away @ np.cross(right, ahead))
-        return 0.5 * camera.image_width + float(x), 0.5 * camera.image_height - float(y)
+        return 0.5 * box["width"] + float(x), 0.5 * box["height"] - float(y)
 
     def press(self, name: str) -> None:
         """Click a button where it has come to rest: on a busy machine, a folder that opens moves it under the mouse."""

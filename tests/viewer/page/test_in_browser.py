@@ -120,6 +120,7 @@ def test_a_click_pins_a_vertex_and_another_one_unpins_it(resting):
     tab.mouse.click(x, y)
     screen.wait(lambda: len(resting.snapshot().pinned) == 1, "the pin")
     screen.wait(lambda: dark() > 10, "the pin in the picture")
+    tab.wait_for_timeout(500)  # two clicks within a shorter time are one double click
     tab.mouse.click(x, y)
     screen.wait(lambda: len(resting.snapshot().pinned) == 0, "no pin")
     screen.wait(lambda: dark() < 5, "no pin in the picture")
@@ -242,7 +243,7 @@ def upload_two_files(resting, spot, tmp_path):
 def test_the_pusher_pushes_a_body(resting):
     screen, controls = resting.screen, resting.panel.mouse_controls
     screen.choose(controls.mode, "push")
-    screen.wait(lambda: controls.radius_input.visible, "the ball's size")
+    screen.wait(lambda: controls.radius_input.handle.visible, "the ball's size")
     middle = resting.middle()
     x, y = screen.place(middle)
     mouse = screen.tab.mouse

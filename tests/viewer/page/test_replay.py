@@ -84,32 +84,6 @@ def test_frames_at_times_between_and_beyond_frames(replay):
         assert replay.frame_at(float(times[number])) == number
 
 
-def test_an_exported_page_is_self_contained(replay, browser, pixels, spot, tmp_path):
-    from dataclasses import replace
-
-    replay.playing = False
-    replay.stage.apply(replace(replay.stage.options, surface="tets"))
-    file = tmp_path / "page.html"
-    file.write_text(replay.page(), encoding="utf-8")
-    tab = browser.new_page(viewport={"width": 480, "height": 320})
-    tab.set_default_timeout(90_000)
-    asked = []
-    tab.on("request", lambda request: asked.append(request.url))
-    tab.goto(file.as_uri())
-    places, end = [], time.monotonic() + 90.0
-    while time.monotonic() < end:
-        tab.wait_for_timeout(100)
-        count, middle, _ = spot(pixels(tab)[:260, 160:], "red")
-        if count > 100:
-            places.append(middle[0])
-        if len(places) > 2 and max(places) - min(places) > 40:
-            break
-    tab.close()
-    assert places, "the red body was never drawn"
-    assert max(places) - min(places) > 40
-    assert asked == [file.as_uri()]
-
-
 def test_exported_pages_keep_times_and_drop_frames_above_the_limit(recorded, monkeypatch):
     from supple.viewer.drawing import page_of_moments as module
 
@@ -138,21 +112,14 @@ def test_the_missing_encoder_is_named(monkeypatch):
     assert "pip install 'supple[video]'" in video_formats()["mp4"]
 
 
-def test_a_recording_in_the_browser(recorded, look, spot, tmp_path):
-    """The slider, another view, a screenshot, and an exported page."""
-    from dataclasses import replace
-
+def test_a_recording_in_the_browser(recorded, look, browser, pixels, spot, tmp_path):
+    """Pause, the slider, colors with their legend, a screenshot, and a page with stress from the export button."""
     with opened_page(recorded, Address(port=0)) as page:
         screen, replay = look(page.url, page.server), page.content
-        where = lambda: spot(screen.shot(), "red")  # noqa: E731
+        where = lambda: spot(screen.shot()[:330], "red")  # noqa: E731 - above the legend
         agree = lambda: screen.reads(replay.slider) == pytest.approx(replay.slider.value, abs=1e-9)  # noqa: E731
-        # A key at the last frame has no effect, so that it is repeated.
-        for _ in range(20):
-            if not replay.playing:
-                break
-            screen.slide(replay.slider, "ArrowRight")
-            screen.tab.wait_for_timeout(200)
-        assert not replay.playing
+        screen.tab.keyboard.press(" ")
+        screen.wait(lambda: not replay.playing, "the pause")
         screen.wait(agree, "the time that is shown in the browser's slider")
         screen.slide(replay.slider, "Home")
         screen.wait(lambda: replay.stage.moment is replay.moment(0), "the first frame")
@@ -161,18 +128,40 @@ def test_a_recording_in_the_browser(recorded, look, spot, tmp_path):
         screen.slide(replay.slider, "End")
         screen.wait(lambda: replay.stage.moment is replay.moment(STEPS), "the last frame")
         screen.wait(lambda: abs(where()[1][0] - left) > 40, "the last frame in the picture")
-        screen.choose(replay.controls.color_by, "volume ratio J")
-        screen.wait(lambda: where()[0] == 0, "the colors of J in the picture")
-        assert screen.tab.locator(".supple-color-bar").is_visible()
-        screen.choose(replay.controls.color_by, "body")
         screen.tab.get_by_text("Record", exact=True).first.click()
         with screen.tab.expect_download(timeout=90_000) as screenshot:
             screen.press("Screenshot")
         picture = pytest.importorskip("PIL.Image").open(screenshot.value.path())
         assert spot(np.asarray(picture.convert("RGB")).astype(int), "red")[0] > 100
+        screen.choose(replay.controls.color_by, "von Mises stress")
+        screen.wait(lambda: where()[0] == 0, "the colors of the stress in the picture")
+        screen.wait(lambda: screen.tab.locator("#supple-legend .bar").is_visible(), "the legend")
+        with screen.tab.expect_download(timeout=90_000) as export:
+            screen.press("Export as page (HTML)")
+        export.value.save_as(tmp_path / "page.html")
         assert screen.errors == []
-        assert replace(replay.stage.options) == ViewOptions()
         screen.close()
+    plays_alone(browser, pixels, tmp_path / "page.html")
+
+
+def plays_alone(browser, pixels, file):
+    """An exported page draws a body in colors of viridis, moves it, and needs nothing else."""
+    tab = browser.new_page(viewport={"width": 480, "height": 320})
+    tab.set_default_timeout(90_000)
+    asked = []
+    tab.on("request", lambda request: asked.append(request.url))
+    tab.goto(file.as_uri())
+    places, end = [], time.monotonic() + 90.0
+    while time.monotonic() < end and not (len(places) > 2 and max(places) - min(places) > 40):
+        tab.wait_for_timeout(100)
+        r, g, b = np.moveaxis(pixels(tab)[:260, 160:], 2, 0)
+        colored = np.maximum(np.maximum(r, g), b) - np.minimum(np.minimum(r, g), b) > 60
+        if colored.sum() > 100:
+            places.append(np.nonzero(colored)[1].mean())
+    tab.close()
+    assert places, "the body was never drawn"
+    assert max(places) - min(places) > 40
+    assert asked == [file.as_uri()]
 
 
 def test_stitches_of_recordings_are_drawn(server, tmp_path):

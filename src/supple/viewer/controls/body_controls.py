@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from supple.viewer.controls.controller import Controller, sequential
-from supple.viewer.controls.inputs import ParameterInput
+from supple.viewer.controls.inputs.parameter_input import ParameterInput
+from supple.viewer.controls.inputs.unit_slider import Scale, UnitSlider
 from supple.viewer.protocol import limits
 from supple.viewer.protocol.commands import AddBody, CopyBody, RemoveBody, Squash
 from supple.viewer.protocol.parameters import PARAMETERS, Value
 from supple.viewer.protocol.snapshots import SceneDescription, Snapshot
-from supple.viewer.server.browser_values import number, one_of
+from supple.viewer.server.browser_values import one_of
 
 ALL = "all bodies"
 _SQUASH, _STRETCH = 0.5, 1.5
@@ -26,17 +27,45 @@ class BodyControls:
         scene = controller.snapshot.description
         size = float(max(scene.high - scene.low))
         with gui.add_folder("Bodies") as self._folder:
-            self.squash = gui.add_button_group("All bodies", ("squash", "stretch"))
-            self.which = gui.add_dropdown("Of", (ALL, *(body.name for body in scene.bodies)), initial_value=ALL)
-            self.change = gui.add_button_group("This one", ("copy", "remove"), visible=False)
-        with gui.add_folder("Add a body", expand_by_default=False) as self.new:
-            self.shape = gui.add_dropdown("Shape", limits.SHAPES, initial_value="sphere")
-            self.size = gui.add_number(
-                "Size [m]", initial_value=round(0.3 * size, 3), min=1e-3, max=100.0, step=round(0.01 * size, 4) or 0.001
+            self.squash = gui.add_button_group(
+                "All bodies", ("squash", "stretch"), hint="Deform all bodies along gravity, without a change of volume"
             )
-            self.resolution = gui.add_slider("Edges across", limits.COARSEST, 16, 1, initial_value=6)
-            self.youngs = gui.add_slider("Young's modulus 10^", 3.0, 8.0, 0.1, initial_value=5.0)
-            self.add = gui.add_button("Add")
+            self.which = gui.add_dropdown(
+                "Of",
+                (ALL, *(body.name for body in scene.bodies)),
+                initial_value=ALL,
+                hint="The body whose values are below",
+            )
+            self.change = gui.add_button_group(
+                "This one", ("copy", "remove"), visible=False, hint="Add a copy of this body, or remove it"
+            )
+        with gui.add_folder("Add a body", expand_by_default=False) as self.new:
+            self.shape = gui.add_dropdown("Shape", limits.SHAPES, initial_value="sphere", hint="Of the new body")
+            self.size = UnitSlider(
+                gui,
+                "Size",
+                Scale(0.03 * size, 3.0 * size, 1e-3, 100.0, "m", logarithmic=True),
+                0.3 * size,
+                hint="Largest side of the new body",
+                changed=_nothing,
+            )
+            self.resolution = UnitSlider(
+                gui,
+                "Edges across",
+                Scale(limits.COARSEST, 16, limits.COARSEST, limits.FINEST, whole=True),
+                6,
+                hint="Edges of the mesh across the new body",
+                changed=_nothing,
+            )
+            self.youngs = UnitSlider(
+                gui,
+                "Young's modulus",
+                Scale(1e3, 1e8, 1e2, 1e11, "Pa", logarithmic=True),
+                1e5,
+                hint="Stiffness of the new body",
+                changed=_nothing,
+            )
+            self.add = gui.add_button("Add", hint="Add this shape above all bodies")
         self.squash.on_click(sequential(self._squash))
         self.which.on_update(lambda _: self.show(controller.snapshot))
         self.change.on_click(sequential(self._change))
@@ -95,15 +124,19 @@ class BodyControls:
             lambda: AddBody(
                 one_of(self.shape.value, limits.SHAPES),
                 size=self.new_size(),
-                resolution=round(number(self.resolution.value, limits.COARSEST, 16)),
+                resolution=round(self.resolution.value),
                 youngs=self.new_youngs(),
             ),
         )
 
     def new_size(self) -> float:
         """Size of a new body [m]."""
-        return number(self.size.value, 1e-3, 100.0)
+        return self.size.value
 
     def new_youngs(self) -> float:
         """Young's modulus of a new body [Pa]."""
-        return 10.0 ** number(self.youngs.value, 3.0, 8.0)
+        return self.youngs.value
+
+
+def _nothing(client: Any, value: float) -> None:
+    """The value is read when a body is added."""

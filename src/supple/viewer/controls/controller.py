@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 from supple.errors import SuppleError
 from supple.viewer.protocol.commands import Command
-from supple.viewer.protocol.snapshots import Snapshot
+from supple.viewer.protocol.snapshots import Progress, Snapshot
 
 
 class Simulation(Protocol):
@@ -22,9 +22,27 @@ class Simulation(Protocol):
         """The newest snapshot; never waits."""
         ...
 
+    def wait_for_news(self, seconds: float) -> None:
+        """Wait until there is a new snapshot, or for some seconds."""
+        ...
+
     @property
     def error(self) -> str | None:
         """Why the simulation ended, or None."""
+        ...
+
+    @property
+    def progress(self) -> Progress | None:
+        """Of the present step, where it takes long."""
+        ...
+
+    @property
+    def heard_at(self) -> float:
+        """When the last message of the simulation came [s of `time.monotonic`]."""
+        ...
+
+    def restart(self) -> None:
+        """Start the simulation again. Raises `SuppleError` where that is impossible."""
         ...
 
 

@@ -4,41 +4,52 @@ from __future__ import annotations
 
 import threading
 from collections import deque
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.readings.joint_readings import JointReading
+from supple.viewer.controls.view.overlay import Overlay
+from supple.viewer.protocol.quantities import written
 from supple.viewer.protocol.snapshots import Snapshot
 from supple.viewer.server.plain_markdown import plain
 
 _SECONDS = 10.0  # of simulated time in a plot
-_MOST_POINTS = 300
 _MOST_JOINTS = 12  # in the text
-_GAP = _SECONDS / _MOST_POINTS  # between two points [s]
+MOST_POINTS = 300
+GAP = _SECONDS / MOST_POINTS  # between two points [s]
 
 
 class Measures:
     """The folder "Measures"."""
 
-    def __init__(self, gui: Any, snapshot: Snapshot) -> None:
+    def __init__(self, gui: Any, snapshot: Snapshot, overlay: Overlay) -> None:
+        self._overlay = overlay
         self._lock = threading.Lock()
-        self._rows: deque[tuple[float, ...]] = deque(maxlen=_MOST_POINTS)
+        self._rows: deque[tuple[float, ...]] = deque(maxlen=MOST_POINTS)
         with gui.add_folder("Measures"):
             self._message = gui.add_markdown("")
-            self.energy = self._plot(gui, "Energy [J]", (("kinetic", "#e65c3c"), ("elastic", "#409ce1")))
-            self.spin = self._plot(gui, "Spin [rad/s]", (("fastest body", "#34ac78"),))
+            self.energy = plot(gui, "Energy [J]", (("kinetic", "#e65c3c"), ("elastic", "#409ce1")))
+            self.spin = plot(gui, "Spin [rad/s]", (("fastest body", "#34ac78"),))
         self.note(snapshot)
 
     def note(self, snapshot: Snapshot) -> None:
         """Store the values for the plots."""
         measures = snapshot.measures
-        row = (snapshot.time, measures.kinetic_energy, measures.elastic_energy, _fastest_spin(snapshot))
+        row = (
+            snapshot.time,
+            measures.kinetic_energy,
+            measures.elastic_energy,
+            _fastest_spin(snapshot),
+            measures.kinetic_energy + measures.elastic_energy + measures.potential_energy,
+            measures.min_det_F,
+        )
         with self._lock:
             if self._rows and snapshot.time < self._rows[-1][0]:
                 self._rows.clear()
-            if not self._rows or snapshot.time - self._rows[-1][0] >= _GAP:
+            if not self._rows or snapshot.time - self._rows[-1][0] >= GAP:
                 self._rows.append(row)
 
     def show(self, snapshot: Snapshot) -> None:
@@ -46,26 +57,42 @@ class Measures:
         self._message.content = measures_text(snapshot)
         with self._lock:
             rows = np.nan_to_num(np.array(self._rows, dtype=np.float64), posinf=0.0, neginf=0.0)
-        self._draw(self.energy, rows, (1, 2))
-        self._draw(self.spin, rows, (3,))
+        shown(self.energy, rows, (1, 2))
+        shown(self.spin, rows, (3,))
+        lines = sparkline(rows[:, 4], "#b8860b") + sparkline(rows[:, 5], "#2e8b57")
+        now = f'energy {written(rows[-1, 4], "J", 3)}</span><span style="color:#2e8b57">smallest J {rows[-1, 5]:.3f}'
+        self._overlay.show("state", f'{lines}<div class="row"><span style="color:#b8860b">{now}</span></div>')
 
-    @staticmethod
-    def _plot(gui: Any, title: str, series: tuple[tuple[str, str], ...]) -> Any:
-        from viser import uplot
 
-        return gui.add_uplot(
-            tuple(np.zeros(1) for _ in range(len(series) + 1)),
-            (uplot.Series(label="t [s]"), *(uplot.Series(label=name, stroke=color, width=2) for name, color in series)),
-            title=title,
-            scales={"x": uplot.Scale(time=False, auto=True), "y": uplot.Scale(auto=True)},
-            height=130,
-        )
+def plot(gui: Any, title: str, series: Iterable[tuple[str, str]]) -> Any:
+    """An empty plot over time of lines with names and colors."""
+    from viser import uplot
 
-    @staticmethod
-    def _draw(handle: Any, rows: NDArray[np.float64], columns: tuple[int, ...]) -> None:
-        if len(rows) == len(handle.data[0]) and rows[-1, 0] == handle.data[0][-1]:
-            return
-        handle.data = tuple(np.ascontiguousarray(rows[:, k]) for k in (0, *columns))
+    lines = tuple(uplot.Series(label=name, stroke=color, width=2) for name, color in series)
+    return gui.add_uplot(
+        tuple(np.zeros(1) for _ in range(len(lines) + 1)),
+        (uplot.Series(label="t [s]"), *lines),
+        title=title,
+        scales={"x": uplot.Scale(time=False, auto=True), "y": uplot.Scale(auto=True)},
+        height=130,
+    )
+
+
+def shown(handle: Any, rows: NDArray[np.float64], columns: Sequence[int]) -> None:
+    """Draw columns of rows, the first of which is the time."""
+    rows = np.nan_to_num(rows, posinf=0.0, neginf=0.0)
+    if len(rows) == len(handle.data[0]) and rows[-1, 0] == handle.data[0][-1]:
+        return
+    handle.data = tuple(np.ascontiguousarray(rows[:, k]) for k in (0, *columns))
+
+
+def sparkline(values: NDArray[np.float64], color: str) -> str:
+    """A small plot of values (k,), as SVG; a line in the middle where they do not change."""
+    low, high = float(values.min()), float(values.max())
+    across = np.linspace(1.0, 149.0, len(values)) if len(values) > 1 else np.array([1.0])
+    up = (values - low) / (high - low) if high > low else np.full(len(values), 0.5)
+    points = " ".join(f"{x:.0f},{y:.1f}" for x, y in zip(across, 22.0 - 20.0 * up, strict=True))
+    return f'<svg viewBox="0 0 150 24"><polyline points="{points}" fill="none" stroke="{color}"/></svg>'
 
 
 def measures_text(snapshot: Snapshot) -> str:

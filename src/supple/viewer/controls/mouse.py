@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,11 +13,24 @@ from numpy.typing import NDArray
 
 from supple.viewer.controls.controller import Controller
 from supple.viewer.controls.mouse_controls import MouseControls
+from supple.viewer.drawing.camera import fit
 from supple.viewer.drawing.picking import nearest_surface_point, point_on_camera_plane, surface_point_on_ray
 from supple.viewer.drawing.stage import Stage
-from supple.viewer.protocol.commands import Grab, MoveGrab, MovePusher, Pin, ReleaseGrab, Unpin
+from supple.viewer.protocol.commands import Command, Grab, MoveGrab, MovePusher, Pin, ReleaseGrab, Unpin
 
 _BACKDROP = "/backdrop"
+
+
+_DOUBLE_CLICK = 0.4  # longest time between two clicks [s]
+
+
+@dataclass(frozen=True, eq=False)
+class _Click:
+    """A click on a body: who clicked, when [s], and the command that takes its effect back."""
+
+    visitor: int
+    at: float
+    undo: Callable[[], Command]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +56,7 @@ class Mouse:
         self._grabs: dict[int, int] = {}  # by visitor
         self._pushes: dict[int, _Push] = {}
         self._backdrop: Any = None
+        self._click: _Click | None = None
         server.on_client_disconnect(lambda client: self.release(client.client_id))
 
     def attach(self, stage: Stage) -> None:
@@ -93,8 +109,16 @@ class Mouse:
         if point is None:
             return
         body, vertex = point.body, point.nearest_vertex
+        before, self._click = self._click, None
+        if before is not None and before.visitor == event.client_id and time.monotonic() - before.at < _DOUBLE_CLICK:
+            # The second click of two: the first one has no effect, and the body fills the picture.
+            self._controller.send(event.client, before.undo)
+            fit(event.client, self._stage.moment.finite_positions[body.vertices])
+            return
         held = vertex + body.vertices.start in self._controller.snapshot.pinned
-        self._controller.send(event.client, lambda: (Unpin if held else Pin)(body.name, vertex))
+        act, undo = (Unpin, Pin) if held else (Pin, Unpin)
+        self._click = _Click(event.client_id, time.monotonic(), lambda: undo(body.name, vertex))
+        self._controller.send(event.client, lambda: act(body.name, vertex))
 
     def release(self, visitor: int) -> None:
         """End the grab or push of a visitor."""

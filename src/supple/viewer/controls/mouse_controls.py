@@ -6,9 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 from supple.viewer.controls.controller import Controller, sequential
+from supple.viewer.controls.inputs.unit_slider import Scale, UnitSlider
 from supple.viewer.protocol import limits
 from supple.viewer.protocol.commands import RemovePusher, Unpin
-from supple.viewer.server.browser_values import number, one_of
+from supple.viewer.server.browser_values import one_of
 
 DRAG, PUSH = "drag and pin", "push"
 MODES = (DRAG, PUSH)
@@ -29,13 +30,26 @@ class MouseControls:
         size = max(float(max(scene.high - scene.low)), 10.0 * limits.SMALLEST_LENGTH)
         self._radii = 0.02 * size, 0.5 * size
         with gui.add_folder("Mouse"):
-            self.mode = gui.add_dropdown("Left button", MODES, initial_value=DRAG)
+            self.mode = gui.add_dropdown("Left button", MODES, initial_value=DRAG, hint="What the left button does")
             self._hint = gui.add_markdown(_HINTS[DRAG])
-            self.strength = gui.add_slider("Strength 10^", -1.5, 1.5, 0.1, initial_value=0.0)
-            self.radius_input = gui.add_slider(
-                "Ball [m]", *self._radii, 0.01 * size, initial_value=0.15 * size, visible=False
+            self.strength = UnitSlider(
+                gui,
+                "Strength",
+                Scale(0.03, 30.0, limits.WEAKEST_GRAB, limits.STRONGEST_GRAB, logarithmic=True),
+                1.0,
+                hint="Stiffness of the spring, as a factor of one with which the body oscillates at 4 Hz",
+                changed=lambda client, value: None,
             )
-            self.unpin = gui.add_button("Unpin all")
+            self.radius_input = UnitSlider(
+                gui,
+                "Ball",
+                Scale(*self._radii, *self._radii, "m"),
+                0.15 * size,
+                hint="Radius of the ball that pushes",
+                changed=lambda client, value: None,
+                visible=False,
+            )
+            self.unpin = gui.add_button("Unpin all", hint="Release all vertices that were pinned on the page")
         # In order, so that the backdrop exists exactly in the mode "push".
         self.mode.on_update(sequential(self._switch))
         self.unpin.on_click(sequential(lambda e: controller.send(e.client, Unpin)))
@@ -48,17 +62,17 @@ class MouseControls:
     @property
     def stiffness(self) -> float:
         """Stiffness factor of grabs."""
-        return 10.0 ** number(self.strength.value, -1.5, 1.5)
+        return self.strength.value
 
     @property
     def radius(self) -> float:
         """Radius of the ball [m]."""
-        return number(self.radius_input.value, *self._radii)
+        return self.radius_input.value
 
     def _switch(self, event: Any) -> None:
         pushes = self.pushes
         self._hint.content = _HINTS[PUSH if pushes else DRAG]
-        self.strength.visible, self.radius_input.visible = not pushes, pushes
+        self.strength.handle.visible, self.radius_input.handle.visible = not pushes, pushes
         if not pushes:
             self._controller.send(event.client, RemovePusher)
         self._changed()

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from supple.viewer.controls.controller import Controller, sequential
-from supple.viewer.controls.inputs import ParameterInput
-from supple.viewer.controls.pending import PendingValue
+from supple.viewer.controls.inputs.parameter_input import ParameterInput
+from supple.viewer.controls.inputs.pending import PendingValue
 from supple.viewer.protocol.commands import SetSolver
 from supple.viewer.protocol.parameters import PARAMETERS
 from supple.viewer.protocol.snapshots import Snapshot
@@ -26,7 +26,12 @@ class SolverControls:
         self._kind = controller.snapshot.description.solver
         self._folder = gui.add_folder("Solver")
         with self._folder:
-            self.kind = gui.add_dropdown("Solver", _KINDS, initial_value=controller.snapshot.description.solver)
+            self.kind = gui.add_dropdown(
+                "Solver",
+                _KINDS,
+                initial_value=controller.snapshot.description.solver,
+                hint="xpbd is fast; implicit solves each step to a tolerance. The state is kept.",
+            )
         self.kind.on_update(sequential(self._switch))
         self.show(controller.snapshot)
 

@@ -11,7 +11,7 @@ from supple.output.drawing import View
 
 ANGLE = 35.0  # vertical field of view [degrees]
 _ROOM = 1.2
-PRESETS = ("corner", "front", "side", "top")
+PRESETS = ("corner", "front", "side", "top", "back")
 
 
 def eye_of(preset: str, view: View) -> NDArray[np.float64]:
@@ -26,7 +26,7 @@ def eye_of(preset: str, view: View) -> NDArray[np.float64]:
     across = np.eye(3)[int(np.argmax(np.abs(level)))]
     ahead = across * np.sign(level @ across)
     # Exactly from above, the up direction of the picture would be undefined.
-    directions = {"front": ahead, "side": np.cross(view.up, ahead), "top": view.up + 1e-3 * ahead}
+    directions = {"front": ahead, "side": np.cross(view.up, ahead), "top": view.up + 1e-3 * ahead, "back": -ahead}
     direction = directions[preset] + (0.0 if preset == "top" else 0.08) * view.up
     return view.center + distance * direction / np.linalg.norm(direction)
 
@@ -41,9 +41,42 @@ def set_initial_camera(server: Any, view: View) -> None:
 
 
 def look_from(client: Any, preset: str, view: View) -> None:
-    """Move the camera of one visitor to a preset."""
+    """Move the camera of one visitor to a preset; in a narrow picture, farther away."""
+    away = eye_of(preset, view) - view.center
+    away *= np.sin(np.radians(0.5 * ANGLE)) / np.sin(_half_angle(client.camera))
+    _move(client, view.center, away, view.up)
+
+
+def fit(client: Any, points: NDArray[np.float64]) -> None:
+    """Move the camera of one visitor so that points (n, 3) [m] fill its picture; it keeps its direction."""
+    camera = client.camera
+    low, high = points.min(axis=0), points.max(axis=0)
+    radius = max(0.5 * float(np.linalg.norm(high - low)), 1e-6)
+    away = np.asarray(camera.position) - np.asarray(camera.look_at)
+    length = float(np.linalg.norm(away))
+    away = away / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
+    _move(client, 0.5 * (low + high), 1.05 * radius / np.sin(_half_angle(camera)) * away)
+
+
+def follow(client: Any, way: NDArray[np.float64]) -> None:
+    """Move the camera of one visitor, and the point that it looks at, by `way` (3,) [m]."""
+    camera = client.camera
+    eye, center = np.asarray(camera.position), np.asarray(camera.look_at)
+    _move(client, center + way, eye - center)
+
+
+def _half_angle(camera: Any) -> float:
+    """Half of the smaller angle of view of a camera [rad]."""
+    half = 0.5 * float(np.clip(camera.fov, 0.02, 3.0))
+    return half if camera.aspect >= 1.0 else float(np.arctan(np.tan(half) * max(camera.aspect, 0.05)))
+
+
+def _move(
+    client: Any, center: NDArray[np.float64], away: NDArray[np.float64], up: NDArray[np.float64] | None = None
+) -> None:
     with client.atomic():
-        client.camera.up_direction = tuple(view.up)
-        client.camera.position = tuple(eye_of(preset, view))
+        if up is not None:
+            client.camera.up_direction = tuple(up)
+        client.camera.position = tuple(center + away)
         # Last: viser moves `look_at` together with the position.
-        client.camera.look_at = tuple(view.center)
+        client.camera.look_at = tuple(center)

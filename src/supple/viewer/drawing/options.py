@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+from supple.viewer.drawing.coloring.color_scale import Range
 
 SURFACES = ("skin", "wireframe", "tets", "exploded tets", "cut")
 COLOR_BY_BODY = "body"
@@ -16,12 +18,14 @@ class ViewOptions:
     ----------
     surface : one of SURFACES
     color_by : COLOR_BY_BODY, or the name of one of the fields
+    ends : of the color scale
     explode : distance by which tets are pulled apart; cut_axis : "x", "y" or "z"; cut_place : from 0 to 1
     velocities, contacts, stitches : whether they are drawn
     """
 
     surface: str = "skin"
     color_by: str = COLOR_BY_BODY
+    ends: Range = field(default_factory=Range)
     explode: float = 0.4
     cut_axis: str = "x"
     cut_place: float = 0.5

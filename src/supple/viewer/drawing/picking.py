@@ -66,15 +66,24 @@ def nearest_surface_point(moment: Moment, place: ArrayLike) -> SurfacePoint:
 
 
 def surface_point_on_ray(moment: Moment, origin: ArrayLike, direction: ArrayLike) -> SurfacePoint | None:
-    """The first intersection of a ray from `origin` (3,) in `direction` (3,) with any boundary, or None.
+    """The first intersection of a ray from `origin` (3,) in `direction` (3,) with any boundary, or None."""
+    triangles = _triangles(moment)
+    hit = first_hit(triangles.corners, origin, direction)
+    if hit is None:
+        return None
+    place = np.asarray(origin, dtype=np.float64) + hit[1] * np.asarray(direction)
+    return _on_triangle(moment.model, triangles, hit[0], place)
+
+
+def first_hit(corners: NDArray[np.float64], origin: ArrayLike, direction: ArrayLike) -> tuple[int, float] | None:
+    """The triangle of `corners` (t, 3, 3) that a ray meets first, and the multiple of `direction` to it, or None.
 
     Source: Möller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection" (1997).
     """
-    triangles = _triangles(moment)
-    a, b, c = (triangles.corners[:, k] for k in range(3))
+    a, b, c = (corners[:, k] for k in range(3))
     start, along = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
     h = np.cross(along, c - a)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         inverse = 1.0 / np.einsum("ij,ij->i", b - a, h)
         u = inverse * np.einsum("ij,ij->i", start - a, h)
         q = np.cross(start - a, b - a)
@@ -84,7 +93,7 @@ def surface_point_on_ray(moment: Moment, origin: ArrayLike, direction: ArrayLike
     if not met.any():
         return None
     first = int(np.argmin(np.where(met, t, np.inf)))
-    return _on_triangle(moment.model, triangles, first, start + t[first] * along)
+    return first, float(t[first])
 
 
 def _on_triangle(model: Model, triangles: _Triangles, row: int, place: NDArray[np.float64]) -> SurfacePoint:

@@ -12,14 +12,16 @@ from numpy.typing import NDArray
 from supple.viewer.drawing.camera import set_initial_camera
 from supple.viewer.drawing.coloring.fields import FIELDS, Field
 from supple.viewer.drawing.layers.dots import Dots
+from supple.viewer.drawing.layers.forces import ForceView
 from supple.viewer.drawing.layers.ground import Ground
 from supple.viewer.drawing.layers.joints import JointView
 from supple.viewer.drawing.layers.obstacles import ObstacleView
 from supple.viewer.drawing.layers.primitives.layer import Layer
+from supple.viewer.drawing.layers.section import Cut
 from supple.viewer.drawing.layers.skin import SkinView
 from supple.viewer.drawing.layers.springs import PusherView, SpringView
 from supple.viewer.drawing.layers.stitches import StitchView
-from supple.viewer.drawing.layers.tets import Cut, TetView
+from supple.viewer.drawing.layers.tets import TetView
 from supple.viewer.drawing.layers.velocities import VelocityView
 from supple.viewer.drawing.moments.model import Model, Moment
 from supple.viewer.drawing.options import COLOR_BY_BODY, ViewOptions
@@ -61,8 +63,22 @@ class Stage:
 
     @property
     def color_range(self) -> tuple[float, float] | None:
-        """(low, high) of the color bar, or None."""
+        """(low, high) of the color bar, or None, also where no value is known."""
         return self._bodies.range if isinstance(self._bodies, TetView) else None
+
+    @property
+    def force_scale(self) -> float | None:
+        """The force of an arrow of half the size of the scene [N]; None where no forces are drawn."""
+        return None if self._forces is None else self._forces.full
+
+    def value_on_ray(self, origin: NDArray[np.float64], direction: NDArray[np.float64]) -> tuple[str, float] | None:
+        """The body that a ray meets first, and the value of the field there; None where there is none."""
+        bodies = self._bodies
+        found = bodies.value_on_ray(origin, direction) if isinstance(bodies, TetView) else None
+        if found is None:
+            return None
+        tet, value = found
+        return next(body.name for body in self.model.bodies if body.tets.start <= tet < body.tets.stop), value
 
     @property
     def body_handles(self) -> list[Any]:
@@ -97,7 +113,9 @@ class Stage:
         self._layers.append(JointView(scene, moment))
         if options.velocities:
             self._layers.append(VelocityView(scene, moment))
-        if options.contacts:
+        self._forces = ForceView(scene, moment) if options.contacts else None
+        if self._forces is not None:
+            self._layers.append(self._forces)
             self._layers.append(Dots(scene, moment, "/contacts/points", _CONTACT_COLOR, 0.02, _contacts))
         if options.stitches:
             self._layers.append(StitchView(scene, moment))
@@ -112,7 +130,7 @@ class Stage:
             return SkinView(self._scene, self.moment)
         explode = options.explode if options.surface == "exploded tets" else 0.0
         cut = Cut("xyz".index(options.cut_axis), options.cut_place) if options.surface == "cut" else None
-        return TetView(self._scene, self.moment, field, explode, cut)
+        return TetView(self._scene, self.moment, field, options.ends, explode, cut)
 
 
 def _pins(moment: Moment) -> NDArray[np.float64]:

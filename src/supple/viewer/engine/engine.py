@@ -15,15 +15,15 @@ from supple.viewer.engine.simulation_process import run_simulation
 from supple.viewer.protocol.command_queue import CommandQueue
 from supple.viewer.protocol.commands import Command
 from supple.viewer.protocol.live_source import LiveSource
-from supple.viewer.protocol.outbox import DESCRIPTION, ERROR
-from supple.viewer.protocol.snapshots import SceneDescription, Snapshot
+from supple.viewer.protocol.outbox import DESCRIPTION, ERROR, PROGRESS, SNAPSHOT
+from supple.viewer.protocol.snapshots import Progress, SceneDescription, Snapshot
 
 # A process that does not end by itself within this time [s] is terminated.
 GRACE = 2.0
 
 
 class Engine:
-    """A simulation in its own process. Only the constructor and `wait_for` wait for the simulation.
+    """A simulation in its own process. Only the constructor, `restart` and `wait...` wait for it.
 
     Thread-safe. The process ends with `close`, at the end of the context, or with this process.
 
@@ -35,6 +35,7 @@ class Engine:
     Attributes
     ----------
     error : why the simulation ended, where it was not closed; otherwise None
+    progress : of the present step, where it takes long; heard_at : when the last message came [s of time.monotonic]
 
     Raises
     ------
@@ -44,13 +45,21 @@ class Engine:
     def __init__(self, source: LiveSource, start_timeout: float = 600.0) -> None:
         self.source = source
         self._arrived = threading.Condition()
-        self._description: SceneDescription | None = None
-        self._raw: tuple[SceneDescription, memoryview] | None = None
-        self._latest: Snapshot | None = None
-        self.error: str | None = None
-        self._closing = False
+        self._start_timeout = start_timeout
         self._number = 0
         self._number_lock = threading.Lock()
+        self._latest: Snapshot | None = None
+        self._start()
+
+    def _start(self) -> None:
+        """Start the process, and wait for its first snapshot."""
+        source = self.source
+        self._description: SceneDescription | None = None
+        self._raw: tuple[SceneDescription, memoryview] | None = None
+        self.error: str | None = None
+        self.progress: Progress | None = None
+        self.heard_at = time.monotonic()
+        self._closing = False
         self._outgoing = CommandQueue()
         context = multiprocessing.get_context("spawn")
         command_reader, self._commands = context.Pipe(duplex=False)
@@ -72,14 +81,30 @@ class Engine:
         # Only the child keeps these ends open: so each process detects the end of the other one.
         command_reader.close()
         snapshot_writer.close()
-        threading.Thread(target=self._read, name="snapshots", daemon=True).start()
-        threading.Thread(target=self._write, name="commands", daemon=True).start()
+        self._reader = threading.Thread(target=self._read, name="snapshots", daemon=True)
+        self._reader.start()
+        threading.Thread(target=self._write, args=(self._outgoing,), name="commands", daemon=True).start()
         with self._arrived:
-            self._arrived.wait_for(lambda: self._raw is not None or self.error is not None, start_timeout)
+            self._arrived.wait_for(lambda: self._raw is not None or self.error is not None, self._start_timeout)
         if self._raw is None:
-            reason = self.error or f"the simulation did not start within {start_timeout:g} s"
+            reason = self.error or f"the simulation did not start within {self._start_timeout:g} s"
             self.close()
             raise SolverError(reason)
+
+    def restart(self) -> None:
+        """Start the simulation again from its source, in a new process. Waits for its first snapshot.
+
+        Raises
+        ------
+        SceneError, SolverError : see above; the error is kept.
+        """
+        self.close()
+        self._reader.join()  # at the end of its pipe
+        try:
+            self._start()
+        except (SceneError, SolverError) as error:
+            self.error = self.error or str(error)
+            raise
 
     def send(self, command: Command) -> int:
         """Send a command to the simulation, without waiting for it.
@@ -109,6 +134,11 @@ class Engine:
                 (description, data), self._raw = self._raw, None
                 self._latest = replace(pickle.loads(data), description=description)
             return self._latest
+
+    def wait_for_news(self, seconds: float) -> None:
+        """Wait until there is a new snapshot, but not longer than `seconds`."""
+        with self._arrived:
+            self._arrived.wait_for(lambda: self._raw is not None, seconds)
 
     def wait_for(self, number: int, timeout: float = 10.0) -> Snapshot:
         """The first received snapshot after the command of this number has been executed.
@@ -169,11 +199,13 @@ class Engine:
                 break
             kind, content = data[:1], memoryview(data)[1:]
             with self._arrived:
+                self.heard_at = time.monotonic()
+                self.progress = pickle.loads(content) if kind == PROGRESS else None
                 if kind == ERROR:
                     self.error = pickle.loads(content)
                 elif kind == DESCRIPTION:
                     self._description = pickle.loads(content)
-                elif self._description is not None:
+                elif kind == SNAPSHOT and self._description is not None:
                     # Unpickled only when `latest` is called.
                     self._raw = self._description, content
                 self._arrived.notify_all()
@@ -183,11 +215,12 @@ class Engine:
                 self.error = f"the simulation ended unexpectedly (exit code {self._process.exitcode})"
             self._arrived.notify_all()
 
-    def _write(self) -> None:
-        while not self._outgoing.closed:
-            batch = self._outgoing.take(None)
+    def _write(self, outgoing: CommandQueue) -> None:
+        commands = self._commands
+        while not outgoing.closed:
+            batch = outgoing.take(None)
             try:
                 if batch:
-                    self._commands.send(batch)
+                    commands.send(batch)
             except OSError:  # the simulation has ended; `_read` detects it
                 return

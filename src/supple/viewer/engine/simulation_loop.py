@@ -17,6 +17,7 @@ from supple.errors import SuppleError
 from supple.state import State
 from supple.viewer.engine.measurement.contact_points import contact_points
 from supple.viewer.engine.measurement.describe import describe, measures
+from supple.viewer.engine.measurement.readings import readings, strongest_forces
 from supple.viewer.engine.measurement.tet_values import tet_values
 from supple.viewer.engine.pacing import Pacing
 from supple.viewer.engine.scene.changes import change
@@ -29,7 +30,7 @@ from supple.viewer.protocol.snapshots import Notice, Snapshot
 
 logger = logging.getLogger(__name__)
 
-HEARTBEAT = 0.5  # longest time between two snapshots [s]
+HEARTBEAT = 0.5  # longest time between two messages [s]
 # Shortest time between two snapshots [s]: slightly less than that between two frames, because jitter of the clock would
 # skip every second frame otherwise.
 SHORTEST = 0.9 / limits.FRAMES_PER_SECOND
@@ -41,12 +42,14 @@ class SimulationLoop:
 
     Attributes
     ----------
-    playing : whether the time runs; steps_left : number of frames to simulate while it does not
+    playing : whether the time runs, as long as somebody watches
+    steps_left : number of frames to simulate while it does not
     """
 
     def __init__(self, live: LiveScene, inbox: CommandQueue, outbox: Outbox) -> None:
         self.live, self.inbox, self.outbox = live, inbox, outbox
         self.playing = False
+        self.watched = True
         self.steps_left = 0
         self.speed = 1.0
         self.view = commands.SetView()
@@ -75,12 +78,16 @@ class SimulationLoop:
             self.applied = max(self.applied, number)
             self._fresh = True
         now = time.perf_counter()
-        if self.steps_left > 0 or (self.playing and now >= self.pacing.due):
+        if self.steps_left > 0 or (self._runs and now >= self.pacing.due):
             self.step()
         now = time.perf_counter()
         since = now - self._published
-        if (self._fresh and since >= SHORTEST) or self._interpolates(now) or since >= HEARTBEAT:
+        if (self._fresh and since >= SHORTEST) or self._interpolates(now):
             self.publish(now)
+        elif since >= HEARTBEAT:
+            # Nothing has changed: a sign of life costs less than a snapshot.
+            self._published = now
+            self.outbox.put_progress(None)
 
     def execute(self, command: commands.Command) -> None:
         """Execute a command; where it fails, send a notice."""
@@ -101,6 +108,10 @@ class SimulationLoop:
                     self.pacing.start(time.perf_counter())
                 case commands.SetView():
                     self.view = command
+                case commands.Watch():
+                    if command.watched and not self.watched:
+                        self.pacing.start(time.perf_counter())
+                    self.watched = command.watched
                 case _:
                     with self.watch.limited():
                         change(command, self.live)
@@ -189,6 +200,7 @@ class SimulationLoop:
         grabs = [spring.drawn(points[spring.command.body]) for spring in setup.grabs.values()]
         pusher = setup.pusher
         contacts = self._requested("contacts", lambda: contact_points(system, state.positions, state.time))
+        forces = self._requested("contacts", lambda: strongest_forces(live))
         quantity = self.view.tet_values or ""
         values = self._requested(
             "tet_values", lambda: tet_values(system.laws, state.positions, quantity, state.internal)
@@ -212,6 +224,8 @@ class SimulationLoop:
             tet_values=values,
             tet_quantity=self.view.tet_values,
             contact_points=contacts,
+            contact_forces=forces,
+            readings=readings(live),
         )
 
     def _requested(self, name: str, compute: Callable[[], Any]) -> Any | None:
@@ -226,11 +240,16 @@ class SimulationLoop:
             self.notify("error", f"{name.replace('_', ' ')} are off: {_one_line(error)}; choose them again to retry")
             return None
 
+    @property
+    def _runs(self) -> bool:
+        """Whether the time runs now."""
+        return self.playing and self.watched
+
     def _interval(self) -> float:
         return self.live.setup.dt / self.speed
 
     def _in_slow_motion(self) -> bool:
-        return self.playing and self.steps_left == 0 and self._interval() > 1.5 / limits.FRAMES_PER_SECOND
+        return self._runs and self.steps_left == 0 and self._interval() > 1.5 / limits.FRAMES_PER_SECOND
 
     def _interpolates(self, now: float) -> bool:
         return self._in_slow_motion() and now - self._published >= SHORTEST
@@ -252,7 +271,7 @@ class SimulationLoop:
             return 0.0
         now = time.perf_counter()
         ends = [self._published + HEARTBEAT]
-        if self.playing:
+        if self._runs:
             ends.append(self.pacing.due)
         if self._fresh or self._in_slow_motion():
             ends.append(self._published + SHORTEST)

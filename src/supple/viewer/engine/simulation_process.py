@@ -21,6 +21,7 @@ def run_simulation(source: LiveSource, commands: Connection, snapshots: Connecti
     inbox = CommandQueue()
     threading.Thread(target=_read, args=(commands, inbox), name="inbox", daemon=True).start()
 
+    from supple.viewer.engine.pulse import report_long_steps
     from supple.viewer.engine.scene.live_scene import LiveScene
     from supple.viewer.engine.simulation_loop import SimulationLoop
     from supple.viewer.protocol.outbox import ERROR, Outbox, packed
@@ -31,7 +32,9 @@ def run_simulation(source: LiveSource, commands: Connection, snapshots: Connecti
     except (SuppleError, MemoryError) as error:
         snapshots.send_bytes(packed(ERROR, " ".join(str(error).split()) or type(error).__name__))
         return
-    SimulationLoop(live, inbox, Outbox(snapshots)).run()
+    loop = SimulationLoop(live, inbox, Outbox(snapshots))
+    report_long_steps(loop.watch, loop.outbox)
+    loop.run()
 
 
 def _read(commands: Connection, inbox: CommandQueue) -> None:

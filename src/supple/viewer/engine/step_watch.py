@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from supple.errors import SolverError
 from supple.numerics.interruption import interruptible
 from supple.viewer.engine.compile_clock import CompileClock
+from supple.viewer.protocol.snapshots import Progress
 
 
 class StepWatch:
@@ -29,16 +30,29 @@ class StepWatch:
         self.longest, self.longest_awaited = longest, longest_awaited
         self._is_awaited = is_awaited
         self._compiled = CompileClock()
+        self._began: float | None = None
+        self._rounds = 0
 
     @contextmanager
     def limited(self) -> Iterator[None]:
         """A block that ends with a `SolverError` where it takes too long."""
         began, compiled = time.monotonic(), self._compiled.seconds
+        self._began, self._rounds = began, 0
 
         def check() -> None:
+            self._rounds += 1
             seconds = time.monotonic() - began - (self._compiled.seconds - compiled)
             if seconds > self.longest or (seconds > self.longest_awaited and self._is_awaited()):
                 raise SolverError(f"given up after {seconds:.1f} s")
 
-        with interruptible(check):
-            yield
+        try:
+            with interruptible(check):
+                yield
+        finally:
+            self._began = None
+
+    @property
+    def progress(self) -> Progress | None:
+        """Of the present computation; None where there is none. Another thread may ask."""
+        began = self._began
+        return None if began is None else Progress(time.monotonic() - began, self._rounds, self._compiled.running)

@@ -75,6 +75,17 @@ class SetSpeed(Command):
 
 
 @dataclass(frozen=True)
+class Watch(Command):
+    """Whether anybody watches. Where nobody does, time does not run; a requested `Step` is still taken."""
+
+    watched: bool
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.watched, bool):
+            raise CommandError(f"watched is {displayed(self.watched)}; give true or false")
+
+
+@dataclass(frozen=True)
 class SetSolver(Command):
     """Continue from the present state with another solver: "xpbd" or "implicit"."""
 

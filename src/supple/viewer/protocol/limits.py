@@ -53,5 +53,5 @@ MOST_CLIENTS = 32
 # In which time a browser sends its first message [s]; a page sends its camera as soon as it is drawn.
 FIRST_MESSAGE = 60.0
 
-# Contact points in a snapshot.
-MOST_CONTACT_POINTS = 2_000
+# Contact points, and forces of contacts, in a snapshot.
+MOST_CONTACT_POINTS, MOST_CONTACT_FORCES = 2_000, 400

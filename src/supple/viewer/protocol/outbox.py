@@ -8,7 +8,7 @@ from multiprocessing.reduction import ForkingPickler
 from typing import Any
 
 # The first byte of a message is its kind; the rest is pickled.
-DESCRIPTION, SNAPSHOT, ERROR = b"d", b"s", b"e"
+DESCRIPTION, SNAPSHOT, ERROR, PROGRESS = b"d", b"s", b"e", b"p"
 
 
 def packed(kind: bytes, content: Any) -> bytes:
@@ -26,6 +26,7 @@ class Outbox:
         self._pipe = pipe
         self._description: bytes | None = None
         self._snapshot: bytes | None = None
+        self._progress: bytes | None = None
         self._changed = threading.Condition()
         threading.Thread(target=self._send_all, name="outbox", daemon=True).start()
 
@@ -33,25 +34,34 @@ class Outbox:
         """Send a description before any snapshot that is put after it."""
         data = packed(DESCRIPTION, description)
         with self._changed:
-            self._description, self._snapshot = data, None
+            self._description, self._snapshot, self._progress = data, None, None
             self._changed.notify()
 
     def put_snapshot(self, snapshot: Any) -> None:
         """Send a snapshot, unless a newer one replaces it."""
         data = packed(SNAPSHOT, snapshot)
         with self._changed:
-            self._snapshot = data
+            self._snapshot, self._progress = data, None
+            self._changed.notify()
+
+    def put_progress(self, progress: Any) -> None:
+        """Send the progress of a long step, or None: a sign of life."""
+        data = packed(PROGRESS, progress)
+        with self._changed:
+            self._progress = data
             self._changed.notify()
 
     def _send_all(self) -> None:
         while True:
             with self._changed:
-                while self._description is None and self._snapshot is None:
+                while self._description is None and self._snapshot is None and self._progress is None:
                     self._changed.wait()
                 if self._description is not None:
                     data, self._description = self._description, None
-                else:
+                elif self._snapshot is not None:
                     data, self._snapshot = self._snapshot, None
+                else:
+                    data, self._progress = self._progress, None
             try:
                 self._pipe.send_bytes(data or b"")
             except OSError:  # the page is gone; the reader of commands ends this process

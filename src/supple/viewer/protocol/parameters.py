@@ -20,7 +20,7 @@ class Parameter:
 
     Attributes
     ----------
-    name : in commands and descriptions; label : on the panel; unit : "" where it has none
+    name : in commands and descriptions; label, hint : on the panel; unit : "" where it has none
     owner : "body" where each body has its own value
     kind : float, int or bool; low, high : both are allowed
     logarithmic : whether a slider uses powers of ten (zero, where allowed, is its left end)
@@ -34,6 +34,7 @@ class Parameter:
     high: float
     unit: str = ""
     logarithmic: bool = False
+    hint: str = ""
 
     def checked(self, value: object) -> Value:
         """`value`, converted to `kind`; raises `CommandError` where it is of another kind or out of range."""
@@ -52,18 +53,107 @@ class Parameter:
 PARAMETERS: dict[str, Parameter] = {
     parameter.name: parameter
     for parameter in (
-        Parameter("substeps", "substeps (0: automatic)", "solver", int, 0, 200),
-        Parameter("momentum_restore", "momentum restore", "solver", bool, 0, 1),
-        Parameter("contact", "contact of bodies", "solver", bool, 0, 1),
-        Parameter("dt", "time step", "scene", float, 1e-4, 0.1, "s", logarithmic=True),
-        Parameter("gravity", "gravity", "scene", float, -100.0, 100.0, "m/s^2"),
-        Parameter("youngs", "Young's modulus", "body", float, 1e2, 1e11, "Pa", logarithmic=True),
-        Parameter("poisson", "Poisson's ratio", "body", float, -0.5, 0.499),
-        Parameter("edge_compliance", "edge compliance", "body", float, 0.0, 1.0, "m/N", logarithmic=True),
-        Parameter("volume_compliance", "volume compliance", "body", float, 0.0, 1.0, "m^5/N", logarithmic=True),
-        Parameter("damping", "damping", "body", float, 0.0, 1.0, "s", logarithmic=True),
-        Parameter("density", "density", "body", float, 1.0, 1e5, "kg/m^3", logarithmic=True),
-        Parameter("friction", "friction", "body", float, 0.0, 10.0),
+        Parameter(
+            "substeps",
+            "substeps (0: automatic)",
+            "solver",
+            int,
+            0,
+            200,
+            hint="Substeps of a time step; 0: as many as the step needs",
+        ),
+        Parameter(
+            "momentum_restore",
+            "momentum restore",
+            "solver",
+            bool,
+            0,
+            1,
+            hint="Correct the momentum that iterations lose",
+        ),
+        Parameter(
+            "contact", "contact of bodies", "solver", bool, 0, 1, hint="Whether bodies touch each other, and themselves"
+        ),
+        Parameter(
+            "dt", "time step", "scene", float, 1e-4, 0.1, "s", logarithmic=True, hint="Simulated time of a frame"
+        ),
+        Parameter(
+            "gravity",
+            "gravity",
+            "scene",
+            float,
+            -100.0,
+            100.0,
+            "m/s^2",
+            hint="Acceleration along the gravity of the scene; negative: upwards",
+        ),
+        Parameter(
+            "youngs",
+            "Young's modulus",
+            "body",
+            float,
+            1e2,
+            1e11,
+            "Pa",
+            logarithmic=True,
+            hint="Stiffness: stress per strain. Rubber 1 MPa, gummy bears 30 kPa",
+        ),
+        Parameter(
+            "poisson",
+            "Poisson's ratio",
+            "body",
+            float,
+            -0.5,
+            0.499,
+            hint="How much a body narrows when stretched; 0.5 keeps its volume",
+        ),
+        Parameter(
+            "edge_compliance",
+            "edge compliance",
+            "body",
+            float,
+            0.0,
+            1.0,
+            "m/N",
+            logarithmic=True,
+            hint="How far edges give way to a force",
+        ),
+        Parameter(
+            "volume_compliance",
+            "volume compliance",
+            "body",
+            float,
+            0.0,
+            1.0,
+            "m^5/N",
+            logarithmic=True,
+            hint="How far the volume of tets gives way to a pressure",
+        ),
+        Parameter(
+            "damping",
+            "damping",
+            "body",
+            float,
+            0.0,
+            1.0,
+            "s",
+            logarithmic=True,
+            hint="Relaxation time of the viscous stress",
+        ),
+        Parameter(
+            "density",
+            "density",
+            "body",
+            float,
+            1.0,
+            1e5,
+            "kg/m^3",
+            logarithmic=True,
+            hint="Mass per volume; water 1000 kg/m³",
+        ),
+        Parameter(
+            "friction", "friction", "body", float, 0.0, 10.0, hint="Coulomb's coefficient; of a pair, see the scene"
+        ),
     )
 }
 

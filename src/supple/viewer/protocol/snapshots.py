@@ -146,6 +146,30 @@ class Timing:
     keeps_up: bool = True
 
 
+@dataclass(frozen=True)
+class Progress:
+    """A step that takes long.
+
+    Attributes
+    ----------
+    seconds : since it began; rounds : substeps or Newton iterations so far
+    compiling : whether kernels are compiled now
+    """
+
+    seconds: float
+    rounds: int = 0
+    compiling: bool = False
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What one sensor, cavity or cable reads. `unit` is that of `value`."""
+
+    name: str
+    unit: str
+    value: float
+
+
 @dataclass(frozen=True, eq=False)
 class Snapshot:
     """The simulation at one time.
@@ -163,6 +187,9 @@ class Snapshot:
     notices : the newest ones; see `Notice`
     applied : number of the newest command that was executed, see `Engine.send`
     velocities : (n, 3) [m/s], tet_values : (m,), contact_points : (c, 3) [m], where `SetView` requests them
+    contact_forces : points (c, 3) [m] and forces (c, 3) [N] of the strongest contacts, each on the first of its two
+        bodies, where `SetView` requests contacts and the solver knows them
+    readings : of sensors, cavities and cables
     tet_quantity : the quantity of `tet_values`: "J", "von_mises", "energy" or None
     """
 
@@ -184,6 +211,8 @@ class Snapshot:
     tet_values: NDArray[np.float64] | None = None
     tet_quantity: str | None = None
     contact_points: NDArray[np.float64] | None = None
+    contact_forces: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    readings: tuple[Reading, ...] = ()
 
     def body_positions(self, name: str) -> NDArray[np.float64]:
         """(n, 3) of one body [m]."""

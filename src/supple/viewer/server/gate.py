@@ -26,6 +26,7 @@ from supple.output.viser_server import serving_with
 from supple.viewer.protocol import limits
 from supple.viewer.server.connection_limit import bounded_connections
 from supple.viewer.server.message_check import Malformed, is_wanted
+from supple.viewer.server.page.served_page import ServedPage
 
 logger = logging.getLogger(__name__)
 
@@ -143,12 +144,13 @@ def _is_websocket(headers: Any) -> bool:
 
 
 @contextmanager
-def gate(host: str, token: str | None = None) -> Iterator[None]:
+def gate(host: str, token: str | None = None, page: ServedPage | None = None) -> Iterator[None]:
     """Start the server of viser within this block: it gets an access check and limits for incoming messages.
 
     Parameters
     ----------
     host : where it will listen; where other machines can reach it, a token is needed.
+    page : that browsers get; None: that of viser
 
     Raises
     ------
@@ -165,7 +167,7 @@ def gate(host: str, token: str | None = None) -> Iterator[None]:
             options |= {"max_size": limits.LARGEST_PICTURE, "max_queue": 16, "close_timeout": 1.0}
             options["create_connection"] = bounded_connections(limits.MOST_CONNECTIONS)
             asyncio.get_running_loop().set_exception_handler(_log_quietly)
-            answer = _guarded(process_request, access)
+            answer = _guarded(process_request, access, page)
             return serve(_watched(handler, clients), *arguments, process_request=answer, **options)
 
         return changed
@@ -174,7 +176,7 @@ def gate(host: str, token: str | None = None) -> Iterator[None]:
         yield
 
 
-def _guarded(process_request: Any, access: AccessCheck) -> Callable[[Any, Any], Any]:
+def _guarded(process_request: Any, access: AccessCheck, page: ServedPage | None) -> Callable[[Any, Any], Any]:
     """The answer of the server to HTTP requests, after the access check."""
 
     def answer(connection: Any, request: Any) -> Any:
@@ -192,6 +194,8 @@ def _guarded(process_request: Any, access: AccessCheck) -> Callable[[Any, Any], 
             # A page of another site may not show this one within itself, where clicks would be led astray.
             response.headers["Content-Security-Policy"] = "frame-ancestors 'none'"
             response.headers["X-Frame-Options"] = "DENY"
+            if page is not None:
+                page.replace(response)
         return response
 
     return answer

@@ -60,7 +60,7 @@ def test_a_thousand_random_events(live, server, fake, visit, until, caplog, capf
 
     def heard(visitor, message):
         message.append(float(next(factors)))
-        visitor.set(live.panel.time.speed, message[-1])
+        visitor.set(live.panel.time.speed.text, repr(message[-1]))
         time.sleep(0.3)
         return any(SetSpeed(factor) in fake.received for factor in message)
 

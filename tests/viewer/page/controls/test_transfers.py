@@ -64,8 +64,8 @@ def give(visitor, live, content, index=0, **changes):
 
 
 def test_an_upload_becomes_a_command(live, fake, visitor, meshed, heard, until):
-    visitor.set(live.panel.bodies.size, 0.75)
-    visitor.set(live.panel.bodies.youngs, 6.0)
+    visitor.set(live.panel.bodies.size.text, "0.75")
+    visitor.set(live.panel.bodies.youngs.handle, 6.0)
     content = bytes(range(256)) * 5000  # three parts
     announce(visitor, live, content, "C:\\things\\my ball.STL")
     for k in range(3):
@@ -143,14 +143,14 @@ def test_invalid_parts_end_the_transfer(live, fake, visitor, meshed, heard, unti
 
 
 def test_other_inputs_accept_no_files_and_nothing_is_kept(live, server, fake, visitor, meshed, until):
-    speed = live.panel.time.speed
+    speed = live.panel.time.speed.handle
     announce(visitor, live, b"abc", source_component_uuid=speed._impl.uuid)
     give(visitor, live, b"abc", source_component_uuid=speed._impl.uuid)
     for k in range(100):
         announce(visitor, live, b"abc", transfer_uuid=f"{k}")
     visitor.press(live.panel.time.play)
     until(lambda: fake.received)
-    assert speed.value == 1.0
+    assert speed.value == 0.0  # a power of ten
     assert server.gui._current_file_upload_states == {}
     assert len(live.panel.upload.transfers._running) == 1
     # It ends with its visitor.

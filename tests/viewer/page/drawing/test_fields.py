@@ -7,7 +7,7 @@ import pytest
 
 import supple as sp
 from supple.materials.elastic_tets.laws import TetLaws, joined_materials
-from supple.viewer.drawing.coloring.color_scale import BINS, Limits, bar_html, bin_of
+from supple.viewer.drawing.coloring.color_scale import BINS, Limits, Range, bar_html, bin_of
 from supple.viewer.drawing.coloring.fields import FIELDS
 from supple.viewer.drawing.moments.from_snapshot import MomentBuilder
 
@@ -54,18 +54,24 @@ def test_bins_of_values_within_and_beyond_the_scale():
 
 
 def test_ends_of_scales_are_round_and_stable():
-    limits = Limits(MISES)
+    limits = Limits(MISES, Range())
     assert limits.follow(np.full(10, 37.0)) == (0.0, 50.0)
     assert limits.follow(np.full(10, 20.0)) == (0.0, 50.0)
     assert limits.follow(np.full(10, 3.0)) == (0.0, 5.0)
     assert limits.follow(np.full(10, 600.0)) == (0.0, 1000.0)
-    assert limits.follow(np.full(10, np.nan))[1] > 0.0
-    assert Limits(J).follow(np.array([0.9, 1.0, 1.07])) == (0.9, 1.1)
+    assert limits.follow(np.full(10, np.nan)) is None
+    assert Limits(J, Range()).follow(np.array([0.9, 1.0, 1.07])) == (0.9, 1.1)
+    # One value of a hundred is extreme.
+    values = np.append(np.full(99, 18.0), 900.0)
+    assert Limits(MISES, Range(0.98)).follow(values) == (0.0, 20.0)
+    assert Limits(MISES, Range(1.0)).follow(values) == (0.0, 1000.0)
+    assert Limits(MISES, Range(fixed=(5.0, 70.0))).follow(values) == (5.0, 70.0)
 
 
-def test_the_color_bar_contains_name_unit_and_numbers():
-    bar = bar_html(replace(MISES, name="<b>"), 0.0, 2e4)
+def test_the_legend_has_name_numbers_and_units_or_says_that_nothing_is_known():
+    bar = bar_html(replace(MISES, name="<b>"), (0.0, 2e4))
     assert "&lt;b&gt;" in bar
-    assert "[Pa]" in bar
-    assert "2e+04" in bar
+    assert [text in bar for text in (">0 Pa<", ">10 kPa<", ">20 kPa<")] == [True] * 3
     assert bar.count("rgb(") == BINS
+    assert "not known" in bar_html(MISES, None)
+    assert "rgb(" not in bar_html(MISES, None)

@@ -5,9 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from supple.output.drawing import body_color
+from supple.output.recording.scene import RecordedObstacle
 from supple.viewer.drawing.coloring.fields import FIELDS
+from supple.viewer.drawing.layers.section import Cut, surface
 from supple.viewer.drawing.layers.springs import length_text
-from supple.viewer.drawing.layers.tets import Cut, exploded_facets, kept_tets, outer_facets
+from supple.viewer.drawing.layers.tets import exploded_facets
 from supple.viewer.drawing.moments.from_snapshot import MomentBuilder
 from supple.viewer.drawing.options import COLOR_BY_BODY, SURFACES, ViewOptions
 from supple.viewer.drawing.stage import Stage
@@ -50,8 +53,8 @@ def test_the_number_of_buffered_messages_does_not_grow_with_moments(server, fake
 
 def test_changed_options_remove_all_old_layers(server, fake):
     stage = Stage(server, MomentBuilder().moment(fake.snapshot), ViewOptions())
-    for surface in (*SURFACES, "skin"):
-        stage.apply(ViewOptions(surface, velocities=True, contacts=True))
+    for kind in (*SURFACES, "skin"):
+        stage.apply(ViewOptions(kind, velocities=True, contacts=True))
     stage.apply(ViewOptions())
     names = set(server.scene._handle_from_node_name)
     drawn = {name for name in names if name.startswith(("/bodies/", "/velocities", "/contacts"))}
@@ -114,18 +117,77 @@ def test_units_of_lengths(meters, text):
     assert length_text(meters) == text
 
 
-def test_a_cut_draws_a_closed_surface_of_the_kept_tets(fake):
+@pytest.mark.parametrize(("axis", "place"), [(0, 0.5), (1, 0.37), (2, 0.81), (0, 1.0)])
+def test_a_cut_is_a_closed_surface_with_a_plane_section(fake, axis, place):
     model = MomentBuilder().moment(fake.snapshot).model
-    kept = kept_tets(model, Cut(1, 0.5))
-    assert 0 < kept.sum() < len(kept)
-    triangles, owner = outer_facets(model, kept)
-    assert kept[owner].all()
-    # Closed: every edge occurs once in each direction; the volume is that of the tets inside.
-    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    forward, backward = ({tuple(edge) for edge in way} for way in (edges, edges[:, ::-1]))
-    assert forward == backward
-    a, b, c = (model.rest_positions[triangles[:, k]] for k in range(3))
-    volume = np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0
-    corners = model.rest_positions[model.tets[kept]]
-    assert volume == pytest.approx(np.linalg.det(corners[:, 1:] - corners[:, :1]).sum() / 6.0)
-    assert len(exploded_facets(model, kept)[0]) == 4 * kept.sum()
+    drawn = surface(model, Cut(axis, place))
+    corners = drawn.corners(model.rest_positions)
+    a, b, c = corners.transpose(1, 0, 2)
+    area = 0.5 * np.cross(b - a, c - a)
+    np.testing.assert_allclose(area.sum(axis=0), 0.0, atol=1e-9)  # closed
+    assert np.einsum("ij,ij->i", a, area).sum() / 3.0 == pytest.approx(2.0 * place)  # the volume of two unit cubes
+    for body in model.bodies:
+        mine = (drawn.owner >= body.tets.start) & (drawn.owner < body.tets.stop)
+        along = model.rest_positions[body.vertices, axis]
+        plane = along.min() + place * np.ptp(along)
+        assert corners[mine][..., axis].max() <= plane + 1e-8
+        on_plane = mine & (np.abs(corners[..., axis] - plane).max(axis=1) < 1e-8)
+        assert area[on_plane, axis].sum() == pytest.approx(1.0)  # the whole section
+    # The section follows the motion of its tets.
+    moved = 2.0 * model.rest_positions + np.array([1.0, 2.0, 3.0])
+    np.testing.assert_allclose(drawn.corners(moved), 2.0 * corners + np.array([1.0, 2.0, 3.0]))
+    assert len(exploded_facets(model).owner) == 4 * len(model.tets)
+
+
+def test_a_scene_without_floor_has_no_grid(server, fake):
+    moment = MomentBuilder().moment(fake.snapshot)
+    Stage(server, moment, ViewOptions())
+    assert "/ground" in server.scene._handle_from_node_name
+    server.scene.reset()
+    empty = replace(fake.snapshot.description, obstacles=())
+    none = np.zeros((0, 3, 3)), np.zeros((0, 3))
+    Stage(server, MomentBuilder().moment(fake.show(description=empty, obstacle_poses=none)), ViewOptions())
+    assert "/ground" not in server.scene._handle_from_node_name
+
+
+def test_forces_are_arrows_with_a_scale(server, fake):
+    translator = MomentBuilder()
+    points, forces = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), np.array([[0.0, 30.0, 0.0], [0.0, 0.0, 15.0]])
+    stage = Stage(server, translator.moment(fake.show(contact_forces=(points, forces))), ViewOptions(contacts=True))
+    arrows = server.scene._handle_from_node_name["/forces"]
+    unit = 0.5 * stage.model.view.radius / 50.0
+    assert stage.force_scale == 50.0
+    np.testing.assert_allclose(arrows.points, np.stack([points, points + unit * forces], axis=1), rtol=1e-6)
+    stage.show(translator.moment(fake.show(contact_forces=(points, 0.5 * forces))))
+    assert stage.force_scale == 50.0
+    stage.show(translator.moment(fake.show(contact_forces=(points, 10.0 * forces))))
+    assert stage.force_scale == 500.0
+    stage.show(translator.moment(fake.show(contact_forces=None)))
+    assert stage.force_scale is None
+    assert not arrows.visible
+
+
+def test_a_room_is_drawn_open(server, fake):
+    room = RecordedObstacle(
+        "bowl",
+        "Sphere",
+        {"center": [0.0, 0.0, 0.0], "radius": 3.0, "inside": True},
+        np.zeros((0, 3)),
+        np.zeros((0, 3), dtype=np.int32),
+    )
+    Stage(
+        server,
+        MomentBuilder().moment(fake.show(description=replace(fake.snapshot.description, obstacles=(room,)))),
+        ViewOptions(),
+    )
+    bowl = server.scene._handle_from_node_name["/obstacles/0 bowl"]
+    assert (bowl.side, bowl.opacity) == ("back", None)
+    a, b, c = (np.asarray(bowl.vertices, dtype=np.float64)[bowl.faces[:, k]] for k in range(3))
+    assert np.einsum("ij,ij->", a, np.cross(b, c)) > 0.0  # faces outwards: only the inside of the far wall is drawn
+
+
+def test_the_colors_of_many_bodies_differ():
+    colors = np.array([body_color(k) for k in range(64)], dtype=float)
+    apart = np.linalg.norm(colors[:, None] - colors, axis=2) + 1e3 * np.eye(64)
+    assert apart.min() > 12.0
+    assert min(apart[k, k + 1] for k in range(63)) > 60.0

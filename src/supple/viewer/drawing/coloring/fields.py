@@ -63,6 +63,6 @@ FIELDS = {
     for field in (
         Field("J", "volume ratio J", "", 1.0, volume_ratio),
         Field("von_mises", "von Mises stress", "Pa", None, von_mises_stress),
-        Field("energy", "energy density", "J/m³", None, energy_density),
+        Field("energy", "energy density", "J/m^3", None, energy_density),
     )
 }

@@ -48,6 +48,7 @@ class MomentBuilder:
             snapshot.velocities,
             poses,
             contact_points=snapshot.contact_points,
+            contact_forces=snapshot.contact_forces,
             pinned=snapshot.pinned.astype(np.int64),
             springs={grab.grab: (np.array(grab.point), np.array(grab.target)) for grab in snapshot.grabs},
             pusher=None if pusher is None else (np.array(pusher[0]), pusher[1]),

@@ -16,7 +16,7 @@ from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.flows.internal import NEVER_FLOWED
 from supple.mesh.topology import TET_FACETS, facet_keys
 from supple.numerics.deformation import deformation_gradients
-from supple.output.drawing import BODY_COLORS, View
+from supple.output.drawing import View, body_color
 from supple.output.recording.joints import RecordedJoint
 from supple.output.recording.scene import RecordedObstacle
 from supple.output.recording.skinned_surface import SkinnedSurface
@@ -48,7 +48,7 @@ class ModelBody:
     @property
     def color(self) -> tuple[int, int, int]:
         """(r, g, b) from 0 to 255."""
-        return BODY_COLORS[self.number % len(BODY_COLORS)]
+        return body_color(self.number)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +138,7 @@ class Moment:
     positions : (n, 3) [m]; velocities : (n, 3) [m/s], or None where they are not known
     poses : (obstacles, 3, 4) rotation and translation of each obstacle since time 0
     contact_points : (c, 3) [m], or None where they are not known
+    contact_forces : points (c, 3) [m] and forces (c, 3) [N] of contacts, or None where they are not known
     pinned : (p,) vertices that are pinned
     springs : point of a body and target (3,) [m], by number of the grab
     pusher : center (3,) and radius of a ball [m], or None
@@ -151,6 +152,7 @@ class Moment:
     velocities: NDArray[np.float64] | None
     poses: NDArray[np.float64]
     contact_points: NDArray[np.float64] | None = None
+    contact_forces: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     pinned: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     springs: Mapping[int, tuple[NDArray[np.float64], NDArray[np.float64]]] = field(default_factory=dict)
     pusher: tuple[NDArray[np.float64], float] | None = None

@@ -49,9 +49,14 @@ class RecordControls:
         kinds = video_formats()
         gui = server.gui
         with gui.add_folder("Record", expand_by_default=False):
-            self.screenshot = gui.add_button("Screenshot")
-            self.kind = gui.add_dropdown("Record as", (_PAGE, *(kind.upper() for kind in kinds)), initial_value=_PAGE)
-            self.record = gui.add_button("Record")
+            self.screenshot = gui.add_button("Screenshot", hint="The picture as a PNG file")
+            self.kind = gui.add_dropdown(
+                "Record as",
+                (_PAGE, *(kind.upper() for kind in kinds)),
+                initial_value=_PAGE,
+                hint="A page can be turned while it plays; GIF and MP4 are films",
+            )
+            self.record = gui.add_button("Record", hint="Start, and press again to receive the file")
             missing_formats = [f"{kind.upper()} {missing}" for kind, missing in kinds.items() if missing]
             self._message = gui.add_markdown("; ".join(missing_formats), visible=bool(missing_formats))
         self.screenshot.on_click(self._send_screenshot)

@@ -1,0 +1,152 @@
+"""The live page in a browser: from a move of the mouse to the moved mesh, and the cost while nothing moves.
+
+A ball at rest in free space is pulled. The clock starts when the browser gets the first move of a drag, and stops at
+the first drawn picture in which the vertices of the ball are elsewhere. Chromium draws in software with few pixels, so
+that the time to draw, which a graphics card would not need, has little effect. Then the processor time of page and
+simulation is measured at rest: paused with a browser, and playing without one.
+
+usage: python -m benchmarks.live_page [tets ...]      (Linux, with Chromium and the packages of the tests)
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from playwright.sync_api import sync_playwright
+
+import supple as sp
+from supple.viewer.app import Address, OpenPage, opened_page
+from supple.viewer.protocol.commands import Pause, Play
+from supple.viewer.protocol.live_source import LiveSource
+
+FLAGS = "--headless --no-sandbox --disable-gpu --use-angle=swiftshader --enable-unsafe-swiftshader"
+# Waits for the first picture after a move in which the mesh differs; resolves with the time between [ms].
+WATCH = """() => {
+  const mesh = () => {
+    let found; suppleViewer.mutable.current.nodeRefFromName["/bodies/0 ball"].traverse((each) => {
+      if (!found && each.geometry) found = each.geometry.attributes.position.array; });
+    return found; };
+  const before = mesh().slice();
+  let began = null;
+  addEventListener("pointermove", () => { began ??= performance.now(); }, { capture: true, once: true });
+  window.waited = new Promise((resolve) => {
+    const look = () => {
+      const now = mesh();
+      if (began !== null && now.some((value, k) => value !== before[k]))
+        requestAnimationFrame(() => resolve(performance.now() - began));
+      else requestAnimationFrame(look);
+    };
+    look();
+  });
+}"""
+
+
+def source(tets: int) -> LiveSource:
+    """A ball of about this many tets."""
+    edge = 0.5 * (37.0 / tets) ** (1.0 / 3.0)
+    rubber = sp.StableNeoHookean(youngs=1e5, poisson=0.4, density=1000.0, damping=0.01)
+    ball = sp.Body("ball", sp.shapes.sphere(radius=0.5, edge_length=edge), rubber)
+    return LiveSource("ball", sp.Scene([ball], gravity=(0.0, 0.0, 0.0)), sp.XPBD(substeps=4), 1 / 60)
+
+
+def processor_seconds() -> float:
+    """Of this process and its simulation, so far."""
+    total = 0.0
+    for pid in (os.getpid(), *_children(os.getpid())):
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+        total += (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    return total
+
+
+def _children(pid: int) -> list[int]:
+    """The processes of this program's kind: not the browser's."""
+    found = []
+    for task in Path(f"/proc/{pid}/task").iterdir():
+        found += [int(each) for each in (task / "children").read_text().split()]
+    return [each for each in found if b"spawn_main" in Path(f"/proc/{each}/cmdline").read_bytes()]
+
+
+def share(seconds: float) -> float:
+    """The share of one core [%] that page and simulation use within the next seconds."""
+    before, began = processor_seconds(), time.perf_counter()
+    time.sleep(seconds)
+    return 100.0 * (processor_seconds() - before) / (time.perf_counter() - began)
+
+
+def latency(tab: Any, page: OpenPage) -> float:
+    """From a move of the mouse to the moved mesh [ms]."""
+    content: Any = page.content
+    box = tab.locator("canvas").first.bounding_box()
+    x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+    tab.mouse.move(x, y)
+    tab.wait_for_timeout(200)
+    tab.mouse.down()
+    tab.wait_for_timeout(100)
+    tab.evaluate(WATCH)
+    tab.mouse.move(x + 40, y - 40)
+    found = float(tab.evaluate("waited"))
+    tab.mouse.up()
+    tab.keyboard.press("r")
+    while content.controller.snapshot.frame > 60 or content.controller.snapshot.grabs:
+        tab.wait_for_timeout(20)
+    tab.wait_for_timeout(400)
+    return found
+
+
+def measure(tets: int, rounds: int, seconds: float) -> dict[str, float]:
+    """All figures of one size, by name."""
+    with opened_page(source(tets), Address(port=0)) as page, sync_playwright() as playwright:
+        content: Any = page.content
+        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS.split())
+        tab = browser.new_page(viewport={"width": 800, "height": 500})
+        tab.set_default_timeout(120_000)
+        tab.goto(page.url + "&fixedDpr=0.2")
+        tab.wait_for_selector("canvas")
+        tab.wait_for_timeout(3000)
+        tab.locator(".mantine-Notification-closeButton").first.dispatch_event("click")
+        send = content.controller.simulation.send
+        send(Play())
+        tab.wait_for_timeout(1500)
+        times = [latency(tab, page) for _ in range(rounds)]
+        step = content.controller.snapshot.timing.step_ms
+        send(Pause())
+        tab.wait_for_timeout(1500)
+        paused = share(seconds)
+        send(Play())
+        tab.close()
+        time.sleep(4.0)
+        unwatched = share(seconds)
+        browser.close()
+        return {
+            "tets": content.controller.snapshot.description.n_tets,
+            "step_ms": step,
+            "median_ms": float(np.median(times)),
+            "p95_ms": float(np.quantile(times, 0.95)),
+            "paused_percent": paused,
+            "unwatched_percent": unwatched,
+        }
+
+
+def main(sizes: tuple[int, ...] = (5_000, 60_000), rounds: int = 20, seconds: float = 10.0) -> list[dict[str, float]]:
+    """Measure and print all sizes."""
+    made = []
+    for tets in sizes:
+        made.append(measure(tets, rounds, seconds))
+        one = made[-1]
+        print(
+            f"{one['tets']:.0f} tets: a step {one['step_ms']:.1f} ms; mouse to moved mesh {one['median_ms']:.0f} ms in "
+            f"the median, {one['p95_ms']:.0f} ms at 95 %; paused {one['paused_percent']:.2f} %, "
+            f"unwatched {one['unwatched_percent']:.2f} % of a core (load {os.getloadavg()[0]:.1f})",
+            flush=True,
+        )
+    return made
+
+
+if __name__ == "__main__":
+    main(tuple(int(each) for each in sys.argv[1:]) or (5_000, 60_000))

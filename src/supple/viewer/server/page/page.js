@@ -1,0 +1,183 @@
+// Runs before viser's client. `suppleChanges` changes its program; the rest draws the overlay that the server sends.
+"use strict";
+(() => {
+  // What is changed in the program of viser's client: a pattern, and what replaces it.
+  const CHANGES = {
+    // The state of the client, for this script.
+    state: [/(\w+)=\{messageSource:(?=\w+,useSceneTree:)/, "$1=globalThis.suppleViewer={messageSource:"],
+    // The arrow of a drag: the server draws the spring.
+    arrow: [/(,16747586,\.18,\.09\);return )(\w+)\.visible=!1,/, "$1$2.visible=$2.line.visible=$2.cone.visible=!1,"],
+    // Only the body that is held has an outline, and it is thin.
+    outline: [
+      /\.visible=(\w+)\.state\.current\.isHovered\)\}\),(\(0,\w+\.jsx\)\(\w+,\{ref:\w+,thickness:)10/,
+      ".visible=globalThis.suppleIsHeld($1.state))}),$23",
+    ],
+    // On a phone, the panel is a drawer as wide as the screen, closed at first.
+    drawer: [/(,\[\w+,\{toggle:\w+\}\]=\w+\()!0(?=\);return\(0,\w+\.jsx\)\(\w+\.Provider,\{value:\{wrapperRef:)/, "$1!1"],
+    width: [/(minHeight:`3\.5em`,maxHeight:`60%`,width:)`20em`(.{0,160}?style:\{width:)`20em`/, "$1`100%`$2`100%`"],
+    // Moves of a drag are sent at every picture, not every 50 ms.
+    rate: [/(\{send:\w+,flush:\w+\}=\w+\()50\)/, "$116)"],
+    // The arrow keys to the sides: the right one takes a step.
+    keys: [/\.has\(`Arrow(?:Left|Right)`\)/g, ".has(``)"],
+  };
+  globalThis.suppleMissing = [];
+  globalThis.suppleChanges = (code) => {
+    for (const [name, [pattern, replacement]] of Object.entries(CHANGES)) {
+      const changed = code.replace(pattern, replacement);
+      if (changed === code) suppleMissing.push(name);
+      code = changed;
+    }
+    if (suppleMissing.length) console.warn(`Supple: not changed in viser's client: ${suppleMissing}`);
+    return code;
+  };
+
+  // The body that was under the pointer when the button went down is held until the button goes up.
+  const onCanvas = (event) => event.target instanceof HTMLCanvasElement;
+  let holds = false, held = new Map();
+  const hold = (now) => {
+    [holds, held] = [now, new Map()];
+    globalThis.suppleViewer?.mutable.current.requestRender();
+  };
+  globalThis.suppleIsHeld = (hover) => {
+    if (!holds) return false;
+    if (!held.has(hover)) held.set(hover, hover.current.isHovered);
+    return held.get(hover);
+  };
+  addEventListener("pointerdown", (event) => hold(onCanvas(event) && event.button === 0), true);
+  for (const kind of ["pointerup", "pointercancel", "blur"]) addEventListener(kind, () => hold(false), true);
+
+  const send = (uuid, value) =>
+    suppleViewer.mutable.current.sendMessage({ type: "GuiUpdateMessage", uuid, updates: { value } });
+
+  // The theme of the system.
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  function follow() {
+    const theme = suppleViewer.useGui.get().theme;
+    if (theme.dark_mode !== dark.matches) suppleViewer.guiActions.setTheme({ ...theme, dark_mode: dark.matches });
+  }
+
+  // The overlay: what the server writes in HTML elements of the panel that are not displayed there. Their parts have
+  // an id each, and are replaced where they have changed.
+  const MARK = '<div class="supple-overlay"';
+  const watched = new Set(), parts = new Map();
+  let pointer = null, layer;
+  function findOverlays() {
+    for (const [uuid, element] of Object.entries(suppleViewer.useGuiConfig.getAll())) {
+      if (watched.has(uuid) || !element?.props?.content?.startsWith?.(MARK)) continue;
+      watched.add(uuid);
+      suppleViewer.useGuiConfig.subscribe(uuid, () => draw(uuid));
+      draw(uuid);
+    }
+  }
+  function draw(uuid) {
+    const element = suppleViewer.useGuiConfig.get(uuid);
+    const source = new DOMParser().parseFromString(element?.props.content ?? "", "text/html");
+    const present = new Set();
+    for (const part of source.querySelectorAll(".supple-overlay > [id]")) {
+      present.add(part.id);
+      if (part.dataset.pointer) pointer = part.dataset.pointer;
+      const text = part.outerHTML, old = document.getElementById(part.id);
+      if (parts.get(part.id)?.text === text && old) continue;
+      parts.set(part.id, { text, uuid });
+      old ? old.replaceWith(part) : layer.append(part);
+    }
+    for (const [id, part] of parts)
+      if (part.uuid === uuid && !present.has(id)) { parts.delete(id); document.getElementById(id)?.remove(); }
+    if (!element) watched.delete(uuid);
+    place();
+  }
+  // The overlay is as wide as the picture beside the panel.
+  function place() {
+    const box = suppleViewer.mutable.current.canvas?.getBoundingClientRect();
+    if (box && layer) Object.assign(layer.style, {
+      left: `${box.left}px`, top: `${box.top}px`, width: `${box.width}px`, height: `${box.height}px` });
+  }
+
+  // The values of sliders with their units: a text input of the panel that is not displayed, whose label names the
+  // slider, takes the place of the slider's number.
+  const BESIDE = "beside ";
+  function findValues() {
+    for (const element of Object.values(suppleViewer.useGuiConfig.getAll())) {
+      const label = element?.props?.label;
+      if (element?.type !== "GuiTextMessage" || !label?.startsWith?.(BESIDE)) continue;
+      const slider = document.getElementById(label.slice(BESIDE.length)), row = slider?.parentElement;
+      if (!row) continue;
+      let box = row.querySelector("input.supple-value");
+      if (!box) {
+        row.classList.add("supple-row");
+        box = row.appendChild(Object.assign(document.createElement("input"), { className: "supple-value", spellcheck: false }));
+        box.addEventListener("change", () => { send(box.dataset.uuid, box.value); box.dataset.waits = box.value; });
+        box.addEventListener("keydown", (event) => { if (event.key === "Enter") box.blur(); });
+        box.addEventListener("focus", () => box.select());
+      }
+      box.dataset.uuid = element.uuid;
+      box.setAttribute("aria-label", document.querySelector(`label[for="${slider.id}"]`)?.textContent ?? "");
+      if (document.activeElement !== box && box.value !== element.value && box.dataset.waits !== box.value)
+        box.value = element.value;
+      if (element.value !== box.dataset.waits) box.dataset.waits = "\u0000";
+    }
+  }
+
+  // A button of the overlay, with the input of the panel that it sets.
+  addEventListener("click", (event) => {
+    const button = event.target.closest?.("[data-press]");
+    if (button) send(button.dataset.press, button.dataset.value ?? true);
+    if (event.target.closest?.("#supple-keys")) toggleKeys();
+  });
+
+  // The place of the pointer, for the value of the field there: (x, y) from -1 to 1, y upwards.
+  let moved = null;
+  addEventListener("pointermove", (event) => { moved = onCanvas(event) && event.buttons === 0 ? event : null; }, true);
+  let sent = "";
+  function sendPointer() {
+    if (pointer === null || document.hidden) return;
+    const box = suppleViewer.mutable.current.canvas?.getBoundingClientRect();
+    let text = "";
+    if (moved && box && document.getElementById("supple-legend")) {
+      const x = (2 * (moved.clientX - box.left)) / box.width - 1, y = 1 - (2 * (moved.clientY - box.top)) / box.height;
+      text = `${x.toFixed(4)} ${y.toFixed(4)}`;
+      const label = document.getElementById("supple-value");
+      if (label) label.style.transform = `translate(${moved.clientX - box.left + 14}px, ${moved.clientY - box.top + 14}px)`;
+    }
+    if (text !== sent) send(pointer, (sent = text));
+  }
+
+  // Keys. viser's client reacts to them in every element; a slider or a tab keeps its own ones.
+  const OWN = "[role=slider],[role=tab],[role=option],[role=listbox],[role=menu],[role=dialog],select";
+  function attachKeys() {
+    document.body.addEventListener("keydown", (event) => {
+      const typed = event.target.closest?.("input,textarea");
+      if (event.key === "?" && !typed) toggleKeys();
+      if (event.key === "Escape") document.getElementById("supple-keys")?.remove();
+      if (event.target.closest?.(OWN) && /^( |Arrow)/.test(event.key)) event.stopPropagation();
+      // Otherwise the space bar would also press the button that was clicked last.
+      if (event.key === " " && event.target.closest?.("button")) event.target.blur();
+    });
+  }
+  const SHOWN = { space: "Space", arrowright: "→" };
+  function toggleKeys() {
+    const old = document.getElementById("supple-keys");
+    if (old) return old.remove();
+    const panel = Object.assign(document.createElement("div"), { id: "supple-keys" });
+    panel.setAttribute("role", "dialog");
+    const commands = Object.values(suppleViewer.useGui.get().commands).map((each) => each.props);
+    for (const [key, label] of [...commands.map((each) => [SHOWN[each.hotkey] ?? each.hotkey, each.label]),
+      ["W A S D", "Move the camera"], ["?", "These keys"]]) {
+      const row = panel.appendChild(document.createElement("div"));
+      row.append(Object.assign(document.createElement("kbd"), { textContent: key }), label);
+    }
+    layer.append(panel);
+  }
+
+  function begin() {
+    if (!globalThis.suppleViewer || suppleViewer.messageSource !== "websocket") return setTimeout(begin, 50);
+    layer = document.body.appendChild(Object.assign(document.createElement("div"), { id: "supple-layer" }));
+    follow();
+    suppleViewer.useGui.subscribe(follow);
+    dark.addEventListener("change", follow);
+    addEventListener("resize", place);
+    setInterval(() => { findOverlays(); place(); sendPointer(); findValues(); }, 80);
+    attachKeys();
+  }
+  addEventListener("DOMContentLoaded", begin);
+})();

@@ -1,0 +1,288 @@
+"""The page in a browser, with a fake simulation: what is above the picture, keys, themes, phones, values with units."""
+
+import random
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from tests.viewer.page.conftest import two_boxes
+
+from supple.output.viser_server import start_server, stop_server
+from supple.viewer.app import configure_page
+from supple.viewer.live_page import LivePage
+from supple.viewer.protocol.commands import Grab, Pause, Play, ReleaseGrab, Reset, SetParameter, Step
+from supple.viewer.protocol.snapshots import GrabState
+from supple.viewer.server.gate import gate
+from supple.viewer.server.page.served_page import ServedPage
+
+WIDE, PHONE = {"width": 1200, "height": 800}, {"width": 400, "height": 800}
+
+
+@pytest.fixture(scope="module")
+def page(look):
+    """A served page with two boxes."""
+    fake = two_boxes()
+    with gate("127.0.0.1", None, ServedPage("boxes & <more>")):
+        server = start_server("127.0.0.1", 0)
+    configure_page(server)
+    live = LivePage(server, fake, fake.snapshot)
+    # Few pixels, because they are drawn in software.
+    screen = look(f"http://127.0.0.1:{server.get_port()}/?fixedDpr=0.3", server)
+    made = SimpleNamespace(screen=screen, tab=screen.tab, live=live, fake=fake, start=fake.snapshot)
+
+    def received(kind):
+        """Wait for a command of this kind."""
+        screen.wait(lambda: any(isinstance(each, kind) for each in fake.received), kind.__name__)
+        found = next(each for each in fake.received if isinstance(each, kind))
+        fake.received.clear()
+        return found
+
+    made.received = received
+    yield made
+    screen.close()
+    live.stop()
+    stop_server(server)
+
+
+@pytest.fixture
+def fresh(page):
+    """The page on a wide screen in the light, with the simulation at its start."""
+    page.tab.set_viewport_size(WIDE)
+    page.tab.emulate_media(color_scheme="light")
+    page.tab.locator("#supple-keys").evaluate_all("all => all.forEach(each => each.remove())")
+    page.tab.locator(".mantine-Notification-closeButton").evaluate_all("all => all.forEach(each => each.click())")
+    page.fake.snapshot = page.start
+    page.fake.received.clear()
+    page.screen.wait(lambda: page.tab.locator("#supple-start button").count() == 1, "the start")
+    yield page
+    assert page.screen.errors == []
+
+
+def test_viser_s_client_is_changed_in_every_place(fresh):
+    assert fresh.tab.evaluate("suppleMissing") == []
+    assert fresh.tab.title() == "boxes & <more> · Supple"
+
+
+def test_a_large_button_starts_the_time(fresh):
+    button = fresh.tab.locator("#supple-start button")
+    assert button.inner_text() == "▶ Play, then drag the body 0"
+    assert button.bounding_box()["height"] > 40
+    button.click()
+    fresh.received(Play)
+    fresh.fake.show(paused=False)
+    fresh.screen.wait(lambda: button.count() == 0, "no button while time runs")
+
+
+def test_keys(fresh):
+    keyboard = fresh.tab.keyboard
+    fresh.tab.mouse.move(300, 700)
+    for key, kind in ((" ", Play), ("ArrowRight", Step), ("r", Reset)):
+        keyboard.press(key)
+        fresh.received(kind)
+    fresh.fake.show(paused=False)
+    fresh.screen.wait(lambda: not fresh.live.controller.snapshot.paused, "the running time")
+    fresh.screen.tab.get_by_role("button", name="Pause", exact=True).focus()
+    keyboard.press(" ")  # once, though the button has the focus
+    fresh.received(Pause)
+    fresh.tab.wait_for_timeout(300)
+    assert fresh.fake.received == []
+    camera = lambda: np.asarray(fresh.screen.client.camera.position)  # noqa: E731
+    keyboard.press("4")
+    center = fresh.live.stage.model.view.center
+    fresh.screen.wait(
+        lambda: camera()[1] > 4.0 and np.abs(camera() - center)[[0, 2]].max() < 0.1, "the view from above"
+    )
+    far = camera()
+    keyboard.press("f")
+    fresh.screen.wait(lambda: camera()[1] < far[1] - 0.1, "the picture to fit")
+    keyboard.press("1")
+    fresh.screen.wait(lambda: abs(camera()[0] - center[0]) > 0.5, "the view from the corner")
+    keyboard.press("?")
+    shown = fresh.tab.locator("#supple-keys")
+    shown.wait_for()
+    text = shown.inner_text()
+    for line in ("Space", "Play or pause", "→", "One frame", "View from: top", "Fit the picture"):
+        assert line in text
+    keyboard.press("Escape")
+    assert shown.count() == 0
+
+
+def test_values_have_units_and_are_typed_with_them(fresh):
+    youngs = fresh.live.panel.bodies.inputs["youngs"]
+    box = fresh.tab.locator(f'[id="{youngs.handle._impl.uuid}"] ~ input.supple-value')
+    fresh.screen.wait(lambda: box.count() == 1 and box.input_value() == "100 kPa", "the value with its unit")
+    row = fresh.tab.locator(f'[id="{youngs.handle._impl.uuid}"]')
+    assert ("100 Pa" in row.inner_text(), "1 GPa" in row.inner_text()) == (True, True)
+    for typed, pascals, shown in (("30 kPa", 3e4, "30 kPa"), ("2e6", 2e6, "2 MPa")):
+        box.fill(typed)
+        box.press("Enter")
+        assert fresh.received(SetParameter) == SetParameter("youngs", pascals)
+        fresh.screen.wait(lambda: box.input_value() == shown, shown)  # noqa: B023
+        assert fresh.screen.reads(youngs.handle) == pytest.approx(np.log10(pascals), abs=0.06)
+    box.fill("30 newton")
+    box.press("Enter")
+    fresh.tab.get_by_text("is no value of Young's modulus; type for example 30 kPa").wait_for()
+    fresh.screen.wait(lambda: box.input_value() == "2 MPa", "the value as it was")
+    # Nothing is wider than its place.
+    clipped = (
+        "all => all.filter(each => each.clientWidth && each.scrollWidth > each.clientWidth).map(each => each.value)"
+    )
+    assert fresh.tab.locator("input.supple-value").evaluate_all(clipped) == []
+
+
+def test_every_input_has_a_tooltip(fresh):
+    for handle in fresh.screen.server.gui._gui_input_handle_from_uuid.values():
+        assert handle.hint or handle.label.startswith("beside "), handle.label
+
+
+def test_a_drag_draws_one_line_and_a_thin_outline_of_the_held_body_only(fresh):
+    screen, mouse = fresh.screen, fresh.tab.mouse
+    middle = fresh.start.positions[fresh.start.description.bodies[0].vertices].mean(axis=0)
+    where = screen.place(middle + np.array([0.0, 0.2, 0.5]))
+    shot = lambda: screen.shot()[120:]  # noqa: E731 - below the energies
+    yellow = lambda: int(np.count_nonzero((shot()[..., :2].min(axis=2) > 190) & (shot()[..., 2] < 150)))  # noqa: E731
+    orange = lambda: int(  # noqa: E731 - viser's arrow
+        np.count_nonzero(np.abs(screen.shot() - [255, 140, 66]).max(axis=2) < 12)
+    )
+    mouse.move(*where)
+    fresh.tab.wait_for_timeout(300)
+    assert yellow() < 5  # not outlined under the pointer only
+    mouse.down()
+    mouse.move(where[0] + 60, where[1] - 60, steps=4)
+    grab = fresh.received(Grab)
+    assert grab.body == "body 0"
+    screen.wait(lambda: yellow() > 30, "the outline")
+    area = int(np.count_nonzero(screen.shot().max(axis=2) - screen.shot().min(axis=2) > 60))
+    assert yellow() < 0.2 * area
+    assert orange() < 5
+    fresh.fake.show(grabs=(GrabState(grab.grab, "body 0", tuple(middle), tuple(middle + np.array([0.0, 1.0, 0.0]))),))
+    screen.wait(
+        lambda: "Paused: the spring pulls when time runs" in fresh.tab.locator("#supple-start").inner_text(),
+        "why nothing moves",
+    )
+    mouse.up()
+    fresh.received(ReleaseGrab)
+    screen.wait(lambda: yellow() < 5, "no outline")
+
+
+def test_the_theme_follows_the_system(fresh):
+    corner = lambda: fresh.screen.shot()[5:40, 500:700].mean()  # noqa: E731
+    assert corner() > 240
+    fresh.tab.emulate_media(color_scheme="dark")
+    fresh.screen.wait(lambda: corner() < 50, "the dark picture")
+    assert fresh.tab.evaluate("document.documentElement.dataset.mantineColorScheme") == "dark"
+    fresh.tab.emulate_media(color_scheme="light")
+    fresh.screen.wait(lambda: corner() > 240, "the light picture")
+
+
+def test_a_phone_has_a_drawer_and_buttons_for_time(fresh):
+    tab = fresh.tab
+    transport = tab.locator("#supple-transport button")
+    assert not transport.first.is_visible()
+    tab.set_viewport_size(PHONE)
+    fresh.screen.wait(lambda: transport.first.is_visible(), "the buttons")
+    boxes = [transport.nth(k).bounding_box() for k in range(3)]
+    assert all(box["width"] >= 44 and box["height"] >= 44 and box["x"] + box["width"] <= 400 for box in boxes)
+    for k, kind in enumerate((Play, Step, Reset)):
+        transport.nth(k).click()
+        fresh.received(kind)
+    play = tab.get_by_role("button", name="Play", exact=True).last
+    connected = tab.get_by_text("Connected")
+    drawer = lambda: connected.bounding_box()["y"]  # noqa: E731
+    fresh.screen.wait(lambda: drawer() > 730, "the closed drawer")
+    connected.click()
+    fresh.screen.wait(lambda: drawer() < 500 and play.is_visible(), "the open drawer")
+    connected.click()
+    fresh.screen.wait(lambda: drawer() > 730, "the closed drawer")
+
+
+def test_the_legend_in_the_picture_and_the_value_at_the_pointer(fresh):
+    tab, screen, views = fresh.tab, fresh.screen, fresh.live.panel.views
+    body = fresh.start.description.bodies[0]
+    fresh.fake.show(tet_values=np.full(96, 12_300.0), tet_quantity="von_mises")
+    views.color_by.value = "von Mises stress"
+    views.apply()
+    legend = tab.locator("#supple-legend")
+    screen.wait(lambda: legend.count() == 1 and "20 kPa" in legend.inner_text(), "the legend")
+    box = legend.bounding_box()
+    assert (box["x"] < 40, box["y"] + box["height"] > 750) == (True, True)
+    bar = legend.locator(".bar").bounding_box()
+    pixels = screen.shot()[int(bar["y"] + 5), int(bar["x"]) + 4 : int(bar["x"] + bar["width"]) - 4]
+    np.testing.assert_allclose(pixels[0], (68, 1, 84), atol=12)  # viridis, from dark
+    np.testing.assert_allclose(pixels[-1], (253, 231, 37), atol=12)  # to bright
+    x, y = screen.place(fresh.start.positions[body.vertices].mean(axis=0))
+    tab.mouse.move(x, y)
+    value = tab.locator("#supple-value")
+    screen.wait(lambda: value.count() == 1 and value.inner_text() == "12.3 kPa · body 0", "the value")
+    place = value.bounding_box()
+    assert (abs(place["x"] - x) < 30, abs(place["y"] - y) < 30) == (True, True)
+    tab.mouse.move(5, 5)
+    screen.wait(lambda: value.count() == 0, "no value beside the bodies")
+    views.color_by.value = "body"
+    views.apply()
+    screen.wait(lambda: legend.count() == 0, "no legend")
+
+
+def test_a_cut_has_a_plane_section_in_the_picture(fresh):
+    """Seen along the cut axis, the section fills the outline of the box with one color."""
+    tab, screen, views = fresh.tab, fresh.screen, fresh.live.panel.views
+    views.surface.value, views.cut_axis.value, views.cut_place.value = "cut", "z", 0.4
+    views.apply()
+    tab.keyboard.press("2")
+    look = lambda: np.asarray(screen.client.camera.look_at) - np.asarray(screen.client.camera.position)  # noqa: E731
+    screen.wait(lambda: abs(look()[2]) > 0.9 * np.linalg.norm(look()), "the view along the axis")
+    if look()[2] > 0.0:
+        tab.keyboard.press("5")
+        screen.wait(lambda: look()[2] < 0.0, "the view from the other side")
+    body = fresh.start.description.bodies[0]
+    x = fresh.start.positions[body.vertices]
+    middle = 0.5 * (x.min(axis=0) + x.max(axis=0))
+    middle[2] = x[:, 2].min() + 0.4 * np.ptp(x[:, 2])
+    corners = [screen.place(middle + np.array([a, b, 0.0])) for a in (-0.42, 0.42) for b in (0.05, 0.42)]
+    (left, top), (right, bottom) = np.min(corners, axis=0), np.max(corners, axis=0)
+
+    def section():
+        return screen.shot()[int(top) : int(bottom), int(left) : int(right)].reshape(-1, 3)
+
+    red = np.array([230, 92, 60])
+    screen.wait(lambda: np.ptp(section(), axis=0).max() < 30, "one flat color")
+    assert section().mean(axis=0) @ red / np.linalg.norm(section().mean(axis=0)) / np.linalg.norm(red) > 0.95
+    views.surface.value = "skin"
+    views.apply()
+    tab.keyboard.press("1")
+
+
+LONG = [
+    pytest.param(size, scheme, 250, marks=pytest.mark.slow) for size in (WIDE, PHONE) for scheme in ("light", "dark")
+]
+
+
+@pytest.mark.parametrize(("size", "scheme", "count"), [(PHONE, "dark", 12), *LONG])
+def test_random_events(fresh, size, scheme, count):
+    """Keys, moves, clicks and drags anywhere, while the simulation changes: no exception, and the page goes on.
+
+    Without a browser, tests/viewer/page/controls/test_random_events.py sends a thousand.
+    """
+    tab, rng = fresh.tab, random.Random(f"{size} {scheme}")
+    tab.set_viewport_size(size)
+    tab.emulate_media(color_scheme=scheme)
+    keys = (" ", "ArrowRight", "r", "f", "1", "2", "3", "4", "5", "?", "Escape", "Tab", "Enter", "w", "ArrowUp", "7")
+    for k in range(count):
+        x, y = rng.uniform(0, size["width"]), rng.uniform(0, size["height"])
+        what = rng.random()
+        if what < 0.35:
+            tab.keyboard.press(rng.choice(keys))
+        elif what < 0.6:
+            tab.mouse.move(x, y)
+        elif what < 0.7:
+            tab.mouse.click(x, y)
+        elif what < 0.8:
+            tab.mouse.down() if rng.random() < 0.5 else tab.mouse.up()
+        else:
+            tab.mouse.wheel(0.0, rng.choice((-120.0, 120.0)))
+        if k % 6 == 0:
+            fresh.fake.show(time=0.01 * k, paused=bool(k % 2))
+    tab.mouse.up()
+    fresh.fake.show(time=77.0)
+    fresh.screen.wait(lambda: fresh.live.controller.snapshot.time == 77.0, "the page to go on")
+    assert fresh.screen.errors == []
