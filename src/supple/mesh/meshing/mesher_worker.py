@@ -147,9 +147,10 @@ def _run_decimation(vertices: Any, triangles: Any, options: dict[str, Any], note
     for aggressiveness in range(1, 10):
         if len(triangles) <= options["triangles"]:
             break
-        vertices, triangles = fast_simplification.simplify(
+        reduced = fast_simplification.simplify(
             vertices, triangles, target_count=options["triangles"], agg=float(aggressiveness)
         )
+        vertices, triangles = reduced[0], reduced[1]
     return vertices, triangles, np.ones(len(triangles))
 
 

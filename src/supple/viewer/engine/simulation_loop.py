@@ -203,7 +203,7 @@ class SimulationLoop:
         forces = self._requested("contacts", lambda: strongest_forces(live))
         quantity = self.view.tet_values or ""
         values = self._requested(
-            "tet_values", lambda: tet_values(system.laws, state.positions, quantity, state.internal)
+            "tet_values", lambda: tet_values(system.laws_at(state.time), state.positions, quantity, state.internal)
         )
         return Snapshot(
             description=None,  # pyright: ignore[reportArgumentType]

@@ -52,7 +52,7 @@ def energy_density(moment: Moment) -> NDArray[np.float64]:
 
 
 def _of_laws(moment: Moment, quantity: str) -> NDArray[np.float64]:
-    laws = moment.model.laws
+    laws = moment.laws
     if laws is None:
         return np.full(len(moment.model.tets), np.nan)
     return tet_values(laws, moment.positions, quantity, moment.internal)

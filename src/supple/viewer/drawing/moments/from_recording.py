@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from supple.output.drawing import view_of
@@ -24,7 +26,6 @@ def model_of_recording(recording: Recording) -> Model:
         view_of(recording),
         recorded_stitches=recording.stitches,
         joints=recording.joints,
-        laws=recording.laws,
     )
 
 
@@ -37,5 +38,6 @@ def moment_of_frame(model: Model, frame: RecordedFrame) -> Moment:
         frame.state.velocities,
         frame.obstacle_poses,
         internal=frame.state.internal,
+        laws=replace(frame.recording.laws, active=frame.active),
         pinned=frame.recording.pinned_vertices.astype(np.int64),
     )

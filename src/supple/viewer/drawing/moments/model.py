@@ -64,7 +64,6 @@ class Model:
     stitches : (k, 4) a vertex, and the three vertices of the triangle that it is stitched to
     recorded_stitches : stitches of a recording, of any kind
     joints : of rigid bodies
-    laws : the elastic laws of a recording's tets; None of a live simulation, which sends what follows from them
     """
 
     bodies: tuple[ModelBody, ...]
@@ -75,7 +74,6 @@ class Model:
     stitches: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 4), dtype=np.int32))
     recorded_stitches: RecordedStitches | None = None
     joints: tuple[RecordedJoint, ...] = ()
-    laws: TetLaws | None = None
 
     @cached_property
     def surface_vertices(self) -> NDArray[np.int64]:
@@ -144,6 +142,7 @@ class Moment:
     pusher : center (3,) and radius of a ball [m], or None
     tet_values : values of tets (m,) that the simulation sent, by the key of their field
     internal : (k, 11) internal variables of a recorded frame, see `State`
+    laws : the elastic laws of a recorded frame's tets; None of a live simulation, which sends what follows from them
     """
 
     model: Model
@@ -158,6 +157,7 @@ class Moment:
     pusher: tuple[NDArray[np.float64], float] | None = None
     tet_values: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     internal: NDArray[np.float64] = field(default_factory=lambda: NEVER_FLOWED)
+    laws: TetLaws | None = None
 
     @cached_property
     def deformation_gradients(self) -> NDArray[np.float64]:
