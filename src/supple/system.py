@@ -1,8 +1,8 @@
 """A scene as flat arrays, the input of solvers, and the interface of solvers.
 
 The bodies' vertices, tets, edges, points and surface triangles are concatenated; a `BodyRange` has the rows of one.
-Vertices are what moves. Points are what touches, combinations of vertices; those of a soft body are its vertices, or
-the vertices of its skin. This file does not depend on solvers, files or viewers.
+Vertices are what moves. Points are what touches: combinations of vertices, of a soft body its vertices or those of its
+skin. This file does not depend on solvers, files or viewers.
 """
 
 from __future__ import annotations
@@ -247,7 +247,6 @@ def build_system(scene: Scene, start: State | None = None) -> System:
     forces = [_applied_force(force, next(part for part in ranges if part.name == force.body)) for force in scene.forces]
     x_start = start_states[0].positions
     given = [applied(load, scene.bodies, begins, all_masses, x_start) for load in scene.loads]
-    loads = [load for parts in given for load in parts]
     return System(
         scene=scene,
         bodies=tuple(ranges),
@@ -263,7 +262,7 @@ def build_system(scene: Scene, start: State | None = None) -> System:
         components=graph_components(n, all_edges[:, 0], all_edges[:, 1]),
         gravity=np.asarray(scene.gravity, dtype=np.float64),
         points=EmbeddedPoints.joined(points),
-        loads=(*forces, *loads),
+        loads=(*forces, *(load for parts in given for load in parts)),
         actuators=actuators_of(scene.cavities, scene.cables, scene.bodies, begins, x_start),
         soft_targets=tuple(SoftTargetRange(item, *_anchored(item, ranges, start)) for item in scene.soft_targets),
         stitching=scene.stitching,

@@ -20,7 +20,7 @@ from supple.output.recording.checked_hdf5 import CheckedFile
 from supple.output.recording.details import RecordedDetails
 from supple.output.recording.file import WRITTEN
 from supple.output.recording.joints import RecordedJoint, read_joints
-from supple.output.recording.laws import recorded_laws
+from supple.output.recording.laws import read_quadratic, recorded_laws
 from supple.output.recording.physics import RecordedPhysics, RecordedWeld, read_physics, read_untouching, read_welds
 from supple.output.recording.recorder import INTERNAL, REPORT_NUMBERS, REPORT_VECTORS, field_series, frame_layout
 from supple.output.recording.scene import RecordedBody, RecordedObstacle, read_bodies, read_header, read_obstacles
@@ -217,15 +217,7 @@ class Recording(Showable, Sequence[RecordedFrame]):
         n = len(self.rest_positions)
         self.tets = file.indices("supple/tets", 4, n)
         m = len(self.tets)
-        self.quadratic: tuple[NDArray[np.int32], NDArray[np.int32]] | None = None
-        if "supple/quadratic" in file:
-            rows = file.array("supple/quadratic/rows", "i", (None,))
-            if len(rows) and (rows.min() < 0 or rows.max() >= m or (np.diff(rows) <= 0).any()):
-                raise file.broken("its quadratic tets are not rows of its tets in ascending order")
-            nodes = file.indices("supple/quadratic/nodes", 10, n)
-            if len(nodes) != len(rows) or not np.array_equal(nodes[:, :4], self.tets[rows]):
-                raise file.broken("the nodes of its quadratic tets do not have the corners of its tets")
-            self.quadratic = rows.astype(np.int32), nodes
+        self.quadratic = read_quadratic(file, self.tets, n)
         self.triangles = file.indices("supple/triangles", 3, n)
         self.rest_volumes = file.array("supple/rest_volumes", "f", (m,))
         self.masses = file.array("supple/masses", "f", (n,))
@@ -254,12 +246,8 @@ class Recording(Showable, Sequence[RecordedFrame]):
         layout = frame_layout(n, m, len(self.obstacles), self.details, self.fields, self.sensors, flowing)
         self._series = {series.path: series for series in layout.series}
         own = [field_series(field, n, m).path for field in self.fields]
-        for path in (
-            *_READ_BY_FRAME,
-            *own,
-            *([_MESSAGE] if _MESSAGE in file else []),
-            *([INTERNAL] if flowing else []),
-        ):
+        others = [_MESSAGE] * (_MESSAGE in file) + [INTERNAL] * (flowing > 0)
+        for path in (*_READ_BY_FRAME, *own, *others):
             file.check_series(self._series[path], self._count)
         self.times: NDArray[np.float64] = self._values("supple/frames/time")
         if not np.isfinite(self.times).all():
