@@ -159,6 +159,8 @@ def _scene(file: Path, timed: bool) -> None:
         ("tets", str(len(system.tets))),
         ("obstacles", ", ".join(f"{o.name} ({type(o).__name__})" for o in scene.obstacles) or "none"),
         ("pins", ", ".join(f"{p.pin.label}: {len(p.vertices)} vertices" for p in system.pins) or "none"),
+        ("loads", ", ".join(load.label for load in scene.loads) or "none"),
+        ("sensors", ", ".join(sensor.label for sensor in scene.sensors) or "none"),
         ("solver", str(run.solver)),
         ("time", f"{run.steps} steps of {run.dt:.6g} s: {run.steps * run.dt:.6g} s"),
         ("memory", f"about {run.solver.bytes_needed(scene) / 1e6:.3g} MB beyond that of the program"),
