@@ -56,7 +56,8 @@ def test_a_scene(rows_of, tmp_path):
         "bodies: [{name: cube, shape: {kind: box, size: [1, 1, 2]}, "
         "material: {kind: arap, youngs: 1e4, poisson: 0.2, density: 500}}]\n"
         "obstacles: [{kind: half_space, name: floor}]\npins: [{body: cube, vertices: [0, 1]}]\n"
-        "loads: [{kind: growth, body: cube, stretch: 1.1}, {kind: body_force, name: wind, body: cube, force: [1, 0, 0]}]\n"
+        "loads: [{kind: growth, body: cube, stretch: 1.1},"
+        " {kind: body_force, name: wind, body: cube, force: [1, 0, 0]}]\n"
         "sensors: [{kind: force, name: foot, body: cube}]\n"
         "solver: {kind: xpbd, substeps: 3}\ndt: 0.5\nsteps: 4\n"
     )

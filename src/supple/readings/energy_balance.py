@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.elastic_tets.stress import elastic_energy
-from supple.materials.flows.internal import DISSIPATED, tets_of
+from supple.materials.flows.internal import DISSIPATED
 from supple.state import State
 from supple.system import System
 
@@ -75,4 +75,6 @@ def dissipated_energy(laws: TetLaws, internal: NDArray[np.float64]) -> float:
     """What flow has dissipated since the start [J]; internal : (k, 11) variables of what flows."""
     if not len(internal):
         return 0.0
-    return float(laws.volumes[tets_of(laws.material)] @ internal[:, DISSIPATED])
+    dissipated = internal[:, DISSIPATED]
+    parts = laws.material.flowing_laws
+    return float(sum(laws.volumes[part.rows] @ laws.means(part, dissipated[own]) for part, own in parts))

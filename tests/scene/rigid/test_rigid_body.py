@@ -233,8 +233,3 @@ def test_a_motion_that_would_deform_the_body():
     system = system_of(body(), pins=[pin])
     with pytest.raises(sp.SceneError, match=r"pin of body 'palm': motion\(0\) has shape \(4, 3\); .* shape \(3,\)"):
         system.pin_targets(0.0)
-
-
-def test_xpbd_refuses_rigid_bodies():
-    with pytest.raises(sp.SolverError, match="XPBD: body 'palm' is rigid; simulate it with Implicit"):
-        sp.simulate(sp.Scene([soft(), body()]), sp.XPBD(), 0.01, 1)
