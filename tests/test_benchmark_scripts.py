@@ -98,6 +98,7 @@ def test_the_search_for_contact_is_measured_in_piles_of_bears(capsys):
     assert np.isfinite(exponent)
 
 
+@pytest.mark.slow
 def test_contact_scenes_are_measured_against_another_checkout(capsys):
     from benchmarks import contact_scenes
 

@@ -101,7 +101,7 @@ def test_ctrl_c_is_python_s_again_afterwards(folder, monkeypatch):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals are sent otherwise elsewhere")
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_signals_of_a_process(folder, number):
     arguments = [sys.executable, "-m", "supple", "run", "scene.yaml", "--steps", "1000000", "-q"]
     # Whoever runs the tests in the background may have had SIGINT ignored; a person at a terminal has not.

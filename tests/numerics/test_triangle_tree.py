@@ -75,6 +75,7 @@ def test_of_equally_near_triangles_the_one_that_faces_the_point_wins():
         assert found.tolist() == [number[1], min(number[1], number[2]), number[0], number[0]]
 
 
+@pytest.mark.slow
 def test_a_hundred_thousand_against_a_hundred_thousand():
     """Takes seconds (not asserted); a search through all 10^10 pairs would take a quarter of an hour."""
     n = 223

@@ -37,6 +37,7 @@ def test_a_case_too_large_for_its_share_of_the_memory_runs_on_fewer_workers(tmp_
     assert table.reasons[2] == "needs about 5.3 GB of memory; 3.6 GB can be used here"
 
 
+@pytest.mark.slow
 def test_a_cluster_without_a_worker_large_enough(cluster, tmp_path):
     def frames(recording):
         return len(recording)

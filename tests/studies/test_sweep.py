@@ -53,6 +53,7 @@ def test_pool_and_cluster_give_the_same_table_as_the_formula(cluster, scene_file
         assert again[-1].index == FALL_STEPS
 
 
+@pytest.mark.slow
 def test_each_worker_has_its_share_of_the_cores(cluster, tmp_path):
     def threads(recording):
         import numba

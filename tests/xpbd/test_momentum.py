@@ -58,7 +58,7 @@ def squashed(material, height, position, mesh=SPHERE):
         pytest.param(JELLY, 0.95, 80, id="neo-hookean .95", marks=pytest.mark.slow),
         pytest.param(JELLY, 0.5, 20, id="neo-hookean .5", marks=pytest.mark.slow),
         pytest.param(JELLY, 0.02, 5, id="neo-hookean pancake"),
-        pytest.param(CLASSIC, 0.95, 5, id="edges+volume .95"),
+        pytest.param(CLASSIC, 0.95, 5, id="edges+volume .95", marks=pytest.mark.slow),
         pytest.param(CLASSIC, 0.8, 40, id="edges+volume .8", marks=pytest.mark.slow),
         pytest.param(CLASSIC, 0.5, 20, id="edges+volume .5", marks=pytest.mark.slow),
         pytest.param(CLASSIC, 0.02, 20, id="edges+volume pancake", marks=pytest.mark.slow),

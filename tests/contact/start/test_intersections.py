@@ -219,6 +219,7 @@ def test_a_body_folded_onto_itself(overlap, there):
         assert found_in(switched_off, start) == []
 
 
+@pytest.mark.slow
 def test_fifty_thousand_triangles_and_the_one_that_is_wrong():
     a, b = cube("a", (0, 0, 0), 46), cube("b", (1.001, 0, 0), 46)
     scene = sp.Scene([a, b])

@@ -179,6 +179,7 @@ def test_a_long_step_stops_before_a_body_in_its_way(way):
         assert step * way > 6.5
 
 
+@pytest.mark.slow
 def test_a_complete_step_in_many_pieces_is_exactly_one():
     """Shares must not add up to slightly less than one: pins must arrive."""
     model, x = two_boxes()

@@ -107,6 +107,7 @@ def test_a_body_follows_the_mouse_until_it_is_released(resting):
     resting.drawn(lambda red: np.abs(red[1] - where()).max() < 25, "the fall in the picture")
 
 
+@pytest.mark.slow
 def test_a_click_pins_a_vertex_and_another_one_unpins_it(resting):
     screen, tab = resting.screen, resting.screen.tab
     top = resting.snapshot().positions[np.argmax(resting.snapshot().positions[:, 1])]

@@ -60,7 +60,7 @@ MATERIALS = {
     ("name", "mode"),
     [
         ("neo-hookean", 0),
-        ("edges+volume", 2),
+        pytest.param("edges+volume", 2, marks=pytest.mark.slow),
         pytest.param("neo-hookean", 2, marks=pytest.mark.slow),
         pytest.param("edges+volume", 0, marks=pytest.mark.slow),
     ],

@@ -56,7 +56,9 @@ def test_friction_holds_a_stack_on_a_slope():
     assert np.abs(travel[-1] - travel[0]).max() < 0.02
 
 
-@pytest.mark.parametrize(("ratio", "substeps"), [(50, 100), (200, 200), (1000, 400)])
+@pytest.mark.parametrize(
+    ("ratio", "substeps"), [(50, 100), (200, 200), pytest.param(1000, 400, marks=pytest.mark.slow)]
+)
 def test_a_light_box_carries_a_heavy_one_without_a_gain_of_energy(ratio, substeps):
     heavy = sp.StableNeoHookean(youngs=1e6 * max(1.0, ratio / 200), poisson=0.4, density=1000.0 * ratio)
     light = sp.StableNeoHookean(youngs=1e6 * max(1.0, ratio / 200), poisson=0.4, density=1000.0)
