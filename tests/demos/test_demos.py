@@ -126,6 +126,7 @@ def test_the_hat_stays_on_the_flying_bear_with_both_solvers():
         assert frames[-1].positions["hat"][:, 1].min() > 0.12
 
 
+@pytest.mark.slow
 def test_both_solvers_bend_the_quilt_into_the_static_shape(monkeypatch):
     """The whole demo in a shorter time, on a coarser patch and bar."""
     monkeypatch.setattr(quilt, "RAMP", 1.0)

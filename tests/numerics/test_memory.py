@@ -128,6 +128,7 @@ MEASURE = """
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="reads Linux's files")
 @pytest.mark.parametrize("solver", ["xpbd", pytest.param("implicit", marks=pytest.mark.slow)])
 def test_the_estimate_is_at_least_what_is_used_and_at_most_six_times_as_much(solver):

@@ -128,6 +128,7 @@ print(*expected)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
 def test_simulations_in_threads_and_after_a_fork_for_any_layer_and_number_of_threads():
     printed = []

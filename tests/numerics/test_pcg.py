@@ -96,6 +96,7 @@ def test_an_indefinite_matrix_is_noticed():
     assert not result.converged
 
 
+@pytest.mark.slow
 def test_same_bits_on_any_number_of_threads(monkeypatch):
     if numba.config.NUMBA_NUM_THREADS < 2:
         pytest.skip("this machine has one core")

@@ -55,7 +55,10 @@ def test_the_coefficients_bound_the_determinant():
     np.testing.assert_allclose(c.mean(axis=1) / 6.0, of_check.volumes(x), rtol=1e-12)
 
 
-@pytest.mark.parametrize(("scale", "length"), [(1.0, 0.1), (1.0, 1.0), (1.0, 100.0), (1e-6, 1e-6), (1e3, 500.0)])
+@pytest.mark.parametrize(
+    ("scale", "length"),
+    [pytest.param(1.0, 0.1, marks=pytest.mark.slow), (1.0, 1.0), (1.0, 100.0), (1e-6, 1e-6), (1e3, 500.0)],
+)
 def test_never_an_overstep_and_not_needlessly_short(scale, length):
     limited = short = 0
     random = np.random.default_rng(4)

@@ -236,6 +236,7 @@ def killing_in_mid_run(marks: Path):
     return make
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="kills processes by signals")
 def test_a_killed_worker_loses_no_case_and_its_own_goes_on_from_the_checkpoint(tmp_path):
     marks = tmp_path / "marks"

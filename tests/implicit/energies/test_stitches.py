@@ -110,6 +110,7 @@ def swinging(damping):
     return sp.Scene([box("a", -0.2, velocity=(0, -0.5, 0))], [sheet], stitches=stitches, gravity=(0, 0, 0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["bdf2", "newmark"])
 def test_damped_stitches_lose_as_much_energy_as_those_of_xpbd(integrator):
     left = {}

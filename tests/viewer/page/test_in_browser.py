@@ -197,6 +197,7 @@ def test_a_body_is_added_and_removed(still, spot):
     screen.tab.get_by_text("Add a body").click()
 
 
+@pytest.mark.slow
 def test_a_file_becomes_a_body_and_a_bad_file_a_message(resting, spot, tmp_path):
     """The file is uploaded in the browser and meshed in another process, while the simulation continues."""
     try:

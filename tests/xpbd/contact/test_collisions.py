@@ -42,6 +42,7 @@ def test_wrong_settings_raise_an_error_that_names_them(wrong, message):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_the_result_has_the_same_bits_on_any_number_of_threads():
     def run(threads):
         return [f.state.positions for f in sp.simulate(pile(), XPBD(substeps=10, threads=threads), 1 / 60, 20)][-1]
