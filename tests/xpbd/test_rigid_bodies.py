@@ -260,3 +260,26 @@ def test_welds_are_refused():
     scene = sp.Scene([rigid(), soft(position=(0.1, 0, 0))], welds=[sp.Weld("soft", "rigid", max_distance=0.01)])
     with pytest.raises(sp.SolverError, match=r"cannot simulate welds \(weld.*; simulate with Implicit"):
         next(iter(sp.simulate(scene, sp.XPBD(), 1 / 60, 1)))
+
+
+def test_turning_bodies_do_not_dip_into_the_floor():
+    # The turn that follows from a body's momenta ends a little elsewhere than contact left it.
+    random = np.random.default_rng(19)
+    bodies = [
+        sp.RigidBody(
+            f"cube {k}",
+            sp.shapes.box_surface((0.1, 0.06, 0.08), (1, 1, 1)),
+            density=1000,
+            position=(0.3 * k, 0.15, 0),
+            rotation=random.normal(size=3),
+            velocity=(0, -random.uniform(2, 5), 0),
+            angular_velocity=10 * random.normal(size=3),
+        )
+        for k in range(6)
+    ]
+    lowest = min(
+        points[:, 1].min()
+        for frame in sp.simulate(sp.Scene(bodies, [sp.HalfSpace(friction=0.5)]), sp.XPBD(), 1 / 60, 20)
+        for points in frame.positions.values()
+    )
+    assert lowest >= 0.0

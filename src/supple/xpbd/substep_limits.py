@@ -47,7 +47,7 @@ def collide(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
     if not _to_world(ws):
         return False
     ws.collisions.project(ws.world, ws.world_previous, time, h, parallel)
-    _apply(ws, h)
+    _apply(ws, time, h)
     return True
 
 
@@ -56,17 +56,17 @@ def collide_again(ws: XPBDWorkspace, time: float, h: float) -> bool:
     if not _to_world(ws):
         return False
     ws.collisions.project_again(ws.world, ws.world_previous, time, h)
-    _apply(ws, h)
+    _apply(ws, time, h)
     return True
 
 
-def _apply(ws: XPBDWorkspace, h: float) -> None:
+def _apply(ws: XPBDWorkspace, time: float, h: float) -> None:
     ws.apply_changes(h)
     if len(ws.rigid):
         # Contacts turn bodies by small rotations; the turn that follows from their momenta ends a little elsewhere.
         ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
         if ws.collisions.contacts and _to_world(ws):
-            ws.collisions.check_parted(ws.world, ws.world_previous)
+            ws.collisions.check_parted(ws.world, ws.world_previous, time)
 
 
 def _to_world(ws: XPBDWorkspace) -> bool:

@@ -72,7 +72,7 @@ class Collisions:
             else None
         )
         self.skin = SKIN * self.thickness
-        self.contacts = 0
+        self.contacts, self._dipped = 0, False
         self._owners = _owners(system, self.obstacles, surfaces)
         self.forces = FrameForces(self._owners)
         self._smallest = math.inf
@@ -161,7 +161,7 @@ class Collisions:
         time : end of the substep [s]; h : its length [s].
         parallel : whether contacts are searched on several threads.
         """
-        self.contacts = 0
+        self.contacts, self._dipped = 0, False
         limit, self._removed = self._removed, 0.0
         self._limits[:] = limit
         if self.surfaces is not None:
@@ -181,6 +181,7 @@ class Collisions:
     def project_again(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], time: float, h: float) -> int:
         """`project` for positions that have changed since, without a new search for contacts of surfaces."""
         self.contacts = 0 if self.surfaces is None else self.surfaces.project_again(x, x_prev, h)
+        self._dipped = False
         self._limits[:] = 0.0
         self._project_obstacles(x, x_prev, time, h)
         return self.contacts
@@ -200,12 +201,13 @@ class Collisions:
     @property
     def parted(self) -> bool:
         """Whether nothing had passed through anything after the last `project`."""
-        return self.surfaces is None or self.surfaces.parted
+        return (self.surfaces is None or self.surfaces.parted) and not self._dipped
 
-    def check_parted(self, x: NDArray[np.float64], begun: NDArray[np.float64]) -> None:
-        """Take notice of what has passed through something from `begun` to x (n, 3) [m]; see `parted`."""
+    def check_parted(self, x: NDArray[np.float64], begun: NDArray[np.float64], time: float) -> None:
+        """Take notice of what has passed through something from `begun` to x (n, 3) [m] at `time` [s]; see `parted`."""
         if self.surfaces is not None:
             self.surfaces.check_parted(x, begun)
+        self._dipped = self.obstacles.rigid_point_inside(x, time)
 
     def passed(
         self, x: NDArray[np.float64], begun: NDArray[np.float64], labels: NDArray[np.integer]

@@ -16,6 +16,7 @@ smaller than d by the ratio of |r_n| to the edges' length.
 from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.xpbd.contact.movers import place, place_before, push_body, softness, turn_body
+from supple.xpbd.rigid.bodies import inertia_of
 
 
 @njit
@@ -149,28 +150,13 @@ def apply_couple(x, x_prev, movers, vertices, e, moment):
 
 @njit
 def _apply_couple_to_vertices(x, x_prev, inverse_masses, vertices, e, moment):
-    cx = cy = cz = 0.0
-    for i in range(4):
-        k = vertices[e, i]
-        cx += 0.25 * x_prev[k, 0]
-        cy += 0.25 * x_prev[k, 1]
-        cz += 0.25 * x_prev[k, 2]
-    center = (cx, cy, cz)
-    xx = yy = zz = xy = yz = zx = 0.0
-    for i in range(4):
-        y = subtract(row(x_prev, vertices[e, i]), center)
-        xx += y[0] * y[0]
-        yy += y[1] * y[1]
-        zz += y[2] * y[2]
-        xy += y[0] * y[1]
-        yz += y[1] * y[2]
-        zx += y[2] * y[0]
-    first, second, third = (yy + zz, -xy, -zx), (-xy, zz + xx, -yz), (-zx, -yz, xx + yy)
+    center, S = inertia_of(x_prev, vertices, e)
+    first, second, third = (S[0], S[3], S[5]), (S[3], S[1], S[4]), (S[5], S[4], S[2])
     # The rows of the adjugate of a symmetric matrix are cross products of its rows.
     a, b, c = cross(second, third), cross(third, first), cross(first, second)
     det = dot(first, a)
     # Four vertices on a line cannot take up every moment.
-    if not det > 1e-9 * (xx + yy + zz) ** 3:
+    if not det > 1e-9 * (0.5 * (S[0] + S[1] + S[2])) ** 3:
         return
     th = (dot(a, moment) / det, dot(b, moment) / det, dot(c, moment) / det)
     for i in range(4):

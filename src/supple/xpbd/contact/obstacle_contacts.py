@@ -152,6 +152,20 @@ class ObstacleContacts:
         held[np.searchsorted(keys, kept)] = loads
         self._enter(keys, held)
 
+    def rigid_point_inside(self, x: NDArray[np.float64], time: float) -> bool:
+        """Whether some point of a rigid body is inside a shape, of those of the vertices x (n, 3) at `time` [s]."""
+        if not len(self._rigid):
+            return False
+        tested = self._tested.copy()
+        tested[: len(x)] = False
+        still = self._arrays[0], np.zeros_like(self._arrays[1])
+        frames, starts = self.shapes.placed(self.poses, time), np.zeros_like(self._starts)
+        places, reach, none = self.places(x), np.zeros(len(tested)), np.zeros(0, dtype=np.int32)
+        return any(
+            find(places, reach, tested, still, self._rules, frames, starts, none, first, last, 0)
+            for find, _, first, last in self._groups
+        )
+
     def _enter(self, keys: NDArray[np.int64], loads: NDArray[np.float64]) -> None:
         """Make the lists from ascending keys (c,), shape times n plus vertex, and their loads (c, 3)."""
         n = len(self.owner)
