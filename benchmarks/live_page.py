@@ -3,7 +3,8 @@
 A ball at rest in free space is pulled. The clock starts when the browser gets the first move of a drag, and stops at
 the first drawn picture in which the vertices of the ball are elsewhere. Chromium draws in software with few pixels, so
 that the time to draw, which a graphics card would not need, has little effect. Then the processor time of page and
-simulation is measured at rest: paused with a browser, and playing without one.
+simulation is measured at rest: paused with a browser, and playing without one. Last, without a page, the frames per
+second of implicit steps with contact.
 
 usage: python -m benchmarks.live_page [tets ...]      (Linux, with Chromium and the packages of the tests)
 """
@@ -22,6 +23,8 @@ from playwright.sync_api import sync_playwright
 
 import supple as sp
 from supple.viewer.app import Address, OpenPage, opened_page
+from supple.viewer.engine.scene.live_scene import LiveScene
+from supple.viewer.engine.scene.solvers import SOLVERS
 from supple.viewer.protocol.commands import Pause, Play
 from supple.viewer.protocol.live_source import LiveSource
 
@@ -133,6 +136,31 @@ def measure(tets: int, rounds: int, seconds: float) -> dict[str, float]:
         }
 
 
+def implicit_frames(divisions: tuple[int, int, int] = (5, 5, 7), frames: int = 60) -> dict[str, float]:
+    """Frames per second of two blocks that fall on a floor and onto each other, with the page's implicit solver."""
+    rubber = sp.StableNeoHookean(youngs=1e5, poisson=0.4, density=1000.0, damping=0.01)
+    block = sp.shapes.box((0.4, 0.4, 0.4), divisions)
+    places = {"lower": (0.0, 0.22, 0.0), "upper": (0.05, 0.65, 0.05)}
+    bodies = [sp.Body(name, block, rubber, position=place) for name, place in places.items()]
+    live = LiveScene(
+        LiveSource("blocks", sp.Scene(bodies, [sp.HalfSpace(friction=0.5)]), SOLVERS["implicit"](), 1 / 60)
+    )
+    live.warm_up()
+    seconds, contacts = [], []
+    for _ in range(frames):
+        began = time.perf_counter()
+        live.step()
+        seconds.append(time.perf_counter() - began)
+        contacts.append(live.report.details.contacts)
+    touching = np.array(seconds)[np.array(contacts) > 0]
+    return {
+        "tets": len(live.system.tets),
+        "contacts": float(np.mean(contacts)),
+        "median_fps": float(1.0 / np.median(touching)),
+        "mean_fps": float(len(touching) / touching.sum()),
+    }
+
+
 def main(sizes: tuple[int, ...] = (5_000, 60_000), rounds: int = 20, seconds: float = 10.0) -> list[dict[str, float]]:
     """Measure and print all sizes."""
     made = []
@@ -145,6 +173,12 @@ def main(sizes: tuple[int, ...] = (5_000, 60_000), rounds: int = 20, seconds: fl
             f"unwatched {one['unwatched_percent']:.2f} % of a core (load {os.getloadavg()[0]:.1f})",
             flush=True,
         )
+    blocks = implicit_frames()
+    print(
+        f"implicit, {blocks['tets']:.0f} tets, {blocks['contacts']:.0f} contacts: {blocks['median_fps']:.1f} frames/s "
+        f"in the median, {blocks['mean_fps']:.1f} in the mean (load {os.getloadavg()[0]:.1f})",
+        flush=True,
+    )
     return made
 
 

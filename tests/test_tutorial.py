@@ -1,19 +1,40 @@
 """The tutorial runs as it stands, block after block."""
 
 import re
+import shlex
 from pathlib import Path
+
+from supple.cli.app import main
 
 TUTORIAL = Path(__file__).parents[1] / "docs" / "tutorial.md"
 
 
+def in_the_shell(block):
+    """Run lines of `supple`, with fewer tets and frames than a person would wait for."""
+    for line in block.splitlines():
+        program, command, *arguments = shlex.split(line, comments=True)
+        assert program == "supple"
+        shorter = ["--steps", "5"] if command == "run" else []
+        assert main([command, *arguments, *shorter]) == 0, line
+        if command == "new":
+            scene = Path("part.yaml").read_text(encoding="utf-8")
+            assert "tets: 5000" in scene
+            Path("part.yaml").write_text(scene.replace("tets: 5000", "tets: 1000"), encoding="utf-8")
+
+
 def test_every_block_of_the_tutorial_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    blocks = re.findall(r"^```python\n(.*?)^```", TUTORIAL.read_text(encoding="utf-8"), flags=re.S | re.M)
+    blocks = re.findall(r"^```(\w+)\n(.*?)^```", TUTORIAL.read_text(encoding="utf-8"), flags=re.S | re.M)
     names: dict[str, object] = {}
-    for number, block in enumerate(blocks, start=1):
-        exec(compile(block, f"tutorial.md, block {number}", "exec"), names)
-    assert len(blocks) == 7
+    for number, (kind, block) in enumerate(blocks, start=1):
+        if kind == "python":
+            exec(compile(block, f"tutorial.md, block {number}", "exec"), names)
+        else:
+            in_the_shell(block)
+    assert [kind for kind, _ in blocks] == ["python", "sh", *["python"] * 7]
+    assert Path("part/index.html").stat().st_size > 10_000
     said = capsys.readouterr().out
-    assert "fast.vtkhdf: 31 of 31 frames checked" in said
-    assert "exact.vtkhdf: 31 of 31 frames checked" in said
+    assert "part.stl is 99.55 m long; it is taken to be in millimetres" in said
+    assert "fast.vtkhdf: 16 of 16 frames checked" in said
+    assert "exact.vtkhdf: 16 of 16 frames checked" in said
     assert "  fail  " not in said

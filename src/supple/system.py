@@ -113,6 +113,8 @@ class System:
     loads : those of the scene's forces, then of its loads
     actuators : those of the scene's cavities, then of its cables
     stitching : tets and springs that join bodies to each other, and to obstacles
+    welding : vertices of soft bodies that are points of rigid ones
+    effective_masses : (n,) with which constraints see vertices, where a solver gives them others than `masses` [kg]
     start_states : where a simulation began, then where it continues; vertices in the scene's order
     quadratic : the quadratic ones among the tets, of which `tets` and `rest_shape_inverse` have the corners; or None
     """
@@ -135,13 +137,10 @@ class System:
     actuators: tuple[Actuator, ...] = ()
     soft_targets: tuple[SoftTargetRange, ...] = ()
     stitching: Stitching = field(default_factory=lambda: no_stitching(0))
+    welding: Welding = field(default_factory=Welding.none)
+    effective_masses: NDArray[np.float64] | None = None
     start_states: tuple[State, ...] = ()
     quadratic: QuadraticTets | None = None
-
-    @property
-    def welding(self) -> Welding:
-        """Vertices of soft bodies that are points of rigid ones."""
-        return self.scene.welding
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
@@ -192,8 +191,8 @@ class System:
 
     @cached_property
     def inverse_masses(self) -> NDArray[np.float64]:
-        """(n,) 1/m [1/kg], zero where a vertex is pinned."""
-        w = 1.0 / self.masses
+        """(n,) 1/m of what constraints see [1/kg], zero where a vertex is pinned."""
+        w = 1.0 / (self.masses if self.effective_masses is None else self.effective_masses)
         w[self.pinned_vertices] = 0.0
         return w
 
@@ -266,6 +265,7 @@ def build_system(scene: Scene, start: State | None = None) -> System:
         actuators=actuators_of(scene.cavities, scene.cables, scene.bodies, begins, x_start),
         soft_targets=tuple(SoftTargetRange(item, *_anchored(item, ranges, start)) for item in scene.soft_targets),
         stitching=scene.stitching,
+        welding=scene.welding,
         start_states=start_states,
         quadratic=_quadratic_tets(ranges, rest_positions),
     )

@@ -70,7 +70,7 @@ def test_a_scene(rows_of, tmp_path):
     assert rows["memory"].startswith("about ")
     assert rows["place of cube"] == "(-0.5, -0.5, -1) to (0.5, 0.5, 1) m"
     assert rows["intersections"].startswith("body 'cube' overlaps obstacle 'floor' at the start")
-    assert "each frame" not in rows
+    assert rows["each frame"].startswith("--time simulates")
     assert rows["loads"] == "growth on body 'cube', body force 'wind'"
     assert rows["sensors"] == "force sensor 'foot'"
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import LinearNDInterpolator
 
 import supple as sp
 from supple.errors import SolverError
@@ -119,32 +120,73 @@ def test_convergence_order():
     assert np.log2(errors[0] / errors[1]) > 1.75
 
 
-def pressure_jump(cells, material, sideways):
-    """Mean jump of pressure between neighbours over the mean pressure, of a block that is compressed by 30 %.
+class CompressedBlock:
+    """A block with irregular cells that is compressed by 30 %, and the pressure in it.
 
-    The vertices of its plates move sideways by this share of their places.
+    The vertices of its plates move sideways by a share of their places: 0 where they are bonded.
+
+    Attributes
+    ----------
+    pressures : (m,) of the tets; at_vertices : (n,) means over the tets around each vertex
+    averaged : (m,) means of the latter over the vertices of each tet
     """
-    unit = sp.shapes.box((1, 1, 1), (cells, cells, cells))
-    inner = np.setdiff1d(np.arange(len(unit.vertices)), np.unique(unit.surface.triangles))
-    vertices = unit.vertices.copy()
-    vertices[inner] += 0.2 / cells * np.random.default_rng(1).uniform(-1, 1, (len(inner), 3))
-    mesh = sp.TetMesh(vertices, unit.tets)
-    ends = np.flatnonzero(np.abs(vertices[:, 1]) > 0.5 - 1e-9)
-    move = vertices[ends] * [sideways, -0.3, sideways]
-    scene = sp.Scene([sp.Body("b", mesh, material)], pins=[sp.Pin("b", ends, lambda t: t * move)], gravity=(0, 0, 0))
-    frame = equilibrium(scene)
-    assert frame.report.iterations < 60  # 279 with the whole term of pressure projected tet by tet
-    pressure = -np.trace(frame.stress["b"], axis1=1, axis2=2) / 3.0
-    tet, facet = np.nonzero(mesh.adjacency >= 0)
-    jumps = np.abs(pressure[tet] - pressure[mesh.adjacency[tet, facet]])
-    return jumps.mean() / abs(np.average(pressure, weights=mesh.volumes))
+
+    def __init__(self, cells, material, sideways=0.0):
+        unit = sp.shapes.box((1, 1, 1), (cells, cells, cells))
+        inner = np.setdiff1d(np.arange(len(unit.vertices)), np.unique(unit.surface.triangles))
+        vertices = unit.vertices.copy()
+        vertices[inner] += 0.2 / cells * np.random.default_rng(1).uniform(-1, 1, (len(inner), 3))
+        self.mesh = mesh = sp.TetMesh(vertices, unit.tets)
+        ends = np.flatnonzero(np.abs(vertices[:, 1]) > 0.5 - 1e-9)
+        move = vertices[ends] * [sideways, -0.3, sideways]
+        pin = sp.Pin("b", ends, lambda t: t * move)
+        frame = equilibrium(sp.Scene([sp.Body("b", mesh, material)], pins=[pin], gravity=(0, 0, 0)))
+        self.iterations = frame.report.iterations
+        self.pressures = -np.trace(frame.stress["b"], axis1=1, axis2=2) / 3.0
+        self.at_vertices = -np.trace(frame.stress.at_vertices["b"], axis1=1, axis2=2) / 3.0
+        self.averaged = self.at_vertices[mesh.tets].mean(axis=1)
+        self.centroids = vertices[mesh.tets].mean(axis=1)
+
+    def jump(self, values, half=0.5):
+        """Mean jump of values (m,) between neighbours over the mean pressure, for |x|, |y|, |z| < `half`."""
+        inside = (np.abs(self.centroids) < half).all(axis=1)
+        tet, facet = np.nonzero(self.mesh.adjacency >= 0)
+        beside = self.mesh.adjacency[tet, facet]
+        both = inside[tet] & inside[beside]
+        jumps = np.abs(values[tet] - values[beside])[both]
+        return jumps.mean() / abs(np.average(self.pressures[inside], weights=self.mesh.volumes[inside]))
 
 
 def test_pressure_of_a_compressed_block_has_no_checkerboard():
     """At nu = 0.4999. Between smooth plates it is constant; near bonded plates it varies (docs/locking.md)."""
-    assert pressure_jump(5, rubber(0.4999), 0.7**-0.5 - 1.0) < 0.05
-    assert pressure_jump(5, rubber(0.4999), 0.0) < 0.3
-    assert pressure_jump(5, rubber(0.4999, "tets"), 0.0) > 4.0
+    smooth = CompressedBlock(5, rubber(0.4999), 0.7**-0.5 - 1.0)
+    assert smooth.jump(smooth.pressures) < 1e-3
+    bonded = CompressedBlock(5, rubber(0.4999))
+    assert bonded.iterations < 60  # 279 with the whole term of pressure projected tet by tet
+    assert bonded.jump(bonded.pressures) < 0.3
+    assert bonded.jump(bonded.averaged) < 0.12
+    locked = CompressedBlock(5, rubber(0.4999, "tets"))
+    assert locked.jump(locked.pressures) > 4.0
+
+
+@pytest.mark.slow
+def test_averaged_pressure_jumps_by_its_gradient_only_and_converges():
+    """Between bonded plates, in the inner half: against the field of the finest mesh, on the same cells."""
+    sizes = (5, 8, 12)
+    blocks = [CompressedBlock(cells, rubber(0.4999)) for cells in sizes]
+    field = LinearNDInterpolator(blocks[-1].mesh.vertices, blocks[-1].at_vertices)
+    jumps, errors = [], []
+    for block in blocks:
+        exact = field(block.centroids)
+        jumps.append(block.jump(block.averaged, 0.25))
+        assert jumps[-1] == pytest.approx(block.jump(exact, 0.25), rel=0.2)
+        inside = (np.abs(block.centroids) < 0.25).all(axis=1)
+        off = (block.averaged - exact)[inside] / block.averaged[inside].mean()
+        errors.append(np.sqrt(np.average(off**2, weights=block.mesh.volumes[inside])))
+    # A checkerboard would not fall with the size of the cells; a gradient falls in proportion to it.
+    np.testing.assert_allclose(np.multiply(jumps, sizes), np.mean(np.multiply(jumps, sizes)), rtol=0.15)
+    assert jumps[-1] < 0.05
+    assert errors[1] < 0.5 * errors[0] < 0.05
 
 
 def test_a_fall_is_recorded_and_checked(tmp_path):

@@ -128,6 +128,29 @@ def test_unknown_and_repeated_fields_are_errors(tmp_path):
         pytest.raises(sp.OutputError, match="contact_force was not recorded; record it with"),
     ):
         plain[0].contact_force  # noqa: B018
+    with (
+        sp.read_recording(tmp_path / "r.vtkhdf") as plain,
+        pytest.raises(sp.OutputError, match=r"there is no field 'stres'; did you mean 'stress'\?"),
+    ):
+        plain[0].field("stres")
+
+
+def test_the_table_of_a_run_that_was_killed(tmp_path, capfd):
+    """A file whose writer is gone has all frames that were complete; one that is cut is one line, with exit code 2."""
+    path, left, cut = (tmp_path / f"{name}.vtkhdf" for name in ("whole", "left", "cut"))
+    frames = sp.simulate(scene(), SOLVER, 1 / 60, 5, sinks=[sp.Recorder(path, fields=["von_mises"])])
+    for _ in range(3):
+        next(frames)
+    left.write_bytes(path.read_bytes())
+    cut.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    frames.close()
+    assert main(["table", str(left), "-o", str(tmp_path / "t.csv")]) == ExitCode.OK
+    with (tmp_path / "t.csv").open(newline="", encoding="utf-8") as file:
+        assert all(row["von_mises.ball.max"] for row in csv.DictReader(file))
+    for wrong in ([str(cut)], [str(left), "--to", "xml"]):
+        capfd.readouterr()
+        assert main(["table", *wrong]) == ExitCode.INPUT
+        assert capfd.readouterr().err.count("\n") == 1
 
 
 FILE = """

@@ -256,6 +256,7 @@ def test_joints_that_do_not_hold_are_found(jointed, tmp_path, body, change, wher
     [
         (2, "max_force", 1e-3, "slider, its motor exceeds its largest effort"),
         (2, "limits", [-0.1, 0.01], "slider"),
+        (2, "max_velocity", 1e-3, "slider, its rate"),
         (2, "axis", [1.0, 1.0, 0.1], "slider"),
         (0, "axis", [0.0, 0.1, 1.0], "hinge"),
         (1, "limits", [0.0, 0.01], "ball"),

@@ -20,7 +20,7 @@ bodies:
   - {BAR % ("slide", 2.5)}
   - {BAR % ("tool", 3.5)}
 joints:
-  - {{kind: ball, first: upper, point: [0, 1, 0], axis: [2, 0, 0], max_swing: 1, name: shoulder}}
+  - {{kind: ball, first: upper, point: [0, 1, 0], axis: [2, 0, 0], max_swing: 1, twist_limits: [-3, 3], name: shoulder}}
   - kind: hinge
     first: lower
     second: upper
@@ -30,7 +30,8 @@ joints:
     damping: 0.5
     max_effort: 7
     motor: {{kind: position, target: {{times: [0, 1], values: [0, 0.5]}}, stiffness: 100, damping: 10, max_force: 8}}
-  - {{kind: slider, first: slide, second: lower, axis: [1, 0, 0], motor: {{kind: velocity, target: 1, max_force: 30}}}}
+  - {{kind: slider, first: slide, second: lower, axis: [1, 0, 0], max_velocity: 9,
+     motor: {{kind: velocity, target: {{input: speed, value: 1}}, max_force: 30}}}}
   - {{kind: fixed, first: tool, second: slide}}
 solver: {{kind: implicit, contact: null}}
 dt: 0.01
@@ -52,8 +53,10 @@ def test_a_scene_file_describes_joints(scene_file):
     assert [joint.name for joint in run.scene.joints] == ["shoulder", "HingeJoint 1", "SliderJoint 1", "FixedJoint 1"]
     assert (elbow.first, elbow.second, elbow.axis.tolist(), elbow.limits) == ("lower", "upper", [0, 0, 1], (-1, 2))
     assert (elbow.motor.at(0.5), elbow.motor.stiffness, elbow.motor.max_force) == (0.25, 100, 7)
-    assert (slider.motor.at(0), slider.motor.max_force) == (1, 30)
+    assert (slider.motor.at(0), slider.motor.max_force, slider.max_velocity) == (1, 30, 9)
+    assert list(run.scene.inputs) == ["speed"]
     assert (shoulder.second, shoulder.max_swing, shoulder.axis.tolist(), fixed.point) == (None, 1, [1, 0, 0], None)
+    assert shoulder.twist_limits == (-3, 3)
     data = read_yaml(scene_file).data
     Draft202012Validator(json_schema()).validate(data)
     again = scene_file.with_name("again.yaml")
@@ -67,7 +70,8 @@ def test_a_scene_file_describes_joints(scene_file):
         ("second: upper", "second: uper", ":10: joints[1].second: joint 'HingeJoint 1': there is no body or obstacle"),
         ("limits: [-1, 2]", "limits: [2, -1]", ":13: joints[1].limits: "),
         ("[0, 0, 2]", "[0, 0, 0]", ":12: joints[1].axis: "),
-        ("kind: velocity", "kind: speed", ":17: joints[2].motor"),
+        ("kind: velocity", "kind: speed", ":18: joints[2].motor"),
+        ("max_velocity: 9", "max_velocity: 0", ":17: joints[2].max_velocity"),
         ("damping: 10", "damping: -1", ":16: joints[1].motor"),
     ],
 )
@@ -79,6 +83,19 @@ def test_bad_joints_are_refused_with_their_line(scene_file, old, new, problem):
     assert "\n" not in str(error.value)
 
 
+def test_motors_of_a_file_share_inputs_which_a_program_sets(scene_file):
+    shared = SCENE.replace("target: {times: [0, 1], values: [0, 0.5]}", "target: {input: speed, value: 1}")
+    scene_file.write_text(shared)
+    run = load_run(scene_file)
+    elbow, slider = (run.scene.motors[name] for name in ("HingeJoint 1", "SliderJoint 1"))
+    assert elbow.script is slider.script is run.scene.inputs["speed"]
+    frames = sp.simulate(run.scene, run.solver, run.dt, 2, control=lambda frame: {"speed": -2.0})
+    assert [frame.report.joints["SliderJoint 1"].motor_force for frame in frames] == [-30.0, -30.0]
+    scene_file.write_text(shared.replace("{input: speed, value: 1}, stiff", "{input: speed, value: 2}, stiff"))
+    with pytest.raises(sp.SceneError, match=r":18: joints\[2\].motor.*: input 'speed' begins at 1 here and at 2 in a"):
+        load_run(scene_file)
+
+
 def test_info_run_recording_and_check_know_joints(scene_file, tmp_path, capsys):
     main(["info", str(scene_file)])
     printed = " ".join(capsys.readouterr().out.split())
@@ -86,7 +103,7 @@ def test_info_run_recording_and_check_know_joints(scene_file, tmp_path, capsys):
         "HingeJoint of lower and upper, from -1 to 2, PositionMotor of at most 7, damping 0.5, largest effort 7"
         in printed
     )
-    assert "BallJoint of upper and the world, swings by 1 rad at most" in printed
+    assert "BallJoint of upper and the world, swings by 1 rad at most, twists from -3 to 3" in printed
     out = tmp_path / "out"
     main(["run", str(scene_file), "-o", str(out), "--quiet"])
     with sp.read_recording(out / "recording.vtkhdf") as recording:

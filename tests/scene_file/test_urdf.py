@@ -77,6 +77,7 @@ def test_a_robot_becomes_rigid_bodies_and_joints(robot_file, caplog):
     assert (shoulder.limits, elbow.limits, grip.limits) == ((-1, 1.5), None, (0, 0.04))
     assert (shoulder.damping, shoulder.friction, shoulder.max_effort, shoulder.motor) == (0.2, 0.0, 10.0, None)
     assert (elbow.damping, elbow.friction, elbow.max_effort) == (0.0, 0.3, None)
+    assert [joint.max_velocity for joint in (shoulder, elbow, grip)] == [1.0, None, None]
     assert scene.gravity.tolist() == [0, 0, -9.81]
     for name in ("<transmission>", "<mimic> of joint 'grip'", "1 of the 2 collision geometries of link 'lower'"):
         assert name in caplog.text
@@ -167,6 +168,8 @@ BAD = {
     "limits without the start": ARM.replace('lower="-1" upper="1.5"', 'lower="0.5" upper="1.5"'),
     "NaN limit": ARM.replace('lower="-1"', 'lower="nan"'),
     "negative effort": ARM.replace('effort="10"', 'effort="-1"'),
+    "negative velocity": ARM.replace('velocity="1"', 'velocity="-1"'),
+    "velocity of text": ARM.replace('velocity="1"', 'velocity="fast"'),
     "negative damping": ARM.replace('damping="0.2"', 'damping="-1"'),
     "no mass": ARM.replace('<mass value="2"/>', ""),
     "zero mass": ARM.replace('mass value="2"', 'mass value="0"'),

@@ -76,6 +76,35 @@ class TestGrabs:
             assert live.report.status.can_go_on
         assert np.isfinite(live.state.positions).all()
 
+    @pytest.mark.parametrize("body", ["cube", "rod"])
+    def test_only_what_depends_on_grabs_is_computed_again(self, body, monkeypatch):
+        """The same bits as with everything computed again, in spite of another grab, forces and soft targets."""
+        rod = sp.RigidBody("rod", sp.shapes.box((0.5, 0.1, 0.1), (1, 1, 1)).surface, density=500.0, position=(0, 2, 0))
+        scene = small_source().scene
+        loads = {
+            "forces": [sp.Force("cube", [1, 2], (0.0, 1.0, 0.0))],
+            "soft_targets": [sp.SoftTarget("block", [3], 100.0)],
+            "loads": [sp.BodyForce((0.0, 0.0, 1.0), "block")],
+        }
+        source = small_source(bodies=[*scene.bodies, rod], **loads)
+        quick, whole = LiveScene(source), LiveScene(source)
+        first, second = corner_grab((0.0, 1.0, 0.0)), Grab(8, body, (1,), (1.0,), (0.5, 1.5, 0.2))
+        with monkeypatch.context() as only:
+            only.setattr(sp.XPBD, "prepare", lambda *_: pytest.fail("everything is computed again"))
+            for command in (first, second, ReleaseGrab(first.grab)):
+                change(command, quick)
+                quick.step()
+        for command in (first, second, ReleaseGrab(first.grab)):
+            change(command, whole)
+            whole.adopt(whole.setup)
+            whole.step()
+        for live in (quick, whole):
+            run(live, 3)
+        assert np.array_equal(quick.state.positions, whole.state.positions)
+        assert measures(quick).energy == measures(whole).energy
+        assert quick.report.details.work == whole.report.details.work
+        assert quick.generation == whole.generation == 1
+
     def test_the_barycentric_point_reaches_the_target(self):
         live = LiveScene(free_source())
         a, b, c = describe(live).body("cube").triangles[5].tolist()

@@ -18,7 +18,7 @@ from supple.viewer.protocol.commands import Pause, Play, Reset
 from .conftest import small_source
 from .server.test_gate import MALFORMED, camera
 
-TIMEOUT = 60.0
+TIMEOUT = 120.0  # the first step compiles [s]
 
 
 @pytest.fixture(scope="module")

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
 from scipy.special import ellipk
 
 import supple as sp
@@ -145,6 +146,8 @@ UP = (0, 0, np.pi / 2)
         ({"motor": sp.VelocityMotor(0.0, max_force=13.0)}, 0.0),
         ({"motor": sp.ForceMotor(lambda t: 20.0)}, LIMITS[1]),
         ({"friction": 13.0}, 0.0),
+        ({"max_velocity": 0.2}, -0.2 * 0.75),
+        ({"max_velocity": 0.2, "motor": sp.VelocityMotor(5.0)}, 0.2 * 0.75),
         # A rate of 12.26 / 40 rad/s after 20 ms.
         ({"damping": 40.0}, -12.26 / 40.0 * (0.75 - 0.02)),
     ],
@@ -152,6 +155,9 @@ UP = (0, 0, np.pi / 2)
 def test_motors_reach_their_targets_and_never_exceed_their_maximum_and_limits_hold(values, end):
     """The weight turns the hinge with 12.26 N m; a damped one goes with 12.26 / 40 rad/s."""
     frames = run(sp.Scene([bar()], joints=[hinge(limits=LIMITS, **values)]), 45)
+    if "max_velocity" in values:
+        angles = np.array([0.0, *(frame.report.joints["hinge"].coordinate for frame in frames)])
+        assert np.abs(np.diff(angles)).max() < 0.2 / 60 + 1e-6
     readings = [frame.report.joints["hinge"] for frame in frames]
     assert readings[-1].coordinate == pytest.approx(end, abs=2e-2 if "damping" in values else 2e-3)
     assert all(LIMITS[0] - 1e-5 < one.coordinate < LIMITS[1] + 1e-5 for one in readings)
@@ -175,14 +181,16 @@ def test_a_slider_lifts_a_bar_and_follows_turns_of_its_obstacle():
     np.testing.assert_allclose(last.poses["bar"].rotation[:, 0], [np.cos(1), 0, -np.sin(1)], atol=1e-4)
 
 
-def test_the_swing_of_a_ball_is_limited_and_a_wheel_counts_its_turns():
-    ball = sp.BallJoint("bar", point=(0, 0, 0), axis=(1, 0, 0), max_swing=0.5, name="ball")
+def test_swing_and_twist_of_a_ball_are_limited_and_a_wheel_counts_its_turns():
+    ball = sp.BallJoint("bar", point=(0, 0, 0), axis=(1, 0, 0), max_swing=0.5, twist_limits=(-0.2, 0.4), name="ball")
     axle = sp.HingeJoint("wheel", point=(0.5, 3, 0), axis=(0, 1, 0), motor=sp.VelocityMotor(30.0), name="axle")
     wheel = bar("wheel", position=(0.5, 3, 0))
     frames = run(sp.Scene([bar(angular_velocity=(3, 0, 0)), wheel], joints=[ball, axle]), 40)
     swings = np.array([frame.report.joints["ball"].coordinate for frame in frames])
     assert swings.max() < 0.5 + 1e-4
     assert swings[-1] == pytest.approx(0.5, abs=1e-4)
+    twists = [Rotation.from_matrix(frame.poses["bar"].rotation).as_quat() for frame in frames]
+    assert max(2.0 * np.arctan2(x, w) for x, _, _, w in twists) == pytest.approx(0.4, abs=1e-4)
     angles = [frame.report.joints["axle"].coordinate for frame in frames]
     np.testing.assert_allclose(angles, 0.5 * np.arange(1, 41), atol=1e-4)
     assert frames[-1].state.hinge_angles == {"axle": angles[-1]}

@@ -163,12 +163,12 @@ def test_a_collision_keeps_both_momenta(other):
 
 
 def test_a_heavy_body_on_a_light_one_gains_no_energy():
-    """50:1, dropped by a centimetre."""
+    """50:1, dropped by a centimetre; 10 substeps, which suffice for equal masses, gain 30 % of the energy."""
     low, high = (
         rigid("low", density=20.0, position=(0, 0.0501, 0)),
         rigid("high", density=1000.0, position=(0, 0.16, 0)),
     )
-    frames = run(sp.Scene([low, replace(high, rotation=(0, 0.4, 0))], obstacles=[FLOOR]), 25, substeps=80)
+    frames = run(sp.Scene([low, replace(high, rotation=(0, 0.4, 0))], obstacles=[FLOOR]), 25, substeps="auto")
     assert max(frame.report.details.energy_gained for frame in frames) < 0.01
     forces = frames[-1].report.details.contact_forces
     assert forces["high"][1] == pytest.approx(G, rel=0.01)
@@ -256,12 +256,6 @@ def test_starts_inside_of_something_are_refused():
         next(iter(sp.simulate(scene, sp.XPBD(), 1 / 60, 1)))
 
 
-def test_welds_are_refused():
-    scene = sp.Scene([rigid(), soft(position=(0.1, 0, 0))], welds=[sp.Weld("soft", "rigid", max_distance=0.01)])
-    with pytest.raises(sp.SolverError, match=r"cannot simulate welds \(weld.*; simulate with Implicit"):
-        next(iter(sp.simulate(scene, sp.XPBD(), 1 / 60, 1)))
-
-
 def test_turning_bodies_do_not_dip_into_the_floor():
     # The turn that follows from a body's momenta ends a little elsewhere than contact left it.
     random = np.random.default_rng(19)
@@ -283,3 +277,32 @@ def test_turning_bodies_do_not_dip_into_the_floor():
         for points in frame.positions.values()
     )
     assert lowest >= 0.0
+
+
+# Edge lengths [m], density [kg/m^3], position [m], rotation [rad], velocity downwards [m/s], spin [rad/s], friction.
+PILE = [
+    ((0.092, 0.097, 0.082), 1210, (0.026, 0.081, 0.005), (-1.265, -0.623, 0.041), 4.29, (-0.66, -3.74, -2.2), 0.69),
+    ((0.084, 0.126, 0.124), 1124, (0.013, 0.283, -0.013), (-0.743, -0.922, -0.458), 3.25, (-3.03, -0.63, -0.48), 0.58),
+    ((0.144, 0.147, 0.103), 3751, (0.008, 0.525, -0.02), (1.346, 0.781, 0.264), 4.45, (4.37, 5.88, 5.4), 0.67),
+]
+
+
+def test_boxes_that_fall_on_each_other_do_not_pass_through_each_other():
+    """What parts them after a blow must not push one edge through another, nor a corner into the floor."""
+    bodies = [
+        sp.RigidBody(
+            f"box {k}",
+            sp.shapes.box_surface(size, (1, 1, 1)),
+            density=density,
+            position=position,
+            rotation=rotation,
+            velocity=(0, -speed, 0),
+            angular_velocity=spin,
+            friction=friction,
+        )
+        for k, (size, density, position, rotation, speed, spin, friction) in enumerate(PILE)
+    ]
+    frames = run(sp.Scene(bodies, [sp.HalfSpace(friction=0.5)]), 12, substeps=10)
+    assert max(frame.report.details.contacts for frame in frames) > 4
+    assert max(frame.report.details.held_back for frame in frames) == 0
+    assert min(points[:, 1].min() for frame in frames for points in frame.positions.values()) >= 0.0

@@ -1,5 +1,6 @@
 """The XPBD solver as a whole: parameters, pins, mixed scenes, threads, and states that cannot be continued."""
 
+import numba
 import numpy as np
 import pytest
 
@@ -192,6 +193,30 @@ def test_the_pace_follows_a_machine_that_becomes_busy_and_quiet_again():
     assert sum(choices[10_000:]) > 9900
 
 
+def test_the_pace_is_not_misled_by_single_tasks():
+    """One task in ten takes a thousand times as long: it includes a compilation, or was interrupted."""
+    slow = clocked(ThreadTuner(True, True), lambda k, way: 1000.0 if k % 10 == 7 else 9.0 if way else 2.0)
+    fast = clocked(ThreadTuner(True, True), lambda k, way: 1000.0 if k % 10 == 7 else 1.0 if way else 2.0)
+    assert sum(slow) < 40
+    assert sum(fast) > 3960
+
+
 def test_the_pace_has_no_say_where_there_is_no_choice():
     assert all(clocked(ThreadTuner(False, True), lambda k, way: 9.0 if way else 1.0))
     assert not any(clocked(ThreadTuner(False, False), lambda k, way: 9.0 if way else 1.0))
+
+
+def test_the_way_of_a_substep_holds_for_all_its_kernels(monkeypatch):
+    """Also for those that search contacts: on a busy machine, each of them would wait for another thread."""
+    monkeypatch.setattr("supple.xpbd.solver.PARALLEL_FROM", 0)
+    used, before = [], numba.get_num_threads()
+    push = sp.Force("cube", [0], lambda time: used.append(numba.get_num_threads()) or (0.0, 0.0, 0.0))
+    system = build_system(sp.Scene(bodies=[sp.Body("cube", CUBE, JELLY)], forces=[push]))
+    solver = XPBD(substeps=3)
+    workspace, state = solver.prepare(system), initial_state(system.scene)
+    for way, count in ((True, before), (False, 1)):
+        used.clear()
+        workspace.pace = ThreadTuner(choice=False, parallel=way)
+        solver.step(system, state, DT, workspace)
+        assert set(used) == {count}
+        assert numba.get_num_threads() == before

@@ -26,14 +26,14 @@ from supple.implicit.newton.free_motion import FreeMotion
 from supple.implicit.newton.linear_solver import LinearSolver
 from supple.implicit.newton.trace import NewtonRow
 from supple.implicit.stepping.integrators import Integrator, Static, integrator_of
-from supple.implicit.stepping.joint_support import refuse_joints, refuse_moved_welds
+from supple.implicit.stepping.joint_support import refuse_joints
 from supple.implicit.stepping.reactions import reaction_forces, weld_forces
 from supple.implicit.stepping.rigid_bodies import orthogonality_errors
 from supple.implicit.stepping.substep import StepSettings, Substep, take_substep
 from supple.implicit.stepping.substepping import Substepping
 from supple.implicit.stepping.workspace import Workspace
 from supple.implicit.timings import PARTS
-from supple.joints.at_state import initial_joint_details, refuse_apart
+from supple.joints.at_state import initial_joint_details, refuse_apart, refuse_moved_welds
 from supple.joints.geometry import JointGeometry
 from supple.materials.flows.internal import checked
 from supple.materials.per_tet import NO_REGION

@@ -1,4 +1,4 @@
-"""What joints are at a state: their coordinates, whether they hold, and what is reported before any step."""
+"""What joints are at a state: their coordinates, whether they and welds hold, and what is reported before any step."""
 
 from __future__ import annotations
 
@@ -9,13 +9,16 @@ from numpy.typing import NDArray
 
 from supple.errors import SceneError
 from supple.joints.functions import values
-from supple.joints.geometry import COSINE, PRODUCT, JointGeometry
+from supple.joints.geometry import COSINE, PRODUCT, TWIST, JointGeometry
 from supple.joints.laws import followed
 from supple.scene.joints.axis_joint import AxisJoint
 from supple.state import State
+from supple.system import System
 
 # At the start, the sides of a joint are placed up to round-off in what a user computed. A share of the joint's size.
 _APART = 1e-3
+# The same for welded vertices, as a share of the rigid body's size.
+_OFF = 1e-6
 
 
 def initial_joint_details(geometry: JointGeometry | None, start: State) -> dict[str, Any]:
@@ -44,14 +47,14 @@ def coordinates_at(geometry: JointGeometry, state: State) -> NDArray[np.float64]
     """(s,) the functions' values at a state, angles over all turns."""
     poses = geometry.poses(state.time)
     corners = state.positions[geometry.corners]
-    triples = np.stack(
+    arguments = np.stack(
         [
             np.einsum("fk,fki->fi", column.coefficients, corners[column.joint]) + column.offsets(poses)
-            for column in geometry.triples
+            for column in geometry.arguments
         ],
         axis=1,
     )
-    return followed(geometry, values(geometry.functions, triples), state.hinge_angles, _APART)
+    return followed(geometry, values(geometry.functions, arguments), state.hinge_angles, _APART)
 
 
 def refuse_apart(geometry: JointGeometry, state: State) -> None:
@@ -68,19 +71,45 @@ def refuse_apart(geometry: JointGeometry, state: State) -> None:
     q = np.einsum("fk,fki->fi", vectors.coefficients, corners) + vectors.offsets(poses)
     off = np.zeros(len(geometry.joints))
     np.maximum.at(off, vectors.joint, np.linalg.norm(q, axis=1))
-    np.maximum.at(off, geometry.triples[0].joint[geometry.across], np.abs(g[geometry.across]))
+    np.maximum.at(off, geometry.arguments[0].joint[geometry.across], np.abs(g[geometry.across]))
     for j, joint in enumerate(geometry.joints):
         if off[j] > _APART * geometry.sizes[j]:
             raise SceneError(
                 f"{joint.label}: at the start it is off by {off[j]:.3g} m; start both sides where the joint holds"
             )
-        row, (low, high) = int(geometry.along[j]), geometry.limits[j]
-        slack = _APART * geometry.units[row] if row >= 0 else 0.0
-        if row >= 0 and not low - slack <= g[row] <= high + slack:
-            here = reported(geometry, g)[str(joint.name)]
+        for row in geometry.limited(j):
+            (low, high), here = geometry.limits[row], float(g[row])
+            slack = _APART * geometry.units[row]
+            if low - slack <= here <= high + slack:
+                continue
+            if geometry.functions[row] == COSINE:
+                here, low, high = np.arccos(np.clip(here, -1.0, 1.0)), 0.0, np.arccos(low)
+            what = "its twist is" if geometry.functions[row] == TWIST else "it is at"
             unit = "m" if geometry.functions[row] == PRODUCT else "rad"
-            given = f"({low:g}, {high:g})" if isinstance(joint, AxisJoint) else f"(0, {np.arccos(low):g})"
             raise SceneError(
-                f"{joint.label}: at the start it is at {here:.4g} {unit}, outside of its limits {given}; "
+                f"{joint.label}: at the start {what} {here:.4g} {unit}, outside of its limits ({low:g}, {high:g}); "
                 "give limits that contain it"
             )
+
+
+def refuse_moved_welds(system: System, state: State) -> None:
+    """Check that welded vertices are in their places on the rigid bodies where a simulation starts.
+
+    Raises
+    ------
+    SceneError : where one is not; the text names the weld and the vertex.
+    """
+    welding, x = system.welding, state.positions
+    if not len(welding):
+        return
+    there = np.einsum("sk,ski->si", welding.weights, x[welding.control])
+    sizes = np.linalg.norm(np.ptp(x[welding.control], axis=1), axis=1)
+    off = np.linalg.norm(x[welding.vertices] - there, axis=1)
+    worst = int((off / sizes).argmax())
+    if off[worst] > _OFF * sizes[worst]:
+        weld = system.scene.welds[welding.weld[worst]]
+        begin = next(part.vertices.start for part in system.bodies if part.name == weld.body)
+        raise SceneError(
+            f"{weld.label}: at the start vertex {welding.vertices[worst] - begin} is {off[worst]:.3g} m off its place "
+            f"on body {weld.rigid!r}; move both bodies together"
+        )

@@ -1,7 +1,7 @@
-"""The nonlinear functions of joints: of three vectors a, b and d each, with derivatives in closed form.
+"""The nonlinear functions of joints: of four vectors a, b, d and f each, with derivatives in closed form.
 
-A product, or a cosine, is a . b. An angle is atan2(s, c) with s = a . d and c = a . b; with n = s^2 + c^2 its
-derivatives are
+A product, or a cosine, is a . b. An angle is atan2(s, c) with s = a . d and c = a . b, a twist with s = a . d - f . b
+and c = a . b + f . d; with n = s^2 + c^2 their derivatives are
 
     (c ds - s dc) / n,
     (c dds - s ddc) / n + ((s^2 - c^2) (ds dc + dc ds) + 2 s c (dc dc - ds ds)) / n^2.
@@ -14,13 +14,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.joints.geometry import ANGLE
+from supple.joints.geometry import ANGLE, TWIST
 
 _I = np.eye(3)
 
 
 class Values(NamedTuple):
-    """Values (s,), their gradients (s, 3, 3) by the vectors and Hessians (s, 3, 3, 3, 3), [vector, coordinate, ...]."""
+    """Values (s,), their gradients (s, 4, 3) by the vectors and Hessians (s, 4, 3, 4, 3), [vector, coordinate, ...]."""
 
     value: NDArray[np.float64]
     gradient: NDArray[np.float64]
@@ -28,29 +28,46 @@ class Values(NamedTuple):
 
 
 def values(functions: NDArray[np.int64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(s,) of vectors (s, 3, 3), those of one function in each row."""
-    a, b, d = vectors[:, 0], vectors[:, 1], vectors[:, 2]
-    c, s = np.einsum("si,si->s", a, b), np.einsum("si,si->s", a, d)
-    return np.where(functions == ANGLE, np.arctan2(s, c), c)
+    """(s,) of vectors (s, 4, 3), those of one function in each row."""
+    c, s = _cosine_and_sine(functions, vectors)
+    return np.where(turns(functions), np.arctan2(s, c), c)
+
+
+def turns(functions: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(s,) which functions are angles, in one turn."""
+    return (functions == ANGLE) | (functions == TWIST)
+
+
+def _cosine_and_sine(
+    functions: NDArray[np.int64], vectors: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    a, b, d, f = vectors.transpose(1, 0, 2)
+    twisting = np.where(functions == TWIST, 1.0, 0.0)
+    c = np.einsum("si,si->s", a, b) + twisting * np.einsum("si,si->s", f, d)
+    return c, np.einsum("si,si->s", a, d) - twisting * np.einsum("si,si->s", f, b)
 
 
 def derivatives(functions: NDArray[np.int64], vectors: NDArray[np.float64]) -> Values:
-    """Values and derivatives at vectors (s, 3, 3)."""
+    """Values and derivatives at vectors (s, 4, 3)."""
     count = len(functions)
-    a, b, d = vectors[:, 0], vectors[:, 1], vectors[:, 2]
-    c, s = np.einsum("si,si->s", a, b), np.einsum("si,si->s", a, d)
-    dc, ds = np.zeros((count, 3, 3)), np.zeros((count, 3, 3))
-    dc[:, 0], dc[:, 1] = b, a
-    ds[:, 0], ds[:, 2] = d, a
-    ddc, dds = np.zeros((3, 3, 3, 3)), np.zeros((3, 3, 3, 3))
-    ddc[0, :, 1], ddc[1, :, 0] = _I, _I
-    dds[0, :, 2], dds[2, :, 0] = _I, _I
-    angle = functions == ANGLE
+    a, b, d, f = vectors.transpose(1, 0, 2)
+    c, s = _cosine_and_sine(functions, vectors)
+    twisting = np.where(functions == TWIST, 1.0, 0.0)
+    t = twisting[:, None]
+    dc = np.stack([b, a, t * f, t * d], axis=1)
+    ds = np.stack([d, -t * f, a, -t * b], axis=1)
+    ddc, dds = np.zeros((count, 4, 3, 4, 3)), np.zeros((count, 4, 3, 4, 3))
+    ddc[:, 0, :, 1], ddc[:, 1, :, 0] = _I, _I
+    dds[:, 0, :, 2], dds[:, 2, :, 0] = _I, _I
+    of_f = twisting[:, None, None] * _I
+    ddc[:, 2, :, 3], ddc[:, 3, :, 2] = of_f, of_f
+    dds[:, 1, :, 3], dds[:, 3, :, 1] = -of_f, -of_f
+    angle = turns(functions)
     n = np.where(angle, s * s + c * c, 1.0)
     dg = np.where(angle[:, None, None], (_scaled(c, ds) - _scaled(s, dc)) / n[:, None, None], dc)
     twist = _outer(ds, dc)
     twist = twist + np.einsum("saibj->sbjai", twist)
-    bent = _scaled(c, np.broadcast_to(dds, twist.shape)) - _scaled(s, np.broadcast_to(ddc, twist.shape))
+    bent = _scaled(c, dds) - _scaled(s, ddc)
     turned = _scaled(s * s - c * c, twist) + _scaled(2.0 * s * c, _outer(dc, dc) - _outer(ds, ds))
     curved = _scaled(1.0 / n, bent) + _scaled(1.0 / n**2, turned)
     hessian = np.where(angle[:, None, None, None, None], curved, ddc)

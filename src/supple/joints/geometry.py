@@ -14,13 +14,19 @@ with the pose R, t of the obstacle. The differences of two of them, first side m
     slider   three directions
 
 They are linear, so that no turn of the bodies changes their derivatives. The remaining conditions, and the coordinates
-of hinges and sliders, are functions of two or three such vectors, a, b and d:
+of hinges and sliders, are functions of two to four such vectors, a, b, d and f:
 
     slider   r . e = 0 for the two directions e of the second across the axis, with the difference r of the points;
              its travel is r . e for the axis e of the second
     hinge    its angle is atan2(a . d, a . b), with a direction a of the first across the axis, which was b of the
              second at angle zero, and d = axis x b of the second
-    ball     with a limit, the cosine a . b of its swing, with the axes a of the first and b of the second
+    ball     with limits, the cosine a . b of its swing, with the axes a of the first and b of the second; and its
+             twist atan2(a . d - f . b, a . b + f . d) about the axis, with the directions a and f of the first across
+             the axis, which were b and d of the second at twist zero
+
+The rotation R of the first against the second, in axes of which the first is the joint's, has the twist atan2(R_21 -
+R_12, R_11 + R_22) = 2 atan2(q_0, w) with its quaternion (w, q): R is this turn about the axis, and then one about a
+line across it (Dobrowolski, "Swing-twist decomposition in Clifford algebra", 2015).
 
 Source: Lan et al., "Affine Body Dynamics" (2022), section 5, for joints that are linear in affine coordinates.
 """
@@ -40,7 +46,7 @@ from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.rotation import rotation_matrix
 from supple.system import System
 
-ANGLE, PRODUCT, COSINE = 0, 1, 2
+ANGLE, PRODUCT, COSINE, TWIST = 0, 1, 2, 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,10 +94,10 @@ class JointGeometry:
     stiffness : (j,) of the smaller body against strain [N/m]; masses : (j,) of the lighter one [kg]
     centers : where forces are reduced to, the joint's points
     differences : of the two sides, all of which vanish
-    functions : (s,) `ANGLE`, `PRODUCT` (a . b) or `COSINE` (a . b); triples : their vectors a, b and d
+    functions : (s,) `ANGLE`, `PRODUCT` (a . b), `COSINE` (a . b) or `TWIST`; arguments : their vectors a, b, d and f
     units : (s,) changes of the functions that count as much as a motion by the joint's size
     across, along : rows of `functions` that vanish; and the one that gives each joint's coordinate, or -1
-    limits : (j, 2) of the functions of `along`, infinite where there are none
+    limits : (s, 2) of the functions, infinite where there are none
     """
 
     joints: tuple[Joint, ...]
@@ -104,7 +110,7 @@ class JointGeometry:
     centers: Vectors
     differences: Vectors
     functions: NDArray[np.int64]
-    triples: tuple[Vectors, Vectors, Vectors]
+    arguments: tuple[Vectors, Vectors, Vectors, Vectors]
     units: NDArray[np.float64]
     across: NDArray[np.int64]
     along: NDArray[np.int64]
@@ -115,9 +121,11 @@ class JointGeometry:
         """The joints of the system's scene."""
         sides = [(_Side(system, one, one.first, 0), _Side(system, one, one.second, 4)) for one in system.scene.joints]
         centers, differences, functions = [], [], []
-        triples: tuple[list, list, list] = ([], [], [])
+        arguments: tuple[list, list, list, list] = ([], [], [], [])
+        limits: list[tuple[float, float]] = []
+        free = (-np.inf, np.inf)
         units, across, along = [], [], np.full(len(sides), -1)
-        limits = np.tile([-np.inf, np.inf], (len(sides), 1))
+        nothing = _Vector(np.zeros(8), np.zeros(3), 0.0)
         for j, (joint, (first, second)) in enumerate(zip(system.scene.joints, sides, strict=True)):
             body = system.scene.body(joint.first)
             assert isinstance(body, RigidBody)
@@ -134,24 +142,29 @@ class JointGeometry:
                 differences += [(j, one) for one in turned]
             rows = []
             if isinstance(joint, HingeJoint):
-                vectors = first.direction(axes[1]), second.direction(axes[1]), second.direction(axes[2])
-                rows = [(ANGLE, 1.0, vectors)]
+                vectors = first.direction(axes[1]), second.direction(axes[1]), second.direction(axes[2]), nothing
+                rows = [(ANGLE, 1.0, joint.limits or free, vectors)]
             elif isinstance(joint, SliderJoint):
-                rows = [(PRODUCT, size, (apart, second.direction(e), second.direction(e))) for e in axes]
+                ends = [joint.limits or free, free, free]
+                across_of = [second.direction(e) for e in axes]
+                rows = [(PRODUCT, size, end, (apart, e, e, nothing)) for end, e in zip(ends, across_of, strict=True)]
                 across += [len(functions) + 1, len(functions) + 2]
             elif isinstance(joint, BallJoint) and joint.max_swing is not None:
-                vectors = first.direction(axes[0]), second.direction(axes[0]), second.direction(axes[0])
-                rows = [(COSINE, np.sin(joint.max_swing), vectors)]
-                limits[j, 0] = np.cos(joint.max_swing)
-            if isinstance(joint, AxisJoint) and joint.limits is not None:
-                limits[j] = joint.limits
+                of_first, of_second = ([side.direction(e) for e in axes] for side in (first, second))
+                vectors = of_first[0], of_second[0], of_second[0], nothing
+                rows = [(COSINE, np.sin(joint.max_swing), (np.cos(joint.max_swing), np.inf), vectors)]
+                if joint.twist_limits is not None:
+                    vectors = of_first[1], of_second[1], of_second[2], of_first[2]
+                    rows.append((TWIST, 1.0, joint.twist_limits, vectors))
             if rows:
                 along[j] = len(functions)
-            for kind, unit, vectors in rows:
+            for kind, unit, ends, vectors in rows:
                 functions.append(kind)
                 units.append(unit)
-                for column, vector in zip(triples, vectors, strict=True):
+                limits.append(ends)
+                for column, vector in zip(arguments, vectors, strict=True):
                     column.append((j, vector))
+        a, b, d, f = (Vectors.of(column) for column in arguments)
         return cls(
             joints=tuple(system.scene.joints),
             system=system,
@@ -163,12 +176,16 @@ class JointGeometry:
             centers=Vectors.of(centers),
             differences=Vectors.of(differences),
             functions=np.array(functions, dtype=np.int64),
-            triples=(Vectors.of(triples[0]), Vectors.of(triples[1]), Vectors.of(triples[2])),
+            arguments=(a, b, d, f),
             units=np.array(units, dtype=np.float64),
             across=np.array(across, dtype=np.int64),
             along=along,
-            limits=limits,
+            limits=np.array(limits, dtype=np.float64).reshape(-1, 2),
         )
+
+    def limited(self, joint: int) -> NDArray[np.int64]:
+        """The functions of a joint that have limits."""
+        return np.flatnonzero((self.arguments[0].joint == joint) & np.isfinite(self.limits).any(axis=1))
 
     def poses(self, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Rotations (j, 3, 3) and translations (j, 3) [m] of the second sides that are obstacles, at `time` [s]."""

@@ -4,10 +4,10 @@ Each is an energy psi of one number g whose derivative is a line that is cut off
 
     psi'(g) = clip(lambda + k (g - g0), low, high).
 
-A condition g = g0 has no ends, with the multiplier lambda; a limit pushes in one direction only; a motor that is to
-reach a velocity has g0 = g_n + h v, and its largest force as ends, as dry friction has with v = 0. Their multipliers
-are updated until the line gives the force that is needed at g0 (the method of multipliers). Where a motor has a
-stiffness K and a damping D, the line is that of an implicit step of h,
+A condition g = g0 has no ends, with the multiplier lambda; a limit pushes in one direction only, that of a rate v at
+g_n + h v and at g_n - h v; a motor that is to reach a velocity has g0 = g_n + h v, and its largest force as ends, as
+dry friction has with v = 0. Their multipliers are updated until the line gives the force that is needed at g0 (the
+method of multipliers). Where a motor has a stiffness K and a damping D, the line is that of an implicit step of h,
 
     K (g - target) + D ((g - g_n) / h - v) = lambda + (K + D / h) (g - g_n),    lambda = K (g_n - target) - D v,
 
@@ -107,7 +107,7 @@ def followed(
             continue
         near = known.get(str(joint.name))
         out[row] = wrapped(g[row]) if near is None else near + wrapped(g[row] - near)
-        below, above = geometry.limits[j] + (-slack, slack) - out[row]
+        below, above = geometry.limits[row] + (-slack, slack) - out[row]
         if near is None and not below <= 0.0 <= above:
             turns = np.ceil(below / TURN) if below > 0.0 else np.floor(above / TURN)
             out[row] += TURN * turns if below <= TURN * turns <= above else 0.0
@@ -130,17 +130,21 @@ def laws_of(
     times : begin and end of the step [s]; moving : whether rates count; without them, as in equilibrium, motors do not
         damp
     """
-    laws = [Law(int(row), float(stiffness[geometry.triples[0].joint[row]]), 0.0) for row in geometry.across]
-    for j, (joint, (low, high)) in enumerate(zip(geometry.joints, geometry.limits.tolist(), strict=True)):
-        row = int(geometry.along[j])
-        if row < 0:
-            continue
-        k = float(stiffness[j] * (geometry.sizes[j] / geometry.units[row]) ** 2)
-        laws += [Law(row, k, low, high=0.0)] if np.isfinite(low) else []
-        laws += [Law(row, k, high, low=0.0)] if np.isfinite(high) else []
+    laws = [Law(int(row), float(stiffness[geometry.arguments[0].joint[row]]), 0.0) for row in geometry.across]
+    for j, joint in enumerate(geometry.joints):
+        scales = stiffness[j] * (geometry.sizes[j] / geometry.units) ** 2
+        for row in geometry.limited(j).tolist():
+            k, (low, high) = float(scales[row]), geometry.limits[row].tolist()
+            laws += [Law(row, k, low, high=0.0)] if np.isfinite(low) else []
+            laws += [Law(row, k, high, low=0.0)] if np.isfinite(high) else []
         if not isinstance(joint, AxisJoint):
             continue
-        here = float(start[row])
+        row = int(geometry.along[j])
+        k, here, (low, high) = float(scales[row]), float(start[row]), geometry.limits[row].tolist()
+        if joint.max_velocity is not None and moving:
+            reach = (times[1] - times[0]) * joint.max_velocity
+            laws += [Law(row, k, here - reach, high=0.0), Law(row, k, here + reach, low=0.0)]
+            low, high = max(low, here - reach), min(high, here + reach)
         if joint.damping > 0.0 and moving:
             laws.append(Law(row, joint.damping / (times[1] - times[0]), here, adapts=False))
         if joint.friction > 0.0 and moving:
@@ -165,7 +169,7 @@ def _motor_law(
     if isinstance(motor, ForceMotor):
         return Law(row, 0.0, start, multiplier=-motor.at(times[1]), adapts=False, is_motor=True)
     if isinstance(motor, VelocityMotor):
-        # A limit stops the motor, also one without a largest force.
+        # A limit of the coordinate or of its rate stops the motor, also one without a largest force.
         end = float(np.clip(start + h * motor.at(times[1]), *limits))
         return Law(row, k, end, -bound, bound, is_motor=True)
     assert isinstance(motor, PositionMotor)

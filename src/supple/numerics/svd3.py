@@ -170,6 +170,15 @@ def _svd_batch(F, U, s, V):
         s[e, 2] = stretches[2]
 
 
+@njit(cache=True, error_model="numpy")
+def principal_stretches(F):
+    """(m, 3) the singular values of `rotation_variant_svd` of F (m, 3, 3), without the rotations."""
+    out = np.empty((len(F), 3))
+    for e in range(len(F)):
+        out[e, 0], out[e, 1], out[e, 2] = svd3(load_mat(F, e))[1]
+    return out
+
+
 def rotation_variant_svd(
     F: ArrayLike,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:

@@ -31,7 +31,7 @@ def balanced_reactions(
     contacts: ContactPoints | None,
     details: SolverDetails,
 ) -> dict[str, NDArray[np.float64]]:
-    """By label, minus the sum (3,) of all other forces on the pinned vertices [N].
+    """By label, minus the sum (3,) of all other forces on the pinned vertices and those welded to them [N].
 
     Other forces: elastic ones, weight, loads, actuators and contact. Viscous forces and the inertia of the pinned
     vertices themselves are left out.
@@ -53,20 +53,24 @@ def balanced_reactions(
     if contacts is not None:
         on_points = contacts.on_vertices(contacts.forces + contacts.friction, len(system.points))
         system.points.add_forces(on_points, forces)
-    _add_elastic_forces(system, P, forces)
-    stitched = system.stitching.nodes()
+    welding, stitched = system.welding, system.stitching.nodes()
+    moved_with = [welding.vertices[np.isin(welding.control[:, 0], pin.vertices)] for pin in system.pins]
+    _add_elastic_forces(system, P, np.concatenate([system.pinned_vertices, *moved_with]), forces)
     found = {}
-    for label, pin in zip(pin_labels(system), system.pins, strict=True):
-        if np.isin(pin.vertices, stitched).any():
+    for label, pin, more in zip(pin_labels(system), system.pins, moved_with, strict=True):
+        rows = np.concatenate([pin.vertices, more])
+        if np.isin(rows, stitched).any():
             raise SceneError(f"{label}: a vertex of it is stitched, so that XPBD has no reaction of it; use Implicit")
-        found[label] = -forces[pin.vertices].sum(axis=0)
+        found[label] = -forces[rows].sum(axis=0)
     return found
 
 
-def _add_elastic_forces(system: System, P: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-    """Add -V P Dm^-T of the soft tets that have a pinned vertex to their vertices' rows of `out` (n, 3)."""
+def _add_elastic_forces(
+    system: System, P: NDArray[np.float64], vertices: NDArray[np.integer], out: NDArray[np.float64]
+) -> None:
+    """Add -V P Dm^-T of the soft tets that have one of these vertices to their vertices' rows of `out` (n, 3)."""
     held = np.zeros(len(out), dtype=bool)
-    held[system.pinned_vertices] = True
+    held[vertices] = True
     for part in system.rigid_bodies:
         held[part.vertices] = False
     rows = np.flatnonzero(held[system.tets].any(axis=1))

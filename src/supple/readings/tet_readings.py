@@ -22,7 +22,7 @@ from supple.materials.elastic_tets.stress import (
 from supple.materials.flows.internal import DISSIPATED, FLOW, checked
 from supple.materials.laws.hencky import HENCKY
 from supple.materials.per_tet import LawTets
-from supple.numerics.svd3 import rotation_variant_svd
+from supple.numerics.svd3 import principal_stretches
 from supple.readings.by_body import BodyRows, TetField
 
 _OF_RIGID = "is rigid: it has no strain and no stress of its own"
@@ -41,7 +41,7 @@ class TetReadings(DisplayedFrame, ABC):
     @abstractmethod
     def _x(self) -> NDArray[np.float64]: ...
 
-    @property
+    @cached_property
     @abstractmethod
     def _laws(self) -> TetLaws: ...
 
@@ -69,20 +69,19 @@ class TetReadings(DisplayedFrame, ABC):
     @cached_property
     def stress(self) -> TetField:
         """Cauchy stress P F^T / J (m, 3, 3) [Pa]: force per area as it is, symmetric."""
+        P = self.first_piola.values_of_all
         with np.errstate(all="ignore"):
-            P = self.first_piola.values_of_all
             return self._field(cauchy_of_tets(self._laws, self._x, P, self._F, self._internal), "stress")
 
     @cached_property
     def von_mises(self) -> TetField:
         """Von Mises stress (m,) [Pa]: sqrt(3/2 s : s) with the deviator s of the Cauchy stress."""
-        with np.errstate(all="ignore"):
-            return self._field(von_mises(self.stress.values_of_all), "stress")
+        return self._field(von_mises(self.stress.values_of_all), "stress")
 
     @cached_property
     def principal_stretches(self) -> TetField:
         """(m, 3) singular values of F [-], descending; the last one is negative where the tet is inverted."""
-        return TetField(rotation_variant_svd(self._F)[1], self._bodies, self._refused_of_rigid, self._to_vertices)
+        return TetField(principal_stretches(self._F), self._bodies, self._refused_of_rigid, self._to_vertices)
 
     @cached_property
     def energy_density(self) -> TetField:

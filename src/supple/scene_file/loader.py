@@ -18,6 +18,7 @@ from supple.scene.body import PlacedBody
 from supple.scene.located import LocatedError, at
 from supple.scene.scene import Scene
 from supple.scene_file.document import OutputModel, SceneFileModel
+from supple.scene_file.entries.joints import with_shared_inputs
 from supple.scene_file.entries.mesh_sources import MeshStore
 from supple.scene_file.mesh_sets import with_numbers
 from supple.scene_file.urdf.document import read_urdf
@@ -129,6 +130,7 @@ def _built(model: SceneFileModel, meshes: MeshStore) -> Run:
     lists = ("pins", "forces", "soft_targets", "stitches", "contact_pairs", "loads", "cavities", "cables", "sensors")
     lists += ("joints", "welds")
     parts = {key: _each(key, getattr(model, key)) for key in lists}
+    parts["joints"] = with_shared_inputs(parts["joints"])
     with at("solver"):
         solver = model.solver.build()
     with at():

@@ -26,6 +26,8 @@ class XPBDDetails(SolverDetails):
     softening : by body, the share of its stiffness that it lacks at this length of the substep, estimated (see
         `supple.xpbd.assessment.softening`)
     energy_gained : energy that came from nowhere, and has not been lost since, over the energy of the scene [-]
+    weld_forces : of the rigid bodies that no pin holds on what is welded to them, by name of the weld, (3,) means over
+        the frame [N]; zero where they sleep
     contact_forces, friction_forces : by name of the body or obstacle, (3,) means over the frame [N]; each sum to zero
     asleep : by body, whether it rests, so that no substep was taken for it (see `supple.xpbd.sleep`)
     held_back : substeps in which the motion of a body was shortened, so that no tet inverts and nothing passes
@@ -40,5 +42,6 @@ class XPBDDetails(SolverDetails):
     energy_gained: float = 0.0
     held_back: int = 0
     asleep: Mapping[str, bool] = field(default_factory=dict)
+    weld_forces: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     contact_forces: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     friction_forces: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)

@@ -53,7 +53,9 @@ class MomentumRestore:
             [(k, lo, min(lo + BLOCK, ends[k])) for k in range(count) for lo in range(starts[k], ends[k], BLOCK)],
             dtype=np.int64,
         ).reshape(-1, 3)
-        self.masses = np.ascontiguousarray(system.masses)
+        # Where vertices are welded, those with which constraints see them. What a held body holds is not free.
+        given = system.masses if system.effective_masses is None else system.effective_masses
+        self.masses = np.where(np.isfinite(given), given, 0.0)
         self.totals = np.bincount(labels[soft], weights=self.masses[soft], minlength=count)
         self._sums = np.zeros((len(self.blocks), _SUMS))
         self._motion = np.zeros((count, 9))

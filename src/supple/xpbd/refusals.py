@@ -12,7 +12,7 @@ from supple.xpbd.sweeps.ordering import Layout
 
 
 def refuse_unsupported(system: System) -> None:
-    """Check that XPBD can simulate the bodies of a system, and what welds them.
+    """Check that XPBD can simulate the bodies of a system.
 
     Raises
     ------
@@ -27,8 +27,6 @@ def refuse_unsupported(system: System) -> None:
             f"XPBD: body {quadratic[0]!r} has quadratic tets; simulate it with Implicit, or give linear tets: "
             "mesh.to_order(1)"
         )
-    if system.scene.welds:
-        raise SolverError(f"XPBD: it cannot simulate welds ({system.scene.welds[0].label}); simulate with Implicit")
 
 
 def is_number(value: object) -> bool:

@@ -80,6 +80,7 @@ class Sleep:
 
     def __init__(self, system: System, layout: Layout, after: float | None, accuracy: float) -> None:
         self._system, self._layout = system, layout
+        self._after, self._accuracy = after, accuracy
         self._starts = [part.vertices.start for part in system.bodies]
         self._poses = ObstaclePoses(system.obstacles)
         self._links = _stitched_bodies(layout.body, system.joined_components)
@@ -94,6 +95,10 @@ class Sleep:
         self._limits = accuracy * np.minimum(EDGES * edges, FALL * fall)
         self._times[self._restless()] = math.inf
         self._scene = _digest(system)
+
+    def of(self, system: System) -> Sleep:
+        """Of another system with the same vertices, such as one with other loads."""
+        return Sleep(system, self._layout, self._after, self._accuracy)
 
     def begin(
         self, x: NDArray[np.float64], v: NDArray[np.float64], time: float, dt: float, memory: SleepMemory | None

@@ -6,7 +6,6 @@ Source: Macklin, Müller, Chentanez, "XPBD" (2016); Macklin et al., "Small Steps
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from time import perf_counter
 from typing import Literal
 
 import numba
@@ -15,9 +14,8 @@ from numba.core import config
 from numpy.typing import NDArray
 
 from supple.errors import SolverError
-from supple.numerics.interruption import interruption_point
+from supple.joints.at_state import refuse_moved_welds
 from supple.numerics.thread_tuning import ThreadTuner
-from supple.numerics.threads import numba_threads
 from supple.readings.actuator_readings import actuator_fields, start_of
 from supple.readings.energy_balance import no_works
 from supple.state import State, Status, StepReport
@@ -45,10 +43,11 @@ from supple.xpbd.rigid.bodies import RigidBodies
 from supple.xpbd.rigid.joints import JointProjection
 from supple.xpbd.sleep import Sleep, SleepMemory
 from supple.xpbd.start import raise_if_inside
-from supple.xpbd.substep_limits import collide, hold_in_contact, hold_joints, keep_volumes, note_works, restore
-from supple.xpbd.substep_start import begin_substep, cycles, load, pin_targets, push_contacts
+from supple.xpbd.substep_limits import collide, hold_in_contact, keep_volumes, move_rigid, note_works, restore
+from supple.xpbd.substep_start import begin_substep, cycles, load, pin_targets, push
 from supple.xpbd.substeps import FALL, SubstepChoice, Substeps
 from supple.xpbd.sweeps.ordering import make_layout, reordered
+from supple.xpbd.welded_masses import WeldedMasses
 from supple.xpbd.workspace import XPBDWorkspace
 
 # How often a bad frame is repeated with twice as many substeps. What crosses with twice as many crosses with more, too.
@@ -120,10 +119,12 @@ class XPBD(Solver):
 
         Raises
         ------
-        SolverError : where a body touches with its skin, has quadratic tets, its material has no XPBD constraints, or
-            there are welds; the text names them.
+        SolverError : where a body touches with its skin, has quadratic tets, or its material has no XPBD constraints;
+            the text names it.
         """
         refuse_unsupported(system)
+        welded = WeldedMasses(system)
+        system = welded.system
         layout = make_layout(system)
         inner = reordered(system, layout)
         extended = np.zeros((len(system.masses) + len(inner.stitching.anchors), 4))
@@ -138,6 +139,7 @@ class XPBD(Solver):
         return XPBDWorkspace(
             system=inner,
             layout=layout,
+            welded=welded,
             rigid=rigid,
             joints=JointProjection(system, layout, rigid),
             sets=sets,
@@ -167,7 +169,8 @@ class XPBD(Solver):
         """
         if isinstance(state.memory, XPBDMemory):
             return
-        workspace.joints.check(state)
+        refuse_moved_welds(system, state)
+        workspace.joints.check(workspace.welded.inner(state))
         if self.start == "refuse":
             edge_length = workspace.collisions.edge_length
             raise_if_inside(system, state.positions, state.time, self.contact, edge_length)
@@ -177,8 +180,9 @@ class XPBD(Solver):
 
         With automatic substeps, a frame that turns out bad is undone and repeated with twice as many.
         """
-        with numba_threads(workspace.threads):
-            return self._step(system, state, dt, workspace)
+        with workspace.own_threads():
+            new, report = self._step(system, workspace.welded.inner(state), dt, workspace)
+            return workspace.welded.outer(new), report
 
     def _step(self, system: System, state: State, dt: float, ws: XPBDWorkspace) -> tuple[State, StepReport]:
         time = state.time + dt
@@ -275,6 +279,7 @@ class XPBD(Solver):
             asleep={part.name: bool(rests) for part, rests in zip(ws.system.bodies, sleep.asleep, strict=True)},
             contact_forces=pushes,
             friction_forces=friction,
+            weld_forces=ws.welded.forces(ws.rigid, ws.velocities, dt, sleep.asleep),
             **ws.actuators.fields(h * used.count),
             **ws.joints.fields(ws.world, time),
             work=works,
@@ -321,17 +326,12 @@ class XPBD(Solver):
         ws.guard.measure(ws.points, False)
         ws.guard.guarded[:] = ws.assessment.begin(ws.moment(state.time), ws.guard.J, h, memory.ledger)
         ws.guard.accept()
-        balance = ws.assessment.balance
         ws.begin_frame(state.time, state.time + dt, h)
         ws.joints.begin_frame(state, sleep.asleep)
-        damping = self._damping(ws, h)
-        lengths = cycles(substeps)
+        damping, lengths = self._damping(ws, h), cycles(substeps)
         if damping is not None:
             damping.begin_step(memory.viscous, state.velocities)
-        for k in range(0 if sleep.asleep.all() else substeps):
-            interruption_point()
-            started = perf_counter()
-            parallel = ws.pace.choose()
+        for k, parallel in ws.pace.tasks(0 if sleep.asleep.all() else substeps, ws.most_threads):
             end = state.time + (k + 1) * h
             if damping is not None and k in lengths:
                 moving = ws.anchors.velocities(end - h, h)
@@ -339,20 +339,15 @@ class XPBD(Solver):
             begin_substep(ws, targets[k], end, h, parallel)
             at = ws.substep(end, h)
             ws.loads.add_forces(at)
-            if damping is not None:
-                damping.push(ws.points, h)
-            if collides:
-                push_contacts(ws, h)
+            push(ws, damping, h)
             for constraints in ws.sets:
                 constraints.project(ws.extended, h, parallel)
             ws.actuators.project_within(at)
             restore(ws, h, parallel)
-            ws.pace.note(parallel, perf_counter() - started)
             ws.loads.pull_to_targets(at)
             ws.loads.pull_springs(at)
             ws.actuators.project_between(at)
-            ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
-            hold_joints(ws, end, h)
+            move_rigid(ws, end, h)
             if collides and not collide(ws, end, h, parallel):
                 break
             hold_in_contact(ws, end, h)
@@ -361,7 +356,7 @@ class XPBD(Solver):
                 ws.collisions.end_substep()
             ws.joints.end_substep(ws.points, ws.origins, end)
             note_works(ws, at, damping)
-            balance.note_contacts(ws.collisions.contacts)
+            ws.assessment.balance.note_contacts(ws.collisions.contacts)
         return held_back
 
     @staticmethod
@@ -378,7 +373,8 @@ class XPBD(Solver):
             contact_forces=pushes,
             friction_forces=friction,
             **actuator_fields(system, *start_of(system)),
-            **workspace.joints.initial_fields(system.start_states[-1]),
+            weld_forces={name: np.zeros(3) for name in workspace.welded.names},
+            **workspace.joints.initial_fields(workspace.welded.inner(system.start_states[-1])),
             work=no_works(system),
         )
 

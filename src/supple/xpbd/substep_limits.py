@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import chain, repeat
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,12 +22,15 @@ MOST_PROJECTIONS = 10
 SEARCH_EACH = 3
 # How often joints and contacts are projected in turn in a substep with contact.
 JOINT_PASSES = 3
-# Of the motion of components that have passed through each other in spite of that: the shares that are tried.
-SHARES = (0.5, 0.25, 0.1, 0.0, 0.0)
+# Of the motion of components that have passed through each other in spite of that: the shares that are tried, before
+# none is left.
+SHARES = (0.5, 0.25, 0.1, 0.01)
 
 
-def hold_joints(ws: XPBDWorkspace, time: float, h: float) -> None:
-    """Project the joints of a substep."""
+def move_rigid(ws: XPBDWorkspace, time: float, h: float) -> None:
+    """Move rigid bodies as all impulses of a substep, and their joints, determine."""
+    ws.rigid.gather(ws.points, ws.velocities, h)
+    ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
     if not len(ws.joints):
         return
     work = ws.joints.project(ws.points, ws.previous, ws.velocities, ws.origins, time, h)
@@ -65,8 +70,8 @@ def _apply(ws: XPBDWorkspace, time: float, h: float) -> None:
     if len(ws.rigid):
         # Contacts turn bodies by small rotations; the turn that follows from their momenta ends a little elsewhere.
         ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
-        if ws.collisions.contacts and _to_world(ws):
-            ws.collisions.check_parted(ws.world, ws.world_previous, time)
+        if _to_world(ws):
+            ws.collisions.check_parted(ws.world, time)
 
 
 def _to_world(ws: XPBDWorkspace) -> bool:
@@ -102,11 +107,15 @@ def _shorten(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
     if failed:
         ws.fallback.apply(*arrays, [[label] for label in np.unique(ws.fallback.tet_labels[failures])])
     groups: list[set[int]] = []
-    for share in SHARES:
+    stopped = False
+    for share in chain(SHARES, repeat(0.0)):
         passed = _passed(ws)
         if not len(passed):
             break
-        failed, groups = True, united(groups, passed.tolist())
+        failed, joined = True, united(groups, passed.tolist())
+        if stopped and joined == groups:
+            break
+        groups, stopped = joined, share == 0.0
         ws.fallback.apply(*arrays, [sorted(group) for group in groups], share)
         ws.rigid.settle(ws.points, ws.velocities)
     ws.guard.measure(ws.points, parallel)
@@ -117,16 +126,16 @@ def _shorten(ws: XPBDWorkspace, time: float, h: float, parallel: bool) -> bool:
 def _passed(ws: XPBDWorkspace) -> NDArray[np.int64]:
     """(k, 2) the components that passed through each other in this substep; see `SurfaceCollisions.passed`."""
     to_world(ws.points, ws.origins, ws.world)
-    to_world(ws.begun, ws.origins, ws.world_previous)
-    return ws.collisions.passed(ws.world, ws.world_previous, ws.fallback.labels)
+    return ws.collisions.passed(ws.world, ws.fallback.labels)
 
 
 def restore(ws: XPBDWorkspace, h: float, parallel: bool) -> None:
     """The velocities of changed positions, with the momentum of the velocities before; rigid bodies are rigid."""
-    ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
     if ws.momentum is not None:
         ws.momentum.apply(ws.points, ws.previous, ws.velocities, h, parallel)
-    else:
+    ws.rigid.gather(ws.points, ws.velocities, h)
+    ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
+    if ws.momentum is None:
         update_velocities(ws.points, ws.previous, ws.velocities, h)
 
 

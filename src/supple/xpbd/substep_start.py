@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from supple.state import State
 from supple.system import System
-from supple.xpbd.damping.kelvin_voigt import cycle_lengths
+from supple.xpbd.damping.kelvin_voigt import Damping, cycle_lengths
 from supple.xpbd.integration import hold, origins_of_components, predict, to_world
 from supple.xpbd.workspace import XPBDWorkspace
 
@@ -38,16 +38,23 @@ def begin_substep(ws: XPBDWorkspace, targets: NDArray[np.float64], end: float, h
     ws.begun[:] = ws.previous
     if len(targets):
         hold(ws.points, ws.system.pinned_vertices, targets, ws.origins)
+    ws.rigid.follow(ws.points, ws.velocities)
     ws.works.begin_substep(ws.extended)
     ws.anchors.place(ws.extended, ws.origins, end)
 
 
-def push_contacts(ws: XPBDWorkspace, h: float) -> None:
-    """Apply the contact forces of the substep before to the prediction."""
-    if to_world(ws.points, ws.origins, ws.world):
+def push(ws: XPBDWorkspace, damping: Damping | None, h: float) -> None:
+    """Apply viscous forces, and the contact forces of the substep before, to the prediction."""
+    if damping is not None:
+        damping.push(ws.points, h)
+    ws.rigid.gather(ws.points, ws.velocities, h)
+    if ws.collisions and to_world(ws.points, ws.origins, ws.world):
         to_world(ws.previous, ws.origins, ws.world_previous)
         if ws.collisions.begin_substep(ws.world, ws.world_previous, h):
             ws.apply_changes(h)
+    if len(ws.rigid.welding):
+        # Constraints see welded vertices where their bodies are to be.
+        ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
 
 
 def pin_targets(system: System, time: float, h: float, substeps: int) -> NDArray[np.float64]:

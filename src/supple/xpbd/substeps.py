@@ -6,6 +6,8 @@ The largest of:
 - what lets surfaces approach each other by less than half the mean height of a tet in a substep: contact may not find
   surfaces that pass each other within one substep, and the guard of volumes stops a compression by less than that;
 - what lets rigid bodies turn by less than a tenth of a radian in a substep;
+- what lets a heavy body sink little into what is below a light rigid one between them: the light one passes on about
+  m / M of the load in each pass, and parting the others again lifts the heavy one;
 - after a frame that had to be repeated with more substeps: a number that falls back from there.
 """
 
@@ -27,6 +29,9 @@ FEWEST = 10
 APPROACH = 0.5
 # By how much a rigid body may turn in a substep [rad]; see `supple.xpbd.rigid.bodies`.
 MOST_TURN = 0.1
+# Largest r g h^2 / H in a substep h, with the ratio r of the masses of a body and of a lighter rigid one near it, and
+# the mean height H of a tet; and the ratio above which this is asked for. docs/rigid_bodies.md has what it gains.
+MOST_SINKING, LEAST_RATIO = 1.5e-4, 4.0
 # By which a number from an earlier frame falls in every frame.
 FALL = 0.8
 # How many times the number of the other criteria it may be: a blow that lasts for some frames must not raise it to any
@@ -56,6 +61,13 @@ class SubstepChoice:
         b = np.concatenate([-Dm_inv.sum(axis=1, keepdims=True), Dm_inv], axis=1)
         heights = 1.0 / np.linalg.norm(b, axis=2).max(axis=1)
         self.height = min(float(heights[part.tets].mean()) for part in system.bodies)
+        free = np.where(
+            system.inverse_masses > 0.0, system.masses, 0.0
+        )  # what pins hold is heavy, and rests on nothing
+        self._masses = np.array([free[part.vertices].sum() for part in system.bodies])
+        heaviest = self._masses.max(initial=0.0)
+        self._light = rigid.numbers[~rigid.held & (self._masses[rigid.numbers] * LEAST_RATIO < heaviest)]
+        self._begins = [part.points.start for part in system.bodies]
 
     def choose(self, moment: Moment, dt: float, accuracy: float, earlier: float) -> Substeps:
         """The number of substeps for a frame that begins at a moment.
@@ -66,12 +78,13 @@ class SubstepChoice:
         earlier : what the frame before asks for, zero or more
         """
         stiff, body = self.softening.substeps(dt, accuracy)
-        fast = _count(self._closing_speed(moment, dt) * dt / (APPROACH * self.height)) if self.touches else 0
+        reach = self._closing_speed(moment, dt) * dt if self.touches else 0.0
         found = max(
             Substeps(FEWEST, "the least number"),
             Substeps(stiff, f"the stiffness of body {body!r}"),
-            Substeps(fast, "the speed of approach"),
+            Substeps(_count(reach / (APPROACH * self.height)), "the speed of approach"),
             self._for_spins(moment, dt),
+            self._for_masses(moment, dt, reach),
             key=lambda each: each.count,
         )
         kept = min(math.ceil(FALL * earlier), MOST_KEPT * found.count)
@@ -85,6 +98,22 @@ class SubstepChoice:
         return Substeps(
             _count(float(spins[fastest]) * dt / MOST_TURN), f"the spin of body {self.rigid.names[fastest]!r}"
         )
+
+    def _for_masses(self, moment: Moment, dt: float, reach: float) -> Substeps:
+        """For heavy bodies on light rigid ones, where surfaces may approach each other by `reach` [m]."""
+        if not self.touches or not len(self._light):
+            return Substeps(0, "")
+        x = self.system.points.positions(moment.points[:, :3] + moment.origins)
+        margin = 0.5 * reach + APPROACH * self.height
+        low, high = np.minimum.reduceat(x, self._begins) - margin, np.maximum.reduceat(x, self._begins) + margin
+        light = self._light[:, None]
+        near = ((low[light] <= high) & (low <= high[light])).all(axis=2)
+        ratios = np.where(near, self._masses / self._masses[light], 0.0).max(axis=1)
+        worst = int(ratios.argmax())
+        sinking = ratios[worst] * math.hypot(*self.system.gravity) * dt**2 / self.height
+        count = _count(math.sqrt(sinking / MOST_SINKING)) if ratios[worst] > LEAST_RATIO else 0
+        name = self.system.bodies[self._light[worst]].name
+        return Substeps(count, f"a body {ratios[worst]:.3g} times as heavy as {name!r}")
 
     def _closing_speed(self, moment: Moment, dt: float) -> float:
         """An upper bound of the speed at which surfaces approach each other in the frame [m/s]."""

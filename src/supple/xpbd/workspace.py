@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from contextlib import contextmanager
+from copy import copy
+from dataclasses import dataclass, field, replace
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.active import Growth
 from supple.numerics.thread_tuning import ThreadTuner
+from supple.numerics.threads import numba_threads, one_thread
 from supple.system import System
 from supple.xpbd.assessment.assessment import Assessment
 from supple.xpbd.assessment.elastic_energy import ElasticEnergy
@@ -30,7 +35,8 @@ from supple.xpbd.rigid.bodies import RigidBodies
 from supple.xpbd.rigid.joints import JointProjection
 from supple.xpbd.sleep import Sleep
 from supple.xpbd.substeps import SubstepChoice
-from supple.xpbd.sweeps.ordering import Layout
+from supple.xpbd.sweeps.ordering import Layout, reordered
+from supple.xpbd.welded_masses import WeldedMasses
 
 
 @dataclass(eq=False)
@@ -42,7 +48,7 @@ class XPBDWorkspace:
     Attributes
     ----------
     growth : which the elastic constants have now
-    threads : of Numba's parallel kernels; None leaves their number as it is
+    threads : of Numba's parallel kernels; None leaves their number as it is; most_threads : in the present frame
     extended : (n + a, 4) positions about the component's origin [m] and inverse masses [1/kg], of the vertices and then
         of the anchors (inverse mass 0); points : the rows of the vertices
     previous : (n, 3) positions at the beginning of the substep [m]; begun : those, which contacts do not change
@@ -51,6 +57,7 @@ class XPBDWorkspace:
 
     system: System
     layout: Layout
+    welded: WeldedMasses
     rigid: RigidBodies
     joints: JointProjection
     sets: list[ConstraintSet]
@@ -70,6 +77,7 @@ class XPBDWorkspace:
     anchors: StitchAnchors
     extended: NDArray[np.float64]
     growth: Growth | None = None
+    most_threads: int = 1
     points: NDArray[np.float64] = field(init=False)
     previous: NDArray[np.float64] = field(init=False)
     begun: NDArray[np.float64] = field(init=False)
@@ -84,6 +92,13 @@ class XPBDWorkspace:
         for name in ("previous", "begun", "velocities", "origins", "world", "world_previous"):
             setattr(self, name, np.zeros((n, 3)))
 
+    def with_loads(self, system: System) -> XPBDWorkspace:
+        """The workspace for a system that differs only by its loads on vertices and its soft targets."""
+        inner = reordered(system, self.layout)
+        works = copy(self.works)
+        works.system = inner
+        return replace(self, system=inner, loads=ExternalForces(inner), works=works, sleep=self.sleep.of(inner))
+
     def set_asleep(self, bodies: NDArray[np.bool_]) -> None:
         """Let no vertex of these bodies (b,) move, and no constraint of them be projected."""
         free = np.where(self.sleep.vertices(bodies), 0.0, self.system.inverse_masses)
@@ -93,6 +108,14 @@ class XPBDWorkspace:
                 constraints.sweep.choose(self.extended[:, 3])
             if self.damping is not None:
                 self.damping.choose(self.extended[:, 3])
+
+    @contextmanager
+    def own_threads(self) -> Iterator[None]:
+        """A frame's block. What is outside of substeps runs in the mode that was faster in them so far."""
+        with numba_threads(self.threads):
+            self.most_threads = numba.get_num_threads()
+            with one_thread(not self.pace.parallel):
+                yield
 
     def grow(self, time: float) -> None:
         """Take the stress-free shapes of the tets at `time` [s]."""
@@ -113,6 +136,7 @@ class XPBDWorkspace:
         work = float(elastic.of(self.points, False).sum()) - before if self.growth is not None else 0.0
         self.actuators.begin_frame(self.substep(time, h))
         self.works.begin_frame(self.velocities, work)
+        self.rigid.begin_frame(self.velocities)
 
     def substep(self, time: float, h: float) -> Substep:
         """The arrays of a substep of h [s] that ends at `time` [s]."""

@@ -39,6 +39,9 @@ JOINTS = {
     "ball": [sp.BallJoint("a", point=POINT)],
     "hinge": [sp.HingeJoint("a", "b", point=POINT, axis=AXIS, limits=(-1e-3, 1e-3), motor=PUSHED)],
     "slider": [sp.SliderJoint("a", "b", point=POINT, axis=AXIS, motor=PUSHED), sp.SliderJoint("b", axis=AXIS)],
+    "limited ball": [
+        sp.BallJoint("a", "b", point=POINT, axis=AXIS, max_swing=0.05, twist_limits=(-1e-3, 1e-3)),
+    ],
     "obstacle": [sp.HingeJoint("a", "wheel", point=POINT, axis=AXIS, motor=sp.VelocityMotor(3.0))],
 }
 WHEEL = sp.Sphere(radius=0.1, center=(5, 0, 0), name="wheel", motion=sp.Keyframes([0, 1], angles=[0, 5]))
@@ -71,7 +74,7 @@ def test_derivatives_are_those_of_the_energy(kind):
     assert (kind in ("fixed", "ball")) == (max(of_gradients) < 1e-7 * scale)
 
 
-@pytest.mark.parametrize("kind", ["hinge", "slider"])
+@pytest.mark.parametrize("kind", ["hinge", "slider", "limited ball"])
 def test_the_projected_hessian_is_positive_semidefinite_and_near_the_true_one(kind):
     energy, x = potential_of(JOINTS[kind])
     found = {}
@@ -92,7 +95,7 @@ def test_the_projected_hessian_is_positive_semidefinite_and_near_the_true_one(ki
     assert true.min() < -1e-6 * true.max()
 
 
-@pytest.mark.parametrize("kind", ["fixed", "hinge", "slider"])
+@pytest.mark.parametrize("kind", ["fixed", "hinge", "slider", "limited ball"])
 def test_forces_of_a_joint_are_those_of_its_energy_and_have_no_sum(kind):
     energy, x = potential_of(JOINTS[kind][:1])
     gradient = np.zeros_like(x)

@@ -1,8 +1,12 @@
 """Joints of rigid bodies: pendulums, a gyroscope, a chain, limits, motors, reactions, and what is refused."""
 
+import json
+
+import h5py
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
 from scipy.special import ellipk
 
 import supple as sp
@@ -226,6 +230,23 @@ def test_damping_friction_and_the_largest_effort_of_a_joint(values, end):
     assert rate == pytest.approx(exact, rel=0.005)
 
 
+@pytest.mark.parametrize("motor", [None, sp.VelocityMotor(5.0), sp.ForceMotor(20.0), sp.PositionMotor(-2.0, 1e4, 10.0)])
+def test_the_rate_of_a_joint_is_limited_and_the_check_finds_faster_ones(motor, tmp_path):
+    """The weight, a motor without a largest force, and what turns already at the start: all move with that rate."""
+    scene = sp.Scene([bar(angular_velocity=(0, 0, -3.0))], joints=[hinge(max_velocity=0.5, motor=motor)])
+    solver, path = sp.Implicit(contact=None), tmp_path / "r.vtkhdf"
+    frames = list(sp.simulate(scene, solver, 0.01, 30, sinks=[sp.Recorder(path, solver=solver)]))
+    assert {frame.report.status for frame in frames} == {"converged"}
+    angles = np.array([0.0, *(frame.report.joints["hinge"].coordinate for frame in frames)])
+    way = 1.0 if isinstance(motor, sp.VelocityMotor | sp.ForceMotor) else -1.0
+    np.testing.assert_allclose(np.diff(angles)[12:], way * 0.005, atol=1e-6)
+    assert np.abs(np.diff(angles)).max() < 0.005 + 1e-6
+    assert sp.check_recording(path)["joints"].verdict == "pass"
+    if motor is None:  # the limit carries all of the weight's torque
+        reading = frames[10].report.joints["hinge"]
+        assert reading.torque[2] == pytest.approx(MASS * G * 0.5 * np.cos(reading.coordinate), rel=0.01)
+
+
 def test_a_program_drives_motors_by_inputs():
     motor = sp.PositionMotor(sp.MotorInput("elbow"), stiffness=2000.0, damping=200.0)
     scene = sp.Scene([bar()], joints=[hinge()], gravity=(0, 0, 0)).with_motors({"hinge": motor})
@@ -255,6 +276,35 @@ def test_the_swing_of_a_ball_is_limited():
     # At rest on the cone: the weight's torque about the joint is carried by the limit.
     torque = frames[-1].report.joints["ball"].torque
     assert torque @ (0, 0, 1) == pytest.approx(MASS * G * 0.5 * directions[-1, 0], rel=0.02)
+
+
+def twist_of(rotation):
+    """About x of the quaternion (q, w): the turn about x that a turn about a line across it follows."""
+    x, _, _, w = Rotation.from_matrix(rotation).as_quat()
+    return 2.0 * np.arctan2(x, w)
+
+
+def test_the_twist_of_a_ball_is_limited_and_the_check_finds_larger_ones(tmp_path):
+    """A bar that falls into its cone and turns about its axis on the way stops at a twist of 0.4, swung by 0.5."""
+    joint = sp.BallJoint("bar", point=(0, 0, 0), axis=(1, 0, 0), max_swing=0.5, twist_limits=(-0.2, 0.4), name="ball")
+    solver, twists = sp.Implicit(contact=None), {}
+    for rate in (3.0, -3.0):
+        path = tmp_path / f"{rate}.vtkhdf"
+        scene = sp.Scene([bar(angular_velocity=(rate, 0, 0))], joints=[joint])
+        frames = list(sp.simulate(scene, solver, 0.01, 60, sinks=[sp.Recorder(path, solver=solver)]))
+        assert {frame.report.status for frame in frames} == {"converged"}
+        twists[rate] = np.array([twist_of(frame.poses["bar"].rotation) for frame in frames])
+        assert frames[-1].report.joints["ball"].coordinate == pytest.approx(0.5, abs=1e-6)
+        assert sp.check_recording(path)["joints"].verdict == "pass"
+    assert twists[3.0].max() == pytest.approx(0.4, abs=1e-6)
+    assert twists[-3.0].min() == pytest.approx(-0.2, abs=1e-6)
+    with h5py.File(path, "r+") as file:
+        header = json.loads(file["supple/header"][()])
+        header["physics"]["joints"][0]["twist_limits"] = [-0.1, 0.4]
+        del file["supple/header"]
+        file["supple/header"] = json.dumps(header)
+    found = sp.check_recording(path)["joints"]
+    assert (found.verdict, found.worst) == ("fail", pytest.approx(0.1, abs=1e-6))
 
 
 def test_a_joint_follows_an_obstacle():
@@ -310,6 +360,12 @@ SOFT = sp.Body("soft", sp.shapes.box((0.1, 0.1, 0.1), (1, 1, 1)), sp.StableNeoHo
         (lambda: sp.BallJoint("bar"), "there is no point"),
         (lambda: sp.BallJoint("bar", point=(0, 0, 0), axis=(1, 0, 0)), "a limit needs both axis and max_swing"),
         (lambda: sp.BallJoint("bar", point=(0, 0, 0), axis=(1, 0, 0), max_swing=3.2), "give one from 0.01 to 3.132"),
+        (lambda: sp.BallJoint("bar", point=(0, 0, 0), twist_limits=(-1, 1)), "twist_limits need axis and max_swing"),
+        (
+            lambda: sp.BallJoint("bar", point=(0, 0, 0), axis=(1, 0, 0), max_swing=1, twist_limits=(-4, 1)),
+            "twist_limits are (-4, 1); give two from -3.132 to 3.132",
+        ),
+        (lambda: hinge(max_velocity=0.0), "max_velocity"),
         (lambda: sp.BallJoint("bar", point=(0, 0)), "point has shape (2,)"),
         (lambda: sp.PositionMotor(1.0, stiffness=0.0), "stiffness and damping are both zero"),
         (lambda: sp.PositionMotor(1.0, stiffness=-1.0), "PositionMotor: stiffness is -1"),

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
-from supple.implicit.newton.line_search import Extension, Jumps, search
+from supple.implicit.limits.step_limits import StepLimit
+from supple.implicit.newton.line_search import Jumps, extended, search
 from supple.implicit.newton.objective import Objective
 
 
@@ -31,12 +32,16 @@ class Quartic(Potential):
 
 @dataclass(frozen=True)
 class Where:
-    """Admits states whose first coordinate passes a test."""
+    """Admits states whose first coordinate passes a test, and steps down to `lowest`."""
 
     passes: Callable[[float], bool]
+    lowest: float = -np.inf
 
     def allows(self, x):
         return self.passes(x[0, 0])
+
+    def largest_step(self, x, direction):
+        return StepLimit(min(1.0, float((self.lowest - x[0, 0]) / direction[0, 0])))
 
 
 ANYWHERE = Where(lambda u: True)
@@ -106,10 +111,40 @@ def test_a_jump_is_crossed_by_a_tiny_step_a_few_times():
     assert taken[5][1] == 0.0
 
 
-def test_directions_that_crawl_are_made_longer_and_cut_ones_shorter():
-    extension = Extension()
-    factors = []
-    for step, rate in [(1.0, 0.9)] * 6 + [(1.0, 0.5), (0.3, 0.9), (0.3, 0.9)]:
-        extension.note(step, rate)
-        factors.append(extension.factor)
-    assert factors == [2.0, 4.0, 8.0, 16.0, 16.0, 16.0, 16.0, 8.0, 4.0]
+@dataclass(frozen=True, eq=False)
+class Quadratic(Potential):
+    """u^2 / 2, and higher by a tenth below `ledge`."""
+
+    projection = Projection.UNNEEDED
+    ledge: float = -np.inf
+
+    def value(self, x):
+        return x[0, 0] ** 2 / 2 + (0.1 if x[0, 0] < self.ledge else 0.0)
+
+    def add_gradient(self, x, out):
+        out[0, 0] += x[0, 0]
+
+    def add_hessian(self, x, out: HessianBlocks, project: bool):
+        out.vertices[0, 0, 0] += 1.0
+
+
+def extend(stiffness: float, energy: Quadratic, states: Where = ANYWHERE) -> tuple[float, float]:
+    """From u = 1, after a whole step of a model that is so many times as stiff as u^2 / 2."""
+    objective = Objective([energy])
+    here = objective.model(np.array([[1.0, 0.0, 0.0]]), None)
+    vector = np.array([[-1.0 / stiffness, 0.0, 0.0]])
+    end, step = extended(objective, here, vector, -1.0 / stiffness, here.positions + vector, states)
+    return end[0, 0], step
+
+
+@pytest.mark.parametrize(("stiffness", "wanted"), [(1.1, 1.0), (2.0, 2.0), (3.5, 3.5), (100.0, 4.0)])
+def test_a_whole_step_of_a_model_that_is_too_stiff_is_made_longer(stiffness: float, wanted: float):
+    end, step = extend(stiffness, Quadratic())
+    assert step == pytest.approx(wanted, rel=1e-12)
+    assert end == pytest.approx(1.0 - wanted / stiffness, abs=1e-12)
+
+
+def test_longer_steps_keep_to_the_limits_and_lower_the_energy():
+    assert extend(2.5, Quadratic(), Where(lambda u: True, lowest=0.3)) == pytest.approx((0.3, 1.75))
+    assert extend(2.5, Quadratic(), Where(lambda u: u > 0.5)) == (0.6, 1.0)
+    assert extend(1.5, Quadratic(ledge=0.3)) == pytest.approx((1.0 / 3.0, 1.0))

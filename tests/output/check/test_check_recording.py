@@ -21,9 +21,9 @@ from .conftest import FRAMES, JELLY, failures, nan_position, recorded, set_heade
 
 def test_a_good_recording_passes_everything_that_can_be_checked(free, around):
     assert verdicts(free) == {
-        name: "skipped" if name in ("obstacles", "rigidity", "welds", "joints") else "pass" for name in NAMES
+        name: "skipped" if name in ("obstacles", "rigidity", "welds", "joints", "works") else "pass" for name in NAMES
     }
-    why_not = dict.fromkeys(("momentum", "spin", "rigidity", "welds", "joints"), "skipped")
+    why_not = dict.fromkeys(("momentum", "spin", "rigidity", "welds", "joints", "works"), "skipped")
     assert verdicts(around) == {name: why_not.get(name, "pass") for name in NAMES}
     report = sp.check_recording(around)
     assert (report.frames, report.frames_checked) == (FRAMES, FRAMES)
@@ -39,7 +39,7 @@ def test_implicit_recordings_pass(tmp_path, integrator):
     solver = sp.Implicit(integrator=integrator)
     scene = sp.Scene([sp.Body("block", block, JELLY, angular_velocity=(0, 3, 1))])
     path = recorded(tmp_path / "r.vtkhdf", scene, solver, initial_positions={"block": block.vertices * [0.9, 1.05, 1]})
-    found = verdicts(path, skip=["obstacles", "rigidity", "welds", "joints"])
+    found = verdicts(path, skip=["obstacles", "rigidity", "welds", "joints", "works"])
     assert set(found.values()) == {"pass"}
 
 
@@ -79,7 +79,7 @@ def test_a_recording_without_physics_is_read_and_unknown_checks_are_skipped(free
     report = sp.check_recording(corrupted(free, age))
     assert report.ok
     skipped = {result.name for result in report.results if result.verdict == "skipped"}
-    assert skipped == {"obstacles", "rigidity", "welds", "joints", "momentum", "spin", "energy"}
+    assert skipped == {"obstacles", "rigidity", "welds", "joints", "momentum", "spin", "energy", "works"}
     assert "older version" in report["energy"].message
 
 

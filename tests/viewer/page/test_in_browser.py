@@ -23,7 +23,7 @@ def live(look, spot):
     scene = sp.Scene([ball], obstacles=[sp.HalfSpace(friction=0.5)])
     source = LiveSource("ball", scene, sp.XPBD(substeps=8), 1 / 60)
     with opened_page(source, Address(port=0)) as page:
-        screen = look(page.url, page.server)
+        screen = look(page.url + "&fixedDpr=0.5", page.server)  # few pixels: they are drawn in software
         controller = page.content.controller
         made = SimpleNamespace(screen=screen, page=page.content, panel=page.content.panel)
         made.snapshot = lambda: controller.snapshot

@@ -131,6 +131,35 @@ def test_values_have_units_and_are_typed_with_them(fresh):
     assert fresh.tab.locator("input.supple-value").evaluate_all(clipped) == []
 
 
+# Pairs of texts of sliders that touch: of the label, the two ends, and the value. Only what is displayed.
+TOUCHING = """sliders => sliders.flatMap(slider => {
+  const around = element => {
+    if (!element) return [];
+    const range = document.createRange();
+    range.selectNodeContents(element);
+    const box = element.matches("input") ? element.getBoundingClientRect() : range.getBoundingClientRect();
+    return box.width ? [{ text: element.textContent || element.value, box }] : [];
+  };
+  const texts = [
+    ...around(document.querySelector(`label[for="${slider.id}"]`)),
+    ...[...slider.querySelectorAll(".mantine-Slider-markLabel")].flatMap(around),
+    ...around(slider.parentElement.querySelector("input.supple-value")),
+  ];
+  return texts.flatMap((a, i) => texts.slice(i + 1)
+    .filter(b => a.box.left < b.box.right && b.box.left < a.box.right)
+    .filter(b => a.box.top < b.box.bottom && b.box.top < a.box.bottom)
+    .map(b => `${a.text} | ${b.text}`));
+})"""
+
+
+def test_no_text_of_a_slider_touches_another_one(fresh):
+    sliders = fresh.tab.locator(".mantine-Slider-root")
+    for name in ("View", "Solver", "Bodies"):
+        fresh.screen.show_tab(name)
+        fresh.screen.wait(lambda: sliders.count() > 0, "sliders")
+        assert sliders.evaluate_all(TOUCHING) == []
+
+
 def test_every_input_has_a_tooltip(fresh):
     for handle in fresh.screen.server.gui._gui_input_handle_from_uuid.values():
         assert handle.hint or handle.label.startswith("beside "), handle.label
@@ -193,6 +222,7 @@ def test_a_phone_has_a_drawer_and_buttons_for_time(fresh):
     fresh.screen.wait(lambda: drawer() > 730, "the closed drawer")
     connected.click()
     fresh.screen.wait(lambda: drawer() < 500 and play.is_visible(), "the open drawer")
+    assert tab.locator(".mantine-Slider-root").evaluate_all(TOUCHING) == []
     connected.click()
     fresh.screen.wait(lambda: drawer() > 730, "the closed drawer")
 

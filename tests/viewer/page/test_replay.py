@@ -115,7 +115,7 @@ def test_the_missing_encoder_is_named(monkeypatch):
 def test_a_recording_in_the_browser(recorded, look, browser, pixels, spot, tmp_path):
     """Pause, the slider, colors with their legend, a screenshot, and a page with stress from the export button."""
     with opened_page(recorded, Address(port=0)) as page:
-        screen, replay = look(page.url, page.server), page.content
+        screen, replay = look(page.url + "&fixedDpr=0.5", page.server), page.content
         where = lambda: spot(screen.shot()[:330], "red")  # noqa: E731 - above the legend
         agree = lambda: screen.reads(replay.slider) == pytest.approx(replay.slider.value, abs=1e-9)  # noqa: E731
         screen.tab.keyboard.press(" ")

@@ -165,9 +165,8 @@ def _scene(file: Path, timed: bool) -> None:
         ("time", f"{run.steps} steps of {run.dt:.6g} s: {run.steps * run.dt:.6g} s"),
         ("memory", f"about {run.solver.bytes_needed(scene) / 1e6:.3g} MB beyond that of the program"),
         ("intersections", _start_problem(system, start)),
+        ("each frame", _frame_time(run) if timed else "--time simulates the first ones, and says how long one takes"),
     ]
-    if timed:
-        rows.append(("each frame", _frame_time(run)))
     for part in system.bodies:
         mass = system.masses[part.vertices].sum()
         rows.append((f"place of {part.name}", _place(points[part.name])))
@@ -232,9 +231,12 @@ def _joint_text(joint: Joint) -> str:
             bound = "" if joint.motor.max_force is None else f" of at most {joint.motor.max_force:g}"
             text += f", {joint.motor.label}{bound}"
         given = {"damping": joint.damping, "friction": joint.friction, "largest effort": joint.max_effort}
+        given |= {"largest rate": joint.max_velocity}
         text += "".join(f", {key} {value:g}" for key, value in given.items() if value)
     elif isinstance(joint, BallJoint) and joint.max_swing is not None:
         text += f", swings by {joint.max_swing:g} rad at most"
+        if joint.twist_limits is not None:
+            text += f", twists from {joint.twist_limits[0]:g} to {joint.twist_limits[1]:g}"
     return text
 
 

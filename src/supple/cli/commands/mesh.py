@@ -25,7 +25,7 @@ def mesh(
     surface: Path,
     /,
     *,
-    output: Annotated[Path, Parameter(name=["--output", "-o"])],
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
     scale: float = 1.0,
     tets: int | None = None,
     edge: float | None = None,
@@ -49,7 +49,7 @@ def mesh(
         STL, OBJ, PLY, OFF, GLB, VTP, VTK or VTU file.
     output
         One of TetGen's names (bear.1.node writes .node, .ele, .edge and .face), or a .msh, .vtu, .vtk, .inp or
-        USD file.
+        USD file. Without it, the surface's name with .vtu, in this folder.
     scale
         Factor of all coordinates: 0.001 for a surface in millimetres.
     tets
@@ -88,6 +88,7 @@ def mesh(
     from supple.mesh.surface import SurfaceMesh
     from supple.mesh.tetgen_files import write_tetgen
 
+    output = Path(surface.with_suffix(".vtu").name) if output is None else output
     # Checked before the meshing, which can take minutes.
     if output.suffix.lower() not in TET_EXTENSIONS:
         raise MeshError(f"{output}: the extension must be one of {', '.join(TET_EXTENSIONS)}")

@@ -37,9 +37,12 @@ def new(
     import numpy as np
 
     from supple.files.replacing import whole_file
+    from supple.mesh.io.mesh_files import SURFACE_READERS
     from supple.mesh.surface import SurfaceMesh
     from supple.scene_file.template import new_scene, new_scene_of
 
+    if scene.suffix.lower() in SURFACE_READERS:
+        raise SceneError(f"{scene}: is a surface, not a scene file; give it as supple new --surface {scene}")
     if scene.suffix.lower() not in (".yaml", ".yml"):
         raise SceneError(f"{scene}: a scene file ends in .yaml; name it {scene.name}.yaml")
     if scene.exists() and not overwrite:

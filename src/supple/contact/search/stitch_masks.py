@@ -3,6 +3,9 @@
 These are the pairs of `supple.scene.stitches.masks`. Between things that are stitched to each other, they are also the
 pairs that are nearer at the start than the gap of contact, where the point or all corners of the triangle are stitched:
 otherwise contact would push faces apart that are stitched to each other.
+
+Of welds, they are the pairs of the rigid body with the welded points and their neighbours that are nearer at the start
+than the longest edge there.
 """
 
 from __future__ import annotations
@@ -22,8 +25,13 @@ def stitched_contacts(system: System, surfaces: ContactSurfaces, poses: Obstacle
     # The last entry is for nodes that do not exist.
     nodes = np.append(_points_of_vertices(system, surfaces), -1)[system.stitching.nodes()]
     points, triangles = stitched_triangles(nodes, surfaces.triangles, len(surfaces.point_piece))
-    near_points, near_triangles = _touching(system, surfaces, poses, nodes)
-    return np.concatenate([points, near_points]), np.concatenate([triangles, near_triangles])
+    start = _start(system, surfaces, poses)
+    near_points, near_triangles = _touching(surfaces, start, nodes)
+    welded_points, welded_triangles = _welded(system, surfaces, start)
+    return (
+        np.concatenate([points, near_points, welded_points]),
+        np.concatenate([triangles, near_triangles, welded_triangles]),
+    )
 
 
 def stitched_points(
@@ -36,7 +44,7 @@ def stitched_points(
     return starts.astype(np.int64), points[order].astype(np.int32)
 
 
-def _touching(system: System, surfaces: ContactSurfaces, poses: ObstaclePoses, nodes: NDArray[np.int64]) -> Pair:
+def _touching(surfaces: ContactSurfaces, start: NDArray[np.float64], nodes: NDArray[np.int64]) -> Pair:
     """Pairs of things that stitches with these nodes (k, 4) join, which are near at the start; see the module."""
     first, second = np.repeat(nodes[:, 0], 3), nodes[:, 1:].ravel()
     both = (first >= 0) & (second >= 0)
@@ -47,15 +55,41 @@ def _touching(system: System, surfaces: ContactSurfaces, poses: ObstaclePoses, n
     nothing = np.zeros(0, dtype=np.int64)
     if not joined.any():
         return nothing, nothing
-    placed = np.concatenate([part.body.place(system.rest_positions[part.vertices]) for part in system.bodies])
-    start = np.zeros((len(surfaces.point_piece), 3))
-    start[: len(surfaces.rows)] = surfaces.embedded.positions(placed)
-    surfaces.place_obstacles(poses, 0.0, start)
     points, triangles = pairs_closer_than(surfaces, start, float(surfaces.gaps[joined].max()), joined)
     stitched = np.zeros(len(start), dtype=np.bool_)
     stitched[nodes[nodes >= 0]] = True
     kept = stitched[points] | stitched[surfaces.triangles[triangles]].all(axis=1)
     return points[kept].astype(np.int64), triangles[kept].astype(np.int64)
+
+
+def _welded(system: System, surfaces: ContactSurfaces, start: NDArray[np.float64]) -> Pair:
+    """Pairs of soft and rigid bodies that are welded to each other; see the module."""
+    welding, names = system.welding, [part.name for part in system.bodies]
+    joined = np.zeros_like(surfaces.allowed)
+    for weld in system.scene.welds:
+        both = (surfaces.owner[:, None] == names.index(weld.body)) & (surfaces.owner == names.index(weld.rigid))
+        joined |= both | both.T
+    joined &= surfaces.allowed
+    welded = np.zeros(len(start), dtype=np.bool_)
+    point = _points_of_vertices(system, surfaces)[welding.vertices]
+    welded[point[point >= 0]] = True
+    ring = surfaces.triangles[welded[surfaces.triangles].any(axis=1)]
+    if not joined.any() or not len(ring):
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    longest = float(np.linalg.norm(start[ring] - start[ring[:, [1, 2, 0]]], axis=2).max())
+    welded[ring] = True
+    points, triangles = pairs_closer_than(surfaces, start, max(longest, float(surfaces.gaps[joined].max())), joined)
+    kept = welded[points] | welded[surfaces.triangles[triangles]].all(axis=1)
+    return points[kept].astype(np.int64), triangles[kept].astype(np.int64)
+
+
+def _start(system: System, surfaces: ContactSurfaces, poses: ObstaclePoses) -> NDArray[np.float64]:
+    """(n, 3) where the scene places the points [m]."""
+    placed = np.concatenate([part.body.place(system.rest_positions[part.vertices]) for part in system.bodies])
+    start = np.zeros((len(surfaces.point_piece), 3))
+    start[: len(surfaces.rows)] = surfaces.embedded.positions(placed)
+    surfaces.place_obstacles(poses, 0.0, start)
+    return start
 
 
 def _points_of_vertices(system: System, surfaces: ContactSurfaces) -> NDArray[np.int64]:

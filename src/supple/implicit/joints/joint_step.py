@@ -96,7 +96,7 @@ class JointStep:
         if laws.adapts.any():
             missing = np.abs(potential.efforts(x) - potential.law_multipliers)[laws.adapts] / laws.k[laws.adapts]
             function = laws.function[laws.adapts]
-            np.maximum.at(out, geometry.triples[0].joint[function], missing / geometry.units[function])
+            np.maximum.at(out, geometry.arguments[0].joint[function], missing / geometry.units[function])
         return out
 
     def measured(self, details: ImplicitDetails, x: NDArray[np.float64]) -> ImplicitDetails:

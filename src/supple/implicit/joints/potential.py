@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.implicit.energies.potential import ContactPotential, HessianBlocks, Projection
-from supple.joints.functions import derivatives, values
-from supple.joints.geometry import ANGLE, JointGeometry, Vectors
+from supple.joints.functions import derivatives, turns, values
+from supple.joints.geometry import JointGeometry, Vectors
 from supple.joints.laws import Laws, wrapped
 from supple.numerics.sparse.couplings import Couplings
 
@@ -55,28 +55,28 @@ class JointPotential(ContactPotential):
         geometry = self.geometry
         forces, pulls, _ = self._forces(x)
         _add(geometry, geometry.differences, self.weight * forces, out)
-        for k, column in enumerate(geometry.triples):
+        for k, column in enumerate(geometry.arguments):
             _add(geometry, column, self.weight * pulls[:, k], out)
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
-        """With `project`, of the functions the nearest positive semi-definite one by their three vectors."""
+        """With `project`, of the functions the nearest positive semi-definite one by their vectors."""
         out.couplings.append(self._linear_couplings)
         geometry = self.geometry
         if not len(geometry.functions):
             return
-        at = derivatives(geometry.functions, self._triples(x))
+        at = derivatives(geometry.functions, self._arguments(x))
         g = self._law_values(x)
         count = len(at.value)
         first = _sum(self.laws, self.laws.efforts(g, self.law_multipliers), count)
         second = _sum(self.laws, self.laws.stiffness(g, self.law_multipliers), count)
         H = np.einsum("s,sai,sbj->saibj", second, at.gradient, at.gradient)
-        H = (H + first[:, None, None, None, None] * at.hessian).reshape(count, 9, 9)
+        H = (H + first[:, None, None, None, None] * at.hessian).reshape(count, 12, 12)
         if project:
             eigenvalues, vectors = np.linalg.eigh(H)
             H = np.einsum("sij,sj,skj->sik", vectors, np.maximum(eigenvalues, 0.0), vectors)
-        C = np.stack([column.coefficients for column in geometry.triples], axis=1)
-        blocks = np.einsum("sap,saibj,sbq->spqij", C, self.weight * H.reshape(count, 3, 3, 3, 3), C, optimize=True)
-        out.couplings.append(_couplings(geometry, geometry.triples[0].joint, blocks))
+        C = np.stack([column.coefficients for column in geometry.arguments], axis=1)
+        blocks = np.einsum("sap,saibj,sbq->spqij", C, self.weight * H.reshape(count, 4, 3, 4, 3), C, optimize=True)
+        out.couplings.append(_couplings(geometry, geometry.arguments[0].joint, blocks))
 
     def differences(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(f, 3) the vectors that vanish where the joints hold [m]."""
@@ -84,8 +84,8 @@ class JointPotential(ContactPotential):
 
     def coordinates(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(s,) values of the functions."""
-        g = values(self.geometry.functions, self._triples(x))
-        return np.where(self.geometry.functions == ANGLE, self.start + wrapped(g - self.start), g)
+        g = values(self.geometry.functions, self._arguments(x))
+        return np.where(turns(self.geometry.functions), self.start + wrapped(g - self.start), g)
 
     def renewed(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The multipliers (f, 3) and (l,) that balance the forces of this energy at x."""
@@ -105,7 +105,7 @@ class JointPotential(ContactPotential):
         forces, torques = np.zeros((count, 3)), np.zeros((count, 3))
         rows, pulls, _ = self._forces(x)
         columns = [(geometry.differences, rows)]
-        columns += [(column, pulls[:, k]) for k, column in enumerate(geometry.triples)]
+        columns += [(column, pulls[:, k]) for k, column in enumerate(geometry.arguments)]
         for vectors, gradient in columns:
             c = vectors.coefficients[:, :4]
             own = np.einsum("fk,fki->fi", c, x[geometry.corners[vectors.joint, :4]])
@@ -123,9 +123,9 @@ class JointPotential(ContactPotential):
         return self.geometry.differences.offsets(self.geometry.poses(self.time))
 
     @cached_property
-    def _triple_offsets(self) -> list[NDArray[np.float64]]:
+    def _argument_offsets(self) -> list[NDArray[np.float64]]:
         poses = self.geometry.poses(self.time)
-        return [column.offsets(poses) for column in self.geometry.triples]
+        return [column.offsets(poses) for column in self.geometry.arguments]
 
     @cached_property
     def _linear_couplings(self) -> Couplings:
@@ -137,22 +137,22 @@ class JointPotential(ContactPotential):
         blocks = total[:, :, :, None, None] * np.eye(3)
         return _couplings(self.geometry, np.arange(len(total)), blocks)
 
-    def _triples(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(s, 3, 3) the vectors of the functions."""
-        columns = zip(self.geometry.triples, self._triple_offsets, strict=True)
+    def _arguments(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(s, 4, 3) the vectors of the functions."""
+        columns = zip(self.geometry.arguments, self._argument_offsets, strict=True)
         return np.stack([_at(self.geometry, column, x, offsets) for column, offsets in columns], axis=1)
 
     def _law_values(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         return self.coordinates(x)[self.laws.function]
 
     def _forces(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Derivatives by the differences (f, 3) and by the functions' vectors (s, 3, 3), and psi' of each function."""
+        """Derivatives by the differences (f, 3) and by the functions' vectors (s, 4, 3), and psi' of each function."""
         linear = self.multipliers + self._k[:, None] * self.differences(x)
         count = len(self.geometry.functions)
         if not count:
-            return linear, np.zeros((0, 3, 3)), np.zeros(0)
+            return linear, np.zeros((0, 4, 3)), np.zeros(0)
         first = _sum(self.laws, self.efforts(x), count)
-        at = derivatives(self.geometry.functions, self._triples(x))
+        at = derivatives(self.geometry.functions, self._arguments(x))
         return linear, first[:, None, None] * at.gradient, first
 
 

@@ -37,11 +37,10 @@ _STEEPEST = 0.5
 _TINY = 20
 _MOST_JUMPS = 5
 
-# Where a body buckles, the projected Hessian is far too stiff, and steps that shrink by less than this factor crawl:
-# directions are then made longer, twice at a time, up to so many times. A step of .25 s of a twisted bar took 97
-# iterations with it, and 425 without.
-_CRAWL = 0.7
-_LONGEST = 16.0
+# A projected Hessian can be far too stiff: where a body buckles, and where surfaces slide over each other's edges.
+# Where this share of the slope is left at the end of a whole step, the step is made longer, up to so many times.
+_LEFT = 0.3
+_LONGEST = 4.0
 
 
 @dataclass(eq=False)
@@ -55,20 +54,6 @@ class Jumps:
         jump = cuts == _TINY and rise > _ROUND_OFF * size and self.crossed < _MOST_JUMPS
         self.crossed += jump
         return jump
-
-
-@dataclass(eq=False)
-class Extension:
-    """How many times longer than Newton's the directions are made."""
-
-    factor: float = 1.0
-
-    def note(self, step: float, rate: float) -> None:
-        """After a step of this share of the direction; rate : length of the direction over that of the last one."""
-        if step == 1.0 and rate > _CRAWL:
-            self.factor = min(2.0 * self.factor, _LONGEST)
-        elif step < 1.0:
-            self.factor = max(0.5 * self.factor, 1.0)
 
 
 def search(
@@ -111,3 +96,31 @@ def search(
         else:
             step *= _SHRINK
     return start.positions, 0.0, _MOST_CUTS
+
+
+def extended(
+    objective: Objective,
+    start: Model,
+    direction: NDArray[np.float64],
+    slope: float,
+    end: NDArray[np.float64],
+    limits: StepLimits,
+) -> tuple[NDArray[np.float64], float]:
+    """The end of a longer step where the model of the whole one was too stiff, else that one's; and the length.
+
+    The length is that at which the secant of the slopes at both ends is zero.
+
+    Parameters
+    ----------
+    start, direction, slope, limits : see `search`; end : (n, 3) of the whole step
+    """
+    left = float(np.vdot(objective.gradient(end), direction)) / slope
+    if not left > _LEFT:
+        return end, 1.0
+    more = (1.0 / (1.0 - left) if left < 1.0 else np.inf) - 1.0
+    more = min(more, _LONGEST - 1.0)
+    more *= limits.largest_step(end, more * direction).step
+    moved = start.positions + (1.0 + more) * direction
+    if limits.allows(moved) and objective.value(moved) < objective.value(end):
+        return moved, 1.0 + more
+    return end, 1.0

@@ -18,7 +18,7 @@ from supple.implicit.limits.step_limits import StepLimits
 from supple.implicit.newton.convergence import Convergence
 from supple.implicit.newton.direction import DirectionFinder, Tools
 from supple.implicit.newton.hessian_projection import ProjectedTerms
-from supple.implicit.newton.line_search import Extension, Jumps, search
+from supple.implicit.newton.line_search import Jumps, extended, search
 from supple.implicit.newton.objective import Model, Objective
 from supple.implicit.newton.trace import NewtonRow
 from supple.numerics.interruption import interruption_point
@@ -28,6 +28,9 @@ logger = logging.getLogger(__name__)
 
 # Directions that shrink by less than this factor converge linearly: Newton's method with the true Hessian is faster.
 _LINEAR_RATE = 0.2
+
+# Those that shrink by less than this one crawl, and their steps may be made longer.
+_CRAWL = 0.5
 
 # Forces are nearly balanced where their sum is below this share of contact's. Larger ones leave errors in friction that
 # a block shows that just sticks on its slope.
@@ -76,7 +79,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
     """Minimize over the free vertices from x, whose guarded tets all have positive volume."""
     objective, convergence, hessian = problem.objective, problem.convergence, tools.hessian
     directions = DirectionFinder(objective, tools, problem.scale, convergence.step, problem.longest)
-    policy, extension, jumps = directions.policy, Extension(), Jumps()
+    policy, jumps = directions.policy, Jumps()
     here = objective.model(x, hessian, policy.now)
     rows: list[NewtonRow] = []
     if not np.isfinite(here.energy):
@@ -90,14 +93,13 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
             return Outcome(Status.NOT_FINITE, here, "the linear system of a Newton step could not be solved", rows)
         last = convergence.is_short(found.length)
         rate = found.length / last_length if last_length > 0.0 else 0.0
-        # True Hessians need no extension, and bodies with inverted tets recover in small steps.
-        if (last and not found.touching) or found.projected is not ProjectedTerms.ALL or not limits.guard.complete:
-            extension.factor = 1.0
-        vector = extension.factor * found.vector
+        vector = found.vector
         largest, _, reason = limits.largest_step(here.positions, vector)
-        slope = extension.factor * found.slope
-        end, step, cuts = search(objective, here, vector, slope, largest, limits, jumps)
-        extension.note(step, rate)
+        end, step, cuts = search(objective, here, vector, found.slope, largest, limits, jumps)
+        # True Hessians need no longer steps, and bodies with inverted tets recover in small ones.
+        projected = found.projected is not ProjectedTerms.NONE and limits.guard.complete
+        if step == 1.0 and rate > _CRAWL and not last and projected:
+            end, step = extended(objective, here, vector, found.slope, end, limits)
         # Where the step is shorter, the duals of the whole direction are those that the next matrix needs, too.
         objective.renew(here.positions, vector)
         policy.note(rate > _LINEAR_RATE and largest == 1.0, found.touching)
@@ -129,7 +131,7 @@ def minimize(problem: Problem, x: NDArray[np.float64], limits: StepLimits, tools
             here = objective.model(here.positions, hessian, policy.now)
         elif found.touching and (
             (settled >= _SETTLED and _is_balanced(problem, here, tools))
-            or (step == 1.0 and _is_outdated(problem, here, tools))
+            or (step >= 1.0 and _is_outdated(problem, here, tools))
         ):
             return Outcome(Status.CONVERGED, here, "", rows)
         if step == 0.0:

@@ -1,19 +1,12 @@
-"""Which integrators hold joints and welds, and where welds may start."""
+"""Which integrators hold joints and welds."""
 
 from __future__ import annotations
 
-import numpy as np
-
-from supple.errors import SceneError, SolverError
+from supple.errors import SolverError
 from supple.implicit.stepping.integrators import Integrator, Newmark, Static
 from supple.scene.joints.axis_joint import AxisJoint
 from supple.scene.joints.motors import VelocityMotor
 from supple.scene.scene import Scene
-from supple.state import State
-from supple.system import System
-
-# At the start, welded vertices are where round-off in what a user computed puts them. A share of the rigid body's size.
-_OFF = 1e-6
 
 
 def refuse_joints(method: Integrator, scene: Scene) -> None:
@@ -38,26 +31,3 @@ def refuse_joints(method: Integrator, scene: Scene) -> None:
                 f"{joint.label}: in an equilibrium nothing moves, and its motor has a velocity; give a PositionMotor, "
                 "or use another integrator"
             )
-
-
-def refuse_moved_welds(system: System, state: State) -> None:
-    """Check that welded vertices are in their places on the rigid bodies where a simulation starts.
-
-    Raises
-    ------
-    SceneError : where one is not; the text names the weld and the vertex.
-    """
-    welding, x = system.welding, state.positions
-    if not len(welding):
-        return
-    there = np.einsum("sk,ski->si", welding.weights, x[welding.control])
-    sizes = np.linalg.norm(np.ptp(x[welding.control], axis=1), axis=1)
-    off = np.linalg.norm(x[welding.vertices] - there, axis=1)
-    worst = int((off / sizes).argmax())
-    if off[worst] > _OFF * sizes[worst]:
-        weld = system.scene.welds[welding.weld[worst]]
-        begin = next(part.vertices.start for part in system.bodies if part.name == weld.body)
-        raise SceneError(
-            f"{weld.label}: at the start vertex {welding.vertices[worst] - begin} is {off[worst]:.3g} m off its place "
-            f"on body {weld.rigid!r}; move both bodies together"
-        )

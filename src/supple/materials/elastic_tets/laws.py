@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from supple.materials.elastic_tets.active import ActiveTets, Growth
 from supple.materials.elastic_tets.edge_springs import EdgeSprings
@@ -77,17 +78,23 @@ class TetLaws:
 
         NaN for a vertex without a tet.
         """
+        vertices, weights = self._around
+        means = np.full((count, values[0].size if len(values) else 0), np.nan)
+        means[vertices] = weights @ values.reshape(len(values), -1)
+        return means.reshape(count, *values.shape[1:])
+
+    @cached_property
+    def _around(self) -> tuple[NDArray[np.int32], csr_array]:
+        """The vertices (k,) that have tets, and the share of each tet in the mean at each of them (k, m)."""
         vertices, tets = self.tets.ravel(), np.repeat(np.arange(len(self.tets)), 4)
         if self.quadratic is not None:
             linear = np.ones(len(self.tets), dtype=bool)
             linear[self.quadratic.rows] = False
             vertices = np.concatenate([self.tets[linear].ravel(), self.quadratic.nodes.ravel()])
             tets = np.concatenate([np.repeat(np.flatnonzero(linear), 4), np.repeat(self.quadratic.rows, 10)])
-        flat = values.reshape(len(values), -1)
-        sums = [np.bincount(vertices, (column * self.volumes)[tets], count) for column in flat.T]
-        with np.errstate(invalid="ignore"):
-            means = np.stack(sums, axis=1) / np.bincount(vertices, self.volumes[tets], count)[:, None]
-        return means.reshape(count, *values.shape[1:])
+        used, row = np.unique(vertices, return_inverse=True)
+        shares = self.volumes[tets] / np.bincount(row, self.volumes[tets])[row]
+        return used, csr_array((shares, (row, tets)), shape=(len(used), len(self.tets)))
 
     @cached_property
     def known(self) -> NDArray[np.bool_]:

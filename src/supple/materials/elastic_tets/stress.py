@@ -26,10 +26,12 @@ from supple.materials.laws.pointwise import densities_at, piolas_at
 from supple.materials.patches.domains import Patches
 from supple.materials.patches.energy import star_states, tet_shares
 from supple.numerics.deformation import deformation_gradients, determinants
+from supple.numerics.kernel_cache import njit
+from supple.numerics.mat3 import det, load_mat, mat_mul_transposed, store_mat
 from supple.numerics.quadratic_tets.bernstein import determinant_coefficients
 from supple.numerics.threads import threads_for
 
-_SERIAL_TETS = 5_000
+_SERIAL_EDGES = 20_000
 
 
 def energy_densities(
@@ -102,7 +104,7 @@ def _of_patches(patches: Patches, x: NDArray[np.float64], F: NDArray[np.float64]
     for k, entry in enumerate(F.reshape(-1, 9).T):
         means[:, k] = np.bincount(numbers, weights=shares * np.repeat(entry, 6)) / edges.volumes
     P = np.empty((len(means), 3, 3))
-    with threads_for(len(P), _SERIAL_TETS):
+    with threads_for(len(P), _SERIAL_EDGES):
         piolas(means.reshape(-1, 3, 3), edges.kind, edges.mu, edges.lam, P)
         for part in edges.laws:
             P[part.rows] += part.law.models(means[part.rows].reshape(-1, 3, 3), part.parameters, False, False)[1]
@@ -182,17 +184,28 @@ def cauchy_of_tets(
     return stresses
 
 
-def cauchy_stresses(P: NDArray[np.float64], F: NDArray[np.float64]) -> NDArray[np.float64]:
+@njit(cache=True, error_model="numpy")
+def cauchy_stresses(P, F):
     """(m, 3, 3) P F^T / J [Pa], from P and F (m, 3, 3).
 
     The symmetric part: with patches, P F^T of a single tet is symmetric only where the deformation is uniform.
     """
-    cauchy = P @ np.swapaxes(F, 1, 2) / determinants(F)[:, None, None]
-    return 0.5 * (cauchy + np.swapaxes(cauchy, 1, 2))
+    out = np.empty_like(P)
+    for e in range(len(P)):
+        f = load_mat(F, e)
+        s, J = mat_mul_transposed(load_mat(P, e), f), det(f)
+        xy, xz, yz = 0.5 * (s[1] + s[3]) / J, 0.5 * (s[2] + s[6]) / J, 0.5 * (s[5] + s[7]) / J
+        store_mat((s[0] / J, xy, xz, xy, s[4] / J, yz, xz, yz, s[8] / J), out, e)
+    return out
 
 
-def von_mises(cauchy: NDArray[np.float64]) -> NDArray[np.float64]:
+@njit(cache=True, error_model="numpy")
+def von_mises(cauchy):
     """(m,) sqrt(3/2 s : s) [Pa] of Cauchy stresses (m, 3, 3) with the deviator s."""
-    pressure = np.trace(cauchy, axis1=1, axis2=2) / 3.0
-    deviator = cauchy - pressure[:, None, None] * np.eye(3)
-    return np.sqrt(1.5 * np.einsum("eij,eij->e", deviator, deviator))
+    out = np.empty(len(cauchy))
+    for e in range(len(cauchy)):
+        s = load_mat(cauchy, e)
+        normal = (s[0] - s[4]) ** 2 + (s[4] - s[8]) ** 2 + (s[8] - s[0]) ** 2
+        shear = s[1] ** 2 + s[2] ** 2 + s[3] ** 2 + s[5] ** 2 + s[6] ** 2 + s[7] ** 2
+        out[e] = np.sqrt(0.5 * normal + 1.5 * shear)
+    return out

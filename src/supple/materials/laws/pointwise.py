@@ -12,7 +12,8 @@ from supple.materials.isotropic import densities, hessians, piolas
 from supple.materials.per_tet import BY_LAW, TetMaterial
 from supple.numerics.threads import threads_for
 
-_SERIAL_TETS = 5_000
+# One pass over so many tets takes half a millisecond; waiting for a second thread on a busy machine takes several.
+_SERIAL_TETS = 20_000
 
 
 def densities_at(material: TetMaterial, F: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -16,35 +16,45 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
 from numba.np.unsafe import ndarray
+from numpy.typing import NDArray
 
 from supple.errors import SceneError
 from supple.materials.laws.isotropic_law import IsotropicLaw
 from supple.materials.laws.log_strains import exp_quotient, law_kernel, log_strains
+from supple.materials.own.formula import VARIABLES, Formula, symbols_of
 from supple.materials.stretch_energies.stretches import volume_change
 from supple.numerics.kernel_cache import njit
 
 to_fixed_tuple: Any = ndarray.to_fixed_tuple  # of an array, for a number of entries that the compiler knows
 _GAUSS = 0.5 * math.sqrt(0.6)
-VARIABLES = {"invariants": ("I1", "I2", "J"), "stretches": ("s0", "s1", "s2")}
 
 
-def expression_of(psi: Callable[..., Any], of: str, names: tuple[str, ...]) -> Any:
-    """The formula that `psi` computes, as an expression of SymPy, zero at rest.
+def expression_of(psi: Callable[..., Any] | str, of: str, names: tuple[str, ...]) -> Any:
+    """The formula that `psi` computes or is, as an expression of SymPy, zero at rest.
 
     Raises
     ------
-    SceneError : where it cannot be called with symbols, or does not return a formula of them.
+    SceneError : where it cannot be called with symbols, or is no formula of them.
     """
     import sympy
 
-    variables = sympy.symbols(VARIABLES[of], positive=True)
-    parameters = {name: sympy.Symbol(name, real=True) for name in names}
+    symbols = symbols_of(of, names)
+    variables = [symbols[name] for name in VARIABLES[of]]
+    rest = dict(zip(variables, (3.0, 3.0, 1.0) if of == "invariants" else (1.0, 1.0, 1.0), strict=True))
+    if isinstance(psi, str):
+        try:
+            formula = Formula(psi, of, names).expression()
+        except SceneError as error:
+            raise SceneError(f"EnergyMaterial: {error}") from None
+        return formula - formula.subs(rest)
     try:
-        formula = sympy.sympify(psi(*variables, **parameters))
+        formula = sympy.sympify(psi(*variables, **{name: symbols[name] for name in names}))
     except Exception as error:  # whatever the user's function raises
         reason = " ".join(str(error).split()) or type(error).__name__
         raise SceneError(
@@ -53,7 +63,6 @@ def expression_of(psi: Callable[..., Any], of: str, names: tuple[str, ...]) -> A
     unknown = getattr(formula, "free_symbols", None)
     if unknown is None or not isinstance(formula, sympy.Expr):
         raise SceneError(f"EnergyMaterial: psi returns a {type(formula).__name__}; return one formula")
-    rest = dict(zip(variables, (3, 3, 1) if of == "invariants" else (1, 1, 1), strict=True))
     return formula - formula.subs(rest)
 
 
@@ -63,8 +72,8 @@ def derivatives(expression: Any, of: str, names: tuple[str, ...]) -> Any:
     six second ones in the order 00, 11, 22, 12, 02, 01; of stretches those by their logarithms."""
     import sympy
 
-    variables = sympy.symbols(VARIABLES[of], positive=True)
-    values = tuple(sympy.Symbol(name, real=True) for name in names)
+    symbols = symbols_of(of, names)
+    variables, values = ([symbols[name] for name in group] for group in (VARIABLES[of], names))
     if of == "invariants":
         first = [sympy.diff(expression, each) for each in variables]
         second = [sympy.diff(first[i], variables[j]) for i, j in ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))]
@@ -87,14 +96,42 @@ def stress_at_rest(expression: Any, of: str, parameters: dict[str, float]) -> fl
     return float(2.0 * by_I1 + 4.0 * by_I2 + by_J)
 
 
+def moduli_at_rest(expression: Any, of: str, names: tuple[str, ...], rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(k, 2) shear and bulk modulus [Pa] of rows of parameters (k, q); nothing is compiled."""
+    function = derivatives(expression, of, names)
+    different, which = np.unique(rows, axis=0, return_inverse=True)
+    found = []
+    for row in different.tolist():
+        if of == "stretches":
+            values = [float(value) for value in function(1.0, 1.0, 1.0, *row)]
+            mu, lam = 0.5 * (values[4] - values[7]), values[7]
+        else:
+            values = [float(value) for value in function(3.0, 3.0, 1.0, *row)]
+            _, W1, W2, WJ, h11, h22, hJJ, h2J, h1J, h12 = values
+            mu = 2.0 * (W1 + W2)
+            lam = 4.0 * W2 + 4.0 * h11 + 16.0 * h12 + 16.0 * h22 + 4.0 * h1J + 8.0 * h2J + hJJ + WJ
+        found.append((mu, lam + 2.0 * mu / 3.0))
+    return np.array(found)[which.ravel()]
+
+
+@dataclass(frozen=True, eq=False)
+class OwnLaw(IsotropicLaw):
+    """The law of an energy that a user gives. formula : as recordings have it; None where it cannot be a text"""
+
+    formula: Formula | None = None
+
+
 @lru_cache(maxsize=64)
-def compiled_law(expression: Any, of: str, names: tuple[str, ...]) -> IsotropicLaw:
+def compiled_law(expression: Any, of: str, names: tuple[str, ...]) -> OwnLaw:
     """The law of an expression of SymPy; its parameters are K of K/2 (J - 1)^2, and those with these names."""
     function = njit(error_model="numpy")(derivatives(expression, of, names))
     name = f"own_{abs(hash((expression, of, names)))}"
     energy = _energy_of_invariants if of == "invariants" else _energy_of_stretches
-    return IsotropicLaw(
-        law_kernel(name, energy(function, len(names)), cache=False), range(1 + len(names), 2 + len(names)), bulk=0
+    return OwnLaw(
+        law_kernel(name, energy(function, len(names)), cache=False),
+        range(1 + len(names), 2 + len(names)),
+        bulk=0,
+        formula=Formula.of_expression(expression, of, names),
     )
 
 

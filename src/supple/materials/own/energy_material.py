@@ -12,20 +12,29 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.materials.hyperelastic.by_law import ByLaw
-from supple.materials.laws.isotropic_law import IsotropicLaw
-from supple.materials.own.derivation import VARIABLES, compiled_law, derivatives, expression_of, stress_at_rest
+from supple.materials.own.derivation import (
+    OwnLaw,
+    compiled_law,
+    derivatives,
+    expression_of,
+    moduli_at_rest,
+    stress_at_rest,
+)
+from supple.materials.own.formula import VARIABLES
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class EnergyMaterial(ByLaw):
     """An isotropic material with an energy of one's own: psi plus K/2 (J - 1)^2.
 
-    `psi` is called once, with symbols. SymPy differentiates the formula that it returns, and Numba compiles all of it.
+    SymPy differentiates the formula that `psi` is, or that it returns when it is called with symbols, and Numba
+    compiles all of it.
 
     Parameters
     ----------
-    psi : function of three variables and of all `parameters` by name, which returns the energy per rest volume [Pa];
-        made of +, -, *, /, ** and functions of SymPy such as `sympy.exp`. A constant in it is taken away.
+    psi : energy per rest volume [Pa]; a constant in it is taken away. Either a text with the three variables and the
+        `parameters` by name, numbers, + - * / ** and exp, log, sqrt, sin, sinh or another such function; or a function
+        of three variables and of all `parameters` by name, made of +, -, *, /, ** and functions of SymPy.
     of : "invariants", then the variables are I1 = tr C, I2 = (I1^2 - tr C^2) / 2 and J = det F; or "stretches", then
         they are the principal stretches, in which psi must be symmetric.
     parameters : by name; one number each, or one per tetrahedron, in the units of the formula [SI].
@@ -36,7 +45,7 @@ class EnergyMaterial(ByLaw):
     SceneError : where psi is no such formula, is not symmetric in the stretches, or has a stress at rest.
     """
 
-    psi: Callable[..., Any]
+    psi: Callable[..., Any] | str
     of: str = "invariants"
     parameters: Mapping[str, float | NDArray[np.float64]] = field(default_factory=dict)
     bulk: float | NDArray[np.float64] = 0.0
@@ -50,8 +59,8 @@ class EnergyMaterial(ByLaw):
     def _check(self) -> None:
         if self.of not in VARIABLES:
             raise SceneError(f"EnergyMaterial: of is {self.of!r}; give 'invariants' or 'stretches'")
-        if not callable(self.psi):
-            raise SceneError(f"EnergyMaterial: psi is a {type(self.psi).__name__}; give a function")
+        if not callable(self.psi) and not isinstance(self.psi, str):
+            raise SceneError(f"EnergyMaterial: psi is a {type(self.psi).__name__}; give a formula or a function")
         for name, value in self.parameters.items():
             try:
                 good = np.isfinite(np.asarray(value, dtype=np.float64)).all()
@@ -61,6 +70,7 @@ class EnergyMaterial(ByLaw):
                 raise SceneError(f"EnergyMaterial: the parameter {name!r} is {value!r}; give finite numbers")
         expression = expression_of(self.psi, self.of, self._names)
         object.__setattr__(self, "formula", str(expression))
+        object.__setattr__(self, "_expression", expression)
         self._check_rest(expression)
         object.__setattr__(self, "_law", compiled_law(expression, self.of, self._names))
 
@@ -97,12 +107,15 @@ class EnergyMaterial(ByLaw):
     def rest_moduli(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         columns = np.broadcast_arrays(*(np.asarray(value, dtype=np.float64) for _, value in self.law_parameters()))
         rows = np.column_stack([np.ravel(column) for column in columns])
-        values = self.law().stretch_values(np.ones((len(rows), 3)), rows)
-        mu = 0.5 * (values[:, 4] - values[:, 7])
-        bulk = values[:, 7] + 2.0 * mu / 3.0
+        expression: Any = self._expression  # pyright: ignore[reportAttributeAccessIssue]
+        try:
+            mu, bulk = moduli_at_rest(expression, self.of, self._names, rows[:, 1:]).T
+        except (ArithmeticError, ValueError, TypeError):
+            raise SceneError("EnergyMaterial: psi or a derivative of it is not finite near rest") from None
+        bulk = bulk + rows[:, 0]
         return (mu, bulk) if columns[0].ndim else (mu[0], bulk[0])
 
-    def law(self) -> IsotropicLaw:
+    def law(self) -> OwnLaw:
         return self._law  # pyright: ignore[reportAttributeAccessIssue]
 
     def law_parameters(self) -> tuple[tuple[str, ArrayLike], ...]:

@@ -15,6 +15,7 @@ from supple.output.check.checks.records import Records
 from supple.output.check.checks.rigidity import Rigidity
 from supple.output.check.checks.tets import Inversion, RestShape, Volume
 from supple.output.check.checks.welds import Welds
+from supple.output.check.checks.works import Works
 from supple.output.check.frame_check import FrameCheck
 from supple.output.check.report import CheckReport, CheckResult
 from supple.output.check.settings import CheckSettings
@@ -40,6 +41,7 @@ CHECKS: tuple[type[FrameCheck], ...] = (
     Spin,
     Energy,
     Balance,
+    Works,
     Records,
 )
 

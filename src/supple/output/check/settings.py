@@ -21,12 +21,13 @@ NAMES = {
     "distance": "the distance of surfaces is above zero",
     "rigidity": "rigid bodies are neither deformed nor mirrored",
     "welds": "welded vertices stay in their places on rigid bodies",
-    "joints": "joints hold, within their limits; motors stay within their largest effort",
+    "joints": "joints hold, within their limits and largest rates; motors stay within their largest effort",
     "volume": "nearly incompressible bodies keep at least half of their volume",
     "momentum": "without loads, momentum changes by gravity alone",
     "spin": "without loads, angular momentum about the center of mass does not grow",
     "energy": "energy does not grow by more than the recorded works",
     "balance": "recorded works and residuals add up to the change of energy, and the residual is small",
+    "works": "recorded works of pins and contact are those that follow from the frames",
     "records": "recorded determinants, energies and momenta are those of the recorded positions and velocities",
 }
 

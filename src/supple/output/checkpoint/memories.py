@@ -9,11 +9,12 @@ from supple.xpbd.contact.contact_rows import LoadedRows
 from supple.xpbd.contact.frame_forces import ShapeLoads
 from supple.xpbd.contact.memory import ContactMemory, ObstacleMemory, SurfaceMemory
 from supple.xpbd.damping.kelvin_voigt import ViscousMemory
-from supple.xpbd.memory import XPBDMemory
+from supple.xpbd.memory import ControlMemory, XPBDMemory
 from supple.xpbd.sleep import SleepMemory
 
 MEMORIES: tuple[type, ...] = (
     ContactMemory,
+    ControlMemory,
     EnergyMade,
     History,
     Ledger,

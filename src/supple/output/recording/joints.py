@@ -29,8 +29,9 @@ class RecordedJoint:
     placed : (2, 3, 4) rotations and translations of the sides where the scene places everything, where the coordinate
         of the joint is zero
     point, axis : (3,) there, in the world [m], [-]
-    limits : of its coordinate [rad] or [m], infinite where there is none
-    max_force : of its motor [N m] or [N], infinite where there is none
+    limits : of its coordinate [rad] or [m]; twist_limits : of the twist of a ball [rad]; infinite where there are none
+    max_force : of its motor [N m] or [N]; max_velocity : of its coordinate [rad/s] or [m/s]; infinite where there is
+        none
     """
 
     name: str
@@ -41,6 +42,8 @@ class RecordedJoint:
     axis: NDArray[np.float64]
     limits: tuple[float, float]
     max_force: float
+    max_velocity: float
+    twist_limits: tuple[float, float]
 
     def described(self) -> dict[str, Any]:
         """As the header has it."""
@@ -52,7 +55,9 @@ class RecordedJoint:
             "point": self.point.tolist(),
             "axis": self.axis.tolist(),
             "limits": [end if np.isfinite(end) else None for end in self.limits],
+            "twist_limits": [end if np.isfinite(end) else None for end in self.twist_limits],
             "max_force": self.max_force if np.isfinite(self.max_force) else None,
+            "max_velocity": self.max_velocity if np.isfinite(self.max_velocity) else None,
         }
 
 
@@ -78,6 +83,7 @@ def joints_of(system: System) -> tuple[RecordedJoint, ...]:
         if isinstance(joint, BallJoint) and joint.max_swing is not None:
             ends = 0.0, joint.max_swing
         most = joint.motor.max_force if isinstance(joint, AxisJoint) and joint.motor is not None else None
+        fastest = joint.max_velocity if isinstance(joint, AxisJoint) else None
         joints.append(
             RecordedJoint(
                 str(joint.name),
@@ -88,6 +94,8 @@ def joints_of(system: System) -> tuple[RecordedJoint, ...]:
                 np.array([1.0, 0.0, 0.0] if axis is None else axis, dtype=np.float64),
                 ends,
                 np.inf if most is None else most,
+                np.inf if fastest is None else fastest,
+                (joint.twist_limits if isinstance(joint, BallJoint) else None) or (-np.inf, np.inf),
             )
         )
     return tuple(joints)
@@ -106,6 +114,7 @@ def read_joints(file: CheckedFile, header: dict[str, Any]) -> tuple[RecordedJoin
         for given in (header.get("physics") or {}).get("joints", []):
             first, second = int(given["sides"][0]), given["sides"][1]
             low, high = given["limits"]
+            least, most = given.get("twist_limits", (None, None))
             joint = RecordedJoint(
                 name=str(given["name"]),
                 kind=str(given["kind"]),
@@ -115,6 +124,8 @@ def read_joints(file: CheckedFile, header: dict[str, Any]) -> tuple[RecordedJoin
                 axis=np.array(given["axis"], dtype=np.float64).reshape(3),
                 limits=(-np.inf if low is None else float(low), np.inf if high is None else float(high)),
                 max_force=np.inf if given["max_force"] is None else float(given["max_force"]),
+                max_velocity=np.inf if given.get("max_velocity") is None else float(given["max_velocity"]),
+                twist_limits=(-np.inf if least is None else float(least), np.inf if most is None else float(most)),
             )
             joints.append(joint)
             numbers = np.concatenate([joint.placed.ravel(), joint.point, joint.axis])

@@ -5,13 +5,14 @@ Recordings from before version 0.1 do not have it; checks that need it are skipp
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.errors import SceneError
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.materials.elastic_tets.active import GROWTH, MUSCLE, ActiveTets
 from supple.materials.elastic_tets.quadratic import QUADRATURE_POINTS
@@ -19,7 +20,10 @@ from supple.materials.flows.internal import count_of
 from supple.materials.flows.registry import RECORDED_FLOWS
 from supple.materials.laws.registry import RECORDED_LAWS
 from supple.materials.material import Hyperelastic
-from supple.materials.per_tet import BY_LAW, NO_REGION, NOT_ELASTIC, LawTets
+from supple.materials.own.derivation import OwnLaw
+from supple.materials.own.formula import VARIABLES, Formula
+from supple.materials.own.formula_law import FormulaLaw
+from supple.materials.per_tet import BY_LAW, NO_REGION, NOT_ELASTIC, Law, LawTets
 from supple.materials.registry import ELASTIC_MATERIALS
 from supple.output.recording.checked_hdf5 import CheckedFile
 from supple.output.recording.joints import joints_of
@@ -91,9 +95,9 @@ def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
             rows = material.per_tet(part.tets.stop - part.tets.start)
             kind[part.tets] = np.where(rows.kind == BY_LAW, GIVEN_BY_LAW, rows.kind)
             mu[part.tets], lam[part.tets], region[part.tets] = rows.mu, rows.lam, rows.region
-    known = [tets for tets in system.laws.material.laws if tets.law.name in RECORDED_LAWS]
+    known = [tets for tets in system.laws.material.laws if _described(tets.law) is not None]
     for tets in system.laws.material.laws:
-        if tets.law.name not in RECORDED_LAWS:
+        if _described(tets.law) is None:
             kind[tets.rows] = NOT_KNOWN
     group = own.create_group("physics")
     group["kind"], group["mu"], group["lam"] = kind, mu, lam
@@ -109,7 +113,7 @@ def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
     return {
         "active": [[each.kind, each.strength] for each in active],
         "laws": [law.__name__ for law in ELASTIC_MATERIALS],
-        "by_law": [tets.law.name for tets in known],
+        "by_law": [_described(tets.law) for tets in known],
         "flows": [None if tets.flow is None else tets.flow.name for tets in known],
         "points": [tets.points for tets in known],
         "internal": count_of(system.laws.material),
@@ -125,6 +129,28 @@ def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
         "welds": _welds(system),
         "joints": [joint.described() for joint in joints_of(system)],
     }
+
+
+def _described(law: Law) -> str | dict[str, Any] | None:
+    """A law as recordings name it, or write it out; None where they cannot."""
+    if not isinstance(law, OwnLaw):
+        return law.name if law.name in RECORDED_LAWS else None
+    return None if law.formula is None else asdict(law.formula)
+
+
+def _law_of(entry: object) -> Law | None:
+    """The law that `_described` gave; None where it is not known here.
+
+    Raises
+    ------
+    SceneError : where a formula is no formula.
+    """
+    if not isinstance(entry, dict):
+        return RECORDED_LAWS.get(str(entry))
+    text, of, names = (entry.get(key) for key in ("text", "of", "parameters"))
+    if not isinstance(text, str) or of not in VARIABLES or not isinstance(names, list):
+        raise SceneError("its entry is incomplete")
+    return FormulaLaw(Formula(text, of, tuple(map(str, names))))
 
 
 def _untouching(system: System) -> list[list[int]]:
@@ -157,13 +183,15 @@ def read_physics(file: CheckedFile, header: dict[str, Any], quadratic: NDArray[n
         counts = [int(physics[key]) for key in ("forces", "soft_targets", "scripted_pins", "stitches")]
         counts += [int(physics.get(key, 0)) for key in ("held_joints", "motors")]
         laws = [str(law) for law in physics["laws"]]
-        names = [str(name) for name in physics.get("by_law", [])]
-        flows = list(physics.get("flows", [None] * len(names)))
-        points = [int(number) for number in physics.get("points", [1] * len(names))]
+        laws_here = [_law_of(entry) for entry in physics.get("by_law", [])]
+        flows = list(physics.get("flows", [None] * len(laws_here)))
+        points = [int(number) for number in physics.get("points", [1] * len(laws_here))]
         internal = int(physics.get("internal", 0))
         compliances = tuple(
             None if pair is None else (float(pair[0]), float(pair[1])) for pair in physics["compliances"]
         )
+    except SceneError as error:
+        raise file.broken(f"the energy of a material: {error}") from None
     except (KeyError, TypeError, ValueError, IndexError):
         raise file.broken("the physics in its header is not described as it should be") from None
     if len(compliances) != len(header["bodies"]):
@@ -180,14 +208,13 @@ def read_physics(file: CheckedFile, header: dict[str, Any], quadratic: NDArray[n
     if physics.get("patches", False):
         region = file.array(f"{_GROUP}/region", "i", (m,)).astype(np.int32)
     known = []
-    for k, (name, flow, at) in enumerate(zip(names, flows, points, strict=False)):
+    for k, (law, flow, at) in enumerate(zip(laws_here, flows, points, strict=False)):
         tets = file.indices(f"{_GROUP}/law_{k}/rows", 1, m)[:, 0].astype(np.int64)
         parameters = file.array(f"{_GROUP}/law_{k}/parameters", "f", (len(tets), None))
         if at != (QUADRATURE_POINTS if quadratic[tets].all() else 1) or quadratic[tets].any() != quadratic[tets].all():
             raise file.broken("a law is not evaluated at the points of its tets")
         if flow is not None and flow not in RECORDED_FLOWS:
             raise file.newer(f"a material flows by a law {flow!r} that this version does not know")
-        law = RECORDED_LAWS.get(name)
         if law is not None and parameters.shape[1] in law.counts:
             parameters = np.ascontiguousarray(parameters)
             known.append(LawTets(law, tets, parameters, None if flow is None else RECORDED_FLOWS[flow], at))

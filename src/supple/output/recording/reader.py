@@ -27,7 +27,7 @@ from supple.output.recording.scene import RecordedBody, RecordedObstacle, read_b
 from supple.output.recording.sensors import RecordedSensor, sensors_of_header
 from supple.output.recording.stitches import RecordedStitches, read_stitches
 from supple.readings.by_body import ByBody
-from supple.readings.fields import FIELDS, Field
+from supple.readings.fields import FIELDS, Field, checked_fields
 from supple.readings.sensor_readings import ForceReading, Reading, TaxelReading
 from supple.readings.tet_readings import TetReadings
 from supple.scene.rigid.pose import Pose, pose_of
@@ -91,7 +91,7 @@ class RecordedFrame(TetReadings):
 
     @cached_property
     def _laws(self) -> TetLaws:
-        return replace(self.recording.laws, active=self.active)
+        return replace(self.recording.laws, active=self.active) if self.active else self.recording.laws
 
     @cached_property
     def active(self) -> tuple[ActiveTets, ...]:
@@ -134,8 +134,9 @@ class RecordedFrame(TetReadings):
 
         Raises
         ------
-        OutputError : where it was not recorded.
+        OutputError : where there is no such field, or it was not recorded.
         """
+        checked_fields([name])
         for field in self.recording.fields:
             if field.name == name:
                 path = field_series(field, 0, 0).path

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from supple.errors import SceneError
-from supple.scene.joints.joint import Joint
+from supple.scene.joints.joint import Joint, checked_limits
 from supple.scene.joints.motors import Motor
-from supple.scene.values import finite_vector, float_array, non_negative, positive
+from supple.scene.values import finite_vector, non_negative, positive
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +27,8 @@ class AxisJoint(Joint):
     damping : effort against each unit of its rate [N m s/rad] or [N s/m].
     friction : largest effort of dry friction [N m] or [N], which holds the joint until the load exceeds it.
     max_effort : largest effort of its motor [N m] or [N], beside the `max_force` of that motor; None: no bound.
+    max_velocity : largest rate of its coordinate in both directions [rad/s] or [m/s], the mean over a step: a limit
+        with whatever effort that takes, as of the coordinate; None: no bound. Equilibria have no rates.
     """
 
     axis: ArrayLike = (0.0, 0.0, 1.0)
@@ -35,33 +37,24 @@ class AxisJoint(Joint):
     damping: float = 0.0
     friction: float = 0.0
     max_effort: float | None = None
+    max_velocity: float | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
         axis = finite_vector(self.axis, f"{self.label}: axis", nonzero=True)
         object.__setattr__(self, "axis", axis / np.linalg.norm(axis))
         if self.limits is not None:
-            object.__setattr__(self, "limits", self._checked_limits())
+            object.__setattr__(self, "limits", checked_limits(self.limits, f"{self.label}: limits"))
         if self.motor is not None and not isinstance(self.motor, Motor):
             raise SceneError(f"{self.label}: motor is {self.motor!r}; give PositionMotor(...) or another motor")
         for key in ("damping", "friction"):
             object.__setattr__(self, key, non_negative(getattr(self, key), f"{self.label}: {key}"))
+        if self.max_velocity is not None:
+            object.__setattr__(self, "max_velocity", positive(self.max_velocity, f"{self.label}: max_velocity"))
         if self.max_effort is not None:
             object.__setattr__(self, "max_effort", positive(self.max_effort, f"{self.label}: max_effort"))
             if self.motor is not None:
                 object.__setattr__(self, "motor", self.motor.bounded(self.max_effort))
-
-    def _checked_limits(self) -> tuple[float, float]:
-        ends = float_array(self.limits, f"{self.label}: limits", "give two numbers (low, high)")
-        if ends.shape != (2,) or np.isnan(ends).any():
-            raise SceneError(f"{self.label}: limits is {self.limits!r}; give two numbers (low, high)")
-        low, high = float(ends[0]), float(ends[1])
-        if not low < high:
-            raise SceneError(
-                f"{self.label}: limits are ({low:g}, {high:g}), and the first is not below the second; exchange them, "
-                "or use a FixedJoint"
-            )
-        return low, high
 
 
 @dataclass(frozen=True, eq=False)

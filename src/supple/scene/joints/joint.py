@@ -16,7 +16,7 @@ from supple.scene.located import at
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.suggestion import suggestion
-from supple.scene.values import check_name, finite_vector
+from supple.scene.values import check_name, finite_vector, float_array
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,3 +88,21 @@ class Joint(ABC):
             raise SceneError(f"{self.label}: there is no {what} {name!r}; {suggestion(name, known)}")
         if not isinstance(bodies[name], RigidBody):
             raise SceneError(f"{self.label}: body {name!r} is soft; joints join rigid bodies")
+
+
+def checked_limits(limits: object, what: str) -> tuple[float, float]:
+    """Two numbers, the first below the second; `what` begins the messages.
+
+    Raises
+    ------
+    SceneError : where they are not.
+    """
+    ends = float_array(limits, what, "give two numbers (low, high)")
+    if ends.shape != (2,) or np.isnan(ends).any():
+        raise SceneError(f"{what} is {limits!r}; give two numbers (low, high)")
+    low, high = float(ends[0]), float(ends[1])
+    if not low < high:
+        raise SceneError(
+            f"{what} are ({low:g}, {high:g}), and the first is not below the second; exchange them, or use a FixedJoint"
+        )
+    return low, high

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,15 @@ class Welding:
 
     def __len__(self) -> int:
         return len(self.vertices)
+
+    @classmethod
+    def none(cls) -> Welding:
+        """Of a scene without welds."""
+        return weld_together((), ())
+
+    def renumbered(self, new: NDArray[np.int32]) -> Welding:
+        """The same, where vertex i has the number new[i]."""
+        return replace(self, vertices=new[self.vertices], control=new[self.control])
 
     def follow(self, x: NDArray[np.float64]) -> None:
         """Set the rows of welded vertices, in place, in positions or displacements x (n, 3) of all."""

@@ -17,8 +17,9 @@ from supple.materials.hyperelastic.yeoh import Yeoh
 from supple.materials.inelastic.j2_plastic import J2Plastic
 from supple.materials.inelastic.viscoelastic import Viscoelastic
 from supple.materials.material import Elastic, Hyperelastic, Material
+from supple.materials.own.energy_material import EnergyMaterial
 from supple.materials.registry import ELASTIC_MATERIALS
-from supple.scene_file.model import Model, NonNegative, Number, Positive, Vector
+from supple.scene_file.model import Model, Name, NonNegative, Number, Positive, Vector
 
 
 def _kind(material: type[Elastic]) -> str:
@@ -108,6 +109,18 @@ class HolzapfelGasserOgdenModel(_ByLawModel):
     )
 
 
+class EnergyMaterialModel(_ByLawModel):
+    """A material with an energy that the file gives as a formula (Implicit only)."""
+
+    kind: Literal["energy_material"]
+    bulk: NonNegative = Field(default=0.0, description="bulk modulus K of K/2 (J - 1)^2, which is added [Pa]")
+    psi: str = Field(max_length=4000, description="energy per rest volume [Pa], such as mu / 2 * (I1 * J**(-2/3) - 3)")
+    of: Literal["invariants", "stretches"] = Field(
+        default="invariants", description="whether psi is a formula of I1, I2 and J, or of s0, s1 and s2"
+    )
+    parameters: dict[Name, Number] = Field(default_factory=dict, description="values of other names in psi, by name")
+
+
 class J2PlasticModel(_MaterialModel):
     """A metal that yields: J2 plasticity at finite strain (Implicit only)."""
 
@@ -128,6 +141,7 @@ BY_LAW_KINDS: dict[str, type[ByLaw]] = {
     "yeoh": Yeoh,
     "ogden": Ogden,
     "holzapfel_gasser_ogden": HolzapfelGasserOgden,
+    "energy_material": EnergyMaterial,
 }
 
 
@@ -157,6 +171,7 @@ else:
         YeohModel,
         OgdenModel,
         HolzapfelGasserOgdenModel,
+        EnergyMaterialModel,
     )
     UnrelaxedModel = Annotated[Union[_UNRELAXED], Field(discriminator="kind")]  # noqa: UP007
 

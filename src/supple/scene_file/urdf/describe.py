@@ -139,7 +139,8 @@ def _joint(joint: RobotJoint, second: str | None, frame: Placement) -> dict[str,
     entry["axis"] = (frame.rotation @ joint.axis).tolist()
     if joint.limits is not None:
         entry["limits"] = list(joint.limits)
-    given = {"damping": joint.damping, "friction": joint.friction, "max_effort": joint.effort}
+    given = {"damping": joint.damping, "friction": joint.friction}
+    given |= {"max_effort": joint.effort, "max_velocity": joint.velocity}
     return entry | {key: value for key, value in given.items() if value > 0.0}
 
 

@@ -74,7 +74,7 @@ class RobotJoint:
     """One joint: kind of `JOINTS`; placement of the child's frame in the parent's; axis (3,) in the child's.
 
     limits : lower and upper end, or None; damping, friction : efforts of the joint
-    effort : the largest of its motor, zero where there is none
+    effort : the largest of its motor; velocity : the largest of its coordinate; zero where there is none
     """
 
     name: str
@@ -87,6 +87,7 @@ class RobotJoint:
     damping: float
     friction: float
     effort: float
+    velocity: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,10 +275,12 @@ def _joint(element: ElementTree.Element, links: dict[str, Link], ignored: dict[s
         raise _Problem(f"{what}: its damping or friction is below zero")
     limits = _limits(element, kind, what)
     limit = element.find("limit")
-    effort = 0.0 if limit is None or "effort" not in limit.attrib else _numbers(limit, "effort", what, 1)[0]
-    if effort < 0.0:
-        raise _Problem(f"{what}: its effort limit is {effort:g}; it must be zero or more")
-    return RobotJoint(name, kind, parent, child, _origin(element, what), axis, limits, damping, friction, effort)
+    most = {}
+    for key in ("effort", "velocity"):
+        most[key] = 0.0 if limit is None or key not in limit.attrib else _numbers(limit, key, what, 1)[0]
+        if most[key] < 0.0:
+            raise _Problem(f"{what}: its {key} limit is {most[key]:g}; it must be zero or more")
+    return RobotJoint(name, kind, parent, child, _origin(element, what), axis, limits, damping, friction, **most)
 
 
 def _limits(element: ElementTree.Element, kind: str, what: str) -> tuple[float, float] | None:

@@ -171,7 +171,7 @@ def _note_near(low, high, owner, collide, boxes, chosen):
 
 
 def colliding_pairs(system: System, settings: XPBDContact | None) -> NDArray[np.bool_]:
-    """(p, p) which things must stay apart: bodies, then obstacles, without those that are stitched to each other."""
+    """(p, p) which things must stay apart: bodies, then obstacles, without those that are stitched or welded."""
     bodies = len(system.bodies)
     collide = pair_table(system.scene).collide.copy()
     if settings is None or not settings.body_collision:
@@ -179,7 +179,8 @@ def colliding_pairs(system: System, settings: XPBDContact | None) -> NDArray[np.
     if settings is None or not settings.self_collision:
         collide[np.arange(bodies), np.arange(bodies)] = False
     names = [part.name for part in system.bodies] + [str(obstacle.name) for obstacle in system.obstacles]
-    for stitch in system.scene.stitches:
-        a, b = names.index(stitch.first), names.index(stitch.second)
+    joined = [(stitch.first, stitch.second) for stitch in system.scene.stitches]
+    for first, second in [*joined, *((weld.body, weld.rigid) for weld in system.scene.welds)]:
+        a, b = names.index(first), names.index(second)
         collide[a, b] = collide[b, a] = False
     return collide

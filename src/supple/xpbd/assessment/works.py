@@ -43,6 +43,8 @@ class Works:
         for pin in system.pins:
             if pin.motion is not None:
                 held[pin.vertices] = True
+        welding = system.welding
+        held[welding.vertices[held[welding.control[:, 0]]]] = True
         self._held = np.flatnonzero(held)
         self.at_pins = ElasticEnergy(system, held) if len(self._held) else None
         self._on_pins = np.zeros((len(system.masses), 3))

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from supple.contact.obstacle_poses import ObstaclePoses
 from supple.contact.search.reach import any_beyond_reach
 from supple.contact.search.surfaces import ContactSurfaces, build_surfaces
-from supple.numerics.kernel_cache import njit
-from supple.numerics.mat3 import dot, row, subtract
 from supple.scene.contact_pairs import pair_table
 from supple.system import System
 from supple.xpbd.contact.frame_forces import FrameForces, Owners
@@ -33,8 +31,9 @@ REMOVED_PER_FRAME, NEAR, DEFAULT_THICKNESS = 0.05, 1.0, 0.05
 SKIN = 0.01
 
 # How often contacts of surfaces and of simple shapes are solved again in turn, where bodies are rigid: without an
-# elastic body between them, a push has to pass from one contact to the next within a substep.
-RIGID_PASSES = 2
+# elastic body between them, a push has to pass from one contact to the next within a substep. At least, and at most
+# while something has passed through something.
+RIGID_PASSES, MOST_RIGID_PASSES = 2, 40
 
 
 class Collisions:
@@ -73,14 +72,13 @@ class Collisions:
         )
         self.skin = SKIN * self.thickness
         self.contacts, self._dipped = 0, False
-        self._owners = _owners(system, self.obstacles, surfaces)
+        self._owners = _owners(system, self.obstacles, surfaces, rigid)
         self.forces = FrameForces(self._owners)
         self._smallest = math.inf
         self._dt = self._removed = 0.0
         count = len(self.obstacles.embedded)
         self._reach = np.zeros(count)
-        self._gathered, self._before = np.zeros((count, 3)), np.zeros((count, 3))
-        self._limits = np.zeros(count)
+        self._gathered = np.zeros((count, 3))
 
     def __bool__(self) -> bool:
         """Whether any contact is possible."""
@@ -163,35 +161,39 @@ class Collisions:
         """
         self.contacts, self._dipped = 0, False
         limit, self._removed = self._removed, 0.0
-        self._limits[:] = limit
         if self.surfaces is not None:
-            self._before[:] = self.obstacles.places(x_prev)
             self._count(self.surfaces.project(x, x_prev, (time - h, time), limit, parallel))
-            # What other bodies moved into an obstacle is no old overlap.
-            add_distances(self._before, self.obstacles.places(x_prev), self._limits)
         between = self.contacts
-        self._project_obstacles(x, x_prev, time, h)
-        if self.surfaces is not None and self.contacts > between:
-            for _ in range(RIGID_PASSES if self._any_rigid and between else 0):
+        self._project_obstacles(x, x_prev, time, h, limit)
+        if self.surfaces is not None:
+            most = MOST_RIGID_PASSES if self._any_rigid and between else 0
+            if self.contacts > between:
+                for _ in range(min(RIGID_PASSES, most)):
+                    self.project_again(x, x_prev, time, h)
+                # What obstacles push may have passed through other bodies.
+                self.surfaces.check_parted(x)
+            for _ in range(most):
+                if self.surfaces.parted:
+                    break
                 self.project_again(x, x_prev, time, h)
-            # What obstacles push may have passed through other bodies.
-            self.surfaces.check_parted(x, x_prev)
+                self.surfaces.check_parted(x)
         return self.contacts
 
     def project_again(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], time: float, h: float) -> int:
         """`project` for positions that have changed since, without a new search for contacts of surfaces."""
         self.contacts = 0 if self.surfaces is None else self.surfaces.project_again(x, x_prev, h)
         self._dipped = False
-        self._limits[:] = 0.0
-        self._project_obstacles(x, x_prev, time, h)
+        self._project_obstacles(x, x_prev, time, h, 0.0)
         return self.contacts
 
-    def _project_obstacles(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], time: float, h: float) -> None:
+    def _project_obstacles(
+        self, x: NDArray[np.float64], x_prev: NDArray[np.float64], time: float, h: float, limit: float
+    ) -> None:
         if self.obstacles:
             if any_beyond_reach(self.obstacles.places(x), self._gathered, self._reach):
                 self._gather_obstacles(x, (x - x_prev) / h, time)
             scales = (self.skin, NEAR * self.edge_length)
-            self._count(self.obstacles.project(x, x_prev, (time - h, time), self._limits, scales))
+            self._count(self.obstacles.project(x, x_prev, (time - h, time), limit, scales))
 
     @property
     def positions(self) -> NDArray[np.float64]:
@@ -203,20 +205,18 @@ class Collisions:
         """Whether nothing had passed through anything after the last `project`."""
         return (self.surfaces is None or self.surfaces.parted) and not self._dipped
 
-    def check_parted(self, x: NDArray[np.float64], begun: NDArray[np.float64], time: float) -> None:
-        """Take notice of what has passed through something from `begun` to x (n, 3) [m] at `time` [s]; see `parted`."""
+    def check_parted(self, x: NDArray[np.float64], time: float) -> None:
+        """Take notice of what has passed through something in the substep that ends at x (n, 3) [m], `time` [s]."""
         if self.surfaces is not None:
-            self.surfaces.check_parted(x, begun)
+            self.surfaces.check_parted(x)
         self._dipped = self.obstacles.rigid_point_inside(x, time)
 
-    def passed(
-        self, x: NDArray[np.float64], begun: NDArray[np.float64], labels: NDArray[np.integer]
-    ) -> NDArray[np.int64]:
+    def passed(self, x: NDArray[np.float64], labels: NDArray[np.integer]) -> NDArray[np.int64]:
         """Which surfaces passed through each other in the substep that was projected last.
 
         Parameters
         ----------
-        x, begun : (n, 3) at its end and at its beginning [m]; labels : (n,) of the vertices, one for each component
+        x : (n, 3) at its end [m]; labels : (n,) of the vertices, one for each component
 
         Returns
         -------
@@ -224,7 +224,7 @@ class Collisions:
         """
         if self.surfaces is None:
             return np.zeros((0, 2), dtype=np.int64)
-        return self.surfaces.component(labels)[self.surfaces.passed(x, begun)]
+        return self.surfaces.component(labels)[self.surfaces.passed(x)]
 
     def memory(self, x: NDArray[np.float64]) -> ContactMemory | None:
         """What the next frame needs beside positions and velocities; `x` (n, 3) are the final positions [m]."""
@@ -245,15 +245,7 @@ class Collisions:
         self._smallest = min(self._smallest, found[1])
 
 
-@njit(cache=True)
-def add_distances(x, y, out):
-    """Add the distances of points x and y (n, 3) to out (n,)."""
-    for i in range(len(x)):
-        d = subtract(row(x, i), row(y, i))
-        out[i] += math.sqrt(dot(d, d))
-
-
-def _owners(system: System, obstacles: ObstacleContacts, surfaces: ContactSurfaces) -> Owners:
+def _owners(system: System, obstacles: ObstacleContacts, surfaces: ContactSurfaces, rigid: RigidBodies) -> Owners:
     names = tuple(part.name for part in system.bodies) + tuple(str(o.name) for o in system.obstacles)
     vertex = obstacles.embedded.single
     # The points of soft bodies are their vertices; a control point is no point.
@@ -267,7 +259,7 @@ def _owners(system: System, obstacles: ObstacleContacts, surfaces: ContactSurfac
         of_vertices=obstacles.owner,
         rows=surfaces.rows,
         tested=points,
-        masses=np.where(vertex < 0, 1.0, system.masses[vertex]),
+        masses=np.where((vertex < 0) | (rigid.welded_to[vertex] >= 0), 1.0, system.masses[vertex]),
     )
 
 

@@ -25,6 +25,7 @@ from supple.xpbd.contact.friction import along_surface, friction_total
 from supple.xpbd.contact.impulses import (
     apply_impulse,
     compliance,
+    difference,
     is_rigid,
     relative,
     relative_before,
@@ -208,17 +209,18 @@ def push_rows(x, x_prev, movers, rows, h):
 
 
 @njit(cache=True)
-def solve_rows(x, x_prev, predicted, points, chosen, rows, h, limit, sweeps):
+def solve_rows(x, x_prev, predicted, begun, points, chosen, rows, h, limit, sweeps):
     """Sweep over the chosen rows, in place. Returns how many push, and the smallest gap before the substep (or inf).
 
-    An overlap that existed when the substep began is removed at both ends of the substep alike, by at most `limit`; the
-    impulse only prevents the gap from becoming smaller than it was then (pre-stabilization: Macklin
-    et al., "Unified Particle Physics", 2014, section 4.4).
+    An overlap that existed when the substep began is removed at both ends of the substep alike, by at most `limit`;
+    what such shifts have brought nearer than it was, at once. The impulse only prevents the gap from becoming smaller
+    than it was then (pre-stabilization: Macklin et al., "Unified Particle Physics", 2014, section 4.4).
 
     Parameters
     ----------
     x, x_prev : (n, 3) at the end and at the beginning of the substep [m]; x includes the forces' impulses
     predicted : (n, 3) the prediction, before forces and constraints [m]
+    begun : (n, 3) `x_prev` without the shifts of this substep [m]
     points : movers, see `Movers`; rates (n,) see `response_rates` [1/s^2]
     chosen : (c,) rows, in the order of a sweep
     rows : `ContactRows.described`; forces are those that x contains, and shares are set
@@ -242,7 +244,8 @@ def solve_rows(x, x_prev, predicted, points, chosen, rows, h, limit, sweeps):
         before = dot(relative_before(x_prev, movers, vertices, weights, e), n)
         smallest = min(smallest, before)
         total = shift_compliance(movers, vertices, weights, e)
-        old = min(offsets[e] - before, limit)
+        begun_gap = dot(difference(begun, vertices, weights, e), n)
+        old = min(offsets[e] - before, limit + max(0.0, begun_gap - before))
         if old > 0.0 and total > 0.0:
             s = old / total
             shift_both(x, x_prev, predicted, movers, vertices, weights, e, (s * n[0], s * n[1], s * n[2]))

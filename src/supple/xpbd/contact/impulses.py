@@ -30,8 +30,15 @@ def _combined(weights, e, p, q, r, s):
 
 
 @njit
+def difference(x, vertices, weights, e):
+    """sum c_i x_i of contact e at places x (n, 3) [m], from points (k, 4) and weights (k, 4)."""
+    p, q, r, s = vertices[e, 0], vertices[e, 1], vertices[e, 2], vertices[e, 3]
+    return _combined(weights, e, row(x, p), row(x, q), row(x, r), row(x, s))
+
+
+@njit
 def relative(x, movers, vertices, weights, e):
-    """sum c_i x_i of contact e at the end of the substep [m], from points (k, 4) and weights (k, 4)."""
+    """sum c_i x_i of contact e at the end of the substep, of places x (n, 3) without the motions of bodies [m]."""
     p, q, r, s = vertices[e, 0], vertices[e, 1], vertices[e, 2], vertices[e, 3]
     return _combined(weights, e, place(x, movers, p), place(x, movers, q), place(x, movers, r), place(x, movers, s))
 

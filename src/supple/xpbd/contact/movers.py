@@ -69,7 +69,9 @@ class MovedPoints:
         self._points, self._rigid = points, rigid
         count, bodies = len(points) + fixed, len(rigid)
         body = np.full(count, -1, dtype=np.int32)
-        body[: len(points)] = np.where(points.single < 0, rigid.of_vertex[points.vertices[points.start[:-1]]], -1)
+        first = points.vertices[points.start[:-1]]
+        body[: len(points)] = np.where(points.single < 0, rigid.of_vertex[first], rigid.welded_to[first])
+        inverse_masses[body >= 0] = 0.0
         self.movers = Movers(
             inverse_masses,
             body,

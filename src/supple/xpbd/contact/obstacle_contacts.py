@@ -80,6 +80,7 @@ class ObstacleContacts:
         self._loads, self._shares, self._places = np.zeros((1024, 3)), np.zeros(1024), np.zeros((1024, 4))
         self._any_load = False
         self._can_move = inverse_masses > 0.0
+        self._can_move[rigid.control] = False
         body = self._moved.movers.body
         if len(rigid):
             self._can_move |= (body >= 0) & ~rigid.held[body]
@@ -87,7 +88,7 @@ class ObstacleContacts:
         # Shapes, vertices and loads of the contacts of what sleeps.
         self._standing = _no_loads()
         self._rates = rates[self.embedded.vertices[self.embedded.start[:-1]]]
-        self._predicted = np.zeros((count, 3))
+        self._predicted, self._begun = np.zeros((count, 3)), np.zeros((count, 3))
         # Consecutive shapes with the same element function need one call.
         self._groups = []
         first = 0
@@ -188,6 +189,7 @@ class ObstacleContacts:
     def begin_substep(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> bool:
         """See `Collisions.begin_substep`."""
         self._moved.take(x, self._predicted)
+        self._moved.take(x_prev, self._begun)
         # What rests on a point approaches it in every substep by its fall; this is no impact.
         self._predicted[len(x) :] -= h * h * self._gravity
         if self._any_load:
@@ -220,22 +222,22 @@ class ObstacleContacts:
         x: NDArray[np.float64],
         x_prev: NDArray[np.float64],
         times: tuple[float, float],
-        limits: NDArray[np.float64],
+        limit: float,
         scales: tuple[float, float],
     ) -> tuple[int, float]:
         """Push vertices out at the end of the substep `times` = (beginning, end) [s]: contacts, smallest gap [m].
 
-        For `limits` and `scales` see `_project_shapes`.
+        For `limit` and `scales` see `_project_shapes`.
         """
         frames = tuple(self.shapes.placed(self.poses, time) for time in reversed(times))
         candidates = (self._starts, self._vertices, self._loads, self._shares, self._places)
         described = (candidates, self._arrays, self._rules, *frames)
         contacts, smallest = 0, math.inf
-        points, h = (self._predicted, self._rates, self._moved.movers), times[1] - times[0]
+        points, h = (self._predicted, self._rates, self._moved.movers, self._begun), times[1] - times[0]
         places, before = self._take(x, x_prev)
         for again in range(RIGID_SWEEPS if len(self._rigid) else 1):
             for _, push, first, last in self._groups:
-                found, gap = push(places, before, points, *described, first, last, h, limits, scales, again > 0)
+                found, gap = push(places, before, points, *described, first, last, h, limit, scales, again > 0)
                 if not again:
                     contacts += found
                     smallest = min(smallest, gap)

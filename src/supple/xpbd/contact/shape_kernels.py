@@ -75,17 +75,18 @@ def _find_candidates(x, reach, tested, shapes, rules, frames, starts, vertices, 
 
 
 def _project_shapes(
-    x, x_prev, points, candidates, shapes, rules, frames, frames_before, first, last, h, limits, scales, rigid_only
+    x, x_prev, points, candidates, shapes, rules, frames, frames_before, first, last, h, limit, scales, rigid_only
 ):
     """Push vertices out of the shapes [first, last), in place. Returns the number of contacts and the smallest gap.
 
     The gap is that before the substep, or inf. An overlap that existed when the substep began is removed at both ends
-    of the substep alike, by at most the limits; the push only prevents the gap from becoming smaller than it was then.
+    of the substep alike, by at most `limit`; what such shifts have brought nearer than it was, at once. The push only
+    prevents the gap from becoming smaller than it was then.
 
     Parameters
     ----------
     points : predicted (n, 3), positions before loads and constraints [m]; rates (n,), see `response_rates` [1/s^2];
-        movers, see `Movers`
+        movers, see `Movers`; begun (n, 3), `x_prev` without the shifts of this substep [m]
     candidates : starts (k + 1,), vertices (c,), as from `_find_candidates`; loads (c, 3), those that x contains, and
         shares (c,) of them for the next substep; see `ObstacleContacts`; places (c, 4) are set to the normal and to the
         gap that remains
@@ -93,11 +94,11 @@ def _project_shapes(
     rules : owner (n,), the body of a vertex; collide (b, k), friction (b, k), of each body with each shape
     frames, frames_before : (k, 4, 3) at the end and at the beginning of the substep
     h : length of the substep [s]
-    limits : (n,) the largest part of an old overlap that is removed at each vertex [m]
+    limit : the largest part of an old overlap that is removed at each vertex [m]
     scales : skin, the gap that is kept; near, gaps above this are not reported [m]
     rigid_only : whether points of rigid bodies are projected once more, and vertices are not
     """
-    predicted, rates, movers = points
+    predicted, rates, movers, begun = points
     starts, vertices, loads, shares, places = candidates
     parameters, moving = shapes
     owner, _, friction = rules
@@ -126,7 +127,10 @@ def _project_shapes(
             soft = softness(movers, movers.body[i], 1.0, cross(row(movers.arms, i), n)) if is_rigid else 1.0
             old = max(0.0, skin - gap_before)
             stays = rigid_only or (is_rigid and movers.loose[movers.body[i]] == 0.0)
-            shift = 0.0 if stays else min(old, limits[i])
+            begun_gap = gap_before
+            if old > 0.0:
+                _, begun_gap, _ = contact(numbers, _local(frames_before, k, row(begun, i)), s)
+            shift = 0.0 if stays else min(old, limit + max(0.0, begun_gap - gap_before))
             push = max(0.0, pushed + (skin - gap - old) / soft)
             carried = p  # position, at the beginning, of the obstacle's point that is now at p
             if moving[k]:

@@ -90,7 +90,8 @@ class SurfaceCollisions:
         self._edges = EdgePairs(surface_edges(s), s, rest, self._stitched)
         self._finder = PairFinder(n)
         self._x, self._before, self._gathered = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
-        self._way = np.zeros((n, 3))
+        # Where the substep began; `_before` also has the shifts that remove old overlaps.
+        self._begun, self._way = np.zeros((n, 3)), np.zeros((n, 3))
         # The ways of the points in the substep, when it was seen which pairs come near on them.
         self._looked = np.full((n, 3), np.inf), np.full((n, 3), np.inf)
         self._shapes = (self._x, s.point_piece, s.triangles, s.triangle_piece)
@@ -98,6 +99,7 @@ class SurfaceCollisions:
         self._predicted = np.zeros((n, 3))
         self._inverse_masses = s.inverse_masses.copy()
         self._moved = MovedPoints(s.embedded, len(s.fixed_points), rigid, self._inverse_masses)
+        self._free_masses = self._inverse_masses.copy()
         self._movers, self._rigid = self._moved.movers, rigid
         own = rates[s.embedded.vertices[s.embedded.start[:-1]]]
         self._points = (self._movers, np.concatenate([own, np.zeros(len(s.fixed_points))]))
@@ -139,7 +141,7 @@ class SurfaceCollisions:
         still = np.where(owner < len(asleep), asleep[np.minimum(owner, len(asleep) - 1)], True)
         np.logical_and(s.allowed, ~(still[:, None] & still), out=self._allowed)
         self._edges.choose(self._allowed)
-        self._inverse_masses[:] = np.where(still[s.point_piece], 0.0, s.inverse_masses)
+        self._inverse_masses[:] = np.where(still[s.point_piece], 0.0, self._free_masses)
         self._apart[:] = True
         for a, b in crossing:
             both = (owner[:, None] == a) & (owner == b)
@@ -163,6 +165,7 @@ class SurfaceCollisions:
         """See `Collisions.begin_substep`."""
         rows = self._rows
         self._moved.take(x, self._predicted)
+        self._moved.take(x_prev, self._begun)
         if len(self._rigid):
             # What rests on a point approaches it in every substep by its fall; this is no impact.
             self._predicted -= h * h * self._falling
@@ -186,6 +189,7 @@ class SurfaceCollisions:
         self._take(x, x_prev)
         s.place_obstacles(self.poses, times[1], self._x)
         s.place_obstacles(self.poses, times[0], self._before)
+        self._begun[len(s.rows) :] = self._before[len(s.rows) :]
         self._predicted[len(s.rows) :] = self._x[len(s.rows) :]
         allowed = (self._far, self._near, s.point_piece, self._all_share, self._drifts)
         if any_beyond_radii(self._x, self._before, self._gathered, *allowed, self._excursions):
@@ -216,16 +220,16 @@ class SurfaceCollisions:
         self._give(x, x_prev)
         return contacts
 
-    def check_parted(self, x: NDArray[np.float64], x_prev: NDArray[np.float64]) -> None:
-        """Take notice of what has passed through something since `project`, from x_prev to x (n, 3) [m]."""
-        self.parted = self.parted and not len(self.passed(x, x_prev))
+    def check_parted(self, x: NDArray[np.float64]) -> None:
+        """Take notice of what has passed through something in the substep that ends at x (n, 3) [m]."""
+        self.parted = not len(self.passed(x))
 
-    def passed(self, x: NDArray[np.float64], begun: NDArray[np.float64]) -> NDArray[np.int64]:
-        """(k, 2) the pieces of which one has passed through the other from `begun` to x (n, 3) [m]."""
-        self._take(x, begun)
-        if any(left_ways(*self._looked, points, 0.5 * self._slack) for points in (self._before, self._x)):
+    def passed(self, x: NDArray[np.float64]) -> NDArray[np.int64]:
+        """(k, 2) the pieces of which one has passed through the other in the substep that ends at x (n, 3) [m]."""
+        self._moved.take(x, self._x)
+        if left_ways(*self._looked, self._x, 0.5 * self._slack):
             self._look_near()
-        shapes = (self._x, self._before)
+        shapes = (self._x, self._begun)
         passed = np.zeros_like(self._apart)
         note_point_passages(*shapes, self._near_triangles, self._pieces, self._apart, self._stitched, passed)
         note_edge_passages(*shapes, self._pairs, self._near_pairs, self._edges.arrays[0], self._edge_rules, passed)
@@ -253,11 +257,11 @@ class SurfaceCollisions:
 
     def _look_near(self) -> None:
         """Set which listed pairs come as near in this substep that contacts may still make them meet."""
-        self._looked[0][:], self._looked[1][:] = self._before, self._x
-        np.subtract(self._x, self._before, out=self._way)
-        swept_boxes(self._before, self._way, self.surfaces.triangles, self._swept)
-        self._near_triangles = near_triangles(self._x, self._before, self._lists, self._swept, self._slack)
-        self._near_pairs = self._edges.swept(self._before, self._way, self._slack)
+        self._looked[0][:], self._looked[1][:] = self._begun, self._x
+        np.subtract(self._x, self._begun, out=self._way)
+        swept_boxes(self._begun, self._way, self.surfaces.triangles, self._swept)
+        self._near_triangles = near_triangles(self._x, self._begun, self._lists, self._swept, self._slack)
+        self._near_pairs = self._edges.swept(self._begun, self._way, self._slack)
 
     def _take(self, x: NDArray[np.float64], x_prev: NDArray[np.float64]) -> None:
         self._moved.take(x, self._x)
@@ -273,7 +277,8 @@ class SurfaceCollisions:
     def _solve(self, kind: int, h: float, limit: float) -> tuple[int, float]:
         """Project the chosen rows of one kind; returns what `solve_rows` does."""
         chosen, described = self._chosen[kind], self._rows.described
-        found = solve_rows(self._x, self._before, self._predicted, self._points, chosen, described, h, limit, SWEEPS)
+        places = (self._x, self._before, self._predicted, self._begun)
+        found = solve_rows(*places, self._points, chosen, described, h, limit, SWEEPS)
         note_depths(self._x, self._movers, chosen, described, self._depth[kind])
         self._settle()
         return found
@@ -281,9 +286,9 @@ class SurfaceCollisions:
     def _find_passages(self, kind: int, part: tuple[int, int], h: float) -> bool:
         """Let points and edges that have passed through something take part. Returns whether there are any."""
         s, described = self.surfaces, self._rows.described
-        points = (self._x, self._before, self._near_triangles, self._pieces, self._apart, part, self._stitched)
+        points = (self._x, self._begun, self._near_triangles, self._pieces, self._apart, part, self._stitched)
         passed = find_point_passages(*points, described, self._entered)
-        found = (self._x, self._before, self._pairs, self._near_pairs, self._edges.arrays[0], self._edge_rules)
+        found = (self._x, self._begun, self._pairs, self._near_pairs, self._edges.arrays[0], self._edge_rules)
         passed += find_edge_passages(*found, len(s.rows), kind, described)
         if passed:
             self._chosen[kind] = choose_rows(self._x, self._before, self._movers, described, len(s.rows), kind, h)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,12 +67,10 @@ def _sum_of(forces: Any, corners: int) -> SerialAndParallel:
     return serial_and_parallel(kernel_with(_sum, forces.py_func.__qualname__, _sum_chunk=compiled))
 
 
-CORNERS = 0
+if TYPE_CHECKING:  # `kernel_with` gives these names to each copy of `_sum_chunk`
+    CORNERS = 0
 
-
-def forces(X, V, k, data, g, h):
-    """Stands for the forces of one kind of elements in `_sum_chunk`."""
-    raise NotImplementedError
+    def forces(X, V, k, data, g, h): ...
 
 
 def _sum_chunk(motion, corners, counts, active, data, first, last, h, out, rates):

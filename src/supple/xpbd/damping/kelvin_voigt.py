@@ -112,7 +112,7 @@ class Damping:
         rows = touched[inverse_masses[touched] > 0.0]
         self._groups = vertex_groups(rows, self._placed, system.joined_components, system.components)
         self._masses = np.zeros(len(inverse_masses))
-        self._masses[:n] = system.masses
+        self._masses[:n] = system.masses if system.effective_masses is None else system.effective_masses
         self._motion = np.zeros((len(inverse_masses), 6))
         self._viscous = np.zeros((len(inverse_masses), 4))
         r, g = len(rows), len(self._groups.start) - 1

@@ -68,7 +68,7 @@ class RigidFallback:
         bounds : (m,) of the guard, minus infinity for tets that are not guarded
         time : end of the substep [s]
         groups : labels of components; -1 for an obstacle
-        most : the largest share a of the motion
+        most : the largest share a of the motion; 0: places relative to each other are those of `begun`
         """
         guarded, flat = bounds > 0.0, bounds < FLATTEST
         for group in groups:
@@ -78,10 +78,11 @@ class RigidFallback:
             mine = guarded & np.isin(self.tet_labels, group)
             tets = self.system.tets[mine]
             start = begun.copy()
-            start[rows] = previous[rows]
             # Contacts part what was too near at the beginning; without that, it would be held back for ever.
-            if not (volume_signs(start, tets) > 0.0).all():
-                start[rows] = begun[rows]
+            if most > 0.0:
+                start[rows] = previous[rows]
+                if not (volume_signs(start, tets) > 0.0).all():
+                    start[rows] = begun[rows]
             base = start.copy()
             base[rows] = self._rigid(points[rows, :3] + shift, start[rows] + shift, rows, held) - shift
             motion = np.zeros_like(base)

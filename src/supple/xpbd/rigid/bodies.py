@@ -48,6 +48,7 @@ class RigidBodies:
     numbers : (b,) of the bodies in the scene
     of_vertex : (n,) the rigid body of each vertex, or -1
     held : (b,) those that pins hold or move; joined : (b,) those with joints
+    welding : vertices of soft bodies that are points of these; welded_to : (n,) their rigid body, -1 for others
     """
 
     def __init__(self, system: System) -> None:
@@ -64,6 +65,16 @@ class RigidBodies:
         self.names = [part.name for part in parts]
         ends = {name for joint in system.scene.joints for name in (joint.first, joint.second)}
         self.joined = np.array([name in ends for name in self.names], dtype=np.bool_)
+        self.welding = system.welding
+        self.welded_to = np.full(len(system.masses), -1, dtype=np.int32)
+        self.welded_to[self.welding.vertices] = self.of_vertex[self.welding.control[:, 0]]
+        w = system.inverse_masses[self.welding.vertices]
+        # Over those of the control points: how an impulse that moves a welded vertex changes their velocities.
+        self._shares = np.where(w > 0.0, 1.0, 0.0) / np.where(w > 0.0, w, 1.0)
+        self._shares = self._shares[:, None] * self.welding.weights / system.masses[self.welding.control]
+        self._placed = np.zeros((len(self.welding), 3))
+        self._impulses, self._begun = np.zeros((len(self.welding), 3)), np.zeros((len(self.welding), 3))
+        self._joined_masses = system.masses[self.welding.control[:, 0]]
 
     def __len__(self) -> int:
         return len(self.control)
@@ -77,6 +88,37 @@ class RigidBodies:
         U, _, Vt = np.linalg.svd(np.einsum("bki,bkj->bij", corners - centers, self._rest))
         U[:, :, 2] *= np.sign(np.linalg.det(U) * np.linalg.det(Vt))[:, None]
         x[self.control] = np.einsum("bij,bkj->bki", U @ Vt, self._rest) + centers
+        self.welding.follow(x)
+
+    def begin_frame(self, velocities: NDArray[np.float64]) -> None:
+        """Begin to add up the impulses on welded vertices, which have the velocities (n, 3) of all."""
+        self._impulses[:], self._begun = 0.0, velocities[self.welding.vertices]
+
+    def follow(self, points: NDArray[np.float64], velocities: NDArray[np.float64]) -> None:
+        """Put welded vertices where their bodies are, in place: points (n, 4), velocities (n, 3)."""
+        if len(self.welding):
+            self.welding.follow(points[:, :3])
+            self.welding.follow(velocities)
+            self._placed[:] = points[self.welding.vertices, :3]
+
+    def gather(self, points: NDArray[np.float64], velocities: NDArray[np.float64], h: float) -> None:
+        """Change the velocities of bodies by the impulses that moved their welded vertices since `follow`, in place.
+
+        An impulse J at a vertex acts on the control points as w_k J, so that its moment is that at the vertex.
+        """
+        if len(self.welding):
+            moved = (points[self.welding.vertices, :3] - self._placed) / h
+            changes = self._shares[:, :, None] * moved[:, None, :]
+            np.add.at(velocities, self.welding.control, changes)
+            self._impulses += self._joined_masses[:, None] * changes.sum(axis=1)
+            self._placed[:] = points[self.welding.vertices, :3]
+
+    def welded_impulses(self, masses: NDArray[np.float64], velocities: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(s, 3) what the bodies gave in the frame to their welded vertices of masses (s,) [kg m/s].
+
+        These need it to move as they do, and pass on what constraints gave to them.
+        """
+        return masses[:, None] * (velocities[self.welding.vertices] - self._begun) - self._impulses
 
     def settle(self, points: NDArray[np.float64], velocities: NDArray[np.float64]) -> None:
         """Make places rigid that something has moved freely; the momenta of velocities (n, 3) remain, in place."""
@@ -84,6 +126,7 @@ class RigidBodies:
             before = points[:, :3].copy()
             self.place(points[:, :3])
             _keep_momenta(before, points, velocities, self.control)
+            self.follow(points, velocities)
 
     def advance(
         self,
@@ -103,6 +146,7 @@ class RigidBodies:
         """
         if len(self):
             _advance(points, previous, velocities, self.control, h)
+            self.follow(points, velocities)
 
     def spins(self, x: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
         """(b,) how fast the bodies turn at positions x and velocities v (n, 3) [rad/s]."""

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.joints.at_state import coordinates_at, initial_joint_details, refuse_apart, reported
-from supple.joints.functions import derivatives, values
+from supple.joints.functions import derivatives, turns, values
 from supple.joints.geometry import ANGLE, JointGeometry, Vectors
 from supple.joints.laws import Law, Laws, laws_of, wrapped
 from supple.numerics.kernel_cache import njit
@@ -81,7 +81,7 @@ class JointProjection:
         bodies[g.alone, 1] = -1
         self._bodies = bodies
         self._free = np.zeros((len(rigid) + 1, 1), dtype=np.bool_)
-        self._angles = g.functions == ANGLE
+        self._angles = turns(g.functions)
         self._g = np.zeros(len(g.functions))
         self._total = np.zeros((len(g.joints), 6))
         self._motors = np.zeros(len(g.joints))
@@ -158,8 +158,9 @@ class JointProjection:
 
     def hinge_angles(self) -> dict[str, float]:
         """As of `State`."""
-        along = zip(self.geometry.joints, self.geometry.along, strict=True)
-        return {str(joint.name): float(self._g[row]) for joint, row in along if row >= 0 and self._angles[row]}
+        g = self.geometry
+        along = zip(g.joints, g.along, strict=True)
+        return {str(joint.name): float(self._g[row]) for joint, row in along if row >= 0 and g.functions[row] == ANGLE}
 
     def fields(self, x: Floats, time: float) -> Mapping[str, Any]:
         """What the details of a frame that ended at world positions x (n, 3) have; forces are means over it."""
@@ -185,12 +186,11 @@ class JointProjection:
         g, out = self.geometry, np.zeros(len(self))
         apart = np.linalg.norm(_at(g, g.differences, x, g.poses(time)), axis=1)
         np.maximum.at(out, g.differences.joint, apart / g.sizes[g.differences.joint])
-        joint = g.triples[0].joint
+        joint = g.arguments[0].joint
         np.maximum.at(out, joint[g.across], np.abs(self._g[g.across]) / g.units[g.across])
-        rows = g.along[g.along >= 0]
-        low, high = g.limits[joint[rows]].T
-        beyond = np.maximum(np.maximum(low - self._g[rows], self._g[rows] - high), 0.0)
-        np.maximum.at(out, joint[rows], beyond / g.units[rows])
+        low, high = g.limits.T
+        beyond = np.maximum(np.maximum(low - self._g, self._g - high), 0.0)
+        np.maximum.at(out, joint, beyond / g.units)
         return out
 
     def apart(self, x: Floats, time: float, tolerated: float) -> list[tuple[float, str]]:
@@ -206,7 +206,7 @@ class JointProjection:
         if not len(g.functions):
             return np.zeros(0)
         poses = g.poses(time)
-        found = values(g.functions, np.stack([_at(g, column, x, poses) for column in g.triples], axis=1))
+        found = values(g.functions, np.stack([_at(g, column, x, poses) for column in g.arguments], axis=1))
         return np.where(self._angles, self._g + wrapped(found - self._g), found)
 
     def _rows(
@@ -226,12 +226,12 @@ class JointProjection:
         low, high = [np.full(count, -np.inf)], [np.full(count, np.inf)]
         compliance = [np.zeros(count)]
         if len(g.functions):
-            at = derivatives(g.functions, np.stack([_at(g, column, x, poses) for column in g.triples], axis=1))
+            at = derivatives(g.functions, np.stack([_at(g, column, x, poses) for column in g.arguments], axis=1))
             now = np.where(self._angles, self._g + wrapped(at.value - self._g), at.value)
-            C = np.stack([column.coefficients for column in g.triples], axis=1)
+            C = np.stack([column.coefficients for column in g.arguments], axis=1)
             by_corner = np.einsum("sap,sai->spi", C, at.gradient)
             gradients.append(by_corner[laws.function])
-            joint.append(g.triples[0].joint[laws.function])
+            joint.append(g.arguments[0].joint[laws.function])
             soft = ~laws.adapts & (laws.k > 0.0)
             k = np.where(soft, laws.k, 1.0)
             missing.append(now[laws.function] - laws.start + np.where(soft, multipliers / k, 0.0))
@@ -270,7 +270,7 @@ class JointProjection:
     def _note(self, rows: _Rows, forces: Floats, laws: Laws, first_law: int, x: Floats) -> None:
         """Add the forces (r,) of a substep to those of the frame, about the joints' points."""
         g = self.geometry
-        joint = np.concatenate([np.repeat(g.differences.joint, 3), g.triples[0].joint[laws.function]])
+        joint = np.concatenate([np.repeat(g.differences.joint, 3), g.arguments[0].joint[laws.function]])
         actions = np.zeros((len(self), 6))
         np.add.at(actions, joint, forces[:, None] * rows.actions[:, 0])
         places = _at(g, g.centers, x, g.poses(0.0))

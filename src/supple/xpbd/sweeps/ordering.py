@@ -119,4 +119,6 @@ def reordered(system: System, layout: Layout) -> System:
         points=replace(points, vertices=new[points.vertices]),
         components=np.ascontiguousarray(system.components[old]),
         stitching=system.stitching.renumbered(new),
+        welding=system.welding.renumbered(new),
+        effective_masses=None if system.effective_masses is None else system.effective_masses[old],
     )

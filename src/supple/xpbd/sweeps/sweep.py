@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,12 +65,10 @@ def _sweep_of(project: Any, corners: int) -> SerialAndParallel:
     return serial_and_parallel(kernel_with(_sweep, name, _sweep_chunk=chunk))
 
 
-CORNERS = 0
+if TYPE_CHECKING:  # `kernel_with` gives these names to each copy of `_sweep_chunk`
+    CORNERS = 0
 
-
-def project(X, data, g, h):
-    """Stands for the projection of a constraint set in `_sweep_chunk`."""
-    raise NotImplementedError
+    def project(X, data, g, h): ...
 
 
 def _sweep_chunk(points, corners, counts, active, data, first, last, h):

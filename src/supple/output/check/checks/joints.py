@@ -1,4 +1,4 @@
-"""The check of joints: what they hold stays together, coordinates stay in their limits, motors in their force."""
+"""The check of joints: they hold, their coordinates and rates stay in their limits, their motors in their force."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from supple.output.check.frame_check import FrameCheck
 from supple.output.check.snapshot import Scene, Snapshot
@@ -33,6 +34,7 @@ class Joints(FrameCheck):
         of_solver = _IMPLICIT if (recording.solver or "").startswith("Implicit") else _OTHERS
         given = self.settings.max_joint_error
         self._most = of_solver if given is None else given
+        self._last: dict[str, tuple[float, float]] = {}
         self._frames = [_Frame.of(self.scene, joint) for joint in recording.joints]
         kept = {field.name: field.keys or () for field in recording.details.fields}
         self._recorded = {
@@ -46,6 +48,11 @@ class Joints(FrameCheck):
             recorded = self._of_report("joint_coordinates", joint.name, at.number)
             error, coordinate = frame.error(at, recorded)
             where = joint.name
+            before, last = self._last.get(joint.name, (at.time, coordinate))
+            self._last[joint.name] = at.time, coordinate
+            if np.isfinite(joint.max_velocity):
+                too_far = (abs(coordinate - last) - joint.max_velocity * (at.time - before)) / frame.unit
+                error, where = (too_far, f"{joint.name}, its rate") if too_far > error else (error, where)
             differs = 0.0 if recorded is None else abs(coordinate - recorded) / frame.unit
             if differs > max(error, self._most):
                 error, where = differs, f"{joint.name}, its recorded coordinate"
@@ -112,11 +119,22 @@ class _Frame:
             coordinate = angle + _TURN * round((middle - angle) / _TURN)
         elif kind == "ball":
             coordinate = float(np.arccos(np.clip(first[0] @ second[0], -1.0, 1.0)))
+            errors.append(self._twisted_beyond(second @ first.T))
         else:
             errors.append(float(turned.max()))
         low, high = self.joint.limits
         errors.append(max(low - coordinate, coordinate - high, 0.0) / self.unit)
         return max(errors), coordinate
+
+    def _twisted_beyond(self, R: NDArray[np.float64]) -> float:
+        """How far the twist of the rotation R (3, 3), in the joint's axes, is beyond its limits [rad]."""
+        low, high = self.joint.twist_limits
+        if not np.isfinite([low, high]).any():
+            return 0.0
+        about, _, _, w = Rotation.from_matrix(R).as_quat()
+        twist = 2.0 * np.arctan2(about, w)
+        twist -= _TURN * np.round(twist / _TURN)
+        return float(max(low - twist, twist - high, 0.0))
 
     def _side(self, at: Snapshot, k: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The linear part (3, 3) of the motion of a side from its own coordinates, and where the joint's point is."""

@@ -79,12 +79,13 @@ def _lines(joint: RecordedJoint, size: float) -> Sides:
     second: list[Any] = []
     if joint.kind in ("hinge", "slider"):
         second.append((p - _AXIS * size * e, p + _AXIS * size * e))
-    if joint.kind == "hinge" and limited:
-        ends = np.linspace(low, min(high, low + 2.0 * np.pi), _ARC)
+    turn = joint.limits if joint.kind == "hinge" else joint.twist_limits
+    if np.isfinite(turn).all():
+        ends = np.linspace(turn[0], min(turn[1], turn[0] + 2.0 * np.pi), _ARC)
         rim = p + _LIMIT * size * np.column_stack([np.cos(ends), np.sin(ends)]) @ across
         second += [*pairwise(rim), (p, rim[0]), (p, rim[-1])]
         first.append((p, p + 1.2 * _LIMIT * size * across[0]))
-    elif joint.kind == "slider" and limited:
+    if joint.kind == "slider" and limited:
         tick = _POINT * size * across[0]
         second += [(p + end * e - tick, p + end * e + tick) for end in (low, high)]
     elif joint.kind == "ball" and limited:

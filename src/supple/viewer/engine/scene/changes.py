@@ -140,7 +140,7 @@ def _(command: commands.Grab, live: LiveScene) -> None:
     if len(others) >= limits.MOST_GRABS:
         raise CommandError(f"there are {len(others)} grabs already; release one first")
     spring = make_spring(command, live.setup.scene, part, live.system.masses, live.state.positions)
-    live.adopt(replace(live.setup, grabs={**others, command.grab: spring}))
+    live.grab({**others, command.grab: spring})
 
 
 @change.register
@@ -154,7 +154,7 @@ def _(command: commands.MoveGrab, live: LiveScene) -> None:
 def _(command: commands.ReleaseGrab, live: LiveScene) -> None:
     grabs = dict(live.setup.grabs)
     if grabs.pop(command.grab, None) is not None:
-        live.adopt(replace(live.setup, grabs=grabs))
+        live.grab(grabs)
 
 
 @change.register

@@ -19,6 +19,7 @@ from supple.state import State, Status, StepReport
 from supple.system import BodyRange, Solver, System, initial_state
 from supple.viewer.engine.scene.grab_spring import GrabSpring
 from supple.viewer.engine.scene.new_bodies import moved_apart
+from supple.viewer.engine.scene.pulls import grabbed, workspace_for
 from supple.viewer.engine.scene.pusher import Pusher
 from supple.viewer.engine.scene.solvers import kind_of
 from supple.viewer.protocol.live_source import LiveSource
@@ -113,10 +114,21 @@ class LiveScene:
             self.generation += 1
         self.revision += 1
         self.setup, self.state, self.system, self.workspace = setup, state, system, workspace
-        self._anchors = {held.pin: held.anchors for held in system.pins} | {
-            soft.target: soft.anchors for soft in system.soft_targets
-        }
+        self._anchors = _anchors_of(system)
         self.solvers[kind_of(setup.solver)] = setup.solver
+
+    def grab(self, grabs: Mapping[int, GrabSpring]) -> None:
+        """Continue with these grabs, by number. Does not compute again what does not depend on grabs, as `adopt` does.
+
+        Raises
+        ------
+        SuppleError : where this is impossible; then nothing is changed.
+        """
+        setup = replace(self.setup, grabs=grabs)
+        system = grabbed(self.system, setup.whole_scene(), grabs)
+        workspace = workspace_for(setup.solver, system, self.workspace)
+        self.setup, self.system, self.workspace = setup, system, workspace
+        self._anchors = _anchors_of(system)
 
     def adopt_checked(self, setup: Setup, state: State | None = None, anchors: Anchors | None = None) -> None:
         """The same as `adopt`, after a trial step: a solver that allows no intersection may be unable to take a step.
@@ -213,6 +225,11 @@ class LiveScene:
         gravity = np.asarray(self.source.scene.gravity)
         size = np.linalg.norm(gravity)
         return -gravity / size if size > 0.0 else np.array([0.0, 1.0, 0.0])
+
+
+def _anchors_of(system: System) -> Anchors:
+    pins = {held.pin: held.anchors for held in system.pins}
+    return pins | {soft.target: soft.anchors for soft in system.soft_targets}
 
 
 def _anchored(system: System, kept: Anchors) -> System:

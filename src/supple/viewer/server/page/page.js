@@ -44,7 +44,8 @@
     return held.get(hover);
   };
   addEventListener("pointerdown", (event) => hold(onCanvas(event) && event.button === 0), true);
-  for (const kind of ["pointerup", "pointercancel", "blur"]) addEventListener(kind, () => hold(false), true);
+  for (const kind of ["pointerup", "pointercancel"]) addEventListener(kind, () => hold(false), true);
+  addEventListener("blur", () => hold(false));  // of the window: without capture, not that of a button which loses the focus to the canvas
 
   const send = (uuid, value) =>
     suppleViewer.mutable.current.sendMessage({ type: "GuiUpdateMessage", uuid, updates: { value } });

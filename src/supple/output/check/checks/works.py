@@ -1,0 +1,186 @@
+"""The works of pins and of contact, computed anew from positions and from recorded contact forces.
+
+Between two frames a force f moves its vertex by d. The trapezoid (f + f') d / 2 is of second order in the time between
+frames; half of |f' d - f d| is how far it may be off, while a force changes in one direction. What the frames leave
+open adds up, and a recorded work may differ by it.
+
+The force of pins is what balances the elastic and stitch forces, weight and inertia on pinned vertices. With E(x) the
+sum of both energies, the elastic part is the derivative of E along the motion of the pinned vertices alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from supple.output.check.checks.budgets import energy_scale, moved_and_height, recorded_works
+from supple.output.check.frame_check import FrameCheck
+from supple.output.check.report import CheckResult
+from supple.output.check.snapshot import Snapshot
+
+# Of a difference quotient of the energy, as a share of the motion between two frames.
+_STEP = 1e-6
+# What else may act on pinned vertices, up to a bound that is known.
+_BESIDE_PINS = {"contact", "friction", "damping", "flow", "growth"}
+# Contact forces are recorded in single precision.
+_SINGLE = 1e-6
+
+
+class Works(FrameCheck):
+    """The recorded works of pins and of contact are those of the frames.
+
+    Attributes
+    ----------
+    frames : of each frame, for each of pins and contact that are judged, the work [J] and how far it may be off [J]
+    """
+
+    name = "works"
+    good = "those of pins and contact agree within {worst} of the energies, beyond what frames leave open"
+    bad = "differ by {worst} of the energies from those of the frames"
+
+    def begin(self) -> None:
+        recording = self.scene.recording
+        self._works = recorded_works(recording) or {}
+        self._open = {"pins": self._pins_are_open(), "contact": self._contact_is_open()}
+        self._parts = [name for name, why in self._open.items() if why is None]
+        if not self._works:
+            self.why_not = "the recording does not contain works"
+        elif self.settings.every > 1:
+            self.why_not = "works are computed from one frame to the next only"
+        elif not self._parts:
+            self.why_not = "; ".join(f"{name}: {why}" for name, why in self._open.items())
+        self._implicit = (recording.solver or "").startswith("Implicit")
+        self._last: Snapshot | None = None
+        self._forces = np.zeros_like(recording.rest_positions)
+        self._first: Snapshot | None = None
+        self._rows: list[tuple[int, float, float]] = []
+        self.frames: list[list[tuple[float, float]]] = []
+
+    def _pins_are_open(self) -> str | None:
+        recording, physics = self.scene.recording, self.scene.recording.physics
+        others = sorted(set(self._works) - _BESIDE_PINS - {"pins"})
+        rigid = np.zeros(len(recording.rest_positions), dtype=bool)
+        for body in recording.bodies:
+            rigid[body.vertices] = body.rigid
+        if "pins" not in self._works:
+            return "nothing is pinned"
+        if physics is None or not all(physics.knows_law(k, body.tets) for k, body in enumerate(recording.bodies)):
+            return "the recording does not contain the law of a body"
+        if physics.stitches and recording.stitches.laws is None:
+            return "the recording does not contain the laws of its stitches"
+        if rigid[recording.pinned_vertices].any():
+            return "a pinned body is rigid"
+        if others:
+            return f"the forces of {', '.join(others)} on pinned vertices are not recorded"
+        return "welds may act on pinned vertices" if recording.welds else None
+
+    def _contact_is_open(self) -> str | None:
+        if not any(field.name == "contact_force" for field in self.scene.recording.fields):
+            return "forces on vertices were not recorded (fields=['contact_force'])"
+        if any(body.rigid or body.skin is not None for body in self.scene.recording.bodies):
+            return "forces on rigid bodies and skins are not recorded"
+        return None
+
+    def see(self, at: Snapshot) -> None:
+        last, forces = self._last, self._forces
+        if self._open["contact"] is None:
+            forces = self.scene.recording[at.number].contact_force.values_of_all
+        found = [(0.0, 0.0)] * len(self._parts)
+        if last is not None:
+            moved = at.positions - last.positions
+            on_vertices = self._of_contact(last, at, forces, moved)
+            of = {"contact": (float(on_vertices[0].sum()), float(on_vertices[1].sum())), "pins": (0.0, 0.0)}
+            if "pins" in self._parts:
+                of["pins"] = self._of_pins(last, at, moved, on_vertices)
+            found = [of[name] for name in self._parts]
+        self._first = self._first or at
+        self._rows.append((at.number, *moved_and_height(at, self._first)))
+        self.frames.append(found)
+        self._last, self._forces = at, forces
+
+    def _of_contact(
+        self, last: Snapshot, at: Snapshot, forces: NDArray[np.float64], moved: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(n,) the works of contact [J], and how far they may be off."""
+        rounding = _SINGLE * np.linalg.norm(moved, axis=1)
+        sizes, after = np.linalg.norm(forces, axis=1), np.einsum("ij,ij->i", forces, moved)
+        if not self._implicit:
+            # Each force is a mean over the frame, in which velocities differ from their mean by half of their change.
+            apart = 0.5 * self.scene.recording.dt * np.linalg.norm(at.velocities - last.velocities, axis=1)
+            return after, sizes * (apart + rounding)
+        before = np.einsum("ij,ij->i", self._forces, moved)
+        return 0.5 * (before + after), 0.5 * np.abs(after - before) + sizes * rounding
+
+    def _of_pins(
+        self,
+        last: Snapshot,
+        at: Snapshot,
+        moved: NDArray[np.float64],
+        of_contact: tuple[NDArray[np.float64], NDArray[np.float64]],
+    ) -> tuple[float, float]:
+        """The work of pins from a frame to the next [J], and how far it may be off."""
+        recording = self.scene.recording
+        rows = np.unique(recording.pinned_vertices)
+        if not moved[rows].any():
+            return 0.0, 0.0
+        along = np.zeros_like(moved)
+        along[rows] = moved[rows]
+        m = recording.masses[rows]
+        speeds = [np.einsum("ij,ij->i", of.velocities[rows], of.velocities[rows]) for of in (last, at)]
+        kinetic = 0.5 * float(m @ (speeds[1] - speeds[0]))
+        before, after = (_slope(each, along) for each in (last, at))
+        work = 0.5 * (before + after) + kinetic - float(m @ moved[rows] @ recording.gravity)
+        # An implicit step takes m (v' - v) v', which differs from the change of kinetic energy by the second term.
+        change = at.velocities[rows] - last.velocities[rows]
+        left_open = 0.5 * abs(after - before) + 0.5 * float(m @ np.einsum("ij,ij->i", change, change))
+        if self._implicit:  # XPBD counts no viscous forces on pins
+            left_open += self._of_viscous_forces(last, at, moved, after - before)
+        if self._open["contact"] is None:
+            work -= float(of_contact[0][rows].sum())
+            left_open += float(of_contact[1][rows].sum())
+        else:
+            details = recording[at.number].report.details
+            for sums in (getattr(details, f"{kind}_forces", {}) for kind in ("contact", "friction")):
+                for body in recording.bodies:
+                    farthest = np.linalg.norm(along[body.vertices], axis=1).max()
+                    left_open += float(np.linalg.norm(sums.get(body.name, 0.0)) * farthest)
+        return work, left_open if np.isfinite(work) else np.inf
+
+    def _of_viscous_forces(self, last: Snapshot, at: Snapshot, moved: NDArray[np.float64], on_pins: float) -> float:
+        """At most what viscous forces on pinned vertices do [J]; on_pins : the change of the slope along their motion.
+
+        Viscous forces are proportional to K d, with the stiffness K of the tets and all motions d. Their share that
+        pins work against is a^T K d / d^T K d, with the motions a of pins alone. Both are changes of slopes.
+        """
+        dissipated = abs(self._works["damping"][at.number]) if "damping" in self._works else 0.0
+        if dissipated == 0.0:
+            return 0.0
+        before, after = (_slope(each, moved) for each in (last, at))
+        return dissipated * max(1.0, abs(on_pins / (after - before)) if after != before else 1.0)
+
+    def result(self) -> CheckResult:
+        if self.why_not is not None or not self._rows:
+            return super().result()
+        recording = self.scene.recording
+        numbers, stored, height = np.array(self._rows).T
+        rows = numbers.astype(int)
+        for k, name in enumerate(self._parts):
+            names = ("contact", "friction") if name == "contact" else ("pins",)
+            recorded = sum((self._works[each] for each in names if each in self._works), np.zeros(len(recording)))
+            work, left_open = np.array([found[k] for found in self.frames]).T
+            apart = np.abs(np.cumsum(np.where(np.isfinite(left_open), recorded[rows] - work, 0.0)))
+            excess = np.maximum(apart - np.cumsum(np.where(np.isfinite(left_open), left_open, 0.0)), 0.0)
+            shares = excess / (energy_scale(self.scene, stored, height) + np.cumsum(np.abs(recorded))[rows])
+            for number, share in zip(rows, shares, strict=True):
+                failed = not share <= self.settings.max_energy_gain
+                self.tally.see(recording[int(number)], float(share), failed, f"work of {name}" if failed else "")
+        return super().result()
+
+
+def _slope(at: Snapshot, along: NDArray[np.float64]) -> float:
+    """The derivative of the elastic and stitch energy along a motion (n, 3) of the vertices [J]."""
+    there = replace(at, positions=at.positions + _STEP * along)
+    energies = [(each.elastic_energy or 0.0) + (each.stitch_energy or 0.0) for each in (at, there)]
+    return (energies[1] - energies[0]) / _STEP
