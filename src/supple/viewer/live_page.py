@@ -85,6 +85,7 @@ class LivePage:
         if error is not None:
             self.panel.time.show_error(error)
         elif self._ended:  # it was started again, and does not know what to send
+            self.panel.time.restarted()
             self.panel.request_view(self.stage.options)
         self._ended = error is not None
         snapshot = self._simulation.latest()

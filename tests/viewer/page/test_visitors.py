@@ -78,6 +78,15 @@ def test_the_frame_rate_decreases_where_the_server_falls_behind(server, until, m
     assert intervals[-1] == FASTEST
 
 
+def test_pictures_go_on_after_one_that_raises(server, until):
+    from supple.viewer.drawing.frame_rate import FrameRate
+
+    frame_rate = FrameRate(server)
+    with pytest.raises(ValueError, match="no picture"), frame_rate.sending():
+        raise ValueError("no picture")
+    until(frame_rate.may_send)
+
+
 def test_fine_skins_follow_their_tets_without_a_python_loop(fake):
     """The work for every picture: 100k vertices, with bounded work for each and without a Python loop."""
     from supple.mesh.skin import Embedding

@@ -94,6 +94,10 @@ class TimeControls:
         self._overlay.show("start", "")
         self.play.disabled = self.speed.handle.disabled = True
 
+    def restarted(self) -> None:
+        """The simulation runs again. Called by the thread that calls `show_error`: both set the same buttons."""
+        self.play.disabled = self.speed.handle.disabled = False
+
     def _restart(self, event: Any) -> None:
         """Called in a thread: a start takes seconds."""
         if event.client is None or self._controller.simulation.error is None:
@@ -103,7 +107,6 @@ class TimeControls:
         self._overlay.show("warning", "The simulation starts again.")
         try:
             self._controller.simulation.restart()
-            self.play.disabled = self.speed.handle.disabled = False
         except SuppleError as error:
             notify(event.client, "Not started", str(error), "red")
         finally:

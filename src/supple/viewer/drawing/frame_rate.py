@@ -40,16 +40,18 @@ class FrameRate:
 
     @contextmanager
     def sending(self) -> Iterator[None]:
-        """A block that draws one picture."""
+        """A block that draws one picture. One that raises does not stop the pictures after it."""
         began = time.monotonic()
         self._asked = began
-        yield
-        drawn = time.monotonic() - began
         try:
-            self._loop.call_soon_threadsafe(self._processed, began, drawn)
-        except RuntimeError:  # the server has stopped
-            self._answered = self._asked
-        self._next = began + self.interval
+            yield
+        finally:
+            drawn = time.monotonic() - began
+            try:
+                self._loop.call_soon_threadsafe(self._processed, began, drawn)
+            except RuntimeError:  # the server has stopped
+                self._answered = self._asked
+            self._next = began + self.interval
 
     def _processed(self, asked: float, drawn: float) -> None:
         """Called in the loop of the server after the picture has been processed."""

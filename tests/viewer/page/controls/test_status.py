@@ -1,5 +1,6 @@
 """What the page tells about the simulation: its speed, its end, long steps, energies, sensors."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -48,6 +49,25 @@ def test_a_simulation_that_has_ended_is_started_again(live, fake, visitor, recei
     visitor.press(live.panel.time.play)
     until(lambda: fake.received == [Play()])
     assert fake.starts == 1
+
+
+def test_a_restart_while_the_end_is_displayed(live, fake, visitor, until, monkeypatch):
+    """The page's thread has read the error, and displays it only after the restart."""
+    part, show_error = live.panel.overlay.part, live.panel.time.show_error
+    fake.error = "the end"
+    until(lambda: "has ended" in part("warning"))
+
+    def late(error: str) -> None:
+        visitor.press(live.panel.time.restart)
+        until(lambda: fake.starts == 1)
+        time.sleep(0.2)  # what the restart does after it
+        show_error(error)
+        monkeypatch.setattr(live.panel.time, "show_error", show_error)
+
+    monkeypatch.setattr(live.panel.time, "show_error", late)
+    until(lambda: live.panel.time.show_error == show_error)
+    fake.show(time=0.0)
+    until(lambda: part("warning") == "" and not live.panel.time.play.disabled)
 
 
 def test_the_progress_of_a_long_step(live, fake, until, monkeypatch):
