@@ -72,6 +72,28 @@ def a_ball_falls_on_the_floor_and_a_lift():
     assert not ball.modifiers
 
 
+def a_paddle_turns_a_ball_aside():
+    scene = empty_scene()
+    scene.supple.floor_height = 0.0
+    ball = mesh_object(
+        bpy.ops.mesh.primitive_ico_sphere_add, "ball", radius=0.1, subdivisions=3, location=(0.2, 0, 0.11)
+    )
+    ball.supple.role, ball.supple.tets = "SOFT", 300
+    paddle = mesh_object(bpy.ops.mesh.primitive_cube_add, "paddle", size=1, location=(0, -0.2, 0.15))
+    paddle.scale = (0.8, 0.04, 0.25)
+    paddle.supple.role = "OBSTACLE"
+    paddle.rotation_euler = (0.2, 0.0, 0.0)
+    paddle.keyframe_insert("rotation_euler", frame=1)
+    paddle.rotation_euler = (0.2, 0.0, math.radians(50))
+    paddle.keyframe_insert("rotation_euler", frame=FRAMES + 1)
+    assert bpy.ops.supple.simulate() == {"FINISHED"}
+    for frame in (1, FRAMES // 2, FRAMES + 1):
+        x = world_vertices(ball, frame)
+        local = (x - np.array(paddle.matrix_world)[:3, 3]) @ np.linalg.inv(np.array(paddle.matrix_world)[:3, :3]).T
+        assert local[:, 1].min() > 0.48, (frame, local[:, 1].min())  # in front of the paddle's side
+    assert world_vertices(ball, FRAMES + 1)[:, 1].mean() > 0.1
+
+
 def an_armature_drives_pins():
     empty_scene()
     bpy.ops.object.armature_add(location=(0, 0, 1))
@@ -134,7 +156,12 @@ def expect(text):
 
 bpy.ops.preferences.addon_install(filepath=str(Path(sys.argv[-1]).resolve()))
 assert bpy.ops.preferences.addon_enable(module="supple_addon") == {"FINISHED"}
-for test in (a_ball_falls_on_the_floor_and_a_lift, an_armature_drives_pins, mistakes_are_named):
+for test in (
+    a_ball_falls_on_the_floor_and_a_lift,
+    a_paddle_turns_a_ball_aside,
+    an_armature_drives_pins,
+    mistakes_are_named,
+):
     test()
     print(f"passed: {test.__name__}")
 bpy.ops.preferences.addon_disable(module="supple_addon")

@@ -55,7 +55,7 @@ class SuppleObject(bpy.types.PropertyGroup):
         items=[
             ("NONE", "None", "Not part of the simulation"),
             ("SOFT", "Soft body", "Its closed surface is filled with tetrahedra"),
-            ("OBSTACLE", "Obstacle", "Soft bodies collide with it; it may be animated by its location"),
+            ("OBSTACLE", "Obstacle", "Soft bodies collide with it; its location and rotation may be animated"),
         ],
     )
     youngs: FloatProperty(name="Young's modulus [Pa]", default=5e4, min=1.0, soft_max=1e7)

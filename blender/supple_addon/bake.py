@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
+from scipy.spatial.transform import Rotation
 
 import supple as sp
 
@@ -119,9 +120,12 @@ def carried(points: NDArray[np.float64], path: NDArray[np.float64]) -> NDArray[n
 
 def _obstacle(described: dict[str, Any], folder: Path, dt: float) -> sp.TriangleObstacle:
     with np.load(folder / described["arrays"]) as arrays:
-        surface, path = sp.SurfaceMesh(arrays["vertices"], arrays["triangles"]), arrays["path"]
-    shifts = path - path[0]
-    motion = sp.Keyframes(dt * np.arange(len(path)), shifts) if np.abs(shifts).max() > 0.0 else None
+        surface = sp.SurfaceMesh(arrays["vertices"], arrays["triangles"])
+        shifts, turns = arrays["path"] - arrays["path"][0], Rotation.from_matrix(arrays["turns"]).as_rotvec()
+        pivot = arrays["path"][0]
+    still = np.abs(shifts).max() == 0.0 and np.abs(turns).max() < 1e-6  # of matrices in single precision
+    times = dt * np.arange(len(shifts))
+    motion = None if still else sp.Keyframes(times, shifts, pivot=pivot, rotations=turns)
     return sp.TriangleObstacle(surface=surface, name=described["name"], friction=described["friction"], motion=motion)
 
 

@@ -25,7 +25,7 @@ def write(context, folder):
 
     Positions are in metres in Blender's world, where z is up. `arrays_K.npz` of a body holds its vertices (n, 3) in the
     first frame, its triangles (m, 3), which vertices are pinned (n,), and where those are in each frame (f, k, 3);
-    that of an obstacle its vertices, triangles and place in each frame (f, 3).
+    that of an obstacle its vertices and triangles, and its place (f, 3) and rotation (f, 3, 3) in each frame.
     """
     scene = context.scene
     things = [thing for thing in scene.objects if thing.type == "MESH" and thing.supple.role != "NONE"]
@@ -58,9 +58,14 @@ def write(context, folder):
         )
     hard = []
     for k, thing in enumerate(obstacles, start=len(bodies)):
-        world = np.array(thing.matrix_world)
-        vertices = _vertices(thing.data) @ world[:3, :3].T + places[thing.name][0]
-        np.savez(folder / f"arrays_{k}.npz", vertices=vertices, triangles=_triangles(thing), path=places[thing.name])
+        matrices = places[thing.name]
+        np.savez(
+            folder / f"arrays_{k}.npz",
+            vertices=_vertices(thing.data) @ matrices[0, :3, :3].T + matrices[0, :3, 3],
+            triangles=_triangles(thing),
+            path=matrices[:, :3, 3],
+            turns=_turns(thing, matrices[:, :3, :3]),
+        )
         hard.append({"name": thing.name, "arrays": f"arrays_{k}.npz", "friction": thing.supple.friction})
     settings = scene.supple
     whole = {
@@ -124,7 +129,7 @@ def _deforms(thing):
 
 
 def _motions(context, bodies, obstacles):
-    """Where the vertices of bodies would be without a simulation (f, n, 3), and where obstacles are (f, 3), by name."""
+    """By name: where vertices of bodies were without a simulation (f, n, 3), and matrices of obstacles (f, 4, 4)."""
     scene = context.scene
     current = scene.frame_current
     hidden = [
@@ -137,7 +142,6 @@ def _motions(context, bodies, obstacles):
         modifier.show_viewport = False
     paths = {thing.name: [] for thing in bodies}
     places = {thing.name: [] for thing in obstacles}
-    turns = {}
     try:
         for frame in range(scene.frame_start, scene.frame_end + 1):
             scene.frame_set(frame)
@@ -150,18 +154,20 @@ def _motions(context, bodies, obstacles):
                 world = np.array(evaluated.matrix_world)
                 paths[thing.name].append(x @ world[:3, :3].T + world[:3, 3])
             for thing in obstacles:
-                world = np.array(thing.evaluated_get(graph).matrix_world)
-                first = turns.setdefault(thing.name, world[:3, :3])
-                if np.abs(world[:3, :3] - first).max() > 1e-6 * np.abs(first).max():
-                    raise JobError(
-                        f"{thing.name}: an obstacle can be animated by its location only; keep its rotation and scale"
-                    )
-                places[thing.name].append(world[:3, 3])
+                places[thing.name].append(np.array(thing.evaluated_get(graph).matrix_world))
     finally:
         for modifier in hidden:
             modifier.show_viewport = True
         scene.frame_set(current)
     return {name: np.array(x) for name, x in paths.items()}, {name: np.array(x) for name, x in places.items()}
+
+
+def _turns(thing, matrices):
+    """The rotation (f, 3, 3) of an obstacle since the first frame, from its matrices (f, 3, 3)."""
+    turns = matrices @ np.linalg.inv(matrices[0])
+    if np.abs(turns @ turns.transpose(0, 2, 1) - np.eye(3)).max() > 1e-4:
+        raise JobError(f"{thing.name}: an obstacle can move and turn; keep its scale")
+    return turns
 
 
 def _vertices(mesh):

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import supple as sp
 from supple.numerics.geometry.triangle_tree import TriangleTree
@@ -162,3 +163,24 @@ def test_points_are_carried_by_the_motion():
     np.testing.assert_allclose(capsule.carried(at[0], 0.5, 1.25), at[1], atol=1e-14)
     still = sp.Capsule()
     assert still.carried(points, 0.0, 1.0) is points
+
+
+def test_keyframes_turn_about_any_axes():
+    """Each keyframe is met; between two, the rotation is the shortest one, at constant rate, about the pivot."""
+    vectors, pivot = [(0.3, 0, 0), (0.3, 1.2, -0.5), (0, 0, 3.0), (0, 0, -3.0)], np.array([1.0, 2.0, 3.0])
+    shifts = np.random.default_rng(0).normal(size=(4, 3))
+    motion = sp.Keyframes([0, 1, 3, 4], shifts, rotations=vectors, pivot=pivot)
+    for time, vector, shift in zip([0, 1, 3, 4], vectors, shifts, strict=True):
+        R, t = motion.pose(time)
+        np.testing.assert_allclose(R, Rotation.from_rotvec(vector).as_matrix(), atol=1e-14)
+        np.testing.assert_allclose(R @ pivot + t, pivot + shift, atol=1e-14)
+    turns = [(motion.pose(a)[0].T @ motion.pose(b)[0]) for a, b in ((1.0, 1.5), (1.5, 2.5), (2.5, 3.0))]
+    angles = [Rotation.from_matrix(turn).magnitude() for turn in turns]
+    np.testing.assert_allclose(angles, angles[0] * np.array([1, 2, 1]), rtol=1e-12)
+    assert Rotation.from_matrix(motion.pose(3)[0].T @ motion.pose(4)[0]).magnitude() == pytest.approx(2 * np.pi - 6)
+    # The first and last keyframes stay; one axis is the same as angles.
+    np.testing.assert_array_equal(motion.pose(9.0)[0], motion.pose(4.0)[0])
+    one = sp.Keyframes([0, 1], rotations=[(0, 0, 0), (0, 1.5, 0)], pivot=pivot)
+    other = sp.Keyframes([0, 1], angles=[0, 1.5], axis=(0, 1, 0), pivot=pivot)
+    for a, b in zip(one.pose(0.3), other.pose(0.3), strict=True):
+        np.testing.assert_allclose(a, b, atol=1e-14)

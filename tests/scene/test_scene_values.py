@@ -137,6 +137,9 @@ BAD_KEYFRAMES = [
     ({"times": [0, 1], "angles": [0]}, r"angles has shape \(1,\)"),
     ({"times": [0], "angles": [1], "axis": (0, 0, 0)}, "axis has no length"),
     ({"times": [0]}, "give displacements, angles, or both"),
+    ({"times": [0], "angles": [1], "rotations": [[0, 0, 1]]}, "angles and rotations are both given"),
+    ({"times": [0, 1], "rotations": [[0, 0, 1]]}, r"rotations has shape \(1, 3\)"),
+    ({"times": [0], "rotations": [[0, 0, np.nan]]}, "rotations holds a value that is not finite"),
 ]
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
 
 from supple.errors import SceneError
 from supple.scene.rotation import rotation_matrix
@@ -25,8 +26,10 @@ class Keyframes:
     ----------
     times : (k,) strictly increasing [s]
     displacements : (k, 3) [m], or None for no translation
-    angles : (k,) [rad], or None for no rotation
+    angles : (k,) [rad] about one axis, or None; they may count whole turns
     axis, pivot : (3,) axis of the rotation: through `pivot` [m] along `axis`
+    rotations : (k, 3) in place of angles: rotation vectors about `pivot` [rad]. From one keyframe to the next, the
+        shortest rotation is taken at constant rate (Shoemake, "Animating rotation with quaternion curves", 1985).
 
     Raises
     ------
@@ -38,6 +41,7 @@ class Keyframes:
     angles: ArrayLike | None = None
     axis: ArrayLike = (0.0, 0.0, 1.0)
     pivot: ArrayLike = (0.0, 0.0, 0.0)
+    rotations: ArrayLike | None = None
 
     def __post_init__(self) -> None:
         times = self._array("times", self.times, (-1,))
@@ -47,8 +51,10 @@ class Keyframes:
         if np.any(np.diff(times) <= 0.0):
             at = int(np.flatnonzero(np.diff(times) <= 0.0)[0]) + 1
             raise SceneError(f"Keyframes: times[{at}] = {times[at]:g} s does not come after {times[at - 1]:g} s")
-        if self.displacements is None and self.angles is None:
+        if self.displacements is None and self.angles is None and self.rotations is None:
             raise SceneError("Keyframes: give displacements, angles, or both")
+        if self.angles is not None and self.rotations is not None:
+            raise SceneError("Keyframes: angles and rotations are both given; give one of them")
         displacements = np.zeros((k, 3)) if self.displacements is None else self.displacements
         angles = np.zeros(k) if self.angles is None else self.angles
         object.__setattr__(self, "times", times)
@@ -60,6 +66,8 @@ class Keyframes:
             raise SceneError("Keyframes: axis has no length; give a direction such as [0, 0, 1]")
         object.__setattr__(self, "axis", axis / length)
         object.__setattr__(self, "pivot", self._array("pivot", self.pivot, (3,)))
+        if self.rotations is not None:
+            object.__setattr__(self, "rotations", self._array("rotations", self.rotations, (k, 3)))
 
     @staticmethod
     def _array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
@@ -73,12 +81,23 @@ class Keyframes:
 
     def pose(self, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Rotation (3, 3) and translation (3,) [m] at `time`: x -> R x + t."""
-        times, angles, displacements = np.asarray(self.times), np.asarray(self.angles), np.asarray(self.displacements)
-        axis, pivot = np.asarray(self.axis), np.asarray(self.pivot)
-        angle = np.interp(time, times, angles)
+        times, displacements, pivot = np.asarray(self.times), np.asarray(self.displacements), np.asarray(self.pivot)
         shift = np.array([np.interp(time, times, displacements[:, k]) for k in range(3)])
-        R = rotation_matrix(angle * axis)
+        R = self._rotation(time)
         return R, pivot - R @ pivot + shift
+
+    def _rotation(self, time: float) -> NDArray[np.float64]:
+        times = np.asarray(self.times)
+        if self.rotations is None:
+            return rotation_matrix(np.interp(time, times, np.asarray(self.angles)) * np.asarray(self.axis))
+        rotations = np.asarray(self.rotations)
+        place = float(np.interp(time, times, np.arange(len(times))))
+        before = int(place)
+        begin = Rotation.from_rotvec(rotations[before])
+        if place == before:
+            return begin.as_matrix()
+        turn = (begin.inv() * Rotation.from_rotvec(rotations[before + 1])).as_rotvec()
+        return (begin * Rotation.from_rotvec((place - before) * turn)).as_matrix()
 
 
 Motion = Keyframes | Callable[[float], ArrayLike] | None

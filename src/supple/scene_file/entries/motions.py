@@ -17,6 +17,9 @@ class KeyframesModel(Model):
     angles: list[Number] | None = Field(default=None, description="one per time [rad]")
     axis: Vector = Field(default=[0.0, 0.0, 1.0], description="axis of the angles")
     pivot: Vector = Field(default=[0.0, 0.0, 0.0], description="a point on that axis [m]")
+    rotations: list[Vector] | None = Field(
+        default=None, description="in place of angles: rotation vectors about the pivot, one per time [rad]"
+    )
 
 
 def built_motion(described: KeyframesModel | None) -> Keyframes | None:
