@@ -140,3 +140,19 @@ def test_names_of_a_module_and_constants_count(monkeypatch):
     before = reached_code(integration.first_lost.py_func)
     monkeypatch.setattr(integration, "FARTHEST", 128.0)
     assert reached_code(integration.first_lost.py_func) != before
+
+
+@njit
+def doubled(x):
+    return 2.0 * x
+
+
+@njit(cache=True)
+def doubled_twice(x):
+    return doubled(doubled(x))
+
+
+def test_a_function_that_kernels_call_can_be_called_from_python_too():
+    assert doubled_twice(1.5) == 6.0
+    assert doubled(1.5) == 3.0
+    assert doubled(np.ones(2)).tolist() == [2.0, 2.0]

