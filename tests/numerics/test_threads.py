@@ -1,10 +1,13 @@
-"""Locks of Numba's threads in forked processes."""
+"""The number of Numba's threads, and their locks in forked processes."""
 
 import os
 import subprocess
 import sys
 
+import numba
 import pytest
+
+from supple.numerics.threads import is_alone, numba_threads
 
 KILLED = """
 import os
@@ -33,3 +36,18 @@ print("goes on")
 def test_a_forked_process_that_is_killed_holds_no_lock_of_others():
     done = subprocess.run([sys.executable, "-c", KILLED], capture_output=True, text=True, timeout=60)
     assert done.stdout == "goes on\n", done.stderr
+
+
+@pytest.mark.skipif(numba.config.NUMBA_NUM_THREADS < 2, reason="there is one thread")  # pyright: ignore
+def test_one_thread_is_known_without_a_question_until_the_block_ends():
+    before = numba.get_num_threads(), is_alone()
+    with numba_threads(1):
+        assert is_alone()
+        with numba_threads(2):
+            assert not is_alone()
+            assert numba.get_num_threads() == 2
+        with numba_threads(1):
+            assert is_alone()
+        assert is_alone()
+        assert numba.get_num_threads() == 1
+    assert (numba.get_num_threads(), is_alone()) == before

@@ -17,6 +17,7 @@ class Clock:
 
     seconds: dict[str, float] = field(default_factory=lambda: defaultdict(float))
     start: float = 0.0
+    _spans: dict[str, _Span] = field(default_factory=dict)
 
     def restart(self) -> None:
         """Begin a step."""
@@ -24,8 +25,11 @@ class Clock:
         self.start = perf_counter()
 
     def of(self, name: str) -> AbstractContextManager[None]:
-        """Count the time of a block under a name."""
-        return _Span(self.seconds, name)
+        """Count the time of a block under a name; no block of that name may be in it."""
+        span = self._spans.get(name)
+        if span is None:
+            span = self._spans[name] = _Span(self.seconds, name)
+        return span
 
     def shares(self) -> dict[str, float]:
         """Seconds since the step began, of each of `PARTS` and of all else, named "other"."""

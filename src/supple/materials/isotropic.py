@@ -41,7 +41,7 @@ gradient = dispatch("gradient", [energy.gradient for energy in STRETCH_ENERGIES]
 curvature = dispatch("curvature", [energy.curvature for energy in STRETCH_ENERGIES], UNKNOWN_SIX)
 quotients = dispatch("quotients", [energy.quotients for energy in STRETCH_ENERGIES], UNKNOWN_SIX)
 volume_term = dispatch("volume_term", [energy.volume_term for energy in STRETCH_ENERGIES], UNKNOWN_THREE)
-_STABLE = STRETCH_ENERGIES.index(stable_neo_hookean.FUNCTIONS)
+STABLE = STRETCH_ENERGIES.index(stable_neo_hookean.FUNCTIONS)
 _OF_STRETCHES = np.array([energy.density_of_stretches for energy in STRETCH_ENERGIES])
 
 
@@ -71,23 +71,29 @@ def stress(U, s, V, kind, mu, lam):
 
 
 @njit(error_model="numpy")
+def stable_piola(F, mu, lam):
+    """P = mu F + (lam (J - 1) - mu) cof F of Stable Neo-Hookean material, which needs no stretches."""
+    c = lam * shape_and_volume(F)[1] - mu
+    a, b, d = F[0:3], F[3:6], F[6:9]
+    u, v, w = cross(b, d), cross(d, a), cross(a, b)
+    return (
+        mu * a[0] + c * u[0],
+        mu * a[1] + c * u[1],
+        mu * a[2] + c * u[2],
+        mu * b[0] + c * v[0],
+        mu * b[1] + c * v[1],
+        mu * b[2] + c * v[2],
+        mu * d[0] + c * w[0],
+        mu * d[1] + c * w[1],
+        mu * d[2] + c * w[2],
+    )
+
+
+@njit(error_model="numpy")
 def first_piola(F, kind, mu, lam):
-    """P of one F, nine numbers; of Stable Neo-Hookean material mu F + (lam (J - 1) - mu) cof F, without stretches."""
-    if kind == _STABLE:
-        c = lam * shape_and_volume(F)[1] - mu
-        a, b, d = F[0:3], F[3:6], F[6:9]
-        u, v, w = cross(b, d), cross(d, a), cross(a, b)
-        return (
-            mu * a[0] + c * u[0],
-            mu * a[1] + c * u[1],
-            mu * a[2] + c * u[2],
-            mu * b[0] + c * v[0],
-            mu * b[1] + c * v[1],
-            mu * b[2] + c * v[2],
-            mu * d[0] + c * w[0],
-            mu * d[1] + c * w[1],
-            mu * d[2] + c * w[2],
-        )
+    """P of one F, nine numbers."""
+    if kind == STABLE:
+        return stable_piola(F, mu, lam)
     U, s, V = decompose(F)
     return stress(U, s, V, kind, mu, lam)
 

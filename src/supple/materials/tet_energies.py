@@ -8,7 +8,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from supple.materials.isotropic import density, energy_density, hessian_block, principal_hessian, stress
+from supple.materials.isotropic import (
+    STABLE,
+    density,
+    energy_density,
+    hessian_block,
+    principal_hessian,
+    stable_piola,
+    stress,
+)
 from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import load_mat, mat_mul, mat_mul_transposed, transpose
 from supple.numerics.svd3 import svd3 as decompose
@@ -116,8 +124,8 @@ def put_hessian(U, A, alpha, beta, V, B, volume, out, e):
 
 @njit(parallel=True, cache=True, error_model="numpy")
 def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, energies, gradients, hessians):
-    """Energies (m,), gradients (m, 4, 3) and, with `second`, Hessians (m, 12, 12) of all tets from one decomposition
-    of each F.
+    """Energies (m,), gradients (m, 4, 3) and, with `second`, Hessians (m, 12, 12) of all tets from at most one
+    decomposition of each F, which takes most of the time.
 
     Parameters
     ----------
@@ -127,8 +135,12 @@ def element_models(x, tets, Dm_inv, volumes, kind, mu, lam, second, project, ene
     """
     for e in prange(len(tets)):
         F = deformation_gradient(x, tets, Dm_inv, e)
-        U, s, V = decompose(F)
         B = load_mat(Dm_inv, e)
+        if kind[e] == STABLE and not second:
+            energies[e] = volumes[e] * density(STABLE, F, (0.0, 0.0, 0.0), mu[e], lam[e])
+            put_gradient(stable_piola(F, mu[e], lam[e]), B, volumes[e], gradients, e)
+            continue
+        U, s, V = decompose(F)
         energies[e] = volumes[e] * density(kind[e], F, s, mu[e], lam[e])
         put_gradient(stress(U, s, V, kind[e], mu[e], lam[e]), B, volumes[e], gradients, e)
         if second:

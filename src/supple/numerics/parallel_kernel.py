@@ -12,6 +12,8 @@ import numba
 from numba.core.dispatcher import Dispatcher
 from numba.np.ufunc.parallel import threading_layer
 
+from supple.numerics.threads import is_alone
+
 
 class ParallelKernel:
     """Two compiled forms of one loop, with the same bits. A call takes the one that is right at that moment.
@@ -34,7 +36,7 @@ class ParallelKernel:
         update_wrapper(self, function)
 
     def __call__(self, *arguments: Any) -> Any:
-        if not _threads.allowed() or not _threads.lock.acquire(blocking=False):
+        if is_alone() or not _threads.allowed() or not _threads.lock.acquire(blocking=False):
             return self.serial(*arguments)
         try:
             return self.parallel(*arguments)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
@@ -27,25 +28,39 @@ def one_thread(alone: bool) -> AbstractContextManager[None]:
 def numba_threads(count: int | None) -> AbstractContextManager[None]:
     """Run Numba's parallel kernels on `count` threads; None leaves the number as it is.
 
-    Within another one of the same number it costs less than a microsecond: Numba's own call takes longer than a small
-    kernel.
+    Where one thread is set already it costs less than a microsecond: Numba's own question for the number takes a lock
+    of processes, and longer than a small kernel.
     """
-    return _UNCHANGED if count is None or count == numba.get_num_threads() else _Threads(count)
+    return _UNCHANGED if count is None or (count == 1 and _present.alone) else _Threads(count)
 
 
+def is_alone() -> bool:
+    """Whether the calling thread has set its number of threads to one by the functions above."""
+    return _present.alone
+
+
+class _Present(threading.local):
+    alone = False
+
+
+_present = _Present()
 _UNCHANGED = nullcontext()
 
 
 class _Threads(AbstractContextManager[None]):
     def __init__(self, count: int) -> None:
-        self.count, self.before = count, 0
+        self.count, self.before, self.alone_before = count, 0, False
 
     def __enter__(self) -> None:
-        self.before = numba.get_num_threads()
-        numba.set_num_threads(self.count)
+        self.before, self.alone_before = numba.get_num_threads(), _present.alone
+        if self.count != self.before:
+            numba.set_num_threads(self.count)
+        _present.alone = self.count == 1
 
     def __exit__(self, *error: object) -> None:
-        numba.set_num_threads(self.before)
+        _present.alone = self.alone_before
+        if self.count != self.before:
+            numba.set_num_threads(self.before)
 
 
 def _forget_the_inherited_lock() -> None:

@@ -45,10 +45,14 @@ def largest_step(
 
     The points may be moved by step * way in rounded numbers. The pair is the first of those with the least step.
     """
-    step, k = _first_point(points, way, mesh.triangles, candidates.vertex_triangle)
-    limit = Limit(step, "vertex-triangle", _pair(candidates.vertex_triangle[k])) if k >= 0 else Limit(1.0)
-    step, k = _first_edge(points, way, mesh.edges, candidates.edge_edge, limit.step)
-    return Limit(step, "edge-edge", _pair(candidates.edge_edge[k])) if k >= 0 else limit
+    limit = Limit(1.0)
+    if len(candidates.vertex_triangle):
+        step, k = _first_point(points, way, mesh.triangles, candidates.vertex_triangle)
+        limit = Limit(step, "vertex-triangle", _pair(candidates.vertex_triangle[k])) if k >= 0 else limit
+    if len(candidates.edge_edge):
+        step, k = _first_edge(points, way, mesh.edges, candidates.edge_edge, limit.step)
+        limit = Limit(step, "edge-edge", _pair(candidates.edge_edge[k])) if k >= 0 else limit
+    return limit
 
 
 def largest_step_in_pieces(finder: CandidateFinder, points: NDArray[np.float64], way: NDArray[np.float64]) -> Limit:

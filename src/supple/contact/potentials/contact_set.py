@@ -70,6 +70,8 @@ class ContactSet:
         vertex_triangle, edge_edge : (k, 2), (l, 2) all pairs that may be nearer than `REACH` dhat
         known : the weights that do not depend on x
         """
+        if not len(vertex_triangle) and not len(edge_edge):
+            return _NOTHING
         mesh, dhat, reach = self._mesh, self.dhat, REACH * self.dhat
         triangles, edges = mesh.triangles, mesh.edges
         with threads_for(len(vertex_triangle) + len(edge_edge), _PARALLEL_FROM):
@@ -130,3 +132,6 @@ def _empty(count: int) -> Contacts:
         np.empty(count),
         np.empty(count),
     )
+
+
+_NOTHING = Found(_empty(0), np.inf, KnownWeights.none(), np.zeros(0, dtype=np.int64))

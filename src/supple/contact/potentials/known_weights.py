@@ -48,12 +48,19 @@ class KnownWeights(NamedTuple):
     def with_planes(self, codes: NDArray[np.int64]) -> KnownWeights:
         """With no weight for pairs that count with a plane, but for those with these codes (m,)."""
         lost = np.flatnonzero((self.triangles >= 0) & (self.weights > 0.0))
-        lost = lost[~np.isin(self.codes[lost], codes)] if len(lost) else lost
+        if not len(lost):
+            return self
+        lost = lost[~_are_among(self.codes[lost], np.sort(codes))]
         if not len(lost):
             return self
         weights = self.weights.copy()
         weights[lost] = 0.0
         return self._replace(weights=weights)
+
+
+def _are_among(codes: NDArray[np.int64], ascending: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(k,) which of the codes (k,) are among others (m,), in ascending order."""
+    return np.searchsorted(ascending, codes, "right") > np.searchsorted(ascending, codes, "left")
 
 
 @njit(error_model="numpy")

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.search.candidates import Candidates
-from supple.contact.search.pair_kernels import motion_of_owners, pairs_within
+from supple.contact.search.pair_kernels import covers
 from supple.contact.search.surface_trees import Rule, SurfaceTrees
 from supple.contact.surface.contact_mesh import ContactMesh
 
@@ -78,9 +78,9 @@ class _KeptList:
         self._wide: Candidates | None = None
         self._begin = self._way = np.zeros((0, 3))
         self._wide_margin = 0.0
-        owners = len(mesh.collide)
-        self._means, self._deviations, self._boxes = np.empty((owners, 3)), np.empty(owners), np.empty((owners, 6))
-        self._possible = bool(rule.allowed.any()) and len(mesh.triangles) > 0
+        self._owners = len(mesh.collide)
+        with_points = np.bincount(mesh.owner, minlength=self._owners) > 0  # half-spaces have none
+        self._possible = bool(rule.allowed[with_points][:, with_points].any()) and len(mesh.triangles) > 0
         self._nothing = Candidates(np.zeros((0, 2), np.int32), np.zeros((0, 2), np.int32))
 
     def find(self, begin: NDArray[np.float64], end: NDArray[np.float64]) -> Candidates:
@@ -119,7 +119,7 @@ class _KeptList:
 
     def _drift(self, way: NDArray[np.float64]) -> NDArray[np.float64]:
         """(s, 3) the mean of the way over each owner."""
-        owner, count = self._mesh.owner, len(self._means)
+        owner, count = self._mesh.owner, self._owners
         counts = np.maximum(np.bincount(owner, minlength=count), 1)
         means = np.stack([np.bincount(owner, weights=way[:, j], minlength=count) / counts for j in range(3)], axis=1)
         return means[owner]
@@ -129,15 +129,11 @@ class _KeptList:
         self._near = self._wide.nearer_than(self._mesh, points, self._dhat + 2.0 * margin)
         self._reference, self._margin = points.copy(), margin
 
-    def _covers(self, *ends: NDArray[np.float64]) -> bool:
-        """Whether `_near` has all candidates while points move straight between the ends."""
-        self._boxes[:, :3], self._boxes[:, 3:] = np.inf, -np.inf
-        moved = []
-        for x in ends:
-            motion_of_owners(x, self._reference, self._mesh.owner, self._boxes, self._means, self._deviations)
-            moved.append((self._means.copy(), self._deviations.copy()))
-        limit = 2.0 * self._margin
-        return all(pairs_within(self._boxes, *each, self._rule.allowed, self._dhat, limit) for each in moved)
+    def _covers(self, begin: NDArray[np.float64], end: NDArray[np.float64] | None = None) -> bool:
+        """Whether `_near` has all candidates at `begin`, and while points move straight from there to `end`."""
+        there, limit = begin if end is None else end, 2.0 * self._margin
+        owner, allowed = self._mesh.owner, self._rule.allowed
+        return covers(begin, there, end is not None, self._reference, owner, allowed, self._dhat, limit)
 
 
 def _distance_from_way(x: NDArray[np.float64], begin: NDArray[np.float64], way: NDArray[np.float64]) -> float:

@@ -234,7 +234,27 @@ def sort_pairs(found, room, counts, size):
 
 
 @njit(cache=True, error_model="numpy")
-def motion_of_owners(x, begin, owner, boxes, means, deviations):
+def covers(begin, end, two_ends, reference, owner, allowed, gap, limit):
+    """Whether, at any moment of a straight way, pairs nearer than `gap` were nearer than `gap + limit` at `reference`.
+
+    Parameters
+    ----------
+    begin, end, reference : (s, 3); two_ends : whether there is a way; otherwise `end` is not read
+    owner : (s,); allowed : (p, p) which owners may touch
+    """
+    owners = len(allowed)
+    boxes = np.empty((owners, 6))
+    boxes[:, :3], boxes[:, 3:] = np.inf, -np.inf
+    means, deviations = np.empty((2, owners, 3)), np.empty((2, owners))
+    _motion_of_owners(begin, reference, owner, boxes, means[0], deviations[0])
+    if two_ends:
+        _motion_of_owners(end, reference, owner, boxes, means[1], deviations[1])
+    within = _pairs_within(boxes, means[0], deviations[0], allowed, gap, limit)
+    return within and (not two_ends or _pairs_within(boxes, means[1], deviations[1], allowed, gap, limit))
+
+
+@njit(error_model="numpy")
+def _motion_of_owners(x, begin, owner, boxes, means, deviations):
     """How points moved since `begin` (s, 3): of each owner the box, the mean, and the largest deviation from the mean.
 
     Parameters
@@ -265,8 +285,8 @@ def motion_of_owners(x, begin, owner, boxes, means, deviations):
         deviations[k] = math.sqrt(deviations[k])
 
 
-@njit(cache=True, error_model="numpy")
-def pairs_within(boxes, means, deviations, allowed, gap, limit):
+@njit(error_model="numpy")
+def _pairs_within(boxes, means, deviations, allowed, gap, limit):
     """Whether no two owners that may touch have moved by more than `limit` with respect to each other.
 
     Owners whose boxes are farther than `gap` apart may have moved by any amount. False where something is not finite.

@@ -27,7 +27,8 @@ class Barrier(ContactPotential):
     stiffness: float
 
     def value(self, x: NDArray[np.float64]) -> float:
-        return barrier_energy(self.collisions.at(x), self.collisions.dhat, self.stiffness)
+        contacts = self.collisions.at(x)
+        return barrier_energy(contacts, self.collisions.dhat, self.stiffness) if len(contacts.kinds) else 0.0
 
     def add_gradient(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
         contacts = self.collisions.at(x)

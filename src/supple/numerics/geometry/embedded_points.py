@@ -91,10 +91,7 @@ class EmbeddedPoints:
 
     def add_forces(self, forces: NDArray[np.float64], out: NDArray[np.float64]) -> None:
         """Add W^T forces, of forces (s, 3) on the points, to `out` (n, 3)."""
-        if self.are_vertices:
-            out[self.vertices] += forces
-        else:
-            _spread(forces, self.start, self.vertices, self.weights, out)
+        _spread(forces, self.start, self.vertices, self.weights, out)
 
 
 @njit(cache=True, error_model="numpy")
