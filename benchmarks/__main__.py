@@ -2,6 +2,7 @@
 
 from benchmarks import (
     automatic_substeps,
+    bear_pile,
     candidate_search,
     contact_scenes,
     hanging_beam,
@@ -24,6 +25,7 @@ if __name__ == "__main__":
     implicit_scaling.main()
     candidate_search.main()
     contact_scenes.main()
+    bear_pile.main((5, 10))
     quadratic_tets.main()
     rigid_bodies.main()
     live.main()

@@ -26,16 +26,17 @@ def alternate(programs: dict[str, Callable[[], dict]], rounds: int) -> dict[str,
     return best
 
 
-def run_json(python: str | Path, script: Path, *arguments: object, threads: int | None = None) -> dict:
-    """Run a script that prints one JSON line at the end, and return it."""
+def run_json(python: str | Path, script: Path | str, *arguments: object, threads: int | None = None) -> dict:
+    """Run a script, or a module of this name, that prints one JSON line at the end, and return it."""
     environment = dict(os.environ)
     if threads is not None:
         environment["NUMBA_NUM_THREADS"] = str(threads)
+    program = [str(script)] if isinstance(script, Path) else ["-m", script]
     done = subprocess.run(
-        [str(python), str(script), *map(str, arguments)], capture_output=True, text=True, env=environment, cwd=ROOT
+        [str(python), *program, *map(str, arguments)], capture_output=True, text=True, env=environment, cwd=ROOT
     )
     if done.returncode != 0:
-        raise RuntimeError(f"{script.name} {arguments} failed:\n{done.stderr[-2000:]}")
+        raise RuntimeError(f"{program[-1]} {arguments} failed:\n{done.stderr[-2000:]}")
     return json.loads(done.stdout.strip().splitlines()[-1])
 
 

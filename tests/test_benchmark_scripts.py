@@ -137,3 +137,13 @@ def test_plates_that_are_bodies_are_compared_with_obstacles(capsys):
     assert list(ratios) == ["obstacles", "scripted bodies", "free bodies"]
     assert all(ratio > 0.0 for ratio in ratios.values())
     assert "between two plates" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_a_pile_of_bears_presses_on_itself_and_stays_apart():
+    from benchmarks import bear_pile
+
+    found = bear_pile.one(5)
+    assert found["statuses"] == "converged"
+    assert found["failures"] == []
+    assert found["steps"][0][1] > 1000  # contacts

@@ -1,5 +1,7 @@
 """Direct solvers: each factorization solves, and its steps are those by conjugate gradients."""
 
+import os
+
 import numpy as np
 import pytest
 
@@ -88,3 +90,14 @@ def test_vectors_over_all_rows_are_added_to_a_factorization(factorization, monke
     np.testing.assert_allclose((dense + G @ G.T) @ solved.ravel(), b.ravel(), atol=1e-9)
     for too_little in (direct_solver.NOTHING_MORE, 0.9 * vectors[:, 0].reshape(1, 4, 3)):
         assert direct_solver.solve_directly(pattern, np.ascontiguousarray(data), b, True, too_little) is None
+
+
+def test_the_library_of_pardiso_is_found_without_a_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pypardiso")
+    library = direct_solver.mkl_library()
+    if library is None:
+        pytest.skip("MKL is not a package of pip here")
+    monkeypatch.delenv("PYPARDISO_MKL_RT", raising=False)
+    monkeypatch.setattr("glob.glob", lambda *_, **__: pytest.fail("pypardiso searches the environment"))
+    assert direct_solver._pardiso.__wrapped__() is not None
+    assert "PYPARDISO_MKL_RT" not in os.environ
