@@ -28,6 +28,17 @@ def _turn_back(frame, x, y, z):
 
 
 @njit(cache=True, error_model="numpy")
+def place(points, velocities, anchor_velocities, h, motion):
+    """Velocities, and the positions in the middle of the last substep, at which a rotation has no rate of strain."""
+    n = len(velocities)
+    for i in range(len(motion)):
+        for j in range(3):
+            v = velocities[i, j] if i < n else anchor_velocities[i - n, j]
+            motion[i, j] = points[i, j] - 0.5 * h * v
+            motion[i, 3 + j] = v
+
+
+@njit(cache=True, error_model="numpy")
 def extrapolate(start, rows, fields, frames, motion, forces, local_forces, local_velocities, ratio):
     """f <- R f_1, and v <- v + ratio (v - R v_1) in `motion`."""
     for g in range(len(frames)):
@@ -99,21 +110,17 @@ def correct(start, rows, fields, frames, blocks, H, masses, placed, forces, visc
 
 
 @njit(cache=True, error_model="numpy")
-def step(start, rows, fields, frames, blocks, H, longest, masses, motion, viscous, products, forces):
-    """f += alpha M z / H with alpha = r . z / z . (M + H K) z of each body, at most `longest`; `viscous` is K z."""
-    for g in range(len(frames)):
-        total = 0.0
-        for k in range(start[g], start[g + 1]):
-            for j in range(3):
-                total += motion[rows[k], 3 + j] * viscous[rows[k], j]
-        products[g, 2] = total
+def step(start, rows, blocks, H, longest, masses, motion, products, powers, forces):
+    """f += alpha M z / H with alpha = r . z / z . (M + H K) z of each body, at most `longest`.
+
+    `powers` (b,) are z . K z, and `products` (g, 2) r . z and z . M z.
+    """
     for b in range(len(blocks) - 1):
-        rz = zMz = zKz = 0.0
+        rz = zMz = 0.0
         for g in range(blocks[b], blocks[b + 1]):
             rz += products[g, 0]
             zMz += products[g, 1]
-            zKz += products[g, 2]
-        curvature = zMz + H * zKz
+        curvature = zMz + H * powers[b]
         if not curvature > 0.0:
             continue
         alpha = min(rz / curvature, longest)

@@ -19,18 +19,19 @@ class ForceSum:
 
     Parameters
     ----------
-    forces : compiled function (X, V, k, data, g, h) with `forceinline`, see `forces_of_tets`
+    laws : compiled functions (X, V, k, data, g, h) with `forceinline`, see `forces_of_tets` and `powers_of_tets`
     elements : (m, k) vertices; constants : (m, c); groups : of these elements
 
     Attributes
     ----------
     members : (g, WIDTH) the elements of each group
     rates : (g,) largest square of a rate of strain of its elements in the last sum [1/s^2]
+    powers : (g,) forces times velocities of its elements [W], see `find_powers`
     """
 
     def __init__(
         self,
-        forces: Callable[..., Any],
+        laws: tuple[Callable[..., Any], Callable[..., Any]],
         elements: NDArray[np.int32],
         constants: NDArray[np.float64],
         groups: Groups,
@@ -39,9 +40,10 @@ class ForceSum:
         self._data = groups.lanes(constants)
         self._counts, self._pointers = groups.counts, groups.pointers
         self.members = groups.members
-        self.rates = np.zeros(len(self._counts))
+        self.rates, self.powers = np.zeros(len(self._counts)), np.zeros(len(self._counts))
         self._active = np.ones(len(self._counts), dtype=np.bool_)
-        self._kernels = _sum_of(forces, elements.shape[1])
+        self._kernels = _sum_of(laws[0], elements.shape[1])
+        self._power_kernels = _powers_of(laws[1], elements.shape[1])
 
     def choose(self, inverse_masses: NDArray[np.float64]) -> None:
         """Sum only the groups with a vertex that can move, of inverse masses (n,) [1/kg]."""
@@ -59,6 +61,11 @@ class ForceSum:
         elements = (self._corners, self._counts, self._active, self._data, self._pointers)
         self._kernels[parallel](motion, *elements, h, out, self.rates)
 
+    def find_powers(self, motion: NDArray[np.float64], h: float, parallel: bool) -> None:
+        """Set `powers`, with which the forces resist the velocities; less work than to sum the forces."""
+        elements = (self._corners, self._counts, self._active, self._data, self._pointers)
+        self._power_kernels[parallel](motion, *elements, h, self.powers)
+
 
 @cache
 def _sum_of(forces: Any, corners: int) -> SerialAndParallel:
@@ -67,10 +74,19 @@ def _sum_of(forces: Any, corners: int) -> SerialAndParallel:
     return serial_and_parallel(kernel_with(_sum, forces.py_func.__qualname__, _sum_chunk=compiled))
 
 
-if TYPE_CHECKING:  # `kernel_with` gives these names to each copy of `_sum_chunk`
+@cache
+def _powers_of(powers: Any, corners: int) -> SerialAndParallel:
+    chunk = kernel_with(_power_chunk, powers.py_func.__qualname__, powers=powers, CORNERS=corners)
+    compiled = njit(fastmath=FLAGS, error_model="numpy")(chunk)
+    return serial_and_parallel(kernel_with(_powers, powers.py_func.__qualname__, _power_chunk=compiled))
+
+
+if TYPE_CHECKING:  # `kernel_with` gives these names to each copy of `_sum_chunk` and `_power_chunk`
     CORNERS = 0
 
     def forces(X, V, k, data, g, h): ...
+
+    def powers(X, V, k, data, g, h): ...
 
 
 def _sum_chunk(motion, corners, counts, active, data, first, last, h, out, rates):
@@ -109,3 +125,30 @@ def _sum(motion, corners, counts, active, data, pointers, h, out, rates):
         for k in prange((n_chunks + 1 - parity) // 2):
             c = 2 * k + parity
             _sum_chunk(motion, corners, counts, active, data, pointers[c], pointers[c + 1], h, out, rates)
+
+
+def _power_chunk(motion, corners, counts, active, data, first, last, h, out):
+    X = np.zeros((3 * CORNERS, WIDTH))
+    V = np.zeros((3 * CORNERS, WIDTH))
+    k = np.zeros((1, WIDTH))
+    for g in range(first, last):
+        total = 0.0
+        if active[g]:
+            for lane in range(counts[g]):
+                for c in range(CORNERS):
+                    p = corners[g, lane, c]
+                    X[3 * c, lane] = motion[p, 0]
+                    X[3 * c + 1, lane] = motion[p, 1]
+                    X[3 * c + 2, lane] = motion[p, 2]
+                    V[3 * c, lane] = motion[p, 3]
+                    V[3 * c + 1, lane] = motion[p, 4]
+                    V[3 * c + 2, lane] = motion[p, 5]
+            powers(X, V, k, data, g, h)
+            for lane in range(counts[g]):
+                total += k[0, lane]
+        out[g] = total
+
+
+def _powers(motion, corners, counts, active, data, pointers, h, out):
+    for c in prange(len(pointers) - 1):
+        _power_chunk(motion, corners, counts, active, data, pointers[c], pointers[c + 1], h, out)

@@ -14,6 +14,72 @@ from supple.xpbd.sweeps.lanes import nine, put_nine, put_twelve, twelve
 
 
 @njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+def _gradient(x, b):
+    """The 9 entries of sum_i x_i b_i^T, of 12 coordinates x and the shape gradients b_1, b_2, b_3."""
+    x0, y0, z0, x1, y1, z1, x2, y2, z2, x3, y3, z3 = x
+    b10, b11, b12, b20, b21, b22, b30, b31, b32 = b
+    ux, uy, uz = x1 - x0, y1 - y0, z1 - z0
+    vx, vy, vz = x2 - x0, y2 - y0, z2 - z0
+    qx, qy, qz = x3 - x0, y3 - y0, z3 - z0
+    return (
+        ux * b10 + vx * b20 + qx * b30,
+        ux * b11 + vx * b21 + qx * b31,
+        ux * b12 + vx * b22 + qx * b32,
+        uy * b10 + vy * b20 + qy * b30,
+        uy * b11 + vy * b21 + qy * b31,
+        uy * b12 + vy * b22 + qy * b32,
+        uz * b10 + vz * b20 + qz * b30,
+        uz * b11 + vz * b21 + qz * b31,
+        uz * b12 + vz * b22 + qz * b32,
+    )
+
+
+@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+def _cofactors(F):
+    """dJ/dF, row by row."""
+    f00, f01, f02, f10, f11, f12, f20, f21, f22 = F
+    return (
+        f11 * f22 - f21 * f12,
+        f12 * f20 - f22 * f10,
+        f10 * f21 - f20 * f11,
+        f21 * f02 - f01 * f22,
+        f22 * f00 - f02 * f20,
+        f20 * f01 - f00 * f21,
+        f01 * f12 - f11 * f02,
+        f02 * f10 - f12 * f00,
+        f00 * f11 - f10 * f01,
+    )
+
+
+@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+def _rates(F, G, C):
+    """D = sym(F^T F') as 00, 11, 22 and twice 01, 02, 12, and J' = dJ/dF : F', with G = F' and C = dJ/dF."""
+    f00, f01, f02, f10, f11, f12, f20, f21, f22 = F
+    g00, g01, g02, g10, g11, g12, g20, g21, g22 = G
+    c00, c01, c02, c10, c11, c12, c20, c21, c22 = C
+    return (
+        f00 * g00 + f10 * g10 + f20 * g20,
+        f01 * g01 + f11 * g11 + f21 * g21,
+        f02 * g02 + f12 * g12 + f22 * g22,
+        f00 * g01 + f10 * g11 + f20 * g21 + f01 * g00 + f11 * g10 + f21 * g20,
+        f00 * g02 + f10 * g12 + f20 * g22 + f02 * g00 + f12 * g10 + f22 * g20,
+        f01 * g02 + f11 * g12 + f21 * g22 + f02 * g01 + f12 * g11 + f22 * g21,
+        (c00 * g00 + c10 * g10 + c20 * g20) + (c01 * g01 + c11 * g11 + c21 * g21) + (c02 * g02 + c12 * g12 + c22 * g22),
+    )
+
+
+@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+def viscous_power_of_tet(x, v, b, shear, bulk):
+    """Forces times velocities of `viscous_tet` [W]: 2 shear |dev D|^2 + bulk (dJ/dF : F')^2."""
+    F = _gradient(x, b)
+    d00, d11, d22, d01, d02, d12, rate = _rates(F, _gradient(v, b), _cofactors(F))
+    third = (d00 + d11 + d22) / 3.0
+    d00, d11, d22 = d00 - third, d11 - third, d22 - third
+    squares = 2.0 * (d00 * d00 + d11 * d11 + d22 * d22) + d01 * d01 + d02 * d02 + d12 * d12
+    return shear * squares + bulk * (rate * rate)
+
+
+@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
 def viscous_tet(x, v, b, shear, bulk):
     """The forces (12) that balance the viscous stress of a tet, means of the diagonal entries (4) of
     their matrix [kg/s], and the square of the rates of the stretches [1/s^2].
@@ -25,41 +91,19 @@ def viscous_tet(x, v, b, shear, bulk):
     x, v : 12 coordinates of the corners [m], and of their velocities [m/s]
     b : 9 entries of the shape gradients b_1, b_2, b_3 [1/m]; shear, bulk : viscosity times volume [J s]
     """
-    x0, y0, z0, x1, y1, z1, x2, y2, z2, x3, y3, z3 = x
     b10, b11, b12, b20, b21, b22, b30, b31, b32 = b
-    ux, uy, uz = x1 - x0, y1 - y0, z1 - z0
-    vx, vy, vz = x2 - x0, y2 - y0, z2 - z0
-    qx, qy, qz = x3 - x0, y3 - y0, z3 - z0
-    f00, f01, f02 = ux * b10 + vx * b20 + qx * b30, ux * b11 + vx * b21 + qx * b31, ux * b12 + vx * b22 + qx * b32
-    f10, f11, f12 = uy * b10 + vy * b20 + qy * b30, uy * b11 + vy * b21 + qy * b31, uy * b12 + vy * b22 + qy * b32
-    f20, f21, f22 = uz * b10 + vz * b20 + qz * b30, uz * b11 + vz * b21 + qz * b31, uz * b12 + vz * b22 + qz * b32
-    x0, y0, z0, x1, y1, z1, x2, y2, z2, x3, y3, z3 = v
-    ux, uy, uz = x1 - x0, y1 - y0, z1 - z0
-    vx, vy, vz = x2 - x0, y2 - y0, z2 - z0
-    qx, qy, qz = x3 - x0, y3 - y0, z3 - z0
-    g00, g01, g02 = ux * b10 + vx * b20 + qx * b30, ux * b11 + vx * b21 + qx * b31, ux * b12 + vx * b22 + qx * b32
-    g10, g11, g12 = uy * b10 + vy * b20 + qy * b30, uy * b11 + vy * b21 + qy * b31, uy * b12 + vy * b22 + qy * b32
-    g20, g21, g22 = uz * b10 + vz * b20 + qz * b30, uz * b11 + vz * b21 + qz * b31, uz * b12 + vz * b22 + qz * b32
-    # 2 shear dev D
-    d00, d11, d22 = (
-        f00 * g00 + f10 * g10 + f20 * g20,
-        f01 * g01 + f11 * g11 + f21 * g21,
-        f02 * g02 + f12 * g12 + f22 * g22,
-    )
+    F = _gradient(x, b)
+    C = _cofactors(F)
+    f00, f01, f02, f10, f11, f12, f20, f21, f22 = F
+    c00, c01, c02, c10, c11, c12, c20, c21, c22 = C
+    d00, d11, d22, d01, d02, d12, p = _rates(F, _gradient(v, b), C)
     rate = d00 * d00 + d11 * d11 + d22 * d22
+    # 2 shear dev D
     third = (d00 + d11 + d22) / 3.0
     twice = 2.0 * shear
     d00, d11, d22 = twice * (d00 - third), twice * (d11 - third), twice * (d22 - third)
-    d01 = shear * (f00 * g01 + f10 * g11 + f20 * g21 + f01 * g00 + f11 * g10 + f21 * g20)
-    d02 = shear * (f00 * g02 + f10 * g12 + f20 * g22 + f02 * g00 + f12 * g10 + f22 * g20)
-    d12 = shear * (f01 * g02 + f11 * g12 + f21 * g22 + f02 * g01 + f12 * g11 + f22 * g21)
-    # dJ/dF by columns
-    c00, c10, c20 = f11 * f22 - f21 * f12, f21 * f02 - f01 * f22, f01 * f12 - f11 * f02
-    c01, c11, c21 = f12 * f20 - f22 * f10, f22 * f00 - f02 * f20, f02 * f10 - f12 * f00
-    c02, c12, c22 = f10 * f21 - f20 * f11, f20 * f01 - f00 * f21, f00 * f11 - f10 * f01
-    p = bulk * (
-        (c00 * g00 + c10 * g10 + c20 * g20) + (c01 * g01 + c11 * g11 + c21 * g21) + (c02 * g02 + c12 * g12 + c22 * g22)
-    )
+    d01, d02, d12 = shear * d01, shear * d02, shear * d12
+    p = bulk * p
     s00 = f00 * d00 + f01 * d01 + f02 * d02 + p * c00
     s01 = f00 * d01 + f01 * d11 + f02 * d12 + p * c01
     s02 = f00 * d02 + f01 * d12 + f02 * d22 + p * c02
@@ -155,6 +199,19 @@ def viscous_spring(x, v, t, viscosity):
 
 
 @njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+def viscous_power_of_spring(x, v, t, viscosity):
+    """Forces times velocities of `viscous_spring` [W]: viscosity (d . d' / |d|)^2."""
+    x0, y0, z0, x1, y1, z1, x2, y2, z2 = x
+    s = 1.0 - t
+    dx, dy, dz = x0 - s * x1 - t * x2, y0 - s * y1 - t * y2, z0 - s * z1 - t * z2
+    x0, y0, z0, x1, y1, z1, x2, y2, z2 = v
+    ex, ey, ez = x0 - s * x1 - t * x2, y0 - s * y1 - t * y2, z0 - s * z1 - t * z2
+    squared = dx * dx + dy * dy + dz * dz
+    product = dx * ex + dy * ey + dz * ez
+    return viscosity * product * product / squared if squared > 0.0 else 0.0
+
+
+@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
 def softened(stiffness, slope, h):
     """The part of a stiffness whose rates substeps of h [s] do not suppress; see `elements`."""
     factor = 1.0 + h * h * stiffness * slope
@@ -187,3 +244,21 @@ def forces_of_springs(X, V, k, data, g, h):
         f = viscous_spring(x, v, data[g, 0, i], tau * softened(data[g, 1, i], data[g, 2, i], h))
         put_nine(V, i, f)
         k[0, i], k[1, i], k[2, i], k[3, i] = f[9], f[10], f[11], f[12]
+
+
+@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+def powers_of_tets(X, V, k, data, g, h):
+    """`viscous_power_of_tet` of group g in the first row of k."""
+    for i in range(WIDTH):
+        tau = max(data[g, 12, i] - h, 0.0)
+        bulk = tau * softened(data[g, 10, i], data[g, 11, i], h)
+        k[0, i] = viscous_power_of_tet(twelve(X, i), twelve(V, i), nine(data[g], i), tau * data[g, 9, i], bulk)
+
+
+@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+def powers_of_springs(X, V, k, data, g, h):
+    """`viscous_power_of_spring` in the same way."""
+    for i in range(WIDTH):
+        tau = max(data[g, 3, i] - h, 0.0)
+        viscosity = tau * softened(data[g, 1, i], data[g, 2, i], h)
+        k[0, i] = viscous_power_of_spring(nine(X, i), nine(V, i), data[g, 0, i], viscosity)

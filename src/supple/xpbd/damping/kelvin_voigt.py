@@ -21,7 +21,7 @@ Sources: Nocedal, Wright, "Numerical Optimization" (2006), section 5.1; Toselli,
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,15 +32,15 @@ from supple.xpbd.damping.coarse_space import CoarseMatrix, frames_of_groups, ver
 from supple.xpbd.damping.element_matrices import matrices_of_springs, matrices_of_tets
 from supple.xpbd.damping.elements import viscous_springs, viscous_tets
 from supple.xpbd.damping.force_sum import ForceSum
-from supple.xpbd.damping.forces import forces_of_springs, forces_of_tets
+from supple.xpbd.damping.forces import forces_of_springs, forces_of_tets, powers_of_springs, powers_of_tets
 from supple.xpbd.sweeps.groups import Groups, make_groups, make_groups_of_one_chunk
 from supple.xpbd.sweeps.ordering import Layout
 
 # Substeps of a cycle. The extrapolated forces need H to be short against the time in which the stiffest tets answer:
-# with exact solutions cycles of 4 have the accuracy of cycles of 1, and cycles of 8 are unstable.
+# with exact solutions cycles of 4 have the accuracy of cycles of 1, and cycles of 6 let modes grow.
 LONGEST_CYCLE = 4
-# Of the conjugate gradients. The largest eigenvalue of P^-1 (M + H K) is about 2.5; longer steps, which one solution
-# may take, let the highest modes overshoot, cycle after cycle.
+# Of the conjugate gradients. The largest eigenvalue of P^-1 (M + H K) is 2.5 to 5. Longer steps, which one solution
+# may take where modes of small eigenvalues dominate, let the highest modes overshoot, cycle after cycle.
 LONGEST_STEP = 0.4
 # Change of strain in a cycle beyond which a body begins from f = 0: bodies that are released from random positions gain
 # energy without limit otherwise.
@@ -97,11 +97,15 @@ class Damping:
         if not self._elements:
             return
         self._layout = layout
+        laws = (tets, forces_of_tets, powers_of_tets), (springs, forces_of_springs, powers_of_springs)
         self._sums = [
             ForceSum(
-                forces, kind.vertices, kind.constants(), _groups_of(kind.vertices, layout, system, len(inverse_masses))
+                (forces, powers),
+                kind.vertices,
+                kind.constants(),
+                _groups_of(kind.vertices, layout, system, len(inverse_masses)),
             )
-            for kind, forces in ((tets, forces_of_tets), (springs, forces_of_springs))
+            for kind, forces, powers in laws
             if len(kind.tau)
         ]
         n = len(system.masses)
@@ -109,7 +113,8 @@ class Damping:
             [initial_state(system.scene).positions[layout.old_from_new], system.stitching.anchors.at(0.0)]
         )
         touched = np.unique(np.concatenate([vertices.ravel() for vertices, *_ in self._elements])).astype(np.int64)
-        rows = touched[inverse_masses[touched] > 0.0]
+        movable = inverse_masses[touched] > 0.0
+        rows, self._held = touched[movable], touched[~movable]
         self._groups = vertex_groups(rows, self._placed, system.joined_components, system.components)
         self._masses = np.zeros(len(inverse_masses))
         self._masses[:n] = system.masses if system.effective_masses is None else system.effective_masses
@@ -117,13 +122,14 @@ class Damping:
         self._viscous = np.zeros((len(inverse_masses), 4))
         r, g = len(rows), len(self._groups.start) - 1
         self._forces, self._local_forces, self._local_velocities = (np.zeros((r, 3)) for _ in range(3))
-        self._frames, self._products = np.zeros((g, 3, 3)), np.zeros((g, 3))
+        self._frames, self._products = np.zeros((g, 3, 3)), np.zeros((g, 2))
         self._coarse = np.zeros(12 * g)
         body_of_group = np.repeat(np.arange(len(self._groups.blocks) - 1), np.diff(self._groups.blocks))
-        # The bodies of the elements of each group; all vertices of an element that can move belong to one.
+        # The body of each group of elements; all vertices of an element that can move belong to one.
         group_of_element = [self._groups.group_of[vertices].max(axis=1) for vertices, *_ in self._elements]
         self._bodies = [
-            body_of_group[group_of[made.members]] for made, group_of in zip(self._sums, group_of_element, strict=True)
+            body_of_group[group_of[made.members[:, 0]]]
+            for made, group_of in zip(self._sums, group_of_element, strict=True)
         ]
         self._interval = 0.0
         self._prepared: dict[tuple[int, int], tuple[NDArray[np.float64], CoarseMatrix]] = {}
@@ -160,14 +166,10 @@ class Damping:
         ----------
         points : (n + a, 4) positions [m] at its beginning; velocities : (n, 3), anchor_velocities : (a, 3) [m/s]
         """
-        groups, motion, n = self._groups, self._motion, len(velocities)
+        groups, motion = self._groups, self._motion
         H = substeps * h
         k, coarse = self._preconditioner(substeps, h)
-        # The positions in the middle of the last substep, at which a rotation has no rate of strain.
-        motion[:n, 3:] = velocities
-        motion[n:, 3:] = anchor_velocities
-        np.multiply(motion[:, 3:], -0.5 * h, out=motion[:, :3])
-        motion[:, :3] += points[:, :3]
+        cycle.place(points, velocities, anchor_velocities, h, motion)
         frames_of_groups(groups.start, groups.rows, motion, groups.offsets, self._frames)
         shape = groups.start, groups.rows, groups.fields, self._frames
         ratio = min(1.0, H / self._interval) if self._interval > 0.0 else 0.0
@@ -179,12 +181,12 @@ class Damping:
             self._apply(h, parallel)
         cycle.restrict(*shape, H, self._forces, self._viscous, self._coarse)
         coarse.solve(self._coarse)
-        motion[:, 3:] = 0.0
-        where = groups.blocks, H, self._masses, k
-        cycle.correct(*shape, *where, self._forces, self._viscous, self._coarse, motion, self._products)
-        self._apply(h, parallel)
+        motion[self._held, 3:] = 0.0
+        where = groups.blocks, H, self._masses
+        cycle.correct(*shape, *where, k, self._forces, self._viscous, self._coarse, motion, self._products)
+        found = self._products, self._powers(h, parallel)
         cycle.step(
-            *shape, groups.blocks, H, LONGEST_STEP, self._masses, motion, self._viscous, self._products, self._forces
+            groups.start, groups.rows, groups.blocks, H, LONGEST_STEP, self._masses, motion, *found, self._forces
         )
         cycle.keep(*shape, velocities, self._forces, self._local_forces, self._local_velocities)
         self._interval = 0.0
@@ -218,6 +220,14 @@ class Damping:
         for made in self._sums:
             made.add(self._motion, h, self._viscous, parallel)
 
+    def _powers(self, h: float, parallel: bool) -> NDArray[np.float64]:
+        """(b,) forces times velocities in `_motion` of each body [W]."""
+        total = np.zeros(len(self._groups.blocks) - 1)
+        for made, bodies in zip(self._sums, self._bodies, strict=True):
+            made.find_powers(self._motion, h, parallel)
+            total += np.bincount(bodies, made.powers, len(total))
+        return total
+
     def _preconditioner(self, substeps: int, h: float) -> tuple[NDArray[np.float64], CoarseMatrix]:
         """The diagonal k of the rows and the coarse matrix, for a length of substeps that is near enough."""
         key = substeps, round(2.0 * np.log2(h))
@@ -244,9 +254,12 @@ class Damping:
 
 
 def _groups_of(vertices: NDArray[np.int32], layout: Layout, system: System, n_vertices: int) -> Groups:
-    """Elements of bodies are summed in the layout's chunks; anchors, which have no chunk, are few."""
+    """Elements of bodies are summed in the layout's chunks; anchors, which have no chunk, are few.
+
+    No group has elements of two joined components.
+    """
     if len(vertices) and vertices.max() < len(layout.rank) and n_vertices == len(layout.rank):
-        return make_groups(layout, vertices)
+        return make_groups(replace(layout, body=system.joined_components), vertices)
     return make_groups_of_one_chunk(vertices, system.joined_components, n_vertices)
 
 
