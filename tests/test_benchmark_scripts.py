@@ -88,6 +88,16 @@ def test_times_of_the_parts_of_steps_with_contact():
     assert sum(result[part] for part in PARTS) <= 1.0
 
 
+def test_the_time_of_an_iteration_in_a_small_scene():
+    from benchmarks.small_scenes import measured
+
+    result = measured("slope")
+    assert result["tets"] == 48
+    assert result["converged"]
+    assert result["iterations"] > result["steps"]
+    assert result["ms"] > 0.0
+
+
 @pytest.mark.slow
 def test_the_search_for_contact_is_measured_in_piles_of_bears(capsys):
     from benchmarks import candidate_search
