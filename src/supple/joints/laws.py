@@ -19,7 +19,7 @@ Source: Nocedal, Wright, "Numerical Optimization" (2006), section 17.4.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
@@ -69,6 +69,12 @@ class Laws:
             is_motor=np.array(is_motor, dtype=np.bool_),
         )
         return made, np.array(multipliers, dtype=np.float64)
+
+    @property
+    def holding(self) -> Laws:
+        """Conditions and limits, without motors and friction."""
+        chosen = self.adapts & ~self.is_motor & (np.isinf(self.low) | np.isinf(self.high))
+        return Laws(*(getattr(self, each.name)[chosen] for each in fields(self)))
 
     def efforts(self, g: NDArray[np.float64], multipliers: NDArray[np.float64]) -> NDArray[np.float64]:
         """(l,) psi' at the values g (l,)."""

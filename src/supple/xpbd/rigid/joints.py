@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from supple.joints.at_state import coordinates_at, initial_joint_details, refuse_apart, reported
 from supple.joints.functions import derivatives, turns, values
 from supple.joints.geometry import ANGLE, JointGeometry, Vectors
-from supple.joints.laws import Law, Laws, laws_of, wrapped
+from supple.joints.laws import Laws, laws_of, wrapped
 from supple.numerics.kernel_cache import njit
 from supple.state import State
 from supple.system import System
@@ -86,6 +86,7 @@ class JointProjection:
         self._total = np.zeros((len(g.joints), 6))
         self._motors = np.zeros(len(g.joints))
         self._substeps = 0
+        self._holding = Laws.of([])[0]
 
     def __len__(self) -> int:
         return len(self.geometry.joints)
@@ -113,6 +114,7 @@ class JointProjection:
         """
         begun = self._functions(previous + origins, end - h)
         laws, multipliers = laws_of(self.geometry, np.ones(len(self)), begun, (end - h, end), moving=True)
+        self._holding = laws.holding
         rows, now, first = self._rows(points[:, :3] + origins, previous + origins, end, h, laws, multipliers)
         forces, twists = self._solve(rows, laws, first, points, previous, velocities, origins, h)
         self._substeps += 1
@@ -122,10 +124,10 @@ class JointProjection:
     def project_again(
         self, points: Floats, previous: Floats, velocities: Floats, origins: Floats, end: float, h: float
     ) -> None:
-        """`project` for positions that have changed since: the conditions, without limits, friction and motors."""
-        g = self.geometry
-        laws, multipliers = Laws.of([Law(int(row), 1.0, 0.0) for row in g.across])
-        rows, _, first = self._rows(points[:, :3] + origins, previous + origins, end, h, laws, multipliers)
+        """`project` for positions that have changed since: conditions and limits, without friction and motors."""
+        laws = self._holding
+        zero = np.zeros(len(laws.k))
+        rows, _, first = self._rows(points[:, :3] + origins, previous + origins, end, h, laws, zero)
         self._solve(rows, laws, first, points, previous, velocities, origins, h)
 
     def _solve(
