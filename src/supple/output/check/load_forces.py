@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.loads.applied import LoadPattern
+from supple.output.recording.actions.loads import LoadPattern
 
 
 def load_forces(

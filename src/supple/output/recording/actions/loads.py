@@ -10,7 +10,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from supple.loads.applied import LoadPattern
+from supple.loads.applied import LoadPattern as LoadPattern  # the checker has it from here
 from supple.output.recording.checked_hdf5 import CheckedFile
 from supple.system import System
 
