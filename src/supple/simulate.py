@@ -20,6 +20,7 @@ from supple.materials.elastic_tets.laws import TetLaws, joined_materials, tet_ma
 from supple.materials.flows.internal import checked
 from supple.numerics.memory import require_memory
 from supple.readings.actuator_readings import CableReading, CavityReading, cable_readings, cavity_readings
+from supple.readings.applied_values import with_applied_values
 from supple.readings.diagnostics import Diagnostics, measure
 from supple.readings.energy_balance import completed_works
 from supple.readings.frame_readings import FrameReadings
@@ -238,7 +239,7 @@ def simulate(
     first = first_frame(scene, start, solver)
     workspace = solver.prepare(first.system)
     solver.check(first.system, first.state, workspace)
-    details = _with_active(solver.initial_details(first.system, workspace), first.system, first.time)
+    details = with_applied_values(solver.initial_details(first.system, workspace), first.system, first.time)
     first = replace(first, report=replace(first.report, details=details))
     shown = [supplied("progress")()] if progress else []
     return _steps(first, solver, float(dt), int(steps), workspace, control, [*sinks, *shown])
@@ -365,16 +366,9 @@ def completed_report(
     measured = measure(system, state)
     values = vars(measured) | vars(step)
     del values["contacts"]  # made when they are asked for: `Frame.contacts`
-    details = _with_active(step.details, system, state.time)
+    details = with_applied_values(step.details, system, state.time)
     if energy_before is not None and details.work:
         works = completed_works(details.work, details.energy_residual, measured.energy - energy_before)
         details = replace(details, work=works)
     values["details"] = details
     return Report(**values, wall_seconds=seconds)
-
-
-def _with_active(details: SolverDetails, system: System, time: float) -> SolverDetails:
-    """The details with the values of growths and muscles."""
-    active = system.laws_at(time).active
-    values = {f"{each.kind}.{k}": each.value for k, each in enumerate(active)}
-    return replace(details, active=values) if values else details

@@ -250,3 +250,14 @@ def test_every_material_carries_its_weight():
     # rho g L^2 / (2 E) = 2 mm of 200 mm; with Poisson's ratio 0 all agree at small strains.
     assert np.ptp(heights) < 5e-5
     assert 0.2 - np.mean(heights) == pytest.approx(1000 * 9.81 * 0.04 / 2e5, rel=0.15)
+
+
+def test_a_pin_moves_where_forces_are_far_from_balanced():
+    """One Newton step for the weight of a soft bar at rest would invert it, and the pin with it."""
+    mesh = sp.shapes.box((0.3, 0.1, 0.1), (4, 2, 2), order=2)
+    bar = sp.Body("bar", mesh, sp.StableNeoHookean(youngs=2e4, poisson=0.4))
+    held = sp.InBox((-1, -1, -1), (-0.149, 1, 1))
+    pin = sp.Pin("bar", held, motion=lambda t: (0, 0.01 * t, 0))
+    scene = sp.Scene([bar], pins=[pin], gravity=(0, -9.81, 3.0))
+    (frame,) = sp.simulate(scene, sp.Implicit(integrator="static", contact=None, max_substeps=1), dt=1.0, steps=1)
+    assert frame.report.status == "converged", frame.report.message

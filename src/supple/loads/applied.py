@@ -5,13 +5,36 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.materials.elastic_tets.active import ActiveTets
 from supple.scene.loads.body_force import BodyForce
+
+
+@dataclass(frozen=True, eq=False)
+class LoadPattern:
+    """How the forces of a load follow from one value at a time, its `AppliedLoad.value`.
+
+    Attributes
+    ----------
+    kind : "vector", a force w_i f on each vertex, with the value f (3,); "pressure", a third of -p A on each corner of
+        a triangle of area vector A, with the value p; "spring", the forces of k / 2 (l - l0)^2,
+        l = |sum w_i x_i + offset|, with the value l0
+    work : as of `AppliedLoad`
+    vertices : (v,), or (t, 3) triangles under a pressure
+    weights : (v,) w; of no meaning for a pressure
+    offset : (3,) [m]; stiffness : k [N/m]
+    """
+
+    kind: Literal["vector", "pressure", "spring"]
+    work: str
+    vertices: NDArray[np.int32]
+    weights: NDArray[np.float64]
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    stiffness: float = 0.0
 
 
 class AppliedLoad(ABC):
@@ -25,6 +48,15 @@ class AppliedLoad(ABC):
 
     is_internal: ClassVar[bool] = False
     work: str
+
+    @property
+    def pattern(self) -> LoadPattern | None:
+        """None where the forces do not follow from one value."""
+        return None
+
+    def value(self, time: float) -> NDArray[np.float64]:
+        """That of the pattern at `time` [s]."""
+        raise NotImplementedError
 
     @abstractmethod
     def renumbered(self, new: NDArray[np.int32]) -> Self:
@@ -58,6 +90,31 @@ class DeadLoad(AppliedLoad):
 
 
 @dataclass(frozen=True, eq=False)
+class UniformLoad(DeadLoad):
+    """One vector times `weights` (k,); `vector` : time -> (3,)."""
+
+    weights: NDArray[np.float64]
+    vector: Callable[[float], NDArray[np.float64]]
+
+    @classmethod
+    def of(
+        cls,
+        vertices: NDArray[np.int32],
+        weights: NDArray[np.float64],
+        vector: Callable[[float], NDArray[np.float64]],
+        work: str,
+    ) -> UniformLoad:
+        return cls(vertices, lambda time: weights[:, None] * vector(time), work, weights, vector)
+
+    @property
+    def pattern(self) -> LoadPattern:
+        return LoadPattern("vector", self.work, self.vertices, self.weights)
+
+    def value(self, time: float) -> NDArray[np.float64]:
+        return self.vector(time)
+
+
+@dataclass(frozen=True, eq=False)
 class MassLoad(AppliedLoad):
     """Forces per mass on `vertices` (k,) with `masses` (k,) [kg]."""
 
@@ -66,6 +123,13 @@ class MassLoad(AppliedLoad):
     masses: NDArray[np.float64]
 
     work = "body_forces"
+
+    @property
+    def pattern(self) -> LoadPattern | None:
+        return LoadPattern("vector", self.work, self.vertices, self.masses) if self.load.is_uniform else None
+
+    def value(self, time: float) -> NDArray[np.float64]:
+        return self.load.at(np.zeros((1, 3)), time)[0]
 
     def renumbered(self, new: NDArray[np.int32]) -> MassLoad:
         return replace(self, vertices=new[self.vertices])

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import SceneError
-from supple.loads.applied import AppliedLoad, DeadLoad, MassLoad
+from supple.loads.applied import AppliedLoad, DeadLoad, MassLoad, UniformLoad
 from supple.loads.growth import GrownTets
 from supple.loads.muscles import FibreTension
 from supple.loads.pressure import FollowerPressure, area_vectors
@@ -53,8 +53,10 @@ def applied(
             shares += np.bincount(triangles.ravel(), np.repeat(areas, 3), len(body.points))
         touched = np.unique(np.concatenate([triangles for triangles, _ in parts]))
         at = _over_time(load.traction, f"{load.label}: traction", (3,))
-        place = body, begins[load.body], touched
-        return [_on_points(*place, lambda time: shares[touched, None] * at(time), "tractions")]
+        vertices, weights = _vertices_of(body, begins[load.body], touched)
+        on_points = shares[touched]
+        own = on_points if weights is None else weights.T @ on_points
+        return [UniformLoad.of(vertices, own, at, "tractions")]
     if isinstance(load, Pressure):
         body = named[load.body]
         at, begin = _over_time(load.pressure, f"{load.label}: pressure", ()), begins[load.body]
@@ -102,13 +104,21 @@ def _on_points(
     body: PlacedBody, begin: int, rows: NDArray[np.integer], forces: Callable[[float], NDArray[np.float64]], work: str
 ) -> DeadLoad:
     """Forces, time -> (k, 3) [N], on the points (k,) of a body."""
+    vertices, weights = _vertices_of(body, begin, rows)
+    return DeadLoad(vertices, forces if weights is None else lambda time: weights.T @ forces(time), work)
+
+
+def _vertices_of(
+    body: PlacedBody, begin: int, rows: NDArray[np.integer]
+) -> tuple[NDArray[np.int32], NDArray[np.float64] | None]:
+    """The vertices (v,) that carry points (k,) of a body, and their weights (k, v); None where points are vertices."""
     points = body.embedded.taken(rows)
     if points.are_vertices:
-        return DeadLoad((points.vertices + begin).astype(np.int32), forces, work)
+        return (points.vertices + begin).astype(np.int32), None
     vertices, column = np.unique(points.vertices, return_inverse=True)
     weights = np.zeros((len(rows), len(vertices)))
     np.add.at(weights, (np.repeat(np.arange(len(rows)), np.diff(points.start)), column.ravel()), points.weights)
-    return DeadLoad((vertices + begin).astype(np.int32), lambda time: weights.T @ forces(time), work)
+    return (vertices + begin).astype(np.int32), weights
 
 
 def _first_tet(name: str, bodies: Sequence[PlacedBody]) -> int:

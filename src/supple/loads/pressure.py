@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.loads.applied import AppliedLoad
+from supple.loads.applied import AppliedLoad, LoadPattern
 from supple.numerics.geometry.cross_matrices import cross_matrices
 
 
@@ -30,6 +30,13 @@ class FollowerPressure(AppliedLoad):
     pressure: Callable[[float], float]
 
     work = "pressures"
+
+    @property
+    def pattern(self) -> LoadPattern:
+        return LoadPattern("pressure", self.work, self.triangles, np.ones(len(self.triangles)))
+
+    def value(self, time: float) -> NDArray[np.float64]:
+        return np.asarray(self.pressure(time))
 
     def renumbered(self, new: NDArray[np.int32]) -> FollowerPressure:
         return replace(self, triangles=new[self.triangles])

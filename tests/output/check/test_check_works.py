@@ -1,9 +1,14 @@
-"""Works of pins and of contact that the check computes anew."""
+"""Works of pins, loads and contact that the check computes anew."""
 
+from itertools import pairwise
+
+import numpy as np
 import pytest
 
 import supple as sp
+from supple.loads.applied import LoadPattern
 from supple.output.check.checks.works import Works
+from supple.output.check.load_forces import load_forces
 from supple.output.check.snapshot import Scene, Snapshot
 
 RUBBER = sp.StableNeoHookean(youngs=2e4, poisson=0.4, damping=0.02)
@@ -78,3 +83,87 @@ def test_the_work_of_pins_is_of_second_order(tmp_path):
             errors.append(abs(work / (stored[-1] - stored[0]) - 1.0))
     assert errors[0] < 0.02
     assert errors[1] == pytest.approx(errors[0] / 4.0, rel=0.2)
+
+
+def loaded_scene(order=1):
+    """A bar on a moving pin, with a load of every kind whose work is computed anew; two of them act on the pin, too."""
+    mesh = sp.shapes.box((0.3, 0.1, 0.1), (4, 2, 2), order=order)
+    bar = sp.Body("bar", mesh, RUBBER)
+    loads = [
+        sp.Traction("bar", lambda t: (0, -300 * np.sin(8 * t), 100)),
+        sp.Pressure("bar", sp.Curve([0.0, 0.3], [0.0, 2e3]), sp.InBox((0.149, -1, -1), (1, 1, 1))),
+        sp.BodyForce((0, 0, 3)),
+        sp.Spring(("bar", (0.1, 0, 0)), (None, (0.3, 0.1, 0.1)), stiffness=20.0, rest_length=lambda t: 0.1 + t),
+    ]
+    pin = sp.Pin("bar", sp.InBox((-1, -1, -1), (-0.149, 1, 1)), motion=lambda t: (0, 0.02 * np.sin(9 * t), 0))
+    return sp.Scene([bar], pins=[pin], loads=loads)
+
+
+LOADS = ["body_forces", "pressures", "springs", "tractions"]
+
+
+@pytest.fixture(scope="module", params=["implicit", "quadratic", "xpbd"])
+def loaded(request, tmp_path_factory):
+    solver = sp.XPBD(substeps=20) if request.param == "xpbd" else sp.Implicit()
+    scene = loaded_scene(2 if request.param == "quadratic" else 1)
+    return recorded(tmp_path_factory.mktemp("works") / "loaded.vtkhdf", scene, solver, 1 / 120, 24)
+
+
+@pytest.mark.parametrize("name", LOADS)
+def test_a_changed_work_of_a_load(loaded, corrupted, name):
+    with sp.read_recording(loaded) as recording:
+        (names,) = (field.keys for field in recording.details.fields if field.name == "work")
+    assert names is not None
+
+    def shift(file, n):
+        works = file["supple/frames/details/work"][:]
+        more = 0.5 * np.abs(works[:, names.index("tractions")])
+        works[:, names.index("numerical")] -= more
+        works[:, names.index(name)] += more
+        file["supple/frames/details/work"][:] = works
+
+    report = checked(loaded)
+    assert report.ok
+    assert report["works"].message.startswith("those of pins, body_forces, pressures, springs and tractions agree")
+    report = checked(corrupted(loaded, shift))
+    assert [result.name for result in report.failures] == ["works"]
+    assert f"work of {name}" in report["works"].message
+
+
+def test_works_of_loads_converge_to_the_changes_of_their_potentials():
+    """-p V of a closed surface, the energy of a spring, and a dead force, along a straight way in 2 and 4 parts."""
+    mesh = sp.shapes.box((0.3, 0.1, 0.1), (2, 1, 1))
+    ends = mesh.vertices, mesh.vertices + 0.02 * np.random.default_rng(3).normal(size=mesh.vertices.shape)
+    vertices, weights = np.array([0, 5, 9], dtype=np.int32), np.array([0.7, 0.3, -1.0])
+    spring = LoadPattern("spring", "springs", vertices, weights, (0.1, 0.0, 0.05), 30.0)
+    pressure = LoadPattern("pressure", "pressures", mesh.surface.triangles, np.ones(len(mesh.surface.triangles)))
+    dead = LoadPattern("vector", "tractions", vertices, weights)
+    loads = {"a": spring, "b": pressure, "c": dead}
+    values = {"a": 0.05, "b": 4e3, "c": np.array([1.0, 2.0, -3.0])}
+    lengths = [np.linalg.norm(weights @ x[vertices] + spring.offset) for x in ends]
+    volumes = [sp.TetMesh(x, mesh.tets).volumes.sum() for x in ends]
+    exact = {
+        "springs": -15.0 * ((lengths[1] - 0.05) ** 2 - (lengths[0] - 0.05) ** 2),
+        "pressures": -4e3 * (volumes[1] - volumes[0]),
+        "tractions": weights @ (ends[1] - ends[0])[vertices] @ values["c"],
+    }
+    errors = []
+    for parts in (2, 4):
+        places = [ends[0] + t * (ends[1] - ends[0]) for t in np.linspace(0, 1, parts + 1)]
+        forces = [load_forces(loads, values, x) for x in places]
+        moved = (ends[1] - ends[0]) / parts
+        works = {name: sum(0.5 * ((a[name] + b[name]) * moved).sum() for a, b in pairwise(forces)) for name in exact}
+        errors.append({name: works[name] - exact[name] for name in exact})
+    assert errors[1]["tractions"] == pytest.approx(0.0, abs=1e-15)
+    for name in ("springs", "pressures"):
+        assert abs(errors[0][name]) < 0.1 * abs(exact[name])
+        assert errors[0][name] / errors[1][name] == pytest.approx(4.0, rel=0.1)
+
+
+def test_a_force_of_places_is_not_computed(tmp_path):
+    bar = sp.Body("bar", sp.shapes.box((0.3, 0.1, 0.1), (2, 1, 1)), RUBBER)
+    scene = sp.Scene([bar], loads=[sp.BodyForce(lambda x, t: -x), sp.BodyForce((0, 0, 1))])
+    path = recorded(tmp_path / "r.vtkhdf", scene, sp.Implicit(contact=None), 1 / 60, 3)
+    with sp.read_recording(path) as recording:
+        assert recording.other_loads == {"body_forces"}
+    assert checked(path)["works"].message.startswith("pins: nothing is pinned; contact: ")

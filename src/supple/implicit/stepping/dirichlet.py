@@ -2,7 +2,9 @@
 
 Each iteration extends the pins' remaining displacement d_p into the body: with the Hessian H of the objective, free
 vertices f and pinned ones p, it solves H_ff d_f = -(gradient_f + H_fp d_p), one Newton step with d_p prescribed. The
-step filter limits how much of it is taken. Afterwards Newton's method continues with the pins in place.
+step filter limits how much of it is taken. Where it lets next to nothing pass, the extension is that of the
+displacement alone: far from equilibrium one Newton step for the forces may lead anywhere. Afterwards Newton's method
+continues with the pins in place.
 """
 
 from __future__ import annotations
@@ -46,6 +48,7 @@ def move_pins(
     near = np.flatnonzero(np.isin(system.elements, moved_with).any(axis=1))
     nodes = system.elements[near]
     rows: list[NewtonRow] = []
+    with_forces = 1.0
     for iteration in range(_MOST_ITERATIONS):
         displacement = np.zeros_like(x)
         displacement[pinned] = targets - x[pinned]
@@ -64,7 +67,7 @@ def move_pins(
         for part in tools.hessian.low_rank:
             part.add_product(displacement, pull)
         with tools.clock.of("linear_solve"):
-            direction, report = tools.linear_solver.solve(-tools.freed(gradient + pull), _TOLERANCE)
+            direction, report = tools.linear_solver.solve(-tools.freed(with_forces * gradient + pull), _TOLERANCE)
         if direction is None or not np.isfinite(direction).all():
             text = "the linear system that moves the pins could not be solved"
             return x, Outcome(Status.NOT_FINITE, here, text, rows)
@@ -94,6 +97,9 @@ def move_pins(
         while step > 0.0 and not limits.allows(end):
             step *= 0.5
             end = x + step * direction
+        if step < _SMALLEST_SHARE and with_forces:
+            with_forces = 0.0
+            continue
         if step < _SMALLEST_SHARE:
             return x, Outcome(Status.BLOCKED, here, _blocked_message(system, x, targets, tet, limits), rows)
         x = end

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
@@ -15,6 +16,7 @@ from supple.output.check.geometry import quadratic_tets
 from supple.output.check.geometry.box_tree import build_tree, triangle_boxes
 from supple.output.check.geometry.orientation import volume_signs
 from supple.output.check.geometry.surface_pairs import meeting_pairs
+from supple.output.check.load_forces import load_forces
 from supple.output.check.seams import seam_keys
 from supple.output.check.stitch_energy import stitch_energy
 from supple.output.check.surfaces import Surfaces
@@ -69,6 +71,7 @@ class Snapshot:
     scene : of the frame; number, time : of the frame, [s]
     positions, velocities : (n, 3) [m], [m/s]; det_F : (m,) as recorded; poses : (obstacles, 3, 4)
     internal : (k, 11) internal variables of materials that flow, see `State`; active : growths and muscles
+    load_values : vectors and numbers of the recorded loads, by name
     """
 
     scene: Scene
@@ -80,10 +83,12 @@ class Snapshot:
     poses: NDArray[np.float64]
     internal: NDArray[np.float64]
     active: tuple[ActiveTets, ...] = ()
+    load_values: Mapping[str, NDArray[np.float64] | float] = field(default_factory=dict)
 
     @classmethod
     def of(cls, scene: Scene, frame: RecordedFrame) -> Snapshot:
         x, v = frame.state.positions, frame.state.velocities
+        details = frame.report.details
         return cls(
             scene,
             frame.number,
@@ -94,6 +99,7 @@ class Snapshot:
             frame.obstacle_poses,
             frame.state.internal,
             frame.active,
+            {**details.load_vectors, **details.load_values},
         )
 
     @cached_property
@@ -145,6 +151,11 @@ class Snapshot:
     def stitch_energy(self) -> float | None:
         """[J], zero at rest; None where the recording does not contain the laws of its stitches."""
         return stitch_energy(self.scene.recording, self.positions, self.poses)
+
+    @cached_property
+    def load_forces(self) -> dict[str, NDArray[np.float64]]:
+        """(n, 3) forces of recorded loads on the vertices [N], by the name of their work."""
+        return load_forces(self.scene.recording.loads, self.load_values, self.positions)
 
     @cached_property
     def points(self) -> NDArray[np.float64]:

@@ -25,8 +25,9 @@ from supple.materials.own.formula import VARIABLES, Formula
 from supple.materials.own.formula_law import FormulaLaw
 from supple.materials.per_tet import BY_LAW, NO_REGION, NOT_ELASTIC, Law, LawTets
 from supple.materials.registry import ELASTIC_MATERIALS
+from supple.output.recording.actions.joints import joints_of
+from supple.output.recording.actions.loads import write_loads
 from supple.output.recording.checked_hdf5 import CheckedFile
-from supple.output.recording.joints import joints_of
 from supple.scene.contact_pairs import pair_table
 from supple.scene.joints.axis_joint import AxisJoint
 from supple.system import System
@@ -127,6 +128,7 @@ def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
         "patches": bool((region != NO_REGION).any()),
         "untouching": _untouching(system),
         "welds": _welds(system),
+        "loads": write_loads(group, system),
         "joints": [joint.described() for joint in joints_of(system)],
     }
 

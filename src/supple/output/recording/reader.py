@@ -16,10 +16,11 @@ from supple.errors import OutputError
 from supple.materials.elastic_tets.active import ActiveTets
 from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.flows.internal import NEVER_FLOWED
+from supple.output.recording.actions.joints import RecordedJoint, read_joints
+from supple.output.recording.actions.loads import read_loads
 from supple.output.recording.checked_hdf5 import CheckedFile
 from supple.output.recording.details import RecordedDetails
 from supple.output.recording.file import WRITTEN
-from supple.output.recording.joints import RecordedJoint, read_joints
 from supple.output.recording.laws import read_quadratic, recorded_laws
 from supple.output.recording.physics import RecordedPhysics, RecordedWeld, read_physics, read_untouching, read_welds
 from supple.output.recording.recorder import INTERNAL, REPORT_NUMBERS, REPORT_VECTORS, field_series, frame_layout
@@ -195,6 +196,7 @@ class Recording(Showable, Sequence[RecordedFrame]):
     sensors : of the scene
     untouching : pairs that may pass through each other: numbers of bodies, then obstacles
     welds : vertices of soft bodies that are points of rigid ones; joints : of the scene
+    loads : those whose forces follow from one value, by its name in the details; other_loads : names of works of others
     scene_text : the scene file's text, or None; solver : its description, or None; supple_version : of the writer
     """
 
@@ -233,6 +235,7 @@ class Recording(Showable, Sequence[RecordedFrame]):
         self.untouching = read_untouching(file, header)
         self.welds: tuple[RecordedWeld, ...] = read_welds(file, header, n)
         self.joints: tuple[RecordedJoint, ...] = read_joints(file, header)
+        self.loads, self.other_loads = read_loads(file, header, n)
         self.stitches: RecordedStitches = read_stitches(file, n, len(self.obstacles))
         self.dt = float(header["dt"])
         self.solver: str | None = header.get("solver")

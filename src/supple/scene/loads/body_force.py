@@ -54,6 +54,11 @@ class BodyForce(Load):
         if self.body is not None:
             body_of(self.body, bodies, self.label)
 
+    @property
+    def is_uniform(self) -> bool:
+        """Whether the force is the same at all places."""
+        return isinstance(self.force, Curve) or not callable(self.force)
+
     def at(self, x: NDArray[np.float64], time: float) -> NDArray[np.float64]:
         """The force (k, 3) per mass [N/kg] at places x (k, 3) and `time`.
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.output.recording.joints import RecordedJoint
+from supple.output.recording.actions.joints import RecordedJoint
 from supple.output.recording.scene import RecordedObstacle
 from supple.readings.joint_readings import JointReading
 from supple.simulate import Diagnostics

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from supple.output.check.frame_check import FrameCheck
 from supple.output.check.snapshot import Scene, Snapshot
-from supple.output.recording.joints import RecordedJoint
+from supple.output.recording.actions.joints import RecordedJoint
 
 # Largest violations, as a share of the joint's size: of `Implicit`, and of solvers that correct positions step by step.
 _IMPLICIT, _OTHERS = 1e-6, 1e-3

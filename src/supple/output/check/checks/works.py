@@ -1,4 +1,4 @@
-"""The works of pins and of contact, computed anew from positions and from recorded contact forces.
+"""The works of pins, loads and contact, computed anew from positions, values of loads and recorded contact forces.
 
 Between two frames a force f moves its vertex by d. The trapezoid (f + f') d / 2 is of second order in the time between
 frames; half of |f' d - f d| is how far it may be off, while a force changes in one direction. What the frames leave
@@ -29,22 +29,24 @@ _SINGLE = 1e-6
 
 
 class Works(FrameCheck):
-    """The recorded works of pins and of contact are those of the frames.
+    """The recorded works of pins, loads and contact are those of the frames.
 
     Attributes
     ----------
-    frames : of each frame, for each of pins and contact that are judged, the work [J] and how far it may be off [J]
+    frames : of each frame, for each part that is judged, the work [J] and how far it may be off [J]
     """
 
     name = "works"
-    good = "those of pins and contact agree within {worst} of the energies, beyond what frames leave open"
     bad = "differ by {worst} of the energies from those of the frames"
 
     def begin(self) -> None:
         recording = self.scene.recording
         self._works = recorded_works(recording) or {}
+        self._loads = {load.work for load in recording.loads.values()} - recording.other_loads
         self._open = {"pins": self._pins_are_open(), "contact": self._contact_is_open()}
-        self._parts = [name for name, why in self._open.items() if why is None]
+        self._parts = [name for name, why in self._open.items() if why is None] + sorted(self._loads & set(self._works))
+        named = " and ".join([", ".join(self._parts[:-1])] * (len(self._parts) > 1) + self._parts[-1:])
+        self.good = f"those of {named} agree within {{worst}} of the energies, beyond what frames leave open"
         if not self._works:
             self.why_not = "the recording does not contain works"
         elif self.settings.every > 1:
@@ -60,7 +62,7 @@ class Works(FrameCheck):
 
     def _pins_are_open(self) -> str | None:
         recording, physics = self.scene.recording, self.scene.recording.physics
-        others = sorted(set(self._works) - _BESIDE_PINS - {"pins"})
+        others = sorted(set(self._works) - _BESIDE_PINS - self._loads - {"pins"})
         rigid = np.zeros(len(recording.rest_positions), dtype=bool)
         for body in recording.bodies:
             rigid[body.vertices] = body.rigid
@@ -90,10 +92,11 @@ class Works(FrameCheck):
         found = [(0.0, 0.0)] * len(self._parts)
         if last is not None:
             moved = at.positions - last.positions
-            on_vertices = self._of_contact(last, at, forces, moved)
-            of = {"contact": (float(on_vertices[0].sum()), float(on_vertices[1].sum())), "pins": (0.0, 0.0)}
+            by_name = {"contact": self._of_contact(last, at, forces, moved)}
+            by_name |= {name: self._of_load(last, at, name, moved) for name in self._loads}
+            of = {name: (float(work.sum()), float(left.sum())) for name, (work, left) in by_name.items()}
             if "pins" in self._parts:
-                of["pins"] = self._of_pins(last, at, moved, on_vertices)
+                of["pins"] = self._of_pins(last, at, moved, by_name)
             found = [of[name] for name in self._parts]
         self._first = self._first or at
         self._rows.append((at.number, *moved_and_height(at, self._first)))
@@ -108,17 +111,32 @@ class Works(FrameCheck):
         sizes, after = np.linalg.norm(forces, axis=1), np.einsum("ij,ij->i", forces, moved)
         if not self._implicit:
             # Each force is a mean over the frame, in which velocities differ from their mean by half of their change.
-            apart = 0.5 * self.scene.recording.dt * np.linalg.norm(at.velocities - last.velocities, axis=1)
-            return after, sizes * (apart + rounding)
+            return after, sizes * (self._way(last, at) + rounding)
         before = np.einsum("ij,ij->i", self._forces, moved)
         return 0.5 * (before + after), 0.5 * np.abs(after - before) + sizes * rounding
+
+    def _of_load(
+        self, last: Snapshot, at: Snapshot, name: str, moved: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(n,) the works of the loads of a name [J], and how far they may be off."""
+        before, after = (np.einsum("ij,ij->i", of.load_forces[name], moved) for of in (last, at))
+        left_open = 0.5 * np.abs(after - before)
+        if not self._implicit:
+            # Within a frame, its change acts on what the way is longer than the straight one, too.
+            change = np.linalg.norm(at.load_forces[name] - last.load_forces[name], axis=1)
+            left_open += 0.5 * change * self._way(last, at)
+        return 0.5 * (before + after), left_open
+
+    def _way(self, last: Snapshot, at: Snapshot) -> NDArray[np.float64]:
+        """(n,) half of how far a vertex would go with the change of its velocity [m]."""
+        return 0.5 * self.scene.recording.dt * np.linalg.norm(at.velocities - last.velocities, axis=1)
 
     def _of_pins(
         self,
         last: Snapshot,
         at: Snapshot,
         moved: NDArray[np.float64],
-        of_contact: tuple[NDArray[np.float64], NDArray[np.float64]],
+        by_name: dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]],
     ) -> tuple[float, float]:
         """The work of pins from a frame to the next [J], and how far it may be off."""
         recording = self.scene.recording
@@ -137,10 +155,11 @@ class Works(FrameCheck):
         left_open = 0.5 * abs(after - before) + 0.5 * float(m @ np.einsum("ij,ij->i", change, change))
         if self._implicit:  # XPBD counts no viscous forces on pins
             left_open += self._of_viscous_forces(last, at, moved, after - before)
-        if self._open["contact"] is None:
-            work -= float(of_contact[0][rows].sum())
-            left_open += float(of_contact[1][rows].sum())
-        else:
+        for name, (on_vertices, left) in by_name.items():
+            if name != "contact" or self._open["contact"] is None:
+                work -= float(on_vertices[rows].sum())
+                left_open += float(left[rows].sum())
+        if self._open["contact"] is not None:
             details = recording[at.number].report.details
             for sums in (getattr(details, f"{kind}_forces", {}) for kind in ("contact", "friction")):
                 for body in recording.bodies:
@@ -167,7 +186,7 @@ class Works(FrameCheck):
         numbers, stored, height = np.array(self._rows).T
         rows = numbers.astype(int)
         for k, name in enumerate(self._parts):
-            names = ("contact", "friction") if name == "contact" else ("pins",)
+            names = ("contact", "friction") if name == "contact" else (name,)
             recorded = sum((self._works[each] for each in names if each in self._works), np.zeros(len(recording)))
             work, left_open = np.array([found[k] for found in self.frames]).T
             apart = np.abs(np.cumsum(np.where(np.isfinite(left_open), recorded[rows] - work, 0.0)))

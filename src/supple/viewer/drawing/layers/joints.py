@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.output.recording.joints import RecordedJoint
+from supple.output.recording.actions.joints import RecordedJoint
 from supple.viewer.drawing.layers.primitives.layer import Layer, single
 from supple.viewer.drawing.moments.model import Model, Moment
 

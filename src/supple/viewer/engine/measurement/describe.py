@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.output.recording.joints import joints_of
+from supple.output.recording.actions.joints import joints_of
 from supple.output.recording.scene import RecordedObstacle
 from supple.readings.joint_readings import joint_readings
 from supple.scene.obstacles.obstacle import Obstacle

@@ -1,0 +1,64 @@
+"""What a recording keeps of loads whose forces follow from one value at a time; each frame has these values.
+
+`SolverDetails.load_vectors` and `load_values` have the values, by the name of the work and the number of the load.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import h5py
+import numpy as np
+
+from supple.loads.applied import LoadPattern as LoadPattern  # the checker has it from here
+from supple.output.recording.checked_hdf5 import CheckedFile
+from supple.system import System
+
+_GROUP = "supple/physics"
+
+
+def write_loads(group: h5py.Group, system: System) -> list[dict[str, Any]]:
+    """Write the arrays to the group of the physics; returns the entries of the header, one for each load."""
+    entries = []
+    for k, load in enumerate(system.loads):
+        pattern = load.pattern
+        if pattern is None:
+            entries.append({"kind": None, "work": load.work})
+            continue
+        vertices = pattern.vertices
+        group[f"load_{k}/vertices"] = vertices if vertices.ndim == 2 else vertices[:, None]
+        group[f"load_{k}/weights"] = pattern.weights
+        own = {"kind": pattern.kind, "offset": list(pattern.offset), "stiffness": float(pattern.stiffness)}
+        entries.append({"work": load.work, **own})
+    return entries
+
+
+def read_loads(
+    file: CheckedFile, header: dict[str, Any], vertices: int
+) -> tuple[dict[str, LoadPattern], frozenset[str]]:
+    """By the name of their values, the loads with a pattern; and the works of loads that have none.
+
+    Raises
+    ------
+    OutputError : where the data are contradictory.
+    """
+    patterns, others = {}, set()
+    for k, entry in enumerate((header.get("physics") or {}).get("loads", [])):
+        try:
+            kind, work = entry["kind"], str(entry["work"])
+            if kind is None:
+                others.add(work)
+                continue
+            x, y, z = map(float, entry["offset"])
+            stiffness = float(entry["stiffness"])
+        except (KeyError, TypeError, ValueError):
+            raise file.broken("its loads are not described as they should be") from None
+        if kind not in ("vector", "pressure", "spring"):
+            raise file.newer(f"a load has the kind {kind!r} that this version does not know")
+        rows = file.indices(f"{_GROUP}/load_{k}/vertices", 3 if kind == "pressure" else 1, vertices)
+        weights = file.array(f"{_GROUP}/load_{k}/weights", "f", (len(rows),))
+        if not np.isfinite([*weights, x, y, z, stiffness]).all():
+            raise file.broken("a number of a load is not finite")
+        rows = rows if kind == "pressure" else np.ascontiguousarray(rows[:, 0])
+        patterns[f"{work}.{k}"] = LoadPattern(kind, work, rows, weights, (x, y, z), stiffness)
+    return patterns, frozenset(others)
