@@ -35,14 +35,15 @@ def test_points_go_rigidly_with_what_carries_them(guides: int) -> None:
 
 
 def job(folder: Path, **changes: object) -> Path:
-    """A ball that is held at its top, which turns and rises, above a block that rises."""
+    """A ball that is held at its top, which turns and rises, above a block that rises and turns."""
     ball = sphere_surface(radius=0.1, edge_length=0.06)
     pinned = ball.vertices[:, 2] > 0.05
     path = [ball.vertices[pinned] @ rotation_matrix([0, 0, 0.1 * k]).T + [0.0, 0.0, 0.01 * k] for k in range(5)]
     np.savez(folder / "a.npz", vertices=ball.vertices, triangles=ball.triangles, pinned=pinned, path=np.array(path))
     block = shapes.box((0.2, 0.2, 0.2), (1, 1, 1)).surface.transformed(translation=(0.0, 0.0, -0.25))
     places = np.array([[0.0, 0.0, 0.01 * k] for k in range(5)])
-    np.savez(folder / "b.npz", vertices=block.vertices, triangles=block.triangles, path=places)
+    turns = np.array([rotation_matrix([0.0, 0.1 * k, 0.2 * k]) for k in range(5)])
+    np.savez(folder / "b.npz", vertices=block.vertices, triangles=block.triangles, path=places, turns=turns)
     body = {"name": "ball", "arrays": "a.npz", "youngs": 5e4, "poisson": 0.4, "density": 1e3, "damping": 0.005}
     whole = {
         "frames": 4,
@@ -70,6 +71,17 @@ def test_every_vertex_has_a_position_in_every_frame(tmp_path: Path, capsys: pyte
     assert report["warnings"] == []
     assert report["summary"].startswith("4 frames of 1 bodies")
     assert capsys.readouterr().out.splitlines()[-1] == "frame 4 of 4"
+
+
+def test_an_obstacle_turns_about_its_own_place(tmp_path: Path) -> None:
+    job(tmp_path)
+    with np.load(tmp_path / "b.npz") as arrays:
+        turns = arrays["turns"]
+    obstacle = bake._obstacle({"name": "block", "arrays": "b.npz", "friction": 0.5}, tmp_path, 1 / 24)
+    for k in range(5):
+        R, t = obstacle.pose(k / 24)
+        np.testing.assert_allclose(R, turns[k], atol=1e-12)
+        np.testing.assert_allclose(t, [0.0, 0.0, 0.01 * k], atol=1e-12)
 
 
 def test_what_cannot_be_simulated_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
