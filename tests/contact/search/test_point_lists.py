@@ -43,14 +43,16 @@ def find(points, triangles, far, near, pieces, excluded=None):
     return found
 
 
-def test_each_near_pair_is_found_once_and_no_other():
+# The second: triangles of two pieces among each other, which no group of points may mix.
+@pytest.mark.parametrize("pieces", [np.arange(90) // 45, np.arange(90) // 3 % 2])
+def test_each_near_pair_is_found_once_and_no_other(pieces):
     rng = np.random.default_rng(2)
     points = rng.uniform(-1, 1, size=(90, 3))
     triangles = np.arange(90, dtype=np.int32).reshape(-1, 3)
     points[1::3] = points[::3] + rng.normal(scale=0.2, size=(30, 3))
     points[2::3] = points[::3] + rng.normal(scale=0.2, size=(30, 3))
     points[0:3] = [[-3, -0.1, -3], [3, -0.1, -3], [0, 0.1, 3]]  # one triangle far larger than others
-    pieces = (np.arange(90) // 45).astype(np.int32)
+    pieces = pieces.astype(np.int32)
     far, near = rng.uniform(0, 0.2, size=(90, 3)), rng.uniform(0, 0.1, size=(90, 3))
     far[7, 0] = 2.5  # a point with a large search radius
     expected = []
@@ -63,6 +65,22 @@ def test_each_near_pair_is_found_once_and_no_other():
                 expected.append((p, t))
     assert find(points, triangles, far, near, pieces) == expected
     assert len(expected) > 60
+
+
+def test_groups_that_are_kept_while_points_move_lose_no_pair():
+    rng = np.random.default_rng(4)
+    points = rng.uniform(-1, 1, size=(60, 3))
+    triangles = np.arange(60, dtype=np.int32).reshape(-1, 3)
+    pieces = (np.arange(60) // 3 % 2).astype(np.int32)
+    shapes = (points, pieces, triangles, pieces[triangles[:, 0]])
+    rules = (np.ones((2, 2), bool), np.zeros(21, np.int64), np.zeros(0, np.int32))
+    radii = np.full((60, 3), 0.2)
+    finder = PairFinder(60)
+    for _ in range(4):
+        finder.gather(shapes, (radii, radii), rules)
+        found = [(p, t) for p in range(60) for t in finder.triangles[finder.starts[p] : finder.starts[p + 1]]]
+        assert found == find(points, triangles, radii, radii, pieces)
+        points += rng.normal(scale=0.05, size=(60, 3))
 
 
 def test_excluded_pairs_and_positions_that_are_not_finite_are_omitted():

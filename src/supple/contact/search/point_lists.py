@@ -15,8 +15,11 @@ from supple.contact.search.pair_kernels import RUNS, boxes_of_owners, meets_part
 from supple.contact.search.room import Room
 from supple.contact.surface.distances import point_triangle_square
 from supple.numerics.adjacency import in_list
-from supple.numerics.geometry.box_tree import STACK, BoxTree, from_root, next_leaf
+from supple.numerics.geometry.box_tree import STACK, BoxTree, from_root, morton_codes, next_leaf, overlap
 from supple.numerics.kernel_cache import njit, prange
+
+# Points that share one walk through the tree; see docs/xpbd_contact.md.
+GROUP = 8
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
@@ -31,26 +34,33 @@ def _boxes_of_triangles(points, triangles, radii, out):
 
 
 @njit(error_model="numpy")
-def _near_point(p, radius, shapes, radii, rules, same, tree, pieces, found, count, scratch):
-    """Append the triangles that are near point p, of its own piece or of others; returns the number of all found.
+def _near_group(group, shapes, radii, rules, same, tree, pieces, found, count, scratch):
+    """Append the triangles near the points of a group, of their own piece or of others; returns the number of all.
+
+    One walk through the tree serves all points of the group.
 
     Parameters
     ----------
-    radius : of the search [m]; for the other arguments see `_list_pairs`
+    group : the points, of one piece; for the other arguments see `_list_pairs`
     pieces : for each piece those that the search looks for, and their boxes
     found : (first, last, out): rows of `out` that may be written; where they are full, pairs are only counted
-    scratch : (STACK,) and (6,)
+    scratch : (STACK,), (6,) and (GROUP, 6)
     """
     points, point_piece, triangles, triangle_piece = shapes
     allowed, excluded = rules
     nodes, labels, order = tree
     first, last, out = found
-    stack, box = scratch
-    mine = point_piece[p]
-    for j in range(3):
-        box[j], box[3 + j] = points[p, j] - radius, points[p, j] + radius
+    stack, box, boxes = scratch
+    mine = point_piece[group[0]]
+    box[:3], box[3:] = np.inf, -np.inf
+    for i in range(len(group)):
+        p = group[i]
+        for j in range(3):
+            boxes[i, j], boxes[i, 3 + j] = points[p, j] - radii[p, 0], points[p, j] + radii[p, 0]
+            box[j], box[3 + j] = min(box[j], boxes[i, j]), max(box[3 + j], boxes[i, 3 + j])
     if not meets_partner(box, mine, pieces[0], pieces[1]):
         return count
+    leaves = len(nodes) // 2
     top = from_root(nodes, box, stack)
     while top > 0:
         leaf, top = next_leaf(nodes, labels, box, mine, same, stack, top)
@@ -58,31 +68,37 @@ def _near_point(p, radius, shapes, radii, rules, same, tree, pieces, found, coun
             continue
         t = order[leaf]
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        if not allowed[mine, triangle_piece[t]] or p in (a, b, c):
+        if not allowed[mine, triangle_piece[t]]:
             continue
-        r = radius + max(radii[a, 1], radii[b, 1], radii[c, 1])
-        if point_triangle_square(points, p, triangles, t) > r * r or in_list(excluded, t, p):
-            continue
-        if first + count < last:
-            out[first + count, 0] = p
-            out[first + count, 1] = t
-        count += 1
+        moves = max(radii[a, 1], radii[b, 1], radii[c, 1])
+        for i in range(len(group)):
+            p = group[i]
+            if not overlap(nodes, leaves + leaf, boxes[i]) or p in (a, b, c) or in_list(excluded, t, p):
+                continue
+            r = radii[p, 0] + moves
+            if point_triangle_square(points, p, triangles, t) > r * r:
+                continue
+            if first + count < last:
+                out[first + count, 0] = p
+                out[first + count, 1] = t
+            count += 1
     return count
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def _list_pairs(shapes, radii, rules, partners, boxes, far_tree, near_tree, room, counts, out):
-    """Write the pairs of each run of points to its room of `out`, and their number to `counts`.
+def _list_pairs(shapes, groups, radii, rules, partners, boxes, far_tree, near_tree, room, counts, out):
+    """Write the pairs of each run of groups to its room of `out`, and their number to `counts`.
 
     Parameters
     ----------
-    shapes, radii, rules : see `PairFinder.gather`
+    shapes, radii, rules : see `PairFinder.gather`; groups : see `_groups_of`
     partners : for each piece the others that its points may come near, and itself where that is allowed: two lists, as
         starts (p + 1,) and pieces
     boxes : (p, 6) of the pieces' triangles, enlarged as in `far_tree`
     far_tree, near_tree : nodes, labels and order of trees of triangles, for pairs of two pieces and of one
     """
     points, point_piece, triangles, triangle_piece = shapes
+    order, starts = groups
     far, near = radii
     allowed, excluded_starts, excluded_points = rules
     (other_starts, others), (own_starts, own) = partners
@@ -92,16 +108,26 @@ def _list_pairs(shapes, radii, rules, partners, boxes, far_tree, near_tree, room
         its_shapes = (points, point_piece, triangles, triangle_piece)
         its_rules = (allowed, (excluded_starts, excluded_points))
         found = (room[r], room[r + 1], out)
-        scratch = np.empty(STACK, dtype=np.int64), np.empty(6)
+        scratch = np.empty(STACK, dtype=np.int64), np.empty(6), np.empty((GROUP, 6))
         count = 0
-        for p in range(r, len(points), RUNS):
+        for g in range(r, len(starts) - 1, RUNS):
+            group = order[starts[g] : starts[g + 1]]
             tree = (far_nodes, far_labels, far_order)
             pieces = ((other_starts, others), boxes)
-            count = _near_point(p, far[p, 0], its_shapes, far, its_rules, False, tree, pieces, found, count, scratch)
+            count = _near_group(group, its_shapes, far, its_rules, False, tree, pieces, found, count, scratch)
             tree = (near_nodes, near_labels, near_order)
             pieces = ((own_starts, own), boxes)
-            count = _near_point(p, near[p, 0], its_shapes, near, its_rules, True, tree, pieces, found, count, scratch)
+            count = _near_group(group, its_shapes, near, its_rules, True, tree, pieces, found, count, scratch)
         counts[r] = count
+
+
+def _groups_of(points: NDArray[np.float64], pieces: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Groups of at most `GROUP` points (n, 3) of one piece (n,) that are near each other: the points in order (n,), and
+    where each group begins (g + 1,)."""
+    order = np.lexsort((morton_codes(np.concatenate([points, points], axis=1)), pieces))
+    ordered = pieces[order]
+    place = np.arange(len(points)) - np.searchsorted(ordered, ordered)
+    return order, np.append(np.flatnonzero(place % GROUP == 0), len(points))
 
 
 class PairFinder:
@@ -114,6 +140,7 @@ class PairFinder:
     def __init__(self, n_points: int) -> None:
         self._room = Room()
         self._trees: list[BoxTree] = []
+        self._groups = np.zeros(0, dtype=np.int64), np.zeros(1, dtype=np.int64)
         self.starts = np.zeros(n_points + 1, dtype=np.int64)
         self.active = np.zeros(0, dtype=np.int32)
         self.triangles = np.zeros(0, dtype=np.int32)
@@ -142,8 +169,8 @@ class PairFinder:
 
     def _pairs(self, shapes: tuple, radii: tuple, rules: tuple) -> NDArray[np.int32]:
         """(k, 2) points and triangles, ascending."""
-        points, point_piece, triangles, triangle_piece = shapes
-        trees, far_boxes = self._sorted(points, triangles, triangle_piece, radii)
+        points, point_piece, _, triangle_piece = shapes
+        trees, far_boxes = self._sorted(shapes, radii)
         room = self._room
         pieces = len(rules[0])
         of_points, of_triangles = np.empty((2, pieces, 3)), np.empty((pieces, 6))
@@ -156,21 +183,15 @@ class PairFinder:
             partners.append(lists)
         arrays = [(tree.nodes, tree.labels, tree.order) for tree in trees]
         while True:
-            _list_pairs(
-                shapes, radii, rules, tuple(partners), of_triangles, *arrays, room.start, room.counts, room.pairs
-            )
+            lists = (tuple(partners), of_triangles, *arrays)
+            _list_pairs(shapes, self._groups, radii, rules, *lists, room.start, room.counts, room.pairs)
             if not room.is_too_small():
                 break
         return sort_pairs(room.pairs, room.start, room.counts, len(points))
 
-    def _sorted(
-        self,
-        points: NDArray[np.float64],
-        triangles: NDArray[np.int32],
-        triangle_piece: NDArray[np.int32],
-        radii: tuple[NDArray[np.float64], NDArray[np.float64]],
-    ) -> tuple[list[BoxTree], NDArray[np.float64]]:
+    def _sorted(self, shapes: tuple, radii: tuple) -> tuple[list[BoxTree], NDArray[np.float64]]:
         """The trees of triangles for pairs of different pieces and of one piece, and the boxes (t, 6) of the first."""
+        points, point_piece, triangles, triangle_piece = shapes
         trees, all_boxes = [], []
         for k, each in enumerate(radii):
             boxes = np.empty((len(triangles), 6))
@@ -180,5 +201,6 @@ class PairFinder:
                 trees.append(self._trees[k])
             else:
                 trees.append(BoxTree.over(boxes, triangle_piece))
+                self._groups = _groups_of(points, point_piece)
         self._trees = trees
         return trees, all_boxes[0]
