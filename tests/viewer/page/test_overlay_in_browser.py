@@ -117,6 +117,7 @@ def test_values_have_units_and_are_typed_with_them(fresh):
         box.fill(typed)
         box.press("Enter")
         assert fresh.received(SetParameter) == SetParameter("youngs", pascals)
+        fresh.tab.wait_for_timeout(500)  # the page looks for new values every 80 ms
         fresh.screen.wait(lambda: box.input_value() == shown, shown)  # noqa: B023
         place = np.log10(pascals)
         fresh.screen.wait(lambda: abs(fresh.screen.reads(youngs.handle) - place) < 0.06, "the slider")  # noqa: B023

@@ -107,15 +107,17 @@
       if (!box) {
         row.classList.add("supple-row");
         box = row.appendChild(Object.assign(document.createElement("input"), { className: "supple-value", spellcheck: false }));
-        box.addEventListener("change", () => { send(box.dataset.uuid, box.value); box.dataset.waits = box.value; });
+        // As viser's own inputs: the server does not answer where it keeps the text as it was typed.
+        box.addEventListener("change", () => {
+          suppleViewer.guiActions.updateGuiProps(box.dataset.uuid, { value: box.value });
+          send(box.dataset.uuid, box.value);
+        });
         box.addEventListener("keydown", (event) => { if (event.key === "Enter") box.blur(); });
         box.addEventListener("focus", () => box.select());
       }
       box.dataset.uuid = element.uuid;
       box.setAttribute("aria-label", document.querySelector(`label[for="${slider.id}"]`)?.textContent ?? "");
-      if (document.activeElement !== box && box.value !== element.value && box.dataset.waits !== box.value)
-        box.value = element.value;
-      if (element.value !== box.dataset.waits) box.dataset.waits = "\u0000";
+      if (document.activeElement !== box && box.value !== element.value) box.value = element.value;
     }
   }
 
