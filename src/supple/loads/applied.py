@@ -54,9 +54,9 @@ class AppliedLoad(ABC):
         """None where the forces do not follow from one value."""
         return None
 
-    def value(self, time: float) -> NDArray[np.float64]:
-        """That of the pattern at `time` [s]."""
-        raise NotImplementedError
+    def value(self, time: float) -> NDArray[np.float64] | None:
+        """That of the pattern at `time` [s]; None where there is no pattern."""
+        return None
 
     @abstractmethod
     def renumbered(self, new: NDArray[np.int32]) -> Self:
@@ -128,8 +128,8 @@ class MassLoad(AppliedLoad):
     def pattern(self) -> LoadPattern | None:
         return LoadPattern("vector", self.work, self.vertices, self.masses) if self.load.is_uniform else None
 
-    def value(self, time: float) -> NDArray[np.float64]:
-        return self.load.at(np.zeros((1, 3)), time)[0]
+    def value(self, time: float) -> NDArray[np.float64] | None:
+        return self.load.at(np.zeros((1, 3)), time)[0] if self.load.is_uniform else None
 
     def renumbered(self, new: NDArray[np.int32]) -> MassLoad:
         return replace(self, vertices=new[self.vertices])

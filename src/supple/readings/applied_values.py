@@ -16,10 +16,11 @@ def with_applied_values(details: SolverDetails, system: System, time: float) -> 
     vectors: dict[str, NDArray] = {}
     values: dict[str, float] = {}
     for k, load in enumerate(system.loads):
-        if load.pattern is None:
+        value = load.value(time)
+        if value is None:
             continue
-        if load.pattern.kind == "vector":
-            vectors[f"{load.work}.{k}"] = load.value(time)
+        if value.ndim:
+            vectors[f"{load.work}.{k}"] = value
         else:
-            values[f"{load.work}.{k}"] = float(load.value(time))
+            values[f"{load.work}.{k}"] = float(value)
     return replace(details, active=active, load_vectors=vectors, load_values=values)

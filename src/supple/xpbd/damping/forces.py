@@ -160,6 +160,18 @@ def viscous_tet(x, v, b, shear, bulk):
 
 
 @njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+def _length_and_rate(x, v, t):
+    """Of a spring from a vertex to the place t of an edge: d (3), d . d' and d . d; see `viscous_spring`."""
+    x0, y0, z0, x1, y1, z1, x2, y2, z2 = x
+    s = 1.0 - t
+    dx, dy, dz = x0 - s * x1 - t * x2, y0 - s * y1 - t * y2, z0 - s * z1 - t * z2
+    x0, y0, z0, x1, y1, z1, x2, y2, z2 = v
+    ex, ey, ez = x0 - s * x1 - t * x2, y0 - s * y1 - t * y2, z0 - s * z1 - t * z2
+    squared = dx * dx + dy * dy + dz * dz
+    return (dx, dy, dz), dx * ex + dy * ey + dz * ez, squared
+
+
+@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
 def viscous_spring(x, v, t, viscosity):
     """The forces (9) of a spring from a vertex to the place t of an edge, mean diagonal entries (3) of the matrix,
     and the square of the rate of its length [1/s^2].
@@ -170,17 +182,13 @@ def viscous_spring(x, v, t, viscosity):
     ----------
     x, v : 9 coordinates [m] and velocities [m/s]; t : place on the edge; viscosity : [kg/s]
     """
-    x0, y0, z0, x1, y1, z1, x2, y2, z2 = x
+    (dx, dy, dz), product, squared = _length_and_rate(x, v, t)
     s = 1.0 - t
-    dx, dy, dz = x0 - s * x1 - t * x2, y0 - s * y1 - t * y2, z0 - s * z1 - t * z2
-    x0, y0, z0, x1, y1, z1, x2, y2, z2 = v
-    ex, ey, ez = x0 - s * x1 - t * x2, y0 - s * y1 - t * y2, z0 - s * z1 - t * z2
-    squared = dx * dx + dy * dy + dz * dz
     # Coinciding ends have no direction.
-    f = viscosity * (dx * ex + dy * ey + dz * ez) / squared if squared > 0.0 else 0.0
+    f = viscosity * product / squared if squared > 0.0 else 0.0
     fx, fy, fz = f * dx, f * dy, f * dz
     third = viscosity / 3.0
-    rate = (dx * ex + dy * ey + dz * ez) / squared if squared > 0.0 else 0.0
+    rate = product / squared if squared > 0.0 else 0.0
     return (
         fx,
         fy,
@@ -201,13 +209,7 @@ def viscous_spring(x, v, t, viscosity):
 @njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
 def viscous_power_of_spring(x, v, t, viscosity):
     """Forces times velocities of `viscous_spring` [W]: viscosity (d . d' / |d|)^2."""
-    x0, y0, z0, x1, y1, z1, x2, y2, z2 = x
-    s = 1.0 - t
-    dx, dy, dz = x0 - s * x1 - t * x2, y0 - s * y1 - t * y2, z0 - s * z1 - t * z2
-    x0, y0, z0, x1, y1, z1, x2, y2, z2 = v
-    ex, ey, ez = x0 - s * x1 - t * x2, y0 - s * y1 - t * y2, z0 - s * z1 - t * z2
-    squared = dx * dx + dy * dy + dz * dz
-    product = dx * ex + dy * ey + dz * ez
+    _, product, squared = _length_and_rate(x, v, t)
     return viscosity * product * product / squared if squared > 0.0 else 0.0
 
 
