@@ -35,6 +35,21 @@ def swept_boxes(begin, way, simplices, out):
             out[i, 3 + j] = high
 
 
+@njit(cache=True, parallel=True, error_model="numpy")
+def swept_boxes_of(which, begin, way, simplices, out):
+    """`swept_boxes` of some simplices: rows `which` (w,) of out (m, 6) are set."""
+    for w in prange(len(which)):
+        i = which[w]
+        for j in range(3):
+            low, high = np.inf, -np.inf
+            for k in range(simplices.shape[1]):
+                a = begin[simplices[i, k], j]
+                b = a + way[simplices[i, k], j]
+                low, high = min(low, a, b), max(high, a, b)
+            out[i, j] = low
+            out[i, 3 + j] = high
+
+
 @njit(cache=True, error_model="numpy")
 def boxes_of_owners(begin, way, owner, out):
     """Write the box that the points of each owner sweep to out (p, 6); inverted for owners without points."""

@@ -5,6 +5,8 @@ import math
 import numpy as np
 
 from supple.numerics.kernel_cache import njit
+from supple.numerics.mat3 import mat_mul_transposed, row, subtract
+from supple.numerics.svd3 import svd3
 
 
 @njit(cache=True)
@@ -18,49 +20,91 @@ def any_beyond_reach(x, x_gathered, reach):
     return False
 
 
-@njit(cache=True)
-def mean_motions(motions, pieces, all_share, out):
-    """Mean of the motions (n, 3) of each piece; the last row is the mean of all points, or zero unless `all_share`."""
-    out[:] = 0.0
-    counts = np.zeros(len(out))
+@njit(cache=True, error_model="numpy")
+def common_motions(points, motions, pieces, all_share, common):
+    """The motion of each piece as a rigid body, nearest to the motions (n, 3) of its points (n, 3).
+
+    Parameters
+    ----------
+    pieces : (n,)
+    all_share : whether the mean motion of all points is common to them; otherwise it counts as zero
+    common : drifts (p + 1, 3), centers (p, 3) and turns (p, 3, 3), set here: point X of piece k moves by
+        drifts[k] + turns[k] (X - centers[k]); drifts[-1] is the mean motion of all points
+    """
+    drifts, centers, turns = common
+    drifts[:], centers[:] = 0.0, 0.0
+    counts = np.zeros(len(drifts))
     for i in range(len(motions)):
-        counts[pieces[i]] += 1.0
+        k = pieces[i]
+        counts[k] += 1.0
         for j in range(3):
-            out[pieces[i], j] += motions[i, j]
+            drifts[k, j] += motions[i, j]
+            centers[k, j] += points[i, j]
     if all_share:
-        for k in range(len(out) - 1):
+        for k in range(len(drifts) - 1):
             counts[-1] += counts[k]
             for j in range(3):
-                out[-1, j] += out[k, j]
-    for k in range(len(out)):
+                drifts[-1, j] += drifts[k, j]
+    for k in range(len(drifts)):
         for j in range(3):
-            out[k, j] /= max(1.0, counts[k])
+            drifts[k, j] /= max(1.0, counts[k])
+            if k < len(centers):
+                centers[k, j] /= max(1.0, counts[k])
+    _turn(points, motions, pieces, drifts, centers, turns)
+
+
+@njit(error_model="numpy")
+def _turn(points, motions, pieces, drifts, centers, turns):
+    """Set each turn to Q - 1, with Q the polar factor of sum (X + u - mean) (X - center)^T."""
+    turns[:] = 0.0
+    for i in range(len(motions)):
+        k = pieces[i]
+        X = subtract(row(points, i), row(centers, k))
+        for r in range(3):
+            moved = X[r] + motions[i, r] - drifts[k, r]
+            for c in range(3):
+                turns[k, r, c] += moved * X[c]
+    for k in range(len(turns)):
+        A = turns[k]
+        U, _, V = svd3((A[0, 0], A[0, 1], A[0, 2], A[1, 0], A[1, 1], A[1, 2], A[2, 0], A[2, 1], A[2, 2]))
+        Q = mat_mul_transposed(U, V)
+        for r in range(3):
+            for c in range(3):
+                turns[k, r, c] = Q[3 * r + c] - (r == c)
+
+
+@njit(error_model="numpy")
+def _relative_squares(points, motions, i, k, common):
+    """The squares of the motion of point i of piece k, less that common to all, and less that of the piece."""
+    drifts, centers, turns = common
+    X = subtract(row(points, i), row(centers, k))
+    absolute = relative = 0.0
+    for r in range(3):
+        turned = turns[k, r, 0] * X[0] + turns[k, r, 1] * X[1] + turns[k, r, 2] * X[2]
+        absolute += (motions[i, r] - drifts[-1, r]) ** 2
+        relative += (motions[i, r] - drifts[k, r] - turned) ** 2
+    return absolute, relative
 
 
 @njit(cache=True)
-def search_radii(motions, moved, excursions, pieces, drifts, scales, far, near):
+def search_radii(points, motions, moved, excursions, pieces, common, scales, far, near):
     """How far points may move, from their velocities: the arguments `far` and `near` of `PairFinder.gather`.
 
     Parameters
     ----------
-    motions : (n, 3) expected motion: velocity times the time ahead [m]
+    points : (n, 3) [m]; motions : (n, 3) expected motion: velocity times the time ahead [m]
     moved : (n, 3) motion since the beginning of the substep [m]
     excursions : (n,) largest motion of a point in a substep before contact stopped it [m]
-    pieces : (n,)
-    drifts : (p + 1, 3) common motion of each piece; in the last row the common motion of all points [m]
+    pieces : (n,); common : of these motions, see `common_motions`
     scales : least, most [m]
     far, near : (n, 3) the search radius of a point, without the gap; how far it may move a triangle; and how far it may
-        move before the search must be repeated. `near` is relative to the motion of its piece [m]
+        move before the search must be repeated. `near` is relative to the motion of its piece as a rigid body, which
+        changes no distance in it [m]
     """
     least, most = scales
     for i in range(len(motions)):
-        k = pieces[i]
-        absolute = relative = path = 0.0
-        for j in range(3):
-            absolute += (motions[i, j] - drifts[-1, j]) ** 2
-            relative += (motions[i, j] - drifts[k, j]) ** 2
-            path += moved[i, j] ** 2
-        path = math.sqrt(path)
+        absolute, relative = _relative_squares(points, motions, i, pieces[i], common)
+        path = math.sqrt(moved[i, 0] ** 2 + moved[i, 1] ** 2 + moved[i, 2] ** 2)
         strain = min(2.0 * most, excursions[i])
         a = strain + min(most, least + 1.2 * math.sqrt(absolute))
         b = strain + min(most, least + 1.2 * math.sqrt(relative))
@@ -69,14 +113,14 @@ def search_radii(motions, moved, excursions, pieces, drifts, scales, far, near):
 
 
 @njit(cache=True)
-def any_beyond_radii(x, x_prev, x_gathered, far, near, pieces, all_share, drifts, excursions):
+def any_beyond_radii(x, x_prev, x_gathered, far, near, pieces, all_share, common, excursions):
     """Whether some point has moved farther than `search_radii` allowed, absolutely or relative to its piece.
 
     Parameters
     ----------
     x, x_prev, x_gathered : (n, 3) now, at the beginning of the substep, and when lists were made [m]
-    far, near : from `search_radii`; pieces : (n,); all_share : see `mean_motions`
-    drifts : (p + 1, 3) scratch memory, see `mean_motions`
+    far, near : from `search_radii`; pieces : (n,); all_share : see `common_motions`
+    common : scratch memory, see `common_motions`
     excursions : (n,) increased to the motion of each point within this substep, where that is larger [m]
     """
     for i in range(len(x)):
@@ -85,13 +129,9 @@ def any_beyond_radii(x, x_prev, x_gathered, far, near, pieces, all_share, drifts
             square += (x[i, j] - x_prev[i, j]) ** 2
         excursions[i] = max(excursions[i], math.sqrt(square))
     moved = x - x_gathered
-    mean_motions(moved, pieces, all_share, drifts)
+    common_motions(x_gathered, moved, pieces, all_share, common)
     for i in range(len(x)):
-        k = pieces[i]
-        absolute = relative = 0.0
-        for j in range(3):
-            absolute += (moved[i, j] - drifts[-1, j]) ** 2
-            relative += (moved[i, j] - drifts[k, j]) ** 2
+        absolute, relative = _relative_squares(x_gathered, moved, i, pieces[i], common)
         # The negated form is also true for positions that are not finite.
         if not (absolute <= far[i, 2] ** 2 and relative <= near[i, 2] ** 2):
             return True

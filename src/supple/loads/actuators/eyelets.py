@@ -99,4 +99,7 @@ class EyeletFriction:
 
 def span_forces(force: float, of_eyelets: NDArray[np.float64]) -> NDArray[np.float64]:
     """(s,) generalized forces on the spans: minus their tensions, for that of the whole cable and f (s - 1,) [N]."""
-    return force + np.append(np.cumsum(of_eyelets[::-1])[::-1], 0.0)
+    out = np.full(len(of_eyelets) + 1, force)
+    if len(of_eyelets):
+        out[:-1] += np.cumsum(of_eyelets[::-1])[::-1]
+    return out

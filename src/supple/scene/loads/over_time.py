@@ -47,8 +47,9 @@ class Curve:
     def __call__(self, time: float) -> NDArray[np.float64]:
         """The value at `time` [s]."""
         times, values = np.asarray(self.times), np.asarray(self.values)
-        columns = values.reshape(len(times), -1).T
-        return np.array([np.interp(time, times, column) for column in columns]).reshape(values.shape[1:])
+        if values.ndim == 1:
+            return np.asarray(np.interp(time, times, values))
+        return np.array([np.interp(time, times, column) for column in values.T])
 
 
 OverTime = ArrayLike | Curve | Callable[[float], ArrayLike]
@@ -62,7 +63,7 @@ def checked_over_time(value: OverTime, what: str, shape: tuple[int, ...]) -> Ove
     SceneError : where a constant or a curve is not finite or has another shape.
     """
     if isinstance(value, Curve):
-        value_at(value, float(np.asarray(value.times)[0]), what, shape)
+        _checked(value(float(np.asarray(value.times)[0])), what, shape)
         return value
     return value if callable(value) else _checked(value, what, shape)
 
@@ -74,6 +75,8 @@ def value_at(value: OverTime, time: float, what: str, shape: tuple[int, ...]) ->
     ------
     SceneError : where it is not finite or has another shape.
     """
+    if isinstance(value, Curve):  # its values were checked when it was made
+        return value(time)
     return _checked(value(time), f"{what}({time:g})", shape) if callable(value) else np.asarray(value)
 
 

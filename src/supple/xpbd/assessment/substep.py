@@ -28,4 +28,7 @@ class Substep(NamedTuple):
 
     def world(self, rows: NDArray[np.integer] | slice = slice(None)) -> NDArray[np.float64]:
         """The positions of some vertices in the world, (k, 3) [m]."""
-        return self.points[rows, :3] + self.origins[rows]
+        if isinstance(rows, slice):
+            return self.points[rows, :3] + self.origins[rows]
+        # Several times as fast as an index.
+        return self.points.take(rows, axis=0)[:, :3] + self.origins.take(rows, axis=0)

@@ -47,6 +47,7 @@ class Works:
         held[welding.vertices[held[welding.control[:, 0]]]] = True
         self._held = np.flatnonzero(held)
         self.at_pins = ElasticEnergy(system, held) if len(self._held) else None
+        self._all = np.arange(len(system.masses))
         self._on_pins = np.zeros((len(system.masses), 3))
         moving = any(obstacle.motion is not None for obstacle in system.obstacles)
         self._anchors = len(system.stitching.anchors) if moving else 0
@@ -80,21 +81,23 @@ class Works:
         contact : whose last entries are those of this substep; extended : (n + a, 4) with the anchors
         of_actuators : gives their forces (n, 3) [N]
         """
-        moved = at.points[:, :3] - at.begun
         self._on_pins[:] = 0.0
         for name, rows, acting in forces:
-            add_works(self.by_name, {name: float(np.einsum("ij,ij->", acting, moved[rows]))})
+            numbers = self._all if isinstance(rows, slice) else rows.astype(np.int64, copy=False)
+            add_works(self.by_name, {name: _work(acting, numbers, at.points, at.begun)})
             if self.at_pins is not None:
                 self._on_pins[rows] += acting
-        if contact.surfaces or contact.shapes:
-            normal, tangential = contact.latest(self.system.points, len(moved))
-            works = [float(np.einsum("ij,ij->", acting, moved)) for acting in (normal, tangential)]
-            add_works(self.by_name, {"contact": works[0], "friction": works[1]})
+        if any(part is not None for part in contact.latest):
+            normal, tangential = contact.on_vertices(self.system.points, len(at.points))
+            places = self._all, at.points, at.begun
+            works = {"contact": _work(normal, *places), "friction": _work(tangential, *places)}
+            add_works(self.by_name, works)
             self._on_pins += normal + tangential
-            self.residual += _work_of_impulses(at.points, self.system.masses, self.impulses, moved, at.h) - sum(works)
+            self.residual -= sum(works.values())
+        self.residual += _work_of_impulses(at.points, self.system.masses, self.impulses, at.begun, at.h)
         if self.at_pins is not None:
             self._on_pins += of_actuators(at)
-            self._add_pins(self.at_pins, at, moved)
+            self._add_pins(self.at_pins, at)
         if self._anchors:
             self._add_anchors(at, extended)
 
@@ -103,15 +106,16 @@ class Works:
         self._add_inertia(velocities, 1.0)
         add_works(self.by_name, more)
 
-    def _add_pins(self, energy: ElasticEnergy, at: Substep, moved: Floats) -> None:
+    def _add_pins(self, energy: ElasticEnergy, at: Substep) -> None:
         before, after = at.begun.copy(), at.points[:, :3].copy()
-        before[self._held] += moved[self._held]
-        after[self._held] -= moved[self._held]
+        moved = after[self._held] - before[self._held]
+        before[self._held] += moved
+        after[self._held] -= moved
         places = before, at.begun, at.points, after
         E = [float(energy.of(x, False, at.h).sum()) for x in places]
         weight = self.system.masses[self._held, None] * self.system.gravity
         others = self._on_pins[self._held] + weight
-        held = float(np.einsum("ij,ij->", others, moved[self._held]))
+        held = float(np.einsum("ij,ij->", others, moved))
         add_works(self.by_name, {"pins": 0.5 * (E[0] - E[1] + E[2] - E[3]) - held})
 
     def _add_anchors(self, at: Substep, extended: Floats) -> None:
@@ -130,11 +134,22 @@ class Works:
 
 
 @njit(cache=True, error_model="numpy")
-def _work_of_impulses(points, masses, impulses, moved, h):
-    """Of changes of velocities (n, 3) of vertices that can move, over displacements (n, 3) in h."""
+def _work(forces, rows, points, begun):
+    """Of forces (k, 3) on the vertices `rows` (k,), over their displacements since `begun` (n, 3)."""
+    total = 0.0
+    for k in range(len(rows)):
+        i = rows[k]
+        for j in range(3):
+            total += forces[k, j] * (points[i, j] - begun[i, j])
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def _work_of_impulses(points, masses, impulses, begun, h):
+    """Of changes of velocities (n, 3) of vertices that can move, over their displacements since `begun` in h."""
     total = 0.0
     for i in range(len(masses)):
         if points[i, 3] > 0.0:
             for j in range(3):
-                total += masses[i] * impulses[i, j] * moved[i, j]
+                total += masses[i] * impulses[i, j] * (points[i, j] - begun[i, j])
     return total / h

@@ -93,7 +93,7 @@ class ActuatorProjection:
         gradients, parts = each.coordinate.part_gradients(own), each.coordinate.parts(own)
         grips = np.zeros(len(parts) - 1)
         self._forces[k][:] = 0.0
-        total = gradients.sum(axis=0)
+        total = gradients[0] if len(gradients) == 1 else gradients.sum(axis=0)
         moved = at.h**2 * at.points[rows, 3, None] * total
         mobility = float(np.einsum("ij,ij->", moved, total))
         if mobility <= 0.0:
@@ -104,8 +104,16 @@ class ActuatorProjection:
             turns = angles(each.coordinate.spans(own)[1])
             free = at.points[rows, 3] * at.h**2
             _stop_slips(gradients, free, parts - self._parts[k], turns, each.friction, -force, moved, grips)
-        at.points[rows, :3] += moved
+        _move(at.points, rows, moved)
         self._forces[k] = span_forces(force, grips)
+
+
+@njit(cache=True)
+def _move(points, rows, moved):
+    """Add displacements (v, 3) to those rows (v,) of points (n, 4)."""
+    for k in range(len(rows)):
+        for j in range(3):
+            points[rows[k], j] += moved[k, j]
 
 
 @njit(cache=True, error_model="numpy")

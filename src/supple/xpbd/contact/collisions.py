@@ -133,16 +133,18 @@ class Collisions:
         """
         self._removed = REMOVED_PER_FRAME * self.edge_length * min(1.0, h / self._dt)
         bodies = self.surfaces is not None and self.surfaces.begin_substep(x, x_prev, h)
-        return self.obstacles.begin_substep(x, x_prev, h) or bodies
+        obstacles = bool(self.obstacles) and self.obstacles.begin_substep(x, x_prev, h)
+        return obstacles or bodies
 
     def end_substep(self) -> None:
         """Take notice of the forces, and keep what the next substep begins with."""
-        self.forces.substeps += 1
+        rows = None if self.surfaces is None else self.surfaces.forces()
+        loads = self.obstacles.forces() if self.obstacles else None
+        self.forces.end_substep(rows, loads)
         if self.surfaces is not None:
-            self.forces.surfaces.append(self.surfaces.forces())
             self.surfaces.end_substep()
-        self.forces.shapes.append(self.obstacles.forces())
-        self.obstacles.end_substep()
+        if self.obstacles:
+            self.obstacles.end_substep()
 
     def project(
         self, x: NDArray[np.float64], x_prev: NDArray[np.float64], time: float, h: float, parallel: bool = False

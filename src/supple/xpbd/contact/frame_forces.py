@@ -74,6 +74,7 @@ class FrameForces:
     Attributes
     ----------
     surfaces, shapes : one entry for each substep that had any contact of the kind
+    latest : those of the latest substep, or None
     substeps : their number, also of those without contact
     standing : the contacts of things that sleep with each other and with obstacles, which are those of every substep
     """
@@ -82,9 +83,19 @@ class FrameForces:
     surfaces: list[LoadedRows] = field(default_factory=list)
     shapes: list[ShapeLoads] = field(default_factory=list)
     substeps: int = 0
+    latest: tuple[LoadedRows | None, ShapeLoads | None] = (None, None)
     standing: tuple[LoadedRows, ShapeLoads] = field(default_factory=lambda: (LoadedRows.none(), ShapeLoads.none()))
 
-    def latest(self, points: EmbeddedPoints, count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def end_substep(self, rows: LoadedRows | None, loads: ShapeLoads | None) -> None:
+        """Take notice of the contacts that push in a substep."""
+        rows = rows if rows is not None and len(rows.keys) else None
+        loads = loads if loads is not None and len(loads.vertices) else None
+        self.surfaces += [] if rows is None else [rows]
+        self.shapes += [] if loads is None else [loads]
+        self.latest = rows, loads
+        self.substeps += 1
+
+    def on_vertices(self, points: EmbeddedPoints, count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The forces of the latest substep along normals and along surfaces on the vertices, (count, 3) [N] each.
 
         Parameters
@@ -92,11 +103,10 @@ class FrameForces:
         points : those of the system; count : of its vertices
         """
         at_points = np.zeros((2, len(points), 3))
-        if self.surfaces:
-            rows = self.surfaces[-1]
+        rows, loads = self.latest
+        if rows is not None:
             add_rows(self.owners.rows, rows.vertices, rows.weights, rows.normals, rows.forces, *at_points)
-        if self.shapes:
-            loads = self.shapes[-1]
+        if loads is not None:
             forces = self.owners.masses[loads.vertices, None] * loads.loads
             add_vertices(self.owners.tested[loads.vertices], loads.places, forces, *at_points)
         normal, tangential = np.zeros((2, count, 3))

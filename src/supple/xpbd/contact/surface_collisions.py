@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from supple.contact.obstacle_poses import ObstaclePoses
 from supple.contact.search.boxes import boxes_of_pieces
 from supple.contact.search.excluded_pairs import excluded_pairs
-from supple.contact.search.pair_kernels import swept_boxes
+from supple.contact.search.pair_kernels import swept_boxes_of
 from supple.contact.search.point_inside import depths_inside
 from supple.contact.search.point_lists import PairFinder
-from supple.contact.search.reach import any_beyond_radii, left_ways, mean_motions, search_radii
+from supple.contact.search.reach import any_beyond_radii, common_motions, left_ways, search_radii
 from supple.contact.search.stitch_masks import stitched_points
 from supple.contact.search.surfaces import ContactSurfaces
 from supple.system import System
@@ -31,7 +31,7 @@ from supple.xpbd.contact.detection.edge_contacts import (
     find_edge_passages,
     note_edge_passages,
 )
-from supple.xpbd.contact.detection.edge_pairs import EdgePairs
+from supple.xpbd.contact.detection.edge_pairs import EdgePairs, marked
 from supple.xpbd.contact.detection.piece_runs import PieceRuns
 from supple.xpbd.contact.detection.surface_contacts import (
     find_contacts,
@@ -86,6 +86,7 @@ class SurfaceCollisions:
         self._edge_rules = (s.point_piece, s.closed, s.gaps, s.friction, self._apart)
         self._slack = widest + SLACK * edge_length
         self._near_pairs = np.zeros(0, dtype=np.int64)
+        self._listed = np.zeros(0, dtype=np.int64)  # the triangles in any list
         self._near_triangles, self._swept = np.zeros((0, 3), dtype=np.int64), np.zeros((len(s.triangles), 6))
         self._edges = EdgePairs(surface_edges(s), s, rest, self._stitched)
         self._finder = PairFinder(n)
@@ -115,7 +116,7 @@ class SurfaceCollisions:
         # Of the last search: the rows of each kind that take part.
         self._chosen = [np.zeros(0, dtype=np.int64)] * 2
         self._far, self._near = np.zeros((n, 3)), np.zeros((n, 3))
-        self._drifts = np.zeros((pieces + 1, 3))
+        self._common = np.zeros((pieces + 1, 3)), np.zeros((pieces, 3)), np.zeros((pieces, 3, 3))
         # Obstacles stand still, so that no motion is common to all points where there is one.
         self._all_share = len(s.fixed_points) == 0
         self._complete = np.zeros(n)
@@ -191,7 +192,7 @@ class SurfaceCollisions:
         s.place_obstacles(self.poses, times[0], self._before)
         self._begun[len(s.rows) :] = self._before[len(s.rows) :]
         self._predicted[len(s.rows) :] = self._x[len(s.rows) :]
-        allowed = (self._far, self._near, s.point_piece, self._all_share, self._drifts)
+        allowed = (self._far, self._near, s.point_piece, self._all_share, self._common)
         if any_beyond_radii(self._x, self._before, self._gathered, *allowed, self._excursions):
             self._gather((self._x - self._before) * (self._dt / h), parallel)
         contacts, smallest = 0, np.inf
@@ -259,7 +260,7 @@ class SurfaceCollisions:
         """Set which listed pairs come as near in this substep that contacts may still make them meet."""
         self._looked[0][:], self._looked[1][:] = self._begun, self._x
         np.subtract(self._x, self._begun, out=self._way)
-        swept_boxes(self._begun, self._way, self.surfaces.triangles, self._swept)
+        swept_boxes_of(self._listed, self._begun, self._way, self.surfaces.triangles, self._swept)
         self._near_triangles = near_triangles(self._x, self._begun, self._lists, self._swept, self._slack)
         self._near_pairs = self._edges.swept(self._begun, self._way, self._slack)
 
@@ -353,16 +354,22 @@ class SurfaceCollisions:
     def _gather(self, motions: NDArray[np.float64], parallel: bool) -> None:
         """List what may touch while no point moves farther than in a frame of these motions (n, 3) [m]."""
         s = self.surfaces
-        mean_motions(motions, s.point_piece, self._all_share, self._drifts)
+        common_motions(self._x, motions, s.point_piece, self._all_share, self._common)
         scales = (LEAST_REACH * self.edge_length, MOST_REACH * self.edge_length)
         points = (self._x - self._before, self._excursions, s.point_piece)
-        search_radii(motions, *points, self._drifts, scales, self._far, self._near)
+        search_radii(self._x, motions, *points, self._common, scales, self._far, self._near)
+        together = self._allowed | self._allowed.T
+        alone = np.diagonal(together).astype(int) == together.sum(axis=1)
+        # No list depends on how far these move.
+        self._far[alone[s.point_piece], 2] = np.inf
+        self._near[~np.diagonal(together)[s.point_piece], 2] = np.inf
         self._complete[:] = self._gap + LEAST_REACH * self.edge_length + self._depth.max(axis=0)
         self._far[:, 0] += self._complete
         self._near[:, 0] += self._complete
         self._looked[0][:] = np.inf
         self._finder.gather(self._shapes, (self._far, self._near), self._rules)
         self._gathered[:] = self._x
+        self._listed = marked(len(s.triangles), self._finder.triangles)
         self._runs.renew()
         near = (self._finder.starts, self._finder.triangles)
         self._edges.renew(self._x, (self._far[:, 1], self._near[:, 1]), self._gap, near, parallel)
