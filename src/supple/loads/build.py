@@ -97,15 +97,18 @@ def _weighted_triangles(body: PlacedBody, rows: NDArray[np.int64]) -> list[tuple
 
 def applied_force(force: Force, body: PlacedBody, begin: int, rows: NDArray[np.integer]) -> DeadLoad:
     """A force on some of its body's points (k,); begin : the number of the body's first vertex."""
-    return _on_points(body, begin, rows, lambda time: force.per_vertex(time, len(rows)), "forces")
-
-
-def _on_points(
-    body: PlacedBody, begin: int, rows: NDArray[np.integer], forces: Callable[[float], NDArray[np.float64]], work: str
-) -> DeadLoad:
-    """Forces, time -> (k, 3) [N], on the points (k,) of a body."""
+    count = len(rows)
     vertices, weights = _vertices_of(body, begin, rows)
-    return DeadLoad(vertices, forces if weights is None else lambda time: weights.T @ forces(time), work)
+    if force.is_total:
+        shares = np.full(count, 1.0 / count)
+        own = shares if weights is None else weights.T @ shares
+        return UniformLoad.of(vertices, own, force.total, "forces")
+
+    def forces(time: float) -> NDArray[np.float64]:
+        given = force.per_vertex(time, count)
+        return given if weights is None else weights.T @ given
+
+    return DeadLoad(vertices, forces, "forces")
 
 
 def _vertices_of(

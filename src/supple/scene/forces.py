@@ -24,7 +24,7 @@ class Force(OnVertices):
     body : name of the body.
     vertices : indices into the body's mesh, or an `InBox`.
     force : [N]; (3,) is the total, shared equally by the vertices; (k, 3) is one force for each of them; or a function
-        of time [s] that returns either.
+        of time [s] that returns either, at all times the same.
     name : appears in messages.
 
     Raises
@@ -45,6 +45,23 @@ class Force(OnVertices):
         if not callable(self.force):
             object.__setattr__(self, "force", self._checked(self.force, "force"))
 
+    @property
+    def is_total(self) -> bool:
+        """Whether one vector is given, which the vertices share."""
+        return self._given(0.0).ndim == 1
+
+    def total(self, time: float) -> NDArray[np.float64]:
+        """That vector (3,) at `time` [N].
+
+        Raises
+        ------
+        SceneError : where the function of time returns a wrong value.
+        """
+        given = self._given(time)
+        if given.ndim != 1:
+            raise SceneError(f"{self.label}: force({time:g}) has shape {given.shape}; at the time 0 it is one vector")
+        return given
+
     def per_vertex(self, time: float, count: int) -> NDArray[np.float64]:
         """The force (count, 3) on each of the `count` selected vertices at `time` [N].
 
@@ -52,12 +69,15 @@ class Force(OnVertices):
         ------
         SceneError : where the number of forces is not that of vertices, or the function of time returns a wrong value.
         """
-        given = self._checked(self.force(time), f"force({time:g})") if callable(self.force) else np.asarray(self.force)
+        given = self._given(time)
         if given.ndim == 1:
             return np.broadcast_to(given / count, (count, 3))
         if len(given) != count:
             raise SceneError(f"{self.label}: force has {len(given)} rows for {count} vertices; they must agree")
         return given
+
+    def _given(self, time: float) -> NDArray[np.float64]:
+        return self._checked(self.force(time), f"force({time:g})") if callable(self.force) else np.asarray(self.force)
 
     def _checked(self, value: ArrayLike, what: str) -> NDArray[np.float64]:
         array = float_array(value, f"{self.label}: {what}")

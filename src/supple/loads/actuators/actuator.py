@@ -36,6 +36,10 @@ class Coordinate(ABC):
         """The same where vertex i has the number new[i]."""
 
     @abstractmethod
+    def described(self) -> dict[str, NDArray]:
+        """The arrays that recordings keep, by name."""
+
+    @abstractmethod
     def parts(self, own: NDArray[np.float64]) -> NDArray[np.float64]:
         """(p,)"""
 

@@ -38,6 +38,9 @@ class CableLength(Coordinate):
     def renumbered(self, new: NDArray[np.int32]) -> CableLength:
         return replace(self, vertices=new[self.vertices])
 
+    def described(self) -> dict[str, NDArray]:
+        return {"vertices": self.vertices[:, None], "weights": self.weights, "offsets": self.offsets}
+
     def spans(self, own: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Lengths (p - 1,) [m] and unit vectors (p - 1, 3), zero where two points coincide."""
         lengths, directions = np.empty(len(self.weights) - 1), np.empty((len(self.weights) - 1, 3))

@@ -34,6 +34,9 @@ class EnclosedVolume(Coordinate):
     def renumbered(self, new: NDArray[np.int32]) -> EnclosedVolume:
         return replace(self, vertices=new[self.vertices])
 
+    def described(self) -> dict[str, NDArray]:
+        return {"triangles": self.vertices[self.triangles]}
+
     def parts(self, own: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.array([self.value(own)])
 

@@ -10,13 +10,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.materials.elastic_tets.active import ActiveTets
+from supple.materials.elastic_tets.active import MUSCLE, ActiveTets
+from supple.output.check.actuator_works import ActuatorState, actuator_states
 from supple.output.check.elastic_energy import elastic_energy
 from supple.output.check.geometry import quadratic_tets
 from supple.output.check.geometry.box_tree import build_tree, triangle_boxes
 from supple.output.check.geometry.orientation import volume_signs
 from supple.output.check.geometry.surface_pairs import meeting_pairs
-from supple.output.check.load_forces import load_forces
+from supple.output.check.load_forces import add_muscle_forces, load_forces
 from supple.output.check.seams import seam_keys
 from supple.output.check.stitch_energy import stitch_energy
 from supple.output.check.surfaces import Surfaces
@@ -72,6 +73,7 @@ class Snapshot:
     positions, velocities : (n, 3) [m], [m/s]; det_F : (m,) as recorded; poses : (obstacles, 3, 4)
     internal : (k, 11) internal variables of materials that flow, see `State`; active : growths and muscles
     load_values : vectors and numbers of the recorded loads, by name
+    pressures, tensions : of cavities [Pa], and of spans of cables [N], by name
     """
 
     scene: Scene
@@ -84,6 +86,8 @@ class Snapshot:
     internal: NDArray[np.float64]
     active: tuple[ActiveTets, ...] = ()
     load_values: Mapping[str, NDArray[np.float64] | float] = field(default_factory=dict)
+    pressures: Mapping[str, float] = field(default_factory=dict)
+    tensions: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(cls, scene: Scene, frame: RecordedFrame) -> Snapshot:
@@ -100,6 +104,8 @@ class Snapshot:
             frame.state.internal,
             frame.active,
             {**details.load_vectors, **details.load_values},
+            details.cavity_pressure,
+            details.cable_tension,
         )
 
     @cached_property
@@ -154,8 +160,24 @@ class Snapshot:
 
     @cached_property
     def load_forces(self) -> dict[str, NDArray[np.float64]]:
-        """(n, 3) forces of recorded loads on the vertices [N], by the name of their work."""
-        return load_forces(self.scene.recording.loads, self.load_values, self.positions)
+        """(n, 3) forces of recorded loads and actuators on the vertices [N], by the name of their work."""
+        recording = self.scene.recording
+        found = load_forces(recording.loads, self.load_values, self.positions)
+        if any(each.kind == MUSCLE for each in self.active):
+            shapes = self.scene.rest_inverse, recording.rest_volumes
+            out = found.setdefault("muscles", np.zeros_like(self.positions))
+            add_muscle_forces(self.active, recording.tets, self.F, shapes, out)
+        for each in self.actuators:
+            out = found.setdefault(each.work, np.zeros_like(self.positions))
+            np.add.at(out, each.vertices, each.force * each.gradient)
+        return found
+
+    @cached_property
+    def actuators(self) -> list[ActuatorState]:
+        """Cavities, and spans of cables."""
+        recording = self.scene.recording
+        values = self.pressures, self.tensions
+        return actuator_states(recording.cavities, recording.cables, *values, self.positions)
 
     @cached_property
     def points(self) -> NDArray[np.float64]:

@@ -25,6 +25,7 @@ from supple.materials.own.formula import VARIABLES, Formula
 from supple.materials.own.formula_law import FormulaLaw
 from supple.materials.per_tet import BY_LAW, NO_REGION, NOT_ELASTIC, Law, LawTets
 from supple.materials.registry import ELASTIC_MATERIALS
+from supple.output.recording.actions.actuators import write_actuators
 from supple.output.recording.actions.joints import joints_of
 from supple.output.recording.actions.loads import write_loads
 from supple.output.recording.checked_hdf5 import CheckedFile
@@ -129,6 +130,7 @@ def write_physics(own: h5py.Group, system: System) -> dict[str, Any]:
         "untouching": _untouching(system),
         "welds": _welds(system),
         "loads": write_loads(group, system),
+        "actuators": write_actuators(group, system),
         "joints": [joint.described() for joint in joints_of(system)],
     }
 

@@ -16,6 +16,7 @@ from supple.errors import OutputError
 from supple.materials.elastic_tets.active import ActiveTets
 from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.flows.internal import NEVER_FLOWED
+from supple.output.recording.actions.actuators import read_actuators
 from supple.output.recording.actions.joints import RecordedJoint, read_joints
 from supple.output.recording.actions.loads import read_loads
 from supple.output.recording.checked_hdf5 import CheckedFile
@@ -197,6 +198,7 @@ class Recording(Showable, Sequence[RecordedFrame]):
     untouching : pairs that may pass through each other: numbers of bodies, then obstacles
     welds : vertices of soft bodies that are points of rigid ones; joints : of the scene
     loads : those whose forces follow from one value, by its name in the details; other_loads : names of works of others
+    cavities, cables : of the scene; none where an older version wrote the recording
     scene_text : the scene file's text, or None; solver : its description, or None; supple_version : of the writer
     """
 
@@ -236,6 +238,7 @@ class Recording(Showable, Sequence[RecordedFrame]):
         self.welds: tuple[RecordedWeld, ...] = read_welds(file, header, n)
         self.joints: tuple[RecordedJoint, ...] = read_joints(file, header)
         self.loads, self.other_loads = read_loads(file, header, n)
+        self.cavities, self.cables = read_actuators(file, header, n)
         self.stitches: RecordedStitches = read_stitches(file, n, len(self.obstacles))
         self.dt = float(header["dt"])
         self.solver: str | None = header.get("solver")

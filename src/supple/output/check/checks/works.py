@@ -1,8 +1,11 @@
-"""The works of pins, loads and contact, computed anew from positions, values of loads and recorded contact forces.
+"""The works of pins, loads, actuators and contact, computed anew from positions and recorded values and forces.
 
 Between two frames a force f moves its vertex by d. The trapezoid (f + f') d / 2 is of second order in the time between
 frames; half of |f' d - f d| is how far it may be off, while a force changes in one direction. What the frames leave
 open adds up, and a recorded work may differ by it.
+
+A cavity or a span of a cable has one force Q on its volume or length s, so that its work is Q ds, with the Q of the
+frame, which is the mean over its substeps.
 
 The force of pins is what balances the elastic and stitch forces, weight and inertia on pinned vertices. With E(x) the
 sum of both energies, the elastic part is the derivative of E along the motion of the pinned vertices alone.
@@ -15,6 +18,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.materials.elastic_tets.active import MUSCLE
 from supple.output.check.checks.budgets import energy_scale, moved_and_height, recorded_works
 from supple.output.check.frame_check import FrameCheck
 from supple.output.check.report import CheckResult
@@ -24,8 +28,21 @@ from supple.output.check.snapshot import Snapshot
 _STEP = 1e-6
 # What else may act on pinned vertices, up to a bound that is known.
 _BESIDE_PINS = {"contact", "friction", "damping", "flow", "growth"}
+# Round-off, as a share of the energies.
+_CLOSED = 1e-9
 # Contact forces are recorded in single precision.
 _SINGLE = 1e-6
+
+
+# Works of loads whose forces recordings may not contain, and of what they never contain.
+_NOT_RECORDED = {
+    "body_forces": "a force per mass that depends on the place is not recorded",
+    "forces": "forces that differ from vertex to vertex are not recorded",
+}
+_NEVER_RECORDED = {
+    "soft_targets": "places of targets are not recorded",
+    "joints": "forces of joints are recorded at the end of a frame only",
+}
 
 
 class Works(FrameCheck):
@@ -37,28 +54,48 @@ class Works(FrameCheck):
     """
 
     name = "works"
-    bad = "differ by {worst} of the energies from those of the frames"
+    bad = "differ by {worst} from those of the frames"
 
     def begin(self) -> None:
         recording = self.scene.recording
         self._works = recorded_works(recording) or {}
-        self._loads = {load.work for load in recording.loads.values()} - recording.other_loads
+        self._left_out = self._not_recorded()
+        self._actuators = {"cavities"} & set(self._works) if recording.cavities else set()
+        self._actuators |= {"cables"} & set(self._works) if recording.cables else set()
+        self._loads = set(self._works) & ({load.work for load in recording.loads.values()} | {"muscles"})
+        self._loads = (self._loads | self._actuators) - set(self._left_out)
         self._open = {"pins": self._pins_are_open(), "contact": self._contact_is_open()}
-        self._parts = [name for name, why in self._open.items() if why is None] + sorted(self._loads & set(self._works))
+        self._parts = [name for name, why in self._open.items() if why is None] + sorted(self._loads)
         named = " and ".join([", ".join(self._parts[:-1])] * (len(self._parts) > 1) + self._parts[-1:])
-        self.good = f"those of {named} agree within {{worst}} of the energies, beyond what frames leave open"
+        self.good = f"those of {named} agree within {{worst}}, beyond what frames leave open"
+        self.good += "".join(f"; without {name}: {why}" for name, why in self._left_out.items())
         if not self._works:
             self.why_not = "the recording does not contain works"
         elif self.settings.every > 1:
             self.why_not = "works are computed from one frame to the next only"
         elif not self._parts:
-            self.why_not = "; ".join(f"{name}: {why}" for name, why in self._open.items())
+            self.why_not = "; ".join(f"{name}: {why}" for name, why in [*self._open.items(), *self._left_out.items()])
         self._implicit = (recording.solver or "").startswith("Implicit")
         self._last: Snapshot | None = None
         self._forces = np.zeros_like(recording.rest_positions)
         self._first: Snapshot | None = None
         self._rows: list[tuple[int, float, float]] = []
         self.frames: list[list[tuple[float, float]]] = []
+
+    def _not_recorded(self) -> dict[str, str]:
+        """The works that are not judged, and why: what recordings do not contain."""
+        recording = self.scene.recording
+        reasons = {name: why for name, why in _NOT_RECORDED.items() if name in recording.other_loads}
+        for name, found in (("cavities", recording.cavities), ("cables", recording.cables)):
+            if not found:
+                reasons[name] = "an older version wrote the recording"
+        reasons |= _NEVER_RECORDED
+        physics = recording.physics
+        if recording.quadratic is not None and physics is not None:
+            fibres = [each.rows for each in physics.active if each.kind == MUSCLE]
+            if fibres and np.isin(np.concatenate(fibres), recording.quadratic[0]).any():
+                reasons["muscles"] = "they act in quadratic tets"
+        return {name: why for name, why in reasons.items() if name in self._works}
 
     def _pins_are_open(self) -> str | None:
         recording, physics = self.scene.recording, self.scene.recording.physics
@@ -95,6 +132,7 @@ class Works(FrameCheck):
             by_name = {"contact": self._of_contact(last, at, forces, moved)}
             by_name |= {name: self._of_load(last, at, name, moved) for name in self._loads}
             of = {name: (float(work.sum()), float(left.sum())) for name, (work, left) in by_name.items()}
+            of |= {name: self._of_actuators(last, at, name) for name in self._actuators}
             if "pins" in self._parts:
                 of["pins"] = self._of_pins(last, at, moved, by_name)
             found = [of[name] for name in self._parts]
@@ -126,6 +164,20 @@ class Works(FrameCheck):
             change = np.linalg.norm(at.load_forces[name] - last.load_forces[name], axis=1)
             left_open += 0.5 * change * self._way(last, at)
         return 0.5 * (before + after), left_open
+
+    def _of_actuators(self, last: Snapshot, at: Snapshot, name: str) -> tuple[float, float]:
+        """The work of cavities or cables [J], and how far it may be off."""
+        work = left_open = 0.0
+        for before, after in zip(last.actuators, at.actuators, strict=True):
+            if after.work == name:
+                change, ds = abs(after.force - before.force), after.coordinate - before.coordinate
+                work += after.force * ds
+                left_open += 0.5 * change * abs(ds)
+                if not self._implicit:
+                    # Within a frame, the change of the force acts on what the way is longer than the straight one.
+                    rates = [state.rate(of.velocities) for state, of in ((before, last), (after, at))]
+                    left_open += 0.25 * self.scene.recording.dt * change * abs(rates[1] - rates[0])
+        return work, left_open
 
     def _way(self, last: Snapshot, at: Snapshot) -> NDArray[np.float64]:
         """(n,) half of how far a vertex would go with the change of its velocity [m]."""
@@ -191,7 +243,11 @@ class Works(FrameCheck):
             work, left_open = np.array([found[k] for found in self.frames]).T
             apart = np.abs(np.cumsum(np.where(np.isfinite(left_open), recorded[rows] - work, 0.0)))
             excess = np.maximum(apart - np.cumsum(np.where(np.isfinite(left_open), left_open, 0.0)), 0.0)
-            shares = excess / (energy_scale(self.scene, stored, height) + np.cumsum(np.abs(recorded))[rows])
+            sizes = np.maximum(np.cumsum(np.abs(recorded))[rows], np.cumsum(np.abs(work)))
+            # Forces of loads are known: their works are compared with themselves. Those of pins and of contact balance
+            # all other forces, and are found as well as these.
+            energies = energy_scale(self.scene, stored, height)
+            shares = excess / (sizes + (_CLOSED if name in self._loads else 1.0) * energies)
             for number, share in zip(rows, shares, strict=True):
                 failed = not share <= self.settings.max_energy_gain
                 self.tally.see(recording[int(number)], float(share), failed, f"work of {name}" if failed else "")

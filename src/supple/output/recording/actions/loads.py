@@ -5,16 +5,39 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
-from supple.loads.applied import LoadPattern as LoadPattern  # the checker has it from here
 from supple.output.recording.checked_hdf5 import CheckedFile
 from supple.system import System
 
 _GROUP = "supple/physics"
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedLoad:
+    """How the forces of a load follow from one value at a time.
+
+    Attributes
+    ----------
+    kind : "vector", a force w_i f on each vertex, with the value f (3,); "pressure", a third of -p A on each corner of
+        a triangle of area vector A, with the value p; "spring", the forces of k / 2 (l - l0)^2,
+        l = |sum w_i x_i + offset|, with the value l0
+    work : the name of its work
+    vertices : (v,), or (t, 3) triangles under a pressure; weights : (v,) w; of no meaning for a pressure
+    offset : (3,) [m]; stiffness : k [N/m]
+    """
+
+    kind: str
+    work: str
+    vertices: NDArray[np.int32]
+    weights: NDArray[np.float64]
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    stiffness: float = 0.0
 
 
 def write_loads(group: h5py.Group, system: System) -> list[dict[str, Any]]:
@@ -35,7 +58,7 @@ def write_loads(group: h5py.Group, system: System) -> list[dict[str, Any]]:
 
 def read_loads(
     file: CheckedFile, header: dict[str, Any], vertices: int
-) -> tuple[dict[str, LoadPattern], frozenset[str]]:
+) -> tuple[dict[str, RecordedLoad], frozenset[str]]:
     """By the name of their values, the loads with a pattern; and the works of loads that have none.
 
     Raises
@@ -60,5 +83,5 @@ def read_loads(
         if not np.isfinite([*weights, x, y, z, stiffness]).all():
             raise file.broken("a number of a load is not finite")
         rows = rows if kind == "pressure" else np.ascontiguousarray(rows[:, 0])
-        patterns[f"{work}.{k}"] = LoadPattern(kind, work, rows, weights, (x, y, z), stiffness)
+        patterns[f"{work}.{k}"] = RecordedLoad(kind, work, rows, weights, (x, y, z), stiffness)
     return patterns, frozenset(others)
