@@ -41,7 +41,7 @@ _NOT_RECORDED = {
 }
 _NEVER_RECORDED = {
     "soft_targets": "places of targets are not recorded",
-    "joints": "forces of joints are recorded at the end of a frame only",
+    "joints": "their forces do not bound them within a frame",
 }
 
 
@@ -241,8 +241,10 @@ class Works(FrameCheck):
             names = ("contact", "friction") if name == "contact" else (name,)
             recorded = sum((self._works[each] for each in names if each in self._works), np.zeros(len(recording)))
             work, left_open = np.array([found[k] for found in self.frames]).T
-            apart = np.abs(np.cumsum(np.where(np.isfinite(left_open), recorded[rows] - work, 0.0)))
-            excess = np.maximum(apart - np.cumsum(np.where(np.isfinite(left_open), left_open, 0.0)), 0.0)
+            known = np.isfinite(left_open)
+            work, left_open = np.where(known, work, 0.0), np.where(known, left_open, 0.0)
+            apart = np.abs(np.cumsum(np.where(known, recorded[rows] - work, 0.0)))
+            excess = np.maximum(apart - np.cumsum(left_open), 0.0)
             sizes = np.maximum(np.cumsum(np.abs(recorded))[rows], np.cumsum(np.abs(work)))
             # Forces of loads are known: their works are compared with themselves. Those of pins and of contact balance
             # all other forces, and are found as well as these.
