@@ -20,12 +20,13 @@ from supple.implicit.energies.potential import HessianBlocks
 from supple.implicit.energies.regularization import regularization_of
 from supple.implicit.energies.stitch_damping import StitchViscosity
 from supple.implicit.energies.stitches import StitchEnergy
+from supple.implicit.joints.rigidity import Rigidity
 from supple.implicit.limits.inversion_guard import refuse_inverted
 from supple.implicit.newton.direction import Tools
 from supple.implicit.newton.free_motion import FreeMotion
 from supple.implicit.newton.linear_solver import LinearSolver
 from supple.implicit.newton.trace import NewtonRow
-from supple.implicit.stepping.integrators import Integrator, Static, integrator_of
+from supple.implicit.stepping.integrators import Integrator, Newmark, Static, integrator_of
 from supple.implicit.stepping.joint_support import refuse_joints
 from supple.implicit.stepping.reactions import reaction_forces, weld_forces
 from supple.implicit.stepping.rigid_bodies import orthogonality_errors
@@ -143,20 +144,22 @@ class Implicit(Solver):
         SolverError : for what this solver does not support: materials of XPBD, obstacles without contact, free bodies
             with the static integrator, and joints with integrators that do not hold them.
         """
-        elasticity = elasticity_of(system)
+        method = integrator_of(self.integrator)
+        # In a step of the midpoint rule, the rigidity of what joints hold is a condition at its end.
+        midpoint = isinstance(method, Newmark) and bool(system.linked_bodies)
+        elasticity = elasticity_of(system, not midpoint)
         contact = None
         if self.contact is not None:
             contact = contact_model(system, self.contact, elasticity.material.mu)
             if contact.system is not system:
                 system = contact.system
-                elasticity = elasticity_of(system)
+                elasticity = elasticity_of(system, not midpoint)
         elif system.obstacles:
             raise SolverError(
                 f"{system.obstacles[0].label}: with contact=None obstacles have no effect; give contact=IPCContact(), "
                 "or remove them"
             )
-        method = integrator_of(self.integrator)
-        if method.name == "newmark" and system.laws.material.flowing_laws:
+        if isinstance(method, Newmark) and system.laws.material.flowing_laws:
             raise SolverError(
                 "Implicit: integrator='newmark' cannot simulate Viscoelastic and J2Plastic, which flow to the end of a "
                 "step; use 'backward_euler', 'bdf2' or 'static'"
@@ -189,7 +192,8 @@ class Implicit(Solver):
             stitches,
             damped,
             quadratic_viscosity_of(elasticity),
-            JointGeometry.of(system) if system.scene.joints else None,
+            JointGeometry.of(system) if system.scene.joints or midpoint else None,
+            Rigidity.of(system) if midpoint else None,
         )
 
     def check(self, system: System, state: State, workspace: Workspace) -> None:

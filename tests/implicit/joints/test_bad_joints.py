@@ -50,7 +50,6 @@ def test_bad_joints_are_refused_in_one_line(make, problem):
 @pytest.mark.parametrize(
     ("joints", "integrator", "problem"),
     [
-        ([hinge()], "newmark", "joint 'hinge': the integrator 'newmark' does not support joints"),
         ([hinge(motor=sp.VelocityMotor(1.0))], "static", "nothing moves, and its motor has a velocity"),
         ([hinge(limits=(0.5, 1.0))], "bdf2", "at the start it is at 0 rad, outside of its limits (0.5, 1)"),
     ],

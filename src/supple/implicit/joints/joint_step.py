@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.implicit.details import ImplicitDetails
+from supple.implicit.energies.potential import Potential
 from supple.implicit.joints.potential import JointPotential
 from supple.implicit.newton.minimize import Outcome
 from supple.joints.at_state import coordinates_at, reported
@@ -18,7 +20,7 @@ from supple.state import State, Status
 # The stiffness of a joint in multiples of that of its bodies against strain, and of inertia in a step. Each update of
 # the multipliers divides the violation by about the latter.
 _BODIES = 100.0
-_INERTIA = 100.0
+INERTIA = 100.0
 
 # A joint holds where its violation is below this share of its size.
 _HELD = 1e-7
@@ -40,6 +42,7 @@ class JointStep:
     potential: JointPotential
     updates: int = 0
     last: float = field(default=np.inf)
+    held: ClassVar[float] = _HELD
 
     @classmethod
     def of(
@@ -53,7 +56,7 @@ class JointStep:
         """
         stiffness = _BODIES * geometry.stiffness
         if scale is not None:
-            stiffness = stiffness + _INERTIA * geometry.masses / scale
+            stiffness = stiffness + INERTIA * geometry.masses / scale
         g = coordinates_at(geometry, start)
         laws, multipliers = laws_of(geometry, stiffness, g, times, moving=scale is not None)
         zero = np.zeros((len(geometry.differences.joint), 3))
@@ -61,14 +64,27 @@ class JointStep:
 
     def update(self, x: NDArray[np.float64]) -> bool:
         """Whether to continue from x (n, 3) with the multipliers that this call has found there."""
-        violation = float(self.violations(x).max(initial=0.0))
+        violation = self.largest_violation(x)
         stuck = violation > _GAIN * self.last and self.updates > 1
-        if violation <= _HELD or self.updates == _MOST_UPDATES or stuck:
+        if violation <= self.held or self.updates == _MOST_UPDATES or stuck:
             return False
         self.updates, self.last = self.updates + 1, violation
+        self.renew(x)
+        return True
+
+    @property
+    def terms(self) -> list[Potential]:
+        """What the joints add to the objective now."""
+        return [self.potential]
+
+    def renew(self, x: NDArray[np.float64]) -> None:
+        """Set the multipliers to what balances the forces at x (n, 3)."""
         multipliers, law_multipliers = self.potential.renewed(x)
         self.potential = replace(self.potential, multipliers=multipliers, law_multipliers=law_multipliers)
-        return True
+
+    def largest_violation(self, x: NDArray[np.float64]) -> float:
+        """Of all conditions at x (n, 3), as a share of sizes."""
+        return float(self.violations(x).max(initial=0.0))
 
     def verified(self, outcome: Outcome) -> Outcome:
         """The outcome, or one that names a joint that does not hold."""
@@ -99,12 +115,17 @@ class JointStep:
             np.maximum.at(out, geometry.arguments[0].joint[function], missing / geometry.units[function])
         return out
 
+    def acting(self, x: NDArray[np.float64]) -> tuple[JointPotential, NDArray[np.float64]]:
+        """The energy whose forces are those of the joints in a step to x (n, 3), and the positions where they act."""
+        return self.potential, x
+
     def measured(self, details: ImplicitDetails, x: NDArray[np.float64]) -> ImplicitDetails:
         """The details of a step that ended at x (n, 3), with what the joints do there."""
-        geometry, potential = self.geometry, self.potential
-        forces, torques = potential.actions(x)
+        geometry = self.geometry
+        potential, there = self.acting(x)
+        forces, torques = potential.actions(there)
         names = [str(joint.name) for joint in geometry.joints]
-        efforts = potential.efforts(x)
+        efforts = potential.efforts(there)
         along = {name: int(row) for name, row in zip(names, geometry.along, strict=True) if row >= 0}
         laws = potential.laws
         motors = {int(laws.function[k]): -float(efforts[k]) for k in np.flatnonzero(laws.is_motor)}
@@ -112,7 +133,7 @@ class JointStep:
             details,
             joint_forces=dict(zip(names, forces, strict=True)),
             joint_torques=dict(zip(names, torques, strict=True)),
-            joint_coordinates=reported(geometry, potential.coordinates(x)),
+            joint_coordinates=reported(geometry, self.potential.coordinates(x)),
             motor_forces={name: motors[row] for name, row in along.items() if row in motors},
             joint_violations=dict(zip(names, map(float, self.violations(x)), strict=True)),
         )

@@ -55,14 +55,14 @@ class JointPotential(ContactPotential):
         geometry = self.geometry
         forces, pulls, _ = self._forces(x)
         _add(geometry, geometry.differences, self.weight * forces, out)
-        for k, column in enumerate(geometry.arguments):
+        for k, column in enumerate(geometry.arguments if len(pulls) else ()):
             _add(geometry, column, self.weight * pulls[:, k], out)
 
     def add_hessian(self, x: NDArray[np.float64], out: HessianBlocks, project: bool) -> None:
         """With `project`, of the functions the nearest positive semi-definite one by their vectors."""
         out.couplings.append(self._linear_couplings)
         geometry = self.geometry
-        if not len(geometry.functions):
+        if not len(self.laws.function):
             return
         at = derivatives(geometry.functions, self._arguments(x))
         g = self._law_values(x)
@@ -87,6 +87,12 @@ class JointPotential(ContactPotential):
         g = values(self.geometry.functions, self._arguments(x))
         return np.where(turns(self.geometry.functions), self.start + wrapped(g - self.start), g)
 
+    def gradients_of_functions(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(s, 8, 3) by the control points of their joints."""
+        gradients = derivatives(self.geometry.functions, self._arguments(x)).gradient
+        coefficients = np.stack([column.coefficients for column in self.geometry.arguments], axis=1)
+        return np.einsum("sap,sai->spi", coefficients, gradients)
+
     def renewed(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The multipliers (f, 3) and (l,) that balance the forces of this energy at x."""
         efforts = self.laws.efforts(self._law_values(x), self.law_multipliers)
@@ -105,7 +111,7 @@ class JointPotential(ContactPotential):
         forces, torques = np.zeros((count, 3)), np.zeros((count, 3))
         rows, pulls, _ = self._forces(x)
         columns = [(geometry.differences, rows)]
-        columns += [(column, pulls[:, k]) for k, column in enumerate(geometry.arguments)]
+        columns += [(column, pulls[:, k]) for k, column in enumerate(geometry.arguments if len(pulls) else ())]
         for vectors, gradient in columns:
             c = vectors.coefficients[:, :4]
             own = np.einsum("fk,fki->fi", c, x[geometry.corners[vectors.joint, :4]])
@@ -143,13 +149,13 @@ class JointPotential(ContactPotential):
         return np.stack([_at(self.geometry, column, x, offsets) for column, offsets in columns], axis=1)
 
     def _law_values(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        return self.coordinates(x)[self.laws.function]
+        return self.coordinates(x)[self.laws.function] if len(self.laws.function) else np.zeros(0)
 
     def _forces(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Derivatives by the differences (f, 3) and by the functions' vectors (s, 4, 3), and psi' of each function."""
         linear = self.multipliers + self._k[:, None] * self.differences(x)
         count = len(self.geometry.functions)
-        if not count:
+        if not len(self.laws.function):
             return linear, np.zeros((0, 4, 3)), np.zeros(0)
         first = _sum(self.laws, self.efforts(x), count)
         at = derivatives(self.geometry.functions, self._arguments(x))

@@ -8,9 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.implicit.energies.potential import ContactPotential, HessianBlocks, Potential
+from supple.implicit.energies.potential import HessianBlocks, Potential
 from supple.implicit.newton.hessian_projection import ProjectedTerms
 from supple.implicit.timings import Clock
+
+# The labels of contact and of joints: so stiff that a short Newton step can leave large forces.
+_STIFF = ("contact", "joints")
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +52,7 @@ class Objective:
 
     def contact_gradient(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(n, 3) of contact and joints alone [N]."""
-        return _gradient([term for term in self.terms if isinstance(term, ContactPotential)], x)
+        return _gradient([term for term in self.terms if term.label in _STIFF], x)
 
     def gradient(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(n, 3) [N]."""

@@ -1,10 +1,10 @@
 """Rigid bodies in a step: the nearest rigid places, how far from rigid bodies are, and the ends of midpoint steps.
 
-The midpoint rule makes a body rigid in the middle of a step. At the end it would be stretched by up to (w h)^2 / 8 at
-an angular velocity w, and every second end: without damping, this motion would stay. The end is therefore replaced by
-a rigid place x with the rigid velocities v that have the angular momentum L of the end, such that the second half of
-the step mirrors the first one. With the middle y, from which the rule left the velocities u at the end, relative to the
-center of mass and with equal masses:
+The midpoint rule makes a body without joints rigid in the middle of a step; for others see `MidpointJoints`. At the
+end it would be stretched by up to (w h)^2 / 8 at an angular velocity w, and every second end: without damping, this
+motion would stay. The end is therefore replaced by a rigid place x with the rigid velocities v that have the angular
+momentum L of the end, such that the second half of the step mirrors the first one. With the middle y, from which the
+rule left the velocities u at the end, relative to the center of mass and with equal masses:
 
     sum y x (v - 2 (x - y) / h) = sum y x (u - (x_end - x_start) / h),    sum x x v = L.
 
@@ -40,24 +40,26 @@ def with_rigid_bodies(
 
     Parameters
     ----------
-    place : where that is, from 0 at the start to 1 at the end
+    place : where that is, from 0 at the start to 1 at the end; those with joints and welds always are at the end
     """
+    linked = system.linked_bodies
     for part in system.rigid_bodies:
         rows = part.vertices
-        there = start[rows] + place * (end[rows] - start[rows])
-        end[rows] += (nearest_rigid(system.rest_positions[rows], there) - there) / place
+        share = 1.0 if part in linked else place
+        there = start[rows] + share * (end[rows] - start[rows])
+        end[rows] += (nearest_rigid(system.rest_positions[rows], there) - there) / share
     return end
 
 
 def rigid_ends(system: System, before: State, end: State, limits: StepLimits) -> State:
     """The end of a midpoint step with rigid bodies rigid, in place and velocity; the given one where surfaces touch.
 
-    Momentum and angular momentum of every body are kept.
+    Those with joints and welds are rigid there already. Momentum and angular momentum of every body are kept.
     """
     x, v = end.positions.copy(), end.velocities.copy()
     h = end.time - before.time
     pinned = system.pinned_vertices
-    for part in system.rigid_bodies:
+    for part in (part for part in system.rigid_bodies if part not in system.linked_bodies):
         rows = part.vertices
         rest, start = system.rest_positions[rows], before.positions[rows]
         if np.isin(pinned, np.arange(rows.start, rows.stop)).any():

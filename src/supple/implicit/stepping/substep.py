@@ -18,9 +18,11 @@ from supple.implicit.energies.loads.muscles import muscles_at
 from supple.implicit.energies.loads.pressure import pressures_at
 from supple.implicit.energies.loads.soft_targets import soft_targets_at
 from supple.implicit.energies.loads.springs import springs_at
+from supple.implicit.energies.midpoint import ActingWithin
 from supple.implicit.energies.potential import Potential
 from supple.implicit.energies.stitch_damping import StitchDamping
 from supple.implicit.joints.joint_step import JointStep
+from supple.implicit.joints.midpoint_step import MidpointJoints, agreeing, joints_in_step
 from supple.implicit.limits.inversion_guard import InversionGuard
 from supple.implicit.limits.step_limits import StepLimits
 from supple.implicit.newton.convergence import Convergence
@@ -30,7 +32,6 @@ from supple.implicit.newton.trace import NewtonRow
 from supple.implicit.stepping.contact_step import ContactStep
 from supple.implicit.stepping.dirichlet import move_pins
 from supple.implicit.stepping.integrators import Integrator, Plan, Static
-from supple.implicit.stepping.midpoint import ActingWithin
 from supple.implicit.stepping.rigid_bodies import rigid_ends, with_rigid_bodies
 from supple.implicit.stepping.works import works_of_step
 from supple.implicit.stepping.workspace import Workspace
@@ -97,6 +98,8 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     if obstacles:
         # What a script moves has the script's velocity, so that its inertia plays no part.
         state.velocities[workspace.bodies_end :] = (targets[-obstacles:] - state.positions[-obstacles:]) / h
+    if workspace.joints is not None and workspace.rigidity is not None and state.memory is None:
+        state = agreeing(workspace.joints, workspace.rigidity, state, h)
     plan = settings.integrator.plan(system, state, h)
     middle = end - (1.0 - plan.place) * h
     forces = total_forces(system, state.positions, middle)
@@ -111,9 +114,7 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     barriers = (inversion_barrier(workspace.elasticity, guard.guarded, onset), guard.quadratic_barrier(onset))
     base = replace(base, terms=[*base.terms, *(barrier for barrier in barriers if barrier is not None)])
     times = state.time, end
-    joints = None
-    if workspace.joints is not None:
-        joints = JointStep.of(workspace.joints, state, times, plan.scale, plan.contact_weight)
+    joints = joints_in_step(workspace.joints, workspace.rigidity, state, times, plan.scale, plan.place)
     contact = ContactStep(workspace.contact, state.positions, times, plan.contact_weight)
     problem = Problem(
         contact.with_contact(_with_joints(base, joints), state.positions),
@@ -150,6 +151,8 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     angles = {} if joints is None else joints.hinge_angles(x)
     after = State(end, x, plan.velocity(x), plan.memory, internal=internal, hinge_angles=angles)
     residual = plan.place * outcome.end.gradient
+    if isinstance(joints, MidpointJoints):
+        joints.finish(x, after.velocities, residual, tools)
     after = settings.integrator.finish(plan, state, after, residual, workspace.conservation)
     if plan.place != 1.0 and system.rigid_bodies and outcome.status is Status.CONVERGED:
         after = rigid_ends(system, state, after, limits)
@@ -161,7 +164,7 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
 
 def _with_joints(objective: Objective, joints: JointStep | None) -> Objective:
     """The objective with the present energy of the joints."""
-    return objective if joints is None else replace(objective, terms=[*objective.terms, joints.potential])
+    return objective if joints is None else replace(objective, terms=[*objective.terms, *joints.terms])
 
 
 def _objective(

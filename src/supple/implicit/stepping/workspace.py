@@ -13,6 +13,7 @@ from supple.implicit.energies.elasticity import Elasticity, elasticity_of
 from supple.implicit.energies.regularization import Regularization
 from supple.implicit.energies.stitch_damping import StitchViscosity
 from supple.implicit.energies.stitches import StitchEnergy
+from supple.implicit.joints.rigidity import Rigidity
 from supple.implicit.newton.direction import Tools
 from supple.implicit.stepping.conservation import Conservation
 from supple.joints.geometry import JointGeometry
@@ -28,6 +29,7 @@ class Workspace:
     Attributes
     ----------
     system : with the obstacles' vertices after the bodies'
+    rigidity : conditions of rigid bodies, where these have no elastic energy
     diagonal : of the smallest body's bounding box at rest [m]
     checked : the state that `Implicit.check` has accepted, or that the latest step ended with
     grown : the latest growth, and the elastic energy with it
@@ -44,6 +46,7 @@ class Workspace:
     stitch_viscosity: StitchViscosity | None
     quadratic_viscosity: QuadraticViscosity | None
     joints: JointGeometry | None
+    rigidity: Rigidity | None
     checked: State | None = None
     grown: tuple[Growth, Elasticity] | None = None
     conservation: Conservation = field(init=False)
@@ -64,7 +67,7 @@ class Workspace:
         if self.grown is None or not laws.growth.equals(self.grown[0]):
             free = laws.stress_free
             shapes = {"rest_shape_inverse": free.Dm_inv, "rest_volumes": free.volumes, "quadratic": free.quadratic}
-            self.grown = laws.growth, elasticity_of(replace(self.system, **shapes))
+            self.grown = laws.growth, elasticity_of(replace(self.system, **shapes), self.elasticity.with_linked)
             self.conservation = replace(self.conservation, elasticity=self.grown[1], latest=None)
         return self.grown[1]
 
