@@ -99,16 +99,39 @@ class Cliff(Quartic):
         return super().value(x) + (0.1 if x[0, 0] > 0.5 else 0.0)
 
 
-def test_a_jump_is_crossed_by_a_tiny_step_a_few_times():
-    objective = Objective([Cliff()])
+def climb(energy: Potential, times: int) -> list[tuple[float, float, int]]:
+    """Ends, lengths and cuts of searches from u = 0.5 on, of one minimization."""
+    objective = Objective([energy])
     here = objective.model(np.array([[0.5, 0.0, 0.0]]), None)
     vector = np.array([[0.1, 0.0, 0.0]])
     slope, jumps = float((here.gradient * vector).sum()), Jumps()
-    taken = [search(objective, here, vector, slope, 1.0, ANYWHERE, jumps) for _ in range(6)]
-    for end, step, _ in taken[:5]:
-        assert 0.0 < step < 1e-5
-        assert end[0, 0] > 0.5
+    taken = [search(objective, here, vector, slope, 1.0, ANYWHERE, jumps) for _ in range(times)]
+    return [(end[0, 0], step, cuts) for end, step, cuts in taken]
+
+
+def test_a_jump_is_crossed_by_a_short_step_a_few_times():
+    taken = climb(Cliff(), 6)
+    assert taken[:5] == [(pytest.approx(0.5 + 0.1 / 16), 1 / 16, 4)] * 5
     assert taken[5][1] == 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Wall(Quartic):
+    """The same, and a stiff spring from u = 0.5 on."""
+
+    def value(self, x):
+        return super().value(x) + 5e4 * max(x[0, 0] - 0.5, 0.0) ** 2
+
+    def add_gradient(self, x, out):
+        super().add_gradient(x, out)
+        out[0, 0] += 1e5 * max(x[0, 0] - 0.5, 0.0)
+
+
+def test_a_stiff_wall_is_no_jump():
+    energy = Wall()
+    ((end, _, cuts),) = climb(energy, 1)
+    assert cuts > 4
+    assert energy.value(np.array([[end, 0.0, 0.0]])) < energy.value(np.array([[0.5, 0.0, 0.0]]))
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,9 +32,10 @@ _ROUND_OFF = 1e-13
 _UNCLEAR = 1e-10
 _STEEPEST = 0.5
 
-# After so many cuts a step is a millionth of its direction: an energy that is still higher has a jump. So many may be
-# crossed in one minimization; contacts that are met there keep their weights, so that the same one is not met again.
-_TINY = 20
+# A convex energy rises by no more than the slope at the end times the length. Where it rises by more than twice that
+# within so small a share of the first length, there is a jump. So many may be crossed in one minimization; contacts
+# that are met there keep their weights, so that the same one is not met again.
+_SHORT = 1.0 / 16.0
 _MOST_JUMPS = 5
 
 # A projected Hessian can be far too stiff: where a body buckles, and where surfaces slide over each other's edges.
@@ -49,9 +50,15 @@ class Jumps:
 
     crossed: int = 0
 
-    def cross(self, cuts: int, rise: float, size: float) -> bool:
-        """Whether the step after so many cuts, with this rise of the energy [J], is to be taken."""
-        jump = cuts == _TINY and rise > _ROUND_OFF * size and self.crossed < _MOST_JUMPS
+    def cross(self, rise: float, uphill: float, round_off: float) -> bool:
+        """Whether a short step that raises the energy is to be taken.
+
+        Parameters
+        ----------
+        rise : of the energy [J]; round_off : its error [J]
+        uphill : the slope at the end, times the length of the step [J]
+        """
+        jump = self.crossed < _MOST_JUMPS and rise > max(2.0 * uphill, 0.0) + round_off
         self.crossed += jump
         return jump
 
@@ -83,17 +90,23 @@ def search(
     for cuts in range(_MOST_CUTS):
         moved = start.positions + step * direction
         energy, size = objective.value_and_size(moved)
-        enough = energy <= start.energy + _SUFFICIENT * step * slope + _ROUND_OFF * max(size, start.size)
-        if enough and limits.allows(moved):
+        size = max(size, start.size)
+        enough = energy <= start.energy + _SUFFICIENT * step * slope + _ROUND_OFF * size
+        if not limits.allows(moved):
+            step *= _SHRINK
+        elif enough:
             uphill = 0.0
-            if -step * slope < _UNCLEAR * max(size, start.size):
+            if -step * slope < _UNCLEAR * size:
                 uphill = float(np.vdot(objective.gradient(moved), direction)) / -slope
             if uphill <= _STEEPEST:
                 return moved, step, cuts
             step /= 1.0 + uphill
-        elif limits.allows(moved) and jumps.cross(cuts, energy - start.energy, max(size, start.size)):
-            return moved, step, cuts
         else:
+            rise = energy - start.energy
+            if step <= _SHORT * largest and 0.0 < rise < np.inf:
+                uphill = step * float(np.vdot(objective.gradient(moved), direction))
+                if jumps.cross(rise, uphill, _ROUND_OFF * size):
+                    return moved, step, cuts
             step *= _SHRINK
     return start.positions, 0.0, _MOST_CUTS
 
