@@ -8,6 +8,7 @@ from benchmarks import (
     hanging_beam,
     implicit_scaling,
     live,
+    live_page,
     projections,
     quadratic_tets,
     rigid_bodies,
@@ -29,3 +30,4 @@ if __name__ == "__main__":
     quadratic_tets.main()
     rigid_bodies.main()
     live.main()
+    live_page.run()

@@ -1,10 +1,13 @@
 """The live page in a browser: from a move of the mouse to the moved mesh, and the cost while nothing moves.
 
 A ball at rest in free space is pulled. The clock starts when the browser gets the first move of a drag, and stops at
-the first drawn picture in which the vertices of the ball are elsewhere. Chromium draws in software with few pixels, so
+the first drawn picture in which the vertices of the ball are elsewhere; `benchmarks.latency` tells where the time
+between goes. Chromium draws in software with few pixels, so
 that the time to draw, which a graphics card would not need, has little effect. Then the processor time of page and
 simulation is measured at rest: paused with a browser, and playing without one. Last, without a page, the frames per
 second of implicit steps with contact.
+
+Without arguments, the figures of docs/live.md are written.
 
 usage: python -m benchmarks.live_page [tets ...]      (Linux, with Chromium and the packages of the tests)
 """
@@ -22,32 +25,15 @@ import numpy as np
 from playwright.sync_api import sync_playwright
 
 import supple as sp
+from benchmarks.latency import MOTION, MOVED, WATCH, noted, printed, stages_of, summary
+from benchmarks.published import publish
 from supple.viewer.app import Address, OpenPage, opened_page
 from supple.viewer.engine.scene.live_scene import LiveScene
 from supple.viewer.engine.scene.solvers import SOLVERS
-from supple.viewer.protocol.commands import Pause, Play
+from supple.viewer.protocol.commands import Pause, Play, Reset
 from supple.viewer.protocol.live_source import LiveSource
 
 FLAGS = "--headless --no-sandbox --disable-gpu --use-angle=swiftshader --enable-unsafe-swiftshader"
-# Waits for the first picture after a move in which the mesh differs; resolves with the time between [ms].
-WATCH = """() => {
-  const mesh = () => {
-    let found; suppleViewer.mutable.current.nodeRefFromName["/bodies/0 ball"].traverse((each) => {
-      if (!found && each.geometry) found = each.geometry.attributes.position.array; });
-    return found; };
-  const before = mesh().slice();
-  let began = null;
-  addEventListener("pointermove", () => { began ??= performance.now(); }, { capture: true, once: true });
-  window.waited = new Promise((resolve) => {
-    const look = () => {
-      const now = mesh();
-      if (began !== null && now.some((value, k) => value !== before[k]))
-        requestAnimationFrame(() => resolve(performance.now() - began));
-      else requestAnimationFrame(look);
-    };
-    look();
-  });
-}"""
 
 
 def source(tets: int) -> LiveSource:
@@ -82,27 +68,38 @@ def share(seconds: float) -> float:
     return 100.0 * (processor_seconds() - before) / (time.perf_counter() - began)
 
 
-def latency(tab: Any, page: OpenPage) -> float:
-    """From a move of the mouse to the moved mesh [ms]."""
+def to_rest(tab: Any, page: OpenPage) -> None:
+    """Return to the start, and wait until the browser shows the mesh at rest."""
+    content: Any = page.content
+    number = content.controller.simulation.send(Reset())
+    while content.controller.snapshot.applied < number or content.controller.snapshot.grabs:
+        tab.wait_for_timeout(20)
+    while tab.evaluate(MOTION) > MOVED:
+        tab.wait_for_timeout(400)
+
+
+def one_event(tab: Any, page: OpenPage) -> dict[str, float]:
+    """From a move of the mouse to the moved mesh: the duration of each stage [ms]."""
     content: Any = page.content
     box = tab.locator("canvas").first.bounding_box()
     x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
     tab.mouse.move(x, y)
     tab.wait_for_timeout(200)
     tab.mouse.down()
-    tab.wait_for_timeout(100)
-    tab.evaluate(WATCH)
-    tab.mouse.move(x + 40, y - 40)
-    found = float(tab.evaluate("waited"))
-    tab.mouse.up()
-    tab.keyboard.press("r")
-    while content.controller.snapshot.frame > 60 or content.controller.snapshot.grabs:
+    tab.mouse.move(x + 6, y - 6)  # the first move begins the drag, and the second one pulls
+    while not content.controller.snapshot.grabs:
         tab.wait_for_timeout(20)
-    tab.wait_for_timeout(400)
-    return found
+    tab.wait_for_timeout(200)
+    tab.evaluate(WATCH)
+    with noted(content) as stamps:
+        tab.mouse.move(x + 40, y - 40)
+        found = tab.evaluate("waited")
+    tab.mouse.up()
+    to_rest(tab, page)
+    return stages_of(found, stamps.by_name)
 
 
-def measure(tets: int, rounds: int, seconds: float) -> dict[str, float]:
+def measure(tets: int, rounds: int, seconds: float) -> dict[str, Any]:
     """All figures of one size, by name."""
     with opened_page(source(tets), Address(port=0)) as page, sync_playwright() as playwright:
         content: Any = page.content
@@ -116,7 +113,7 @@ def measure(tets: int, rounds: int, seconds: float) -> dict[str, float]:
         send = content.controller.simulation.send
         send(Play())
         tab.wait_for_timeout(1500)
-        times = [latency(tab, page) for _ in range(rounds)]
+        events = [one_event(tab, page) for _ in range(rounds)]
         step = content.controller.snapshot.timing.step_ms
         send(Pause())
         tab.wait_for_timeout(1500)
@@ -129,8 +126,7 @@ def measure(tets: int, rounds: int, seconds: float) -> dict[str, float]:
         return {
             "tets": content.controller.snapshot.description.n_tets,
             "step_ms": step,
-            "median_ms": float(np.median(times)),
-            "p95_ms": float(np.quantile(times, 0.95)),
+            **summary(events),
             "paused_percent": paused,
             "unwatched_percent": unwatched,
         }
@@ -161,7 +157,7 @@ def implicit_frames(divisions: tuple[int, int, int] = (5, 5, 7), frames: int = 6
     }
 
 
-def main(sizes: tuple[int, ...] = (5_000, 60_000), rounds: int = 20, seconds: float = 10.0) -> list[dict[str, float]]:
+def main(sizes: tuple[int, ...] = (5_000, 60_000), rounds: int = 60, seconds: float = 10.0) -> dict[str, Any]:
     """Measure and print all sizes."""
     made = []
     for tets in sizes:
@@ -170,7 +166,7 @@ def main(sizes: tuple[int, ...] = (5_000, 60_000), rounds: int = 20, seconds: fl
         print(
             f"{one['tets']:.0f} tets: a step {one['step_ms']:.1f} ms; mouse to moved mesh {one['median_ms']:.0f} ms in "
             f"the median, {one['p95_ms']:.0f} ms at 95 %; paused {one['paused_percent']:.2f} %, "
-            f"unwatched {one['unwatched_percent']:.2f} % of a core (load {os.getloadavg()[0]:.1f})",
+            f"unwatched {one['unwatched_percent']:.2f} % of a core (load {os.getloadavg()[0]:.1f})\n{printed(one)}",
             flush=True,
         )
     blocks = implicit_frames()
@@ -179,8 +175,17 @@ def main(sizes: tuple[int, ...] = (5_000, 60_000), rounds: int = 20, seconds: fl
         f"in the median, {blocks['mean_fps']:.1f} in the mean (load {os.getloadavg()[0]:.1f})",
         flush=True,
     )
-    return made
+    return {"load": os.getloadavg()[0], "sizes": made, "implicit": blocks}
+
+
+def run() -> None:
+    """Measure the two sizes of docs/live.md, and write the page's figures."""
+    if shutil.which("chromium") is None:
+        print("live_page: left out, Chromium is not on the path")
+        return
+    publish("live_page", main())
 
 
 if __name__ == "__main__":
-    main(tuple(int(each) for each in sys.argv[1:]) or (5_000, 60_000))
+    given = tuple(int(each) for each in sys.argv[1:])
+    main(given) if given else run()

@@ -60,6 +60,21 @@ def test_the_progress_of_a_step():
     assert watch.progress is None
 
 
+def test_the_first_colors_are_reported_as_a_long_step(loop, monkeypatch):
+    """Their kernels are compiled outside of a step, for seconds."""
+    found = []
+
+    def values(*_):
+        found.append(loop.watch.progress)
+        return np.zeros(1)
+
+    monkeypatch.setattr(simulation_loop, "tet_values", values)
+    loop.execute(commands.SetView("von_mises"))
+    loop.publish(0.0)
+    assert [progress is not None for progress in found] == [True]
+    assert loop.watch.progress is None
+
+
 def test_forces_of_contacts_and_what_a_sensor_reads():
     """A block at rest on a floor: the forces add up to its weight, and the sensor below it feels them."""
     rubber = sp.StableNeoHookean(youngs=1e5, poisson=0.4, density=1000.0, damping=0.05)

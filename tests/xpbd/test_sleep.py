@@ -9,6 +9,7 @@ import pytest
 
 import supple as sp
 from supple.output.checkpoint.file import Checkpoint, RunFacts, read_checkpoint, write_checkpoint
+from supple.system import build_system
 
 MESH = sp.shapes.box((0.1, 0.1, 0.1), (2, 2, 2))
 MATERIAL = sp.StableNeoHookean(youngs=1e5, poisson=0.4, density=1000.0, damping=0.02)
@@ -151,3 +152,22 @@ def test_bad_times():
     for bad in (0.0, -1.0, np.nan, "now", True):
         with pytest.raises(sp.SolverError, match=r"sleep_after is .*; give a time above zero \[s\], or None"):
             sp.XPBD(sleep_after=bad)
+
+
+def test_sleep_of_a_system_with_other_loads_is_that_of_its_own():
+    """A drag on the page changes loads only: what does not depend on them is not computed again."""
+    cube = sp.Body("cube", sp.shapes.box((0.1, 0.1, 0.1), (1, 1, 1)), sp.StableNeoHookean(youngs=1e5, poisson=0.3))
+    other = sp.Body("other", cube.mesh, cube.material, position=(1.0, 0.0, 0.0))
+    pull = sp.SoftTarget("cube", [0], 10.0)
+
+    def sleep(**loads):
+        return sp.XPBD().prepare(build_system(sp.Scene([cube, other], **loads))).sleep
+
+    free, pulled = sleep(), sleep(soft_targets=[pull])
+    changed = free.of(pulled._system)
+    assert (changed._scene == pulled._scene, changed._scene == free._scene) == (True, False)
+    np.testing.assert_array_equal(changed._times, pulled._times)
+    assert (np.isinf(changed._times[0]), np.isfinite(changed._times[1])) == (True, True)
+    back = changed.of(free._system)
+    assert back._scene == free._scene
+    np.testing.assert_array_equal(back._times, free._times)

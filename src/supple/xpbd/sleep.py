@@ -24,6 +24,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Iterable
+from copy import copy
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
@@ -33,6 +34,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from supple.contact.obstacle_poses import ObstaclePoses
+from supple.scene.scene import Scene
 from supple.system import System
 from supple.xpbd.contact.contact_rows import LoadedRows
 from supple.xpbd.contact.frame_forces import FrameForces, ShapeLoads
@@ -40,6 +42,7 @@ from supple.xpbd.sweeps.ordering import Layout
 
 EDGES, FALL = 0.5, 0.1
 AWAKE = -1
+_LOADS = {System: {"loads", "soft_targets"}, Scene: {"forces", "soft_targets"}}
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,19 +89,31 @@ class Sleep:
         self._links = _stitched_bodies(layout.body, system.joined_components)
         if after is None:
             self._times = np.full(len(system.bodies), math.inf)
-            self._limits, self._scene = np.zeros(len(system.bodies)), ""
+            self._own_times, self._limits = self._times, np.zeros(len(system.bodies))
+            self._unloaded = self._scene = ""
             return
         damping = [part.body.material.per_tet(part.tets.stop - part.tets.start).damping for part in system.bodies]
-        self._times = np.array([max(after, float(np.max(tau))) for tau in damping])
+        self._own_times = np.array([max(after, float(np.max(tau))) for tau in damping])
         edges = np.array([float(system.rest_lengths[part.edges].mean()) for part in system.bodies])
-        fall = 0.5 * math.hypot(*system.gravity) * (0.5 * self._times) ** 2
+        fall = 0.5 * math.hypot(*system.gravity) * (0.5 * self._own_times) ** 2
         self._limits = accuracy * np.minimum(EDGES * edges, FALL * fall)
-        self._times[self._restless()] = math.inf
-        self._scene = _digest(system)
+        self._unloaded = _digest(system, without_loads=True)
+        self._take_loads()
 
     def of(self, system: System) -> Sleep:
-        """Of another system with the same vertices, such as one with other loads."""
-        return Sleep(system, self._layout, self._after, self._accuracy)
+        """Of a system that differs only by its loads on vertices and its soft targets."""
+        made = copy(self)
+        made._system = system
+        if self._after is not None:
+            made._take_loads()
+        return made
+
+    def _take_loads(self) -> None:
+        system = self._system
+        self._times = np.where(self._restless(), math.inf, self._own_times)
+        self._scene = self._unloaded + _digest(
+            (system.loads, system.soft_targets, system.scene.forces, system.scene.soft_targets)
+        )
 
     def begin(
         self, x: NDArray[np.float64], v: NDArray[np.float64], time: float, dt: float, memory: SleepMemory | None
@@ -213,9 +228,15 @@ def _stitched_bodies(bodies: NDArray[np.int32], components: NDArray[np.int32]) -
     return [(first.setdefault(component, body), body) for body, component in pairs]
 
 
-def _digest(system: System) -> str:
-    """A number of all values that the motion of a system depends on; functions of time count by their names."""
+def _digest(thing: Any, without_loads: bool = False) -> str:
+    """A number of all values in a system, or a part of it; functions of time count by their names.
+
+    Parameters
+    ----------
+    without_loads : leave out the loads on vertices and the soft targets of the system and of its scene
+    """
     digest = hashlib.sha256()
+    left_out = _LOADS if without_loads else {}
 
     def add(value: Any) -> None:
         if isinstance(value, np.ndarray):
@@ -224,7 +245,7 @@ def _digest(system: System) -> str:
         elif is_dataclass(value):
             add(type(value).__qualname__)
             for each in fields(value):
-                if each.name != "start_states":
+                if each.name != "start_states" and each.name not in left_out.get(type(value), ()):
                     add(getattr(value, each.name))
         elif isinstance(value, (tuple, list)):
             digest.update(f"{len(value)} of".encode())
@@ -237,5 +258,5 @@ def _digest(system: System) -> str:
         else:
             digest.update(getattr(value, "__qualname__", type(value).__qualname__).encode())
 
-    add(system)
+    add(thing)
     return digest.hexdigest()

@@ -54,28 +54,23 @@ def test_the_frame_rate_decreases_where_the_server_falls_behind(server, until, m
     from supple.viewer.drawing.frame_rate import FASTEST, FrameRate
 
     frame_rate = FrameRate(server)
-    assert frame_rate.interval == FASTEST
-    with frame_rate.sending():
-        pass
-    until(frame_rate.may_send)
-    loop, free = server.get_event_loop(), threading.Event()
-    loop.call_soon_threadsafe(free.wait, 20.0)
-    with frame_rate.sending():
-        pass
-    assert not frame_rate.may_send()
-    time.sleep(0.1)
-    free.set()
-    until(frame_rate.may_send)
-    assert frame_rate.interval >= 0.2  # the delay of the server counts like drawing
-    # The rate increases slowly: each picture without delay has the weight 0.3.
+    loop = server.get_event_loop()
+    for late in (1, 2):
+        free = threading.Event()
+        loop.call_soon_threadsafe(free.wait, 20.0)
+        with frame_rate.sending():
+            pass
+        assert not frame_rate.may_send()
+        time.sleep(0.1)
+        free.set()
+        until(frame_rate.may_send)
+        # The delay of the server counts like drawing. One late picture does not delay those after it.
+        assert frame_rate.interval == FASTEST if late == 1 else frame_rate.interval >= 0.2
     clock = time.monotonic()
     monkeypatch.setattr(frame_rate_module.time, "monotonic", lambda: clock)
-    intervals = []
-    for _ in range(20):
+    for _ in range(2):
         frame_rate._processed(clock, 0.0)
-        intervals.append(frame_rate.interval)
-    assert intervals[0] >= 0.7 * 0.2
-    assert intervals[-1] == FASTEST
+    assert frame_rate.interval == FASTEST
 
 
 def test_pictures_go_on_after_one_that_raises(server, until):

@@ -31,7 +31,7 @@ def bottleneck(snapshot: Snapshot) -> Bottleneck | None:
         cause = f"{step}: {iterations} substeps of {scene.n_tets} tets, {snapshot.measures.contacts} contacts"
         fewer = int(0.8 * iterations * allowed / timing.step_ms)
         if 1 <= fewer < iterations and "substeps" in scene.values:
-            return Bottleneck(cause, f"Use {fewer} substeps", SetParameter("substeps", fewer))
+            return Bottleneck(cause, f"Use {fewer} substep{'s' * (fewer > 1)}", SetParameter("substeps", fewer))
     else:
         contacts = snapshot.measures.contacts
         cause = f"{step}: {iterations} Newton iterations with {scene.n_tets} tets and {contacts} contacts"

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
+from statistics import median
 from typing import Any
 
 FASTEST, SLOWEST = 1.0 / 60.0, 0.5  # between two pictures [s]
 _SHARE = 0.5  # largest share of the time for drawing
+# The cost of a picture is the median of the latest ones: a single late one must not delay those after it.
+_SAMPLES = 3
 
 
 class FrameRate:
@@ -22,7 +26,7 @@ class FrameRate:
     def __init__(self, server: Any) -> None:
         self._loop = server.get_event_loop()
         self._asked = self._answered = 0.0
-        self._cost = 0.0
+        self._costs = deque([0.0] * _SAMPLES, maxlen=_SAMPLES)
         self._next = 0.0
 
     def pause(self) -> float:
@@ -36,7 +40,7 @@ class FrameRate:
     @property
     def interval(self) -> float:
         """Present time between two pictures [s]."""
-        return min(SLOWEST, max(FASTEST, self._cost / _SHARE))
+        return min(SLOWEST, max(FASTEST, median(self._costs) / _SHARE))
 
     @contextmanager
     def sending(self) -> Iterator[None]:
@@ -56,7 +60,5 @@ class FrameRate:
     def _processed(self, asked: float, drawn: float) -> None:
         """Called in the loop of the server after the picture has been processed."""
         lag = time.monotonic() - asked - drawn
-        # The rate decreases immediately and increases slowly.
-        cost = drawn + max(0.0, lag)
-        self._cost = cost if cost > self._cost else 0.7 * self._cost + 0.3 * cost
+        self._costs.append(drawn + max(0.0, lag))
         self._answered = asked

@@ -95,6 +95,7 @@ class Stage:
                 return
             for layer in self._layers:
                 layer.update(moment)
+        self._server.flush()  # otherwise viser waits for more, up to a sixtieth of a second
 
     def apply(self, options: ViewOptions) -> None:
         """Draw the same moment with other options."""

@@ -171,10 +171,9 @@ class SimulationLoop:
 
         Where that fails, the simulation pauses, and the last snapshot is sent again with an error notice.
         """
-        live = self.live
         self._published, self._fresh = now, False
         try:
-            description = describe(live) if self._described != live.revision else None
+            description = describe(self.live) if self._described != self.live.revision else None
             self._last = self.snapshot(now)
         except Exception as error:
             if self._last is None:
@@ -233,7 +232,8 @@ class SimulationLoop:
         if not getattr(self.view, name):
             return None
         try:
-            return compute()
+            with self.watch.limited():  # the first time, kernels are compiled
+                return compute()
         except Exception as error:
             logger.exception("%s could not be computed", name)
             self.view = replace(self.view, **{name: getattr(commands.SetView(), name)})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import os
 import signal
@@ -29,6 +30,8 @@ def run_simulation(source: LiveSource, commands: Connection, snapshots: Connecti
     try:
         live = LiveScene(source)
         live.warm_up()
+        # Otherwise a collection looks at the objects of all loaded libraries, for a tenth of a second or more.
+        gc.freeze()
     except (SuppleError, MemoryError) as error:
         snapshots.send_bytes(packed(ERROR, " ".join(str(error).split()) or type(error).__name__))
         return

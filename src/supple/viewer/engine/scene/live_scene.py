@@ -17,11 +17,12 @@ from supple.scene.scene import Scene
 from supple.simulate import first_frame
 from supple.state import State, Status, StepReport
 from supple.system import BodyRange, Solver, System, initial_state
-from supple.viewer.engine.scene.grab_spring import GrabSpring
+from supple.viewer.engine.scene.grab_spring import GrabSpring, make_spring
 from supple.viewer.engine.scene.new_bodies import moved_apart
 from supple.viewer.engine.scene.pulls import grabbed, workspace_for
 from supple.viewer.engine.scene.pusher import Pusher
 from supple.viewer.engine.scene.solvers import kind_of
+from supple.viewer.protocol.commands import Grab
 from supple.viewer.protocol.live_source import LiveSource
 
 Anchors = Mapping[Pin | SoftTarget, NDArray[np.float64]]
@@ -157,11 +158,15 @@ class LiveScene:
         self.workspace = self.setup.solver.prepare(self.system)
 
     def warm_up(self) -> None:
-        """Take one step and discard it, so that compiled kernels are loaded before a person waits for them."""
-        state = self.state
+        """Pull for one step and discard it, so that compiled kernels are loaded before a person waits for them."""
+        setup, state = self.setup, self.state
+        for body in self.system.bodies[:1]:
+            target = state.positions.mean(axis=0)
+            command = Grab(0, body.name, (0,), (1.0,), (target[0], target[1], target[2]))
+            self.grab({0: make_spring(command, setup.scene, body, self.system.masses, state.positions)})
         self.step()
         self.frame = 0
-        self.adopt(self.setup, state)
+        self.adopt(setup, state)
 
     def step(self) -> StepReport:
         """Simulate one frame. Where this fails, the state does not change, and the report contains the reason."""

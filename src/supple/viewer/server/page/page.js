@@ -17,6 +17,9 @@
     width: [/(minHeight:`3\.5em`,maxHeight:`60%`,width:)`20em`(.{0,160}?style:\{width:)`20em`/, "$1`100%`$2`100%`"],
     // Moves of a drag are sent at every picture, not every 50 ms.
     rate: [/(\{send:\w+,flush:\w+\}=\w+\()50\)/, "$116)"],
+    // Messages are drawn when they arrive: the client would hold them back to smooth their rate, after a late one for
+    // many pictures.
+    pacing: [/(\w+)>3\)\{let (\w+)=\.95;(?=setTimeout)/, "$1>1/0){let $2=.95;"],
     // The arrow keys to the sides: the right one takes a step.
     keys: [/\.has\(`Arrow(?:Left|Right)`\)/g, ".has(``)"],
   };

@@ -1,0 +1,43 @@
+"""Figures of the documentation: a benchmark writes `docs/figures/NAME.json`, and the part of a page that shows it."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from benchmarks.latency import live_page_text
+from benchmarks.measuring import ROOT
+
+DOCS = ROOT / "docs"
+# The page and the text of each file.
+SHOWN: dict[str, tuple[str, Callable[[Any], str]]] = {"live_page": ("live.md", live_page_text)}
+
+
+def publish(name: str, figures: Any) -> None:
+    """Write the figures of this name, and the text between the two marks of its page."""
+    path = file_of(name)
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+    page = DOCS / SHOWN[name][0]
+    page.write_text(with_figures(page.read_text(encoding="utf-8"), name), encoding="utf-8")
+    print(f"written: {path.relative_to(ROOT)} and {page.relative_to(ROOT)}")
+
+
+def file_of(name: str) -> Path:
+    """Where the figures of this name are."""
+    return DOCS / "figures" / f"{name}.json"
+
+
+def with_figures(page: str, name: str) -> str:
+    """The text of a page, with the figures of its file between the two marks; nothing where there is no file."""
+    begin, end = f"<!-- figures: {name} -->\n", "<!-- end of figures -->"
+    text = ""
+    if file_of(name).exists():
+        text = SHOWN[name][1](json.loads(file_of(name).read_text(encoding="utf-8"))) + "\n\n"
+    pattern = f"{re.escape(begin)}.*?{re.escape(end)}"
+    changed, count = re.subn(pattern, lambda _: f"{begin}\n{text}{end}", page, flags=re.S)
+    assert count == 1, f"the page of {name} needs the marks {begin.strip()} and {end}"
+    return changed

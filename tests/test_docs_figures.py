@@ -1,0 +1,35 @@
+"""Figures of pages come from the files that benchmarks write."""
+
+import pytest
+from benchmarks import published
+from benchmarks.latency import STAGES, summary
+
+
+@pytest.mark.parametrize("name", published.SHOWN)
+def test_a_page_shows_its_file(name):
+    page = (published.DOCS / published.SHOWN[name][0]).read_text(encoding="utf-8")
+    assert published.with_figures(page, name) == page
+
+
+def test_every_file_is_shown():
+    assert {path.stem for path in (published.DOCS / "figures").glob("*.json")} <= set(published.SHOWN)
+
+
+def test_figures_become_tables(monkeypatch, tmp_path):
+    both = {"median_ms": 1.25, "p95_ms": 2.5}
+    events = [dict.fromkeys(STAGES, 1.0), dict.fromkeys(STAGES, 1.0) | {"sent": 51.0}]
+    found = summary(events)
+    assert (found["median_ms"], found["slow"]) == (31.0, {"sent": 1})
+    size = {"tets": 5760, "step_ms": 3.0, "paused_percent": 0.5, "unwatched_percent": 0.5, "stages": {}} | found
+    size["stages"] = dict.fromkeys(STAGES, both)
+    figures = {"load": 0.1, "sizes": [size, size], "implicit": {"median_fps": 12.0, "tets": 2000, "contacts": 80.0}}
+    monkeypatch.setattr(published, "DOCS", tmp_path)
+    monkeypatch.setattr(published, "ROOT", tmp_path)
+    page = tmp_path / "live.md"
+    page.write_text("before\n<!-- figures: live_page -->\nold\n<!-- end of figures -->\nafter\n", encoding="utf-8")
+    published.publish("live_page", figures)
+    text = page.read_text(encoding="utf-8")
+    assert "| 5,760 | 3.0 ms | 31 ms |" in text
+    assert "| browser to server | 1.2 / 2.5 | 1.2 / 2.5 |" in text
+    assert "old" not in text
+    assert published.with_figures(text, "live_page") == text
