@@ -158,7 +158,7 @@ class Energy(FrameCheck):
             for each in (works.values(), (one for name, one in works.items() if name not in _PASSIVE))
         )
         scale = energy_scale(self.scene, stored, height) + float(np.abs(work).max())
-        # Nothing is gained by a step whose energy falls. Where a body turns far in one step while contact stops it, what the
+        # A step whose energy falls gains nothing. Where a body turns far in one step while contact stops it, what the
         # forces at its end take exceeds what is lost.
         energy = stored + height
         gained, risen = np.diff(energy - work), np.diff(energy - driving)
