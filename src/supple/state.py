@@ -16,7 +16,7 @@ from supple.errors import SceneError
 class Status(StrEnum):
     """How a step ended. It equals its name as text: `report.status == "converged"`.
 
-    Where several hold for one step, the report has the first of: inverted, intersecting, held_back, energy_gained,
+    Where several hold for one step, the report has the first of: inverted, intersecting, energy_gained, held_back,
     softened.
 
     Attributes

@@ -127,3 +127,23 @@ def test_cavities_and_flow():
     assert work["flow"] == pytest.approx(-tets, rel=1e-9)
     assert work["flow"] < 0.0
     assert residual < 1e-5 * work["cavities"]
+
+
+def test_what_turns_without_change_of_shape_is_not_worked_on_by_its_muscle():
+    """A free bar of 1e7 Pa whose muscle is in balance with it, turned by 0.5 rad in each step."""
+    jelly, fibre = sp.StableNeoHookean(youngs=1e7, poisson=0.3), sp.Muscle("bar", 1e6, (1, 0, 0))
+    still = sp.Scene([sp.Body("bar", BAR, jelly)], loads=[fibre], gravity=(0, 0, 0))
+    *_, rest = sp.simulate(still, sp.Implicit(), 1.0, 4)
+    bar = sp.Body("bar", BAR, jelly, angular_velocity=(0, 0, 30.0))
+    turning = sp.Scene([bar], loads=[fibre], gravity=(0, 0, 0))
+    work, _, frames = totals(turning, sp.Implicit(), 3, initial_positions=rest.positions)
+    assert abs(work["muscles"]) < 0.02 * frames[0].report.elastic_energy
+    assert work["numerical"] < 0.0
+
+
+def test_growth_without_stress_does_the_work_of_its_motion():
+    jelly, grows = sp.StableNeoHookean(youngs=1e6, poisson=0.3), sp.Growth("cube", sp.Curve([0, 1], [1, 2]))
+    work, _, frames = totals(sp.Scene([sp.Body("cube", CUBE, jelly)], loads=[grows], gravity=(0, 0, 0)), sp.Implicit(), 4)
+    kinetic = frames[-1].report.kinetic_energy
+    assert kinetic > 0.0
+    assert 0.9 * kinetic < work["growth"] < 2.1 * kinetic

@@ -13,6 +13,7 @@ or loses: for example, backward Euler takes the square of each change of velocit
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,8 @@ from supple.state import State
 from supple.system import System
 
 NUMERICAL = "numerical"
+# Of the change of growth in a step, for its rate of work.
+_DIFFERENCE = 5e-3
 
 
 def no_works(system: System) -> dict[str, float]:
@@ -54,15 +57,26 @@ def works_of_actuators(system: System, works: Sequence[NDArray[np.float64]]) -> 
 
 
 def work_of_growth(system: System, before: State, after: State) -> dict[str, float]:
-    """What growth between two states adds to the elastic energy, the mean of that at the positions of both [J]."""
-    grown = [system.laws_at(state.time) for state in (before, after)]
-    if grown[0].growth is None or grown[0].growth.equals(grown[1].growth):
+    """What growth between two states adds to the elastic energy [J].
+
+    The mean of its rates at the beginning and at the end of the step, each for the change of the whole step: growth
+    without stress does no work, neither does the rotation of a body.
+    """
+    begun, ended = (system.laws_at(state.time) for state in (before, after))
+    if begun.growth is None or begun.growth.equals(ended.growth):
         return {}
     work = 0.0
-    for at in (before, after):
-        one, other = (elastic_energy(laws, at.positions, at.internal) for laws in grown)
-        work += 0.5 * (other - one)
-    return {"growth": work}
+    for state, laws in ((before, begun), (after, ended)):
+        more, less = (_grown_by(laws, begun, ended, share) for share in (_DIFFERENCE, -_DIFFERENCE))
+        work += elastic_energy(more, state.positions, state.internal)
+        work -= elastic_energy(less, state.positions, state.internal)
+    return {"growth": work / (4.0 * _DIFFERENCE)}
+
+
+def _grown_by(laws: TetLaws, begun: TetLaws, ended: TetLaws, share: float) -> TetLaws:
+    """The laws with this share of the change of all growths added."""
+    changes = (new.value - old.value for old, new in zip(begun.active, ended.active, strict=True))
+    return replace(laws, active=tuple(at.at(at.value + share * d) for at, d in zip(laws.active, changes, strict=True)))
 
 
 def completed_works(works: Mapping[str, float], residual: float, change: float) -> dict[str, float]:

@@ -16,9 +16,6 @@ from supple.xpbd.assessment.softening import Softening
 from supple.xpbd.assessment.surfaces import Overlap, SurfaceCheck
 from supple.xpbd.contact.settings import XPBDContact
 
-# A frame in which less than this share of the energy appears does not add to what appeared before.
-LEAST_GAIN = 2e-4
-
 
 @dataclass(frozen=True)
 class Ledger:
@@ -100,7 +97,6 @@ class Assessment:
             overlaps=self._surfaces.find(world, moment.time, asleep),
             held=held,
             gained=excess / scale if scale > 0.0 else 0.0,
-            gains=gain > LEAST_GAIN * scale,
             gainer=self.system.bodies[gainer].name,
             softened=[(share, name) for share, name in lacks if share > accuracy],
         )

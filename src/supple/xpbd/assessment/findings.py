@@ -24,8 +24,8 @@ class Findings:
     inverted : number of inverted tets by body, without bodies that began with some
     overlaps : what is through what
     held : the share of the substeps in which the motion of bodies was shortened
-    gained : energy from nowhere over the energy of the scene [-]; gains : whether it grew in this frame
-    gainer : the body whose energy rose most
+    gained : energy from nowhere, in this frame and before, that has not been lost since, over the scene's energy [-]
+    gainer : the body whose energy rose most in this frame
     softened : (share, body) for each body that is softer than the accuracy allows
     apart : (share of its size, joint) for each joint whose sides are farther apart than that
     """
@@ -34,7 +34,6 @@ class Findings:
     overlaps: list[Overlap] = field(default_factory=list)
     held: float = 0.0
     gained: float = 0.0
-    gains: bool = False
     gainer: str = ""
     softened: list[tuple[float, str]] = field(default_factory=list)
     apart: list[tuple[float, str]] = field(default_factory=list)
@@ -56,11 +55,11 @@ class Findings:
         found += [(Status.INTERSECTING, str(overlap)) for overlap in self.overlaps[:3]]
         if len(self.overlaps) > 3:
             found.append((Status.INTERSECTING, f"{len(self.overlaps) - 3} more such pairs"))
-        if self.held > HELD_TOLERANCE:
-            found.append((Status.HELD_BACK, f"bodies were held back in {_percent(self.held)} of the substeps"))
-        if self.gains and self.gained > ENERGY_TOLERANCE:
+        if self.gained > ENERGY_TOLERANCE:
             text = f"{_percent(self.gained)} of the energy came from nowhere, most in body {self.gainer!r}"
             found.append((Status.ENERGY_GAINED, text))
+        if self.held > HELD_TOLERANCE:
+            found.append((Status.HELD_BACK, f"bodies were held back in {_percent(self.held)} of the substeps"))
         for share, name in self.softened:
             found.append((Status.SOFTENED, f"body {name!r} about {_percent(share)} too soft"))
         for share, label in self.apart:

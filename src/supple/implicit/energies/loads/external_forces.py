@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
 from supple.loads.applied import DeadLoad, MassLoad
+from supple.loads.muscles import FibreTension
 from supple.system import System
 
 
@@ -38,9 +39,16 @@ class ExternalForces(Potential):
 def works_of_loads(
     system: System, x: NDArray[np.float64], displacements: NDArray[np.float64], time: float
 ) -> dict[str, float]:
-    """The work of the loads that `total_forces` adds up, over displacements (n, 3) [m], by its name [J]."""
+    """The work of the loads that `total_forces` adds up, over displacements (n, 3) [m], by its name [J].
+
+    That of muscles is what their potential loses: they may turn with their body in a step, over which the forces of its
+    end would do work.
+    """
     works: dict[str, float] = {}
     for load in system.loads:
+        if isinstance(load, FibreTension):
+            lost = load.energy(x, time) - load.energy(x + displacements, time)
+            works[load.work] = works.get(load.work, 0.0) + lost
         if isinstance(load, (DeadLoad, MassLoad)):
             forces = np.zeros_like(x)
             load.add_forces(x, time, forces)

@@ -19,7 +19,6 @@ class MusclePotential(Potential):
     muscle: FibreTension
     time: float
     projection = Projection.RELEASED_FIRST
-    work = "muscles"
 
     def value(self, x: NDArray[np.float64]) -> float:
         return self.muscle.energy(x, self.time)

@@ -17,6 +17,8 @@ _UNKNOWN = "the recording does not contain what acts on its bodies: an older ver
 _FLOOR = 1e-9
 # Energies are recorded and computed here in double precision, each up to round-off of the energies of its elements.
 _CLOSED = 1e-9
+# Works that take energy where nothing moves obstacles.
+_PASSIVE = ("contact", "friction", "damping")
 
 
 def external_action(recording: Recording) -> str | None:
@@ -150,11 +152,18 @@ class Energy(FrameCheck):
             return super().result()
         recording = self.scene.recording
         numbers, stored, height = np.array(self._rows).T
-        work = np.zeros(len(numbers))
-        if self._works is not None:
-            work = np.cumsum(sum(self._works.values(), np.zeros(len(recording))))[numbers.astype(int)]
+        rows, works = numbers.astype(int), self._works or {}
+        work, driving = (
+            np.cumsum(sum(each, np.zeros(len(recording))))[rows]
+            for each in (works.values(), (one for name, one in works.items() if name not in _PASSIVE))
+        )
         scale = energy_scale(self.scene, stored, height) + float(np.abs(work).max())
-        gains = (stored + height - stored[0] - height[0] - (work - work[0])) / scale
+        # A step whose energy falls gains nothing. Where a body turns far in one step while contact stops it, what the
+        # forces at its end take exceeds what is lost.
+        energy = stored + height
+        gained, risen = np.diff(energy - work), np.diff(energy - driving)
+        gained = np.where(gained > 0.0, np.minimum(gained, np.maximum(risen, 0.0)), gained)
+        gains = np.append(0.0, np.cumsum(gained)) / scale
         for (number, _, _), gain in zip(self._rows, gains, strict=True):
             self.tally.see(recording[number], float(gain), not gain <= self.settings.max_energy_gain)
         return super().result()
