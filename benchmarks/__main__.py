@@ -11,6 +11,7 @@ from benchmarks import (
     projections,
     quadratic_tets,
     rigid_bodies,
+    rigid_heap,
     startup,
     work_precision,
 )
@@ -28,4 +29,5 @@ if __name__ == "__main__":
     bear_pile.main((5, 10))
     quadratic_tets.main()
     rigid_bodies.main()
+    rigid_heap.main()
     live.main()

@@ -48,7 +48,7 @@ def search_radii(motions, moved, excursions, pieces, drifts, scales, far, near):
     excursions : (n,) largest motion of a point in a substep before contact stopped it [m]
     pieces : (n,)
     drifts : (p + 1, 3) common motion of each piece; in the last row the common motion of all points [m]
-    scales : least, most [m]
+    scales : least [m], most (n,) [m]
     far, near : (n, 3) the search radius of a point, without the gap; how far it may move a triangle; and how far it may
         move before the search must be repeated. `near` is relative to the motion of its piece [m]
     """
@@ -61,9 +61,9 @@ def search_radii(motions, moved, excursions, pieces, drifts, scales, far, near):
             relative += (motions[i, j] - drifts[k, j]) ** 2
             path += moved[i, j] ** 2
         path = math.sqrt(path)
-        strain = min(2.0 * most, excursions[i])
-        a = strain + min(most, least + 1.2 * math.sqrt(absolute))
-        b = strain + min(most, least + 1.2 * math.sqrt(relative))
+        strain = min(2.0 * most[i], excursions[i])
+        a = strain + min(most[i], least + 1.2 * math.sqrt(absolute))
+        b = strain + min(most[i], least + 1.2 * math.sqrt(relative))
         far[i, 0], far[i, 1], far[i, 2] = a + path, a + path, a
         near[i, 0], near[i, 1], near[i, 2] = b + path, b + path, b
 
