@@ -9,9 +9,8 @@ from supple.numerics.kernel_cache import njit
 
 Floats = NDArray[np.float64]
 
-# Sweeps over all rows; and the largest correction, as a share of the joint's size, after which they end. A chain of 20
-# links needs 200 to hold within 1e-3 of a link.
-_MOST_SWEEPS, _EXACT = 200, 1e-9
+# The largest correction, as a share of the joint's size, after which sweeps end.
+_EXACT = 1e-9
 
 
 class JointRows(NamedTuple):
@@ -43,10 +42,10 @@ def changes_by(rows: JointRows, twists: Floats) -> Floats:
 
 
 @njit(cache=True)
-def solve_joint_rows(rows, impulses, twists):
-    """Solve the rows, in place: impulses (r,) [kg m] and twists (b, 6), displacement and rotation of the bodies."""
+def solve_joint_rows(rows, impulses, twists, most):
+    """Solve the rows, in place: impulses (r,) [kg m] and twists (b, 6), displacement and rotation of bodies."""
     count = len(rows.total)
-    for sweep in range(_MOST_SWEEPS):
+    for sweep in range(most):
         largest = 0.0
         for k in range(count):
             r = k if sweep % 2 == 0 else count - 1 - k

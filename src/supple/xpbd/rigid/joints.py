@@ -34,6 +34,8 @@ from supple.xpbd.sweeps.ordering import Layout
 
 Floats = NDArray[np.float64]
 
+# Sweeps over all rows, at most this many, or as many for each joint: what pulls at a chain has to go along it.
+_MOST_SWEEPS, _SWEEPS_PER_JOINT = 60, 10
 # Of the largest inverse mass of the joint's rows: rows that move less say nothing of their own.
 _IDLE = 1e-5
 
@@ -118,7 +120,7 @@ class JointProjection:
     ) -> tuple[Floats, Floats]:
         """Solve the rows and move the bodies; the forces (r,) and the twists (b, 6)."""
         impulses, twists = np.zeros(len(rows.total)), np.zeros((len(self._rigid), 6))
-        solve_joint_rows(rows, impulses, twists)
+        solve_joint_rows(rows, impulses, twists, max(_MOST_SWEEPS, _SWEEPS_PER_JOINT * len(self)))
         forces = impulses / h**2
         self._note(rows, forces, laws, first_law, points[:, :3] + origins)
         control = self._rigid.control
