@@ -12,6 +12,7 @@ from benchmarks import (
     projections,
     quadratic_tets,
     rigid_bodies,
+    rigid_heap,
     startup,
     work_precision,
 )
@@ -29,5 +30,6 @@ if __name__ == "__main__":
     bear_pile.main((5, 10))
     quadratic_tets.main()
     rigid_bodies.main()
+    rigid_heap.main()
     live.main()
     live_page.run()

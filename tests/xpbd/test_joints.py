@@ -79,26 +79,28 @@ def test_a_gyroscope_precesses():
     assert np.abs(centers[:, 1]).max() < 1e-3
 
 
-def chain(count):
+def chain(count, damping=2e-3):
     """A chain of links of 0.1 m that hangs by its first one, horizontal at the start."""
     link = sp.shapes.box_surface((0.1, 0.01, 0.01), (1, 1, 1))
     bodies = [sp.RigidBody(f"{i}", link, density=1000.0, position=(0.1 * i + 0.05, 0, 0)) for i in range(count)]
     joints = [
-        sp.HingeJoint(f"{i}", f"{i - 1}" if i else None, point=(0.1 * i, 0, 0), damping=2e-3, name=f"{i}")
+        sp.HingeJoint(f"{i}", f"{i - 1}" if i else None, point=(0.1 * i, 0, 0), damping=damping, name=f"{i}")
         for i in range(count)
     ]
     return bodies, joints
 
 
-@pytest.mark.parametrize(("count", "steps"), [(5, 75), pytest.param(20, 300, marks=pytest.mark.slow)])
-def test_a_chain_hangs_in_its_catenary(count, steps):
+@pytest.mark.parametrize(
+    ("count", "steps", "damping"), [(5, 75, 2e-3), pytest.param(20, 300, 2e-2, marks=pytest.mark.slow)]
+)
+def test_a_chain_hangs_in_its_catenary(count, steps, damping):
     """Of damped links, whose end a pin brings nearer."""
     span = 0.075 * count
-    bodies, joints = chain(count)
-    joints[0] = sp.HingeJoint("0", point=(0, 0, 0), damping=2e-3, name="0")
+    bodies, joints = chain(count, damping)
+    joints[0] = sp.HingeJoint("0", point=(0, 0, 0), damping=damping, name="0")
     block = sp.shapes.box_surface((0.02, 0.02, 0.02), (1, 1, 1))
     bodies.append(sp.RigidBody("end", block, density=1000.0, position=(0.1 * count, 0, 0)))
-    joints.append(sp.HingeJoint(f"{count - 1}", "end", point=(0.1 * count, 0, 0), damping=2e-3, name="last"))
+    joints.append(sp.HingeJoint(f"{count - 1}", "end", point=(0.1 * count, 0, 0), damping=damping, name="last"))
     motion = sp.Keyframes([0.0, 0.3], displacements=[(0, 0, 0), (span - 0.1 * count, 0, 0)])
     frames = run(sp.Scene(bodies, joints=joints, pins=[sp.Pin("end", motion=motion)]), steps, violation=1e-3)
     # Forces along a chain of equal links: the slope grows by the same from middle to middle.

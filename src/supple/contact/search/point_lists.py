@@ -11,11 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.search.boxes import boxes_of_pieces
-from supple.contact.search.pair_kernels import RUNS, boxes_of_owners, meets_partner, partner_lists, sort_pairs
+from supple.contact.search.pair_kernels import RUNS, boxes_of_owners, meets_partner, sort_pairs
 from supple.contact.search.room import Room
 from supple.contact.surface.distances import point_triangle_square
 from supple.numerics.adjacency import in_list
-from supple.numerics.geometry.box_tree import STACK, BoxTree, from_root, morton_codes, next_leaf, overlap
+from supple.numerics.geometry.box_tree import (
+    STACK,
+    BoxTree,
+    from_root,
+    morton_codes,
+    near_boxes,
+    next_leaf,
+    overlap,
+)
 from supple.numerics.kernel_cache import njit, prange
 
 # Points that share one walk through the tree; see docs/xpbd_contact.md.
@@ -93,7 +101,7 @@ def _list_pairs(shapes, groups, radii, rules, partners, boxes, far_tree, near_tr
     ----------
     shapes, radii, rules : see `PairFinder.gather`; groups : see `_groups_of`
     partners : for each piece the others that its points may come near, and itself where that is allowed: two lists, as
-        starts (p + 1,) and pieces
+        starts (p + 1,) and pieces, see `near_boxes`
     boxes : (p, 6) of the pieces' triangles, enlarged as in `far_tree`
     far_tree, near_tree : nodes, labels and order of trees of triangles, for pairs of two pieces and of one
     """
@@ -176,14 +184,14 @@ class PairFinder:
         of_points, of_triangles = np.empty((2, pieces, 3)), np.empty((pieces, 6))
         boxes_of_pieces(points, point_piece, radii[0], *of_points)
         boxes_of_owners(far_boxes[:, :3], far_boxes[:, 3:] - far_boxes[:, :3], triangle_piece, of_triangles)
-        partners = []
-        for kind in (~np.eye(pieces, dtype=np.bool_), np.eye(pieces, dtype=np.bool_)):
-            lists = np.empty(pieces + 1, np.int32), np.empty(pieces * pieces, np.int32)
-            partner_lists(np.concatenate(of_points, axis=1), of_triangles, rules[0] & kind, *lists)
-            partners.append(lists)
+        boxes = np.concatenate(
+            [np.minimum(of_points[0], of_triangles[:, :3]), np.maximum(of_points[1], of_triangles[:, 3:])], axis=1
+        )
+        own = np.diagonal(rules[0])
+        partners = near_boxes(boxes, rules[0]), (np.append(0, np.cumsum(own)), np.flatnonzero(own))
         arrays = [(tree.nodes, tree.labels, tree.order) for tree in trees]
         while True:
-            lists = (tuple(partners), of_triangles, *arrays)
+            lists = (partners, of_triangles, *arrays)
             _list_pairs(shapes, self._groups, radii, rules, *lists, room.start, room.counts, room.pairs)
             if not room.is_too_small():
                 break

@@ -96,7 +96,7 @@ def search_radii(points, motions, moved, excursions, pieces, common, scales, far
     moved : (n, 3) motion since the beginning of the substep [m]
     excursions : (n,) largest motion of a point in a substep before contact stopped it [m]
     pieces : (n,); common : of these motions, see `common_motions`
-    scales : least, most [m]
+    scales : least [m], most (n,) [m]
     far, near : (n, 3) the search radius of a point, without the gap; how far it may move a triangle; and how far it may
         move before the search must be repeated. `near` is relative to the motion of its piece as a rigid body, which
         changes no distance in it [m]
@@ -105,9 +105,9 @@ def search_radii(points, motions, moved, excursions, pieces, common, scales, far
     for i in range(len(motions)):
         absolute, relative = _relative_squares(points, motions, i, pieces[i], common)
         path = math.sqrt(moved[i, 0] ** 2 + moved[i, 1] ** 2 + moved[i, 2] ** 2)
-        strain = min(2.0 * most, excursions[i])
-        a = strain + min(most, least + 1.2 * math.sqrt(absolute))
-        b = strain + min(most, least + 1.2 * math.sqrt(relative))
+        strain = min(2.0 * most[i], excursions[i])
+        a = strain + min(most[i], least + 1.2 * math.sqrt(absolute))
+        b = strain + min(most[i], least + 1.2 * math.sqrt(relative))
         far[i, 0], far[i, 1], far[i, 2] = a + path, a + path, a
         near[i, 0], near[i, 1], near[i, 2] = b + path, b + path, b
 

@@ -250,15 +250,26 @@ def _overlapping(nodes, labels, order, boxes, start, found):
 def near_boxes(boxes, together):
     """For each of a few boxes (p, 6) the others that overlap it, of those that are `together` (p, p): starts, found."""
     count = len(boxes)
+    # Side by side in memory: most pairs are apart along the first axis.
+    low, high = boxes[:, 0].copy(), boxes[:, 3].copy()
     starts = np.zeros(count + 1, dtype=np.int64)
-    found = np.empty(64, dtype=np.int64)
+    pairs = np.empty((64, 2), dtype=np.int64)
     total = 0
     for k in range(count):
-        for other in range(count):
-            if other != k and together[k, other] and overlap(boxes, other, boxes[k]):
-                if total == len(found):
-                    found = np.concatenate((found, np.empty(total, dtype=np.int64)))
-                found[total] = other
-                total += 1
-        starts[k + 1] = total
+        for other in range(k + 1, count):
+            if low[other] > high[k] or high[other] < low[k] or not overlap(boxes, other, boxes[k]):
+                continue
+            if total + 2 > len(pairs):
+                pairs = np.concatenate((pairs, np.empty_like(pairs)))
+            for a, b in ((k, other), (other, k)):
+                if together[a, b]:
+                    pairs[total, 0], pairs[total, 1] = a, b
+                    starts[a + 1] += 1
+                    total += 1
+    starts = np.cumsum(starts)
+    fill, found = starts.copy(), np.empty(total, dtype=np.int64)
+    for i in range(total):
+        k = pairs[i, 0]
+        found[fill[k]] = pairs[i, 1]
+        fill[k] += 1
     return starts, found

@@ -73,10 +73,13 @@ def _percent(share: float) -> str:
 
 def count_inverted(system: System, J: NDArray[np.float64], tangled: frozenset[str]) -> dict[str, int]:
     """Number of tets with J <= 0 of each body that has some, without the tangled ones; J (m,)."""
+    if (J > 0.0).all():
+        return {}
     bad = {part.name: int(np.count_nonzero(~(J[part.tets] > 0.0))) for part in system.bodies}
     return {name: count for name, count in bad.items() if count and name not in tangled}
 
 
 def tangled_bodies(system: System, J: NDArray[np.float64]) -> frozenset[str]:
     """The bodies with a tet of J <= 0; J (m,)."""
-    return frozenset(part.name for part in system.bodies if not (J[part.tets] > 0.0).all())
+    bad = ~(J > 0.0)
+    return frozenset(part.name for part in system.bodies if bad[part.tets].any()) if bad.any() else frozenset()

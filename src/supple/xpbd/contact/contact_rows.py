@@ -1,4 +1,4 @@
-"""The contacts of surfaces as rows of arrays, and the Gauss-Seidel sweeps over them.
+"""The contacts of surfaces as rows of arrays.
 
 A row keeps a gap: n . r >= offset, with r = sum c_i x_i over four points (see `impulses`). Its impulse in total is a
 push along n and friction perpendicular to n. A substep begins with the force that was kept of the substep before. It is
@@ -13,26 +13,15 @@ starting).
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.numerics.kernel_cache import njit
-from supple.numerics.mat3 import dot, row, subtract
-from supple.xpbd.contact.friction import along_surface, friction_total
-from supple.xpbd.contact.impulses import (
-    apply_impulse,
-    compliance,
-    difference,
-    is_rigid,
-    relative,
-    relative_before,
-    shift_both,
-    shift_compliance,
-)
-from supple.xpbd.contact.response_rates import keep_shares, kept_share
+from supple.numerics.mat3 import dot, row
+from supple.xpbd.contact.impulses import apply_impulse, relative
+from supple.xpbd.contact.response_rates import keep_shares
 
 
 class LoadedRows(NamedTuple):
@@ -206,118 +195,6 @@ def push_rows(x, x_prev, movers, rows, h):
         if f[0] != 0.0 or f[1] != 0.0 or f[2] != 0.0:
             d = (h * h * f[0], h * h * f[1], h * h * f[2])
             apply_impulse(x, x_prev, movers, vertices, weights, e, d)
-
-
-@njit(cache=True)
-def solve_rows(x, x_prev, predicted, begun, points, chosen, rows, h, limit, sweeps):
-    """Sweep over the chosen rows, in place. Returns how many push, and the smallest gap before the substep (or inf).
-
-    An overlap that existed when the substep began is removed at both ends of the substep alike, by at most `limit`;
-    what such shifts have brought nearer than it was, at once. The impulse only prevents the gap from becoming smaller
-    than it was then (pre-stabilization: Macklin et al., "Unified Particle Physics", 2014, section 4.4).
-
-    Parameters
-    ----------
-    x, x_prev : (n, 3) at the end and at the beginning of the substep [m]; x includes the forces' impulses
-    predicted : (n, 3) the prediction, before forces and constraints [m]
-    begun : (n, 3) `x_prev` without the shifts of this substep [m]
-    points : movers, see `Movers`; rates (n,) see `response_rates` [1/s^2]
-    chosen : (c,) rows, in the order of a sweep
-    rows : `ContactRows.described`; forces are those that x contains, and shares are set
-    h : length of the substep [s]
-    limit : the largest part of an old overlap that one substep removes [m]
-    sweeps : number of sweeps
-    """
-    vertices, weights, normals, offsets, friction, forces, shares, _, _ = rows
-    movers, rates = points
-    h2 = h * h
-    smallest = np.inf
-    pushes, holds = np.zeros(len(chosen)), np.zeros((len(chosen), 3))
-    for k in range(len(chosen)):
-        e = chosen[k]
-        n = row(normals, e)
-        force = row(forces, e)
-        pushes[k] = max(0.0, h2 * dot(force, n))
-        t = along_surface(force, n)
-        for j in range(3):
-            holds[k, j] = h2 * t[j]
-        before = dot(relative_before(x_prev, movers, vertices, weights, e), n)
-        smallest = min(smallest, before)
-        total = shift_compliance(movers, vertices, weights, e)
-        begun_gap = dot(difference(begun, vertices, weights, e), n)
-        old = min(offsets[e] - before, limit + max(0.0, begun_gap - before))
-        if old > 0.0 and total > 0.0:
-            s = old / total
-            shift_both(x, x_prev, predicted, movers, vertices, weights, e, (s * n[0], s * n[1], s * n[2]))
-    for _ in range(sweeps):
-        for k in range(len(chosen)):
-            e = chosen[k]
-            n = row(normals, e)
-            total = compliance(movers, vertices, weights, e, n)
-            if not total > 0.0:
-                continue
-            r = relative(x, movers, vertices, weights, e)
-            r_prev = relative_before(x_prev, movers, vertices, weights, e)
-            missing = min(0.0, dot(r_prev, n) - offsets[e]) - (dot(r, n) - offsets[e])
-            push = max(0.0, pushes[k] + missing / total)
-            more = push - pushes[k]
-            slip = subtract(r, r_prev)
-            if is_rigid(movers, vertices, e):
-                # The push turns bodies, and they answer differently along the surface.
-                apply_impulse(x, x_prev, movers, vertices, weights, e, (more * n[0], more * n[1], more * n[2]))
-                more = 0.0
-                slip = along_surface(subtract(relative(x, movers, vertices, weights, e), r_prev), n)
-                length = math.sqrt(dot(slip, slip))
-                if length > 0.0:
-                    along = (slip[0] / length, slip[1] / length, slip[2] / length)
-                    total = compliance(movers, vertices, weights, e, along)
-            held = row(holds, k)
-            # Corrections of positions in place of impulses: divided by the same inverse masses.
-            scaled = (held[0] * total, held[1] * total, held[2] * total)
-            hold = friction_total(scaled, slip, n, friction[e] * push * total)
-            hold = (hold[0] / total, hold[1] / total, hold[2] / total)
-            d = (
-                more * n[0] + hold[0] - held[0],
-                more * n[1] + hold[1] - held[1],
-                more * n[2] + hold[2] - held[2],
-            )
-            pushes[k] = push
-            for j in range(3):
-                holds[k, j] = hold[j]
-            apply_impulse(x, x_prev, movers, vertices, weights, e, d)
-    contacts = 0
-    for k in range(len(chosen)):
-        e = chosen[k]
-        contacts += pushes[k] > 0.0
-        share = 0.0
-        if pushes[k] > 0.0:
-            share = _sustained(x_prev, predicted, movers, (vertices, weights, normals, offsets), e, pushes[k])
-            share *= kept_share(h2 * _fastest(rates, vertices, weights, e))
-        shares[e] = share
-        for j in range(3):
-            forces[e, j] = (pushes[k] * normals[e, j] + holds[k, j]) / h2
-    return contacts, smallest
-
-
-@njit
-def _sustained(x_prev, predicted, movers, rows, e, push):
-    """The part of a push that did not stop the approach with which the substep began: that part does not return."""
-    vertices, weights, normals, offsets = rows
-    n = row(normals, e)
-    before = dot(relative_before(x_prev, movers, vertices, weights, e), n) - offsets[e]
-    approach = min(0.0, before) - (dot(relative_before(predicted, movers, vertices, weights, e), n) - offsets[e])
-    impact = max(0.0, approach) / compliance(movers, vertices, weights, e, n)
-    return max(0.0, 1.0 - impact / push)
-
-
-@njit
-def _fastest(rates, vertices, weights, e):
-    """The largest rate of the vertices that take part."""
-    rate = 0.0
-    for i in range(4):
-        if weights[e, i] != 0.0:
-            rate = max(rate, rates[vertices[e, i]])
-    return rate
 
 
 @njit(cache=True)

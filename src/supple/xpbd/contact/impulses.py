@@ -16,7 +16,7 @@ smaller than d by the ratio of |r_n| to the edges' length.
 from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.xpbd.contact.movers import place, place_before, push_body, softness, turn_body
-from supple.xpbd.rigid.bodies import inertia_of
+from supple.xpbd.rigid.motion import inertia_of
 
 
 @njit

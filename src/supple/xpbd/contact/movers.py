@@ -25,7 +25,8 @@ from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.xpbd.contact.rows_of_points import give_rows, take_points
-from supple.xpbd.rigid.bodies import RigidBodies, inertia_of, solve_symmetric
+from supple.xpbd.rigid.bodies import RigidBodies
+from supple.xpbd.rigid.motion import inertia_of, solve_symmetric
 
 
 class Movers(NamedTuple):

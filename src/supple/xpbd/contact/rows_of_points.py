@@ -12,11 +12,11 @@ def take_points(x, start, vertices, weights, out):
             for j in range(3):
                 out[i, j] = x[vertices[first], j]
         else:
-            for j in range(3):
-                total = 0.0
-                for k in range(first, start[i + 1]):
-                    total += weights[k] * x[vertices[k], j]
-                out[i, j] = total
+            a = b = c = 0.0
+            for k in range(first, start[i + 1]):
+                w, v = weights[k], vertices[k]
+                a, b, c = a + w * x[v, 0], b + w * x[v, 1], c + w * x[v, 2]
+            out[i, 0], out[i, 1], out[i, 2] = a, b, c
 
 
 @njit(cache=True)

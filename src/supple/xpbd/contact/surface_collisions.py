@@ -24,7 +24,6 @@ from supple.xpbd.contact.contact_rows import (
     deactivate,
     note_depths,
     push_rows,
-    solve_rows,
 )
 from supple.xpbd.contact.detection.edge_contacts import (
     find_edge_contacts,
@@ -33,24 +32,24 @@ from supple.xpbd.contact.detection.edge_contacts import (
 )
 from supple.xpbd.contact.detection.edge_pairs import EdgePairs, marked
 from supple.xpbd.contact.detection.piece_runs import PieceRuns
-from supple.xpbd.contact.detection.surface_contacts import (
-    find_contacts,
-    find_point_passages,
-    near_triangles,
-    note_point_passages,
-)
+from supple.xpbd.contact.detection.point_passages import find_point_passages, near_triangles, note_point_passages
+from supple.xpbd.contact.detection.surface_contacts import find_contacts
 from supple.xpbd.contact.detection.surface_edges import surface_edges
 from supple.xpbd.contact.memory import SurfaceMemory
 from supple.xpbd.contact.movers import MovedPoints
+from supple.xpbd.contact.sweeps.row_sweeps import solve_rows
 from supple.xpbd.rigid.bodies import RigidBodies
 
 # Of the mean surface edge: the least and the largest motion of a point that lists of candidates allow for, and the
 # largest gap that is reported.
 LEAST_REACH, MOST_REACH, NEAR = 0.05, 0.3, 1.0
+# The largest motion of points of rigid bodies, whose lists are short: one body that is too fast makes all lists new.
+RIGID_REACH = 0.6
 # Of the mean surface edge: how far contacts may move a point in a substep, where edges are looked for.
 SLACK = 0.1
-# Sweeps over all contacts of a substep; see docs/xpbd_contact.md for what more of them would change.
-SWEEPS = 2
+# Sweeps over all contacts of a substep; see docs/xpbd_contact.md for what more of them would change. The second number:
+# where they are solved again because something has still passed through something.
+SWEEPS, MORE_SWEEPS = 2, 4
 # How often contacts are solved again because edges have passed through each other.
 MOST_PASSAGES = 5
 # Below this many active points, contacts are found before a second thread has started.
@@ -88,7 +87,8 @@ class SurfaceCollisions:
         self._near_pairs = np.zeros(0, dtype=np.int64)
         self._listed = np.zeros(0, dtype=np.int64)  # the triangles in any list
         self._near_triangles, self._swept = np.zeros((0, 3), dtype=np.int64), np.zeros((len(s.triangles), 6))
-        self._edges = EdgePairs(surface_edges(s), s, rest, self._stitched)
+        self._boxes = np.zeros((len(s.triangles), 6))
+        self._edges = EdgePairs(surface_edges(s, rest), s, rest, self._stitched)
         self._finder = PairFinder(n)
         self._x, self._before, self._gathered = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
         # Where the substep began; `_before` also has the shifts that remove old overlaps.
@@ -120,12 +120,13 @@ class SurfaceCollisions:
         # Obstacles stand still, so that no motion is common to all points where there is one.
         self._all_share = len(s.fixed_points) == 0
         self._complete = np.zeros(n)
+        self._most_reach = np.where(self._movers.body >= 0, RIGID_REACH, MOST_REACH) * edge_length
         self._gap = np.where(s.allowed, s.gaps, 0.0).max(axis=1)[s.point_piece]
         # See `SurfaceMemory`.
         self._depth = np.zeros((2, n))
         self._entered = np.zeros(n, dtype=np.int32)
         self._excursions = np.zeros(n)
-        self._dt = 0.0
+        self._dt = self._least_gap = 0.0
 
     def begin_step(
         self,
@@ -148,7 +149,7 @@ class SurfaceCollisions:
             both = (owner[:, None] == a) & (owner == b)
             self._apart &= ~(both | both.T)
         bodies = len(self.surfaces.rows)
-        self._dt = dt
+        self._dt, self._least_gap = dt, NEAR * self.edge_length
         self._moved.begin_step(asleep[self._rigid.numbers] | self._rigid.held)
         self._moved.take(x, self._x)
         self.surfaces.place_obstacles(self.poses, time, self._x)
@@ -211,13 +212,19 @@ class SurfaceCollisions:
                     pushes, _ = self._solve(kind, h, 0.0 if k else limit)
                     self.parted &= k < MOST_PASSAGES - 1
                 contacts, smallest = contacts + pushes, min(smallest, gap, least)
+        # Larger gaps in this frame are of no interest.
+        self._least_gap = min(self._least_gap, smallest)
         self._give(x, x_prev)
         return contacts, smallest
 
     def project_again(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> int:
-        """Project the contacts of the last search at positions that have changed since then; returns their number."""
+        """Project the contacts of the last search at positions that have changed since then; returns their number.
+
+        Sweeps are more where something has passed through something: it takes many to push a pile apart.
+        """
         self._take(x, x_prev)
-        contacts = sum(self._solve(kind, h, 0.0)[0] for kind, chosen in enumerate(self._chosen) if len(chosen))
+        sweeps = SWEEPS if self.parted else MORE_SWEEPS
+        contacts = sum(self._solve(kind, h, 0.0, sweeps)[0] for kind, chosen in enumerate(self._chosen) if len(chosen))
         self._give(x, x_prev)
         return contacts
 
@@ -275,11 +282,11 @@ class SurfaceCollisions:
     def _give(self, x: NDArray[np.float64], x_prev: NDArray[np.float64]) -> None:
         self._moved.give(self._x, self._before, x, x_prev)
 
-    def _solve(self, kind: int, h: float, limit: float) -> tuple[int, float]:
+    def _solve(self, kind: int, h: float, limit: float, sweeps: int = SWEEPS) -> tuple[int, float]:
         """Project the chosen rows of one kind; returns what `solve_rows` does."""
         chosen, described = self._chosen[kind], self._rows.described
         places = (self._x, self._before, self._predicted, self._begun)
-        found = solve_rows(*places, self._points, chosen, described, h, limit, SWEEPS)
+        found = solve_rows(*places, self._points, chosen, described, h, limit, sweeps)
         note_depths(self._x, self._movers, chosen, described, self._depth[kind])
         self._settle()
         return found
@@ -298,17 +305,17 @@ class SurfaceCollisions:
     def _find(self, kind: int, part: tuple[int, int], h: float, parallel: bool) -> float:
         """Find the contacts with the triangles of one part, of bodies (0) or of obstacles (1); the smallest gap [m]."""
         s, rows = self.surfaces, self._rows
-        bodies, near = len(s.rows), NEAR * self.edge_length
+        bodies, near = len(s.rows), self._least_gap
         described = rows.described
         smallest = np.inf
         deactivate(rows.active)
         n_active = self._lists[0]
         if n_active:
             shapes = (self._pieces, (self._depth[kind], self._entered, self._complete))
+            swept_boxes(self._before, self._x - self._before, s.triangles, self._boxes)
             several = parallel and n_active >= PARALLEL_FROM
-            find_contacts[several](
-                self._x, self._before, self._lists, *shapes, near, part, self._stitched, described, self._smallest
-            )
+            places, which = (self._x, self._before, self._lists, self._boxes), (near, part, self._stitched)
+            find_contacts[several](*places, *shapes, *which, described, self._smallest)
             smallest = self._smallest[:n_active].min()
         if len(self._edges.keys):
             which = (near, bodies, kind)
@@ -355,7 +362,7 @@ class SurfaceCollisions:
         """List what may touch while no point moves farther than in a frame of these motions (n, 3) [m]."""
         s = self.surfaces
         common_motions(self._x, motions, s.point_piece, self._all_share, self._common)
-        scales = (LEAST_REACH * self.edge_length, MOST_REACH * self.edge_length)
+        scales = (LEAST_REACH * self.edge_length, self._most_reach)
         points = (self._x - self._before, self._excursions, s.point_piece)
         search_radii(self._x, motions, *points, self._common, scales, self._far, self._near)
         together = self._allowed | self._allowed.T

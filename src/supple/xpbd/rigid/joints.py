@@ -4,8 +4,7 @@ A row is a number g of the control points (see `supple.joints.geometry`) with th
 has on a body the force sum G_k and the moment sum r_k x G_k about the center, with the arms r_k of the beginning of the
 substep, and moves the body by its inverse mass and inertia. A condition has g = g0. Limits, friction and motors are
 laws p = -h^2 clip(lambda + k (g - g0), low, high) (see `supple.joints.laws`); where k is that of a condition, it is
-infinite here. Gauss-Seidel sweeps over all rows, forward and backward in turn, solve these equations; multipliers begin
-at zero in each substep.
+infinite here. `joint_rows` solves these equations; multipliers begin at zero in each substep.
 
 Where the two sides of a joint are apart, its forces have a moment. It is taken away from both bodies alike, so that
 two free bodies keep their angular momentum.
@@ -18,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,40 +26,18 @@ from supple.joints.at_state import coordinates_at, initial_joint_details, refuse
 from supple.joints.functions import derivatives, turns, values
 from supple.joints.geometry import ANGLE, JointGeometry, Vectors
 from supple.joints.laws import Laws, laws_of, wrapped
-from supple.numerics.kernel_cache import njit
 from supple.state import State
 from supple.system import System
 from supple.xpbd.rigid.bodies import RigidBodies
+from supple.xpbd.rigid.joint_rows import JointRows, changes_by, solve_joint_rows
 from supple.xpbd.sweeps.ordering import Layout
 
 Floats = NDArray[np.float64]
 
-# Sweeps over all rows; and the largest correction, as a share of the joint's size, after which they end.
-_MOST_SWEEPS, _EXACT = 60, 1e-9
+# Sweeps over all rows, at most this many, or as many for each joint: what pulls at a chain has to go along it.
+_MOST_SWEEPS, _SWEEPS_PER_JOINT = 60, 10
 # Of the largest inverse mass of the joint's rows: rows that move less say nothing of their own.
 _IDLE = 1e-5
-
-
-class _Rows(NamedTuple):
-    """Rows as kernels receive them; see the module.
-
-    Attributes
-    ----------
-    bodies : (r, 2), -1 for none; actions : (r, 2, 6) force and moment on each body for a unit impulse
-    answers : (r, 2, 6) how they move these bodies; total : (r,) inverse masses [1/kg], zero where a row is idle
-    missing : (r,) g - g0 [m]; compliance : (r,) 1 / (h^2 k) [1/kg]; low, high : (r,) ends of the impulse [kg m]
-    sizes : (r,) of g that count as much as the size of the joint
-    """
-
-    bodies: NDArray[np.int64]
-    actions: Floats
-    answers: Floats
-    total: Floats
-    missing: Floats
-    compliance: Floats
-    low: Floats
-    high: Floats
-    sizes: Floats
 
 
 class JointProjection:
@@ -118,7 +95,7 @@ class JointProjection:
         rows, now, first = self._rows(points[:, :3] + origins, previous + origins, end, h, laws, multipliers)
         forces, twists = self._solve(rows, laws, first, points, previous, velocities, origins, h)
         self._substeps += 1
-        changes = now[laws.function] + _changes(rows, twists)[first:] - begun[laws.function]
+        changes = now[laws.function] + changes_by(rows, twists)[first:] - begun[laws.function]
         return float((forces[first:] * changes)[laws.is_motor].sum())
 
     def project_again(
@@ -132,7 +109,7 @@ class JointProjection:
 
     def _solve(
         self,
-        rows: _Rows,
+        rows: JointRows,
         laws: Laws,
         first_law: int,
         points: Floats,
@@ -143,7 +120,7 @@ class JointProjection:
     ) -> tuple[Floats, Floats]:
         """Solve the rows and move the bodies; the forces (r,) and the twists (b, 6)."""
         impulses, twists = np.zeros(len(rows.total)), np.zeros((len(self._rigid), 6))
-        _sweep(rows, impulses, twists)
+        solve_joint_rows(rows, impulses, twists, max(_MOST_SWEEPS, _SWEEPS_PER_JOINT * len(self)))
         forces = impulses / h**2
         self._note(rows, forces, laws, first_law, points[:, :3] + origins)
         control = self._rigid.control
@@ -213,7 +190,7 @@ class JointProjection:
 
     def _rows(
         self, x: Floats, x_prev: Floats, time: float, h: float, laws: Laws, multipliers: Floats
-    ) -> tuple[_Rows, Floats, int]:
+    ) -> tuple[JointRows, Floats, int]:
         """All rows, conditions first; the values (s,) of the functions; and the first row of the laws."""
         g, poses = self.geometry, self.geometry.poses(time)
         corners = x_prev[g.corners]
@@ -259,7 +236,7 @@ class JointProjection:
         np.maximum.at(largest, j, total)
         total[total <= _IDLE * largest[j]] = 0.0
         parts = (np.concatenate(each) for each in (missing, compliance, low, high, sizes))
-        return _Rows(np.where(free, bodies, -1), actions, answers, total, *parts), now, count
+        return JointRows(np.where(free, bodies, -1), actions, answers, total, *parts), now, count
 
     def _turned(self, arms: Floats, bodies: NDArray[np.int64], free: NDArray[np.bool_], moments: Floats) -> Floats:
         """(r, 2, 3) the rotations by moments (r, 2, 3), of corners at arms (r, 8, 3) with equal masses."""
@@ -269,7 +246,7 @@ class JointProjection:
         share = np.where(free, 4.0 / self._rigid.masses[bodies], 0.0)
         return share[:, :, None] * np.linalg.solve(inertia, moments[..., None])[..., 0]
 
-    def _note(self, rows: _Rows, forces: Floats, laws: Laws, first_law: int, x: Floats) -> None:
+    def _note(self, rows: JointRows, forces: Floats, laws: Laws, first_law: int, x: Floats) -> None:
         """Add the forces (r,) of a substep to those of the frame, about the joints' points."""
         g = self.geometry
         joint = np.concatenate([np.repeat(g.differences.joint, 3), g.arguments[0].joint[laws.function]])
@@ -286,39 +263,3 @@ def _at(geometry: JointGeometry, vectors: Vectors, x: Floats, poses: tuple[Float
     """(f, 3) points, directions or differences at world positions x (n, 3)."""
     corners = x[geometry.corners[vectors.joint]]
     return np.einsum("fk,fki->fi", vectors.coefficients, corners) + vectors.offsets(poses)
-
-
-def _changes(rows: _Rows, twists: Floats) -> Floats:
-    """(r,) how far the twists (b, 6) have moved each row [m]."""
-    own = np.where((rows.bodies >= 0)[:, :, None], twists[rows.bodies], 0.0)
-    return np.einsum("rbi,rbi->r", rows.actions, own)
-
-
-@njit(cache=True)
-def _sweep(rows, impulses, twists):
-    """Solve the rows, in place: impulses (r,) [kg m] and twists (b, 6), displacement and rotation of the bodies."""
-    count = len(rows.total)
-    for sweep in range(_MOST_SWEEPS):
-        largest = 0.0
-        for k in range(count):
-            r = k if sweep % 2 == 0 else count - 1 - k
-            if rows.total[r] == 0.0:
-                continue
-            g = rows.missing[r] + rows.compliance[r] * impulses[r]
-            for side in range(2):
-                b = rows.bodies[r, side]
-                if b >= 0:
-                    for i in range(6):
-                        g += rows.actions[r, side, i] * twists[b, i]
-            p = impulses[r] - g / (rows.total[r] + rows.compliance[r])
-            p = min(max(p, rows.low[r]), rows.high[r])
-            change = p - impulses[r]
-            impulses[r] = p
-            largest = max(largest, abs(change) * rows.total[r] / rows.sizes[r])
-            for side in range(2):
-                b = rows.bodies[r, side]
-                if b >= 0:
-                    for i in range(6):
-                        twists[b, i] += rows.answers[r, side, i] * change
-        if largest <= _EXACT:
-            break

@@ -15,8 +15,6 @@ rows of `ContactRows`, which are solved afterwards in a fixed order.
 
 import math
 
-import numpy as np
-
 from supple.numerics.adjacency import in_list
 from supple.numerics.geometry.closest_point import area_normal, between, closest_on_triangle, combine
 from supple.numerics.kernel_cache import njit, prange
@@ -28,12 +26,12 @@ TIE = 1e-9
 
 
 @njit
-def _corners(x, triangles, t):
+def corners_of(x, triangles, t):
     return row(x, triangles[t, 0]), row(x, triangles[t, 1]), row(x, triangles[t, 2])
 
 
 @njit
-def _passage(p, p0, corners, corners0, both_ways):
+def passage(p, p0, corners, corners0, both_ways):
     """The time in the substep (0..1) at which the point passed through the triangle, otherwise 2; the side; the place.
 
     The point and the corners move on straight lines; the heights above the triangle at both ends give the time.
@@ -63,14 +61,25 @@ def _passage(p, p0, corners, corners0, both_ways):
 
 
 @njit
-def _select_triangle(x, x_prev, p, triangles, near, same, closed, entered, reach):
+def _is_beyond(q, q0, boxes, t, square):
+    """Whether the way of a point from q0 to q is farther from the box of triangle t than the root of `square` [m]."""
+    total = 0.0
+    for j in range(3):
+        d = max(0.0, boxes[t, j] - max(q[j], q0[j]), min(q[j], q0[j]) - boxes[t, 3 + j])
+        total += d * d
+    return total > square
+
+
+@njit
+def _select_triangle(x, x_prev, p, triangles, boxes, near, same, closed, entered, reach, bound):
     """The triangle for the contact of point p, the barycentric point on it, the side of p, and the distance.
 
     Parameters
     ----------
+    boxes : (t, 6) see `find_contacts`
     near : triangles of one piece; same : whether p is a point of that piece; closed : whether it has an inside
     entered : the triangle of the same piece that p has passed through and is still behind, or -1
-    reach : `near` contains all triangles up to this distance [m]
+    reach : `near` contains all triangles up to this distance [m]; bound : farther ones are of no interest [m]
 
     Returns
     -------
@@ -83,8 +92,11 @@ def _select_triangle(x, x_prev, p, triangles, near, same, closed, entered, reach
     first, best, side, best_alignment, least = 2.0, -1, 1.0, -1.0, math.inf
     where = (1.0, 0.0, 0.0)
     for t in near:
-        corners, corners0 = _corners(x, triangles, t), _corners(x_prev, triangles, t)
-        time, from_side, place = _passage(q, q0, corners, corners0, not closed)
+        most = min(bound * bound, least * (1.0 + TIE))
+        if _is_beyond(q, q0, boxes, t, most):
+            continue
+        corners, corners0 = corners_of(x, triangles, t), corners_of(x_prev, triangles, t)
+        time, from_side, place = passage(q, q0, corners, corners0, not closed)
         if time < first:
             first, best, side, where = time, t, from_side, place
         if first <= 1.0:
@@ -93,12 +105,12 @@ def _select_triangle(x, x_prev, p, triangles, near, same, closed, entered, reach
         n = area_normal(a, b, c)
         height = dot(subtract(q, a), n)
         length = math.sqrt(dot(n, n))
-        if length == 0.0:
+        if length == 0.0 or height * height > most * length * length:
             continue
         if same:
             if entered >= 0:
                 # Only triangles that face in the same direction as the one that the point is behind.
-                u, v, w = _corners(x, triangles, entered)
+                u, v, w = corners_of(x, triangles, entered)
                 if dot(area_normal(u, v, w), n) <= 0.0:
                     continue
             else:
@@ -122,7 +134,7 @@ def _select_triangle(x, x_prev, p, triangles, near, same, closed, entered, reach
 
 
 @njit
-def _direction(x, p, triangle, where, passed, side, open_sheet):
+def direction(x, p, triangle, where, passed, side, open_sheet):
     """The unit normal of the contact, out of the piece."""
     a, b, c = triangle
     n = area_normal(a, b, c)
@@ -137,7 +149,7 @@ def _direction(x, p, triangle, where, passed, side, open_sheet):
 
 
 @njit
-def _enter(rows, r, p, triangles, t, where, n, gap, mu):
+def enter_contact(rows, r, p, triangles, t, where, n, gap, mu):
     """Fill in the row r of a contact of point p with triangle t."""
     vertices, weights, normals, offsets, mus, _, _, active, _ = rows
     vertices[r, 0], weights[r, 0] = p, 1.0
@@ -148,7 +160,7 @@ def _enter(rows, r, p, triangles, t, where, n, gap, mu):
 
 
 @njit
-def _find_contacts_of(x, x_prev, p, runs, lists, surfaces, memory, near, part, stitched, rows):
+def _find_contacts_of(x, x_prev, p, runs, lists, boxes, surfaces, memory, near, part, stitched, rows):
     """The contacts of point p with the pieces near it; returns the smallest distance that is no contact, or inf."""
     first_run, last_run = runs
     run_starts, run_rows, listed = lists
@@ -168,8 +180,10 @@ def _find_contacts_of(x, x_prev, p, runs, lists, surfaces, memory, near, part, s
         held = entered[p] if same else -1
         pushed = forces[e, 0] != 0.0 or forces[e, 1] != 0.0 or forces[e, 2] != 0.0
         deep[e] = False
+        # Of farther triangles, only what a pair holds or has entered counts, and the smallest gap.
+        bound = math.inf if pushed or same or was_inside > 0.0 else max(gap, complete[p], min(near, smallest))
         t, where, side, distance = _select_triangle(
-            x, x_prev, p, triangles, listed[begin:end], same, closed[its], held, complete[p]
+            x, x_prev, p, triangles, boxes, listed[begin:end], same, closed[its], held, complete[p], bound
         )
         if same and held >= 0 and (t < 0 or side > 0.0):
             entered[p] = -1
@@ -187,22 +201,23 @@ def _find_contacts_of(x, x_prev, p, runs, lists, surfaces, memory, near, part, s
                 smallest = min(smallest, distance)
             if not pushed:
                 continue
-        n = _direction(x, p, _corners(x, triangles, t), where, passed, side, not closed[its])
+        n = direction(x, p, corners_of(x, triangles, t), where, passed, side, not closed[its])
         if passed and same:
             entered[p] = t
-        _enter(rows, e, p, triangles, t, where, n, gap, friction[mine, its])
+        enter_contact(rows, e, p, triangles, t, where, n, gap, friction[mine, its])
         deep[e] = not same and closed[its]
     return smallest
 
 
 @serial_and_parallel
-def find_contacts(x, x_prev, lists, surfaces, memory, near, part, stitched, rows, smallest):
+def find_contacts(x, x_prev, lists, boxes, surfaces, memory, near, part, stitched, rows, smallest):
     """Find which points touch triangles now, and fill in their rows.
 
     Parameters
     ----------
     x, x_prev : (n, 3) at the end and at the beginning of the substep [m]
     lists : of `PieceRuns`: n_active, points, run_ranges, run_starts, run_rows, triangles
+    boxes : (t, 6) low and high corners of what each triangle sweeps [m]
     surfaces : point_piece (n,), triangles (t, 3), triangle_piece (t,), closed (p,), gaps (p, p), friction (p, p): see
         `ContactSurfaces`
     memory : depth (n,) [m], how deep a point is inside a piece of this part; entered (n,), see `ContactMemory`;
@@ -219,75 +234,5 @@ def find_contacts(x, x_prev, lists, surfaces, memory, near, part, stitched, rows
         runs = (run_ranges[index], run_ranges[index + 1])
         found = (run_starts, run_rows, listed)
         smallest[index] = _find_contacts_of(
-            x, x_prev, points[index], runs, found, surfaces, memory, near, part, stitched, rows
+            x, x_prev, points[index], runs, found, boxes, surfaces, memory, near, part, stitched, rows
         )
-
-
-@njit(cache=True)
-def near_triangles(x, x_prev, lists, boxes, margin):
-    """The points, the rows and the triangles, (k, 3), that come as near as the margin [m] in the substep.
-
-    Parameters
-    ----------
-    x, x_prev, lists : see `find_contacts`; boxes : (t, 6) low and high corners of what each triangle sweeps [m]
-    """
-    n_active, points, run_ranges, run_starts, run_rows, listed = lists
-    out = np.empty((run_starts[run_ranges[n_active]], 3), dtype=np.int64)
-    count = 0
-    for index in range(n_active):
-        p = points[index]
-        for k in range(run_ranges[index], run_ranges[index + 1]):
-            for i in range(run_starts[k], run_starts[k + 1]):
-                t = listed[i]
-                overlap = True
-                for j in range(3):
-                    overlap = overlap and min(x[p, j], x_prev[p, j]) - margin <= boxes[t, 3 + j]
-                    overlap = overlap and max(x[p, j], x_prev[p, j]) + margin >= boxes[t, j]
-                if overlap:
-                    out[count, 0], out[count, 1], out[count, 2] = p, run_rows[k], t
-                    count += 1
-    return out[:count].copy()
-
-
-@njit(cache=True)
-def find_point_passages(x, x_prev, near_triangles, surfaces, apart, part, stitched, rows, entered):
-    """Activate the rows of the points that have passed through a triangle; returns how many.
-
-    Parameters
-    ----------
-    near_triangles : see above; apart : (p, p) see `find_edge_contacts`; for the others see `find_contacts`
-    """
-    point_piece, triangles, triangle_piece, closed, gaps, friction = surfaces
-    normals = rows[2]
-    count = 0
-    for i in range(len(near_triangles)):
-        p, r, t = near_triangles[i, 0], near_triangles[i, 1], near_triangles[i, 2]
-        mine, its = point_piece[p], triangle_piece[t]
-        if not part[0] <= t < part[1] or not apart[mine, its]:
-            continue
-        corners, corners0 = _corners(x, triangles, t), _corners(x_prev, triangles, t)
-        time, side, where = _passage(row(x, p), row(x_prev, p), corners, corners0, not closed[its])
-        if time > 1.0 or in_list(stitched, t, p):
-            continue
-        n = _direction(x, p, corners, where, True, side, not closed[its])
-        if normals[r, 0] == n[0] and normals[r, 1] == n[1] and normals[r, 2] == n[2]:
-            continue
-        if mine == its:
-            entered[p] = t
-        _enter(rows, r, p, triangles, t, where, n, gaps[mine, its], friction[mine, its])
-        rows[8][r] = mine != its and closed[its]
-        count += 1
-    return count
-
-
-@njit(cache=True)
-def note_point_passages(x, x_prev, near_triangles, surfaces, apart, stitched, passed):
-    """Set passed[k, l] for the pieces where a point of k has passed through l. For arguments see above."""
-    point_piece, triangles, triangle_piece, closed, _, _ = surfaces
-    for i in range(len(near_triangles)):
-        p, t = near_triangles[i, 0], near_triangles[i, 2]
-        mine, its = point_piece[p], triangle_piece[t]
-        if passed[mine, its] or not apart[mine, its] or in_list(stitched, t, p):
-            continue
-        corners, corners0 = _corners(x, triangles, t), _corners(x_prev, triangles, t)
-        passed[mine, its] = _passage(row(x, p), row(x_prev, p), corners, corners0, not closed[its])[0] <= 1.0
