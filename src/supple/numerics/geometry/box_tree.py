@@ -4,6 +4,7 @@ The tree is complete: node k has the children 2 k and 2 k + 1, and the primitive
 centers' Morton codes. When boxes change, only the boxes of the nodes are computed again.
 
 A node also has the label that all primitives below it share, or -1. Searches use it to leave out whole branches.
+Primitives of one label are therefore next to each other in the order, and the labels in that of their boxes' centers.
 
 Kernels search with a stack of nodes:
 
@@ -55,8 +56,8 @@ class BoxTree:
         leaves = 1
         while leaves < len(boxes):
             leaves *= 2
-        order = np.argsort(morton_codes(boxes), kind="stable").astype(np.int32)
         own = np.zeros(len(boxes), dtype=np.int32) if labels is None else labels
+        order = np.lexsort((morton_codes(boxes), _places_of_labels(boxes, own)[own])).astype(np.int32)
         nodes = np.empty((2 * leaves, 6))
         size = _refit(boxes, order, nodes)
         return cls(order, nodes, _labels_of_nodes(own, order, leaves), size)
@@ -82,6 +83,22 @@ def overlapping(tree: BoxTree, boxes: NDArray[np.float64]) -> tuple[NDArray[np.i
     found = np.empty(start[-1], dtype=np.int32)
     _overlapping(tree.nodes, tree.labels, tree.order, boxes, start, found)
     return start, found
+
+
+def _places_of_labels(boxes: NDArray[np.float64], labels: NDArray[np.int32]) -> NDArray[np.int64]:
+    """The place of each label (p,) in the order of the Morton codes of the boxes of all that has it."""
+    together = np.empty((labels.max(initial=-1) + 1, 6))
+    _boxes_of_labels(boxes, labels, together)
+    return np.argsort(np.argsort(morton_codes(together), kind="stable"))
+
+
+@njit(cache=True)
+def _boxes_of_labels(boxes, labels, out):
+    out[:, :3], out[:, 3:] = np.inf, -np.inf
+    for i in range(len(boxes)):
+        k = labels[i]
+        for j in range(3):
+            out[k, j], out[k, 3 + j] = min(out[k, j], boxes[i, j]), max(out[k, 3 + j], boxes[i, 3 + j])
 
 
 @njit(error_model="numpy")

@@ -61,3 +61,13 @@ def area_normal(a, b, c):
 def between(a, b, t):
     """(1 - t) a + t b"""
     return (a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2]))
+
+
+@njit
+def square_from_box(q, a, b, c):
+    """The squared distance of a point from the box of a triangle."""
+    square = 0.0
+    for j in range(3):
+        low, high = min(a[j], b[j], c[j]), max(a[j], b[j], c[j])
+        square += max(0.0, low - q[j], q[j] - high) ** 2
+    return square

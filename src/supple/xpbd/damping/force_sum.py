@@ -89,6 +89,20 @@ if TYPE_CHECKING:  # `kernel_with` gives these names to each copy of `_sum_chunk
     def powers(X, V, k, data, g, h): ...
 
 
+@njit(error_model="numpy", forceinline=True)
+def _gather(motion, corners, g, count, n_corners, X, V):
+    """Positions and velocities of the corners of group g, one element in each column of X and V."""
+    for lane in range(count):
+        for c in range(n_corners):
+            p = corners[g, lane, c]
+            X[3 * c, lane] = motion[p, 0]
+            X[3 * c + 1, lane] = motion[p, 1]
+            X[3 * c + 2, lane] = motion[p, 2]
+            V[3 * c, lane] = motion[p, 3]
+            V[3 * c + 1, lane] = motion[p, 4]
+            V[3 * c + 2, lane] = motion[p, 5]
+
+
 def _sum_chunk(motion, corners, counts, active, data, first, last, h, out, rates):
     X = np.zeros((3 * CORNERS, WIDTH))
     V = np.zeros((3 * CORNERS, WIDTH))
@@ -97,15 +111,7 @@ def _sum_chunk(motion, corners, counts, active, data, first, last, h, out, rates
         if not active[g]:
             continue
         count = counts[g]
-        for lane in range(count):
-            for c in range(CORNERS):
-                p = corners[g, lane, c]
-                X[3 * c, lane] = motion[p, 0]
-                X[3 * c + 1, lane] = motion[p, 1]
-                X[3 * c + 2, lane] = motion[p, 2]
-                V[3 * c, lane] = motion[p, 3]
-                V[3 * c + 1, lane] = motion[p, 4]
-                V[3 * c + 2, lane] = motion[p, 5]
+        _gather(motion, corners, g, count, CORNERS, X, V)
         forces(X, V, k, data, g, h)
         fastest = 0.0
         for lane in range(count):
@@ -134,15 +140,7 @@ def _power_chunk(motion, corners, counts, active, data, first, last, h, out):
     for g in range(first, last):
         total = 0.0
         if active[g]:
-            for lane in range(counts[g]):
-                for c in range(CORNERS):
-                    p = corners[g, lane, c]
-                    X[3 * c, lane] = motion[p, 0]
-                    X[3 * c + 1, lane] = motion[p, 1]
-                    X[3 * c + 2, lane] = motion[p, 2]
-                    V[3 * c, lane] = motion[p, 3]
-                    V[3 * c + 1, lane] = motion[p, 4]
-                    V[3 * c + 2, lane] = motion[p, 5]
+            _gather(motion, corners, g, counts[g], CORNERS, X, V)
             powers(X, V, k, data, g, h)
             for lane in range(counts[g]):
                 total += k[0, lane]

@@ -16,13 +16,15 @@ rows of `ContactRows`, which are solved afterwards in a fixed order.
 import math
 
 from supple.numerics.adjacency import in_list
-from supple.numerics.geometry.closest_point import area_normal, between, closest_on_triangle, combine
+from supple.numerics.geometry.closest_point import area_normal, between, closest_on_triangle, combine, square_from_box
 from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import dot, row, subtract
 from supple.xpbd.sweeps.compilation import serial_and_parallel
 
 # Squared distances with a relative difference below this are equal: the point is nearest to a common edge or corner.
 TIE = 1e-9
+# Of squared distances: a triangle is not looked at where its plane or its box is farther by more than the nearest one.
+MARGIN = 1e-6
 
 
 @njit
@@ -106,6 +108,9 @@ def _select_triangle(x, x_prev, p, triangles, boxes, near, same, closed, entered
         height = dot(subtract(q, a), n)
         length = math.sqrt(dot(n, n))
         if length == 0.0 or height * height > most * length * length:
+            continue
+        farthest = least * (1.0 + MARGIN)
+        if height * height > farthest * length * length or square_from_box(q, a, b, c) > farthest:
             continue
         if same:
             if entered >= 0:
