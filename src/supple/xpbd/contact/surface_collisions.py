@@ -312,7 +312,7 @@ class SurfaceCollisions:
         n_active = self._lists[0]
         if n_active:
             shapes = (self._pieces, (self._depth[kind], self._entered, self._complete))
-            swept_boxes(self._before, self._x - self._before, s.triangles, self._boxes)
+            swept_boxes_of(self._listed, self._before, self._x - self._before, s.triangles, self._boxes)
             several = parallel and n_active >= PARALLEL_FROM
             places, which = (self._x, self._before, self._lists, self._boxes), (near, part, self._stitched)
             find_contacts[several](*places, *shapes, *which, described, self._smallest)

@@ -247,7 +247,10 @@ class EdgePairs:
         """
         a, b = self.edges.ends.T
         margin, own = (np.maximum(each[a], each[b]) + 0.5 * gaps[a] for each in motions)
-        meets = boxes_of_edges(x, self.edges.ends, margin, self._pieces, self._together, self._boxes, self._piece_boxes)
+        # A point may move more relative to a piece that turns than absolutely.
+        meets = boxes_of_edges(
+            x, self.edges.ends, np.maximum(margin, own), self._pieces, self._together, self._boxes, self._piece_boxes
+        )
         rest = (self._lengths, self._pieces, self._together)
         folded = folded_edges(x, self.edges.ends, *rest, near, self._surfaces)
         taking_part = np.flatnonzero((meets | folded) & np.isfinite(self._boxes).all(axis=1))
