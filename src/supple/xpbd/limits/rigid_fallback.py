@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.numerics.noninverting_step import noninverting_step, volume_signs
+from supple.scene.rotation import rotation_matrix
 from supple.system import System
 from supple.xpbd.limits.obstacle_lift import ObstacleLift
 from supple.xpbd.limits.volume_guard import FLATTEST
@@ -100,13 +101,16 @@ class RigidFallback:
             points[rows, :3] = base[rows] + step * motion[rows]
             v = (points[rows, :3] - start[rows]) / h
             if not held:
-                change = self._excess(start[rows] + shift, v, previous[rows] + shift, velocities[rows], rows)
-                v -= change
-                # Not where the body turned so far in the substep that this field would turn tets over.
+                x_old, at = previous[rows] + shift, start[rows] + shift
+                wrong = self._excess(at, v, x_old, velocities[rows], rows)
                 moved = base + step * motion
-                moved[rows] -= h * change
+                # A rotation: displacements linear in the places would change distances, and surfaces may be in touch.
+                moved[rows] = self._displaced(moved[rows] + shift, rows, -h * wrong) - shift
                 if (volume_signs(moved, tets) > 0.0).all():
                     points[rows, :3] = moved[rows]
+                    v = (moved[rows] - start[rows]) / h
+                    wrong = self._excess(at, v, x_old, velocities[rows], rows)
+                v -= wrong[0] + np.cross(wrong[1], at - self._center(at, rows))
                 shown = (points[:, :3] + origins, start + origins)
                 lift = self._lift.displacement(*shown, rows, (time - h, time))
                 points[rows, :3] += lift
@@ -123,13 +127,25 @@ class RigidFallback:
         return (before - center_before) @ (U @ Vt) + center
 
     def _excess(self, x: NDArray, v: NDArray, x_old: NDArray, v_old: NDArray, rows: NDArray) -> NDArray[np.float64]:
-        """The rigid field of velocities (k, 3) about x with the momenta of (x, v) without those of (x_old, v_old)."""
+        """A rigid field with the momenta of (x, v) without those of (x_old, v_old): (2, 3).
+
+        The velocity of the center of x [m/s], and the angular velocity about it [rad/s].
+        """
         m = self.system.masses[rows]
-        center = m @ x / m.sum()
+        center = self._center(x, rows)
         r = x - center
         moment = (m[:, None] * (np.cross(r, v) - np.cross(x_old - center, v_old))).sum(axis=0)
         inertia = np.einsum("i,ij,ij->", m, r, r) * np.eye(3) - np.einsum("i,ij,ik->jk", m, r, r)
-        return m @ (v - v_old) / m.sum() + np.cross(np.linalg.lstsq(inertia, moment, rcond=None)[0], r)
+        return np.array([m @ (v - v_old) / m.sum(), np.linalg.lstsq(inertia, moment, rcond=None)[0]])
+
+    def _center(self, x: NDArray, rows: NDArray) -> NDArray[np.float64]:
+        m = self.system.masses[rows]
+        return m @ x / m.sum()
+
+    def _displaced(self, x: NDArray, rows: NDArray, by: NDArray) -> NDArray[np.float64]:
+        """Places x (k, 3) moved by a vector and turned about their center by a rotation vector: `by` (2, 3)."""
+        center = self._center(x, rows)
+        return (x - center) @ rotation_matrix(by[1]).T + center + by[0]
 
 
 def united(groups: Sequence[set[int]], pairs: Sequence[Sequence[int]]) -> list[set[int]]:
