@@ -38,7 +38,7 @@ def raise_if_inside(
     # Obstacles without triangles were measured exactly above; a polyhedron about them is larger.
     bodies = len(system.bodies)
     for k, obstacle in enumerate(system.obstacles):
-        if obstacle.surface_mesh is None:
+        if obstacle.contact_mesh is None:
             collide[bodies + k] = collide[:, bodies + k] = False
     table = PairTable(collide, pair_table(system.scene).friction, bodies)
     found = intersections_of(start_surfaces(system, positions, time), table)

@@ -214,3 +214,18 @@ def test_a_frictionless_floor_corrects_along_its_normal_only():
     assert (x[:, [0, 2]] == wanted[:, [0, 2]]).all()
     assert (before[:, [0, 2]] == wanted_before[:, [0, 2]]).all()
     assert (x[:, 1] != wanted[:, 1]).any()
+
+
+@pytest.mark.parametrize("cells", [1, 3])
+def test_the_edge_of_a_box_and_a_small_ball_do_not_enter_between_vertices(cells, tmp_path):
+    """A cube on the edge of a long box, whose corners are beside it, and on a ball narrower than its face."""
+    edge = sp.Box(size=(1, 1, 4), rotation=(0, 0, np.pi / 4), friction=0.5)
+    ball = sp.Sphere(center=(6, 0.2, 0), radius=0.5, friction=0.5)
+    cube, rubber = sp.shapes.box((1, 1, 1), (cells,) * 3), sp.StableNeoHookean(youngs=1e5, poisson=0.3)
+    bodies = [sp.Body(f"cube {x}", cube, rubber, position=(x, 1.24, 0.03)) for x in (0, 6)]
+    recorder = sp.Recorder(tmp_path / "edge.vtkhdf")
+    frames = list(sp.simulate(sp.Scene(bodies, [edge, ball]), sp.XPBD(), 1 / 60, 8, sinks=[recorder]))
+    assert {frame.report.status for frame in frames} == {"converged"}
+    assert min(frame.report.details.contacts for frame in frames[-2:]) > 1
+    report = sp.check_recording(tmp_path / "edge.vtkhdf")
+    assert report.ok, report

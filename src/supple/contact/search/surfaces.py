@@ -22,8 +22,8 @@ from supple.system import System
 class ContactSurfaces:
     """Points and triangles, and which of them may touch. A piece is a connected part of one body or one obstacle.
 
-    The bodies' points come first, then those of obstacles: vertices of triangle obstacles, and the probes of others
-    (`Obstacle.probes`: corners of boxes, centers of small spheres, which touch at a gap of their radius).
+    The bodies' points come first, then those of obstacles: vertices of their triangles, and the probes of others
+    (`Obstacle.probes`: for example centers of small spheres, which touch at a gap of their radius).
 
     Attributes
     ----------
@@ -93,6 +93,7 @@ def build_surfaces(
     body_collision: bool,
     self_collision: bool,
     thickness: float,
+    skin: float,
     edge_length: float,
 ) -> ContactSurfaces:
     """Collect what may touch.
@@ -101,10 +102,11 @@ def build_surfaces(
     ----------
     table : which bodies and obstacles may touch, and with which friction
     body_collision, self_collision : whether bodies touch each other, and themselves
-    thickness : the gap that surfaces keep [m]; edge_length : mean edge length of the bodies' surfaces [m]
+    thickness : the gap that surfaces keep; skin : that from obstacles of simple shape [m]
+    edge_length : mean edge length of the bodies' surfaces [m]
     """
     rows, bodies = _body_part(system)
-    fixed = [_obstacle_part(table.bodies + k, each, edge_length) for k, each in enumerate(system.obstacles)]
+    fixed = [_obstacle_part(table.bodies + k, each, edge_length, skin) for k, each in enumerate(system.obstacles)]
     pieces: list[_Piece] = []
     point_piece, triangles, count = [], [], 0
     for part in (bodies, *fixed):
@@ -153,15 +155,15 @@ def _body_part(system: System) -> tuple[NDArray[np.int32], _Part]:
     return rows, _Part(pieces, system.rest_points[rows], piece.astype(np.int32), triangles[order])
 
 
-def _obstacle_part(owner: int, obstacle: Obstacle, edge_length: float) -> _Part:
-    if obstacle.surface_mesh is not None:
-        return _triangle_part(owner, obstacle.surface_mesh)
+def _obstacle_part(owner: int, obstacle: Obstacle, edge_length: float, skin: float) -> _Part:
+    if obstacle.contact_mesh is not None:
+        return _triangle_part(owner, obstacle.contact_mesh, None if obstacle.surface_mesh is not None else skin)
     points, gap = obstacle.probes(edge_length)
-    pieces = [_Piece(owner, gap=gap)] if len(points) else []
+    pieces = [_Piece(owner, gap=gap + skin)] if len(points) else []
     return _Part(pieces, points, np.zeros(len(points), dtype=np.int32), np.zeros((0, 3), dtype=np.int32))
 
 
-def _triangle_part(owner: int, mesh: SurfaceMesh) -> _Part:
+def _triangle_part(owner: int, mesh: SurfaceMesh, gap: float | None) -> _Part:
     surface = mesh.compact()
     triangles = surface.triangles
     count, labels = connected_components(triangles, len(surface.vertices))
@@ -171,7 +173,7 @@ def _triangle_part(owner: int, mesh: SurfaceMesh) -> _Part:
     inward = closed[labels].all() and surface.volume < 0.0
     point_piece = np.zeros(len(surface.vertices), dtype=np.int32)
     point_piece[triangles] = labels[:, None]
-    pieces = [_Piece(owner, closed=bool(c)) for c in closed]
+    pieces = [_Piece(owner, closed=bool(c), gap=gap) for c in closed]
     return _Part(pieces, surface.vertices, point_piece, triangles[:, ::-1] if inward else triangles)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self
 
@@ -10,28 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple.mesh import shapes
-from supple.numerics.kernel_cache import njit
 from supple.scene.obstacles.half_space import plane_contact
 from supple.scene.obstacles.obstacle import Obstacle, distances_from_corner
 from supple.scene.obstacles.parameters import parameter
-from supple.scene.obstacles.shape import Shape, convex_contact, frame_of
+from supple.scene.obstacles.shape import Shape, frame_of
 from supple.scene.rotation import rotation_matrix
-
-
-@njit
-def _signed_distance(half, s):
-    """Of the box with the half edge lengths `half` about the origin, and the normal."""
-    e = (abs(s[0]) - half[0], abs(s[1]) - half[1], abs(s[2]) - half[2])
-    sign = (math.copysign(1.0, s[0]), math.copysign(1.0, s[1]), math.copysign(1.0, s[2]))
-    a, b, c = max(e[0], 0.0), max(e[1], 0.0), max(e[2], 0.0)
-    d = math.sqrt(a * a + b * b + c * c)
-    if d > 0.0:
-        return d, (sign[0] * a / d, sign[1] * b / d, sign[2] * c / d)
-    if e[0] >= e[1] and e[0] >= e[2]:
-        return e[0], (sign[0], 0.0, 0.0)
-    if e[1] >= e[2]:
-        return e[1], (0.0, sign[1], 0.0)
-    return e[2], (0.0, 0.0, sign[2])
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,13 +66,9 @@ class Box(Obstacle):
     def shapes(self) -> tuple[Shape, ...]:
         center, half, axes = np.asarray(self.center), 0.5 * np.asarray(self.size), self.orientation.T
         if not self.inside:
-            return (Shape(convex_contact(_signed_distance), np.vstack([center, axes]), tuple(half)),)
+            return ()
         return tuple(
             Shape(plane_contact, frame_of(center + side * half[i] * axes[i], -side * axes[i]))
             for i in range(3)
             for side in (-1.0, 1.0)
         )
-
-    def probes(self, edge_length: float) -> tuple[NDArray[np.float64], float]:
-        """The corners of a solid box."""
-        return (np.zeros((0, 3)) if self.inside else self.triangles()[0]), 0.0

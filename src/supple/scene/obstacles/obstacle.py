@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -101,6 +102,13 @@ class Obstacle(ABC):
         """The triangles of an obstacle that consists of triangles, which can be stitched to; None for others."""
         return None
 
+    @cached_property
+    def contact_mesh(self) -> SurfaceMesh | None:
+        """The triangles, at time 0, that XPBD keeps apart from those of bodies; None where they are not the surface."""
+        if self.surface_mesh is None and self.has_exact_triangles:
+            return SurfaceMesh(*self.triangles())
+        return self.surface_mesh
+
     @property
     def has_exact_triangles(self) -> bool:
         """Whether `triangles` is the surface itself, and not a polyhedron about it."""
@@ -125,7 +133,7 @@ class Obstacle(ABC):
         return self.triangles()
 
     def shapes(self) -> tuple[Shape, ...]:
-        """Shapes for XPBD; none for an obstacle with a `surface_mesh`."""
+        """Shapes for XPBD; none for an obstacle with a `contact_mesh`."""
         return ()
 
     def probes(self, edge_length: float) -> tuple[NDArray[np.float64], float]:

@@ -16,6 +16,9 @@ from supple.xpbd.assessment.softening import Softening
 from supple.xpbd.assessment.surfaces import Overlap, SurfaceCheck
 from supple.xpbd.contact.settings import XPBDContact
 
+# Of the energy of the scene: what appears in a frame, and does not count. Old overlaps are removed with as little.
+LEAST_GAIN = 2e-4
+
 
 @dataclass(frozen=True)
 class Ledger:
@@ -90,7 +93,8 @@ class Assessment:
         before = self._ledger
         tangled = before.tangled & tangled_bodies(self.system, J)
         gain, energy, gainer = self.balance.end(moment, works)
-        excess, scale = max(0.0, before.excess + gain), max(before.scale, energy)
+        scale = max(before.scale, energy)
+        excess = max(0.0, before.excess + (gain if not 0.0 < gain < LEAST_GAIN * scale else 0.0))
         lacks = zip(self.softening.shares(h).tolist(), self.softening.names, strict=True)
         findings = Findings(
             inverted=count_inverted(self.system, J, tangled),

@@ -68,7 +68,7 @@ class SurfaceCheck:
         owner = [np.repeat(np.arange(bodies), [part.triangles.stop - part.triangles.start for part in system.bodies])]
         self._formulas = []
         for k, obstacle in enumerate(system.obstacles):
-            mesh = obstacle.surface_mesh
+            mesh = obstacle.contact_mesh
             if mesh is None:
                 self._formulas.append(k)
                 continue

@@ -24,7 +24,7 @@ class ObstacleLift:
     def __init__(self, system: System, skin: float) -> None:
         self._skin = skin
         self._poses = ObstaclePoses(system.obstacles)
-        self._shapes = [k for k, obstacle in enumerate(system.obstacles) if obstacle.surface_mesh is None]
+        self._shapes = [k for k, obstacle in enumerate(system.obstacles) if obstacle.contact_mesh is None]
         collide = pair_table(system.scene).collide
         bodies = len(system.bodies)
         self._points = system.points
