@@ -63,3 +63,18 @@ def test_depths_in_obstacles_and_crossed_triangles_are_found():
 
 def test_a_vertex_that_barely_overlaps_an_obstacle_is_not_found():
     assert found(sp.Scene([sp.Body("a", CUBE, JELLY)], [sp.HalfSpace(point=(0, -0.49, 0))])) == []
+
+
+@pytest.mark.parametrize(
+    "solid",
+    [
+        sp.Sphere(center=(0.1, -0.6, 0.2), radius=0.2, name="solid"),
+        sp.Capsule(start=(0.1, -0.6, -3), end=(0.1, -0.6, 3), radius=0.2, name="solid"),
+        sp.Cylinder(start=(0.1, -0.6, -3), end=(0.1, -0.6, 3), radius=0.2, name="solid"),
+    ],
+    ids=lambda solid: solid.file_kind,
+)
+def test_a_round_solid_between_vertices_is_found(solid):
+    cube = sp.shapes.box((1.0, 1.0, 1.0), (1, 1, 1))
+    (text,) = found(sp.Scene([sp.Body("a", cube, JELLY)], [solid]))
+    assert text == "body 'a' is 0.1 m deep in obstacle 'solid'"
