@@ -23,6 +23,7 @@ LAYERS = (
     ("simulate",),
     ("xpbd", "implicit"),
     ("contact", "joints", "readings"),
+    ("solver",),
     ("system",),
     ("loads",),
     ("scene",),

@@ -30,7 +30,7 @@ RETURNED = {
         "supple.xpbd.details.XPBDDetails",
         "supple.implicit.details.ImplicitDetails",
     ),
-    "recordings": ("supple.output.recording.reader.RecordedFrame",),
+    "recordings": ("supple.output.recording.frame.RecordedFrame",),
 }
 
 

@@ -28,8 +28,9 @@ from supple.readings.joint_readings import JointReading, joint_readings
 from supple.scene.inputs import checked_values, drive_inputs, hold_inputs
 from supple.scene.rigid.pose import Pose, pose_of
 from supple.scene.scene import Scene
+from supple.solver import Solver
 from supple.state import ContactPoints, Problems, SolverDetails, State, Status, StepReport
-from supple.system import BodyRange, Solver, System, build_system, initial_state
+from supple.system import BodyRange, System, build_system, initial_state
 
 logger = logging.getLogger(__name__)
 

@@ -1,4 +1,4 @@
-"""A scene as flat arrays, the input of solvers, and the interface of solvers.
+"""A scene as flat arrays, the input of solvers.
 
 The bodies' vertices, tets, edges, points and surface triangles are concatenated; a `BodyRange` has the rows of one.
 Vertices are what moves. Points are what touches: combinations of vertices, of a soft body its vertices or those of its
@@ -7,11 +7,9 @@ skin. This file does not depend on solvers, files or viewers.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,7 +34,7 @@ from supple.scene.pins import Pin
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.scene.scene import Scene
 from supple.scene.stitches.stitching import Stitching, no_stitching
-from supple.state import SolverDetails, State, StepReport
+from supple.state import State
 
 
 @dataclass(frozen=True, eq=False)
@@ -362,47 +360,3 @@ def initial_state(
         x.append(placed)
         v.append(moving)
     return State(0.0, np.ascontiguousarray(np.concatenate(x)), np.ascontiguousarray(np.concatenate(v)))
-
-
-# Of a simulation by XPBD, at most, for each tet and its share of vertices, edges and surface. Measured: 970 on a cube
-# of 83,000 tets, 1600 on three thin plates in contact.
-_BYTES_PER_TET = 2000
-
-
-class Solver(ABC):
-    """An immutable description of a method and its parameters; what changes is in the State and the workspace."""
-
-    def bytes_needed(self, scene: Scene) -> int:
-        """Estimate of the memory that a simulation takes beyond that of the program itself [bytes].
-
-        Solvers with other needs than arrays of the scene's size override this method.
-        """
-        return _BYTES_PER_TET * sum(len(body.mesh.tets) for body in scene.bodies)
-
-    @abstractmethod
-    def prepare(self, system: System) -> Any:
-        """What is computed once for a system: colorings, sparsity patterns, work arrays.
-
-        Raises
-        ------
-        SolverError : where this solver cannot work with something in the scene; the text names it.
-        """
-
-    def check(self, system: System, state: State, workspace: Any) -> None:
-        """Raise where this solver cannot start from `state`. `simulate` calls it before anything is written.
-
-        Solvers that start from any state do not override this method.
-
-        Raises
-        ------
-        SceneError, SolverError : the text names what is wrong with the state.
-        """
-        return
-
-    def initial_details(self, system: System, workspace: Any) -> SolverDetails:
-        """The details of the start, before any step: of the type and with the names that all steps have."""
-        return SolverDetails()
-
-    @abstractmethod
-    def step(self, system: System, state: State, dt: float, workspace: Any) -> tuple[State, StepReport]:
-        """Advance `state` by `dt` [s]. Where that is impossible, return the last good state and the reason."""

@@ -16,8 +16,9 @@ from supple.demos.rigid import dzhanibekov, gripper
 from supple.errors import SceneError, SolverError
 from supple.implicit.solver import Implicit
 from supple.simulate import simulate
+from supple.solver import Solver
 from supple.state import Status
-from supple.system import Solver, build_system, initial_state
+from supple.system import build_system, initial_state
 from supple.xpbd.solver import XPBD
 
 # Torture scenes are tested in test_torture.py.

@@ -14,8 +14,8 @@ from supple.implicit.details import ImplicitDetails
 from supple.output.recording.reader import Recording, read_recording
 from supple.output.recording.recorder import Recorder
 from supple.simulate import simulate
+from supple.solver import Solver
 from supple.state import State, Status, StepReport
-from supple.system import Solver
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ import pytest
 
 import supple as sp
 from supple.scene.scene import Scene
+from supple.solver import Solver
 from supple.state import State, Status, StepReport
-from supple.system import Solver
 
 DT, STEPS = 1 / 60, 16
 MESH = sp.shapes.box((0.2, 0.2, 0.2), (1, 1, 1))

@@ -18,8 +18,8 @@ from supple.runs.resume import resume
 from supple.runs.run_folder import RunFolder, SceneSource
 from supple.scene.scene import Scene
 from supple.simulate import Frame, Sink, simulate
+from supple.solver import Solver
 from supple.state import Status
-from supple.system import Solver
 
 if TYPE_CHECKING:
     from supple.output.progress import ProgressBar

@@ -11,7 +11,7 @@ from supple.implicit.details import ImplicitDetails
 from supple.implicit.newton.trace import NewtonRow, trace_csv
 from supple.implicit.solver import Implicit
 from supple.simulate import Frame
-from supple.system import Solver
+from supple.solver import Solver
 
 
 class NewtonTrace:

@@ -11,8 +11,8 @@ from typing import Any
 from supple.errors import SolverError
 from supple.scene.scene import Scene
 from supple.simulate import Frame
+from supple.solver import Solver
 from supple.state import Status
-from supple.system import Solver
 
 
 @dataclass(frozen=True)

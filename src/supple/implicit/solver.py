@@ -43,8 +43,9 @@ from supple.numerics.threads import threads_for
 from supple.readings.actuator_readings import actuator_fields, start_of
 from supple.readings.energy_balance import add_works, no_works, works_of_actuators
 from supple.scene.scene import Scene
+from supple.solver import Solver
 from supple.state import State, Status, StepReport
-from supple.system import Solver, System
+from supple.system import System
 
 logger = logging.getLogger(__name__)
 

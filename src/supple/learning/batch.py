@@ -19,8 +19,8 @@ from supple.numerics.thread_tuning import ThreadTuner
 from supple.numerics.threads import numba_threads
 from supple.scene.scene import Scene
 from supple.simulate import Frame, check_timing
+from supple.solver import Solver
 from supple.state import Status
-from supple.system import Solver
 from supple.xpbd.solver import XPBD
 
 # After how many steps the slower of one thread and several is measured again.

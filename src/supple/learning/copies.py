@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from supple.errors import SceneError
 from supple.scene.scene import Scene
 from supple.simulate import Frame, advance, completed_report, first_frame, measure
+from supple.solver import Solver
 from supple.state import State, Status, StepReport
-from supple.system import Solver, System, initial_state
+from supple.system import System, initial_state
 
 
 @dataclass(frozen=True, eq=False)

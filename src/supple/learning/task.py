@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from supple.learning.batch import Batch
 from supple.scene.scene import Scene
-from supple.system import Solver
+from supple.solver import Solver
 from supple.xpbd.solver import XPBD
 
 

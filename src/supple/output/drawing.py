@@ -15,7 +15,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.output.recording.reader import RecordedFrame, Recording, read_recording
+from supple.output.recording.frame import RecordedFrame
+from supple.output.recording.reader import Recording, read_recording
 from supple.output.recording.scene import RecordedBody, RecordedObstacle
 
 # Colors that can also be distinguished with color blindness (after Okabe and Ito, brightened).

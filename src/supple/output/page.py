@@ -23,7 +23,8 @@ from supple.output.drawing import (
     pictures,
     view_of,
 )
-from supple.output.recording.reader import RecordedFrame, Recording
+from supple.output.recording.frame import RecordedFrame
+from supple.output.recording.reader import Recording
 from supple.output.viser_server import temporary_server
 
 # Bytes of moving vertices before compression, which at least halves them; pages of longer recordings have fewer frames.

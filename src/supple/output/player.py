@@ -11,7 +11,8 @@ from typing import Any
 from supple.errors import OutputError
 from supple.files.replacing import whole_file
 from supple.output.page import write_page
-from supple.output.recording.reader import RecordedFrame, Recording
+from supple.output.recording.frame import RecordedFrame
+from supple.output.recording.reader import Recording
 from supple.output.recording.recorder import Recorder
 from supple.scene.scene import Scene
 from supple.simulate import Frame, start_frame

@@ -11,7 +11,8 @@ from supple.output.checkpoint.scene_hash import scene_hash
 from supple.runs.facts import versions
 from supple.scene.scene import Scene
 from supple.simulate import Frame, start_frame
-from supple.system import Solver, System, rebuilt_system
+from supple.solver import Solver
+from supple.system import System, rebuilt_system
 
 
 def facts_of(system: System, start: tuple[int, float], dt: float, steps: int, solver: Solver) -> RunFacts:

@@ -21,7 +21,7 @@ from supple.runs.keeper import Keeper
 from supple.runs.run_folder import FolderSink
 from supple.scene.scene import Scene
 from supple.simulate import Control, Frame, Frames, Sink, simulate
-from supple.system import Solver
+from supple.solver import Solver
 
 logger = logging.getLogger(__name__)
 

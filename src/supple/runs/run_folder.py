@@ -20,7 +20,7 @@ from supple.runs.contents import RunPaths
 from supple.runs.journal import Journal
 from supple.runs.keeper import Keeper
 from supple.simulate import Frame
-from supple.system import Solver
+from supple.solver import Solver
 
 CHECKPOINT_EVERY = 100
 

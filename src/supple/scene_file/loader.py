@@ -24,7 +24,7 @@ from supple.scene_file.mesh_sets import with_numbers
 from supple.scene_file.urdf.document import read_urdf
 from supple.scene_file.validation_errors import scene_error
 from supple.scene_file.yaml_reader import Key, YamlDocument, read_yaml
-from supple.system import Solver
+from supple.solver import Solver
 
 logger = logging.getLogger(__name__)
 

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import StudyError
-from supple.output.recording.reader import RecordedFrame, Recording
+from supple.output.recording.frame import RecordedFrame
+from supple.output.recording.reader import Recording
 
 AXES = ("x", "y", "z")
 

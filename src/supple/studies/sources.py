@@ -22,7 +22,7 @@ from supple.scene_file.loader import Run, load_run, validated
 from supple.scene_file.paths import unit_of, with_values
 from supple.scene_file.yaml_reader import YamlDocument, read_yaml
 from supple.scene_file.yaml_writer import yaml_text
-from supple.system import Solver
+from supple.solver import Solver
 
 
 def _by_name(module: ModuleType) -> tuple[Callable[[str], ModuleType], tuple[str]]:

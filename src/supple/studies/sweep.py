@@ -8,6 +8,7 @@ from typing import Any
 
 from supple.scene.scene import Scene
 from supple.scene_file.loader import Run
+from supple.solver import Solver
 from supple.studies.run_case import Measure
 from supple.studies.runner import StudyProgress
 from supple.studies.sampling.designs import Design, Grid
@@ -15,7 +16,6 @@ from supple.studies.sampling.factors import Factor, as_factor
 from supple.studies.sources import FileSource, FunctionSource, Source
 from supple.studies.study import CHECKPOINT_SECONDS, Study, ignore_progress
 from supple.studies.table import StudyTable
-from supple.system import Solver
 
 
 def sweep(

@@ -18,8 +18,9 @@ from supple.joints.at_state import refuse_moved_welds
 from supple.numerics.thread_tuning import ThreadTuner
 from supple.readings.actuator_readings import actuator_fields, start_of
 from supple.readings.energy_balance import no_works
+from supple.solver import Solver
 from supple.state import State, Status, StepReport
-from supple.system import Solver, System
+from supple.system import System
 from supple.xpbd.assessment.assessment import Assessment
 from supple.xpbd.assessment.findings import Findings
 from supple.xpbd.assessment.surfaces import Overlap, crossings

@@ -21,7 +21,8 @@ from supple.output.check.load_forces import add_muscle_forces, load_forces
 from supple.output.check.seams import seam_keys
 from supple.output.check.stitch_energy import stitch_energy
 from supple.output.check.surfaces import Surfaces
-from supple.output.recording.reader import RecordedFrame, Recording
+from supple.output.recording.frame import RecordedFrame
+from supple.output.recording.reader import Recording
 
 _MOST_PAIRS = 1000
 

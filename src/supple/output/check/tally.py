@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from supple.output.check.report import CheckResult, Verdict
 from supple.output.check.snapshot import Snapshot
-from supple.output.recording.reader import RecordedFrame
+from supple.output.recording.frame import RecordedFrame
 
 # Units of numbers that count errors.
 COUNTED = ("numbers", "pairs", "pieces")

@@ -25,7 +25,8 @@ from supple.output.drawing import (
     vertex_normals,
     view_of,
 )
-from supple.output.recording.reader import RecordedFrame, Recording
+from supple.output.recording.frame import RecordedFrame
+from supple.output.recording.reader import Recording
 
 logger = logging.getLogger(__name__)
 

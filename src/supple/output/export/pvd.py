@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from supple.files.replacing import whole_file, whole_folder
-from supple.output.recording.reader import RecordedFrame, Recording
+from supple.output.recording.frame import RecordedFrame
+from supple.output.recording.reader import Recording
 
 
 def write_pvd(recording: Recording, output: Path) -> None:

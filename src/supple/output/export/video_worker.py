@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from supple.errors import SuppleError
 from supple.output.drawing import evenly, obstacle_pictures, pictures, vertex_normals, view_of
-from supple.output.recording.reader import RecordedFrame, Recording, read_recording
+from supple.output.recording.frame import RecordedFrame
+from supple.output.recording.reader import Recording, read_recording
 
 _ANGLE = 30.0  # of the camera, upwards [degrees]
 _SIZES = {"gif": (480, 360), "mp4": (960, 720)}

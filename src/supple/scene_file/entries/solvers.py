@@ -9,7 +9,7 @@ from pydantic import Field
 from supple.errors import SolverError
 from supple.scene_file.model import Model, Positive
 from supple.scene_file.validation_errors import suggestion
-from supple.system import Solver
+from supple.solver import Solver
 
 Iterations = Annotated[int, Field(ge=1, le=100_000)]
 Share = Annotated[float, Field(gt=0, lt=1)]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.scene.scene import Scene
-from supple.system import Solver
+from supple.solver import Solver
 
 
 @dataclass(frozen=True, eq=False)

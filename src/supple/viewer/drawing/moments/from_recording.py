@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from supple.output.drawing import view_of
-from supple.output.recording.reader import RecordedFrame, Recording
+from supple.output.recording.frame import RecordedFrame
+from supple.output.recording.reader import Recording
 from supple.viewer.drawing.moments.model import Model, ModelBody, Moment
 
 

@@ -15,8 +15,9 @@ from supple.scene.forces import Force, SoftTarget
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.simulate import first_frame
+from supple.solver import Solver
 from supple.state import State, Status, StepReport
-from supple.system import BodyRange, Solver, System, initial_state
+from supple.system import BodyRange, System, initial_state
 from supple.viewer.engine.scene.grab_spring import GrabSpring, make_spring
 from supple.viewer.engine.scene.new_bodies import moved_apart
 from supple.viewer.engine.scene.pulls import grabbed, workspace_for

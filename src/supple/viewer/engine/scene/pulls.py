@@ -11,7 +11,8 @@ import numpy as np
 from supple.loads.build import applied_force
 from supple.scene.forces import Force, SoftTarget
 from supple.scene.scene import Scene
-from supple.system import SoftTargetRange, Solver, System
+from supple.solver import Solver
+from supple.system import SoftTargetRange, System
 from supple.viewer.engine.scene.grab_spring import GrabSpring
 from supple.xpbd.workspace import XPBDWorkspace
 

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Callable
 
 from supple.errors import CommandError
-from supple.system import Solver
+from supple.solver import Solver
 from supple.viewer.protocol.parameters import PARAMETERS, Value
 
 
