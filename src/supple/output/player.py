@@ -78,7 +78,7 @@ def _page(shown: Any, folder: Path) -> str:
     if isinstance(shown, Recording):
         write_page(shown, page)
     elif isinstance(shown, RecordedFrame):
-        write_page(shown.recording, page, frames=[shown])
+        write_page(shown.recording.path, page, frames=[shown])
     else:
         frame = shown if isinstance(shown, Frame) else _first_frame(shown)
         recorder = Recorder(folder / "frame.vtkhdf")

@@ -33,7 +33,7 @@ _VECTORS = ("linear_momentum", "angular_momentum")
 
 
 def _displacements(frame: RecordedFrame, body: str) -> NDArray[np.float64]:
-    return frame.positions[body] - frame.recording[0].positions[body]
+    return frame.positions[body] - RecordedFrame(frame.recording, 0).positions[body]
 
 
 BODY_QUANTITIES: dict[str, tuple[str, Callable[[RecordedFrame, str], NDArray[np.float64]]]] = {

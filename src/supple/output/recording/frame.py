@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from supple.errors import OutputError
 from supple.materials.elastic_tets.active import ActiveTets
 from supple.materials.elastic_tets.laws import TetLaws
 from supple.materials.flows.internal import NEVER_FLOWED
+from supple.output.recording.contents import RecordedContents
 from supple.output.recording.recorder import INTERNAL, REPORT_NUMBERS, REPORT_VECTORS, field_series
 from supple.output.recording.scene import RecordedBody
 from supple.readings.by_body import ByBody
@@ -23,9 +24,6 @@ from supple.scene.rigid.pose import Pose, pose_of
 from supple.simulate import Report
 from supple.state import State
 
-if TYPE_CHECKING:
-    from supple.output.recording.reader import Recording
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RecordedFrame(TetReadings):
@@ -34,7 +32,7 @@ class RecordedFrame(TetReadings):
     `simulate(..., start=recording[-1])` continues from a frame, with either solver.
     """
 
-    recording: Recording
+    recording: RecordedContents
     number: int
 
     @property
