@@ -10,6 +10,9 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
+# Otherwise ffmpeg is started by a copy of this process, which takes a minute on some machines.
+os.environ.setdefault("IMAGEIO_FFMPEG_NO_PREVENT_SIGINT", "1")
+
 _FLAGS = (
     "--headless --no-sandbox --disable-gpu --use-angle=swiftshader --enable-unsafe-swiftshader "
     "--disable-background-networking"
