@@ -149,6 +149,16 @@ class Snapshot:
         return least
 
     @cached_property
+    def bounded_J(self) -> NDArray[np.float64]:
+        """(m,) as `J`; in quadratic tets, what bounds it below everywhere in them where they are straight at rest."""
+        if self.scene.recording.quadratic is None:
+            return self.J
+        rows, nodes = self.scene.recording.quadratic
+        least = self.J.copy()
+        least[rows] = quadratic_tets.lowest_coefficients(self.positions[nodes], self.scene.quadratic_at_rest)
+        return least
+
+    @cached_property
     def elastic_energy(self) -> float | None:
         """[J], zero at rest; None where the recording does not contain the law of a body."""
         recording, inverse = self.scene.recording, self.scene.rest_inverse

@@ -8,11 +8,13 @@ A cavity or a span of a cable has one force Q on its volume or length s, so that
 frame, which is the mean over its substeps.
 
 The force of pins is what balances the elastic and stitch forces, weight and inertia on pinned vertices. With E(x) the
-sum of both energies, the elastic part is the derivative of E along the motion of the pinned vertices alone.
+sum of both energies, the elastic part is the derivative of E along the motion of the pinned vertices alone. Barriers
+against inversion, which are in no energy of a frame, act on pins as well: the steps in which they may are left out.
 """
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -26,6 +28,8 @@ from supple.output.check.snapshot import Snapshot
 
 # Of a difference quotient of the energy, as a share of the motion between two frames.
 _STEP = 1e-6
+# J below which a barrier against inversion may act, where the recording does not say it.
+_BARRIER_ONSET = 0.1
 # What else may act on pinned vertices, up to a bound that is known.
 _BESIDE_PINS = {"contact", "friction", "damping", "flow", "growth"}
 # Round-off, as a share of the energies.
@@ -76,6 +80,8 @@ class Works(FrameCheck):
         elif not self._parts:
             self.why_not = "; ".join(f"{name}: {why}" for name, why in [*self._open.items(), *self._left_out.items()])
         self._implicit = (recording.solver or "").startswith("Implicit")
+        onset = re.search(r"barrier_onset=([-+.\de]+)", recording.solver or "")
+        self._onset = float(onset[1]) if onset else _BARRIER_ONSET
         self._last: Snapshot | None = None
         self._forces = np.zeros_like(recording.rest_positions)
         self._first: Snapshot | None = None
@@ -195,6 +201,8 @@ class Works(FrameCheck):
         rows = np.unique(recording.pinned_vertices)
         if not moved[rows].any():
             return 0.0, 0.0
+        if not min(last.bounded_J.min(), at.bounded_J.min()) > self._onset:
+            return 0.0, np.inf
         along = np.zeros_like(moved)
         along[rows] = moved[rows]
         m = recording.masses[rows]

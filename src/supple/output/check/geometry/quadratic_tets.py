@@ -71,6 +71,12 @@ def smallest_ratios(corners: NDArray[np.float64], rest: NDArray[np.float64]) -> 
     return (determinants(corners, places) / determinants(rest, places)).min(axis=1)
 
 
+def lowest_coefficients(corners: NDArray[np.float64], rest: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(k,) the smallest ratio of the determinants' Bernstein coefficients, which bounds J below."""
+    coefficients = [determinants(nodes, _LATTICE) @ _TO_BERNSTEIN.T for nodes in (corners, rest)]
+    return (coefficients[0] / coefficients[1]).min(axis=1)
+
+
 def at_quadrature_points(
     corners: NDArray[np.float64], rest: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
