@@ -148,3 +148,14 @@ def test_growth_without_stress_does_the_work_of_its_motion():
     kinetic = frames[-1].report.kinetic_energy
     assert kinetic > 0.0
     assert 0.9 * kinetic < work["growth"] < 2.1 * kinetic
+
+
+def test_a_muscle_that_growth_stretches_leaves_nothing_to_the_numerical_work():
+    """Both change in every step, so slowly that the bar is in balance."""
+    jelly, rise = sp.StableNeoHookean(youngs=1e6, poisson=0.3), sp.Curve([0, 10], [0, 1])
+    loads = [sp.Muscle("bar", 3e4, (1, 0, 0), rise), sp.Growth("bar", sp.Curve([0, 10], [1, 1.2]))]
+    scene = sp.Scene([sp.Body("bar", BAR, jelly)], loads=loads, gravity=(0, 0, 0))
+    *_, last = frames = list(sp.simulate(scene, sp.Implicit(tolerance=1e-6), 1.0, 8))
+    work = {name: sum(frame.report.work[name] for frame in frames) for name in last.report.work}
+    assert work["muscles"] < -0.1 * work["growth"] < 0.0
+    assert last.report.elastic_energy == pytest.approx(work["muscles"] + work["growth"], rel=0.02)

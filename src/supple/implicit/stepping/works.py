@@ -39,7 +39,7 @@ def works_of_step(
     system, x, n = ws.system, outcome.end.positions, ws.bodies_end
     moved = x - before.positions
     moved[n:] = 0.0  # obstacles
-    works = works_of_loads(system, before.positions, moved, middle)
+    works = works_of_loads(system, before, moved, middle, time)
     end = State(time, x, before.velocities, internal=internal)
     add_works(works, work_of_growth(system, before, end))
     for term in objective.terms:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from supple.implicit.energies.potential import HessianBlocks, Potential, Projection
 from supple.loads.applied import DeadLoad, MassLoad
 from supple.loads.muscles import FibreTension
+from supple.state import State
 from supple.system import System
 
 
@@ -37,21 +38,23 @@ class ExternalForces(Potential):
 
 
 def works_of_loads(
-    system: System, x: NDArray[np.float64], displacements: NDArray[np.float64], time: float
+    system: System, before: State, displacements: NDArray[np.float64], middle: float, end: float
 ) -> dict[str, float]:
     """The work of the loads that `total_forces` adds up, over displacements (n, 3) [m], by its name [J].
 
-    That of muscles is what their potential loses: they may turn with their body in a step, over which the forces of its
-    end would do work.
+    Forces are those at `middle` [s], where the step's equations have them. The work of muscles is what their potential
+    loses, in the mean of the activations at the beginning and at the `end` of the step [s], as that of growth: they may
+    turn with their body in a step, over which the forces of its end would do work.
     """
     works: dict[str, float] = {}
+    x = before.positions
     for load in system.loads:
         if isinstance(load, FibreTension):
-            lost = load.energy(x, time) - load.energy(x + displacements, time)
-            works[load.work] = works.get(load.work, 0.0) + lost
+            lost = [load.energy(x, time) - load.energy(x + displacements, time) for time in (before.time, end)]
+            works[load.work] = works.get(load.work, 0.0) + 0.5 * sum(lost)
         if isinstance(load, (DeadLoad, MassLoad)):
             forces = np.zeros_like(x)
-            load.add_forces(x, time, forces)
+            load.add_forces(x, middle, forces)
             works[load.work] = works.get(load.work, 0.0) + float(np.einsum("ij,ij->", forces, displacements))
     return works
 
