@@ -1,6 +1,5 @@
 """A new kind of obstacle needs one class and one call of `register`, and no change of another file."""
 
-import math
 from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 from typing import ClassVar
@@ -8,7 +7,6 @@ from typing import ClassVar
 import h5py
 import numpy as np
 import pytest
-from numba import njit
 
 import supple as sp
 from supple.output.drawing import obstacle_pictures, view_of
@@ -16,7 +14,6 @@ from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.obstacles.parameters import parameter
 from supple.scene.obstacles.polyhedra import hull, round_ball
 from supple.scene.obstacles.registry import KINDS, register
-from supple.scene.obstacles.shape import Shape, convex_contact
 from supple.viewer.drawing.layers.obstacles import ObstacleView
 from supple.viewer.drawing.moments.from_recording import model_of_recording, moment_of_frame
 from supple.viewer.drawing.moments.from_snapshot import MomentBuilder
@@ -28,18 +25,6 @@ from supple.viewer.protocol.command_queue import CommandQueue
 from supple.viewer.protocol.live_source import LiveSource
 
 RUBBER = sp.StableNeoHookean(youngs=2e4, poisson=0.3, density=1000.0, damping=0.01)
-
-
-@njit
-def _distance(parameters, s):
-    r = parameters[1]
-    h = parameters[0] - r
-    x, y, z = s[0] - min(max(s[0], -h), h), s[1] - min(max(s[1], -h), h), s[2] - min(max(s[2], -h), h)
-    d = math.sqrt(x * x + y * y + z * z)
-    if d > 0.0:
-        return d - r, (x / d, y / d, z / d)
-    sign = math.copysign(1.0, s[1])
-    return abs(s[1]) - h - r, (0.0, sign, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +49,6 @@ class RoundedCube(Obstacle):
         h = self.half - self.rounding
         corners = [[x, y, z] for x in (-h, h) for y in (-h, h) for z in (-h, h)]
         return hull(np.concatenate([ball + corner for corner in np.array(corners)]))
-
-    def shapes(self):
-        frame = np.vstack([np.zeros(3), np.eye(3)])
-        return (Shape(convex_contact(_distance), frame, (self.half, self.rounding)),)
 
 
 @pytest.fixture(autouse=True)

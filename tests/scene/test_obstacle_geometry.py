@@ -107,33 +107,13 @@ def test_triangles_are_closed_face_outwards_and_do_not_cross_the_true_surface(na
     assert distances.max() < 0.005 * getattr(obstacle, "radius", 0.0) + 1e-12
 
 
-@pytest.mark.parametrize("inside", [False, True])
-def test_a_fast_point_stays_on_the_side_where_it_entered(inside):
-    """Through a thin cylinder in one substep, along its axis and across it, and at its rim."""
-    obstacle = sp.Cylinder(start=(0, -0.002, 0), end=(0, 0.002, 0), radius=0.5, inside=inside)
-    (shape,) = obstacle.shapes()
-    numbers = np.array([*shape.parameters, 0.0, 0.0])
-
-    def contact(before, now):
-        ends = (shape.frame[1:] @ (np.asarray(p) - shape.frame[0]) for p in (before, now))
-        gap, gap_before, normal = shape.contact(numbers, *map(tuple, ends))
-        return gap, gap_before, normal @ shape.frame[1:]
-
-    if inside:
-        gap, before, normal = contact((0, 0, 0.2), (0, -3, 0.2))
-        assert (gap, before) == pytest.approx((-2.998, 0.002))
-        np.testing.assert_allclose(normal, (0, 1, 0), atol=1e-12)
-        return
-    for start, end, normal in [
-        ((0.1, 1, 0.2), (0.1, -2, 0.2), (0, 1, 0)),
-        ((0.1, -1, 0.2), (0.1, 0.001, 0.2), (0, -1, 0)),
-        ((0.4999, 1, 0), (0.4999, 0.0015, 0), (0, 1, 0)),
-        ((2, 0.001, 0), (-2, 0.001, 0), (1, 0, 0)),
-    ]:
-        gap, before, found = contact(start, end)
-        assert gap < 0.0 < before
-        np.testing.assert_allclose(found, normal, atol=1e-9)
-    assert contact((2, 0.01, 0), (-2, 0.01, 0))[0] > 0.0
+def test_a_fast_point_stays_in_a_room():
+    """Through both ends of a thin cylinder in one substep."""
+    (shape,) = sp.Cylinder(start=(0, -0.002, 0), end=(0, 0.002, 0), radius=0.5, inside=True).shapes()
+    ends = (shape.frame[1:] @ (np.asarray(p) - shape.frame[0]) for p in ((0, 0, 0.2), (0, -3, 0.2)))
+    gap, before, normal = shape.contact(np.array([*shape.parameters, 0.0, 0.0]), *map(tuple, ends))
+    assert (gap, before) == pytest.approx((-2.998, 0.002))
+    np.testing.assert_allclose(normal @ shape.frame[1:], (0, 1, 0), atol=1e-12)
 
 
 BAD = [

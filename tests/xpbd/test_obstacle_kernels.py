@@ -15,9 +15,9 @@ from supple.xpbd.contact.movers import Movers
 from supple.xpbd.contact.shape_kernels import kernels_of
 
 for name in sys.argv[1:]:
-    obstacle = sp.Sphere(radius=0.5) if name == "Sphere" else KINDS[name]()
+    obstacle = sp.Sphere(radius=0.5, inside=True) if name == "Sphere" else KINDS[name](inside=True)
     (shape,) = obstacle.shapes()
-    x = np.array([[0.45, 0.1, 0.0]])
+    x = np.array([[0.55, 0.1, 0.0]])
     numbers = np.zeros((1, 4))
     numbers[0, : len(shape.parameters)] = shape.parameters
     arrays = (numbers, np.zeros(1, dtype=np.bool_))
@@ -28,13 +28,13 @@ for name in sys.argv[1:]:
     body = np.full(1, -1, dtype=np.int32)
     nobody = (np.zeros(0), np.zeros((0, 3, 3)), np.zeros(0), np.zeros((0, 9)), none)
     movers = Movers(np.ones(1), body, np.zeros((1, 3)), *nobody)
-    points = (x.copy(), np.zeros(1), movers)
-    ends = (0, 1, 1.0, np.ones(1), (0.0, 1.0), False)
+    points = (x.copy(), np.zeros(1), movers, x.copy())
+    ends = (0, 1, 1.0, 1.0, (0.0, 1.0), False)
     kernels_of(shape.contact)[1](x, x.copy(), points, found, arrays, rules, frames, frames, *ends)
     print(name, *np.round(x[0], 6) + 0.0)
 """
 PUSHED = {
-    "Sphere": "Sphere 0.488094 0.108465 0.0",
+    "Sphere": "Sphere 0.491935 0.089443 0.0",
     "Capsule": "Capsule 0.5 0.1 0.0",
     "Cylinder": "Cylinder 0.5 0.1 0.0",
 }

@@ -32,7 +32,7 @@ def test_closest_point_agrees_with_the_plane_and_the_edges():
 
 
 def find(points, triangles, far, near, pieces, excluded=None):
-    finder = PairFinder(len(points))
+    finder = PairFinder(np.ones(len(points), dtype=bool))
     starts, masked = excluded if excluded else (np.zeros(len(triangles) + 1, np.int64), np.zeros(0, np.int32))
     shapes = (points, pieces, triangles, pieces[triangles[:, 0]])
     k = int(pieces.max()) + 1
@@ -75,7 +75,7 @@ def test_groups_that_are_kept_while_points_move_lose_no_pair():
     shapes = (points, pieces, triangles, pieces[triangles[:, 0]])
     rules = (np.ones((2, 2), bool), np.zeros(21, np.int64), np.zeros(0, np.int32))
     radii = np.full((60, 3), 0.2)
-    finder = PairFinder(60)
+    finder = PairFinder(np.ones(60, dtype=bool))
     for _ in range(4):
         finder.gather(shapes, (radii, radii), rules)
         found = [(p, t) for p in range(60) for t in finder.triangles[finder.starts[p] : finder.starts[p + 1]]]

@@ -53,7 +53,7 @@ def pairs_closer_than(
     positions : (n, 3) of all points [m]; pieces : (p, p) whether points of one piece and triangles of another count
     """
     n, t = len(surfaces.point_piece), len(surfaces.triangles)
-    finder = PairFinder(n)
+    finder = PairFinder(np.ones(n, dtype=np.bool_))
     look = np.zeros((n, 3))
     look[:, 0] = closer_than
     none = (pieces, np.zeros(t + 1, dtype=np.int64), np.zeros(0, dtype=np.int32))

@@ -129,27 +129,31 @@ def _list_pairs(shapes, groups, radii, rules, partners, boxes, far_tree, near_tr
         counts[r] = count
 
 
-def _groups_of(points: NDArray[np.float64], pieces: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Groups of at most `GROUP` points (n, 3) of one piece (n,) that are near each other: the points in order (n,), and
-    where each group begins (g + 1,)."""
+def _groups_of(
+    points: NDArray[np.float64], pieces: NDArray[np.int32], wanted: NDArray[np.bool_]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Groups of at most `GROUP` of the wanted points (n, 3), of one piece (n,), that are near each other: the points in
+    order (k,), and where each group begins (g + 1,)."""
     order = np.lexsort((morton_codes(np.concatenate([points, points], axis=1)), pieces))
+    order = order[wanted[order]]
     ordered = pieces[order]
-    place = np.arange(len(points)) - np.searchsorted(ordered, ordered)
-    return order, np.append(np.flatnonzero(place % GROUP == 0), len(points))
+    place = np.arange(len(order)) - np.searchsorted(ordered, ordered)
+    return order, np.append(np.flatnonzero(place % GROUP == 0), len(order))
 
 
 class PairFinder:
-    """Lists of triangles near each of n points. Every search reuses the same memory.
+    """Lists of triangles near each of n points, of which some are wanted (n,). Every search reuses the same memory.
 
     After `gather`, the triangles near point p are `triangles[starts[p]:starts[p + 1]]` in ascending order, and
     `active[:n_active]` are the points that have any.
     """
 
-    def __init__(self, n_points: int) -> None:
+    def __init__(self, wanted: NDArray[np.bool_]) -> None:
+        self._wanted = wanted
         self._room = Room()
         self._trees: list[BoxTree] = []
         self._groups = np.zeros(0, dtype=np.int64), np.zeros(1, dtype=np.int64)
-        self.starts = np.zeros(n_points + 1, dtype=np.int64)
+        self.starts = np.zeros(len(wanted) + 1, dtype=np.int64)
         self.active = np.zeros(0, dtype=np.int32)
         self.triangles = np.zeros(0, dtype=np.int32)
         self.n_active = 0
@@ -209,6 +213,6 @@ class PairFinder:
                 trees.append(self._trees[k])
             else:
                 trees.append(BoxTree.over(boxes, triangle_piece))
-                self._groups = _groups_of(points, point_piece)
+                self._groups = _groups_of(points, point_piece, self._wanted)
         self._trees = trees
         return trees, all_boxes[0]

@@ -22,8 +22,7 @@ from supple.system import System
 class ContactSurfaces:
     """Points and triangles, and which of them may touch. A piece is a connected part of one body or one obstacle.
 
-    The bodies' points come first, then those of obstacles: vertices of their triangles, and the probes of others
-    (`Obstacle.probes`: for example centers of small spheres, which touch at a gap of their radius).
+    The bodies' points come first, then those of obstacles.
 
     Attributes
     ----------
@@ -94,7 +93,6 @@ def build_surfaces(
     self_collision: bool,
     thickness: float,
     skin: float,
-    edge_length: float,
 ) -> ContactSurfaces:
     """Collect what may touch.
 
@@ -103,10 +101,9 @@ def build_surfaces(
     table : which bodies and obstacles may touch, and with which friction
     body_collision, self_collision : whether bodies touch each other, and themselves
     thickness : the gap that surfaces keep; skin : that from obstacles of simple shape [m]
-    edge_length : mean edge length of the bodies' surfaces [m]
     """
     rows, bodies = _body_part(system)
-    fixed = [_obstacle_part(table.bodies + k, each, edge_length, skin) for k, each in enumerate(system.obstacles)]
+    fixed = [_obstacle_part(table.bodies + k, each, skin) for k, each in enumerate(system.obstacles)]
     pieces: list[_Piece] = []
     point_piece, triangles, count = [], [], 0
     for part in (bodies, *fixed):
@@ -155,12 +152,10 @@ def _body_part(system: System) -> tuple[NDArray[np.int32], _Part]:
     return rows, _Part(pieces, system.rest_points[rows], piece.astype(np.int32), triangles[order])
 
 
-def _obstacle_part(owner: int, obstacle: Obstacle, edge_length: float, skin: float) -> _Part:
-    if obstacle.contact_mesh is not None:
-        return _triangle_part(owner, obstacle.contact_mesh, None if obstacle.surface_mesh is not None else skin)
-    points, gap = obstacle.probes(edge_length)
-    pieces = [_Piece(owner, gap=gap + skin)] if len(points) else []
-    return _Part(pieces, points, np.zeros(len(points), dtype=np.int32), np.zeros((0, 3), dtype=np.int32))
+def _obstacle_part(owner: int, obstacle: Obstacle, skin: float) -> _Part:
+    if obstacle.contact_mesh is None:
+        return _Part([], np.zeros((0, 3)), np.zeros(0, dtype=np.int32), np.zeros((0, 3), dtype=np.int32))
+    return _triangle_part(owner, obstacle.contact_mesh, None if obstacle.surface_mesh is not None else skin)
 
 
 def _triangle_part(owner: int, mesh: SurfaceMesh, gap: float | None) -> _Part:

@@ -14,6 +14,7 @@ from supple.materials.elastic_tets.laws import TetLaws
 from supple.output.recording.actions.actuators import read_actuators
 from supple.output.recording.actions.joints import RecordedJoint, read_joints
 from supple.output.recording.actions.loads import read_loads
+from supple.output.recording.actions.stitches import RecordedStitches, read_stitches
 from supple.output.recording.checked_hdf5 import CheckedFile
 from supple.output.recording.details import RecordedDetails
 from supple.output.recording.file import WRITTEN
@@ -22,7 +23,6 @@ from supple.output.recording.physics import RecordedPhysics, RecordedWeld, read_
 from supple.output.recording.recorder import INTERNAL, REPORT_NUMBERS, REPORT_VECTORS, field_series, frame_layout
 from supple.output.recording.scene import RecordedBody, RecordedObstacle, read_bodies, read_header, read_obstacles
 from supple.output.recording.sensors import RecordedSensor, sensors_of_header
-from supple.output.recording.stitches import RecordedStitches, read_stitches
 from supple.readings.fields import FIELDS, Field
 from supple.state import Status
 

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from supple.errors import MeshError, SceneError
 from supple.mesh.skin import Embedding
 from supple.mesh.surface import SurfaceMesh
+from supple.output.recording.actions.stitches import write_stitches
 from supple.output.recording.checked_hdf5 import CheckedFile
 from supple.output.recording.physics import write_physics
 from supple.output.recording.skinned_surface import SkinnedSurface
-from supple.output.recording.stitches import write_stitches
 from supple.scene.body import PlacedBody
 from supple.scene.obstacles.obstacle import Obstacle
 from supple.scene.obstacles.registry import KINDS, restored_obstacle

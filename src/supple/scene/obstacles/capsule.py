@@ -14,7 +14,7 @@ from supple.numerics.kernel_cache import njit
 from supple.scene.obstacles.obstacle import lengths_and_directions
 from supple.scene.obstacles.polyhedra import hull, round_ball
 from supple.scene.obstacles.segment import SegmentObstacle
-from supple.scene.obstacles.shape import Shape, concave_contact, convex_contact
+from supple.scene.obstacles.shape import Shape, concave_contact
 
 
 @njit
@@ -59,5 +59,6 @@ class Capsule(SegmentObstacle):
         return self.placed(points), triangles
 
     def shapes(self) -> tuple[Shape, ...]:
-        contact = (concave_contact if self.inside else convex_contact)(_signed_distance)
-        return (Shape(contact, self.frame, (self.half_length, self.radius)),)
+        if not self.inside:
+            return ()
+        return (Shape(concave_contact(_signed_distance), self.frame, (self.half_length, self.radius)),)

@@ -13,7 +13,7 @@ from supple.numerics.kernel_cache import njit
 from supple.scene.obstacles.obstacle import distances_from_corner
 from supple.scene.obstacles.polyhedra import prism
 from supple.scene.obstacles.segment import SegmentObstacle
-from supple.scene.obstacles.shape import Shape, concave_contact, convex_contact
+from supple.scene.obstacles.shape import Shape, concave_contact
 
 
 @njit
@@ -56,5 +56,6 @@ class Cylinder(SegmentObstacle):
         return self.placed(points * [self.half_length, self.radius, self.radius]), triangles
 
     def shapes(self) -> tuple[Shape, ...]:
-        contact = (concave_contact if self.inside else convex_contact)(_signed_distance)
-        return (Shape(contact, self.frame, (self.half_length, self.radius)),)
+        if not self.inside:
+            return ()
+        return (Shape(concave_contact(_signed_distance), self.frame, (self.half_length, self.radius)),)

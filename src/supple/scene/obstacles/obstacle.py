@@ -104,10 +104,10 @@ class Obstacle(ABC):
 
     @cached_property
     def contact_mesh(self) -> SurfaceMesh | None:
-        """The triangles, at time 0, that XPBD keeps apart from those of bodies; None where they are not the surface."""
-        if self.surface_mesh is None and self.has_exact_triangles:
-            return SurfaceMesh(*self.triangles())
-        return self.surface_mesh
+        """The triangles, at time 0, that XPBD keeps apart from those of bodies; None for rooms and half-spaces."""
+        if self.surface_mesh is not None or self.is_room or self.plane is not None:
+            return self.surface_mesh
+        return SurfaceMesh(*self.triangles())
 
     @property
     def has_exact_triangles(self) -> bool:
@@ -133,19 +133,8 @@ class Obstacle(ABC):
         return self.triangles()
 
     def shapes(self) -> tuple[Shape, ...]:
-        """Shapes for XPBD; none for an obstacle with a `contact_mesh`."""
+        """Shapes for XPBD of what keeps bodies in, or is not bounded; none for an obstacle with a `contact_mesh`."""
         return ()
-
-    def probes(self, edge_length: float) -> tuple[NDArray[np.float64], float]:
-        """Points (k, 3) that XPBD keeps away from triangles of bodies, and by how much [m].
-
-        They support bodies whose vertices are farther apart than the obstacle is wide.
-
-        Parameters
-        ----------
-        edge_length : of the bodies' surfaces, mean [m]
-        """
-        return np.zeros((0, 3)), 0.0
 
     def _oriented(
         self, distances: NDArray[np.float64], normals: NDArray[np.float64]

@@ -54,10 +54,3 @@ class SegmentObstacle(Obstacle):
     def placed(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Points (k, 3), given in `frame`, in the world [m]."""
         return self.frame[0] + points @ self.frame[1:]
-
-    def probes(self, edge_length: float) -> tuple[NDArray[np.float64], float]:
-        """Points of the axis, where the obstacle is thin enough to fit between vertices."""
-        if self.inside or self.radius >= 2.0 * edge_length:
-            return np.zeros((0, 3)), 0.0
-        count = 2 + int(2.0 * self.half_length / min(edge_length, self.radius))
-        return np.linspace(np.asarray(self.start), np.asarray(self.end), min(count, 1000)), self.radius

@@ -14,7 +14,7 @@ from supple.numerics.mat3 import dot
 from supple.scene.obstacles.obstacle import Obstacle, lengths_and_directions
 from supple.scene.obstacles.parameters import parameter
 from supple.scene.obstacles.polyhedra import round_ball
-from supple.scene.obstacles.shape import Shape, concave_contact, convex_contact
+from supple.scene.obstacles.shape import Shape, concave_contact
 
 
 @njit
@@ -51,10 +51,7 @@ class Sphere(Obstacle):
         return np.asarray(self.center) + self.radius * points, triangles
 
     def shapes(self) -> tuple[Shape, ...]:
-        contact = (concave_contact if self.inside else convex_contact)(_signed_distance)
-        return (Shape(contact, np.vstack([np.asarray(self.center), np.eye(3)]), (self.radius,)),)
-
-    def probes(self, edge_length: float) -> tuple[NDArray[np.float64], float]:
-        """The center of a ball that is small enough to fit between vertices."""
-        small = not self.inside and self.radius < 2.0 * edge_length
-        return np.asarray(self.center)[None][: int(small)], self.radius
+        if not self.inside:
+            return ()
+        frame = np.vstack([np.asarray(self.center), np.eye(3)])
+        return (Shape(concave_contact(_signed_distance), frame, (self.radius,)),)

@@ -13,14 +13,11 @@ from supple.numerics.geometry.box_tree import near_boxes, overlap
 from supple.numerics.geometry.triangle_crossings import CROSSING, crossing_triangles
 from supple.numerics.kernel_cache import njit
 from supple.scene.contact_pairs import pair_table
-from supple.scene.obstacles.obstacle import Obstacle
 from supple.system import System
 from supple.xpbd.contact.settings import XPBDContact
 
 # Of the mean surface edge: how deep a vertex may be in an obstacle. Old overlaps are removed slowly.
 TOLERATED_DEPTH = 0.05
-# Barycentric coordinates of points of a triangle, a quarter of its edges apart.
-_SAMPLES = np.array([[i, j, 4 - i - j] for i in range(5) for j in range(5 - i)]) / 4.0
 # More pairs of triangles than this say nothing new.
 MOST_PAIRS = 1000
 
@@ -137,7 +134,7 @@ class SurfaceCheck:
         return chosen
 
     def depths(self, x: NDArray[np.float64], time: float, collide: NDArray[np.bool_] | None = None) -> list[Overlap]:
-        """Bodies with vertices or triangles deep in obstacles without triangles, of the pairs `collide` (p, p)."""
+        """Bodies with vertices deep in obstacles without triangles, of the pairs `collide` (p, p)."""
         collide = self._collide if collide is None else collide
         R, t = self._poses.at(time)
         x = self.system.points.positions(x)
@@ -146,28 +143,9 @@ class SurfaceCheck:
             # Of all points at once: a scene may have many bodies of a few points each.
             obstacle, local = self.system.obstacles[k], (x - t[k]) @ R[k]
             deepest = np.maximum.reduceat(-obstacle.signed_distance(local[self._surface])[0], self._begins)
-            if obstacle.plane is None and not obstacle.is_room:
-                self._deepen(obstacle, local[self.system.triangles], deepest)
             for number in np.flatnonzero((deepest > self.tolerated) & collide[:bodies, bodies + k]):
                 found.append(Overlap(self._names[number], self._names[bodies + k], depth=float(deepest[number])))
         return found
-
-    def _deepen(self, obstacle: Obstacle, corners: NDArray[np.float64], deepest: NDArray[np.float64]) -> None:
-        """Raise `deepest` (b,) to the depths of points of the triangles (t, 3, 3) in a convex solid."""
-        middles = corners.mean(axis=1)
-        reach = np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1)
-        near = np.flatnonzero(obstacle.signed_distance(middles)[0] < reach - self.tolerated)
-        if not len(near):
-            return
-        # The distance is convex: the lowest of some points, and then of points about it.
-        best, distances = np.full((len(near), 3), 1.0 / 3.0), np.zeros((len(near), 1))
-        for width in (1.0, 0.5, 0.25, 0.125, 0.06):
-            shares = np.maximum(best[:, None] + width * (_SAMPLES - 1.0 / 3.0), 0.0)
-            shares /= shares.sum(axis=2, keepdims=True)
-            samples = np.einsum("tsc,tcj->tsj", shares, corners[near])
-            distances = obstacle.signed_distance(samples.reshape(-1, 3))[0].reshape(len(near), -1)
-            best = shares[np.arange(len(near)), distances.argmin(axis=1)]
-        np.maximum.at(deepest, self._owner[near], -distances.min(axis=1))
 
 
 @njit(cache=True)

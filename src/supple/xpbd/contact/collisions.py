@@ -64,7 +64,7 @@ class Collisions:
         thickness = settings.thickness if settings is not None else None
         self.thickness = thickness if thickness is not None else DEFAULT_THICKNESS * self.edge_length
         switches = (False, False) if settings is None else (settings.body_collision, settings.self_collision)
-        surfaces = build_surfaces(system, table, *switches, self.thickness, SKIN * self.thickness, self.edge_length)
+        surfaces = build_surfaces(system, table, *switches, self.thickness, SKIN * self.thickness)
         self.surfaces = (
             SurfaceCollisions(system, surfaces, self.poses, self.edge_length, rates, rigid)
             if surfaces.is_needed

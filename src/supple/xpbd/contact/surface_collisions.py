@@ -88,8 +88,9 @@ class SurfaceCollisions:
         self._listed = np.zeros(0, dtype=np.int64)  # the triangles in any list
         self._near_triangles, self._swept = np.zeros((0, 3), dtype=np.int64), np.zeros((len(s.triangles), 6))
         self._boxes = np.zeros((len(s.triangles), 6))
-        self._edges = EdgePairs(surface_edges(s, rest), s, rest, self._stitched)
-        self._finder = PairFinder(n)
+        edges = surface_edges(s, rest)
+        self._edges = EdgePairs(edges, s, rest, self._stitched)
+        self._finder = PairFinder(~edges.blunt)
         self._x, self._before, self._gathered = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
         # Where the substep began; `_before` also has the shifts that remove old overlaps.
         self._begun, self._way = np.zeros((n, 3)), np.zeros((n, 3))

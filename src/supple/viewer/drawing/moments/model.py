@@ -18,9 +18,9 @@ from supple.mesh.topology import TET_FACETS, facet_keys
 from supple.numerics.deformation import deformation_gradients
 from supple.output.drawing import View, body_color
 from supple.output.recording.actions.joints import RecordedJoint
+from supple.output.recording.actions.stitches import RecordedStitches
 from supple.output.recording.scene import RecordedObstacle
 from supple.output.recording.skinned_surface import SkinnedSurface
-from supple.output.recording.stitches import RecordedStitches
 
 
 @dataclass(frozen=True, eq=False)

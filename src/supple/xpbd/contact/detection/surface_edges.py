@@ -2,7 +2,8 @@
 
 Flat and reentrant ones of soft bodies belong to them: where bodies are dented, such an edge becomes a ridge, on which
 an edge of another body rests while all vertices keep their gap from all faces. On rigid bodies and obstacles, they stay
-what they are: before another edge could pass through one of them it would pass through a ridge.
+what they are: before another edge could pass through one of them it would pass through a ridge. Neither do their points
+need to be kept from triangles at which no ridge ends: where they push, they push aside, as if the face were not flat.
 """
 
 from __future__ import annotations
@@ -26,11 +27,13 @@ class SurfaceEdges:
     ----------
     ends : (e, 2) points; opposite : (e, 2) the third corners of the two triangles, -1 where there is none
     triangles : (e, 2) the triangles themselves, -1 where there is none
+    blunt : (n,) the points of rigid pieces at which no ridge ends
     """
 
     ends: NDArray[np.int32]
     opposite: NDArray[np.int32]
     triangles: NDArray[np.int32]
+    blunt: NDArray[np.bool_]
 
 
 def surface_edges(surfaces: ContactSurfaces, rest: NDArray[np.float64]) -> SurfaceEdges:
@@ -57,11 +60,17 @@ def surface_edges(surfaces: ContactSurfaces, rest: NDArray[np.float64]) -> Surfa
     kept = may_touch[piece] & (counts <= 2)
     rigid = np.ones(len(surfaces.closed), dtype=np.bool_)
     rigid[surfaces.point_piece[: len(surfaces.rows)][surfaces.embedded.single >= 0]] = False
-    kept &= ~rigid[piece] | _are_ridges(rest, triangles, ends, opposite, beside, surfaces.closed[piece])
+    dull = rigid[piece] & (counts <= 2)
+    dull &= ~_are_ridges(rest, triangles, ends, opposite, beside, surfaces.closed[piece])
+    blunt = np.zeros(len(rest), dtype=np.bool_)
+    blunt[ends[dull]] = True
+    blunt[ends[~dull]] = False
+    kept &= ~dull
     return SurfaceEdges(
         ends=ends[kept].astype(np.int32),
         opposite=opposite[kept],
         triangles=beside[kept],
+        blunt=blunt,
     )
 
 
