@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from supple.state import State
 from supple.xpbd.assessment.assessment import Ledger
+from supple.xpbd.assessment.softening import MeasuredWork
 from supple.xpbd.contact.memory import ContactMemory
 from supple.xpbd.damping.kelvin_voigt import ViscousMemory
 from supple.xpbd.sleep import SleepMemory
@@ -42,6 +43,7 @@ class XPBDMemory:
     contact : of contact; None without contact of surfaces
     viscous : of damping; None where nothing is damped
     ledger : of the assessment of frames; None at the start
+    measured : how much of their stiffness bodies lacked; None at the start
     substeps : what the last frame asks of the next one, where repetitions helped; falls back to zero
     sleep : of bodies at rest; None at the start
     futile : the statuses that the last frame had in spite of repetitions
@@ -51,6 +53,7 @@ class XPBDMemory:
     contact: ContactMemory | None = None
     viscous: ViscousMemory | None = None
     ledger: Ledger | None = None
+    measured: MeasuredWork | None = None
     substeps: float = 0.0
     futile: frozenset[str] = frozenset()
     sleep: SleepMemory | None = None

@@ -5,6 +5,7 @@ Source: Macklin, Müller, Chentanez, "XPBD" (2016); Macklin et al., "Small Steps
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -23,9 +24,11 @@ from supple.state import State, Status, StepReport
 from supple.system import System
 from supple.xpbd.assessment.assessment import Assessment
 from supple.xpbd.assessment.findings import Findings
+from supple.xpbd.assessment.softening import enough
 from supple.xpbd.assessment.surfaces import Overlap, crossings
 from supple.xpbd.assessment.works import Works
 from supple.xpbd.constraints.actuators import ActuatorProjection
+from supple.xpbd.constraints.delivered_work import DeliveredWork
 from supple.xpbd.constraints.registry import build_constraint_sets
 from supple.xpbd.constraints.stitch_anchors import StitchAnchors
 from supple.xpbd.constraints.stitches import stitch_constraints
@@ -152,6 +155,7 @@ class XPBD(Solver):
             guard=VolumeGuard(inner),
             fallback=RigidFallback(inner, collisions.skin),
             assessment=assessment,
+            delivered=DeliveredWork(inner, sets),
             works=Works(inner),
             choice=SubstepChoice(inner, assessment.softening, bool(collisions), rigid),
             sleep=Sleep(inner, layout, self.sleep_after, self.accuracy),
@@ -210,7 +214,11 @@ class XPBD(Solver):
             if last or problem is None or problem in memory.futile:
                 break
             repeats += 1
-            used = Substeps(min(2 * used.count, self.max_substeps), f"a repetition: {problem}")
+            most = min(2 * used.count, self.max_substeps)
+            if problem is Status.SOFTENED:
+                shares = ws.assessment.softening.by_body(dt / used.count, new.memory.measured)
+                most = min(most, enough(used.count, shares, self.accuracy))
+            used = Substeps(most, f"a repetition: {problem}")
         if lost >= 0:
             message = lost_position_message(ws.system, ws.layout, lost, time)
             details = self.initial_details(system, ws)
@@ -221,7 +229,8 @@ class XPBD(Solver):
         """How many substeps the frame is simulated with at first."""
         if self.substeps != "auto":
             return Substeps(self.substeps, "the user")
-        wanted = ws.choice.choose(ws.moment(state.time), dt, self.accuracy, memory.substeps)
+        known = ws.assessment.softening.own(memory.measured)
+        wanted = ws.choice.choose(ws.moment(state.time), dt, self.accuracy, memory.substeps, known)
         if wanted.count > self.max_substeps:
             return Substeps(self.max_substeps, f"max_substeps; {wanted.reason} asks for {wanted.count}")
         return wanted
@@ -244,8 +253,12 @@ class XPBD(Solver):
         ws.guard.measure(ws.points, False)
         ws.works.end_frame(ws.velocities, ws.actuators.works())
         held, works = held_back / used.count, ws.works.by_name
+        softening = ws.assessment.softening
+        delivered = ws.delivered.end(ws.points, h)
+        measured = softening.after(softening.own(before.measured), delivered, h, sleep.asleep)
+        shares = softening.by_body(h, measured)
         findings, ledger = ws.assessment.end(
-            ws.moment(time), ws.world, ws.guard.J, h, self.accuracy, held, sleep.asleep, works
+            ws.moment(time), ws.world, ws.guard.J, h, self.accuracy, held, sleep.asleep, works, measured
         )
         findings = replace(findings, apart=ws.joints.apart(ws.world, time, self.accuracy))
         status = findings.status
@@ -254,6 +267,8 @@ class XPBD(Solver):
             problem = Status.INTERSECTING
         elif problem is None and held_back:
             problem = Status.INVERTED
+        elif problem is None and findings.softened:
+            problem = Status.SOFTENED
         forces, old_points = ws.collisions.forces, ws.layout.old_points
         x, v = ws.world[ws.layout.new_from_old], ws.velocities[ws.layout.new_from_old]
         sound = status in (Status.CONVERGED, Status.SOFTENED) and not held_back
@@ -263,6 +278,7 @@ class XPBD(Solver):
             contact=ws.collisions.memory(ws.world),
             viscous=None if damping is None else damping.memory(v),
             ledger=ledger,
+            measured=measured,
             substeps=float(used.count) if repeats and problem is None else FALL * before.substeps,
             sleep=rest,
             futile=frozenset() if problem is None else before.futile | ({problem} if repeats else set()),
@@ -274,7 +290,7 @@ class XPBD(Solver):
             substeps=used.count,
             repeats=repeats,
             substeps_reason=used.reason,
-            softening=ws.assessment.softening.by_body(h),
+            softening=shares,
             energy_gained=findings.gained,
             held_back=held_back,
             asleep={part.name: bool(rests) for part, rests in zip(ws.system.bodies, sleep.asleep, strict=True)},
@@ -287,7 +303,7 @@ class XPBD(Solver):
             energy_residual=ws.works.residual,
         )
         world, surfaces = ws.collisions.obstacles.places(ws.world).copy(), ws.collisions.positions
-        message = findings.message(time, self._remedy(ws, dt, findings, used.count))
+        message = findings.message(time, self._remedy(findings, used.count, shares))
         report = StepReport(
             status,
             used.count,
@@ -297,12 +313,12 @@ class XPBD(Solver):
         )
         return State(time, x, v, memory=memory, hinge_angles=ws.joints.hinge_angles()), report, problem
 
-    def _remedy(self, ws: XPBDWorkspace, dt: float, findings: Findings, used: int) -> str:
+    def _remedy(self, findings: Findings, used: int, shares: Mapping[str, float]) -> str:
         """What helps against what was found."""
-        enough = ws.assessment.softening.substeps(dt, self.accuracy)[0]
+        count = enough(used, shares, self.accuracy)
         if findings.status is not Status.SOFTENED:
-            enough = max(enough, 2 * used)
-        return f"take {'max_substeps' if self.substeps == 'auto' else 'substeps'}={enough}"
+            count = max(count, 2 * used)
+        return f"take {'max_substeps' if self.substeps == 'auto' else 'substeps'}={count}"
 
     def _advance(
         self,
@@ -341,6 +357,8 @@ class XPBD(Solver):
             at = ws.substep(end, h)
             ws.loads.add_forces(at)
             push(ws, damping, h)
+            if k == substeps - 1:
+                ws.delivered.begin(ws.extended)
             for constraints in ws.sets:
                 constraints.project(ws.extended, h, parallel)
             ws.actuators.project_within(at)

@@ -2,7 +2,7 @@
 
 The largest of:
 
-- what keeps every body's stiffness within the accuracy (`assessment.softening`);
+- what keeps every body's stiffness within the accuracy, as measured in the frame before (`assessment.softening`);
 - what lets surfaces approach each other by less than half the mean height of a tet in a substep: contact may not find
   surfaces that pass each other within one substep, and the guard of volumes stops a compression by less than that;
 - what lets rigid bodies turn by less than a tenth of a radian in a substep;
@@ -20,7 +20,7 @@ import numpy as np
 
 from supple.system import System
 from supple.xpbd.assessment.moment import Moment
-from supple.xpbd.assessment.softening import Softening
+from supple.xpbd.assessment.softening import MeasuredWork, Softening
 from supple.xpbd.rigid.bodies import RigidBodies
 
 # Fewer substeps damp slow oscillations too much: a mode of frequency w decays at h w^2 / 2.
@@ -69,15 +69,18 @@ class SubstepChoice:
         self._light = rigid.numbers[~rigid.held & (self._masses[rigid.numbers] * LEAST_RATIO < heaviest)]
         self._begins = [part.points.start for part in system.bodies]
 
-    def choose(self, moment: Moment, dt: float, accuracy: float, earlier: float) -> Substeps:
+    def choose(
+        self, moment: Moment, dt: float, accuracy: float, earlier: float, measured: MeasuredWork | None
+    ) -> Substeps:
         """The number of substeps for a frame that begins at a moment.
 
         Parameters
         ----------
         dt : length of the frame [s]; accuracy : how much of its stiffness a body may lack
         earlier : what the frame before asks for, zero or more
+        measured : by the frames before; None at the start
         """
-        stiff, body = self.softening.substeps(dt, accuracy)
+        stiff, body = self.softening.substeps(dt, accuracy, measured)
         reach = self._closing_speed(moment, dt) * dt if self.touches else 0.0
         found = max(
             Substeps(FEWEST, "the least number"),

@@ -21,6 +21,7 @@ from supple.xpbd.assessment.moment import Moment
 from supple.xpbd.assessment.substep import Substep
 from supple.xpbd.assessment.works import Works
 from supple.xpbd.constraints.actuators import ActuatorProjection
+from supple.xpbd.constraints.delivered_work import DeliveredWork
 from supple.xpbd.constraints.registry import ConstraintSet
 from supple.xpbd.constraints.stable_neo_hookean import StableNeoHookeanConstraints
 from supple.xpbd.constraints.stitch_anchors import StitchAnchors
@@ -69,6 +70,7 @@ class XPBDWorkspace:
     guard: VolumeGuard
     fallback: RigidFallback
     assessment: Assessment
+    delivered: DeliveredWork
     works: Works
     choice: SubstepChoice
     sleep: Sleep

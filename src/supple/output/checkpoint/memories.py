@@ -5,6 +5,7 @@ from __future__ import annotations
 from supple.implicit.stepping.conservation import EnergyMade
 from supple.implicit.stepping.integrators import History
 from supple.xpbd.assessment.assessment import Ledger
+from supple.xpbd.assessment.softening import MeasuredWork
 from supple.xpbd.contact.contact_rows import LoadedRows
 from supple.xpbd.contact.frame_forces import ShapeLoads
 from supple.xpbd.contact.memory import ContactMemory, ObstacleMemory, SurfaceMemory
@@ -19,6 +20,7 @@ MEMORIES: tuple[type, ...] = (
     History,
     Ledger,
     LoadedRows,
+    MeasuredWork,
     ObstacleMemory,
     ShapeLoads,
     SleepMemory,

@@ -12,7 +12,7 @@ from supple.system import System
 from supple.xpbd.assessment.energy_balance import EnergyBalance
 from supple.xpbd.assessment.findings import Findings, count_inverted, tangled_bodies
 from supple.xpbd.assessment.moment import Moment
-from supple.xpbd.assessment.softening import Softening
+from supple.xpbd.assessment.softening import MeasuredWork, Softening
 from supple.xpbd.assessment.surfaces import Overlap, SurfaceCheck
 from supple.xpbd.contact.settings import XPBDContact
 
@@ -80,6 +80,7 @@ class Assessment:
         held: float,
         asleep: NDArray[np.bool_],
         works: Mapping[str, float],
+        measured: MeasuredWork,
     ) -> tuple[Findings, Ledger]:
         """Judge the end of a frame.
 
@@ -89,13 +90,14 @@ class Assessment:
         h : length of the substeps [s]; accuracy : how much stiffness a body may lack
         held : the share of the substeps in which the motion of bodies was shortened
         asleep : (b,) bodies that did not move; works : of the frame, by name [J]
+        measured : of the stresses that substeps of h delivered, with this frame
         """
         before = self._ledger
         tangled = before.tangled & tangled_bodies(self.system, J)
         gain, energy, gainer = self.balance.end(moment, works)
         scale = max(before.scale, energy)
         excess = max(0.0, before.excess + (gain if not 0.0 < gain < LEAST_GAIN * scale else 0.0))
-        lacks = zip(self.softening.shares(h).tolist(), self.softening.names, strict=True)
+        lacks = zip(self.softening.shares(h, measured).tolist(), self.softening.names, strict=True)
         findings = Findings(
             inverted=count_inverted(self.system, J, tangled),
             overlaps=self._surfaces.find(world, moment.time, asleep),

@@ -7,6 +7,43 @@ from supple.xpbd.sweeps.lanes import nine, put_twelve, twelve
 
 
 @njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+def deformation_of(x, b):
+    """F and dJ/dF of a tet, 9 entries each by rows, and J; x and b as of `block_of_two`."""
+    x0, y0, z0, x1, y1, z1, x2, y2, z2, x3, y3, z3 = x
+    b10, b11, b12, b20, b21, b22, b30, b31, b32 = b
+    ux, uy, uz = x1 - x0, y1 - y0, z1 - z0
+    vx, vy, vz = x2 - x0, y2 - y0, z2 - z0
+    qx, qy, qz = x3 - x0, y3 - y0, z3 - z0
+    f00, f01, f02 = ux * b10 + vx * b20 + qx * b30, ux * b11 + vx * b21 + qx * b31, ux * b12 + vx * b22 + qx * b32
+    f10, f11, f12 = uy * b10 + vy * b20 + qy * b30, uy * b11 + vy * b21 + qy * b31, uy * b12 + vy * b22 + qy * b32
+    f20, f21, f22 = uz * b10 + vz * b20 + qz * b30, uz * b11 + vz * b21 + qz * b31, uz * b12 + vz * b22 + qz * b32
+    c00, c10, c20 = f11 * f22 - f21 * f12, f21 * f02 - f01 * f22, f01 * f12 - f11 * f02
+    c01, c11, c21 = f12 * f20 - f22 * f10, f22 * f00 - f02 * f20, f02 * f10 - f12 * f00
+    c02, c12, c22 = f10 * f21 - f20 * f11, f20 * f01 - f00 * f21, f00 * f11 - f10 * f01
+    J = f00 * c00 + f10 * c10 + f20 * c20
+    return (f00, f01, f02, f10, f11, f12, f20, f21, f22), (c00, c01, c02, c10, c11, c12, c20, c21, c22), J
+
+
+@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+def stress_of_step(f, c, J, material, k, step):
+    """The first Piola stress of a step, times V [J]: 9 entries by rows; see `deformation_of` and `block_of_two`."""
+    f00, f01, f02, f10, f11, f12, f20, f21, f22 = f
+    c00, c01, c02, c10, c11, c12, c20, c21, c22 = c
+    mu, lam, rest, _ = material
+    n0, n1, n2 = step * k[0], step * k[1], step * k[2]
+    slope = (
+        n0 * (c00 * c00 + c10 * c10 + c20 * c20)
+        + n1 * (c01 * c01 + c11 * c11 + c21 * c21)
+        + n2 * (c02 * c02 + c12 * c12 + c22 * c22)
+    )
+    pressure = lam * (J - rest - mu * J * (n0 + n1 + n2)) / (1.0 + lam * slope)
+    s00, s01, s02 = mu * f00 + pressure * c00, mu * f01 + pressure * c01, mu * f02 + pressure * c02
+    s10, s11, s12 = mu * f10 + pressure * c10, mu * f11 + pressure * c11, mu * f12 + pressure * c12
+    s20, s21, s22 = mu * f20 + pressure * c20, mu * f21 + pressure * c21, mu * f22 + pressure * c22
+    return s00, s01, s02, s10, s11, s12, s20, s21, s22
+
+
+@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
 def block_of_two(x, w, b, material, k, h2):
     """The corners of a tet after the projection of C_D and C_H.
 
@@ -20,32 +57,9 @@ def block_of_two(x, w, b, material, k, h2):
     x0, y0, z0, x1, y1, z1, x2, y2, z2, x3, y3, z3 = x
     w0, w1, w2, w3 = w
     b10, b11, b12, b20, b21, b22, b30, b31, b32 = b
-    mu, lam, rest, longest = material
-    step = min(h2, longest)
-
-    ux, uy, uz = x1 - x0, y1 - y0, z1 - z0
-    vx, vy, vz = x2 - x0, y2 - y0, z2 - z0
-    qx, qy, qz = x3 - x0, y3 - y0, z3 - z0
-    f00, f01, f02 = ux * b10 + vx * b20 + qx * b30, ux * b11 + vx * b21 + qx * b31, ux * b12 + vx * b22 + qx * b32
-    f10, f11, f12 = uy * b10 + vy * b20 + qy * b30, uy * b11 + vy * b21 + qy * b31, uy * b12 + vy * b22 + qy * b32
-    f20, f21, f22 = uz * b10 + vz * b20 + qz * b30, uz * b11 + vz * b21 + qz * b31, uz * b12 + vz * b22 + qz * b32
-    # dJ/dF by columns
-    c00, c10, c20 = f11 * f22 - f21 * f12, f21 * f02 - f01 * f22, f01 * f12 - f11 * f02
-    c01, c11, c21 = f12 * f20 - f22 * f10, f22 * f00 - f02 * f20, f02 * f10 - f12 * f00
-    c02, c12, c22 = f10 * f21 - f20 * f11, f20 * f01 - f00 * f21, f00 * f11 - f10 * f01
-    J = f00 * c00 + f10 * c10 + f20 * c20
-
-    n0, n1, n2 = step * k[0], step * k[1], step * k[2]
-    slope = (
-        n0 * (c00 * c00 + c10 * c10 + c20 * c20)
-        + n1 * (c01 * c01 + c11 * c11 + c21 * c21)
-        + n2 * (c02 * c02 + c12 * c12 + c22 * c22)
-    )
-    pressure = lam * (J - rest - mu * J * (n0 + n1 + n2)) / (1.0 + lam * slope)
-    # The first Piola stress of the step, times V
-    s00, s01, s02 = mu * f00 + pressure * c00, mu * f01 + pressure * c01, mu * f02 + pressure * c02
-    s10, s11, s12 = mu * f10 + pressure * c10, mu * f11 + pressure * c11, mu * f12 + pressure * c12
-    s20, s21, s22 = mu * f20 + pressure * c20, mu * f21 + pressure * c21, mu * f22 + pressure * c22
+    step = min(h2, material[3])
+    f, c, J = deformation_of(x, b)
+    s00, s01, s02, s10, s11, s12, s20, s21, s22 = stress_of_step(f, c, J, material, k, step)
 
     # dx_i = -w_i step S b_i, with b_0 = -(b_1 + b_2 + b_3)
     d1x, d1y, d1z = (
@@ -80,6 +94,16 @@ def block_of_two(x, w, b, material, k, h2):
     )
 
 
+@njit(error_model="numpy", forceinline=True)
+def constants_of_tet(data, g, i):
+    """The material, the diagonal k and the inverse masses of the tet in lane i of group g, as of `block_of_two`."""
+    return (
+        (data[g, 9, i], data[g, 10, i], data[g, 11, i], data[g, 12, i]),
+        (data[g, 13, i], data[g, 14, i], data[g, 15, i]),
+        (data[g, 16, i], data[g, 17, i], data[g, 18, i], data[g, 19, i]),
+    )
+
+
 @njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
 def project_blocks_of_two(X, data, g, h):
     """`block_of_two` of group g, as `Sweep` needs it.
@@ -89,7 +113,5 @@ def project_blocks_of_two(X, data, g, h):
     for i in range(WIDTH):
         x = twelve(X, i)
         b = nine(data[g], i)
-        material = (data[g, 9, i], data[g, 10, i], data[g, 11, i], data[g, 12, i])
-        k = (data[g, 13, i], data[g, 14, i], data[g, 15, i])
-        w = (data[g, 16, i], data[g, 17, i], data[g, 18, i], data[g, 19, i])
+        material, k, w = constants_of_tet(data, g, i)
         put_twelve(X, i, block_of_two(x, w, b, material, k, h * h))

@@ -45,6 +45,11 @@ class Sweep:
         self._active = np.ones(len(self._counts), dtype=np.bool_)
         self._kernels = _sweep_of(project, constraints.shape[1])
 
+    @property
+    def groups(self) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
+        """Vertices (g, WIDTH, k), used lanes (g,), what is active (g,), constants (g, c, WIDTH), starts of chunks."""
+        return self._corners, self._counts, self._active, self._data, self._pointers
+
     def choose(self, inverse_masses: NDArray[np.float64]) -> None:
         """Project only the groups with a vertex that can move, of inverse masses (n,) [1/kg]."""
         self._active[:] = (inverse_masses[self._corners] > 0.0).any(axis=(1, 2))
