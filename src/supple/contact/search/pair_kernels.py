@@ -21,30 +21,18 @@ from supple.numerics.kernel_cache import njit, prange
 RUNS = 64
 
 
-@njit(error_model="numpy")
-def _sweep_box(i, begin, way, simplices, out):
-    for j in range(3):
-        low, high = np.inf, -np.inf
-        for k in range(simplices.shape[1]):
-            a = begin[simplices[i, k], j]
-            b = a + way[simplices[i, k], j]
-            low, high = min(low, a, b), max(high, a, b)
-        out[i, j] = low
-        out[i, 3 + j] = high
-
-
 @njit(cache=True, parallel=True, error_model="numpy")
 def swept_boxes(begin, way, simplices, out):
     """Write the lowest and highest corner of what each simplex (m, k) of points (s, 3) sweeps to out (m, 6)."""
     for i in prange(len(simplices)):
-        _sweep_box(i, begin, way, simplices, out)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def swept_boxes_of(which, begin, way, simplices, out):
-    """`swept_boxes` of some simplices: rows `which` (w,) of out (m, 6) are set."""
-    for w in prange(len(which)):
-        _sweep_box(which[w], begin, way, simplices, out)
+        for j in range(3):
+            low, high = np.inf, -np.inf
+            for k in range(simplices.shape[1]):
+                a = begin[simplices[i, k], j]
+                b = a + way[simplices[i, k], j]
+                low, high = min(low, a, b), max(high, a, b)
+            out[i, j] = low
+            out[i, 3 + j] = high
 
 
 @njit(cache=True, error_model="numpy")
