@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from supple.contact.search.pair_kernels import RUNS, sort_pairs
 from supple.contact.search.room import Room
 from supple.contact.search.surfaces import ContactSurfaces
-from supple.contact.surface.distances import edge_edge_square
+from supple.contact.surface.distances import edge_edge_square, edge_is_beyond
 from supple.numerics.adjacency import in_list
 from supple.numerics.geometry.box_tree import STACK, BoxTree, after_leaf, near_boxes, next_leaf, overlap
 from supple.numerics.kernel_cache import njit, prange
@@ -145,12 +145,13 @@ def pairs_within_margins(
         count = 0
         for q in range(r, len(order), RUNS):
             e = near[order[q]]
+            box = boxes[e]
             for same in (False, True):
                 if same and not folded[e]:
                     continue
-                top = after_leaf(nodes, q, boxes[e], stack)
+                top = after_leaf(nodes, q, box, stack)
                 while top > 0:
-                    leaf, top = next_leaf(nodes, labels, boxes[e], pieces[e], same, stack, top)
+                    leaf, top = next_leaf(nodes, labels, box, pieces[e], same, stack, top)
                     if leaf < 0:
                         continue
                     f = near[order[leaf]]
@@ -159,6 +160,7 @@ def pairs_within_margins(
                         not together[pieces[e], pieces[f]]
                         or (same and not folded[f])
                         or _share_an_end(ends, e, f)
+                        or edge_is_beyond(x, ends, e, f, reach)
                         or edge_edge_square(x, ends, e, f) > reach * reach
                         or _is_stitched(ends, f, triangles, e, (starts, points))
                         or _is_stitched(ends, e, triangles, f, (starts, points))
