@@ -16,9 +16,9 @@ from supple.numerics.kernel_cache import njit
 from supple.readings.energy_balance import add_works, no_works
 from supple.scene.stitches.measures import stitch_energy
 from supple.system import System
+from supple.xpbd.assessment.contact_works import contact_works
 from supple.xpbd.assessment.elastic_energy import ElasticEnergy
 from supple.xpbd.assessment.substep import Substep
-from supple.xpbd.contact.contact_works import contact_works
 from supple.xpbd.contact.frame_forces import FrameForces
 
 Floats = NDArray[np.float64]
