@@ -15,36 +15,24 @@ import numpy as np
 
 from supple.contact.surface.distances import edge_edge_square, point_triangle_square
 from supple.numerics.adjacency import in_list
-from supple.numerics.geometry.box_tree import STACK, after_leaf, from_root, next_leaf
+from supple.numerics.geometry.box_tree import STACK, after_leaf, from_root, next_leaf, overlap
 from supple.numerics.kernel_cache import njit, prange
 
 RUNS = 64
-
-
-@njit(error_model="numpy")
-def _sweep_box(i, begin, way, simplices, out):
-    for j in range(3):
-        low, high = np.inf, -np.inf
-        for k in range(simplices.shape[1]):
-            a = begin[simplices[i, k], j]
-            b = a + way[simplices[i, k], j]
-            low, high = min(low, a, b), max(high, a, b)
-        out[i, j] = low
-        out[i, 3 + j] = high
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def swept_boxes(begin, way, simplices, out):
     """Write the lowest and highest corner of what each simplex (m, k) of points (s, 3) sweeps to out (m, 6)."""
     for i in prange(len(simplices)):
-        _sweep_box(i, begin, way, simplices, out)
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def swept_boxes_of(which, begin, way, simplices, out):
-    """`swept_boxes` of some simplices: rows `which` (w,) of out (m, 6) are set."""
-    for w in prange(len(which)):
-        _sweep_box(which[w], begin, way, simplices, out)
+        for j in range(3):
+            low, high = np.inf, -np.inf
+            for k in range(simplices.shape[1]):
+                a = begin[simplices[i, k], j]
+                b = a + way[simplices[i, k], j]
+                low, high = min(low, a, b), max(high, a, b)
+            out[i, j] = low
+            out[i, 3 + j] = high
 
 
 @njit(cache=True, error_model="numpy")
@@ -62,22 +50,10 @@ def boxes_of_owners(begin, way, owner, out):
 
 
 @njit(error_model="numpy")
-def _boxes_overlap(a, b, i):
-    return (
-        a[0] <= b[i, 3]
-        and a[3] >= b[i, 0]
-        and a[1] <= b[i, 4]
-        and a[4] >= b[i, 1]
-        and a[2] <= b[i, 5]
-        and a[5] >= b[i, 2]
-    )
-
-
-@njit(error_model="numpy")
 def meets_partner(box, owner, partners, owner_boxes):
     """Whether a box overlaps that of an owner that may touch its own."""
-    for k in range(partners[0][owner], partners[0][owner + 1]):
-        if _boxes_overlap(box, owner_boxes, partners[1][k]):
+    for k in range(partners[0][owner], partners[0][owner + 1]):  # noqa: SIM110
+        if overlap(owner_boxes, partners[1][k], box):
             return True
     return False
 
@@ -95,7 +71,7 @@ def partner_lists(boxes, others, allowed, start, items):
     for a in range(len(boxes)):
         start[a] = count
         for b in range(len(boxes)):
-            if allowed[a, b] and _boxes_overlap(boxes[a], others, b):
+            if allowed[a, b] and overlap(others, b, boxes[a]):
                 items[count] = b
                 count += 1
     start[len(boxes)] = count

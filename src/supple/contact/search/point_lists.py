@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from supple.contact.search.boxes import boxes_of_pieces
 from supple.contact.search.pair_kernels import RUNS, boxes_of_owners, meets_partner, sort_pairs
 from supple.contact.search.room import Room
-from supple.contact.surface.distances import point_triangle_square
+from supple.contact.surface.distances import point_triangle_square, triangle_is_beyond
 from supple.numerics.adjacency import in_list
 from supple.numerics.geometry.box_tree import (
     STACK,
@@ -22,7 +22,6 @@ from supple.numerics.geometry.box_tree import (
     morton_codes,
     near_boxes,
     next_leaf,
-    overlap,
 )
 from supple.numerics.kernel_cache import njit, prange
 
@@ -42,6 +41,22 @@ def _boxes_of_triangles(points, triangles, radii, out):
 
 
 @njit(error_model="numpy")
+def _which_overlap(nodes, k, boxes):
+    """The boxes (6, GROUP) that node k overlaps, as bits of a number. Without branches, this is vector code."""
+    found = 0
+    for i in range(GROUP):
+        found |= (
+            (boxes[0, i] <= nodes[k, 3])
+            & (boxes[3, i] >= nodes[k, 0])
+            & (boxes[1, i] <= nodes[k, 4])
+            & (boxes[4, i] >= nodes[k, 1])
+            & (boxes[2, i] <= nodes[k, 5])
+            & (boxes[5, i] >= nodes[k, 2])
+        ) << i
+    return found
+
+
+@njit(error_model="numpy")
 def _near_group(group, shapes, radii, rules, same, tree, pieces, found, count, scratch):
     """Append the triangles near the points of a group, of their own piece or of others; returns the number of all.
 
@@ -52,7 +67,7 @@ def _near_group(group, shapes, radii, rules, same, tree, pieces, found, count, s
     group : the points, of one piece; for the other arguments see `_list_pairs`
     pieces : for each piece those that the search looks for, and their boxes
     found : (first, last, out): rows of `out` that may be written; where they are full, pairs are only counted
-    scratch : (STACK,), (6,) and (GROUP, 6)
+    scratch : (STACK,), (6,) and (6, GROUP)
     """
     points, point_piece, triangles, triangle_piece = shapes
     allowed, excluded = rules
@@ -61,11 +76,12 @@ def _near_group(group, shapes, radii, rules, same, tree, pieces, found, count, s
     stack, box, boxes = scratch
     mine = point_piece[group[0]]
     box[:3], box[3:] = np.inf, -np.inf
+    boxes[:3], boxes[3:] = np.inf, -np.inf
     for i in range(len(group)):
         p = group[i]
         for j in range(3):
-            boxes[i, j], boxes[i, 3 + j] = points[p, j] - radii[p, 0], points[p, j] + radii[p, 0]
-            box[j], box[3 + j] = min(box[j], boxes[i, j]), max(box[3 + j], boxes[i, 3 + j])
+            boxes[j, i], boxes[3 + j, i] = points[p, j] - radii[p, 0], points[p, j] + radii[p, 0]
+            box[j], box[3 + j] = min(box[j], boxes[j, i]), max(box[3 + j], boxes[3 + j, i])
     if not meets_partner(box, mine, pieces[0], pieces[1]):
         return count
     leaves = len(nodes) // 2
@@ -79,12 +95,13 @@ def _near_group(group, shapes, radii, rules, same, tree, pieces, found, count, s
         if not allowed[mine, triangle_piece[t]]:
             continue
         moves = max(radii[a, 1], radii[b, 1], radii[c, 1])
+        meets = _which_overlap(nodes, leaves + leaf, boxes)
         for i in range(len(group)):
             p = group[i]
-            if not overlap(nodes, leaves + leaf, boxes[i]) or p in (a, b, c) or in_list(excluded, t, p):
+            if not (meets >> i) & 1 or p in (a, b, c) or in_list(excluded, t, p):
                 continue
             r = radii[p, 0] + moves
-            if point_triangle_square(points, p, triangles, t) > r * r:
+            if triangle_is_beyond(points, p, triangles, t, r) or point_triangle_square(points, p, triangles, t) > r * r:
                 continue
             if first + count < last:
                 out[first + count, 0] = p
@@ -116,7 +133,7 @@ def _list_pairs(shapes, groups, radii, rules, partners, boxes, far_tree, near_tr
         its_shapes = (points, point_piece, triangles, triangle_piece)
         its_rules = (allowed, (excluded_starts, excluded_points))
         found = (room[r], room[r + 1], out)
-        scratch = np.empty(STACK, dtype=np.int64), np.empty(6), np.empty((GROUP, 6))
+        scratch = np.empty(STACK, dtype=np.int64), np.empty(6), np.empty((6, GROUP))
         count = 0
         for g in range(r, len(starts) - 1, RUNS):
             group = order[starts[g] : starts[g + 1]]

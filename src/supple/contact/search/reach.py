@@ -139,9 +139,12 @@ def any_beyond_radii(x, x_prev, x_gathered, far, near, pieces, all_share, common
 
 
 @njit(cache=True)
-def left_ways(begin, end, points, distance):
-    """Whether some of the points (n, 3) is farther than a distance from its way, straight from begin to end (n, 3)."""
-    for i in range(len(points)):
+def left_ways(which, begin, end, points, distance):
+    """Whether one of some points (k,), now at points (n, 3), is farther than a distance from its way.
+
+    The ways are straight, from begin to end (n, 3).
+    """
+    for i in which:
         along = length = 0.0
         for j in range(3):
             way = end[i, j] - begin[i, j]

@@ -104,13 +104,14 @@ def _boxes_of_labels(boxes, labels, out):
 @njit(error_model="numpy")
 def overlap(nodes, i, box):
     """Whether node i overlaps a box of six numbers; touching counts."""
+    # Without branches: which of the comparisons fails first cannot be predicted.
     return (
-        nodes[i, 0] <= box[3]
-        and nodes[i, 3] >= box[0]
-        and nodes[i, 1] <= box[4]
-        and nodes[i, 4] >= box[1]
-        and nodes[i, 2] <= box[5]
-        and nodes[i, 5] >= box[2]
+        (nodes[i, 0] <= box[3])
+        & (nodes[i, 3] >= box[0])
+        & (nodes[i, 1] <= box[4])
+        & (nodes[i, 4] >= box[1])
+        & (nodes[i, 2] <= box[5])
+        & (nodes[i, 5] >= box[2])
     )
 
 

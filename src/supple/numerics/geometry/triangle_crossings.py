@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.numerics.adjacency import in_list
-from supple.numerics.geometry.box_tree import STACK, BoxTree, after_leaf, next_leaf
+from supple.numerics.geometry.box_tree import STACK, BoxTree, after_leaf, next_leaf, overlap
 from supple.numerics.geometry.exact_predicates import side_of_line, side_of_plane
+from supple.numerics.geometry.vertex_stars import simple_stars
 from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import cross, dot, row, subtract
 
@@ -17,6 +18,8 @@ APART, TOUCHING, CROSSING = 0, 1, 2
 
 # Triangles are divided into this many runs, whatever the number of threads.
 _RUNS = 64
+# Leaves of a block: their walk through the tree is one. A power of two.
+_BLOCK = 16
 
 
 @njit
@@ -182,26 +185,68 @@ def triangles_meet(x, first, second, sides):
 
 
 @njit(error_model="numpy")
-def _crossings_of_run(r, x, triangles, owner, collide, ignored, tree, most, pairs, kinds):
-    """Write the pairs of every `_RUNS`-th leaf with later leaves, as far as they fit; returns their number."""
-    nodes, labels, order = tree
+def _is_separate(triangles, i, j, simple):
+    """Whether triangles i and j share an edge, or a vertex that `simple_stars` says is simple."""
+    a, b, c = triangles[j, 0], triangles[j, 1], triangles[j, 2]
+    shared, at = 0, 0
+    for k in range(3):
+        v = triangles[i, k]
+        if v in (a, b, c):
+            shared, at = shared + 1, v
+    # Where they share an edge, every edge of one has a vertex of the other.
+    return shared > 1 or (shared == 1 and simple[at])
+
+
+@njit(error_model="numpy")
+def _crossings_of_run(r, x, triangles, owner, collide, ignored, tree, simple, most, pairs, kinds):
+    """Write the pairs of every `_RUNS`-th block, in it and with later ones, as far as they fit; returns how many."""
+    nodes, labels, _ = tree
     leaves = len(nodes) // 2
+    blocks = max(1, leaves // _BLOCK)
+    # The tree of which the blocks are the leaves.
+    upper = nodes[: 2 * blocks]
     stack = np.empty(STACK, dtype=np.int64)
     sides = np.zeros((2, 3), dtype=np.int64)
     count = 0
-    for q in range(r, len(order), _RUNS):
-        i = order[q]
+    for one in range(r, blocks, _RUNS):
+        label = labels[blocks + one]
+        if label >= 0 and collide[label, label]:
+            label = -1
+        box = upper[blocks + one]
+        top = after_leaf(upper, one, box, stack)
+        other = one
+        while other >= 0:
+            count = _crossings_of_blocks(
+                one, other, x, triangles, owner, collide, ignored, tree, simple, most, sides, count, pairs, kinds
+            )
+            if count == most:
+                return count
+            other, top = next_leaf(upper, labels, box, label, False, stack, top)
+    return count
+
+
+@njit(error_model="numpy")
+def _crossings_of_blocks(
+    one, other, x, triangles, owner, collide, ignored, tree, simple, most, sides, count, pairs, kinds
+):
+    """Write the pairs of triangles of two blocks, or of one, after `count` pairs; returns the number of all."""
+    nodes, _, order = tree
+    leaves = len(nodes) // 2
+    size = min(_BLOCK, leaves)
+    whole = leaves // size + other
+    for q in range(one * size, min((one + 1) * size, len(order))):
         box = nodes[leaves + q]
-        mine = collide[owner[i]]
-        label = -1 if mine[owner[i]] else owner[i]
-        top = after_leaf(nodes, q, box, stack)
-        while top > 0:
-            leaf, top = next_leaf(nodes, labels, box, label, False, stack, top)
-            if leaf < 0:
+        if not overlap(nodes, whole, box):
+            continue
+        i = order[q]
+        for leaf in range(max(q + 1, other * size), min((other + 1) * size, len(order))):
+            if not overlap(nodes, leaves + leaf, box):
                 continue
             j = order[leaf]
             low, high = min(i, j), max(i, j)
-            if not mine[owner[j]] or in_list(ignored, low, high):
+            if not collide[owner[i], owner[j]] or _is_separate(triangles, i, j, simple):
+                continue
+            if in_list(ignored, low, high):
                 continue
             kind = triangles_meet(x, triangles[i], triangles[j], sides)
             if kind == APART:
@@ -216,7 +261,7 @@ def _crossings_of_run(r, x, triangles, owner, collide, ignored, tree, most, pair
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def _crossings(x, triangles, owner, collide, ignored, tree, most, room, pairs, kinds, counts):
+def _crossings(x, triangles, owner, collide, ignored, tree, simple, most, room, pairs, kinds, counts):
     """The pairs of all runs, of which rows room[r] .. room[r + 1] are for run r; see `crossing_triangles`."""
     start, items = ignored
     nodes, labels, order = tree
@@ -224,7 +269,7 @@ def _crossings(x, triangles, owner, collide, ignored, tree, most, room, pairs, k
         first, last = room[r], room[r + 1]
         its = pairs[first:last], kinds[first:last]
         counts[r] = _crossings_of_run(
-            r, x, triangles, owner, collide, (start, items), (nodes, labels, order), most, its[0], its[1]
+            r, x, triangles, owner, collide, (start, items), (nodes, labels, order), simple, most, its[0], its[1]
         )
 
 
@@ -257,11 +302,12 @@ def crossing_triangles(
     arrays = tree.nodes, tree.labels, tree.order
     none = np.zeros(len(triangles) + 1, dtype=np.int32)
     lists = (none, none[:0]) if ignored is None else (ignored[0], ignored[1])
+    simple = simple_stars(x, triangles)
     counts = np.full(_RUNS, 64, dtype=np.int64)
     while True:
         room = np.concatenate([[0], np.cumsum(counts)])
         pairs, kinds = np.zeros((room[-1], 2), dtype=np.int64), np.zeros(room[-1], dtype=np.int8)
-        _crossings(x, triangles, owner, collide, lists, arrays, most, room, pairs, kinds, counts)
+        _crossings(x, triangles, owner, collide, lists, arrays, simple, most, room, pairs, kinds, counts)
         if (counts <= np.diff(room)).all():
             break
     found = np.concatenate([np.arange(first, first + count) for first, count in zip(room, counts, strict=False)])

@@ -16,6 +16,7 @@ from supple.numerics.kernel_cache import njit
 from supple.readings.energy_balance import add_works, no_works
 from supple.scene.stitches.measures import stitch_energy
 from supple.system import System
+from supple.xpbd.assessment.contact_works import contact_works
 from supple.xpbd.assessment.elastic_energy import ElasticEnergy
 from supple.xpbd.assessment.substep import Substep
 from supple.xpbd.contact.frame_forces import FrameForces
@@ -81,18 +82,18 @@ class Works:
         contact : whose last entries are those of this substep; extended : (n + a, 4) with the anchors
         of_actuators : gives their forces (n, 3) [N]
         """
-        self._on_pins[:] = 0.0
+        if self.at_pins is not None:
+            self._on_pins[:] = 0.0
         for name, rows, acting in forces:
             numbers = self._all if isinstance(rows, slice) else rows.astype(np.int64, copy=False)
             add_works(self.by_name, {name: _work(acting, numbers, at.points, at.begun)})
             if self.at_pins is not None:
                 self._on_pins[rows] += acting
         if any(part is not None for part in contact.latest):
-            normal, tangential = contact.on_vertices(self.system.points, len(at.points))
-            places = self._all, at.points, at.begun
-            works = {"contact": _work(normal, *places), "friction": _work(tangential, *places)}
+            works = contact_works(contact, self.system.points, at.points, at.begun)
             add_works(self.by_name, works)
-            self._on_pins += normal + tangential
+            if self.at_pins is not None:
+                self._on_pins += sum(contact.on_vertices(self.system.points, len(at.points)))
             self.residual -= sum(works.values())
         self.residual += _work_of_impulses(at.points, self.system.masses, self.impulses, at.begun, at.h)
         if self.at_pins is not None:

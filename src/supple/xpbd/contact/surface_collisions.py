@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from supple.contact.obstacle_poses import ObstaclePoses
 from supple.contact.search.boxes import boxes_of_pieces
 from supple.contact.search.excluded_pairs import excluded_pairs
-from supple.contact.search.pair_kernels import swept_boxes_of
 from supple.contact.search.point_inside import depths_inside
 from supple.contact.search.point_lists import PairFinder
-from supple.contact.search.reach import any_beyond_radii, common_motions, left_ways, search_radii
+from supple.contact.search.reach import any_beyond_radii, common_motions, search_radii
 from supple.contact.search.stitch_masks import stitched_points
 from supple.contact.search.surfaces import ContactSurfaces
 from supple.system import System
@@ -30,9 +29,10 @@ from supple.xpbd.contact.detection.edge_contacts import (
     find_edge_passages,
     note_edge_passages,
 )
-from supple.xpbd.contact.detection.edge_pairs import EdgePairs, marked
+from supple.xpbd.contact.detection.edge_pairs import EdgePairs
+from supple.xpbd.contact.detection.near_pairs import NearPairs
 from supple.xpbd.contact.detection.piece_runs import PieceRuns
-from supple.xpbd.contact.detection.point_passages import find_point_passages, near_triangles, note_point_passages
+from supple.xpbd.contact.detection.point_passages import find_point_passages, note_point_passages
 from supple.xpbd.contact.detection.surface_contacts import find_contacts
 from supple.xpbd.contact.detection.surface_edges import surface_edges
 from supple.xpbd.contact.memory import SurfaceMemory
@@ -46,7 +46,7 @@ LEAST_REACH, MOST_REACH, NEAR = 0.05, 0.3, 1.0
 # The largest motion of points of rigid bodies, whose lists are short: one body that is too fast makes all lists new.
 RIGID_REACH = 0.6
 # Of the mean surface edge: how far contacts may move a point in a substep, where edges are looked for.
-SLACK = 0.1
+SLACK = 0.05
 # Sweeps over all contacts of a substep; see docs/xpbd_contact.md for what more of them would change. The second number:
 # where they are solved again because something has still passed through something.
 SWEEPS, MORE_SWEEPS = 2, 4
@@ -84,18 +84,13 @@ class SurfaceCollisions:
         self._apart = np.ones((pieces, pieces), dtype=np.bool_)
         self._edge_rules = (s.point_piece, s.closed, s.gaps, s.friction, self._apart)
         self._slack = widest + SLACK * edge_length
-        self._near_pairs = np.zeros(0, dtype=np.int64)
-        self._listed = np.zeros(0, dtype=np.int64)  # the triangles in any list
-        self._near_triangles, self._swept = np.zeros((0, 3), dtype=np.int64), np.zeros((len(s.triangles), 6))
-        self._boxes = np.zeros((len(s.triangles), 6))
         edges = surface_edges(s, rest)
         self._edges = EdgePairs(edges, s, rest, self._stitched)
+        self._near_pairs = NearPairs(n, s.triangles, self._edges.arrays[0])
         self._finder = PairFinder(~edges.blunt)
         self._x, self._before, self._gathered = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
         # Where the substep began; `_before` also has the shifts that remove old overlaps.
-        self._begun, self._way = np.zeros((n, 3)), np.zeros((n, 3))
-        # The ways of the points in the substep, when it was seen which pairs come near on them.
-        self._looked = np.full((n, 3), np.inf), np.full((n, 3), np.inf)
+        self._begun = np.zeros((n, 3))
         self._shapes = (self._x, s.point_piece, s.triangles, s.triangle_piece)
         self._pieces = (s.point_piece, s.triangles, s.triangle_piece, s.closed, s.gaps, s.friction)
         self._predicted = np.zeros((n, 3))
@@ -236,12 +231,11 @@ class SurfaceCollisions:
     def passed(self, x: NDArray[np.float64]) -> NDArray[np.int64]:
         """(k, 2) the pieces of which one has passed through the other in the substep that ends at x (n, 3) [m]."""
         self._moved.take(x, self._x)
-        if left_ways(*self._looked, self._x, 0.5 * self._slack):
-            self._look_near()
-        shapes = (self._x, self._begun)
+        self._look_again()
+        shapes, near = (self._x, self._begun), self._near_pairs
         passed = np.zeros_like(self._apart)
-        note_point_passages(*shapes, self._near_triangles, self._pieces, self._apart, self._stitched, passed)
-        note_edge_passages(*shapes, self._pairs, self._near_pairs, self._edges.arrays[0], self._edge_rules, passed)
+        note_point_passages(*shapes, near.points, self._pieces, self._apart, self._stitched, passed)
+        note_edge_passages(*shapes, self._pairs, near.edges, self._edges.arrays[0], self._edge_rules, passed)
         return np.argwhere(passed)
 
     def component(self, labels: NDArray[np.integer]) -> NDArray[np.int64]:
@@ -266,11 +260,13 @@ class SurfaceCollisions:
 
     def _look_near(self) -> None:
         """Set which listed pairs come as near in this substep that contacts may still make them meet."""
-        self._looked[0][:], self._looked[1][:] = self._begun, self._x
-        np.subtract(self._x, self._begun, out=self._way)
-        swept_boxes_of(self._listed, self._begun, self._way, self.surfaces.triangles, self._swept)
-        self._near_triangles = near_triangles(self._x, self._begun, self._lists, self._swept, self._slack)
-        self._near_pairs = self._edges.swept(self._begun, self._way, self._slack)
+        margin, memory = max(self._slack, self._least_gap), (self._depth, self._entered)
+        self._near_pairs.look(self._begun, self._x, margin, self._rows.forces, memory)
+
+    def _look_again(self) -> None:
+        """`_look_near`, where contacts have moved a point that far that this could change anything."""
+        if self._near_pairs.left(self._x, 0.5 * self._slack):
+            self._look_near()
 
     def _take(self, x: NDArray[np.float64], x_prev: NDArray[np.float64]) -> None:
         self._moved.take(x, self._x)
@@ -295,9 +291,11 @@ class SurfaceCollisions:
     def _find_passages(self, kind: int, part: tuple[int, int], h: float) -> bool:
         """Let points and edges that have passed through something take part. Returns whether there are any."""
         s, described = self.surfaces, self._rows.described
-        points = (self._x, self._begun, self._near_triangles, self._pieces, self._apart, part, self._stitched)
+        self._look_again()
+        near = self._near_pairs
+        points = (self._x, self._begun, near.points, self._pieces, self._apart, part, self._stitched)
         passed = find_point_passages(*points, described, self._entered)
-        found = (self._x, self._begun, self._pairs, self._near_pairs, self._edges.arrays[0], self._edge_rules)
+        found = (self._x, self._begun, self._pairs, near.edges, self._edges.arrays[0], self._edge_rules)
         passed += find_edge_passages(*found, len(s.rows), kind, described)
         if passed:
             self._chosen[kind] = choose_rows(self._x, self._before, self._movers, described, len(s.rows), kind, h)
@@ -310,17 +308,17 @@ class SurfaceCollisions:
         described = rows.described
         smallest = np.inf
         deactivate(rows.active)
-        n_active = self._lists[0]
+        lists = self._near_pairs.lists
+        n_active = lists[0]
         if n_active:
             shapes = (self._pieces, (self._depth[kind], self._entered, self._complete))
-            swept_boxes_of(self._listed, self._before, self._x - self._before, s.triangles, self._boxes)
             several = parallel and n_active >= PARALLEL_FROM
-            places, which = (self._x, self._before, self._lists, self._boxes), (near, part, self._stitched)
+            places, which = (self._x, self._before, lists), (near, part, self._stitched)
             find_contacts[several](*places, *shapes, *which, described, self._smallest)
             smallest = self._smallest[:n_active].min()
         if len(self._edges.keys):
             which = (near, bodies, kind)
-            found = (self._x, self._before, self._pairs, self._near_pairs, self._edges.arrays, self._edge_rules)
+            found = (self._x, self._before, self._pairs, self._near_pairs.edges, self._edges.arrays, self._edge_rules)
             smallest = min(smallest, find_edge_contacts(*found, *which, described))
         self._chosen[kind] = choose_rows(self._x, self._before, self._movers, described, bodies, kind, h)
         return float(smallest)
@@ -374,17 +372,16 @@ class SurfaceCollisions:
         self._complete[:] = self._gap + LEAST_REACH * self.edge_length + self._depth.max(axis=0)
         self._far[:, 0] += self._complete
         self._near[:, 0] += self._complete
-        self._looked[0][:] = np.inf
         self._finder.gather(self._shapes, (self._far, self._near), self._rules)
         self._gathered[:] = self._x
-        self._listed = marked(len(s.triangles), self._finder.triangles)
         self._runs.renew()
         near = (self._finder.starts, self._finder.triangles)
         self._edges.renew(self._x, (self._far[:, 1], self._near[:, 1]), self._gap, near, parallel)
         # Keys of points come before keys of edges.
         self._rows.renew(np.concatenate([self._runs.keys, self._edges.keys]))
-        self._lists = self._runs.lists(np.searchsorted(self._rows.keys, self._runs.keys))
         self._pairs = self._edges.numbered(np.searchsorted(self._rows.keys, self._edges.keys))
+        lists = self._runs.lists(np.searchsorted(self._rows.keys, self._runs.keys))
+        self._near_pairs.renew(lists, self._pairs)
 
     def _find_overlaps(self) -> None:
         """Set how deep each point is inside other pieces, from positions alone."""

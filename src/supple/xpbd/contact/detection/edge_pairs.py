@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.contact.search.pair_kernels import RUNS, sort_pairs, swept_boxes_of
+from supple.contact.search.pair_kernels import RUNS, sort_pairs
 from supple.contact.search.room import Room
 from supple.contact.search.surfaces import ContactSurfaces
-from supple.contact.surface.distances import edge_edge_square
+from supple.contact.surface.distances import edge_edge_square, edge_is_beyond
 from supple.numerics.adjacency import in_list
 from supple.numerics.geometry.box_tree import STACK, BoxTree, after_leaf, near_boxes, next_leaf, overlap
 from supple.numerics.kernel_cache import njit, prange
@@ -145,12 +145,13 @@ def pairs_within_margins(
         count = 0
         for q in range(r, len(order), RUNS):
             e = near[order[q]]
+            box = boxes[e]
             for same in (False, True):
                 if same and not folded[e]:
                     continue
-                top = after_leaf(nodes, q, boxes[e], stack)
+                top = after_leaf(nodes, q, box, stack)
                 while top > 0:
-                    leaf, top = next_leaf(nodes, labels, boxes[e], pieces[e], same, stack, top)
+                    leaf, top = next_leaf(nodes, labels, box, pieces[e], same, stack, top)
                     if leaf < 0:
                         continue
                     f = near[order[leaf]]
@@ -159,6 +160,7 @@ def pairs_within_margins(
                         not together[pieces[e], pieces[f]]
                         or (same and not folded[f])
                         or _share_an_end(ends, e, f)
+                        or edge_is_beyond(x, ends, e, f, reach)
                         or edge_edge_square(x, ends, e, f) > reach * reach
                         or _is_stitched(ends, f, triangles, e, (starts, points))
                         or _is_stitched(ends, e, triangles, f, (starts, points))
@@ -169,27 +171,6 @@ def pairs_within_margins(
                         out[room[r] + count, 1] = max(e, f)
                     count += 1
         counts[r] = count
-
-
-@njit(cache=True)
-def overlapping(first, second, boxes, margin):
-    """The numbers of the pairs (k,) whose boxes (e, 6) overlap, or are as near as the margin [m]; ascending."""
-    out = np.empty(len(first), dtype=np.int64)
-    box = np.empty(6)
-    count = 0
-    for i in range(len(first)):
-        for j in range(3):
-            box[j], box[3 + j] = boxes[first[i], j] - margin, boxes[first[i], 3 + j] + margin
-        out[count] = i
-        count += overlap(boxes, second[i], box)
-    return out[:count].copy()
-
-
-def marked(count: int, numbers: NDArray[np.integer]) -> NDArray[np.int64]:
-    """Those of the numbers below `count` that occur among `numbers`, ascending."""
-    found = np.zeros(count, dtype=np.bool_)
-    found[numbers] = True
-    return np.flatnonzero(found)
 
 
 class EdgePairs:
@@ -223,9 +204,7 @@ class EdgePairs:
         self._lengths = np.linalg.norm(rest[edges.ends[:, 0]] - rest[edges.ends[:, 1]], axis=1)
         self._boxes, self._piece_boxes = np.zeros((e, 6)), np.zeros((p, 6))
         self._room = Room()
-        self._swept = np.zeros((e, 6))
         self._first = self._second = np.zeros(0, dtype=np.int32)
-        self._listed = np.zeros(0, dtype=np.int64)
 
     def __len__(self) -> int:
         return len(self.edges.ends)
@@ -268,15 +247,7 @@ class EdgePairs:
                     break
             pairs = sort_pairs(room.pairs, room.start, room.counts, len(self.edges.ends))
         self._first, self._second = np.ascontiguousarray(pairs[:, 0]), np.ascontiguousarray(pairs[:, 1])
-        self._listed = marked(len(self.edges.ends), pairs)
         self.keys = keys_of_edges(self._first, self._second)
-
-    def swept(self, begin: NDArray[np.float64], way: NDArray[np.float64], margin: float) -> NDArray[np.int64]:
-        """The numbers of the pairs that come as near as the margin [m] on the ways (n, 3) of their points."""
-        if not len(self.keys):
-            return self.keys
-        swept_boxes_of(self._listed, begin, way, self.edges.ends, self._swept)
-        return overlapping(self._first, self._second, self._swept, margin)
 
     def numbered(self, rows: NDArray[np.int64]) -> tuple:
         """The argument `pairs` of `find_edge_contacts`, for these rows."""

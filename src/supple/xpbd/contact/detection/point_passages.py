@@ -1,37 +1,9 @@
 """Points that have passed through triangles in a substep; see `surface_contacts`."""
 
-import numpy as np
-
 from supple.numerics.adjacency import in_list
 from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import row
 from supple.xpbd.contact.detection.surface_contacts import corners_of, direction, enter_contact, passage
-
-
-@njit(cache=True)
-def near_triangles(x, x_prev, lists, boxes, margin):
-    """The points, the rows and the triangles, (k, 3), that come as near as the margin [m] in the substep.
-
-    Parameters
-    ----------
-    x, x_prev, lists : see `find_contacts`; boxes : (t, 6) low and high corners of what each triangle sweeps [m]
-    """
-    n_active, points, run_ranges, run_starts, run_rows, listed = lists
-    out = np.empty((run_starts[run_ranges[n_active]], 3), dtype=np.int64)
-    count = 0
-    for index in range(n_active):
-        p = points[index]
-        for k in range(run_ranges[index], run_ranges[index + 1]):
-            for i in range(run_starts[k], run_starts[k + 1]):
-                t = listed[i]
-                overlap = True
-                for j in range(3):
-                    overlap = overlap and min(x[p, j], x_prev[p, j]) - margin <= boxes[t, 3 + j]
-                    overlap = overlap and max(x[p, j], x_prev[p, j]) + margin >= boxes[t, j]
-                if overlap:
-                    out[count, 0], out[count, 1], out[count, 2] = p, run_rows[k], t
-                    count += 1
-    return out[:count].copy()
 
 
 @njit(cache=True)
@@ -40,7 +12,7 @@ def find_point_passages(x, x_prev, near_triangles, surfaces, apart, part, stitch
 
     Parameters
     ----------
-    near_triangles : of `near_triangles`; apart : (p, p) see `find_edge_contacts`; for the others see `find_contacts`
+    near_triangles : see `NearPairs.points`; apart : (p, p) see `find_edge_contacts`; for the others see `find_contacts`
     """
     point_piece, triangles, triangle_piece, closed, gaps, friction = surfaces
     normals = rows[2]

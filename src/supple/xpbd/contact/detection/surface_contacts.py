@@ -23,7 +23,8 @@ from supple.xpbd.sweeps.compilation import serial_and_parallel
 
 # Squared distances with a relative difference below this are equal: the point is nearest to a common edge or corner.
 TIE = 1e-9
-# Of squared distances: a triangle is not looked at where its plane or its box is farther by more than the nearest one.
+# Of squared distances: the nearest place on a triangle is not looked for where its plane or its box is farther, by more
+# than this, than the nearest triangle so far.
 MARGIN = 1e-6
 
 
@@ -63,22 +64,11 @@ def passage(p, p0, corners, corners0, both_ways):
 
 
 @njit
-def _is_beyond(q, q0, boxes, t, square):
-    """Whether the way of a point from q0 to q is farther from the box of triangle t than the root of `square` [m]."""
-    total = 0.0
-    for j in range(3):
-        d = max(0.0, boxes[t, j] - max(q[j], q0[j]), min(q[j], q0[j]) - boxes[t, 3 + j])
-        total += d * d
-    return total > square
-
-
-@njit
-def _select_triangle(x, x_prev, p, triangles, boxes, near, same, closed, entered, reach, bound):
+def _select_triangle(x, x_prev, p, triangles, near, same, closed, entered, reach, bound):
     """The triangle for the contact of point p, the barycentric point on it, the side of p, and the distance.
 
     Parameters
     ----------
-    boxes : (t, 6) see `find_contacts`
     near : triangles of one piece; same : whether p is a point of that piece; closed : whether it has an inside
     entered : the triangle of the same piece that p has passed through and is still behind, or -1
     reach : `near` contains all triangles up to this distance [m]; bound : farther ones are of no interest [m]
@@ -95,8 +85,6 @@ def _select_triangle(x, x_prev, p, triangles, boxes, near, same, closed, entered
     where = (1.0, 0.0, 0.0)
     for t in near:
         most = min(bound * bound, least * (1.0 + TIE))
-        if _is_beyond(q, q0, boxes, t, most):
-            continue
         corners, corners0 = corners_of(x, triangles, t), corners_of(x_prev, triangles, t)
         time, from_side, place = passage(q, q0, corners, corners0, not closed)
         if time < first:
@@ -165,7 +153,7 @@ def enter_contact(rows, r, p, triangles, t, where, n, gap, mu):
 
 
 @njit
-def _find_contacts_of(x, x_prev, p, runs, lists, boxes, surfaces, memory, near, part, stitched, rows):
+def _find_contacts_of(x, x_prev, p, runs, lists, surfaces, memory, near, part, stitched, rows):
     """The contacts of point p with the pieces near it; returns the smallest distance that is no contact, or inf."""
     first_run, last_run = runs
     run_starts, run_rows, listed = lists
@@ -188,7 +176,7 @@ def _find_contacts_of(x, x_prev, p, runs, lists, boxes, surfaces, memory, near, 
         # Of farther triangles, only what a pair holds or has entered counts, and the smallest gap.
         bound = math.inf if pushed or same or was_inside > 0.0 else max(gap, complete[p], min(near, smallest))
         t, where, side, distance = _select_triangle(
-            x, x_prev, p, triangles, boxes, listed[begin:end], same, closed[its], held, complete[p], bound
+            x, x_prev, p, triangles, listed[begin:end], same, closed[its], held, complete[p], bound
         )
         if same and held >= 0 and (t < 0 or side > 0.0):
             entered[p] = -1
@@ -215,14 +203,13 @@ def _find_contacts_of(x, x_prev, p, runs, lists, boxes, surfaces, memory, near, 
 
 
 @serial_and_parallel
-def find_contacts(x, x_prev, lists, boxes, surfaces, memory, near, part, stitched, rows, smallest):
+def find_contacts(x, x_prev, lists, surfaces, memory, near, part, stitched, rows, smallest):
     """Find which points touch triangles now, and fill in their rows.
 
     Parameters
     ----------
     x, x_prev : (n, 3) at the end and at the beginning of the substep [m]
     lists : of `PieceRuns`: n_active, points, run_ranges, run_starts, run_rows, triangles
-    boxes : (t, 6) low and high corners of what each triangle sweeps [m]
     surfaces : point_piece (n,), triangles (t, 3), triangle_piece (t,), closed (p,), gaps (p, p), friction (p, p): see
         `ContactSurfaces`
     memory : depth (n,) [m], how deep a point is inside a piece of this part; entered (n,), see `ContactMemory`;
@@ -239,5 +226,5 @@ def find_contacts(x, x_prev, lists, boxes, surfaces, memory, near, part, stitche
         runs = (run_ranges[index], run_ranges[index + 1])
         found = (run_starts, run_rows, listed)
         smallest[index] = _find_contacts_of(
-            x, x_prev, points[index], runs, found, boxes, surfaces, memory, near, part, stitched, rows
+            x, x_prev, points[index], runs, found, surfaces, memory, near, part, stitched, rows
         )
