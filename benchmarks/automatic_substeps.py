@@ -94,13 +94,13 @@ def row(found: list[Found | None]) -> str:
     others = sorted({status for status, _, _ in run} - {"converged", "softened"})
     softened = f"{len(soft)}, {np.median(soft):.0%}" if len(soft) else "0"
     errors = f"{np.median(good):.2%}, {good.max():.2%} | {min(counts)} to {max(counts)}" if len(good) else "none |"
-    return f"{len(run)} | {errors} | {softened} | {len(found) - len(run)} {' '.join(others)}"
+    return f"{len(good)} of {len(run)} | {errors} | {softened} | {len(found) - len(run)} {' '.join(others)}"
 
 
 def main(quick: bool = False) -> None:
     """Print two rows for each nu."""
     logging.disable(logging.WARNING)
-    print("nu | cases | errors of converged ones: median, largest | substeps | softened, median error | left out")
+    print("nu | converged, of cases | their errors: median, largest | substeps | softened, median error | left out")
     for poisson in POISSON:
         *_, still = sp.simulate(scene(1e5, poisson, 0.1), sp.Implicit(integrator="static", contact=None), 1 / 60, 2)
         reference = sag(still, 0.1)

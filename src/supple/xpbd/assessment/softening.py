@@ -37,6 +37,9 @@ FALL = 0.8
 LEAST_STRAIN = 1e-3
 # Of what single tets lack and have too much: the least error. A sum in which all of it cancels is too good.
 LEAST_PART = 0.15
+# Of the estimate: the least error. The sum is that of the present deformation; of a body that is stretched by far more
+# than it is bent, it says little about the bending.
+LEAST_OF_ESTIMATE = 1.0 / 3.0
 # Of the accuracy: what the number of substeps aims at, so that a frame is seldom beyond it.
 AIM = 0.75
 
@@ -85,8 +88,7 @@ class Softening:
 
     def shares(self, h: float, work: MeasuredWork | None) -> NDArray[np.float64]:
         """(b,) the share of its stiffness that each body lacks at substeps of h [s], the present ones of the work."""
-        estimated = self.rates * h**2
-        estimated /= 1.0 + estimated
+        estimated = self._estimated(h)
         if work is None:
             return estimated
         measured, trust = self._measured(work)
@@ -107,6 +109,10 @@ class Softening:
         worst = int(counts.argmax())
         return max(1, math.ceil(float(counts[worst]) - 1e-9)), self.names[worst]
 
+    def _estimated(self, h: float) -> NDArray[np.float64]:
+        error = self.rates * h**2
+        return error / (1.0 + error)
+
     def _measured(self, work: MeasuredWork) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(b,) the share that each body lacks, and what it counts against the estimate, from 0 to 1."""
         lacks, has, sizes = work.sums.T
@@ -114,6 +120,7 @@ class Softening:
         strained = np.maximum(has, 0.0)
         tiny = np.finfo(float).tiny
         share = np.minimum(error, strained) / np.maximum(strained, tiny)
+        share = np.maximum(share, LEAST_OF_ESTIMATE * self._estimated(work.h))
         return share, strained / np.maximum(strained + self._least, tiny)
 
 
