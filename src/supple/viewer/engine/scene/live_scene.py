@@ -23,7 +23,7 @@ from supple.viewer.engine.scene.new_bodies import moved_apart
 from supple.viewer.engine.scene.pulls import grabbed, workspace_for
 from supple.viewer.engine.scene.pusher import Pusher
 from supple.viewer.engine.scene.solvers import kind_of
-from supple.viewer.protocol.commands import Grab
+from supple.viewer.protocol.commands import Grab, MoveGrab
 from supple.viewer.protocol.live_source import LiveSource
 
 Anchors = Mapping[Pin | SoftTarget, NDArray[np.float64]]
@@ -175,8 +175,7 @@ class LiveScene:
         if setup.pusher is not None:
             setup.pusher.begin_step(self.state.time, setup.dt)
         for spring in setup.grabs.values():
-            anchors = self._anchors[spring.load] if isinstance(spring.load, SoftTarget) else None
-            spring.begin_step(self.system, self.state, setup.dt, anchors)
+            self._aim(spring)
         state, report = self._stepped()
         if not report.status.can_go_on and setup.pusher is not None and setup.pusher.moves:
             setup.pusher.stay()  # it is blocked
@@ -188,6 +187,23 @@ class LiveScene:
             if setup.pusher is not None:
                 setup.pusher.end_step()
         return report
+
+    @property
+    def follows_within_steps(self) -> bool:
+        """Whether a grab may move within a step: XPBD asks for loads in every substep, Newton's method only once."""
+        return kind_of(self.setup.solver) == "xpbd"
+
+    def move_grab(self, command: MoveGrab) -> None:
+        """Let a grab pull to another place, in the middle of a step where `follows_within_steps`."""
+        spring = self.setup.grabs.get(command.grab)
+        if spring is not None:  # otherwise it was removed meanwhile, for example by a reset
+            spring.target[:] = command.target
+            self._aim(spring)
+
+    def _aim(self, spring: GrabSpring) -> None:
+        """Set what a grab does in the present step."""
+        anchors = self._anchors[spring.load] if isinstance(spring.load, SoftTarget) else None
+        spring.begin_step(self.system, self.state, self.setup.dt, anchors)
 
     def _stepped(self) -> tuple[State, StepReport]:
         state, report = self.setup.solver.step(self.system, self.state, self.setup.dt, self.workspace)
