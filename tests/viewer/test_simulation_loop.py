@@ -20,8 +20,6 @@ from supple.viewer.engine.pacing import Pacing
 from supple.viewer.engine.warnings_as_notices import warnings_as_notices
 from supple.viewer.protocol import commands
 
-from .conftest import corner_grab
-
 
 def with_solver_that(loop, step):
     """Replace the solver of the loop by one that calls `step`."""
@@ -174,6 +172,21 @@ def test_a_request_to_pause_interrupts_a_long_step(loop):
     assert not loop.playing
 
 
+def test_a_reset_during_a_long_step_does_not_end_play(loop):
+    loop.watch.longest_awaited = 0.1
+    loop.execute(commands.Play())
+    loop.live.step()
+    solver = loop.live.setup.solver
+    with_solver_that(loop, endless)
+    threading.Timer(0.2, loop.inbox.put, (1, commands.Reset())).start()
+    loop.step()
+    loop.live.setup = dataclasses.replace(loop.live.setup, solver=solver)
+    assert loop.playing
+    loop.run_once(0.0)
+    assert (loop.applied, loop.playing, list(loop.notices)) == (1, True, [])
+    assert loop.live.frame <= 1
+
+
 def test_impossible_commands_become_notices_and_play_continues(loop):
     loop.execute(commands.Play())
     loop.execute(commands.RemoveBody("ghost"))
@@ -292,63 +305,6 @@ def test_each_warning_becomes_one_notice(loop):
         ("info", "tets are too stiff for substeps of 0.002 s"),
         ("info", "something else"),
     ]
-
-
-class TestPulls:
-    """A pull acts as soon as it can: in the present step of XPBD, otherwise in a step that begins at once."""
-
-    def held(self, loop):
-        loop.execute(corner_grab((-0.2, 0.3, -0.2)))
-        loop.live.step()
-        return loop.live.setup.grabs[7]
-
-    def test_a_move_within_a_step_of_xpbd_acts_in_it(self, loop):
-        self.held(loop)
-        corner, moves = loop.live.body_positions("cube")[0].copy(), iter([None, None, (1.0, 0.3, -0.2), None])
-        take = loop.inbox.take_leading
-
-        def arriving(kind):
-            target = next(moves, None)
-            if target is not None:
-                loop.inbox.put(5, commands.MoveGrab(7, target))
-            return take(kind)
-
-        loop.inbox.take_leading = arriving
-        loop.step()
-        assert loop.applied == 5
-        assert loop.live.body_positions("cube")[0, 0] > corner[0] + 0.1
-        assert loop.live.report.details.work["soft_targets"] > 0.0
-        assert loop.live.report.details.energy_gained == 0.0  # the work of the pull is known
-
-    def test_commands_of_other_kinds_and_what_follows_wait_for_the_end_of_a_step(self, loop):
-        spring = self.held(loop)
-        release, move = commands.ReleaseGrab(7), commands.MoveGrab(7, (2.0, 0.3, -0.2))
-        loop.inbox.put_all([(1, commands.MoveGrab(7, (1.0, 0.3, -0.2))), (2, release), (3, move)])
-        loop.step()
-        assert loop.applied == 1
-        assert spring.target[0] == 1.0
-        assert loop.inbox.take(0.0) == [(2, release), (3, move)]
-
-    def test_the_implicit_solver_keeps_its_loads_within_a_step(self, loop):
-        loop.live.adopt(dataclasses.replace(loop.live.setup, solver=sp.Implicit()))
-        self.held(loop)
-        loop.inbox.put(1, commands.MoveGrab(7, (1.0, 0.3, -0.2)))
-        loop.step()
-        assert loop.applied == 0
-        assert len(loop.inbox.take(0.0)) == 1
-
-    def test_a_step_begins_early_where_a_body_was_pulled_but_only_one(self, loop):
-        loop.execute(commands.Play())
-        self.held(loop)
-        loop.pacing.due = time.perf_counter() + 100.0
-        loop.execute(commands.SetParameter("gravity", 1.0))
-        assert loop._next_step() == loop.pacing.due - loop._interval()  # the grab
-        loop.step()
-        assert loop._next_step() == loop.pacing.due
-        loop.execute(commands.MoveGrab(7, (0.0, 0.4, 0.0)))
-        assert loop._next_step() == loop.pacing.due - loop._interval()
-        loop.execute(commands.SetSpeed(0.1))
-        assert loop._next_step() == loop.pacing.due
 
 
 class TestPacing:

@@ -144,6 +144,8 @@ class SimulationLoop:
         now = time.perf_counter()
         self.steps_left = max(0, self.steps_left - 1)
         self._fresh = True
+        if failed and self.inbox.holds(commands.Reset):
+            return  # which comes next, and may be why the step was given up
         if failed:
             self.playing, self.steps_left = False, 0
             self.notify("error", f"paused at t = {self.live.state.time:.4g} s; {failed}")

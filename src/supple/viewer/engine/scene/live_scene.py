@@ -159,10 +159,14 @@ class LiveScene:
         self.workspace = self.setup.solver.prepare(self.system)
 
     def warm_up(self) -> None:
-        """Pull for one step and discard it, so that compiled kernels are loaded before a person waits for them."""
+        """Pull for one step and discard it, so that compiled kernels are loaded before a person waits for them.
+
+        Not far: contacts of a surface that is torn through others take many seconds.
+        """
         setup, state = self.setup, self.state
         for body in self.system.bodies[:1]:
-            target = state.positions.mean(axis=0)
+            x = self.body_positions(body.name)
+            target = x[0] + 0.1 * (x.mean(axis=0) - x[0])
             command = Grab(0, body.name, (0,), (1.0,), (target[0], target[1], target[2]))
             self.grab({0: make_spring(command, setup.scene, body, self.system.masses, state.positions)})
         self.step()
