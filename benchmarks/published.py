@@ -3,18 +3,31 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from benchmarks.latency import live_page_text
 from benchmarks.measuring import ROOT
+from benchmarks.tables import live_text, rigid_bodies_text
 from supple.files.replacing import whole_file
 
 DOCS = ROOT / "docs"
 # The page and the text of each file.
-SHOWN: dict[str, tuple[str, Callable[[Any], str]]] = {"live_page": ("live.md", live_page_text)}
+SHOWN: dict[str, tuple[str, Callable[[Any], str]]] = {
+    "live_page": ("live.md", live_page_text),
+    "live": ("benchmarks.md", live_text),
+    "rigid_bodies": ("benchmarks.md", rigid_bodies_text),
+}
+
+
+def circumstances() -> dict[str, Any]:
+    """The date, the load of the machine, and the number of its cores."""
+    load = f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
+    return {"date": time.strftime("%Y-%m-%d"), "load": load, "cores": os.cpu_count()}
 
 
 def publish(name: str, figures: Any) -> None:
