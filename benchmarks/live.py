@@ -10,14 +10,15 @@ usage: python -m benchmarks.live
 from __future__ import annotations
 
 import contextlib
-import os
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
 from statistics import median
+from typing import Any
 
 import supple as sp
+from benchmarks.published import circumstances, publish
 from supple.viewer.app import Address, opened_page
 from supple.viewer.engine.engine import Engine
 from supple.viewer.protocol.commands import Play, Reset, Step
@@ -69,7 +70,7 @@ def behind(engine: Engine, frames: int, look: float) -> float:
         time.sleep(look)
 
 
-def played(engine: Engine, seconds: float) -> str:
+def played(engine: Engine, seconds: float) -> float:
     """The simulated time per wall-clock time of a simulation in real time."""
     engine.send(Reset())
     engine.send(Play())
@@ -80,7 +81,7 @@ def played(engine: Engine, seconds: float) -> str:
     snapshot = engine.latest()
     assert snapshot is not None
     engine.wait_for(engine.send(Reset()))
-    return f"played: {snapshot.timing.real_time_ratio:.3f} of real time, {snapshot.timing.step_ms:.2f} ms a step"
+    return snapshot.timing.real_time_ratio
 
 
 @contextlib.contextmanager
@@ -98,15 +99,10 @@ def listening(url: str) -> Iterator[None]:
         listener.wait()
 
 
-def load() -> str:
-    """The load of the machine in the last minute."""
-    return f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
-
-
-def main(rounds: int = 15, frames: int = 90, edge_length: float = 0.1, seconds: float = 10.0) -> dict[str, list[float]]:
-    """Run all programs alternately and print their times. Returns the times of each, by round [ms/frame]."""
+def main(rounds: int = 15, frames: int = 90, edge_length: float = 0.1, seconds: float = 10.0) -> dict[str, Any]:
+    """Run all programs alternately and print their times [ms/frame]; returns the figures."""
     live = source(edge_length)
-    at_start = load()
+    at_start = circumstances()
     with Engine(live) as engine, opened_page(live, Address(port=0)) as page, listening(page.url):
         behind_page = page.content.controller.simulation
         assert isinstance(behind_page, Engine)
@@ -125,16 +121,25 @@ def main(rounds: int = 15, frames: int = 90, edge_length: float = 0.1, seconds: 
         tets = engine.description.n_tets
     print(
         f"\nXPBD, 20 substeps, {tets} tets, {frames} frames of 1/60 s, {rounds} rounds; "
-        f"load {at_start} at the start, {load()} at the end"
+        f"load {at_start['load']} at the start, {circumstances()['load']} at the end"
     )
+    ways = {}
     for way, text in WAYS.items():
         ratio = median(own / base for own, base in zip(times[way], times["headless"], strict=True))
+        ways[way] = {"best": min(times[way]), "median": median(times[way]), "ratio": ratio}
+        clock = f"played: {clocks[way]:.3f} of real time" if way in clocks else ""
         print(
-            f"{text:<66} {min(times[way]):6.2f} ms/frame at best, {median(times[way]):6.2f} in the median, "
-            f"ratio {ratio:4.2f}  {clocks.get(way, '')}"
+            f"{text:<66} {ways[way]['best']:6.2f} ms/frame at best, {ways[way]['median']:6.2f} in the median, "
+            f"ratio {ratio:4.2f}  {clock}"
         )
-    return times
+    counts = {"tets": tets, "frames": frames, "rounds": rounds}
+    return {**at_start, **counts, "ways": ways, "real_time": clocks["page"]}
+
+
+def run() -> None:
+    """Measure, and write the figures of docs/benchmarks.md."""
+    publish("live", main())
 
 
 if __name__ == "__main__":
-    main()
+    run()

@@ -9,8 +9,10 @@ the ratios are to the obstacles.
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import supple as sp
+from benchmarks.published import circumstances, publish
 
 PLATE = sp.shapes.box_surface((0.3, 0.02, 0.3), (4, 1, 4))
 RADIUS, GAP = 0.1, 5e-4
@@ -53,20 +55,26 @@ def seconds_per_step(kind: str, edge: float, steps: int, skipped: int) -> tuple[
     return (time.perf_counter() - began) / count, iterations / count
 
 
-def main(edge: float = 0.03, steps: int = 30, skipped: int = 4, rounds: int = 3) -> dict[str, float]:
-    """Print the table; returns the ratio of each kind to the obstacles."""
+def main(edge: float = 0.03, steps: int = 30, skipped: int = 4, rounds: int = 3) -> dict[str, Any]:
+    """Print the table; returns its figures."""
+    at_start = circumstances()
     best: dict[str, tuple[float, float]] = {}
     for _ in range(rounds):
         for kind in KINDS:
             best[kind] = min(best.get(kind, (float("inf"), 0.0)), seconds_per_step(kind, edge, steps, skipped))
-    print(f"\na ball of {len(scene('obstacles', edge).bodies[0].mesh.tets)} tets between two plates")
+    tets = len(scene("obstacles", edge).bodies[0].mesh.tets)
+    print(f"\na ball of {tets} tets between two plates")
     print(f"{'plates':18}{'ms/step':>9}{'Newton/step':>13}{'ratio':>8}")
-    ratios = {}
     for kind, (seconds, iterations) in best.items():
-        ratios[kind] = seconds / best["obstacles"][0]
-        print(f"{kind:18}{1e3 * seconds:9.1f}{iterations:13.1f}{ratios[kind]:8.2f}")
-    return ratios
+        print(f"{kind:18}{1e3 * seconds:9.1f}{iterations:13.1f}{seconds / best['obstacles'][0]:8.2f}")
+    plates = {kind: {"ms_per_step": 1e3 * seconds, "iterations": count} for kind, (seconds, count) in best.items()}
+    return {**at_start, "tets": tets, "plates": plates}
+
+
+def run() -> None:
+    """Measure, and write the figures of docs/benchmarks.md."""
+    publish("rigid_bodies", main())
 
 
 if __name__ == "__main__":
-    main()
+    run()

@@ -1,6 +1,10 @@
 """Mesh files that are malformed, damaged or missing: an error of one line names file, fault and place."""
 
+import lzma
 import struct
+import tracemalloc
+import zlib
+from base64 import b64encode
 
 import numpy as np
 import pytest
@@ -199,3 +203,23 @@ def test_unwritable_output_leaves_no_file(tmp_path, mesh, name):
     assert [p.name for p in tmp_path.iterdir()] == [name]
     with pytest.raises(MeshError, match="is not one of"):
         mesh.save(tmp_path / "a.docx")
+
+
+@pytest.mark.parametrize("compressor", ["vtkZLibDataCompressor", "vtkLZMADataCompressor"])
+@pytest.mark.parametrize("said", [0, 36, 2**15])
+def test_a_block_that_swells_beyond_what_it_says_is_refused_without_the_memory(tmp_path, compressor, said):
+    zeros = bytes(2**25)
+    bomb = zlib.compress(zeros) if "ZLib" in compressor else lzma.compress(zeros, preset=0)
+    data = b64encode(struct.pack("<4I", 1, said, said, len(bomb))) + b64encode(bomb)
+    file = tmp_path / "bomb.vtp"
+    file.write_bytes(
+        f'<VTKFile type="PolyData" byte_order="LittleEndian" compressor="{compressor}"><PolyData><Piece '
+        'NumberOfPoints="3" NumberOfPolys="1"><Points><DataArray type="Float32" NumberOfComponents="3" '
+        f'format="binary">{data.decode()}</DataArray></Points></Piece></PolyData></VTKFile>'.encode()
+    )
+    tracemalloc.start()
+    with pytest.raises(MeshError, match="cannot be decoded: the file is damaged"):
+        SurfaceMesh.load(file)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 2**20

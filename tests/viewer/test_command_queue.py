@@ -37,6 +37,18 @@ def test_parameters_of_one_body_and_of_all_bodies_keep_their_order():
     assert [command for _, command in drained(*again)] == again[-1:]
 
 
+def test_the_oldest_commands_of_a_kind_can_be_taken_alone():
+    queue = CommandQueue()
+    first, second, release = MoveGrab(1, (1, 0, 0)), MoveGrab(2, (1, 0, 0)), ReleaseGrab(1)
+    queue.put_all([(1, first), (2, second), (3, release), (4, second)])
+    assert queue.take_leading(MoveGrab) == [(1, first), (2, second)]
+    assert queue.take_leading(MoveGrab) == []
+    queue.put(5, first)
+    queue.put(6, first)
+    assert queue.take(0.0) == [(3, release), (4, second), (6, first)]
+    assert queue.take_leading(MoveGrab) == []
+
+
 def test_no_play_pause_or_step_is_merged():
     commands = [Play(), Pause(), Play(), Step(2), Step(2)]
     assert [command for _, command in drained(*commands)] == commands

@@ -210,6 +210,32 @@ def test_a_killed_process_is_reported_and_nothing_blocks():
     engine.close()
 
 
+def test_a_process_that_reads_an_unguarded_program_ends_at_once(monkeypatch):
+    monkeypatch.setattr(multiprocessing.current_process(), "_inheriting", True, raising=False)
+    with pytest.raises(SystemExit):
+        Engine(small_source())
+
+
+@pytest.mark.slow
+def test_a_program_without_the_guard_ends_with_one_line(tmp_path):
+    script = tmp_path / "page.py"
+    script.write_text(
+        textwrap.dedent("""
+        import supple as sp
+        from supple.viewer.app import Address, serve
+        from supple.viewer.protocol.live_source import LiveSource
+
+        body = sp.Body("cube", sp.shapes.box((1, 1, 1), (2, 2, 2)), sp.StableNeoHookean(youngs=1e5, poisson=0.3))
+        source = LiveSource("cube", sp.Scene([body]), sp.XPBD(substeps=2), 0.01)
+        serve(source, Address(port=0), open_browser=False)
+        """)
+    )
+    ended = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=TIMEOUT)
+    assert ended.returncode == 1
+    assert ended.stderr.count("Traceback") == 1
+    assert 'the line if __name__ == "__main__":' in ended.stderr.splitlines()[-1]
+
+
 @pytest.mark.skipif(os.name != "posix", reason="sends a signal")
 def test_the_simulation_process_ignores_ctrl_c(fresh):
     """The signal reaches both processes."""

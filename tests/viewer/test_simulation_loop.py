@@ -17,6 +17,7 @@ from supple.numerics.interruption import interruption_point
 from supple.state import Status, StepReport
 from supple.viewer.engine import simulation_loop
 from supple.viewer.engine.pacing import Pacing
+from supple.viewer.engine.warnings_as_notices import warnings_as_notices
 from supple.viewer.protocol import commands
 
 
@@ -171,6 +172,21 @@ def test_a_request_to_pause_interrupts_a_long_step(loop):
     assert not loop.playing
 
 
+def test_a_reset_during_a_long_step_does_not_end_play(loop):
+    loop.watch.longest_awaited = 0.1
+    loop.execute(commands.Play())
+    loop.live.step()
+    solver = loop.live.setup.solver
+    with_solver_that(loop, endless)
+    threading.Timer(0.2, loop.inbox.put, (1, commands.Reset())).start()
+    loop.step()
+    loop.live.setup = dataclasses.replace(loop.live.setup, solver=solver)
+    assert loop.playing
+    loop.run_once(0.0)
+    assert (loop.applied, loop.playing, list(loop.notices)) == (1, True, [])
+    assert loop.live.frame <= 1
+
+
 def test_impossible_commands_become_notices_and_play_continues(loop):
     loop.execute(commands.Play())
     loop.execute(commands.RemoveBody("ghost"))
@@ -279,7 +295,7 @@ def test_a_failed_snapshot_pauses_with_one_notice(loop, monkeypatch, function):
 
 def test_each_warning_becomes_one_notice(loop):
     log = logging.getLogger("supple.somewhere")
-    with loop.warnings_as_notices():
+    with warnings_as_notices(loop.notify):
         for _ in range(3):
             log.warning("tets are too stiff for substeps of %g s", 0.002)
         log.info("not for the page")

@@ -175,8 +175,10 @@ class Sleep:
         moved = self._largest(np.abs(x - begun.places)) > self._limits
         since = np.where(moved, time, begun.since)
         ready = begun.asleep | ((time - since >= (1.0 - 1e-9) * self._times) & sound)
-        islands = self._islands(forces.pairs())
-        ready = ~np.isin(islands, islands[~ready])
+        islands = begun.islands
+        if ready.any():
+            islands = self._islands(forces.pairs())
+            ready = ~np.isin(islands, islands[~ready])
         fallen = ready & ~begun.asleep
         rows = self._vertices(moved | fallen)
         places = np.where(rows[:, None], x, begun.places)

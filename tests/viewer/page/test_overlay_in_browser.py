@@ -228,6 +228,27 @@ def test_a_phone_has_a_drawer_and_buttons_for_time(fresh):
     fresh.screen.wait(lambda: drawer() > 730, "the closed drawer")
 
 
+def test_the_bodies_stay_in_the_picture_of_a_window_that_becomes_a_phone(fresh):
+    tab, screen = fresh.tab, fresh.screen
+    points = fresh.start.positions[np.linspace(0, len(fresh.start.positions) - 1, 40).astype(int)]
+
+    def shares():
+        box = tab.locator("canvas").first.bounding_box()
+        return max(abs(screen.place(point)[0] / box["width"] - 0.5) for point in points)
+
+    tab.keyboard.press("1")
+    tab.keyboard.press("f")
+    screen.wait(lambda: shares() < 0.5 and screen.client.camera.aspect > 1.0, "the bodies in the wide window")
+    tab.wait_for_timeout(500)
+    away = lambda: float(np.linalg.norm(screen.client.camera.position - screen.client.camera.look_at))  # noqa: E731
+    before = away()
+    tab.set_viewport_size(PHONE)
+    screen.wait(lambda: screen.client.camera.aspect < 1.0 and away() > 1.3 * before, "a camera farther away")
+    screen.wait(lambda: shares() < 0.5, "all bodies in the narrow picture")
+    tab.set_viewport_size(WIDE)
+    screen.wait(lambda: abs(away() - before) < 0.01 * before, "the camera where it was")
+
+
 def test_the_legend_in_the_picture_and_the_value_at_the_pointer(fresh):
     tab, screen, views = fresh.tab, fresh.screen, fresh.live.panel.views
     body = fresh.start.description.bodies[0]

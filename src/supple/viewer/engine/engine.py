@@ -18,6 +18,8 @@ from supple.viewer.protocol.live_source import LiveSource
 from supple.viewer.protocol.outbox import DESCRIPTION, ERROR, PROGRESS, SNAPSHOT
 from supple.viewer.protocol.snapshots import Progress, SceneDescription, Snapshot
 
+# The exit code of a process that reads a program without this guard, and would start itself again.
+_UNGUARDED = 117
 # A process that does not end by itself within this time [s] is terminated.
 GRACE = 2.0
 
@@ -53,6 +55,8 @@ class Engine:
 
     def _start(self) -> None:
         """Start the process, and wait for its first snapshot."""
+        if getattr(multiprocessing.current_process(), "_inheriting", False):
+            raise SystemExit(_UNGUARDED)
         source = self.source
         self._description: SceneDescription | None = None
         self._raw: tuple[SceneDescription, memoryview] | None = None
@@ -211,8 +215,14 @@ class Engine:
                 self._arrived.notify_all()
         self._process.join(GRACE)
         with self._arrived:
-            if not self._closing and self.error is None:
-                self.error = f"the simulation ended unexpectedly (exit code {self._process.exitcode})"
+            code = self._process.exitcode
+            if code == _UNGUARDED:
+                self.error = (
+                    "the process of the simulation reads this program again; write what the program does below "
+                    'the line if __name__ == "__main__":'
+                )
+            elif not self._closing and self.error is None:
+                self.error = f"the simulation ended unexpectedly (exit code {code})"
             self._arrived.notify_all()
 
     def _write(self, outgoing: CommandQueue) -> None:

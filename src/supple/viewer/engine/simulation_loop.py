@@ -5,8 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -23,6 +22,7 @@ from supple.viewer.engine.pacing import Pacing
 from supple.viewer.engine.scene.changes import change
 from supple.viewer.engine.scene.live_scene import LiveScene
 from supple.viewer.engine.step_watch import StepWatch
+from supple.viewer.engine.warnings_as_notices import warnings_as_notices
 from supple.viewer.protocol import commands, limits
 from supple.viewer.protocol.command_queue import CommandQueue
 from supple.viewer.protocol.outbox import Outbox
@@ -58,6 +58,7 @@ class SimulationLoop:
             limits.LONGEST_STEP, lambda: inbox.holds(commands.Pause, commands.Reset), limits.LONGEST_STEP_WHEN_ASKED
         )
         self.applied = 0
+        self._pulled = False  # whether a body was pulled since the last step
         self.notices: deque[Notice] = deque(maxlen=NOTICES_KEPT)
         self._before: State = live.state
         self._last: Snapshot | None = None
@@ -67,7 +68,7 @@ class SimulationLoop:
 
     def run(self) -> None:
         """Run until the process of the page ends."""
-        with self.warnings_as_notices():
+        with warnings_as_notices(self.notify):
             while not self.inbox.closed:
                 self.run_once(self._time_to_wait())
 
@@ -78,7 +79,7 @@ class SimulationLoop:
             self.applied = max(self.applied, number)
             self._fresh = True
         now = time.perf_counter()
-        if self.steps_left > 0 or (self._runs and now >= self.pacing.due):
+        if self.steps_left > 0 or (self._runs and now >= self._next_step()):
             self.step()
         now = time.perf_counter()
         since = now - self._published
@@ -113,6 +114,7 @@ class SimulationLoop:
                         self.pacing.start(time.perf_counter())
                     self.watched = command.watched
                 case _:
+                    self._pulled |= isinstance(command, (commands.Grab, commands.MoveGrab))
                     with self.watch.limited():
                         change(command, self.live)
                     if isinstance(command, commands.Reset):  # frames that were requested before belong to the old start
@@ -127,9 +129,9 @@ class SimulationLoop:
     def step(self) -> None:
         """Simulate one frame; where this fails, pause at the last good state, and send a notice with the reason."""
         began = time.perf_counter()
-        before = self.live.state
+        before, self._pulled = self.live.state, False
         try:
-            with self.watch.limited():
+            with self.watch.limited(self._follow):
                 report = self.live.step()
             failed = "" if report.status.can_go_on else f"{report.status}: {report.message}"
         except (SuppleError, ArithmeticError, MemoryError) as error:
@@ -142,6 +144,8 @@ class SimulationLoop:
         now = time.perf_counter()
         self.steps_left = max(0, self.steps_left - 1)
         self._fresh = True
+        if failed and self.inbox.holds(commands.Reset):
+            return  # which comes next, and may be why the step was given up
         if failed:
             self.playing, self.steps_left = False, 0
             self.notify("error", f"paused at t = {self.live.state.time:.4g} s; {failed}")
@@ -149,22 +153,17 @@ class SimulationLoop:
         self._before = before
         self.pacing.stepped(now, now - began, self.live.setup.dt, self.speed)
 
+    def _follow(self) -> None:
+        """Pull to where the pointer is by now, within a step."""
+        if self.live.follows_within_steps:
+            for number, command in self.inbox.take_leading(commands.MoveGrab):
+                self.live.move_grab(command)
+                self.applied = max(self.applied, number)
+
     def notify(self, level: str, text: str) -> None:
         """Send a notice to the page."""
         number = self.notices[-1].number + 1 if self.notices else 1
         self.notices.append(Notice(number, level, text))
-
-    @contextmanager
-    def warnings_as_notices(self) -> Iterator[None]:
-        """A block in which each warning of the library becomes a notice, once."""
-        log, handler = logging.getLogger("supple"), _Notices(self)
-        propagated, log.propagate = log.propagate, False
-        log.addHandler(handler)
-        try:
-            yield
-        finally:
-            log.removeHandler(handler)
-            log.propagate = propagated
 
     def publish(self, now: float) -> None:
         """Send a snapshot, after a new description where the scene has changed.
@@ -248,6 +247,14 @@ class SimulationLoop:
     def _interval(self) -> float:
         return self.live.setup.dt / self.speed
 
+    def _next_step(self) -> float:
+        """When the next step begins: when it is due; up to one step earlier where a body was pulled.
+
+        In slow motion, the state of an earlier step would not be displayed earlier.
+        """
+        early = self._pulled and not self._in_slow_motion()
+        return self.pacing.due - (self._interval() if early else 0.0)
+
     def _in_slow_motion(self) -> bool:
         return self._runs and self.steps_left == 0 and self._interval() > 1.5 / limits.FRAMES_PER_SECOND
 
@@ -272,27 +279,10 @@ class SimulationLoop:
         now = time.perf_counter()
         ends = [self._published + HEARTBEAT]
         if self._runs:
-            ends.append(self.pacing.due)
+            ends.append(self._next_step())
         if self._fresh or self._in_slow_motion():
             ends.append(self._published + SHORTEST)
         return max(0.0, min(ends) - now)
-
-
-class _Notices(logging.Handler):
-    """Turns warnings into notices of a loop. Errors go to the terminal: they are faults of the code."""
-
-    def __init__(self, loop: SimulationLoop) -> None:
-        super().__init__(logging.WARNING)
-        self.loop = loop
-        self.received: set[str] = set()
-
-    def emit(self, record: logging.LogRecord) -> None:
-        text = " ".join(record.getMessage().split())[:500]
-        if record.levelno >= logging.ERROR:
-            logging.getLogger().handle(record)
-        elif text not in self.received and len(self.received) < 1000:
-            self.received.add(text)
-            self.loop.notify("info", text)
 
 
 def _one_line(error: BaseException) -> str:

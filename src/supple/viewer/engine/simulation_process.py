@@ -22,6 +22,16 @@ def run_simulation(source: LiveSource, commands: Connection, snapshots: Connecti
     inbox = CommandQueue()
     threading.Thread(target=_read, args=(commands, inbox), name="inbox", daemon=True).start()
 
+    import numba
+
+    from supple.numerics.threads import numba_threads
+
+    # One core is left to the page and the browser: a kernel waits long for a thread that does not get a core.
+    with numba_threads(max(1, numba.get_num_threads() - 1)):
+        _simulate(source, inbox, snapshots)
+
+
+def _simulate(source: LiveSource, inbox: CommandQueue, snapshots: Connection) -> None:
     from supple.viewer.engine.pulse import report_long_steps
     from supple.viewer.engine.scene.live_scene import LiveScene
     from supple.viewer.engine.simulation_loop import SimulationLoop

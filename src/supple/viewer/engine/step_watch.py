@@ -34,8 +34,8 @@ class StepWatch:
         self._rounds = 0
 
     @contextmanager
-    def limited(self) -> Iterator[None]:
-        """A block that ends with a `SolverError` where it takes too long."""
+    def limited(self, at_each: Callable[[], None] = lambda: None) -> Iterator[None]:
+        """A block that ends with a `SolverError` where it takes too long; `at_each` is called where it could end."""
         began, compiled = time.monotonic(), self._compiled.seconds
         self._began, self._rounds = began, 0
 
@@ -44,6 +44,7 @@ class StepWatch:
             seconds = time.monotonic() - began - (self._compiled.seconds - compiled)
             if seconds > self.longest or (seconds > self.longest_awaited and self._is_awaited()):
                 raise SolverError(f"given up after {seconds:.1f} s")
+            at_each()
 
         try:
             with interruptible(check):

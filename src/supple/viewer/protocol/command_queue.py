@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Hashable, Iterable
+from typing import TypeVar
 
 from supple.viewer.protocol import limits
 from supple.viewer.protocol.commands import (
@@ -19,6 +20,7 @@ from supple.viewer.protocol.commands import (
 )
 
 Numbered = tuple[int, Command]
+Kind = TypeVar("Kind", bound=Command)
 
 
 def subject(command: Command) -> Hashable | None:
@@ -90,6 +92,19 @@ class CommandQueue:
             commands, self._waiting = self._waiting, []
             self._places.clear()
             return commands
+
+    def take_leading(self, kind: type[Kind]) -> list[tuple[int, Kind]]:
+        """The oldest waiting commands, up to the first one of another kind. Never waits."""
+        taken: list[tuple[int, Kind]] = []
+        with self._changed:
+            for number, command in self._waiting:
+                if not isinstance(command, kind):
+                    break
+                taken.append((number, command))
+            if taken:
+                del self._waiting[: len(taken)]
+                self._places.clear()
+        return taken
 
     def holds(self, *kinds: type[Command]) -> bool:
         """Whether a command of one of these kinds waits."""

@@ -126,6 +126,8 @@ class FrameForces:
 
     def at_rest(self, asleep: NDArray[np.bool_]) -> tuple[LoadedRows, ShapeLoads]:
         """The contacts of sleeping bodies (b,) with each other and with obstacles, with their means over the frame."""
+        if not asleep.any():
+            return LoadedRows.none(), ShapeLoads.none()
         still = np.ones(len(self.owners.names), dtype=np.bool_)
         still[: len(asleep)] = asleep
         rows, loads, owner = self._rows(), self._loads(), self.owners.of_points

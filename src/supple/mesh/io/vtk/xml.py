@@ -166,11 +166,10 @@ def _bytes(source: bytes, is_text: bool, encoding: _Encoding) -> bytes:
 
 
 def _unpacked(block: bytes, size: int, compressor: str) -> bytes:
-    if compressor == "vtkZLibDataCompressor":
-        out = zlib.decompressobj().decompress(block, size)
-    else:
-        out = lzma.LZMADecompressor().decompress(block, size)
-    if len(out) != size:
+    # One byte more shows whether the block is longer than it says; for zlib, a limit of 0 would be none.
+    packed = zlib.decompressobj() if compressor == "vtkZLibDataCompressor" else lzma.LZMADecompressor()
+    out = packed.decompress(block, size + 1)
+    if len(out) != size or not packed.eof:
         raise ValueError
     return out
 

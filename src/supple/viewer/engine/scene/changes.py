@@ -145,9 +145,7 @@ def _(command: commands.Grab, live: LiveScene) -> None:
 
 @change.register
 def _(command: commands.MoveGrab, live: LiveScene) -> None:
-    spring = live.setup.grabs.get(command.grab)
-    if spring is not None:  # otherwise it was removed meanwhile, for example by a reset
-        spring.target[:] = command.target
+    live.move_grab(command)
 
 
 @change.register

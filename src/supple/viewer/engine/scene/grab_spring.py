@@ -56,9 +56,9 @@ class GrabSpring(ABC):
         """(3,) the point to which the spring is attached, or its velocity, from those of its body's points (n, 3)."""
         return np.asarray(self.command.weights) @ points[list(self.command.vertices)]
 
-    def way(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(3,) from the point to the target, as far as it pulls [m]."""
-        way = self.target - self.point(points)
+    def way(self, points: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(3,) from the point to a target, as far as it pulls [m]."""
+        way = target - self.point(points)
         length = float(np.linalg.norm(way))
         return way * (self.longest / length) if length > self.longest else way
 
@@ -74,25 +74,44 @@ class SoftGrab(GrabSpring):
 
     In every step each vertex of the patch is pulled towards x_i + (target - p), with x_i and p at the start of the
     step. So the force causes no torque about p, and the motion of the patch is slightly damped, as by a dashpot k dt.
+
+    The patch weighs little and follows the target at once. So the target goes to its new place over the rest of the
+    step, not in a jump: that would put the patch into the surface beside it.
     """
 
     patch: NDArray[np.int32]
-    _displacements: NDArray[np.float64] = field(init=False)
+    _points: NDArray[np.float64] = field(init=False)  # of the body, at the start of the step
+    _rest: NDArray[np.float64] = field(init=False)  # of the patch's targets
+    _ends: tuple[NDArray[np.float64], NDArray[np.float64]] = field(init=False)  # of the way of the target
+    _times: tuple[float, float] = (0.0, 0.0)  # at these ends
+    _asked: float = 0.0  # the latest time for which the displacements were asked
 
     def __post_init__(self) -> None:
-        self._displacements = np.zeros((len(self.patch), 3))
+        self._ends = self.target.copy(), self.target.copy()
         self.load = SoftTarget(
             self.command.body,
             self.patch,
             self.stiffness / len(self.patch),
-            lambda time: self._displacements,
+            self._displacements,
             name=f"grab {self.command.grab}",
         )
 
     def begin_step(self, system: System, state: State, dt: float, anchors: NDArray[np.float64] | None) -> None:
-        x = system.split(state.positions)[self.command.body]
         assert anchors is not None
-        self._displacements = x[self.patch] + self.way(x) - anchors
+        self._points, self._rest = system.split(state.positions)[self.command.body], anchors
+        end = state.time + dt
+        now = self._asked if state.time < self._asked <= end else state.time
+        self._ends, self._times = (self._place(now), self.target.copy()), (now, end)
+
+    def _place(self, time: float) -> NDArray[np.float64]:
+        """(3,) of the target on its way [m]."""
+        (first, last), (begin, end) = self._ends, self._times
+        share = min(1.0, max(0.0, (time - begin) / (end - begin))) if end > begin else 1.0
+        return first + share * (last - first)
+
+    def _displacements(self, time: float) -> NDArray[np.float64]:
+        self._asked = time
+        return self._points[self.patch] + self.way(self._points, self._place(time)) - self._rest
 
 
 @dataclass(eq=False)
@@ -117,7 +136,11 @@ class RigidGrab(GrabSpring):
         x, v = (system.split(values)[part.name] for values in (state.positions, state.velocities))
         assert isinstance(part.body, RigidBody)
         inverse = float(self.point(part.body.weights) ** 2 @ (1.0 / system.masses[part.vertices]))
-        force = self.stiffness * (self.way(x) - dt * self.point(v)) / (1.0 + self.stiffness * dt * dt * inverse)
+        force = (
+            self.stiffness
+            * (self.way(x, self.target) - dt * self.point(v))
+            / (1.0 + self.stiffness * dt * dt * inverse)
+        )
         self._forces = np.outer(self.command.weights, force)
 
 

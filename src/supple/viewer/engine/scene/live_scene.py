@@ -23,7 +23,7 @@ from supple.viewer.engine.scene.new_bodies import moved_apart
 from supple.viewer.engine.scene.pulls import grabbed, workspace_for
 from supple.viewer.engine.scene.pusher import Pusher
 from supple.viewer.engine.scene.solvers import kind_of
-from supple.viewer.protocol.commands import Grab
+from supple.viewer.protocol.commands import Grab, MoveGrab
 from supple.viewer.protocol.live_source import LiveSource
 
 Anchors = Mapping[Pin | SoftTarget, NDArray[np.float64]]
@@ -159,10 +159,14 @@ class LiveScene:
         self.workspace = self.setup.solver.prepare(self.system)
 
     def warm_up(self) -> None:
-        """Pull for one step and discard it, so that compiled kernels are loaded before a person waits for them."""
+        """Pull for one step and discard it, so that compiled kernels are loaded before a person waits for them.
+
+        Not far: contacts of a surface that is torn through others take many seconds.
+        """
         setup, state = self.setup, self.state
         for body in self.system.bodies[:1]:
-            target = state.positions.mean(axis=0)
+            x = self.body_positions(body.name)
+            target = x[0] + 0.1 * (x.mean(axis=0) - x[0])
             command = Grab(0, body.name, (0,), (1.0,), (target[0], target[1], target[2]))
             self.grab({0: make_spring(command, setup.scene, body, self.system.masses, state.positions)})
         self.step()
@@ -175,8 +179,7 @@ class LiveScene:
         if setup.pusher is not None:
             setup.pusher.begin_step(self.state.time, setup.dt)
         for spring in setup.grabs.values():
-            anchors = self._anchors[spring.load] if isinstance(spring.load, SoftTarget) else None
-            spring.begin_step(self.system, self.state, setup.dt, anchors)
+            self._aim(spring)
         state, report = self._stepped()
         if not report.status.can_go_on and setup.pusher is not None and setup.pusher.moves:
             setup.pusher.stay()  # it is blocked
@@ -188,6 +191,23 @@ class LiveScene:
             if setup.pusher is not None:
                 setup.pusher.end_step()
         return report
+
+    @property
+    def follows_within_steps(self) -> bool:
+        """Whether a grab may move within a step: XPBD asks for loads in every substep, Newton's method only once."""
+        return kind_of(self.setup.solver) == "xpbd"
+
+    def move_grab(self, command: MoveGrab) -> None:
+        """Let a grab pull to another place, in the middle of a step where `follows_within_steps`."""
+        spring = self.setup.grabs.get(command.grab)
+        if spring is not None:  # otherwise it was removed meanwhile, for example by a reset
+            spring.target[:] = command.target
+            self._aim(spring)
+
+    def _aim(self, spring: GrabSpring) -> None:
+        """Set what a grab does in the present step."""
+        anchors = self._anchors[spring.load] if isinstance(spring.load, SoftTarget) else None
+        spring.begin_step(self.system, self.state, self.setup.dt, anchors)
 
     def _stepped(self) -> tuple[State, StepReport]:
         state, report = self.setup.solver.step(self.system, self.state, self.setup.dt, self.workspace)

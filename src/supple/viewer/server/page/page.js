@@ -95,6 +95,16 @@
     const box = suppleViewer.mutable.current.canvas?.getBoundingClientRect();
     if (box && layer) Object.assign(layer.style, {
       left: `${box.left}px`, top: `${box.top}px`, width: `${box.width}px`, height: `${box.height}px` });
+    if (box?.height) keepInPicture(Math.min(1, box.width / box.height));
+  }
+  // Where the picture becomes narrower than it is high, or wider again, the camera moves such that as much stays in it.
+  let narrow = null;
+  function keepInPicture(now) {
+    const control = suppleViewer.mutable.current.cameraControl;
+    if (!control || now === narrow) return;
+    const sine = (aspect) => Math.sin(Math.atan(Math.tan((control.camera.fov * Math.PI) / 360) * aspect));
+    if (narrow !== null) control.dollyTo((control.distance * sine(narrow)) / sine(now), false);
+    narrow = now;
   }
 
   // The values of sliders with their units: a text input of the panel that is not displayed, whose label names the
