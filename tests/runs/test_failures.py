@@ -172,7 +172,7 @@ def test_cg_that_cannot_converge(out, monkeypatch, caplog, kind):
     for _ in range(2):
         good = next(frames)
 
-    def stalls(data, preconditioner, b, x, *rest):
+    def stalls(preconditioner, b, x, *rest):
         x[:] = 0.0
         return CGResult(10, False, False, 1.0)
 

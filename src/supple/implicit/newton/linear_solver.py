@@ -205,7 +205,7 @@ class LinearSolver:
     def _conjugate_gradients(
         self, b: NDArray[np.float64], x: NDArray[np.float64], tolerance: float, most: int
     ) -> CGResult:
-        return conjugate_gradients(self.matrix, self.preconditioner, b, x, tolerance, most, self.low_rank)
+        return conjugate_gradients(self.preconditioner, b, x, tolerance, most, self.low_rank)
 
     def _age_by(self, iterations: int) -> None:
         """After a run of CG: keep the coarse level unless it has become too old."""

@@ -1,8 +1,8 @@
 """Preconditioned conjugate gradients on 3x3-block matrices, in few passes over memory.
 
 Sums are taken group by group and then over groups in order: the same bits on any number of threads. The inner product
-r.z needs the coarse part of z only through its coarse coefficients, so that an iteration is three passes: the product
-with the matrix; the update of x and r with the smoother and the restriction; the prolongation with the next direction.
+r.z needs the coarse part of z only through its coarse coefficients. An iteration reads the matrix once: half of it in
+the sweep backward, the other half in the sweep forward, which also give the product (`gauss_seidel`).
 
 Source: Saad, "Iterative Methods for Sparse Linear Systems" (2003), algorithm 9.1.
 """
@@ -14,12 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.numerics.kernel_cache import njit, prange
+from supple.numerics.kernel_cache import njit
+from supple.numerics.sparse.gauss_seidel import backward, forward, update
 from supple.numerics.sparse.preconditioner import TwoLevel
 from supple.numerics.sparse.skyline_cholesky import solve
-from supple.numerics.threads import threads_for
+from supple.numerics.threads import is_alone, threads_for
 
-# Three short passes in each iteration: fewer blocks than this are worked on by one thread.
+# Short passes in each iteration: fewer blocks than this are worked on by one thread.
 _SERIAL_BLOCKS = 50_000
 
 NOTHING_MORE = np.zeros((0, 0, 3))
@@ -43,7 +44,6 @@ class CGResult:
 
 
 def conjugate_gradients(
-    data: NDArray[np.float64],
     preconditioner: TwoLevel,
     b: NDArray[np.float64],
     x: NDArray[np.float64],
@@ -55,106 +55,34 @@ def conjugate_gradients(
 
     Parameters
     ----------
-    data : (blocks, 3, 3) of A on `preconditioner.pattern`
+    preconditioner : updated with the matrix A
     b : (n, 3); x : (n, 3) overwritten, the search starts at zero
     tolerance : on the residual's norm sqrt(r . M^-1 r), relative to that of b
     max_iterations : stop there, converged or not
     low_rank : (k, n, 3) the vectors g. The preconditioner becomes the inverse of M + sum g g^T, so that k costs no
         iterations
     """
-    p = preconditioner.pattern
-    with threads_for(p.blocks, _SERIAL_BLOCKS):
+    order = preconditioner.order
+    solution = np.zeros_like(x)
+    with threads_for(preconditioner.pattern.blocks, _SERIAL_BLOCKS):
         iterations, converged, indefinite, first = _solve(
-            p.row_start,
-            p.columns,
-            p.diagonal,
-            data,
-            preconditioner.group_start,
-            preconditioner.inner,
+            is_alone(),
+            (order.groups, order.group_start, order.color_start),
+            (order.lower.start, order.lower.columns, order.lower.blocks),
+            (order.upper.start, order.upper.columns, order.upper.blocks),
+            preconditioner.diagonal,
+            preconditioner.inverse_diagonal,
             preconditioner.fields,
             preconditioner.first,
-            preconditioner.inverse_diagonal,
             preconditioner.coarse,
-            b,
-            x,
+            b[order.rows],
+            solution,
             tolerance,
             max_iterations,
-            low_rank,
+            np.take(low_rank, order.rows, axis=1) if len(low_rank) else low_rank,
         )
+    x[order.rows] = solution
     return CGResult(int(iterations), bool(converged), bool(indefinite), float(first))
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def _product(group_start, row_start, columns, data, p, Ap, sums):
-    """Ap <- A p, and each group's share of p . Ap."""
-    for g in prange(len(group_start) - 1):
-        total = 0.0
-        for i in range(group_start[g], group_start[g + 1]):
-            a = b = c = 0.0
-            for q in range(row_start[i], row_start[i + 1]):
-                j = columns[q]
-                x, y, z = p[j, 0], p[j, 1], p[j, 2]
-                a += data[q, 0, 0] * x + data[q, 0, 1] * y + data[q, 0, 2] * z
-                b += data[q, 1, 0] * x + data[q, 1, 1] * y + data[q, 1, 2] * z
-                c += data[q, 2, 0] * x + data[q, 2, 1] * y + data[q, 2, 2] * z
-            Ap[i, 0], Ap[i, 1], Ap[i, 2] = a, b, c
-            total += p[i, 0] * a + p[i, 1] * b + p[i, 2] * c
-        sums[g] = total
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def _smooth(alpha, group_start, columns, diagonal, inner, data, inverse, fields, p, Ap, x, r, z, restricted, sums):
-    """x += alpha p, r -= alpha Ap, z <- S^-1 r, restricted <- Z^T r, and each group's share of r . z."""
-    for g in prange(len(group_start) - 1):
-        low, high = group_start[g], group_start[g + 1]
-        for i in range(low, high):
-            for k in range(3):
-                x[i, k] += alpha * p[i, k]
-                r[i, k] -= alpha * Ap[i, k]
-        for k in range(12):
-            restricted[12 * g + k] = 0.0
-        for i in range(low, high):
-            a, b, c = r[i, 0], r[i, 1], r[i, 2]
-            for m in range(4):
-                w = fields[i, m]
-                restricted[12 * g + 3 * m] += w * a
-                restricted[12 * g + 3 * m + 1] += w * b
-                restricted[12 * g + 3 * m + 2] += w * c
-            for q in range(inner[i, 0], diagonal[i]):
-                j = columns[q]
-                u, v, w = z[j, 0], z[j, 1], z[j, 2]
-                a -= data[q, 0, 0] * u + data[q, 0, 1] * v + data[q, 0, 2] * w
-                b -= data[q, 1, 0] * u + data[q, 1, 1] * v + data[q, 1, 2] * w
-                c -= data[q, 2, 0] * u + data[q, 2, 1] * v + data[q, 2, 2] * w
-            z[i, 0] = inverse[i, 0, 0] * a + inverse[i, 0, 1] * b + inverse[i, 0, 2] * c
-            z[i, 1] = inverse[i, 1, 0] * a + inverse[i, 1, 1] * b + inverse[i, 1, 2] * c
-            z[i, 2] = inverse[i, 2, 0] * a + inverse[i, 2, 1] * b + inverse[i, 2, 2] * c
-        total = 0.0
-        for i in range(high - 1, low - 1, -1):
-            a = b = c = 0.0
-            for q in range(diagonal[i] + 1, inner[i, 1]):
-                j = columns[q]
-                u, v, w = z[j, 0], z[j, 1], z[j, 2]
-                a += data[q, 0, 0] * u + data[q, 0, 1] * v + data[q, 0, 2] * w
-                b += data[q, 1, 0] * u + data[q, 1, 1] * v + data[q, 1, 2] * w
-                c += data[q, 2, 0] * u + data[q, 2, 1] * v + data[q, 2, 2] * w
-            z[i, 0] -= inverse[i, 0, 0] * a + inverse[i, 0, 1] * b + inverse[i, 0, 2] * c
-            z[i, 1] -= inverse[i, 1, 0] * a + inverse[i, 1, 1] * b + inverse[i, 1, 2] * c
-            z[i, 2] -= inverse[i, 2, 0] * a + inverse[i, 2, 1] * b + inverse[i, 2, 2] * c
-            total += r[i, 0] * z[i, 0] + r[i, 1] * z[i, 1] + r[i, 2] * z[i, 2]
-        sums[g] = total
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def _direction(beta, group_start, fields, coefficients, z, p):
-    """p <- z + Z coefficients + beta p."""
-    for g in prange(len(group_start) - 1):
-        for i in range(group_start[g], group_start[g + 1]):
-            for k in range(3):
-                value = z[i, k]
-                for m in range(4):
-                    value += fields[i, m] * coefficients[12 * g + 3 * m + k]
-                p[i, k] = value + beta * p[i, k]
 
 
 @njit(cache=True, error_model="numpy")
@@ -192,16 +120,22 @@ def _inverse(a):
 
 
 @njit(cache=True, error_model="numpy")
+def _coarse_solution(restricted, coarse, first, coefficients):
+    for k in range(len(restricted)):
+        coefficients[k] = restricted[k]
+    solve(coarse, first, coefficients)
+
+
+@njit(cache=True, error_model="numpy")
 def _solve(
-    row_start,
-    columns,
+    alone,
+    order,
+    lower,
+    upper,
     diagonal,
-    data,
-    group_start,
-    inner,
+    inverse,
     fields,
     first,
-    inverse,
     coarse,
     rhs,
     x,
@@ -209,51 +143,51 @@ def _solve(
     max_iterations,
     low,
 ):
-    groups = len(group_start) - 1
-    sums = np.zeros(groups)
-    restricted = np.zeros(12 * groups)
-    coefficients = np.zeros(12 * groups)
+    groups, start, colors = order
+    sums = np.zeros(len(groups))
+    restricted = np.zeros(12 * len(groups))
+    coefficients = np.zeros_like(restricted)
     r = np.zeros_like(rhs)
-    for i in range(len(rhs)):
-        for k in range(3):
-            x[i, k] = 0.0
-    z = np.zeros_like(r)
-    p = np.zeros_like(r)
-    Ap = np.zeros_like(r)
-    alpha = 0.0
-    # (M + G G^T)^-1 = M^-1 - Y S^-1 Y^T with Y = M^-1 G and S = 1 + G^T Y.
-    Y = np.zeros_like(low)
+    y, s, t, Ut = np.zeros_like(r), np.zeros_like(r), np.zeros_like(r), np.zeros_like(r)
+    p, Up, Ap, w = np.zeros_like(r), np.zeros_like(r), np.zeros_like(r), np.zeros_like(r)
+    # (M + G G^T)^-1 = M^-1 - Y S^-1 Y^T with Y = M^-1 G and S = 1 + G^T Y. W = (D + L)^-1 G.
+    W, Y, UY = np.zeros_like(low), np.zeros_like(low), np.zeros_like(low)
     S = np.eye(len(low))
     for m in range(len(low)):
-        _add(1.0, low[m], r)
-        _smooth(alpha, group_start, columns, diagonal, inner, data, inverse, fields, p, Ap, x, r, z, restricted, sums)
-        for k in range(12 * groups):
-            coefficients[k] = restricted[k]
-        solve(coarse, first, coefficients)
-        _direction(0.0, group_start, fields, coefficients, z, Y[m])
-        _add(-1.0, low[m], r)
+        # With p = 0 the sweep forward takes its right side from Ut: Ap becomes g and w becomes (D + L)^-1 g.
+        forward(alone, colors, 0.0, start, *lower, diagonal, inverse, t, low[m], p, Up, Ap, W[m], sums)
+        r[:] = low[m]
+        update(alone, 0.0, groups, start, fields, p, Ap, w, x, r, y, restricted)
+        _coarse_solution(restricted, coarse, first, coefficients)
+        backward(alone, colors, groups, start, *upper, inverse, fields, coefficients, r, W[m], s, Y[m], UY[m], sums)
         for n in range(len(low)):
             S[n, m] += _inner(low[n], Y[m])
     S_inverse = _inverse(S)
     weights = np.zeros(len(low))
-    _add(1.0, rhs, r)
+    # The same for the right side: this update makes r of it.
+    forward(alone, colors, 0.0, start, *lower, diagonal, inverse, t, rhs, p, Up, Ap, w, sums)
+    r[:] = 0.0
+    alpha = -1.0
     first_norm = 0.0
     old = 0.0
     for iteration in range(max_iterations + 1):
-        _smooth(alpha, group_start, columns, diagonal, inner, data, inverse, fields, p, Ap, x, r, z, restricted, sums)
-        for k in range(12 * groups):
-            coefficients[k] = restricted[k]
-        solve(coarse, first, coefficients)
+        update(alone, alpha, groups, start, fields, p, Ap, w, x, r, y, restricted)
+        _coarse_solution(restricted, coarse, first, coefficients)
+        backward(alone, colors, groups, start, *upper, inverse, fields, coefficients, r, y, s, t, Ut, sums)
         rz = 0.0
-        for g in range(groups):
+        for g in range(len(groups)):
             rz += sums[g]
-        for k in range(12 * groups):
+        for k in range(len(restricted)):
             rz += restricted[k] * coefficients[k]
         for m in range(len(low)):
             weights[m] = _inner(Y[m], r)
         for m in range(len(low)):
+            total = 0.0
             for n in range(len(low)):
-                rz -= weights[m] * S_inverse[m, n] * weights[n]
+                total += S_inverse[m, n] * weights[n]
+            rz -= weights[m] * total
+            _add(-total, Y[m], t)
+            _add(-total, UY[m], Ut)
         norm = rz**0.5 if rz > 0.0 else 0.0
         if iteration == 0:
             first_norm = norm
@@ -263,19 +197,14 @@ def _solve(
             break
         beta = rz / old if iteration > 0 else 0.0
         old = rz
-        _direction(beta, group_start, fields, coefficients, z, p)
-        for m in range(len(low)):
-            total = 0.0
-            for n in range(len(low)):
-                total += S_inverse[m, n] * weights[n]
-            _add(-total, Y[m], p)
-        _product(group_start, row_start, columns, data, p, Ap, sums)
+        forward(alone, colors, beta, start, *lower, diagonal, inverse, t, Ut, p, Up, Ap, w, sums)
         curvature = 0.0
-        for g in range(groups):
+        for g in range(len(groups)):
             curvature += sums[g]
         for m in range(len(low)):
             along = _inner(low[m], p)
             _add(along, low[m], Ap)
+            _add(along, W[m], w)
             curvature += along * along
         if not curvature > 0.0:
             return iteration, False, True, first_norm
