@@ -119,7 +119,8 @@ def scaled(size):
 
 
 def test_a_scene_in_millimetres_has_the_shapes_of_the_scene_in_metres():
-    large, small = (run(scaled(size), 0.02, 15, sp.Implicit(tolerance=1e-7)) for size in (1.0, 1e-3))
+    # Up to here both bodies have hit something. Each impact lets round-off grow a thousandfold or more.
+    large, small = (run(scaled(size), 0.02, 12, sp.Implicit(tolerance=1e-7)) for size in (1.0, 1e-3))
     assert large[-1].report.details.contacts > 0
     for a, b in zip(large, small, strict=True):
         # Where a contact is first met, and so its weight, depends on Newton's method up to its tolerance.

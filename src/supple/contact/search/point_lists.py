@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from supple.contact.search.boxes import boxes_of_pieces
 from supple.contact.search.pair_kernels import RUNS, boxes_of_owners, meets_partner, sort_pairs
 from supple.contact.search.room import Room
-from supple.contact.surface.distances import point_triangle_square, triangle_is_beyond
+from supple.contact.surface.distances import point_triangle_square
 from supple.numerics.adjacency import in_list
 from supple.numerics.geometry.box_tree import (
     STACK,
@@ -101,7 +101,7 @@ def _near_group(group, shapes, radii, rules, same, tree, pieces, found, count, s
             if not (meets >> i) & 1 or p in (a, b, c) or in_list(excluded, t, p):
                 continue
             r = radii[p, 0] + moves
-            if triangle_is_beyond(points, p, triangles, t, r) or point_triangle_square(points, p, triangles, t) > r * r:
+            if point_triangle_square(points, p, triangles, t) > r * r:
                 continue
             if first + count < last:
                 out[first + count, 0] = p

@@ -25,31 +25,6 @@ def edge_edge_square(x, edges, e, f):
     return dot(r, r)
 
 
-@njit(error_model="numpy")
-def triangle_is_beyond(x, v, triangles, t, reach):
-    """Whether triangle t is farther than `reach` from point v along the way to its center.
-
-    Otherwise it may be farther all the same. This costs a part of the distance.
-    """
-    p = row(x, v)
-    a, b = subtract(row(x, triangles[t, 0]), p), subtract(row(x, triangles[t, 1]), p)
-    c = subtract(row(x, triangles[t, 2]), p)
-    w = (a[0] + b[0] + c[0], a[1] + b[1] + c[1], a[2] + b[2] + c[2])
-    nearest = min(dot(a, w), dot(b, w), dot(c, w))
-    return nearest > 0.0 and nearest * nearest > reach * reach * dot(w, w)
-
-
-@njit(error_model="numpy")
-def edge_is_beyond(x, edges, e, f, reach):
-    """Whether two edges are farther than `reach` from each other along the way between their middles; see above."""
-    a, b, c, d = row(x, edges[e, 0]), row(x, edges[e, 1]), row(x, edges[f, 0]), row(x, edges[f, 1])
-    u, v = subtract(b, a), subtract(d, c)
-    w = (c[0] + d[0] - a[0] - b[0], c[1] + d[1] - a[1] - b[1], c[2] + d[2] - a[2] - b[2])
-    square = dot(w, w)
-    gap = square - abs(dot(u, w)) - abs(dot(v, w))
-    return gap > 0.0 and gap * gap > 4.0 * reach * reach * square
-
-
 @njit(cache=True, parallel=True, error_model="numpy")
 def points_nearer(x, triangles, pairs, reach):
     """Which pairs (k, 2) of points and triangles are nearer than `reach`."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from supple.contact.search.pair_kernels import RUNS, sort_pairs
 from supple.contact.search.room import Room
 from supple.contact.search.surfaces import ContactSurfaces
-from supple.contact.surface.distances import edge_edge_square, edge_is_beyond
+from supple.contact.surface.distances import edge_edge_square
 from supple.numerics.adjacency import in_list
 from supple.numerics.geometry.box_tree import STACK, BoxTree, after_leaf, near_boxes, next_leaf, overlap
 from supple.numerics.kernel_cache import njit, prange
@@ -160,7 +160,6 @@ def pairs_within_margins(
                         not together[pieces[e], pieces[f]]
                         or (same and not folded[f])
                         or _share_an_end(ends, e, f)
-                        or edge_is_beyond(x, ends, e, f, reach)
                         or edge_edge_square(x, ends, e, f) > reach * reach
                         or _is_stitched(ends, f, triangles, e, (starts, points))
                         or _is_stitched(ends, e, triangles, f, (starts, points))
