@@ -93,6 +93,7 @@ def test_the_gripper_holds_its_box_and_not_a_slippery_one(monkeypatch):
     assert not lifted.holds
 
 
+@pytest.mark.slow
 def test_cantilever_on_coarser_meshes_bends_less_than_theory(monkeypatch):
     monkeypatch.setattr(cantilever, "MESHES", {"coarse": (16, 3, 1), "medium": (32, 6, 2), "fine": (64, 12, 4)})
     assert cantilever.beam_theory() == pytest.approx(4.031e-4, rel=1e-4)
