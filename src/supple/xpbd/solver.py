@@ -5,14 +5,12 @@ Source: Macklin, Müller, Chentanez, "XPBD" (2016); Macklin et al., "Small Steps
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numba
 import numpy as np
 from numba.core import config
-from numpy.typing import NDArray
 
 from supple.errors import SolverError
 from supple.joints.at_state import refuse_moved_welds
@@ -23,9 +21,7 @@ from supple.solver import Solver
 from supple.state import State, Status, StepReport
 from supple.system import System
 from supple.xpbd.assessment.assessment import Assessment
-from supple.xpbd.assessment.findings import Findings
 from supple.xpbd.assessment.softening import enough
-from supple.xpbd.assessment.surfaces import Overlap, crossings
 from supple.xpbd.assessment.works import Works
 from supple.xpbd.constraints.actuators import ActuatorProjection
 from supple.xpbd.constraints.delivered_work import DeliveredWork
@@ -34,10 +30,13 @@ from supple.xpbd.constraints.stitch_anchors import StitchAnchors
 from supple.xpbd.constraints.stitches import stitch_constraints
 from supple.xpbd.contact.collisions import Collisions
 from supple.xpbd.contact.settings import XPBDContact
-from supple.xpbd.damping.kelvin_voigt import Damping, make_damping
+from supple.xpbd.damping.kelvin_voigt import make_damping
 from supple.xpbd.details import XPBDDetails
 from supple.xpbd.external_forces import ExternalForces
-from supple.xpbd.integration import first_lost, to_world
+from supple.xpbd.frame.advance import advance, disturbed_bodies, overlaps_of
+from supple.xpbd.frame.end import end_frame
+from supple.xpbd.frame.substep_start import load
+from supple.xpbd.integration import first_lost
 from supple.xpbd.limits.rigid_fallback import RigidFallback
 from supple.xpbd.limits.volume_guard import VolumeGuard
 from supple.xpbd.memory import XPBDMemory
@@ -45,11 +44,9 @@ from supple.xpbd.momentum import MomentumRestore
 from supple.xpbd.refusals import check_count, is_number, lost_position_message, refuse_unsupported
 from supple.xpbd.rigid.bodies import RigidBodies
 from supple.xpbd.rigid.joints import JointProjection
-from supple.xpbd.sleep import Sleep, SleepMemory
+from supple.xpbd.sleep import Sleep
 from supple.xpbd.start import raise_if_inside
-from supple.xpbd.substep_limits import collide, hold_in_contact, keep_volumes, move_rigid, note_works, restore
-from supple.xpbd.substep_start import begin_substep, cycles, load, pin_targets, push
-from supple.xpbd.substeps import FALL, SubstepChoice, Substeps
+from supple.xpbd.substeps import SubstepChoice, Substeps
 from supple.xpbd.sweeps.ordering import make_layout, reordered
 from supple.xpbd.welded_masses import WeldedMasses
 from supple.xpbd.workspace import XPBDWorkspace
@@ -191,22 +188,24 @@ class XPBD(Solver):
 
     def _step(self, system: System, state: State, dt: float, ws: XPBDWorkspace) -> tuple[State, StepReport]:
         time = state.time + dt
+        setting = "max_substeps" if self.substeps == "auto" else "substeps"
         memory = state.memory if isinstance(state.memory, XPBDMemory) else XPBDMemory()
         load(ws, state)
         used, repeats = self._first_choice(ws, state, dt, memory), 0
         sleep = ws.sleep.begin(state.positions, state.velocities, state.time, dt, memory.sleep)
-        overlaps = _overlaps(ws, state.time, sleep)
+        overlaps = overlaps_of(ws, state.time, sleep)
         while True:
-            held_back = self._advance(ws, state, dt, used.count, memory, overlaps, sleep)
+            held_back = advance(ws, state, dt, used.count, memory, overlaps, sleep)
             lost = first_lost(ws.points, ws.velocities)
             if lost < 0:
-                disturbed = _disturbed(ws, time, sleep)
+                disturbed = disturbed_bodies(ws, time, sleep)
                 if disturbed.any():
                     sleep = ws.sleep.woken(sleep, disturbed)
                     load(ws, state)
-                    overlaps = _overlaps(ws, state.time, sleep)
+                    overlaps = overlaps_of(ws, state.time, sleep)
                     continue
-                new, report, problem = self._reported(ws, time, dt, held_back, used, repeats, memory, overlaps, sleep)
+                frame = (time, dt, held_back, used, repeats, memory, overlaps, sleep)
+                new, report, problem = end_frame(ws, *frame, self.accuracy, setting)
             else:
                 problem = Status.NOT_FINITE
             most = MOST_FOR_CROSSINGS if problem is Status.INTERSECTING else MOST_REPEATS
@@ -235,154 +234,6 @@ class XPBD(Solver):
             return Substeps(self.max_substeps, f"max_substeps; {wanted.reason} asks for {wanted.count}")
         return wanted
 
-    def _reported(
-        self,
-        ws: XPBDWorkspace,
-        time: float,
-        dt: float,
-        held_back: int,
-        used: Substeps,
-        repeats: int,
-        before: XPBDMemory,
-        overlaps: list[Overlap],
-        sleep: SleepMemory,
-    ) -> tuple[State, StepReport, Status | None]:
-        """The state at the end of a frame, what is wrong with it, and the status that more substeps might cure."""
-        h = dt / used.count
-        to_world(ws.points, ws.origins, ws.world)
-        ws.guard.measure(ws.points, False)
-        ws.works.end_frame(ws.velocities, ws.actuators.works())
-        held, works = held_back / used.count, ws.works.by_name
-        softening = ws.assessment.softening
-        delivered = ws.delivered.end(ws.points, h)
-        measured = softening.after(softening.own(before.measured), delivered, h, sleep.asleep)
-        shares = softening.by_body(h, measured)
-        findings, ledger = ws.assessment.end(
-            ws.moment(time), ws.world, ws.guard.J, h, self.accuracy, held, sleep.asleep, works, measured
-        )
-        findings = replace(findings, apart=ws.joints.apart(ws.world, time, self.accuracy))
-        status = findings.status
-        problem = status if status in (Status.INVERTED, Status.ENERGY_GAINED) else None
-        if crossings(findings.overlaps) > crossings(overlaps):
-            problem = Status.INTERSECTING
-        elif problem is None and held_back:
-            problem = Status.INVERTED
-        elif problem is None and findings.softened:
-            problem = Status.SOFTENED
-        forces, old_points = ws.collisions.forces, ws.layout.old_points
-        x, v = ws.world[ws.layout.new_from_old], ws.velocities[ws.layout.new_from_old]
-        sound = status in (Status.CONVERGED, Status.SOFTENED) and not held_back
-        rest = ws.sleep.end(x, v, time, sleep, forces, sound)
-        damping = self._damping(ws, h)
-        memory = XPBDMemory(
-            contact=ws.collisions.memory(ws.world),
-            viscous=None if damping is None else damping.memory(v),
-            ledger=ledger,
-            measured=measured,
-            substeps=float(used.count) if repeats and problem is None else FALL * before.substeps,
-            sleep=rest,
-            futile=frozenset() if problem is None else before.futile | ({problem} if repeats else set()),
-        )
-        pushes, friction = forces.by_name()
-        details = XPBDDetails(
-            contacts=ws.collisions.contacts + sum(len(part[0]) for part in forces.standing),
-            smallest_gap=ws.collisions.smallest_gap,
-            substeps=used.count,
-            repeats=repeats,
-            substeps_reason=used.reason,
-            softening=shares,
-            energy_gained=findings.gained,
-            held_back=held_back,
-            asleep={part.name: bool(rests) for part, rests in zip(ws.system.bodies, sleep.asleep, strict=True)},
-            contact_forces=pushes,
-            friction_forces=friction,
-            weld_forces=ws.welded.forces(ws.rigid, ws.velocities, dt, sleep.asleep),
-            **ws.actuators.fields(h * used.count),
-            **ws.joints.fields(ws.world, time),
-            work=works,
-            energy_residual=ws.works.residual,
-        )
-        world, surfaces = ws.collisions.obstacles.places(ws.world).copy(), ws.collisions.positions
-        message = findings.message(time, self._remedy(findings, used.count, shares))
-        report = StepReport(
-            status,
-            used.count,
-            message,
-            details=details,
-            contacts=lambda: forces.points(world, surfaces, old_points),
-        )
-        return State(time, x, v, memory=memory, hinge_angles=ws.joints.hinge_angles()), report, problem
-
-    def _remedy(self, findings: Findings, used: int, shares: Mapping[str, float]) -> str:
-        """What helps against what was found."""
-        count = enough(used, shares, self.accuracy)
-        if findings.status is not Status.SOFTENED:
-            count = max(count, 2 * used)
-        return f"take {'max_substeps' if self.substeps == 'auto' else 'substeps'}={count}"
-
-    def _advance(
-        self,
-        ws: XPBDWorkspace,
-        state: State,
-        dt: float,
-        substeps: int,
-        memory: XPBDMemory,
-        overlaps: list[Overlap],
-        sleep: SleepMemory,
-    ) -> int:
-        """Simulate the substeps of a frame from a state; returns in how many the motion of a body was shortened."""
-        h, held_back = dt / substeps, 0
-        load(ws, state)
-        ws.set_asleep(sleep.asleep)
-        targets = pin_targets(ws.system, state.time, h, substeps)
-        collides = bool(ws.collisions)
-        if collides:
-            crossing = [each.numbers for each in overlaps if each.pairs]
-            ws.collisions.begin_step(ws.world, ws.velocities, state.time, dt, memory.contact, crossing, sleep.asleep)
-            ws.collisions.forces.keep_standing((sleep.contacts, sleep.loads), sleep.asleep)
-        ws.guard.measure(ws.points, False)
-        ws.guard.guarded[:] = ws.assessment.begin(ws.moment(state.time), ws.guard.J, h, memory.ledger)
-        ws.guard.accept()
-        ws.begin_frame(state.time, state.time + dt, h)
-        ws.joints.begin_frame(state, sleep.asleep)
-        damping, lengths = self._damping(ws, h), cycles(substeps)
-        if damping is not None:
-            damping.begin_step(memory.viscous, state.velocities)
-        for k, parallel in ws.pace.tasks(0 if sleep.asleep.all() else substeps, ws.most_threads):
-            end = state.time + (k + 1) * h
-            if damping is not None and k in lengths:
-                moving = ws.anchors.velocities(end - h, h)
-                damping.begin_cycle(ws.extended, ws.velocities, moving, lengths[k], h, parallel)
-            begin_substep(ws, targets[k], end, h, parallel)
-            at = ws.substep(end, h)
-            ws.loads.add_forces(at)
-            push(ws, damping, h)
-            if k == substeps - 1:
-                ws.delivered.begin(ws.extended)
-            for constraints in ws.sets:
-                constraints.project(ws.extended, h, parallel)
-            ws.actuators.project_within(at)
-            restore(ws, h, parallel)
-            ws.loads.pull_to_targets(at)
-            ws.loads.pull_springs(at)
-            ws.actuators.project_between(at)
-            move_rigid(ws, end, h)
-            if collides and not collide(ws, end, h, parallel):
-                break
-            hold_in_contact(ws, end, h)
-            held_back += keep_volumes(ws, end, h, parallel)
-            if collides:
-                ws.collisions.end_substep()
-            ws.joints.end_substep(ws.points, ws.origins, end)
-            note_works(ws, at, damping)
-            ws.assessment.balance.note_contacts(ws.collisions.contacts)
-        return held_back
-
-    @staticmethod
-    def _damping(ws: XPBDWorkspace, h: float) -> Damping | None:
-        """Damping in substeps of h [s]; None where XPBD itself damps as much, which is like tau = h."""
-        return ws.damping if ws.damping is not None and ws.damping.tau > h else None
-
     def initial_details(self, system: System, workspace: XPBDWorkspace) -> XPBDDetails:
         """No contacts; see `Solver.initial_details`."""
         pushes, friction = workspace.collisions.forces.by_name()
@@ -396,17 +247,3 @@ class XPBD(Solver):
             **workspace.joints.initial_fields(workspace.welded.inner(system.start_states[-1])),
             work=no_works(system),
         )
-
-
-def _overlaps(ws: XPBDWorkspace, time: float, sleep: SleepMemory) -> list[Overlap]:
-    """What is through what at the world positions of the workspace."""
-    return ws.assessment.overlaps(ws.world, time, sleep.asleep) if ws.collisions else []
-
-
-def _disturbed(ws: XPBDWorkspace, time: float, sleep: SleepMemory) -> NDArray[np.bool_]:
-    """(b,) the sleeping bodies that something awake pushed, or is through, at the end of a frame."""
-    if not sleep.asleep.any() or sleep.asleep.all():
-        return np.zeros(len(sleep.islands), dtype=np.bool_)
-    to_world(ws.points, ws.origins, ws.world)
-    crossing = [overlap.numbers for overlap in _overlaps(ws, time, sleep)]
-    return ws.sleep.disturbed(sleep, [*ws.collisions.forces.pairs(), *crossing])

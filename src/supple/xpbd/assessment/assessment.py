@@ -28,7 +28,7 @@ class Ledger:
     ----------
     tangled : names of the bodies that began with inverted tets and still have some
     excess : energy that came from nowhere and has not been lost since [J]
-    scale : the largest energy so far, to compare the excess with [J]
+    scale : the largest energy so far without the excess of its time, to compare the excess with [J]
     """
 
     tangled: frozenset[str] = frozenset()
@@ -95,14 +95,15 @@ class Assessment:
         before = self._ledger
         tangled = before.tangled & tangled_bodies(self.system, J)
         gain, energy, gainer = self.balance.end(moment, works)
-        scale = max(before.scale, energy)
-        excess = max(0.0, before.excess + (gain if not 0.0 < gain < LEAST_GAIN * scale else 0.0))
+        counts = not 0.0 < gain < LEAST_GAIN * max(before.scale, energy)
+        excess = max(0.0, before.excess + (gain if counts else 0.0))
+        scale = max(before.scale, energy - max(before.excess, excess))
         lacks = zip(self.softening.shares(h, measured).tolist(), self.softening.names, strict=True)
         findings = Findings(
             inverted=count_inverted(self.system, J, tangled),
             overlaps=self._surfaces.find(world, moment.time, asleep),
             held=held,
-            gained=excess / scale if scale > 0.0 else 0.0,
+            gained=excess / (scale + excess) if excess > 0.0 else 0.0,
             gainer=self.system.bodies[gainer].name,
             softened=[(share, name) for share, name in lacks if share > accuracy],
         )
