@@ -55,6 +55,8 @@ def read(data: bytes) -> NamedSets:
     if form.version == "4.0":
         raise FormatError("groups of version 4.0 cannot be read; save it as version 4.1 or 2.2")
     tags = node_tags(data, form)
+    if not len(tags):
+        raise FormatError("it has no nodes")
     order = np.argsort(tags, kind="stable")
     ordered = tags[order]
     names = _names(data)
