@@ -55,8 +55,6 @@ def read(data: bytes) -> NamedSets:
     if form.version == "4.0":
         raise FormatError("groups of version 4.0 cannot be read; save it as version 4.1 or 2.2")
     tags = node_tags(data, form)
-    if not len(tags):
-        raise FormatError("it has no nodes")
     order = np.argsort(tags, kind="stable")
     ordered = tags[order]
     names = _names(data)
@@ -66,6 +64,8 @@ def read(data: bytes) -> NamedSets:
     solid = [block for block in blocks if block.kind == kind]
     if not solid:
         raise FormatError("it has no tetrahedra")
+    if not len(ordered):
+        raise FormatError("it has no nodes")
 
     def places(nodes: NDArray[np.int64]) -> NDArray[np.int64]:
         found = np.minimum(np.searchsorted(ordered, nodes), len(ordered) - 1)
