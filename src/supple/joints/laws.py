@@ -77,9 +77,9 @@ class Laws:
         return made, np.array(multipliers, dtype=np.float64)
 
     @property
-    def holding(self) -> Laws:
-        """Conditions and limits, without motors and friction."""
-        return self.selected(self.adapts & ~self.is_motor & (np.isinf(self.low) | np.isinf(self.high)))
+    def holds(self) -> NDArray[np.bool_]:
+        """(l,) which are conditions and limits, not motors and friction."""
+        return self.adapts & ~self.is_motor & (np.isinf(self.low) | np.isinf(self.high))
 
     def selected(self, chosen: NDArray[np.bool_]) -> Laws:
         """Those where `chosen` (l,) is true."""

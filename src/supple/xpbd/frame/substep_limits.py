@@ -20,8 +20,10 @@ from supple.xpbd.workspace import XPBDWorkspace
 MOST_PROJECTIONS = 10
 # After how many of these projections contacts of surfaces are searched, which costs about ten times as much.
 SEARCH_EACH = 3
-# How often joints and contacts are projected in turn in a substep with contact.
-JOINT_PASSES = 3
+# How often joints and contacts are projected in turn in a substep with contact, at most, and below which correction of a
+# joint, as a share of its size, they are not projected again. What a heavy body and a joint push at from both sides
+# takes as many as the ratio of the masses.
+JOINT_PASSES, JOINT_EXACT = 100, 1e-5
 # Of the motion of components that have passed through each other in spite of that: the shares that are tried, before
 # none is left.
 SHARES = (0.5, 0.25, 0.1, 0.01)
@@ -41,9 +43,9 @@ def move_rigid(ws: XPBDWorkspace, time: float, h: float) -> None:
 def hold_in_contact(ws: XPBDWorkspace, time: float, h: float) -> None:
     """Project joints and contacts in turn, where contacts have moved what joints hold."""
     for _ in range(JOINT_PASSES if len(ws.joints) and ws.collisions.contacts else 0):
-        ws.joints.project_again(ws.points, ws.previous, ws.velocities, ws.origins, time, h)
+        moved = ws.joints.project_again(ws.points, ws.previous, ws.velocities, ws.origins, time, h)
         ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
-        if not collide_again(ws, time, h):
+        if not collide_again(ws, time, h) or moved <= JOINT_EXACT:
             return
 
 

@@ -43,8 +43,11 @@ def changes_by(rows: JointRows, twists: Floats) -> Floats:
 
 @njit(cache=True)
 def solve_joint_rows(rows, impulses, twists, most):
-    """Solve the rows, in place: impulses (r,) [kg m] and twists (b, 6), displacement and rotation of bodies."""
-    count = len(rows.total)
+    """Solve the rows, in place: impulses (r,) [kg m] and twists (b, 6), displacement and rotation of bodies.
+
+    Returns the largest correction of the first sweep, as a share of the joint's size.
+    """
+    count, first = len(rows.total), 0.0
     for sweep in range(most):
         largest = 0.0
         for k in range(count):
@@ -67,5 +70,8 @@ def solve_joint_rows(rows, impulses, twists, most):
                 if b >= 0:
                     for i in range(6):
                         twists[b, i] += rows.answers[r, side, i] * change
+        if sweep == 0:
+            first = largest
         if largest <= _EXACT:
             break
+    return first

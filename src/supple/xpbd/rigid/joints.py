@@ -63,7 +63,8 @@ class JointProjection:
         self._total = np.zeros((len(g.joints), 6))
         self._motors = np.zeros(len(g.joints))
         self._substeps = 0
-        self._holding = Laws.of([])[0]
+        # Conditions and limits of the substep, and their impulses so far.
+        self._holding, self._held = Laws.of([])[0], np.zeros(0)
 
     def __len__(self) -> int:
         return len(self.geometry.joints)
@@ -91,21 +92,30 @@ class JointProjection:
         """
         begun = self._functions(previous + origins, end - h)
         laws, multipliers = laws_of(self.geometry, np.ones(len(self)), begun, (end - h, end), moving=True)
-        self._holding = laws.holding
         rows, now, first = self._rows(points[:, :3] + origins, previous + origins, end, h, laws, multipliers)
-        forces, twists = self._solve(rows, laws, first, points, previous, velocities, origins, h)
+        impulses, twists, _ = self._solve(rows, laws, first, points, previous, velocities, origins, h)
+        holds = laws.holds
+        self._holding, self._held = laws.selected(holds), impulses[first:][holds]
         self._substeps += 1
         changes = now[laws.function] + changes_by(rows, twists)[first:] - begun[laws.function]
-        return float((forces[first:] * changes)[laws.is_motor].sum())
+        return float((impulses[first:] * changes)[laws.is_motor].sum()) / h**2
 
     def project_again(
         self, points: Floats, previous: Floats, velocities: Floats, origins: Floats, end: float, h: float
-    ) -> None:
-        """`project` for positions that have changed since: conditions and limits, without friction and motors."""
+    ) -> float:
+        """`project` for positions that have changed since: conditions and limits, without friction and motors.
+
+        Limits take back what they have pushed too much: only their impulse in total has a sign. Otherwise a push of a
+        contact that sweeps reduce later would leave energy. Returns the largest correction, as a share of the joint's size.
+        """
         laws = self._holding
         zero = np.zeros(len(laws.k))
         rows, _, first = self._rows(points[:, :3] + origins, previous + origins, end, h, laws, zero)
-        self._solve(rows, laws, first, points, previous, velocities, origins, h)
+        rows.low[first:] -= self._held
+        rows.high[first:] -= self._held
+        impulses, _, largest = self._solve(rows, laws, first, points, previous, velocities, origins, h)
+        self._held += impulses[first:]
+        return largest
 
     def _solve(
         self,
@@ -117,18 +127,17 @@ class JointProjection:
         velocities: Floats,
         origins: Floats,
         h: float,
-    ) -> tuple[Floats, Floats]:
-        """Solve the rows and move the bodies; the forces (r,) and the twists (b, 6)."""
+    ) -> tuple[Floats, Floats, float]:
+        """Solve the rows and move the bodies; impulses (r,) [kg m], twists (b, 6), and what `solve_joint_rows` returns."""
         impulses, twists = np.zeros(len(rows.total)), np.zeros((len(self._rigid), 6))
-        solve_joint_rows(rows, impulses, twists, max(_MOST_SWEEPS, _SWEEPS_PER_JOINT * len(self)))
-        forces = impulses / h**2
-        self._note(rows, forces, laws, first_law, points[:, :3] + origins)
+        largest = solve_joint_rows(rows, impulses, twists, max(_MOST_SWEEPS, _SWEEPS_PER_JOINT * len(self)))
+        self._note(rows, impulses / h**2, laws, first_law, points[:, :3] + origins)
         control = self._rigid.control
         arms = previous[control] - previous[control].mean(axis=1, keepdims=True)
         moved = twists[:, None, :3] + np.cross(twists[:, None, 3:], arms)
         points[control, :3] += moved
         velocities[control] += moved / h
-        return forces, twists
+        return impulses, twists, largest
 
     def end_substep(self, points: Floats, origins: Floats, end: float) -> None:
         """Follow the angles of hinges over all turns."""
