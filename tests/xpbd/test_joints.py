@@ -244,7 +244,7 @@ def test_joints_that_contradict_each_other_are_named():
 
 @pytest.mark.parametrize("density", [1000.0, 8000.0])
 def test_a_heavy_body_on_a_bar_at_its_limit_gains_no_energy(density):
-    """8 and 64 kg hit a bar of 2.5 kg between them and the limit. Limits that only pushed left 8 times the energy of the blow."""
+    """8 and 64 kg hit a bar of 2.5 kg, that its limit holds. Limits that only pushed left 8 times its energy."""
     box = sp.shapes.box_surface((0.2, 0.2, 0.2), (1, 1, 1))
     heavy = sp.RigidBody("box", box, density=density, position=(0.8, 0.136, 0), velocity=(0, -0.5, 0))
     scene = sp.Scene([bar(), heavy], joints=[hinge(axis=(0, 0, 1), limits=(0, 1))])

@@ -20,8 +20,8 @@ from supple.xpbd.workspace import XPBDWorkspace
 MOST_PROJECTIONS = 10
 # After how many of these projections contacts of surfaces are searched, which costs about ten times as much.
 SEARCH_EACH = 3
-# How often joints and contacts are projected in turn in a substep with contact, at most, and below which correction of a
-# joint, as a share of its size, they are not projected again. What a heavy body and a joint push at from both sides
+# How often joints and contacts are projected in turn in a substep with contact, at most, and below which correction of
+# a joint, as a share of its size, they are not projected again. What a heavy body and a joint push at from both sides
 # takes as many as the ratio of the masses.
 JOINT_PASSES, JOINT_EXACT = 100, 1e-5
 # Of the motion of components that have passed through each other in spite of that: the shares that are tried, before

@@ -106,7 +106,8 @@ class JointProjection:
         """`project` for positions that have changed since: conditions and limits, without friction and motors.
 
         Limits take back what they have pushed too much: only their impulse in total has a sign. Otherwise a push of a
-        contact that sweeps reduce later would leave energy. Returns the largest correction, as a share of the joint's size.
+        contact that sweeps reduce later would leave energy. Returns the largest correction, as a share of the joint's
+        size.
         """
         laws = self._holding
         zero = np.zeros(len(laws.k))
@@ -128,7 +129,7 @@ class JointProjection:
         origins: Floats,
         h: float,
     ) -> tuple[Floats, Floats, float]:
-        """Solve the rows and move the bodies; impulses (r,) [kg m], twists (b, 6), and what `solve_joint_rows` returns."""
+        """Solve the rows and move the bodies; impulses (r,) [kg m], twists (b, 6), and the largest correction."""
         impulses, twists = np.zeros(len(rows.total)), np.zeros((len(self._rigid), 6))
         largest = solve_joint_rows(rows, impulses, twists, max(_MOST_SWEEPS, _SWEEPS_PER_JOINT * len(self)))
         self._note(rows, impulses / h**2, laws, first_law, points[:, :3] + origins)
