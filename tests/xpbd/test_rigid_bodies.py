@@ -306,3 +306,20 @@ def test_boxes_that_fall_on_each_other_do_not_pass_through_each_other():
     assert max(frame.report.details.contacts for frame in frames) > 4
     assert max(frame.report.details.held_back for frame in frames) == 0
     assert min(points[:, 1].min() for frame in frames for points in frame.positions.values()) >= 0.0
+
+
+@pytest.mark.parametrize(("ratio", "turn"), [(1.0, 0.0), (4.0, 0.5)])
+def test_a_box_that_lies_off_the_center_of_another_rests(ratio, turn):
+    """It slid off at 3 to 7 mm/s: forces that one body passes on to the floor were taken for those of a blow."""
+    cube = sp.shapes.box_surface((0.1, 0.1, 0.1), (2, 2, 2))
+    low = sp.RigidBody("low", cube, density=1000.0, position=(0, 0.05, 0), friction=0.5)
+    high = sp.RigidBody(
+        "high", cube, density=1000.0 * ratio, position=(0.02, 0.155, 0.002), rotation=(0, turn, 0), friction=0.5
+    )
+    scene = sp.Scene([low, high], [sp.HalfSpace(friction=0.5)])
+    frames = list(sp.simulate(scene, sp.XPBD(sleep_after=None), 1 / 60, 40))
+    assert {frame.report.status for frame in frames} == {"converged"}
+    for name in ("low", "high"):
+        moved = frames[-1].poses[name].translation - frames[25].poses[name].translation
+        assert np.abs(moved).max() < 1e-6
+        assert np.abs(frames[-1].poses[name].velocity).max() < 1e-5

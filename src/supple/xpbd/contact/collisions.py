@@ -31,9 +31,10 @@ REMOVED_PER_FRAME, NEAR, DEFAULT_THICKNESS = 0.05, 1.0, 0.05
 SKIN = 0.01
 
 # How often contacts of surfaces and of simple shapes are solved again in turn, where bodies are rigid: without an
-# elastic body between them, a push has to pass from one contact to the next within a substep. At least, and at most
-# while something has passed through something.
-RIGID_PASSES, MOST_RIGID_PASSES = 2, 40
+# elastic body between them, a push has to pass from one contact to the next within a substep. At least; at most while a
+# gap between two of them still changes by more than a fall from rest in a substep; and at most while something has
+# passed through something. Without gravity, gaps are exact that change by less than this fraction of the skin.
+RIGID_PASSES, CONVERGING_PASSES, MOST_RIGID_PASSES, EXACT = 2, 4, 40, 0.01
 
 
 class Collisions:
@@ -77,6 +78,7 @@ class Collisions:
         self._smallest = math.inf
         self._dt = self._removed = 0.0
         count = len(self.obstacles.embedded)
+        self._falling = math.hypot(*system.gravity)
         self._reach = np.zeros(count)
         self._gathered = np.zeros((count, 3))
 
@@ -132,6 +134,8 @@ class Collisions:
         h : length of the substep [s]
         """
         self._removed = REMOVED_PER_FRAME * self.edge_length * min(1.0, h / self._dt)
+        if self.obstacles:
+            self.obstacles.predict(x, x_prev, h)
         bodies = self.surfaces is not None and self.surfaces.begin_substep(x, x_prev, h)
         obstacles = bool(self.obstacles) and self.obstacles.begin_substep(x, x_prev, h)
         return obstacles or bodies
@@ -170,7 +174,9 @@ class Collisions:
         if self.surfaces is not None:
             most = MOST_RIGID_PASSES if self._any_rigid and between else 0
             if self.contacts > between:
-                for _ in range(min(RIGID_PASSES, most)):
+                for k in range(min(CONVERGING_PASSES, most)):
+                    if k >= RIGID_PASSES and self.surfaces.changed <= self._falling * h * h + EXACT * self.skin:
+                        break
                     self.project_again(x, x_prev, time, h)
                 # What obstacles push may have passed through other bodies.
                 self.surfaces.check_parted(x)
@@ -235,7 +241,7 @@ class Collisions:
         return ContactMemory(surfaces, obstacles) if self else None
 
     def _gather_obstacles(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float) -> None:
-        falling = 0.5 * math.hypot(*self.system.gravity) * self._dt**2
+        falling = 0.5 * self._falling * self._dt**2
         least = LEAST_REACH * self.edge_length + falling
         x, v = self.obstacles.places(x), self.obstacles.places(v)
         self._reach = least + 1.2 * self._dt * np.sqrt(np.einsum("ij,ij->i", v, v))

@@ -186,12 +186,18 @@ class ObstacleContacts:
         shapes = np.searchsorted(self._starts, k, side="right") - 1
         return ShapeLoads(shapes.astype(np.int64), self._vertices[k], self._loads[k], self._places[k])
 
-    def begin_substep(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> bool:
-        """See `Collisions.begin_substep`."""
+    def predict(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> None:
+        """Take notice of the prediction of a substep, before any forces of contacts; see `begin_substep`.
+
+        What other bodies press onto an obstacle approaches it by their forces. This is no impact either.
+        """
         self._moved.take(x, self._predicted)
         self._moved.take(x_prev, self._begun)
         # What rests on a point approaches it in every substep by its fall; this is no impact.
         self._predicted[len(x) :] -= h * h * self._gravity
+
+    def begin_substep(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> bool:
+        """See `Collisions.begin_substep`."""
         if self._any_load:
             count, places = self._starts[-1], self._take(x, x_prev)
             add_loads(places[0], self._moved.movers, self._vertices[:count], self._loads[:count], h)

@@ -107,8 +107,8 @@ class SurfaceCollisions:
         # The contacts between pieces that sleep.
         self._standing = LoadedRows.none()
         self._smallest = np.zeros(n)
-        # Whether nothing had passed through anything after the last projection.
-        self.parted = True
+        # Whether nothing had passed through anything after the last projection; how much it changed a gap, at most [m].
+        self.parted, self.changed = True, 0.0
         # Of the last search: the rows of each kind that take part.
         self._chosen = [np.zeros(0, dtype=np.int64)] * 2
         self._far, self._near = np.zeros((n, 3)), np.zeros((n, 3))
@@ -219,6 +219,7 @@ class SurfaceCollisions:
         Sweeps are more where something has passed through something: it takes many to push a pile apart.
         """
         self._take(x, x_prev)
+        self.changed = 0.0
         sweeps = SWEEPS if self.parted else MORE_SWEEPS
         contacts = sum(self._solve(kind, h, 0.0, sweeps)[0] for kind, chosen in enumerate(self._chosen) if len(chosen))
         self._give(x, x_prev)
@@ -280,13 +281,14 @@ class SurfaceCollisions:
         self._moved.give(self._x, self._before, x, x_prev)
 
     def _solve(self, kind: int, h: float, limit: float, sweeps: int = SWEEPS) -> tuple[int, float]:
-        """Project the chosen rows of one kind; returns what `solve_rows` does."""
+        """Project the chosen rows of one kind; returns how many push, and the smallest gap before the substep."""
         chosen, described = self._chosen[kind], self._rows.described
         places = (self._x, self._before, self._predicted, self._begun)
-        found = solve_rows(*places, self._points, chosen, described, h, limit, sweeps)
+        *found, changed = solve_rows(*places, self._points, chosen, described, h, limit, sweeps)
         note_depths(self._x, self._movers, chosen, described, self._depth[kind])
         self._settle()
-        return found
+        self.changed = max(self.changed, changed)
+        return found[0], found[1]
 
     def _find_passages(self, kind: int, part: tuple[int, int], h: float) -> bool:
         """Let points and edges that have passed through something take part. Returns whether there are any."""

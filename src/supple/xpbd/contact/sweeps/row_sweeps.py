@@ -20,10 +20,17 @@ from supple.xpbd.contact.impulses import (
 from supple.xpbd.contact.response_rates import kept_share
 from supple.xpbd.contact.sweeps.rigid_rows import empty_rows, prepare_row, push_bodies, slip_of, softness_along
 
+# Of the gap that is kept: an overlap of this size remains where a body is rigid. A shift that removes it lifts the body
+# off its other contacts, onto which it falls in the next substep, so that nothing would come to rest.
+REMAINS = 0.3
+
 
 @njit(cache=True, error_model="numpy")
 def solve_rows(x, x_prev, predicted, begun, points, chosen, rows, h, limit, sweeps):
-    """Sweep over the chosen rows, in place. Returns how many push, and the smallest gap before the substep (or inf).
+    """Sweep over the chosen rows, in place.
+
+    Returns how many push, the smallest gap before the substep (or inf), and the largest change of a gap between rigid
+    bodies in the first sweep [m].
 
     An overlap that existed when the substep began is removed at both ends of the substep alike, by at most `limit`;
     what such shifts have brought nearer than it was, at once. The impulse only prevents the gap from becoming smaller
@@ -62,9 +69,10 @@ def solve_rows(x, x_prev, predicted, begun, points, chosen, rows, h, limit, swee
             totals[k] = compliance(movers, vertices, weights, e, n)
             before = relative_before(x_prev, movers, vertices, weights, e)
         gaps[k] = dot(before, n) - offsets[e]
-    for _ in range(sweeps):
+    largest = 0.0
+    for sweep in range(sweeps):
         for k in range(count):
-            e = chosen[k]
+            e, push = chosen[k], pushes[k]
             if not totals[k] > 0.0:
                 continue
             if rigid.bodies[k, 0] >= -1:
@@ -72,6 +80,8 @@ def solve_rows(x, x_prev, predicted, begun, points, chosen, rows, h, limit, swee
             else:
                 places = (x, x_prev, movers, vertices, weights)
                 _solve(places, e, k, row(normals, e), offsets[e], gaps[k], totals[k], friction[e], pushes, holds)
+            if sweep == 0 and rigid.bodies[k, 0] >= -1:
+                largest = max(largest, abs(pushes[k] - push) * totals[k])
     contacts = 0
     for k in range(count):
         e = chosen[k]
@@ -86,7 +96,7 @@ def solve_rows(x, x_prev, predicted, begun, points, chosen, rows, h, limit, swee
         shares[e] = share
         for j in range(3):
             forces[e, j] = (pushes[k] * normals[e, j] + holds[k, j]) / h2
-    return contacts, smallest
+    return contacts, smallest, largest
 
 
 @njit
@@ -103,6 +113,8 @@ def _remove_overlaps(x, x_prev, predicted, begun, movers, chosen, rows, limit):
         total = shift_compliance(movers, vertices, weights, e)
         begun_gap = dot(difference(begun, vertices, weights, e), n)
         old = min(offsets[e] - before, limit + max(0.0, begun_gap - before))
+        if is_rigid(movers, vertices, e):
+            old = min(old, max(0.0, begun_gap - before) + max(0.0, (1.0 - REMAINS) * offsets[e] - begun_gap))
         if old > 0.0 and total > 0.0:
             s = old / total
             shift_both(x, x_prev, predicted, movers, vertices, weights, e, (s * n[0], s * n[1], s * n[2]))
