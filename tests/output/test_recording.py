@@ -73,6 +73,13 @@ def test_the_scene_reads_back_equal(recorded, recording):
     assert recording.dt == pytest.approx(1 / 30)
 
 
+def test_the_solver_of_the_simulation_is_recorded(tmp_path, tools):
+    path, solver = tmp_path / "r.vtkhdf", tools.Prescribed()
+    list(simulate(tools.small_scene(), solver, 1 / 30, 1, sinks=[Recorder(path)]))
+    with sp.read_recording(path) as recording:
+        assert recording.solver == str(solver)
+
+
 def test_every_kind_of_obstacle_reads_back_equal(tmp_path, tools):
     obstacles = [
         sp.HalfSpace(name="floor", point=(0.1, -1, 0), normal=(0.1, 1, 0.2), friction=0.3),

@@ -55,7 +55,7 @@ def scene() -> Scene:
         friction=0.5,
     )
     seam = SoftVertexTriangleStitch(
-        "hat", "bear", max_distance=0.004, youngs=3e3, poisson=0.3, min_separate_distance=1e-3, damping=0.005
+        "hat", "bear", max_distance=0.004, youngs=1e4, poisson=0.3, min_separate_distance=1e-3, damping=0.005
     )
     return Scene(
         bodies=[bear, hat],

@@ -176,6 +176,15 @@ def test_frames_in_another_order(landing, corrupted):
     assert "from where its velocities lead" in report["sequence"].where
 
 
+def test_a_static_solution_of_a_body_that_begins_with_a_velocity(tmp_path):
+    bar = sp.shapes.box((0.3, 0.1, 0.1), (2, 1, 1))
+    held = sp.Pin("bar", np.flatnonzero(bar.vertices[:, 0] < -0.1))
+    scene = sp.Scene([sp.Body("bar", bar, JELLY, velocity=(1, 0, 0))], pins=[held])
+    path = tmp_path / "static.vtkhdf"
+    list(sp.simulate(scene, sp.Implicit("static", contact=None), 1 / 60, 2, sinks=[sp.Recorder(path)]))
+    assert failures(path) == {}
+
+
 def test_a_step_that_did_not_converge(free, corrupted):
     def change(file, n):
         file["supple/frames/status"][5] = 1

@@ -78,3 +78,38 @@ def test_a_round_solid_between_vertices_is_found(solid):
     cube = sp.shapes.box((1.0, 1.0, 1.0), (1, 1, 1))
     (text,) = found(sp.Scene([sp.Body("a", cube, JELLY)], [solid]))
     assert text.startswith("body 'a' passes through obstacle 'solid' (")
+
+
+def stitched(x_of_high=None):
+    """Two cubes face to face, stitched at the corners of one edge; `x_of_high` moves the upper one."""
+    low = sp.Body("low", CUBE, JELLY)
+    high = sp.Body("high", CUBE, JELLY, position=(0, 1, 0))
+    x = CUBE.vertices
+    edge = np.flatnonzero((np.abs(x[:, 0]) > 0.4) & (x[:, 1] < -0.4) & (x[:, 2] < -0.4))
+    above = np.flatnonzero((np.abs(x[:, 0]) > 0.4) & (x[:, 1] > 0.4) & (x[:, 2] < -0.4))
+    seam = sp.VertexVertexStitch("high", "low", pairs=np.column_stack([edge, above]), stiffness=1e3)
+    scene = sp.Scene([low, high], stitches=[seam])
+    moved = initial_state(scene).positions.copy()
+    if x_of_high is not None:
+        moved[len(x) :] = x_of_high(moved[len(x) :])
+    return found(scene, x=moved)
+
+
+def test_stitched_bodies_may_meet_at_the_seam_and_not_beside_it():
+    assert stitched() == []
+    # Corners at the seam go into the other body; then the whole face does.
+    assert stitched(lambda x: x - 1e-3 * ((x[:, 1] < 0.6) & (x[:, 2] < -0.4))[:, None] * [0, 1, 0]) == []
+    (text,) = stitched(lambda x: x - [0.05, 0.1, 0.05])
+    assert text.startswith("body 'low' passes through body 'high' (")
+
+
+def test_welded_bodies_may_meet_at_the_weld_and_not_beside_it():
+    rigid = sp.RigidBody("rigid", sp.shapes.box_surface((1, 1, 1), (1, 1, 1)), density=1000, position=(0, -1.05, 0))
+    bottom = np.flatnonzero((CUBE.vertices[:, 1] < -0.4) & (CUBE.vertices[:, 0] < -0.4))
+    scene = sp.Scene([sp.Body("soft", CUBE, JELLY), rigid], welds=[sp.Weld("soft", "rigid", bottom)])
+    start = initial_state(scene).positions
+    assert found(scene, x=start) == []
+    sunk = start.copy()
+    sunk[: len(CUBE.vertices)] -= 0.1 * (CUBE.vertices[:, :1] > 0.4) * [0, 1, 0]
+    (text,) = found(scene, x=sunk)
+    assert text.startswith("body 'soft' passes through body 'rigid' (")

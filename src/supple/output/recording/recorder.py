@@ -95,7 +95,7 @@ class Recorder:
     ----------
     path : of the file, ending in .vtkhdf (or .hdf, .hdf5, .h5). Its folder is made where it is missing.
     scene_text : the scene file's text, kept in the recording.
-    solver : a description of the solver, kept in the recording.
+    solver : a description of the solver, kept in the recording; by default that of the first frame.
     compress : compress the frames when the simulation ends. The file is smaller and takes longer to write.
     fields : names of `supple.readings.fields.FIELDS`, such as "von_mises" and "contact_force", that every frame has in
         addition, in single precision. Their cost in bytes is logged when the simulation begins.
@@ -134,7 +134,9 @@ class Recorder:
 
         system = first.system
         self._details = RecordedDetails.like(first.report.details)
-        facts = {"supple_version": __version__, "dt": float(dt), "steps": int(steps), "solver": self._solver}
+        # The limits of `check_recording` depend on the solver.
+        solver = str(first.solver) if self._solver is None and first.solver is not None else self._solver
+        facts = {"supple_version": __version__, "dt": float(dt), "steps": int(steps), "solver": solver}
         facts["details"] = self._details.header()
         facts["fields"] = [field.name for field in self._fields]
         facts["sensors"] = [sensor.described() for sensor in recorded_sensors(system.scene)]

@@ -14,6 +14,7 @@ from supple.numerics.geometry.triangle_crossings import CROSSING, crossing_trian
 from supple.numerics.kernel_cache import njit
 from supple.scene.contact_pairs import pair_table
 from supple.system import System
+from supple.xpbd.assessment.seams import Seams
 from supple.xpbd.contact.settings import XPBDContact
 
 # Of the mean surface edge: how deep a vertex may be in an obstacle. Old overlaps are removed slowly.
@@ -54,7 +55,8 @@ def crossings(overlaps: Iterable[Overlap]) -> int:
 class SurfaceCheck:
     """The surfaces of a system that must stay apart, in the solver's numbering.
 
-    Stitched things, pairs without contact, and what `settings` turns off, are left out.
+    Obstacles with what is stitched to them, pairs without contact, and what `settings` turns off, are left out; of
+    bodies that are stitched or welded to each other, the triangles at the seam.
     """
 
     def __init__(self, system: System, settings: XPBDContact | None, edge_length: float) -> None:
@@ -62,7 +64,7 @@ class SurfaceCheck:
         self.tolerated = TOLERATED_DEPTH * edge_length
         self._poses = ObstaclePoses(system.obstacles)
         self._names = [f"body {part.name!r}" for part in system.bodies] + [o.label for o in system.obstacles]
-        self._collide = colliding_pairs(system, settings)
+        self._collide = colliding_pairs(system, settings, joined=True)
         bodies, n = len(system.bodies), len(system.points)
         triangles, points, self._owners = [system.triangles], [], []
         owner = [np.repeat(np.arange(bodies), [part.triangles.stop - part.triangles.start for part in system.bodies])]
@@ -78,6 +80,8 @@ class SurfaceCheck:
             owner.append(np.full(len(mesh.triangles), bodies + k))
         self._triangles = np.ascontiguousarray(np.concatenate(triangles), dtype=np.int32)
         self._owner = np.concatenate(owner).astype(np.int32)
+        joins = len(system.stitching) or len(system.welding)
+        self._seams = Seams(system, self._owner[: len(system.triangles)]) if joins else None
         pairs = self._collide[np.ix_(owned := np.unique(self._owner), owned)]
         self._may_cross = bool(pairs.any())
         self._fixed = np.concatenate(points) if points else np.zeros((0, 3))
@@ -116,7 +120,9 @@ class SurfaceCheck:
         if not chosen.any():
             return []
         picked = np.flatnonzero(chosen)
-        pairs, kinds = crossing_triangles(points, self._triangles[picked], self._owner[picked], collide, MOST_PAIRS)
+        seams = None if self._seams is None else self._seams.among(picked, len(self._triangles))
+        shapes = points, self._triangles[picked], self._owner[picked]
+        pairs, kinds = crossing_triangles(*shapes, collide, MOST_PAIRS, seams)
         owners = np.sort(self._owner[picked][pairs[kinds == CROSSING]], axis=1)
         found, counts = np.unique(owners, axis=0, return_counts=True) if len(owners) else (owners, [])
         return [
@@ -170,8 +176,11 @@ def _note_near(low, high, owner, collide, boxes, chosen):
             chosen[t] = overlap(boxes, near[i], box)
 
 
-def colliding_pairs(system: System, settings: XPBDContact | None) -> NDArray[np.bool_]:
-    """(p, p) which things must stay apart: bodies, then obstacles, without those that are stitched or welded."""
+def colliding_pairs(system: System, settings: XPBDContact | None, joined: bool = False) -> NDArray[np.bool_]:
+    """(p, p) which things must stay apart: bodies, then obstacles, without those that are stitched or welded.
+
+    joined : with bodies that are stitched or welded to each other
+    """
     bodies = len(system.bodies)
     collide = pair_table(system.scene).collide.copy()
     if settings is None or not settings.body_collision:
@@ -179,8 +188,9 @@ def colliding_pairs(system: System, settings: XPBDContact | None) -> NDArray[np.
     if settings is None or not settings.self_collision:
         collide[np.arange(bodies), np.arange(bodies)] = False
     names = [part.name for part in system.bodies] + [str(obstacle.name) for obstacle in system.obstacles]
-    joined = [(stitch.first, stitch.second) for stitch in system.scene.stitches]
-    for first, second in [*joined, *((weld.body, weld.rigid) for weld in system.scene.welds)]:
+    joints = [(stitch.first, stitch.second) for stitch in system.scene.stitches]
+    for first, second in [*joints, *((weld.body, weld.rigid) for weld in system.scene.welds)]:
         a, b = names.index(first), names.index(second)
-        collide[a, b] = collide[b, a] = False
+        if not joined or max(a, b) >= bodies:
+            collide[a, b] = collide[b, a] = False
     return collide

@@ -113,12 +113,12 @@ class Sequence(FrameCheck):
             speeds = [float(np.sqrt(share @ (frame.velocities[rows] ** 2).sum(axis=1))) for frame in (before, at)]
             first, last = (share @ frame.velocities[rows] for frame in (before, at))
             mean = share @ (at.positions[rows] - before.positions[rows]) / step
-            # The mean velocity of a step is between those before and after it; a static solver leaves none.
+            # The mean velocity of a step is between those before and after it; a static solver leaves none after it.
             change = last - first
             along = np.clip((mean - first) @ change / max(float(change @ change), 1e-300), 0.0, 1.0)
             off = float(np.linalg.norm(mean - first - along * change))
             rounding = _MOVING * self.scene.size / abs(step)
-            if max(speeds) > 0.0 and off > _LARGEST_DEVIATION * (max(speeds) + fall) + rounding:
+            if speeds[1] > 0.0 and off > _LARGEST_DEVIATION * (max(speeds) + fall) + rounding:
                 where = f"{body.name} is {off * abs(step):.3g} m from where its velocities lead"
                 self.tally.see(at, off, True, where)
 

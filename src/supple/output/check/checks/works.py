@@ -5,7 +5,8 @@ frames; half of |f' d - f d| is how far it may be off, while a force changes in 
 open adds up, and a recorded work may differ by it.
 
 A cavity or a span of a cable has one force Q on its volume or length s, so that its work is Q ds, with the Q of the
-frame, which is the mean over its substeps.
+frame, which is the mean over its substeps. Before the first step no Q is known, and that step is left out: a given
+volume may begin with a jump.
 
 The force of pins is what balances the elastic and stitch forces, weight and inertia on pinned vertices. With E(x) the
 sum of both energies, the elastic part is the derivative of E along the motion of the pinned vertices alone. Barriers
@@ -174,6 +175,8 @@ class Works(FrameCheck):
     def _of_actuators(self, last: Snapshot, at: Snapshot, name: str) -> tuple[float, float]:
         """The work of cavities or cables [J], and how far it may be off."""
         work = left_open = 0.0
+        if last.number == 0:
+            return work, np.inf
         for before, after in zip(last.actuators, at.actuators, strict=True):
             if after.work == name:
                 change, ds = abs(after.force - before.force), after.coordinate - before.coordinate
@@ -183,7 +186,18 @@ class Works(FrameCheck):
                     # Within a frame, the change of the force acts on what the way is longer than the straight one.
                     rates = [state.rate(of.velocities) for state, of in ((before, last), (after, at))]
                     left_open += 0.25 * self.scene.recording.dt * change * abs(rates[1] - rates[0])
+                    # In a collision the coordinate goes and comes back; both frames may be at rest in it.
+                    sizes = np.linalg.norm(after.gradient, axis=1)
+                    left_open += 0.5 * change * float(sizes @ self._way_in_contact(last, at)[after.vertices])
         return work, left_open
+
+    def _way_in_contact(self, last: Snapshot, at: Snapshot) -> NDArray[np.float64]:
+        """(n,) `_way` of the bodies that something touched between the frames, zero for the others [m]."""
+        forces = getattr(self.scene.recording[at.number].report.details, "contact_forces", {})
+        way = self._way(last, at)
+        for body in self.scene.recording.bodies:
+            way[body.vertices] *= bool(np.any(forces.get(body.name, 0.0)))
+        return way
 
     def _way(self, last: Snapshot, at: Snapshot) -> NDArray[np.float64]:
         """(n,) half of how far a vertex would go with the change of its velocity [m]."""
