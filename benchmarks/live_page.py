@@ -143,6 +143,7 @@ def measure(tets: int, rounds: int = 40, longest: float = 45.0, seconds: float =
         send(Play())
         tab.wait_for_timeout(1500)
         events = measure_events(tab, page, rounds, longest)
+        tab.wait_for_timeout(2500)  # until the slow first step after the last reset is not in the mean
         step = content.controller.snapshot.timing.step_ms
         send(Pause())
         tab.wait_for_timeout(1500)

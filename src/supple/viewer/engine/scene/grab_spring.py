@@ -24,6 +24,9 @@ from supple.viewer.protocol.snapshots import GrabState
 FREQUENCY, SAG = 4.0, 0.05
 # Radius of the patch, as a share of the diagonal of the body. A single vertex would be pulled out as a spike.
 PATCH = 0.06
+# How far the target of a patch goes in a step, relative to the body, in radii of the patch. Faster than the body can
+# follow, it would fold the surface around the patch.
+SHARE = 0.5
 
 
 @dataclass(eq=False)
@@ -75,15 +78,18 @@ class SoftGrab(GrabSpring):
     In every step each vertex of the patch is pulled towards x_i + (target - p), with x_i and p at the start of the
     step. So the force causes no torque about p, and the motion of the patch is slightly damped, as by a dashpot k dt.
 
-    The patch weighs little and follows the target at once. So the target goes to its new place over the rest of the
-    step, not in a jump: that would put the patch into the surface beside it.
+    The patch weighs little and follows the target at once. So the target goes from there to its place over the rest of
+    the step, not in a jump, and by at most `farthest` [m] more than the center of mass moves: otherwise the patch would
+    go into the surface beside it.
     """
 
     patch: NDArray[np.int32]
+    farthest: float
     _points: NDArray[np.float64] = field(init=False)  # of the body, at the start of the step
     _rest: NDArray[np.float64] = field(init=False)  # of the patch's targets
     _ends: tuple[NDArray[np.float64], NDArray[np.float64]] = field(init=False)  # of the way of the target
     _times: tuple[float, float] = (0.0, 0.0)  # at these ends
+    _begun: bool = False
     _asked: float = 0.0  # the latest time for which the displacements were asked
 
     def __post_init__(self) -> None:
@@ -101,7 +107,15 @@ class SoftGrab(GrabSpring):
         self._points, self._rest = system.split(state.positions)[self.command.body], anchors
         end = state.time + dt
         now = self._asked if state.time < self._asked <= end else state.time
-        self._ends, self._times = (self._place(now), self.target.copy()), (now, end)
+        place = self._place(now) if self._begun else self.point(self._points)
+        rows = next(part.vertices for part in system.bodies if part.name == self.command.body)
+        mean = np.average(state.velocities[rows], axis=0, weights=system.masses[rows])
+        farthest = (end - now) * (self.farthest / dt + float(np.linalg.norm(mean)))
+        way = self.target - place
+        length = float(np.linalg.norm(way))
+        if length > farthest:
+            way *= farthest / length
+        self._ends, self._times, self._begun = (place, place + way), (now, end), True
 
     def _place(self, time: float) -> NDArray[np.float64]:
         """(3,) of the target on its way [m]."""
@@ -171,4 +185,4 @@ def make_spring(
     center = np.asarray(command.weights) @ rest[list(command.vertices)]
     skin = np.unique(part.body.mesh.surface.triangles)
     near = skin[np.linalg.norm(rest[skin] - center, axis=1) <= PATCH * diagonal]
-    return SoftGrab(*values, np.union1d(near, command.vertices).astype(np.int32))
+    return SoftGrab(*values, np.union1d(near, command.vertices).astype(np.int32), SHARE * PATCH * diagonal)
