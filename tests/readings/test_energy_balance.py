@@ -150,6 +150,15 @@ def test_growth_without_stress_does_the_work_of_its_motion():
     assert 0.9 * kinetic < work["growth"] < 2.1 * kinetic
 
 
+def test_growth_in_xpbd_goes_from_substep_to_substep():
+    """A frame's growth at once strains a cube of 1 m that cannot follow: ten times as much energy as its motion has."""
+    jelly, grows = sp.StableNeoHookean(youngs=1e6, poisson=0.3), sp.Growth("cube", sp.Curve([0, 1], [1, 2]))
+    body = sp.Body("cube", sp.shapes.box((1, 1, 1), (2, 2, 2)), jelly)
+    work, _, frames = totals(sp.Scene([body], loads=[grows], gravity=(0, 0, 0)), sp.XPBD(substeps=20), 4)
+    assert frames[-1].report.elastic_energy < 0.1 * frames[-1].report.kinetic_energy
+    assert -work["numerical"] < 0.5 * work["growth"]
+
+
 def test_a_muscle_that_growth_stretches_leaves_nothing_to_the_numerical_work():
     """Both change in every step, so slowly that the bar is in balance."""
     jelly, rise = sp.StableNeoHookean(youngs=1e6, poisson=0.3), sp.Curve([0, 10], [0, 1])

@@ -119,25 +119,24 @@ class XPBDWorkspace:
             with one_thread(not self.pace.parallel):
                 yield
 
-    def grow(self, time: float) -> None:
-        """Take the stress-free shapes of the tets at `time` [s]."""
+    def grow(self, time: float) -> float:
+        """Take the stress-free shapes of the tets at `time` [s]; returns the work of that [J]."""
         laws = self.system.laws_at(time)
         if laws.growth is None or laws.growth.equals(self.growth):
-            return
+            return 0.0
+        elastic = self.assessment.balance.elastic
+        before = float(elastic.of(self.points, False).sum())
         self.growth = laws.growth
         shapes = laws.stress_free.Dm_inv, laws.stress_free.volumes
         for each in (*self.sets, self.assessment.balance.elastic, self.works.at_pins):
             if isinstance(each, (StableNeoHookeanConstraints, ElasticEnergy)):
                 each.grow(*shapes)
+        return float(elastic.of(self.points, False).sum()) - before
 
-    def begin_frame(self, time: float, end: float, h: float) -> None:
-        """Begin a frame from `time` to `end` [s]: what grows in it has grown at its beginning."""
-        elastic = self.assessment.balance.elastic
-        before = float(elastic.of(self.points, False).sum()) if self.growth is not None else 0.0
-        self.grow(end)
-        work = float(elastic.of(self.points, False).sum()) - before if self.growth is not None else 0.0
+    def begin_frame(self, time: float, h: float) -> None:
+        """Begin a frame at `time` [s], in substeps of h [s]."""
         self.actuators.begin_frame(self.substep(time, h))
-        self.works.begin_frame(self.velocities, work)
+        self.works.begin_frame(self.velocities)
         self.rigid.begin_frame(self.velocities)
 
     def substep(self, time: float, h: float) -> Substep:

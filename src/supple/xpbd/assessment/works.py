@@ -54,10 +54,9 @@ class Works:
         self._anchors = len(system.stitching.anchors) if moving else 0
         self._anchored = np.zeros((self._anchors, 3))
 
-    def begin_frame(self, velocities: Floats, growth: float) -> None:
-        """Begin a frame with velocities (n, 3) [m/s], and with the work of growth in it [J]."""
+    def begin_frame(self, velocities: Floats) -> None:
+        """Begin a frame with velocities (n, 3) [m/s]."""
         self.by_name, self.residual = no_works(self.system), 0.0
-        add_works(self.by_name, {"growth": growth} if growth else {})
         self._add_inertia(velocities, -1.0)
 
     def begin_substep(self, extended: Floats) -> None:

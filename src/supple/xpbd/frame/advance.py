@@ -9,7 +9,7 @@ from supple.state import State
 from supple.xpbd.assessment.surfaces import Overlap
 from supple.xpbd.damping.kelvin_voigt import Damping
 from supple.xpbd.frame.substep_limits import collide, hold_in_contact, keep_volumes, move_rigid, note_works, restore
-from supple.xpbd.frame.substep_start import begin_substep, cycles, load, pin_targets, push
+from supple.xpbd.frame.substep_start import begin_substep, cycles, grow, load, pin_targets, push
 from supple.xpbd.integration import to_world
 from supple.xpbd.memory import XPBDMemory
 from supple.xpbd.sleep import SleepMemory
@@ -38,7 +38,7 @@ def advance(
     ws.guard.measure(ws.points, False)
     ws.guard.guarded[:] = ws.assessment.begin(ws.moment(state.time), ws.guard.J, h, memory.ledger)
     ws.guard.accept()
-    ws.begin_frame(state.time, state.time + dt, h)
+    ws.begin_frame(state.time, h)
     ws.joints.begin_frame(state, sleep.asleep)
     damping, lengths = damping_in(ws, h), cycles(substeps)
     if damping is not None:
@@ -48,6 +48,7 @@ def advance(
         if damping is not None and k in lengths:
             moving = ws.anchors.velocities(end - h, h)
             damping.begin_cycle(ws.extended, ws.velocities, moving, lengths[k], h, parallel)
+        grow(ws, end)
         begin_substep(ws, targets[k], end, h, parallel)
         at = ws.substep(end, h)
         ws.loads.add_forces(at)

@@ -7,6 +7,7 @@ from itertools import accumulate
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.readings.energy_balance import add_works
 from supple.state import State
 from supple.system import System
 from supple.xpbd.damping.kelvin_voigt import Damping, cycle_lengths
@@ -30,6 +31,13 @@ def cycles(substeps: int) -> dict[int, int]:
     """The first substep of each cycle of damping, and the cycle's length."""
     lengths = cycle_lengths(substeps)
     return dict(zip(accumulate(lengths, initial=0), lengths, strict=False))
+
+
+def grow(ws: XPBDWorkspace, end: float) -> None:
+    """Take the stress-free shapes of the end of a substep [s]."""
+    work = ws.grow(end)
+    if work:
+        add_works(ws.works.by_name, {"growth": work})
 
 
 def begin_substep(ws: XPBDWorkspace, targets: NDArray[np.float64], end: float, h: float, parallel: bool) -> None:
