@@ -91,6 +91,8 @@ def _volume_slopes(system: System, tets: slice) -> NDArray[np.float64]:
 
 
 def _sums(values: NDArray[np.float64], starts: NDArray[np.intp]) -> NDArray[np.float64]:
+    if not len(values):
+        return np.zeros(len(starts))
     ends = [*starts[1:], len(values)]
     return np.array([values[low:high].sum() for low, high in zip(starts, ends, strict=True)])
 
