@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from types import MappingProxyType
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from supple.errors import CommandError, SolverError
-from supple.scene.forces import Force, SoftTarget
+from supple.scene.forces import SoftTarget
 from supple.scene.pins import Pin
 from supple.scene.scene import Scene
 from supple.simulate import first_frame
@@ -21,45 +20,13 @@ from supple.system import BodyRange, System, initial_state
 from supple.viewer.engine.scene.grab_spring import GrabSpring, make_spring
 from supple.viewer.engine.scene.new_bodies import moved_apart
 from supple.viewer.engine.scene.pulls import grabbed, workspace_for
-from supple.viewer.engine.scene.pusher import Pusher
+from supple.viewer.engine.scene.setup import Setup, Start
 from supple.viewer.engine.scene.solvers import kind_of
 from supple.viewer.protocol.commands import Grab, MoveGrab
 from supple.viewer.protocol.live_source import LiveSource
+from supple.xpbd.workspace import XPBDWorkspace
 
 Anchors = Mapping[Pin | SoftTarget, NDArray[np.float64]]
-
-
-@dataclass(frozen=True, eq=False)
-class Setup:
-    """Everything that commands change, apart from the state.
-
-    Attributes
-    ----------
-    scene : without what the page adds to it:
-    page_pins : pins made on the page, by body and vertex; grabs : by number; pusher : or None
-    added : names of bodies that were added on the page
-    """
-
-    scene: Scene
-    solver: Solver
-    dt: float
-    page_pins: Mapping[tuple[str, int], Pin] = field(default_factory=lambda: MappingProxyType({}))
-    grabs: Mapping[int, GrabSpring] = field(default_factory=lambda: MappingProxyType({}))
-    pusher: Pusher | None = None
-    added: frozenset[str] = frozenset()
-
-    def whole_scene(self) -> Scene:
-        """The scene with pins, grabs and pusher of the page."""
-        if not self.page_pins and not self.grabs and self.pusher is None:
-            return self.scene
-        pulls = [spring.load for spring in self.grabs.values()]
-        return replace(
-            self.scene,
-            pins=(*self.scene.pins, *self.page_pins.values()),
-            forces=(*self.scene.forces, *(load for load in pulls if isinstance(load, Force))),
-            soft_targets=(*self.scene.soft_targets, *(load for load in pulls if isinstance(load, SoftTarget))),
-            obstacles=(*self.scene.obstacles, *([self.pusher.obstacle] if self.pusher else [])),
-        )
 
 
 class LiveScene:
@@ -89,7 +56,9 @@ class LiveScene:
         self.report = StepReport(Status.CONVERGED, 0)
         self.workspace: Any = None
         self._anchors: Anchors = {}
+        self._start: Start | None = None
         self.adopt(Setup(source.scene, source.solver, source.dt), initial_state(source.scene, self.starts), anchors={})
+        self._keep_start()
 
     def adopt(self, setup: Setup, state: State | None = None, anchors: Anchors | None = None) -> None:
         """Continue with another setup. The memory of the present state is kept: a solver ignores that of another one.
@@ -157,6 +126,7 @@ class LiveScene:
     def prepare_workspace(self) -> None:
         """Prepare a new workspace, after a step that was not completed."""
         self.workspace = self.setup.solver.prepare(self.system)
+        self._start = None  # its workspace shares arrays with the one that was left in the middle of a step
 
     def warm_up(self) -> None:
         """Pull for one step and discard it, so that compiled kernels are loaded before a person waits for them.
@@ -169,9 +139,11 @@ class LiveScene:
             target = x[0] + 0.1 * (x.mean(axis=0) - x[0])
             command = Grab(0, body.name, (0,), (1.0,), (target[0], target[1], target[2]))
             self.grab({0: make_spring(command, setup.scene, body, self.system.masses, state.positions)})
-        self.step()
+        if self.step().status.can_go_on and self._start is not None:
+            self._return(self._start)
+        else:
+            self.adopt(setup, state)
         self.frame = 0
-        self.adopt(setup, state)
 
     def step(self) -> StepReport:
         """Simulate one frame. Where this fails, the state does not change, and the report contains the reason."""
@@ -221,6 +193,30 @@ class LiveScene:
 
         Added bodies return to where they were added. Where another body starts there, they are placed above all bodies.
         """
+        if self._start is not None and self._start.serves(self.setup):
+            self._return(self._start)
+        else:
+            self._restart()
+            self._keep_start()
+        self.frame = 0
+        self.report = StepReport(Status.CONVERGED, 0)
+
+    def _return(self, start: Start) -> None:
+        """Return to a start without computing again what has not changed."""
+        if _shapes(self.system.scene) != _shapes(start.system.scene):
+            self.generation += 1
+        self.revision += 1
+        self.setup = replace(start.setup, dt=self.setup.dt)
+        self.state, self.system, self.workspace = start.state, start.system, start.workspace
+        self._anchors = _anchors_of(start.system)
+
+    def _keep_start(self) -> None:
+        """Keep the present state for later resets. Only a workspace of XPBD remembers nothing of a step."""
+        if isinstance(self.workspace, XPBDWorkspace):
+            self._start = Start(self.setup, self.state, self.system, self.workspace)
+
+    def _restart(self) -> None:
+        """Compute the start of the present bodies, parameters and solver."""
         names = {body.name for body in self.setup.scene.bodies}
         scene = replace(self.setup.scene, pins=tuple(pin for pin in self.pins if pin.body in names))
         starts = {name: start for name, start in self.starts.items() if name in names}
@@ -230,8 +226,6 @@ class LiveScene:
             initial_state(scene, starts),
             anchors={},
         )
-        self.frame = 0
-        self.report = StepReport(Status.CONVERGED, 0)
 
     def part(self, name: str) -> BodyRange:
         """The rows of one body; raises `CommandError` where there is none of that name."""
