@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from supple.materials.elastic_tets.active import Growth
 from supple.numerics.thread_tuning import ThreadTuner
 from supple.numerics.threads import numba_threads, one_thread
+from supple.state import State
 from supple.system import System
 from supple.xpbd.assessment.assessment import Assessment
 from supple.xpbd.assessment.elastic_energy import ElasticEnergy
@@ -31,6 +32,7 @@ from supple.xpbd.external_forces import ExternalForces
 from supple.xpbd.integration import apply_changes
 from supple.xpbd.limits.rigid_fallback import RigidFallback
 from supple.xpbd.limits.volume_guard import VolumeGuard
+from supple.xpbd.memory import XPBDMemory
 from supple.xpbd.momentum import MomentumRestore
 from supple.xpbd.rigid.bodies import RigidBodies
 from supple.xpbd.rigid.joints import JointProjection
@@ -52,6 +54,7 @@ class XPBDWorkspace:
     threads : of Numba's parallel kernels; None leaves their number as it is; most_threads : in the present frame
     extended : (n + a, 4) positions about the component's origin [m] and inverse masses [1/kg], of the vertices and then
         of the anchors (inverse mass 0); points : the rows of the vertices
+    time : of these positions, between two substeps [s]
     previous : (n, 3) positions at the beginning of the substep [m]; begun : those, which contacts do not change
     velocities, origins : (n, 3); world, world_previous : (n, 3) positions in world coordinates, for contacts
     """
@@ -80,6 +83,7 @@ class XPBDWorkspace:
     extended: NDArray[np.float64]
     growth: Growth | None = None
     most_threads: int = 1
+    time: float = 0.0
     points: NDArray[np.float64] = field(init=False)
     previous: NDArray[np.float64] = field(init=False)
     begun: NDArray[np.float64] = field(init=False)
@@ -147,6 +151,12 @@ class XPBDWorkspace:
         """Apply what contacts changed in `world` and `world_previous`."""
         places = self.origins, self.previous, self.world, self.world_previous
         apply_changes(self.points, self.velocities, h, *places, self.works.impulses)
+
+    def present(self) -> State:
+        """The state after the latest substep, in the numbering of the scene, without what later frames must know."""
+        new = self.layout.new_from_old
+        state = State(self.time, (self.points[:, :3] + self.origins)[new], self.velocities[new], memory=XPBDMemory())
+        return replace(self.welded.outer(state), memory=None)
 
     def moment(self, time: float) -> Moment:
         """What the assessment reads, at `time` [s]."""

@@ -14,6 +14,7 @@ import numpy as np
 from supple.contact.obstacle_poses import ObstaclePoses
 from supple.errors import SuppleError
 from supple.state import State
+from supple.viewer.engine.displayed_states import LONGEST_UNSEEN, between, within_step
 from supple.viewer.engine.measurement.contact_points import contact_points
 from supple.viewer.engine.measurement.describe import describe, measures
 from supple.viewer.engine.measurement.readings import readings, strongest_forces
@@ -58,6 +59,7 @@ class SimulationLoop:
             limits.LONGEST_STEP, lambda: inbox.holds(commands.Pause, commands.Reset), limits.LONGEST_STEP_WHEN_ASKED
         )
         self.applied = 0
+        self._shown = 0.0  # time of the newest picture within the present step [s]
         self._pulled = False  # whether a body was pulled since the last step
         self.notices: deque[Notice] = deque(maxlen=NOTICES_KEPT)
         self._before: State = live.state
@@ -130,6 +132,7 @@ class SimulationLoop:
         """Simulate one frame; where this fails, pause at the last good state, and send a notice with the reason."""
         began = time.perf_counter()
         before, self._pulled = self.live.state, False
+        self._shown = before.time
         try:
             with self.watch.limited(self._follow):
                 report = self.live.step()
@@ -154,11 +157,23 @@ class SimulationLoop:
         self.pacing.stepped(now, now - began, self.live.setup.dt, self.speed)
 
     def _follow(self) -> None:
-        """Pull to where the pointer is by now, within a step."""
+        """Pull to where the pointer is by now, within a step, and draw a step that takes long."""
         if self.live.follows_within_steps:
             for number, command in self.inbox.take_leading(commands.MoveGrab):
                 self.live.move_grab(command)
                 self.applied = max(self.applied, number)
+
+        now = time.perf_counter()
+        if self._runs and min(now - self._published, self.watch.seconds) >= LONGEST_UNSEEN and not self._in_slow_motion():
+            self._publish_within_step(now)
+
+    def _publish_within_step(self, now: float) -> None:
+        """Send a picture of the present step, where it is of the scene that the page knows."""
+        last = self._last if self._described == self.live.revision else None
+        picture = None if last is None else within_step(self.live, last, self._shown)
+        if picture is not None:
+            self._published, self._shown = now, picture.time
+            self.outbox.put_snapshot(replace(picture, applied=self.applied, notices=tuple(self.notices)))
 
     def notify(self, level: str, text: str) -> None:
         """Send a notice to the page."""
@@ -266,12 +281,7 @@ class SimulationLoop:
         if not self._in_slow_motion() or before is after or len(before.positions) != len(after.positions):
             return after
         share = float(np.clip(1.0 - (self.pacing.due - now) / self._interval(), 0.0, 1.0))
-        return State(
-            before.time + share * (after.time - before.time),
-            before.positions + share * (after.positions - before.positions),
-            before.velocities + share * (after.velocities - before.velocities),
-            internal=after.internal,
-        )
+        return between(before, after, share)
 
     def _time_to_wait(self) -> float:
         if self.steps_left > 0:

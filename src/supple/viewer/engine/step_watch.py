@@ -55,5 +55,11 @@ class StepWatch:
     @property
     def progress(self) -> Progress | None:
         """Of the present computation; None where there is none. Another thread may ask."""
+        running = self._began is not None
+        return Progress(self.seconds, self._rounds, self._compiled.running) if running else None
+
+    @property
+    def seconds(self) -> float:
+        """Of the present computation so far [s]; 0 where there is none."""
         began = self._began
-        return None if began is None else Progress(time.monotonic() - began, self._rounds, self._compiled.running)
+        return 0.0 if began is None else time.monotonic() - began

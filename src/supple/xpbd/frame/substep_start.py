@@ -17,7 +17,7 @@ from supple.xpbd.workspace import XPBDWorkspace
 
 def load(ws: XPBDWorkspace, state: State) -> None:
     """Copy a state into the arrays of the workspace."""
-    old = ws.layout.old_from_new
+    ws.time, old = state.time, ws.layout.old_from_new
     np.take(state.positions, old, axis=0, out=ws.world)
     np.take(state.velocities, old, axis=0, out=ws.velocities)
     ws.rigid.place(ws.world)
@@ -42,6 +42,7 @@ def grow(ws: XPBDWorkspace, end: float) -> None:
 
 def begin_substep(ws: XPBDWorkspace, targets: NDArray[np.float64], end: float, h: float, parallel: bool) -> None:
     """Predict positions, with pinned vertices at `targets` (k, 3)."""
+    ws.time = end
     predict[parallel](ws.points, ws.previous, ws.velocities, ws.system.gravity, h)
     ws.begun[:] = ws.previous
     if len(targets):

@@ -27,11 +27,10 @@ class Pusher:
         self._times = (0.0, 0.0)
         self._ends = (self.center, self.center)
         # The obstacle is placed at the origin, so that its displacement is its position.
-        self.obstacle = Sphere(
-            center=(0.0, 0.0, 0.0), radius=radius, friction=friction, motion=self._motion, name=PUSHER
-        )
+        self.obstacle = Sphere(center=(0.0, 0.0, 0.0), radius=radius, friction=friction, motion=self.place, name=PUSHER)
 
-    def _motion(self, time: float) -> NDArray[np.float64]:
+    def place(self, time: float) -> NDArray[np.float64]:
+        """(3,) its center at a time of the present step [m]."""
         (begin, end), (a, b) = self._times, self._ends
         if end <= begin:
             return b
