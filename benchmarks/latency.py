@@ -13,6 +13,9 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from websockets.asyncio.server import ServerConnection
+
+from supple.viewer.drawing.layers.skin import drawn_points
 
 # What ends at each time stamp after the first, which is that of the event in the browser.
 STAGES = {
@@ -20,13 +23,14 @@ STAGES = {
     "simulated": "command, wait for the next step, step, snapshot",
     "taken": "wait of the page for its turn to draw",
     "drawn": "messages of the picture made",
-    "received": "viser's window, network, decoding",
+    "written": "viser's window, and its messages written to the browser",
+    "received": "network, and decoding in the browser",
     "displayed": "browser: geometry, normals, drawing",
 }
 # What is ours, and what belongs to the browser: with a graphics card, the second part is short.
 PARTS = {
-    "ours": ("event at the server to mesh in the browser", ("simulated", "taken", "drawn", "received")),
-    "browser": ("the browser: event to server, drawing in software", ("sent", "displayed")),
+    "ours": ("ours: event at the server to mesh written to the browser", ("simulated", "taken", "drawn", "written")),
+    "browser": ("the browser: event to server, decoding, drawing in software", ("sent", "received", "displayed")),
 }
 MOVED = 1e-4  # [m]; what moves less is round-off
 # How far the drawn mesh has moved since the last call [m].
@@ -80,6 +84,13 @@ def noted(content: Any) -> Iterator[Stamps]:
     """A block in which the page notes the first command of the mouse, and the first picture with another mesh."""
     stamps, controller, stage = Stamps(), content.controller, content.stage
     send, show, before = controller.send, stage.show, stage.moment.positions
+    smallest = 12 * drawn_points(stage.model)  # of a message with the mesh [bytes]
+    write = ServerConnection.send
+
+    async def noted_write(connection: Any, data: Any, *more: Any, **named: Any) -> None:
+        await write(connection, data, *more, **named)
+        if "taken" in stamps.by_name and len(data) >= smallest:
+            stamps.note("written")
 
     def noted_send(client: Any, make: Any) -> int:
         if client is not None:
@@ -97,10 +108,12 @@ def noted(content: Any) -> Iterator[Stamps]:
             stamps.note("drawn")
 
     controller.send, stage.show = noted_send, noted_show
+    ServerConnection.send = noted_write  # pyright: ignore[reportAttributeAccessIssue]
     try:
         yield stamps
     finally:
         del controller.send, stage.show
+        ServerConnection.send = write
 
 
 def stages_of(browser: dict[str, float], page: dict[str, float]) -> dict[str, float]:

@@ -163,16 +163,16 @@ class SimulationLoop:
                 self.live.move_grab(command)
                 self.applied = max(self.applied, number)
 
-        now = time.perf_counter()
-        if self._runs and min(now - self._published, self.watch.seconds) >= LONGEST_UNSEEN and not self._in_slow_motion():
-            self._publish_within_step(now)
+        unseen = min(time.perf_counter() - self._published, self.watch.seconds)
+        if self._runs and unseen >= LONGEST_UNSEEN and not self._in_slow_motion():
+            self._publish_within_step()
 
-    def _publish_within_step(self, now: float) -> None:
+    def _publish_within_step(self) -> None:
         """Send a picture of the present step, where it is of the scene that the page knows."""
         last = self._last if self._described == self.live.revision else None
         picture = None if last is None else within_step(self.live, last, self._shown)
         if picture is not None:
-            self._published, self._shown = now, picture.time
+            self._published, self._shown = time.perf_counter(), picture.time
             self.outbox.put_snapshot(replace(picture, applied=self.applied, notices=tuple(self.notices)))
 
     def notify(self, level: str, text: str) -> None:
