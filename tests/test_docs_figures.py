@@ -33,7 +33,7 @@ def test_figures_become_tables(monkeypatch, tmp_path):
     text = page.read_text(encoding="utf-8")
     assert "| a step | 3.0 ms | 3.0 ms |" in text
     assert "| stage: browser to server | 1.2 / 2.5 | 1.2 / 2.5 |" in text
-    assert "| event at the server to mesh in the browser | 4.0 / 4.0 | 4.0 / 4.0 |" in text
+    assert "| ours: event at the server to mesh written to the browser | 4.0 / 4.0 | 4.0 / 4.0 |" in text
     assert "old" not in text
     assert published.with_figures(text, "live_page") == text
     published.publish("live_page", figures | {"sizes": [size], "implicit": None})  # as where a part took too long

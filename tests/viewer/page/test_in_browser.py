@@ -87,6 +87,44 @@ def test_play_pause_step_and_reset(still):
     assert screen.errors == []
 
 
+# Keeps the first vertex of every mesh that arrives in the browser.
+KEEP_MESHES = """() => {
+  const queue = suppleViewer.mutable.current.messageQueue;
+  window.meshes = [];
+  queue.push = (message) => {
+    const vertices = message.updates?.vertices;
+    if (vertices) meshes.push([...vertices.slice(0, 3)]);
+    return Array.prototype.push.call(queue, message);
+  };
+}"""
+
+
+def test_pictures_arrive_in_order_and_the_last_one_is_the_state(still):
+    screen, stage, drawn = still.screen, still.page.stage, []
+    show = stage.show
+
+    def noted_show(moment):
+        show(moment)
+        drawn.append(stage.body_handles[0].vertices[0].tolist())
+
+    screen.tab.evaluate(KEEP_MESHES)
+    stage.show = noted_show
+    try:
+        screen.press("Play")
+        screen.wait(lambda: still.middle()[1] < 0.4, "the fall")
+        screen.press("Pause")
+        screen.wait(lambda: still.snapshot().paused, "the pause")
+        screen.wait(lambda: screen.tab.evaluate("meshes.at(-1)") == drawn[-1], "the last picture")
+    finally:
+        del stage.show
+        meshes = screen.tab.evaluate("() => { delete suppleViewer.mutable.current.messageQueue.push; return meshes; }")
+    places = [drawn.index(mesh) for mesh in meshes]  # each is one that was drawn
+    assert places == sorted(places)
+    assert 2 <= len(meshes) <= len(drawn)
+    first = np.flatnonzero((stage.moment.positions.astype(np.float32) == np.float32(meshes[-1])).all(axis=1))
+    assert len(first) == 1
+
+
 def test_a_body_follows_the_mouse_until_it_is_released(resting):
     screen, mouse = resting.screen, resting.screen.tab.mouse
     low = resting.seen()
