@@ -35,7 +35,7 @@ from supple.system import BodyRange, System, build_system, initial_state
 logger = logging.getLogger(__name__)
 
 # Beyond these, dt^2 and 1 / dt^2 leave what float64 can hold.
-_DT_RANGE = (1e-30, 1e30)
+DT_RANGE = (1e-30, 1e30)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -250,8 +250,8 @@ def check_timing(caller: str, dt: object, steps: object) -> None:
     """Raise `SolverError` unless dt is a length of time [s] and steps a number; the text begins with `caller`."""
     if isinstance(dt, bool) or not isinstance(dt, (int, float, np.number)) or not math.isfinite(dt) or dt <= 0.0:
         raise SolverError(f"{caller}: dt is {dt!r}; it must be finite and above zero [s]")
-    if not _DT_RANGE[0] <= dt <= _DT_RANGE[1]:
-        raise SolverError(f"{caller}: dt is {dt!r}; it must be between {_DT_RANGE[0]:g} and {_DT_RANGE[1]:g} s")
+    if not DT_RANGE[0] <= dt <= DT_RANGE[1]:
+        raise SolverError(f"{caller}: dt is {dt!r}; it must be between {DT_RANGE[0]:g} and {DT_RANGE[1]:g} s")
     if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)) or steps < 0:
         raise SolverError(f"{caller}: steps is {steps!r}; give a whole number of zero or more")
 

@@ -26,6 +26,7 @@ steps: 5
 CASES = [
     ("youngs: 1e5", "yungs: 1e5", "6: bodies[0].material.yungs: unknown key; did you mean `youngs`?"),
     ("position:", "postion:", "8: bodies[0].postion: unknown key; did you mean `position`?"),
+    ("dt: 1/60", "dt: 1e-300", "13: dt: is 1e-300; it must be at least 1e-30"),
     ("dt: 1/60", "colour: red", "13: colour: unknown key; known here: supple, bodies"),
     (
         "kind: stable_neo_hookean",
@@ -193,8 +194,8 @@ CASES = [
         "13: contact_pairs[0].friction: contact pair of 'cube' and 'cube': friction of a pair that does not collide",
     ),
     ("1/60", "1/0", "13: dt: is the text '1/0'; give a number"),
-    ("1/60", "-0.1", "13: dt: is -0.1; it must be above 0"),
-    ("1/60", "0", "13: dt: is 0; it must be above 0"),
+    ("1/60", "-0.1", "13: dt: is -0.1; it must be at least 1e-30"),
+    ("1/60", "0", "13: dt: is 0; it must be at least 1e-30"),
     ("steps: 5", "steps: 2.5", "14: steps: is 2.5; give a whole number"),
     ("steps: 5", "steps: -1", "14: steps: is -1; it must be at least 0"),
     ("steps: 5", "steps: 99999999999999999999999999", "14: steps: is 99999999999999999999999999; it must be at most"),

@@ -20,6 +20,7 @@ from supple.scene_file.entries.solvers import SolverModel, XPBDModel
 from supple.scene_file.entries.stitches import StitchModel
 from supple.scene_file.fraction import number_or_fraction
 from supple.scene_file.model import Model, Vector
+from supple.simulate import DT_RANGE
 
 MAX_STEPS = 10_000_000
 
@@ -36,12 +37,12 @@ def _seconds(value: Any) -> Any:
 
 Seconds = Annotated[
     float,
-    Field(gt=0.0, le=1e6, allow_inf_nan=False),
+    Field(ge=DT_RANGE[0], le=1e6, allow_inf_nan=False),
     BeforeValidator(_seconds),
     WithJsonSchema(
         {
             "anyOf": [
-                {"type": "number", "exclusiveMinimum": 0, "maximum": 1e6},
+                {"type": "number", "minimum": DT_RANGE[0], "maximum": 1e6},
                 {"type": "string", "pattern": r"^\s*[0-9.eE+-]+\s*/\s*[0-9.eE+-]+\s*$"},
             ]
         }
