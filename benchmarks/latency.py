@@ -174,7 +174,7 @@ def live_page_text(figures: dict[str, Any]) -> str:
     lines = [
         f"From a move of the mouse to the moved mesh: {events} drags of a ball at rest, XPBD with 4 "
         f"substeps. Chromium draws in software, 160 x 100 pixels; {figures['date']}, load {figures['load']:.1f} "
-        "before, on two cores.",
+        f"before and {figures['load_after']:.1f} after (the browser included), on two cores.",
         "",
         row("", (f"{one['tets']:,} tets" for one in sizes)),
         "|---|" + "---|" * len(sizes),

@@ -239,6 +239,7 @@ def main(sizes: tuple[int, ...] = (5_000, 60_000)) -> dict[str, Any]:
     implicit = part("implicit")
     return {
         "load": load,
+        "load_after": os.getloadavg()[0],
         "date": time.strftime("%Y-%m-%d"),
         "sizes": [one for one in made if one],
         "implicit": implicit,

@@ -271,6 +271,17 @@ def test_collapsed_triangles_and_unused_vertices_are_dropped_and_logged(tmp_path
     assert "1 vertices that belong to no triangle" in caplog.text
 
 
+def test_triangles_that_are_there_twice_are_dropped_and_logged(tmp_path, caplog):
+    """In any order of their corners; two that face each other are left, as a surface without thickness is a fault."""
+    turned = np.roll(BALL.triangles, 1, axis=1)
+    doubled = SurfaceMesh(BALL.vertices, np.vstack([BALL.triangles, turned, BALL.triangles[:3, ::-1]]))
+    doubled.save(tmp_path / "a.obj")
+    loaded = SurfaceMesh.load(tmp_path / "a.obj")
+    assert loaded.triangles.tolist() == [*BALL.triangles.tolist(), *BALL.triangles[:3, ::-1].tolist()]
+    assert f"{len(BALL.triangles)} triangles that are there twice" in caplog.text
+    assert len(loaded.check().duplicate_triangles) == 3
+
+
 def test_negative_tets_and_unused_vertices_in_files(tmp_path, caplog):
     tets = BODY.tets.copy()
     tets[::2] = tets[::2][:, [1, 0, 2, 3]]

@@ -63,7 +63,8 @@ class SurfaceMesh(Displayed):
 
         Polygons are cut into triangles. Vertices closer than 2e-7 of the bounding box's diagonal (two units in the
         last place of the single precision that most files are written in) become one; triangles that collapse by
-        this, and vertices that no triangle uses, are dropped. The log gives their numbers.
+        this, that repeat another one and face the same way, and vertices that no triangle uses are dropped. The log
+        gives their numbers.
 
         Raises
         ------

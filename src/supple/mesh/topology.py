@@ -56,6 +56,17 @@ def has_vertex_twice(simplices: NDArray[np.integer]) -> NDArray[np.bool_]:
     return (corners[:, 1:] == corners[:, :-1]).any(axis=1)
 
 
+def repeats_another(triangles: NDArray[np.integer], n_vertices: int) -> NDArray[np.bool_]:
+    """Which triangles (m,) have the vertices of an earlier one, and face the same way."""
+    a, b, c = triangles.astype(np.int64).T
+    faces = np.sign(b - a) * np.sign(c - b) * np.sign(a - c) > 0
+    keys = facet_keys(triangles, n_vertices)
+    _, first = np.unique(np.where(faces, keys, -1 - keys), return_index=True)
+    repeats = np.ones(len(triangles), dtype=bool)
+    repeats[first] = False
+    return repeats
+
+
 def is_used(simplices: NDArray[np.integer], n_vertices: int) -> NDArray[np.bool_]:
     """Which vertices (n,) some element has."""
     used = np.zeros(n_vertices, dtype=bool)

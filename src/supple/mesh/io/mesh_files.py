@@ -21,7 +21,7 @@ from supple.mesh.io.tetgen_family import SUFFIXES, family_paths, is_tetgen_path,
 from supple.mesh.io.vtk import legacy as vtk_legacy
 from supple.mesh.io.vtk import xml as vtk_xml
 from supple.mesh.merge import merge_map
-from supple.mesh.topology import has_vertex_twice, without_unused
+from supple.mesh.topology import has_vertex_twice, repeats_another, without_unused
 
 logger = logging.getLogger(__name__)
 
@@ -83,7 +83,11 @@ def read_surface(path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.int6
         logger.info("%s: %d vertices at the place of others were merged", path, len(points) - len(keep))
     if collapsed.any():
         logger.warning("%s: %d triangles that have a vertex twice were dropped", path, np.count_nonzero(collapsed))
-    points, triangles = without_unused(points[keep], triangles[~collapsed])
+    triangles = triangles[~collapsed]
+    repeats = repeats_another(triangles, len(keep))
+    if repeats.any():
+        logger.warning("%s: %d triangles that are there twice were dropped once", path, np.count_nonzero(repeats))
+    points, triangles = without_unused(points[keep], triangles[~repeats])
     if len(points) < len(keep):
         unused = len(keep) - len(points)
         logger.warning("%s: %d vertices that belong to no triangle were dropped", path, unused)
