@@ -53,6 +53,20 @@ def test_an_input_file_is_not_replaced(place, capsys, arguments):
     assert contents(place) == before
 
 
+@pytest.mark.parametrize("arguments", [["check"], ["plot"], ["export", "--to", "pvd"]], ids=lambda some: some[0])
+def test_the_folder_of_a_run_stands_for_its_recording(place, capsys, arguments):
+    (place / "out").mkdir()
+    assert main([*arguments, "out"]) == ExitCode.INPUT
+    assert "out is a folder without recording.vtkhdf" in capsys.readouterr().err
+    (place / "r.vtkhdf").rename(place / "out" / "recording.vtkhdf")
+    assert main([*arguments, "out"]) == ExitCode.OK
+    assert {path.name for path in (place / "out").iterdir()} >= {
+        "check": {"recording.vtkhdf"},
+        "plot": {"plot.png"},
+        "export": {"recording_pvd"},
+    }[arguments[0]]
+
+
 def test_a_format_is_not_written_under_the_suffix_of_another(place, capsys):
     before = contents(place)
     assert main(["export", "r.vtkhdf", "--to", "glb", "-o", "x.obj"]) == ExitCode.INPUT

@@ -40,7 +40,7 @@ def unique_edges(simplices: NDArray[np.int32], n_vertices: int) -> NDArray[np.in
     return np.ascontiguousarray(np.column_stack(np.divmod(keys, n_vertices)).astype(np.int32))
 
 
-def facet_keys(triangles: NDArray[np.int32], n_vertices: int) -> NDArray[np.int64]:
+def facet_keys(triangles: NDArray[np.integer], n_vertices: int) -> NDArray[np.int64]:
     """One 64-bit key for each triangle (m, 3), independent of the order of its corners."""
     low, middle, high = np.sort(triangles, axis=1).astype(np.int64).T
     if n_vertices < 2**21:

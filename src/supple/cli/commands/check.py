@@ -9,6 +9,7 @@ from cyclopts import Parameter
 
 from supple.cli.exit_codes import ExitCode
 from supple.cli.numbers import Steps
+from supple.cli.recordings import recording_at
 
 if TYPE_CHECKING:
     from supple.output.check.report import CheckReport
@@ -35,7 +36,7 @@ def check(
     Parameters
     ----------
     recording
-        The recording (.vtkhdf).
+        The recording (.vtkhdf), or the folder of its run.
     every
         Check every k-th frame and the last one.
     only
@@ -69,6 +70,7 @@ def check(
         "max_energy_gain": max_energy_gain,
         "max_momentum_change": max_momentum_change,
     }
+    recording = recording_at(recording)
     settings = CheckSettings(**{key: value for key, value in given.items() if value is not None})
     if json is not None:
         refuse_to_replace(recording, json)

@@ -7,6 +7,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from supple.cli.recordings import recording_at
+
 
 def export(
     recording: Path,
@@ -20,7 +22,7 @@ def export(
     Parameters
     ----------
     recording
-        The recording (.vtkhdf).
+        The recording (.vtkhdf), or the folder of its run.
     to
         glb (Blender, three.js), obj (a folder, one file per frame), pvd (a folder for ParaView), vtu (the last frame),
         vtkhdf (compressed, or repaired after a kill), usd (extra: usd), gif or mp4 (extra: video), html (a page),
@@ -30,4 +32,4 @@ def export(
     """
     from supple.output.export.exporter import export as write
 
-    print(write(recording, to, output))
+    print(write(recording_at(recording), to, output))

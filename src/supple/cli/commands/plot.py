@@ -7,6 +7,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from supple.cli.recordings import recording_at
+
 
 def plot(
     recording: Path,
@@ -20,13 +22,14 @@ def plot(
     Parameters
     ----------
     recording
-        The recording (.vtkhdf).
+        The recording (.vtkhdf), or the folder of its run.
     output
         Picture to write (.png, .pdf or .svg); without it, plot.png beside the recording.
     """
     from supple.files.replacing import refuse_to_replace
     from supple.output.plots import plot_recording
 
+    recording = recording_at(recording)
     picture = recording.with_name("plot.png") if output is None else output
     refuse_to_replace(recording, picture)
     print(plot_recording(recording, picture))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from supple.cli.live import Host, Open, Port, UseToken
+from supple.cli.recordings import recording_at
 
 SCENE_FILES = (".yaml", ".yml", ".urdf")
 RECORDINGS = (".vtkhdf", ".hdf", ".h5")
@@ -72,10 +73,7 @@ def find_source(path: Path) -> Path:
     from supple.errors import OutputError
 
     if path.is_dir():
-        inside = path / "recording.vtkhdf"
-        if not inside.exists():
-            raise OutputError(f"{path} is a folder without recording.vtkhdf; name a scene file or a recording")
-        return inside
+        return recording_at(path)
     if not path.exists():
         raise OutputError(f"{path}: there is no such file")
     if path.suffix.lower() not in (*SCENE_FILES, *RECORDINGS):
