@@ -7,6 +7,7 @@ import logging
 import numpy as np
 import pytest
 
+import supple as sp
 from supple.errors import MeshingError
 from supple.mesh.meshing.decimation import decimate_surface
 from supple.mesh.meshing.tetrahedralize import tetrahedralize
@@ -47,6 +48,12 @@ def test_tets_of_a_surface_that_is_too_fine(caplog: pytest.LogCaptureFixture) ->
 def test_without_it_the_log_gives_a_number(caplog: pytest.LogCaptureFixture) -> None:
     tetrahedralize(BALL, tets=800)
     assert "reduce them first with decimate=133" in caplog.text
+
+
+def test_a_surface_that_cannot_have_so_few_triangles_gets_no_such_number(caplog: pytest.LogCaptureFixture) -> None:
+    tetrahedralize(sp.shapes.box_surface((1.0, 1.0, 1.0), (1, 1, 1)), tets=5)
+    assert "6 tets instead of 5" in caplog.text
+    assert "decimate" not in caplog.text
 
 
 def test_a_surface_that_is_coarse_enough_is_returned() -> None:

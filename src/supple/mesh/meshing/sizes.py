@@ -53,10 +53,8 @@ def mesh_with_count(make: Callable[[float], TetMesh], count: int, volume: float)
             bound = math.sqrt(too_fine * too_coarse)
     assert best is not None
     if len(best.tets) > (1.0 + COUNT_TOLERANCE) * count:
-        logger.warning(
-            "%d tets instead of %d: the triangles of the surface need so many; reduce them first with decimate=%d",
-            len(best.tets),
-            count,
-            max(100, count // _TETS_OF_TRIANGLE),
-        )
+        fewer = max(100, count // _TETS_OF_TRIANGLE)
+        hint = f"; reduce them first with decimate={fewer}" if fewer < len(best.surface.triangles) else ""
+        made = len(best.tets)
+        logger.warning("%d tets instead of %d: the triangles of the surface need so many%s", made, count, hint)
     return best
