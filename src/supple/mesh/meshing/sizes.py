@@ -15,6 +15,8 @@ MOST_TRIES = 6
 
 # Tets for each triangle of a coarse surface, at the usual quality: a ball of 100 to 300 triangles has 5 to 7.
 _TETS_OF_TRIANGLE = 6
+# Ratio of two bounds from which on their meshes show how the number depends on it: TetGen's is uneven over less.
+_LEVER = 2.0
 
 
 def volume_of_edge(edge: float) -> float:
@@ -33,10 +35,12 @@ def mesh_with_count(make: Callable[[float], TetMesh], count: int, volume: float)
 
     The number of tets is about inversely proportional to the bound on their volume. Where the surface alone rules (its
     triangles are smaller than such tets), no bound reaches the number: the coarsest mesh is returned, with a warning.
+    That is so where the power law through the last two meshes needs a bound above the whole volume.
     """
     bound = 2.0 * volume / count  # a mean tet is about half as large as the largest
     too_fine, too_coarse = 0.0, math.inf
     best: TetMesh | None = None
+    last: tuple[float, int] | None = None  # bound and tets of the mesh before, where these were too many
     for _ in range(MOST_TRIES):
         mesh = make(bound)
         made = len(mesh.tets)
@@ -45,7 +49,9 @@ def mesh_with_count(make: Callable[[float], TetMesh], count: int, volume: float)
         if abs(made - count) <= COUNT_TOLERANCE * count or bound > volume:
             break
         if made > count:
-            too_fine = max(too_fine, bound)
+            if last is not None and too_coarse == math.inf and not _reaches(count, last, (bound, made), volume):
+                break
+            too_fine, last = max(too_fine, bound), (bound, made)
         else:
             too_coarse = min(too_coarse, bound)
         bound *= made / count
@@ -58,3 +64,12 @@ def mesh_with_count(make: Callable[[float], TetMesh], count: int, volume: float)
         made = len(best.tets)
         logger.warning("%d tets instead of %d: the triangles of the surface need so many%s", made, count, hint)
     return best
+
+
+def _reaches(count: int, before: tuple[float, int], now: tuple[float, int], volume: float) -> bool:
+    """Whether the power law through two meshes (bound, tets) has so few tets at some bound below the whole volume."""
+    (small, many), (large, fewer) = before, now
+    if large < _LEVER * small:
+        return True
+    slope = math.log(many / fewer) / math.log(large / small)
+    return slope > 0.0 and math.log(fewer / count) <= slope * math.log(volume / large)
