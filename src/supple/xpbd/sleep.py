@@ -23,7 +23,6 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterable
 from copy import copy
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
@@ -140,14 +139,13 @@ class Sleep:
         return replace(memory, islands=islands)
 
     @staticmethod
-    def disturbed(begun: SleepMemory, pairs: Iterable[tuple[int, int]]) -> NDArray[np.bool_]:
-        """(b,) the sleeping bodies that something awake has touched in the frame, of pairs of bodies and obstacles."""
+    def disturbed(begun: SleepMemory, pairs: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """(b,) the sleeping bodies that something awake touched in the frame, of pairs (k, 2) with obstacles too."""
         asleep = begun.asleep
         found = np.zeros(len(asleep), dtype=np.bool_)
-        for a, b in pairs:
-            if max(a, b) < len(asleep) and asleep[a] != asleep[b]:
-                found[a if asleep[a] else b] = True
-        return found
+        pairs = pairs[(pairs < len(asleep)).all(axis=1)]
+        found[pairs[asleep[pairs[:, 0]] != asleep[pairs[:, 1]]]] = True
+        return found & asleep
 
     def end(
         self,
@@ -192,11 +190,10 @@ class Sleep:
 
     _vertices = vertices
 
-    def _islands(self, pairs: Iterable[tuple[int, int]]) -> NDArray[np.int64]:
+    def _islands(self, pairs: NDArray[np.int64]) -> NDArray[np.int64]:
         """(b,) the lowest body of those that each is connected to, by contact or stitches."""
         count = len(self._starts)
-        links = [*self._links, *((a, b) for a, b in pairs if max(a, b) < count)]
-        a, b = np.array(links, dtype=np.int64).reshape(-1, 2).T
+        a, b = np.concatenate([self._links, pairs[(pairs < count).all(axis=1)]]).T
         labels = connected_components(coo_array((np.ones(len(a)), (a, b)), shape=(count, count)), directed=False)[1]
         return np.unique(labels, return_index=True)[1][labels].astype(np.int64)
 
@@ -223,11 +220,12 @@ class Sleep:
         return np.concatenate([R.reshape(len(t), 9), t], axis=1)
 
 
-def _stitched_bodies(bodies: NDArray[np.int32], components: NDArray[np.int32]) -> list[tuple[int, int]]:
-    """Links between the bodies of each component; both are given for every vertex (n,)."""
+def _stitched_bodies(bodies: NDArray[np.int32], components: NDArray[np.int32]) -> NDArray[np.int64]:
+    """(k, 2) links between the bodies of each component; both are given for every vertex (n,)."""
     first: dict[int, int] = {}
     pairs = np.unique(np.stack([bodies, components], axis=1), axis=0).tolist()
-    return [(first.setdefault(component, body), body) for body, component in pairs]
+    links = [(first.setdefault(component, body), body) for body, component in pairs]
+    return np.array(links, dtype=np.int64).reshape(-1, 2)
 
 
 def _digest(thing: Any, without_loads: bool = False) -> str:

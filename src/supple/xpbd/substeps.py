@@ -25,6 +25,9 @@ from supple.xpbd.rigid.bodies import RigidBodies
 
 # Fewer substeps damp slow oscillations too much: a mode of frequency w decays at h w^2 / 2.
 FEWEST = 10
+# Rigid bodies alone have no such modes. In a frame of 1/60 s, a body that falls and others push into an obstacle or
+# another body sinks by less than a fiftieth of its size; docs/rigid_bodies.md.
+FEWEST_RIGID = 7
 # Of the mean height of a tet: how far surfaces may approach each other in a substep.
 APPROACH = 0.5
 # By how much a rigid body may turn in a substep [rad]; see `supple.xpbd.rigid.bodies`.
@@ -67,6 +70,9 @@ class SubstepChoice:
         self._masses = np.array([free[part.vertices].sum() for part in system.bodies])
         heaviest = self._masses.max(initial=0.0)
         self._light = rigid.numbers[~rigid.held & (self._masses[rigid.numbers] * LEAST_RATIO < heaviest)]
+        scene = system.scene
+        swings = len(rigid) < len(system.bodies) or scene.joints or scene.stitches or scene.forces or system.actuators
+        self._fewest = FEWEST if swings else FEWEST_RIGID
         self._begins = [part.points.start for part in system.bodies]
 
     def choose(
@@ -83,7 +89,7 @@ class SubstepChoice:
         stiff, body = self.softening.substeps(dt, accuracy, measured)
         reach = self._closing_speed(moment, dt) * dt if self.touches else 0.0
         found = max(
-            Substeps(FEWEST, "the least number"),
+            Substeps(self._fewest, "the least number"),
             Substeps(stiff, f"the stiffness of body {body!r}"),
             Substeps(_count(reach / (APPROACH * self.height)), "the speed of approach"),
             self._for_spins(moment, dt),

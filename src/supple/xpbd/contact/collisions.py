@@ -121,7 +121,7 @@ class Collisions:
             known = None if memory is None else memory.obstacles
             self.obstacles.begin_step(known, x, LEAST_REACH * self.edge_length, asleep)
             if not asleep.all():
-                self._gather_obstacles(x, v, time)
+                self._gather_obstacles(self.obstacles.places(x), self.obstacles.places(v), time)
 
     def begin_substep(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> bool:
         """Apply the forces kept of the substep before to the prediction, in place, before all other constraints.
@@ -198,10 +198,12 @@ class Collisions:
         self, x: NDArray[np.float64], x_prev: NDArray[np.float64], time: float, h: float, limit: float
     ) -> None:
         if self.obstacles:
-            if any_beyond_reach(self.obstacles.places(x), self._gathered, self._reach):
-                self._gather_obstacles(x, (x - x_prev) / h, time)
+            places, before = self.obstacles.take(x, x_prev)
+            if any_beyond_reach(places, self._gathered, self._reach):
+                self._gather_obstacles(places, (places - before) / h, time)
             scales = (self.skin, NEAR * self.edge_length)
-            self._count(self.obstacles.project(x, x_prev, (time - h, time), limit, scales))
+            self._count(self.obstacles.project(places, before, (time - h, time), limit, scales))
+            self.obstacles.give(places, before, x, x_prev)
 
     @property
     def positions(self) -> NDArray[np.float64]:
@@ -243,7 +245,6 @@ class Collisions:
     def _gather_obstacles(self, x: NDArray[np.float64], v: NDArray[np.float64], time: float) -> None:
         falling = 0.5 * self._falling * self._dt**2
         least = LEAST_REACH * self.edge_length + falling
-        x, v = self.obstacles.places(x), self.obstacles.places(v)
         self._reach = least + 1.2 * self._dt * np.sqrt(np.einsum("ij,ij->i", v, v))
         self._gathered[:] = x
         self.obstacles.gather(x, self._reach, time)

@@ -114,10 +114,11 @@ class FrameForces:
         points.add_forces(at_points[1], tangential)
         return normal, tangential
 
-    def pairs(self) -> list[tuple[int, int]]:
-        """The pairs of bodies and obstacles (counted after the bodies) whose surfaces push each other."""
-        vertices, owner = self._rows().vertices, self.owners.of_points
-        return [tuple(pair) for pair in np.unique(owner[vertices[:, [0, 3]]], axis=0).tolist()]
+    def pairs(self) -> NDArray[np.int64]:
+        """(k, 2) the pairs of bodies and obstacles (counted after the bodies) whose surfaces push each other."""
+        vertices, owner, count = self._rows().vertices, self.owners.of_points, len(self.owners.names)
+        keys = np.unique(owner[vertices[:, 0]].astype(np.int64) * count + owner[vertices[:, 3]])
+        return np.column_stack(np.divmod(keys, count))
 
     def keep_standing(self, standing: tuple[LoadedRows, ShapeLoads], asleep: NDArray[np.bool_]) -> None:
         """Set `standing` to the contacts of an earlier frame, as far as the bodies (b,) still sleep."""
@@ -142,12 +143,11 @@ class FrameForces:
 
     def by_name(self) -> tuple[dict[str, NDArray[np.float64]], dict[str, NDArray[np.float64]]]:
         """The sums along the normals, and along the surfaces, on each body and obstacle: (3,) [N]; each add up to 0."""
-        normal, tangential = np.zeros((2, len(self.owners.names), 3))
+        names, count = self.owners.names, len(self.owners.names)
+        normal, tangential = np.zeros((2, count, 3))
         for part in (_of_rows(self._rows(), self), _of_shapes(self._loads(), self)):
             for out, forces in ((normal, part.normal), (tangential, part.tangential)):
-                np.add.at(out, part.first, forces)
-                np.subtract.at(out, part.second, forces)
-        names = self.owners.names
+                out += _sums(part.first, forces, count) - _sums(part.second, forces, count)
         return dict(zip(names, normal, strict=True)), dict(zip(names, tangential, strict=True))
 
     def points(

@@ -199,13 +199,16 @@ class ObstacleContacts:
     def begin_substep(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> bool:
         """See `Collisions.begin_substep`."""
         if self._any_load:
-            count, places = self._starts[-1], self._take(x, x_prev)
+            count, places = self._starts[-1], self.take(x, x_prev)
             add_loads(places[0], self._moved.movers, self._vertices[:count], self._loads[:count], h)
-            self._give(*places, x, x_prev)
+            self.give(*places, x, x_prev)
         return self._any_load
 
-    def _take(self, x: NDArray[np.float64], x_prev: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
-        """The places of what is tested, of those of the vertices."""
+    def take(self, x: NDArray[np.float64], x_prev: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
+        """The places of what is tested (t, 3) at the end and at the beginning of a substep, of those of the vertices.
+
+        `give` applies what has been done to them to the vertices.
+        """
         if not len(self._rigid):
             return x, x_prev
         self._moved.take(x, self._x)
@@ -213,7 +216,8 @@ class ObstacleContacts:
         self._moved.begin(x, x_prev, self._before)
         return self._x, self._before
 
-    def _give(self, places: NDArray, before: NDArray, x: NDArray[np.float64], x_prev: NDArray[np.float64]) -> None:
+    def give(self, places: NDArray, before: NDArray, x: NDArray[np.float64], x_prev: NDArray[np.float64]) -> None:
+        """Move the vertices x, x_prev (n, 3) as the places were moved."""
         if len(self._rigid):
             self._moved.settle(places, before, self._predicted)
             self._moved.give(places, before, x, x_prev)
@@ -225,27 +229,25 @@ class ObstacleContacts:
 
     def project(
         self,
-        x: NDArray[np.float64],
-        x_prev: NDArray[np.float64],
+        places: NDArray[np.float64],
+        before: NDArray[np.float64],
         times: tuple[float, float],
         limit: float,
         scales: tuple[float, float],
     ) -> tuple[int, float]:
-        """Push vertices out at the end of the substep `times` = (beginning, end) [s]: contacts, smallest gap [m].
+        """Push what `take` returned out, at the end of the substep `times` = (beginning, end) [s].
 
-        For `limit` and `scales` see `_project_shapes`.
+        Returns the number of contacts, and the smallest gap [m]. For `limit` and `scales` see `_project_shapes`.
         """
         frames = tuple(self.shapes.placed(self.poses, time) for time in reversed(times))
         candidates = (self._starts, self._vertices, self._loads, self._shares, self._places)
         described = (candidates, self._arrays, self._rules, *frames)
         contacts, smallest = 0, math.inf
         points, h = (self._predicted, self._rates, self._moved.movers, self._begun), times[1] - times[0]
-        places, before = self._take(x, x_prev)
         for again in range(RIGID_SWEEPS if len(self._rigid) else 1):
             for _, push, first, last in self._groups:
                 found, gap = push(places, before, points, *described, first, last, h, limit, scales, again > 0)
                 if not again:
                     contacts += found
                     smallest = min(smallest, gap)
-        self._give(places, before, x, x_prev)
         return contacts, smallest

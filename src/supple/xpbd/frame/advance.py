@@ -90,5 +90,5 @@ def disturbed_bodies(ws: XPBDWorkspace, time: float, sleep: SleepMemory) -> NDAr
     if not sleep.asleep.any() or sleep.asleep.all():
         return np.zeros(len(sleep.islands), dtype=np.bool_)
     to_world(ws.points, ws.origins, ws.world)
-    crossing = [overlap.numbers for overlap in overlaps_of(ws, time, sleep)]
-    return ws.sleep.disturbed(sleep, [*ws.collisions.forces.pairs(), *crossing])
+    crossing = np.array([overlap.numbers for overlap in overlaps_of(ws, time, sleep)], dtype=np.int64).reshape(-1, 2)
+    return ws.sleep.disturbed(sleep, np.concatenate([ws.collisions.forces.pairs(), crossing]))
