@@ -5,7 +5,9 @@ the coordinate by h^2 Q sum w |ds/dx|^2. The law gives the Q that fits the coord
 eyelet of a cable then stops its slip, with a force that is at most that of the capstan's law.
 
 An actuator between vertices of one piece is projected with the constraints, before the momentum of the piece is
-restored; one that joins pieces to each other or to the world, after that.
+restored; one that joins pieces to each other or to the world, after that. The latter moves vertices along ds/dx of the
+beginning of the substep: as the velocity is (x - x_n) / h, such forces have no moment (Ryckaert, Ciccotti, Berendsen,
+"Numerical integration of the cartesian equations of motion of a system with constraints", 1977).
 """
 
 from __future__ import annotations
@@ -52,7 +54,7 @@ class ActuatorProjection:
         """Move the vertices of the actuators within one piece, in place."""
         for k, each in enumerate(self.system.actuators):
             if self._inner[k]:
-                self._project(k, each, at)
+                self._project(k, each, at, _own(each, at))
 
     def project_between(self, at: Substep) -> None:
         """Move the vertices of all other actuators, in place, and change their velocities."""
@@ -60,7 +62,7 @@ class ActuatorProjection:
             if not self._inner[k]:
                 rows = each.coordinate.vertices
                 before = at.points[rows, :3].copy()
-                self._project(k, each, at)
+                self._project(k, each, at, at.begun[rows] + at.origins[rows])
                 at.velocities[rows] += (at.points[rows, :3] - before) / at.h
 
     def end_substep(self, at: Substep) -> None:
@@ -88,9 +90,10 @@ class ActuatorProjection:
             out[each.coordinate.vertices] += np.einsum("p,pij->ij", forces, gradients)
         return out
 
-    def _project(self, k: int, each: Actuator, at: Substep) -> None:
+    def _project(self, k: int, each: Actuator, at: Substep, places: Floats) -> None:
+        """Move the vertices of an actuator, in place, along the gradients at `places` (v, 3) of them."""
         rows, own = each.coordinate.vertices, _own(each, at)
-        gradients, parts = each.coordinate.part_gradients(own), each.coordinate.parts(own)
+        gradients, parts = each.coordinate.part_gradients(places), each.coordinate.parts(own)
         grips = np.zeros(len(parts) - 1)
         self._forces[k][:] = 0.0
         total = gradients[0] if len(gradients) == 1 else gradients.sum(axis=0)
