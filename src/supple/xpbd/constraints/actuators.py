@@ -4,10 +4,11 @@ Without its generalized force Q the coordinate would be s. Q moves the vertices 
 the coordinate by h^2 Q sum w |ds/dx|^2. The law gives the Q that fits the coordinate which it leads to. Friction at an
 eyelet of a cable then stops its slip, with a force that is at most that of the capstan's law.
 
-An actuator between vertices of one piece is projected with the constraints, before the momentum of the piece is
-restored; one that joins pieces to each other or to the world, after that. The latter moves vertices along ds/dx of the
-beginning of the substep: as the velocity is (x - x_n) / h, such forces have no moment (Ryckaert, Ciccotti, Berendsen,
-"Numerical integration of the cartesian equations of motion of a system with constraints", 1977).
+An actuator between vertices of one piece, without points of rigid bodies, is projected with the constraints, before
+the momentum of the piece is restored; one that joins pieces to each other or to the world, or pulls at a rigid body,
+after that. The latter moves vertices along ds/dx of the beginning of the substep: as the velocity is (x - x_n) / h,
+such forces have no moment (Ryckaert, Ciccotti, Berendsen, "Numerical integration of the cartesian equations of motion
+of a system with constraints", 1977).
 """
 
 from __future__ import annotations
@@ -38,11 +39,10 @@ class ActuatorProjection:
 
     def __init__(self, system: System) -> None:
         self.system = system
-        pieces = [np.unique(system.joined_components[each.coordinate.vertices]) for each in system.actuators]
-        self._inner = [
-            len(piece) == 1 and not each.coordinate.is_anchored
-            for piece, each in zip(pieces, system.actuators, strict=True)
-        ]
+        rigid = np.zeros(len(system.masses), dtype=np.bool_)
+        for part in system.rigid_bodies:
+            rigid[part.vertices] = True
+        self._inner = [_is_inner(each, system.joined_components, rigid) for each in system.actuators]
         self._impulses, self._works, self._parts, self._forces = ([] for _ in range(4))
 
     def begin_frame(self, at: Substep) -> None:
@@ -148,6 +148,11 @@ def _stop_slips(gradients, free, longer, turns, friction, tension, moved, grips)
                 for j in range(3):
                     moved[i, j] += grips[e] * free[i] * before[i, j]
         tension -= grips[e]
+
+
+def _is_inner(each: Actuator, pieces: NDArray[np.int32], rigid: NDArray[np.bool_]) -> bool:
+    rows = each.coordinate.vertices
+    return len(np.unique(pieces[rows])) == 1 and not each.coordinate.is_anchored and not rigid[rows].any()
 
 
 def _own(each: Actuator, at: Substep) -> Floats:
