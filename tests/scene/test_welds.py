@@ -234,15 +234,15 @@ def test_bad_welds_are_refused_in_one_line(make, problem):
     assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize("solver", [xpbd(40), implicit("static")], ids=["xpbd", "implicit"])
+@pytest.mark.parametrize("solver", [xpbd(60), implicit("static")], ids=["xpbd", "implicit"])
 def test_a_joint_at_the_center_of_a_body_with_a_weld_carries_the_moment_about_it(solver):
     """Not about the center of the body with what is welded to it, where XPBD had it."""
-    stiff = sp.StableNeoHookean(youngs=5e7, poisson=0.3, density=100, damping=0.02)
+    stiff = sp.StableNeoHookean(youngs=3e5, poisson=0.3, density=100, damping=0.02)
     light = sp.Body("beam", sp.shapes.box((0.4, 0.1, 0.1), (4, 1, 1)), stiff)
     clamp = sp.FixedJoint("cube", name="clamp")
     scene = sp.Scene([light, cube(mass=0.1, density=None)], welds=[WELD], joints=[clamp])
     static = isinstance(solver, sp.Implicit)
-    frames = list(sp.simulate(scene, solver, 1 / 60, 1 if static else 12))
-    readings = [frame.report.joints["clamp"] for frame in frames[-1 if static else -6 :]]
+    frames = run(scene, 1 if static else 24, solver)
+    readings = [frame.report.joints["clamp"] for frame in frames[-16:]]
     assert np.mean([one.force[1] for one in readings]) == pytest.approx(0.5 * G, rel=0.01)
     assert np.mean([one.torque[2] for one in readings]) == pytest.approx(0.4 * G * 0.25, rel=0.02)
