@@ -193,7 +193,7 @@ def test_voids_are_found_by_size_and_chosen_by_triangles():
         sp.Cavity("shell", pressure=1.0, void=1, name="again"),
         sp.Cavity("shell", pressure=1.0),
     ]
-    starts = [each.start for each in build_system(sp.Scene([body], cavities=cavities)).actuators]
+    starts = [build_system(sp.Scene([body], cavities=[each])).actuators[0].start for each in cavities]
     assert starts[0] == starts[1] < 0.01 * starts[2]
 
 
@@ -273,6 +273,10 @@ def test_bad_cavities_are_one_line(make, message):
 def test_cavities_are_checked_further_where_they_are_used(tmp_path):
     with pytest.raises(sp.SceneError, match="another cavity has this name"):
         sp.Scene([shell()], cavities=[sp.Cavity("shell", pressure=1.0), sp.Cavity("shell", volume=1.0)])
+    with pytest.raises(
+        sp.SceneError, match="cavity 'air': cavity 'shell' has the same triangles; give each surface one"
+    ):
+        sp.Scene([shell()], cavities=[sp.Cavity("shell", pressure=1.0), sp.Cavity("shell", volume=1.0, name="air")])
     never = sp.Cavity("shell", volume=lambda t: -t)
     with pytest.raises(sp.SceneError, match=r"volume\(0.01\) is -0.01; it must be above zero"):
         list(sp.simulate(scene(never), sp.XPBD(substeps=1), dt=0.01, steps=1))

@@ -62,6 +62,16 @@ def test_frames_read_back_equal(recorded):
         assert [body.rigid for body in recording.bodies] == [False, True]
 
 
+def test_fields_of_soft_bodies_are_in_the_table(tmp_path):
+    path = tmp_path / "r.vtkhdf"
+    recorder = sp.Recorder(path, fields=["von_mises", "contact_pressure"])
+    list(sp.simulate(scene(), sp.Implicit(), 0.01, 2, sinks=[recorder]))
+    export(path, "csv", tmp_path / "r.csv")
+    columns = (tmp_path / "r.csv").read_text().splitlines()[0].split(",")
+    assert {"von_mises.soft.max", "contact_pressure.soft.max"} <= set(columns)
+    assert not any(".palm.max" in column for column in columns)
+
+
 def test_the_surface_is_drawn(recorded):
     path, frames = recorded
     with sp.read_recording(path) as recording:

@@ -240,6 +240,32 @@ def test_joints_that_contradict_each_other_are_named():
     frames = list(sp.simulate(sp.Scene([bar()], joints=joints, obstacles=[away]), sp.XPBD(substeps=10), 1 / 60, 20))
     assert frames[-1].report.status == "softened"
     assert "is off by" in frames[-1].report.message
+    assert "take substeps=20, or remove what contradicts the joint" in frames[-1].report.message
+
+
+def test_a_motor_that_nothing_can_move_is_named():
+    """A slider across holds its body, and a motor without a largest force is not its cause alone."""
+    across = sp.SliderJoint("bar", axis=(1, 0, 0))
+    driven = sp.SliderJoint("bar", axis=(0, 1, 0), motor=sp.VelocityMotor(1.0), name="driven")
+    (frame,) = sp.simulate(sp.Scene([bar()], joints=[across, driven]), sp.XPBD(substeps=10), 1 / 100, 1)
+    assert frame.report.status == "softened"
+    assert "joint 'driven' is off by 100 % of the way of its motor" in frame.report.message
+
+
+@pytest.mark.parametrize("motor", [sp.VelocityMotor(-0.1), sp.PositionMotor(lambda t: -0.1 * t, 1e6, 1e3)])
+def test_motors_push_on_against_contact(motor):
+    """Through 25 of 100 mm of soft material. Motors that did not answer to contact fell back by up to 11 mm."""
+    material = sp.StableNeoHookean(youngs=1e5, poisson=0.3, density=1000)
+    block = sp.Body("block", sp.shapes.box((0.1, 0.1, 0.1), (2, 2, 2)), material, position=(0, 0.051, 0))
+    shape = sp.shapes.box_surface((0.2, 0.02, 0.2), (2, 1, 2))
+    plate = sp.RigidBody("plate", shape, mass=1.0, position=(0, 0.1135, 0))
+    press = sp.SliderJoint("plate", axis=(0, 1, 0), motor=motor, name="press")
+    scene = sp.Scene([block, plate], obstacles=[sp.HalfSpace(friction=0.5, name="floor")], joints=[press])
+    last = run(scene, 15, substeps=30, contact=sp.XPBDContact(), violation=1e-3)[-1]
+    pushed = last.report.details.contact_forces["plate"][1]
+    expected = -0.025 + (pushed / 1e6 if isinstance(motor, sp.PositionMotor) else 0.0)
+    assert last.report.joints["press"].coordinate == pytest.approx(expected, abs=1e-4)
+    assert last.report.joints["press"].motor_force == pytest.approx(G - pushed, rel=0.01)
 
 
 @pytest.mark.parametrize("density", [1000.0, 8000.0])

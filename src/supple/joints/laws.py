@@ -76,11 +76,6 @@ class Laws:
         )
         return made, np.array(multipliers, dtype=np.float64)
 
-    @property
-    def holds(self) -> NDArray[np.bool_]:
-        """(l,) which are conditions and limits, not motors and friction."""
-        return self.adapts & ~self.is_motor & (np.isinf(self.low) | np.isinf(self.high))
-
     def selected(self, chosen: NDArray[np.bool_]) -> Laws:
         """Those where `chosen` (l,) is true."""
         return Laws(*(getattr(self, each.name)[chosen] for each in fields(self)))

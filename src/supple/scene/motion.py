@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from supple.errors import SceneError
 from supple.scene.rotation import rotation_matrix
-from supple.scene.values import float_array
+from supple.scene.values import float_array, unit_vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,11 +60,7 @@ class Keyframes:
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "displacements", self._array("displacements", displacements, (k, 3)))
         object.__setattr__(self, "angles", self._array("angles", angles, (k,)))
-        axis = self._array("axis", self.axis, (3,))
-        length = np.linalg.norm(axis)
-        if length == 0.0:
-            raise SceneError("Keyframes: axis has no length; give a direction such as [0, 0, 1]")
-        object.__setattr__(self, "axis", axis / length)
+        object.__setattr__(self, "axis", unit_vector(self.axis, "Keyframes: axis"))
         object.__setattr__(self, "pivot", self._array("pivot", self.pivot, (3,)))
         if self.rotations is not None:
             object.__setattr__(self, "rotations", self._array("rotations", self.rotations, (k, 3)))

@@ -135,8 +135,8 @@ class Scene(Showable):
                 _check_own_name("sensor", sensor, self.sensors[:i])
         for i, cavity in enumerate(self.cavities):
             with at("cavities", i):
-                cavity.surface(self.bodies)
                 _check_own_name("cavity", cavity, self.cavities[:i])
+                cavity.check(self.bodies, self.cavities[:i])
         for i, cable in enumerate(self.cables):
             with at("cables", i):
                 cable.corners(self.bodies)

@@ -38,6 +38,17 @@ def finite_vector(value: object, what: str, *, nonzero: bool = False) -> NDArray
     return vector
 
 
+def unit_vector(value: object, what: str) -> NDArray[np.float64]:
+    """The direction (3,) of a vector of any length; raise where it is not three finite numbers, or has no length."""
+    vector = finite_vector(value, what, nonzero=True)
+    largest = np.abs(vector).max()
+    if not 1e-100 < largest < 1e100:  # squares would not be numbers
+        vector = vector / largest
+    length = np.linalg.norm(vector)
+    # A unit vector stays the same to the last bit, so that a recorded one reads back equal.
+    return vector if abs(length - 1.0) <= 4e-16 else finite_vector(vector / length, what)
+
+
 def _number(value: object, what: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise SceneError(f"{what} is {value!r}; give a number")

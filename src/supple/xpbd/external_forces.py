@@ -46,12 +46,16 @@ class ExternalForces:
     def pull_springs(self, at: Substep) -> None:
         """Project the springs between points: C = l - l0 with compliance 1 / k, one after the other.
 
-        Dlam = -C / (sum w c^2 + 1 / (k h^2)), with the coefficients c of the vertices.
+        Dlam = -C / (sum w c^2 + 1 / (k h^2)), with the coefficients c of the vertices. The direction is that of the
+        beginning of the substep, see `ActuatorProjection`.
         """
         for spring in self._springs:
             rows, c = spring.vertices, spring.coefficients
             r = c @ at.world(rows) + spring.offset
             length = float(np.sqrt(r @ r))
+            begun = c @ (at.begun[rows] + at.origins[rows]) + spring.offset
+            if begun @ r > 0.0:
+                r = begun * (length / np.sqrt(begun @ begun))
             w = at.points[rows, 3]
             if length > 0.0:
                 stretch = length - spring.rest_length(at.time)

@@ -52,7 +52,11 @@ class WeldedMasses:
         )
         self._into = np.asarray(block_diag(*(own.weights_of(other.mesh.vertices) for own, other in pairs)))
         self._back = np.asarray(block_diag(*(other.weights_of(own.mesh.vertices) for own, other in pairs)))
-        scene = replace(system.scene, bodies=[heavy.get(part.name, part.body) for part in system.bodies])
+        # Joints without a point are at the centers of mass of the scene's bodies.
+        places = {own.name: own for own, _ in pairs}
+        joints = [replace(joint, point=joint.place(places[joint.first])) for joint in system.scene.joints]
+        bodies = [heavy.get(part.name, part.body) for part in system.bodies]
+        scene = replace(system.scene, bodies=bodies, joints=joints)
         anchors = [self._anchors(pin) for pin in system.pins]
         built = rebuilt_system(scene, tuple(self.inner(state) for state in system.start_states), anchors)
         masses, seen = built.masses.copy(), built.masses.copy()

@@ -47,6 +47,17 @@ def test_bad_joints_are_refused_in_one_line(make, problem):
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize("length", [1e-310, 1e-200, 3.0, 1e200, 1e308])
+def test_an_axis_has_any_length(length):
+    for joint in (
+        hinge(axis=(0, length, length)),
+        sp.BallJoint("bar", point=(0, 0, 0), axis=(0, length, length), max_swing=1),
+    ):
+        np.testing.assert_allclose(joint.axis, [0, 0.5**0.5, 0.5**0.5], rtol=1e-14)
+    muscle = sp.Muscle("soft", 1e3, (0, length, length))
+    np.testing.assert_allclose(muscle.direction, [0, 0.5**0.5, 0.5**0.5], rtol=1e-14)
+
+
 @pytest.mark.parametrize(
     ("joints", "integrator", "problem"),
     [

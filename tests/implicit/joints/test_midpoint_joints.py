@@ -108,6 +108,27 @@ def test_limits_stop_without_a_bounce(values):
     assert frames[-1].report.joints["hinge"].torque[2] == pytest.approx(WEIGHT * np.cos(0.1), rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    "joint",
+    [
+        hinge(limits=(-0.1, 0.1)),
+        hinge(limits=(-1.0, 0.02), motor=sp.VelocityMotor(1.0, max_force=300.0)),
+        sp.BallJoint("bar", point=(0, 0, 0), axis=(1, 0, 0), max_swing=0.1, name="hinge"),
+        sp.SliderJoint("bar", axis=(1, 1, 0), limits=(-0.02, 1.0), name="hinge"),
+    ],
+)
+def test_the_force_of_a_joint_changes_the_momentum_also_where_it_stops(joint):
+    """In every step, that of an impact too; its work is that of the joint, and none is left over."""
+    frames = run(sp.Scene([bar()], joints=[joint]), 0.01, 20)
+    P = np.array([frame.report.linear_momentum for frame in frames])
+    forces = np.array([frame.report.joints["hinge"].force for frame in frames[1:]])
+    np.testing.assert_allclose(forces, np.diff(P, axis=0) / 0.01 + [0, MASS * G, 0], atol=1e-9)
+    assert np.abs(forces).max() > 4 * MASS * G
+    assert max(abs(frame.report.work["numerical"]) for frame in frames) < 1e-5
+    efforts = [frame.report.joints["hinge"].motor_force or 0.0 for frame in frames]
+    assert max(map(abs, efforts)) <= 300.0
+
+
 def test_a_velocity_motor_accelerates_with_the_torque_that_it_takes():
     """And stops at its limit: rates follow the motor at the ends of steps, and do not alternate about it."""
     motor = sp.VelocityMotor(sp.Curve([0.0, 0.3], [0.0, 1.0]))

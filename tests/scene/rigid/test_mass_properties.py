@@ -83,7 +83,7 @@ def test_the_surface_of_a_tet_mesh_has_its_properties():
 
 
 def test_mass_scales_the_moments_and_inertia_replaces_them():
-    box = with_mass(of_solid(BOX, "box"), 12.0)
+    box = with_mass(of_solid(BOX, "box"), 12.0, "box")
     np.testing.assert_allclose(box.second_moment, box_moment(12.0, (1.0, 2.0, 3.0)), atol=1e-12)
     assert (box.mass, box.volume) == pytest.approx((12.0, 6.0))
     given = np.array([[3.0, 0.5, 0.0], [0.5, 4.0, 0.0], [0.0, 0.0, 5.0]])

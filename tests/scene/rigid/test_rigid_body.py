@@ -193,6 +193,18 @@ PIN = sp.Pin("palm")
         (lambda: body(mass=1.0), "rigid body 'palm': give its density .* or its mass .*, one of the two"),
         (lambda: body(density=0.0), "rigid body 'palm': density is 0; it must be above zero"),
         (lambda: body(density=None, mass=0.0), "rigid body 'palm': mass is 0; it must be above zero"),
+        (
+            lambda: body(density=None, mass=1e-320),
+            "rigid body 'palm': its mass is 9.99989e-321 kg; give one",
+        ),
+        (
+            lambda: body(BOX, density=1e307),
+            "rigid body 'palm': its mass is 6e[+]307 kg; give one from 1e-90 to 1e[+]90 kg",
+        ),
+        (
+            lambda: body(density=None, mass=1, inertia=[1e308] * 3),
+            "rigid body 'palm': inertia is 1e[+]308 kg",
+        ),
         (lambda: body(inertia=[1, 1, 1]), "rigid body 'palm': inertia needs a mass"),
         (lambda: body(density=None, mass=1.0, center=(0, 0, 0)), "rigid body 'palm': center needs an inertia"),
         (lambda: body(center=(0, 0, 0)), "rigid body 'palm': center needs a mass and an inertia"),

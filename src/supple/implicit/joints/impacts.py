@@ -22,6 +22,7 @@ from scipy.sparse.linalg import splu
 
 from supple.implicit.joints.potential import JointPotential
 from supple.implicit.joints.rigidity import Rigidity
+from supple.joints.laws import Law, Laws
 
 # Of the mean of the diagonal: conditions may repeat each other.
 _REPEATED = 1e-11
@@ -32,18 +33,31 @@ _COMPONENTS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 def stop_at_laws(
     potential: JointPotential, rigidity: Rigidity, x: NDArray[np.float64], velocities: NDArray[np.float64], begin: float
-) -> None:
+) -> tuple[JointPotential, float] | None:
     """Where laws act at the end x (n, 3) of a step from `begin` [s], give their pieces rates that agree, in place.
 
-    `potential` has the multipliers that were found in the step.
+    `potential` has the multipliers that were found in the step. Returned is the potential whose forces at x have the
+    impulses of this change within the step, and their work [J].
     """
     geometry, laws, efforts = potential.geometry, potential.laws, potential.law_multipliers
     acting = (efforts > laws.low) & (efforts < laws.high) & ~np.isin(laws.function, geometry.across)
-    if acting.any():
-        rates = dict(zip(laws.function[acting].tolist(), laws.rate[acting].tolist(), strict=True))
-        corners = geometry.corners[geometry.arguments[0].joint[list(rates)], 0]
-        pieces = np.unique(geometry.system.joined_components[corners])
-        agree(potential, rigidity, x, velocities, begin, rates, pieces)
+    if not acting.any() or not len(rigidity.corners):
+        return None
+    rates = dict(zip(laws.function[acting].tolist(), laws.rate[acting].tolist(), strict=True))
+    corners = geometry.corners[geometry.arguments[0].joint[list(rates)], 0]
+    pieces = np.unique(geometry.system.joined_components[corners])
+    of_functions, of_differences, work = agree(potential, rigidity, x, velocities, begin, rates, pieces)
+    h = potential.time - begin
+    # A motor is the last law of its function, whose impulse it has where it acts.
+    motors = laws.function[acting & laws.is_motor].tolist()
+    made, efforts = Laws.of(
+        [
+            Law(row, 0.0, 0.0, multiplier=-impulse / h, adapts=False, is_motor=row in motors)
+            for row, impulse in of_functions.items()
+        ]
+    )
+    changed = {"laws": made, "law_multipliers": efforts, "multipliers": -of_differences / h}
+    return replace(potential, stiffness=np.zeros_like(potential.stiffness), **changed), work
 
 
 def agree(
@@ -54,16 +68,16 @@ def agree(
     begin: float,
     rates: dict[int, float],
     pieces: NDArray[np.int32],
-) -> None:
+) -> tuple[dict[int, float], NDArray[np.float64], float]:
     """Give some pieces of the system velocities (n, 3) that agree with their joints at x (n, 3), in place.
+
+    Returned are the impulses by the functions of the joints and of the differences (f, 3) [N s], and their work [J].
 
     Parameters
     ----------
     rates : of functions of the joints, by number; those across sliders have the rate zero
     begin : since when obstacles have the velocities that they have now [s]
     """
-    if not len(rigidity.corners):
-        return
     geometry, linear = potential.geometry, potential.geometry.differences
     earlier = replace(potential, time=begin)
     h = potential.time - begin
@@ -78,6 +92,7 @@ def agree(
     for a, b in _COMPONENTS:
         groups.append((rigidity.corners, rigidity.gradients(x, a, b), np.zeros(len(rigidity.corners))))
     owner = geometry.system.joined_components
+    impulses = [np.zeros(len(of)) for of, _, _ in groups]
     kept = [np.isin(owner[corners[:, 0]], pieces) for corners, _, _ in groups]
     groups = [(of[keep], by[keep], to[keep]) for (of, by, to), keep in zip(groups, kept, strict=True)]
 
@@ -91,7 +106,14 @@ def agree(
     inverse = bsr_array((blocks, np.arange(len(blocks)), np.arange(len(blocks) + 1)))
     S = csc_array(G @ inverse @ G.T)
     S = csc_array(S + _REPEATED * S.diagonal().mean() * eye_array(len(change)))
-    velocities[free] += (inverse @ (G.T @ splu(S).solve(change))).reshape(-1, 3)
+    solved = splu(S).solve(change)
+    velocities[free] += (inverse @ (G.T @ solved)).reshape(-1, 3)
+    ends = np.cumsum([len(rate) for rate in now])[:-1]
+    for all_of, keep, some in zip(impulses, kept, np.split(solved, ends), strict=True):
+        all_of[keep] = some
+    of_functions = dict(zip(rows.tolist(), impulses[0].tolist(), strict=True))
+    work = float(solved @ (np.concatenate(now) + 0.5 * change))
+    return of_functions, np.stack(impulses[1:4], axis=1), work
 
 
 def _matrix(

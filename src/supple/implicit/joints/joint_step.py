@@ -115,20 +115,24 @@ class JointStep:
             np.maximum.at(out, geometry.arguments[0].joint[function], missing / geometry.units[function])
         return out
 
-    def acting(self, x: NDArray[np.float64]) -> tuple[JointPotential, NDArray[np.float64]]:
-        """The energy whose forces are those of the joints in a step to x (n, 3), and the positions where they act."""
-        return self.potential, x
+    def acting(self, x: NDArray[np.float64]) -> list[tuple[JointPotential, NDArray[np.float64]]]:
+        """Energies whose forces are those of the joints in a step to x (n, 3), and the positions where they act."""
+        return [(self.potential, x)]
 
     def measured(self, details: ImplicitDetails, x: NDArray[np.float64]) -> ImplicitDetails:
         """The details of a step that ended at x (n, 3), with what the joints do there."""
         geometry = self.geometry
-        potential, there = self.acting(x)
-        forces, torques = potential.actions(there)
+        forces, torques = np.zeros((2, len(geometry.joints), 3))
+        motors: dict[int, float] = {}
+        for potential, there in self.acting(x):
+            force, torque = potential.actions(there)
+            forces, torques = forces + force, torques + torque
+            efforts, laws = potential.efforts(there), potential.laws
+            for k in np.flatnonzero(laws.is_motor):
+                row = int(laws.function[k])
+                motors[row] = motors.get(row, 0.0) - float(efforts[k])
         names = [str(joint.name) for joint in geometry.joints]
-        efforts = potential.efforts(there)
         along = {name: int(row) for name, row in zip(names, geometry.along, strict=True) if row >= 0}
-        laws = potential.laws
-        motors = {int(laws.function[k]): -float(efforts[k]) for k in np.flatnonzero(laws.is_motor)}
         return replace(
             details,
             joint_forces=dict(zip(names, forces, strict=True)),

@@ -44,6 +44,7 @@ class MidpointJoints(JointStep):
     rigidity : of the bodies at the end; start : (n, 3) x_n [m]
     begin : of the step [s]; place, middle : where forces act, as a share of the step, and when [s]
     others : laws whose multipliers (l,) stay, in the middle
+    impact : whose forces at the end have the impulses of an impact, see `impacts`
     """
 
     held: ClassVar[float] = 1e-9
@@ -54,6 +55,7 @@ class MidpointJoints(JointStep):
     place: float
     middle: float
     others: tuple[Laws, NDArray[np.float64]]
+    impact: JointPotential | None = None
 
     @property
     def terms(self) -> list[Potential]:
@@ -87,16 +89,18 @@ class MidpointJoints(JointStep):
     def largest_violation(self, x: NDArray[np.float64]) -> float:
         return max(super().largest_violation(x), self.rigidity.violation(x))
 
-    def acting(self, x: NDArray[np.float64]) -> tuple[JointPotential, NDArray[np.float64]]:
-        return self._renewed(x)._acting, self.start + self.place * (x - self.start)
+    def acting(self, x: NDArray[np.float64]) -> list[tuple[JointPotential, NDArray[np.float64]]]:
+        in_the_middle = self._renewed(x)._acting, self.start + self.place * (x - self.start)
+        return [in_the_middle] if self.impact is None else [in_the_middle, (self.impact, x)]
 
     def finish(
         self, x: NDArray[np.float64], velocities: NDArray[np.float64], residual: NDArray[np.float64], tools: Tools
-    ) -> None:
+    ) -> float:
         """Give the bodies their velocities (n, 3) at the end x (n, 3) of a step, in place.
 
         They are those of the balance of momentum with all forces in the middle, those of the penalties too, and of the
-        laws that act. The residual (n, 3) [N] of the step is zero on the bodies afterwards.
+        laws that act. The residual (n, 3) [N] of the step is zero on the bodies afterwards. Returned is the work of an
+        impact [J].
         """
         before, latest = np.zeros_like(x), self._renewed(x)
         for term in self.terms:
@@ -110,9 +114,13 @@ class MidpointJoints(JointStep):
         if reduction is not None:
             reduction.reduce(residual)
         self.rigidity.settle(residual, velocities, h)
-        stop_at_laws(latest.potential, self.rigidity, x, velocities, self.begin)
+        stopped = stop_at_laws(latest.potential, self.rigidity, x, velocities, self.begin)
         if reduction is not None:
             reduction.welding.follow(velocities)
+        if stopped is None:
+            return 0.0
+        self.impact, work = stopped
+        return work
 
     def _renewed(self, x: NDArray[np.float64]) -> MidpointJoints:
         """With the multipliers that balance the forces at x (n, 3)."""
@@ -123,6 +131,8 @@ class MidpointJoints(JointStep):
 
 def agreeing(geometry: JointGeometry, rigidity: Rigidity, start: State, h: float) -> State:
     """The state with the nearest velocities that agree with its joints, before a step of h [s]."""
+    if not len(rigidity.corners):
+        return start
     laws, multipliers = Laws.of([])
     joints, rows = np.zeros(len(geometry.joints)), np.zeros((len(geometry.differences.joint), 3))
     g = coordinates_at(geometry, start)

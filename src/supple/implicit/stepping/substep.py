@@ -151,14 +151,17 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     angles = {} if joints is None else joints.hinge_angles(x)
     after = State(end, x, plan.velocity(x), plan.memory, internal=internal, hinge_angles=angles)
     residual = plan.place * outcome.end.gradient
+    impact = 0.0
     if isinstance(joints, MidpointJoints):
-        joints.finish(x, after.velocities, residual, tools)
+        impact = joints.finish(x, after.velocities, residual, tools)
     after = settings.integrator.finish(plan, state, after, residual, workspace.conservation)
     if plan.place != 1.0 and system.rigid_bodies and outcome.status is Status.CONVERGED:
         after = rigid_ends(system, state, after, limits)
     acted = state.positions + plan.place * (x - state.positions)
     forces_of_actuators = tuple(actuator.forces(acted) for actuator in actuators)
     works, residual = works_of_step(problem.objective, outcome, state, internal, plan, middle, end, workspace)
+    if impact:
+        works["joints"] += impact
     return Substep(after, outcome, contact, joints, forces_of_actuators, works, residual)
 
 

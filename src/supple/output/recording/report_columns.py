@@ -53,9 +53,8 @@ def _add_vectors(columns: dict[str, NDArray[Any]], name: str, values: NDArray[An
 def _add_fields(columns: dict[str, NDArray[Any]], recording: Recording) -> None:
     for field in recording.fields:
         if field.shape == ():
-            names = [body.name for body in recording.bodies]
             frames = [frame.field(field.name) for frame in recording]
-            for name in names:
+            for name in frames[0] if frames else ():
                 columns[f"{field.name}.{name}.max"] = np.array([values[name].max() for values in frames])
 
 

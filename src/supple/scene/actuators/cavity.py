@@ -77,6 +77,13 @@ class Cavity:
         """The names of the bodies that it acts on."""
         return (self.body,)
 
+    def check(self, bodies: Sequence[PlacedBody], others: Sequence[Cavity]) -> None:
+        """Raise `SceneError` where it has no surface of its own; see `surface`."""
+        mine = set(map(tuple, self.surface(bodies).tolist()))
+        for other in others:
+            if other.body == self.body and not mine.isdisjoint(map(tuple, other.surface(bodies).tolist())):
+                raise SceneError(f"{self.label}: {other.label} has the same triangles; give each surface one cavity")
+
     def surface(self, bodies: Sequence[PlacedBody]) -> NDArray[np.int32]:
         """(t, 3) the triangles about the cavity, of vertices of the body's mesh, facing into the cavity.
 

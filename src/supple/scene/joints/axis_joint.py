@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from supple.errors import SceneError
 from supple.scene.joints.joint import Joint, checked_limits
 from supple.scene.joints.motors import Motor
-from supple.scene.values import finite_vector, non_negative, positive
+from supple.scene.values import non_negative, positive, unit_vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,8 +40,7 @@ class AxisJoint(Joint):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        axis = finite_vector(self.axis, f"{self.label}: axis", nonzero=True)
-        object.__setattr__(self, "axis", axis / np.linalg.norm(axis))
+        object.__setattr__(self, "axis", unit_vector(self.axis, f"{self.label}: axis"))
         if self.limits is not None:
             object.__setattr__(self, "limits", checked_limits(self.limits, f"{self.label}: limits"))
         if self.motor is not None and not isinstance(self.motor, Motor):

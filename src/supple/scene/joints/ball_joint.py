@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from supple.errors import SceneError
 from supple.scene.joints.joint import Joint, checked_limits
-from supple.scene.values import finite_vector, positive
+from supple.scene.values import positive, unit_vector
 
 # The swing has no direction at zero and at half a turn: limits stay away from them.
 _SWINGS = (0.01, np.pi - 0.01)
@@ -50,8 +50,7 @@ class BallJoint(Joint):
             if self.twist_limits is not None:
                 raise SceneError(f"{self.label}: twist_limits need axis and max_swing, without which there is no twist")
             return
-        axis = finite_vector(self.axis, f"{self.label}: axis", nonzero=True)
-        object.__setattr__(self, "axis", axis / np.linalg.norm(axis))
+        object.__setattr__(self, "axis", unit_vector(self.axis, f"{self.label}: axis"))
         object.__setattr__(self, "max_swing", positive(self.max_swing, f"{self.label}: max_swing"))
         if not _SWINGS[0] <= self.max_swing <= _SWINGS[1]:
             raise SceneError(

@@ -63,10 +63,11 @@ def checked_directions(direction: ArrayLike, label: str) -> NDArray[np.float64]:
     given = float_array(direction, f"{label}: direction", "give three numbers, or three for each tet")
     if given.shape != (3,) and (given.ndim != 2 or given.shape[1] != 3):
         raise SceneError(f"{label}: direction has shape {given.shape}; give (3,), or (m, 3) for m tets")
-    lengths = np.linalg.norm(given, axis=-1)
-    if not (np.isfinite(lengths).all() and (lengths > 0.0).all()):
+    largest = np.abs(given).max(axis=-1, keepdims=True)
+    if not (np.isfinite(largest).all() and (largest > 0.0).all()):
         raise SceneError(f"{label}: direction is zero or not finite; give vectors of any length above zero")
-    return given / lengths[..., None]
+    given = given / largest
+    return given / np.linalg.norm(given, axis=-1, keepdims=True)
 
 
 def directions_of(direction: ArrayLike, rows: NDArray[np.int64], label: str) -> NDArray[np.float64]:

@@ -14,14 +14,7 @@ from numpy.typing import NDArray
 
 from supple.errors import SceneError
 from supple.mesh.surface import SurfaceMesh
-from supple.scene.values import finite_vector, positive
-
-
-def _direction(value: object, what: str) -> NDArray[np.float64]:
-    vector = finite_vector(value, what, nonzero=True)
-    length = np.linalg.norm(vector)
-    # A unit vector stays the same to the last bit, so that a recorded normal reads back equal.
-    return vector if abs(length - 1.0) <= 4e-16 else finite_vector(vector / length, what)
+from supple.scene.values import finite_vector, positive, unit_vector
 
 
 def _extents(value: object, what: str) -> NDArray[np.float64]:
@@ -45,7 +38,7 @@ def _surface(value: object, what: str) -> SurfaceMesh:
 
 _CHECKS: dict[str, Callable[[Any, str], Any]] = {
     "vector": finite_vector,
-    "direction": _direction,
+    "direction": unit_vector,
     "extents": _extents,
     "positive": positive,
     "flag": _flag,

@@ -27,6 +27,9 @@ from supple.scene.values import float_array
 # no inertia that double precision can tell from zero.
 _FLAT = 1e-12
 
+# Masses and inertia whose products double precision can hold.
+_SMALLEST, _LARGEST = 1e-90, 1e90
+
 # Round-off in numbers that a user has computed, such as a rotated inertia tensor.
 _ROUND_OFF = 1e-9
 
@@ -101,6 +104,7 @@ def with_inertia(properties: MassProperties, mass: float, inertia: ArrayLike, ow
     if given.shape != (3, 3) or not np.isfinite(given).all():
         raise SceneError(f"{owner}: inertia must be finite, (3, 3) or its diagonal (3,) [kg m^2]")
     size = float(np.abs(given).max())
+    _within_range(size, f"{owner}: inertia", "kg m^2")
     if np.abs(given - given.T).max() > _ROUND_OFF * size:
         raise SceneError(f"{owner}: inertia is not symmetric; give the tensor about the center of mass")
     tensor = 0.5 * (given + given.T)
@@ -116,10 +120,21 @@ def with_inertia(properties: MassProperties, mass: float, inertia: ArrayLike, ow
     return MassProperties(mass, properties.volume, properties.center, 0.5 * np.trace(tensor) * np.eye(3) - tensor)
 
 
-def with_mass(properties: MassProperties, mass: float) -> MassProperties:
-    """The same distribution with another mass [kg]."""
+def with_mass(properties: MassProperties, mass: float, owner: str) -> MassProperties:
+    """The same distribution with another mass [kg].
+
+    Raises
+    ------
+    SceneError : where the mass is so small or large that its products are not numbers.
+    """
+    _within_range(mass, f"{owner}: its mass", "kg")
     moment = mass / properties.mass * properties.second_moment
     return MassProperties(mass, properties.volume, properties.center, moment)
+
+
+def _within_range(value: float, what: str, unit: str) -> None:
+    if not _SMALLEST < value < _LARGEST:
+        raise SceneError(f"{what} is {value:g} {unit}; give one from {_SMALLEST:g} to {_LARGEST:g} {unit}")
 
 
 def _moments(corners: NDArray[np.float64]) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:

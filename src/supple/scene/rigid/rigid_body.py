@@ -175,13 +175,14 @@ class RigidBody(PlacedBody):
                 raise SceneError(f"{owner}: inertia needs a mass [kg] in place of the density; give mass=...")
             if self.center is not None:
                 raise SceneError(f"{owner}: center needs a mass and an inertia; give both")
-            return with_mass(solid, solid.volume * positive(self.density, f"{owner}: density"))
+            return with_mass(solid, solid.volume * positive(self.density, f"{owner}: density"), owner)
         mass = positive(self.mass, f"{owner}: mass")
+        if self.inertia is None and self.center is not None:
+            raise SceneError(f"{owner}: center needs an inertia [kg m^2] about it; give inertia=...")
+        homogeneous = with_mass(solid, mass, owner)
         if self.inertia is None:
-            if self.center is not None:
-                raise SceneError(f"{owner}: center needs an inertia [kg m^2] about it; give inertia=...")
-            return with_mass(solid, mass)
-        properties = with_inertia(solid, mass, self.inertia, owner)
+            return homogeneous
+        properties = with_inertia(homogeneous, mass, self.inertia, owner)
         if self.center is None:
             return properties
         return replace(properties, center=finite_vector(self.center, f"{owner}: center"))

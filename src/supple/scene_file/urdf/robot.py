@@ -1,7 +1,6 @@
 """Reading a URDF file: links with inertia and collision geometry, and the joints between them.
 
-The parser is Python's own. Document type declarations are refused, so that no entity is ever expanded. What this file
-does not read is named in `Robot.ignored`.
+What this file does not read is named in `Robot.ignored`.
 
 Source: the specification of URDF, https://wiki.ros.org/urdf/XML.
 """
@@ -9,7 +8,6 @@ Source: the specification of URDF, https://wiki.ros.org/urdf/XML.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
@@ -20,9 +18,9 @@ from numpy.typing import NDArray
 from supple.errors import SceneError
 from supple.scene.rotation import rotation_matrix
 from supple.scene_file.entries.mesh_sources import SURFACE_FILES
+from supple.scene_file.urdf.elements import Problem, attribute, child_of, ignore_others, numbers, only, parsed
 from supple.scene_file.yaml_reader import printable
 
-_LARGEST = 16 * 2**20  # bytes
 JOINTS = ("fixed", "revolute", "continuous", "prismatic", "floating")
 
 
@@ -109,37 +107,9 @@ def read_robot(path: Path) -> Robot:
     SceneError : where the file cannot be read, or does not describe a tree of links; one line with the path first.
     """
     try:
-        return _robot(_parsed(path), path.parent)
-    except _Problem as problem:
+        return _robot(parsed(path), path.parent)
+    except Problem as problem:
         raise SceneError(f"{path}: {problem}") from None
-
-
-class _Problem(Exception):
-    """What is wrong, without the name of the file."""
-
-
-def _parsed(path: Path) -> ElementTree.Element:
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise _Problem(f"cannot be read: {error.strerror or error}") from None
-    if len(data) > _LARGEST:
-        raise _Problem(f"larger than {_LARGEST // 2**20} MiB; a URDF names its meshes, it does not contain them")
-    parser = ElementTree.XMLParser()
-    try:
-        # Entities need a declaration, and with it a document type.
-        if "<!" in data.decode("utf-8-sig").replace("<!--", "").replace("<![CDATA[", ""):
-            raise _Problem("it has a document type declaration, which URDF does not need; remove it")
-        parser.feed(data)
-        root = parser.close()
-    except UnicodeDecodeError:
-        raise _Problem("this is not UTF-8 text; save it as UTF-8") from None
-    except (ElementTree.ParseError, ValueError) as error:
-        line = getattr(error, "position", (0, 0))[0]
-        raise _Problem(f"it is not well-formed XML (line {line}): truncated, or not a URDF file") from None
-    if root.tag != "robot":
-        raise _Problem(f"its root is <{printable(root.tag)}>; a URDF file has <robot>")
-    return root
 
 
 def _robot(root: ElementTree.Element, folder: Path) -> Robot:
@@ -148,15 +118,15 @@ def _robot(root: ElementTree.Element, folder: Path) -> Robot:
     for element in root.findall("link"):
         link = _link(element, folder, ignored)
         if link.name in links:
-            raise _Problem(f"two links are called {printable(link.name)!r}; give each a name of its own")
+            raise Problem(f"two links are called {printable(link.name)!r}; give each a name of its own")
         links[link.name] = link
     if not links:
-        raise _Problem("it has no link")
+        raise Problem("it has no link")
     joints: dict[str, RobotJoint] = {}
     for element in root.findall("joint"):
         joint = _joint(element, links, ignored)
         if joint.name in joints:
-            raise _Problem(f"two joints are called {printable(joint.name)!r}; give each a name of its own")
+            raise Problem(f"two joints are called {printable(joint.name)!r}; give each a name of its own")
         joints[joint.name] = joint
     for element in root:
         if element.tag not in ("link", "joint", "material"):
@@ -169,67 +139,68 @@ def _root(links: dict[str, Link], joints: dict[str, RobotJoint]) -> str:
     parents: dict[str, str] = {}
     for joint in joints.values():
         if joint.child in parents:
-            raise _Problem(f"link {printable(joint.child)!r} is the child of two joints; links must be a tree")
+            raise Problem(f"link {printable(joint.child)!r} is the child of two joints; links must be a tree")
         parents[joint.child] = joint.parent
     roots = [name for name in links if name not in parents]
     if len(roots) > 1:
         text = ", ".join(repr(printable(name)) for name in roots[:5])
-        raise _Problem(f"links {text} have no parent; join them, so that the links are one tree")
+        raise Problem(f"links {text} have no parent; join them, so that the links are one tree")
     for name in links:
         here, seen = name, 0
         while here in parents:
             here, seen = parents[here], seen + 1
             if seen > len(links):
-                raise _Problem(f"link {printable(name)!r} is its own ancestor; links must be a tree without loops")
+                raise Problem(f"link {printable(name)!r} is its own ancestor; links must be a tree without loops")
     return roots[0]
 
 
 def _link(element: ElementTree.Element, folder: Path, ignored: dict[str, None]) -> Link:
-    name = _attribute(element, "name", "a link")
+    name = attribute(element, "name", "a link")
     what = f"link {printable(name)!r}"
     found = element.findall("collision")
     if len(found) > 1:
         ignored[f"{len(found) - 1} of the {len(found)} collision geometries of {what}"] = None
     collision = _geometry(found[0], what, folder, ignored) if found else None
-    inertial = element.find("inertial")
+    inertial = only(element, "inertial", what)
+    ignore_others(element, ("inertial", "collision", "visual"), what, ignored)
     return Link(name, None if inertial is None else _inertia(inertial, what), collision)
 
 
 def _inertia(element: ElementTree.Element, what: str) -> Inertia:
-    mass = _numbers(_child(element, "mass", what), "value", what, 1)[0]
+    mass = numbers(child_of(element, "mass", what), "value", what, 1)[0]
     if mass <= 0.0:
-        raise _Problem(f"{what}: its mass is {mass:g} kg; it must be above zero")
-    given = _child(element, "inertia", what)
-    xx, xy, xz, yy, yz, zz = (_numbers(given, key, what, 1)[0] for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
+        raise Problem(f"{what}: its mass is {mass:g} kg; it must be above zero")
+    given = child_of(element, "inertia", what)
+    xx, xy, xz, yy, yz, zz = (numbers(given, key, what, 1)[0] for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
     return Inertia(mass, np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]), _origin(element, what))
 
 
 def _geometry(element: ElementTree.Element, what: str, folder: Path, ignored: dict[str, None]) -> Geometry:
-    inside = list(_child(element, "geometry", what))
+    inside = list(child_of(element, "geometry", what))
     if len(inside) != 1:
-        raise _Problem(f"{what}: its collision geometry has {len(inside)} shapes; give one")
+        raise Problem(f"{what}: its collision geometry has {len(inside)} shapes; give one")
     shape, placement = inside[0], _origin(element, what)
     if shape.tag == "mesh":
-        scale = _numbers(shape, "scale", what, 3) if "scale" in shape.attrib else (1.0, 1.0, 1.0)
+        scale = numbers(shape, "scale", what, 3) if "scale" in shape.attrib else (1.0, 1.0, 1.0)
         if not scale[0] == scale[1] == scale[2] > 0.0:
-            raise _Problem(f"{what}: the scale of its mesh is {scale}; give three equal numbers above zero")
-        return Geometry("mesh", scale[:1], placement, _mesh_file(_attribute(shape, "filename", what), what, folder))
+            raise Problem(f"{what}: the scale of its mesh is {scale}; give three equal numbers above zero")
+        return Geometry("mesh", scale[:1], placement, _mesh_file(attribute(shape, "filename", what), what, folder))
     keys = {"box": (("size", 3),), "cylinder": (("radius", 1), ("length", 1)), "sphere": (("radius", 1),)}
     if shape.tag not in keys:
-        raise _Problem(
+        raise Problem(
             f"{what}: there is no geometry <{printable(str(shape.tag))}>; there are box, cylinder, sphere, mesh"
         )
-    numbers = tuple(number for key, count in keys[shape.tag] for number in _numbers(shape, key, what, count))
-    if min(numbers) <= 0.0:
-        raise _Problem(f"{what}: its {shape.tag} has a length of {min(numbers):g} m; it must be above zero")
-    return Geometry(shape.tag, numbers, placement)
+    lengths = tuple(number for key, count in keys[shape.tag] for number in numbers(shape, key, what, count))
+    if min(lengths) <= 0.0:
+        raise Problem(f"{what}: its {shape.tag} has a length of {min(lengths):g} m; it must be above zero")
+    return Geometry(shape.tag, lengths, placement)
 
 
 def _mesh_file(name: str, what: str, folder: Path) -> str:
     """The file of a mesh relative to the folder; of a package, below the nearest folder above with its name."""
     path = Path(name.removeprefix("file://"))
     if path.suffix.lower() not in SURFACE_FILES:
-        raise _Problem(f"{what}: the mesh {printable(name)!r} is not one of {', '.join(SURFACE_FILES)}; convert it")
+        raise Problem(f"{what}: the mesh {printable(name)!r} is not one of {', '.join(SURFACE_FILES)}; convert it")
     if name.startswith("package://"):
         package, _, rest = name.removeprefix("package://").partition("/")
         above = [folder.resolve(), *folder.resolve().parents]
@@ -240,99 +211,66 @@ def _mesh_file(name: str, what: str, folder: Path) -> str:
     try:
         there = (folder / path).resolve()
         if not there.is_file():
-            raise _Problem(f"{what}: there is no mesh {printable(name)!r}")
+            raise Problem(f"{what}: there is no mesh {printable(name)!r}")
         return Path(os.path.relpath(there, folder.resolve())).as_posix()
     except (OSError, ValueError):
-        raise _Problem(f"{what}: the mesh {printable(name)!r} cannot be read") from None
+        raise Problem(f"{what}: the mesh {printable(name)!r} cannot be read") from None
 
 
 def _joint(element: ElementTree.Element, links: dict[str, Link], ignored: dict[str, None]) -> RobotJoint:
-    name = _attribute(element, "name", "a joint")
+    name = attribute(element, "name", "a joint")
     what = f"joint {printable(name)!r}"
-    kind = _attribute(element, "type", what)
+    kind = attribute(element, "type", what)
     if kind not in JOINTS:
-        raise _Problem(f"{what}: its type {printable(kind)!r} is not supported; there are {', '.join(JOINTS)}")
-    parent, child = (_attribute(_child(element, key, what), "link", what) for key in ("parent", "child"))
+        raise Problem(f"{what}: its type {printable(kind)!r} is not supported; there are {', '.join(JOINTS)}")
+    parent, child = (attribute(child_of(element, key, what), "link", what) for key in ("parent", "child"))
     for end in (parent, child):
         if end not in links:
-            raise _Problem(f"{what}: there is no link {printable(end)!r}")
+            raise Problem(f"{what}: there is no link {printable(end)!r}")
     if parent == child:
-        raise _Problem(f"{what}: it joins link {printable(parent)!r} to itself")
-    for key in ("mimic", "safety_controller", "calibration"):
-        if element.find(key) is not None:
-            ignored[f"<{key}> of {what}"] = None
+        raise Problem(f"{what}: it joins link {printable(parent)!r} to itself")
+    ignore_others(element, ("parent", "child", "origin", "axis", "limit", "dynamics"), what, ignored)
     axis = np.array([1.0, 0.0, 0.0])
-    if (given := element.find("axis")) is not None:
-        axis = np.array(_numbers(given, "xyz", what, 3))
-    if kind in ("revolute", "continuous", "prismatic") and not np.linalg.norm(axis) > 0.0:
-        raise _Problem(f"{what}: its axis has no length; give a direction")
-    dynamics = element.find("dynamics")
+    if (given := only(element, "axis", what)) is not None:
+        axis = np.array(numbers(given, "xyz", what, 3))
+    if kind in ("revolute", "continuous", "prismatic") and not axis.any():
+        raise Problem(f"{what}: its axis has no length; give a direction")
+    dynamics = only(element, "dynamics", what)
     damping, friction = (
-        0.0 if dynamics is None or key not in dynamics.attrib else _numbers(dynamics, key, what, 1)[0]
+        0.0 if dynamics is None or key not in dynamics.attrib else numbers(dynamics, key, what, 1)[0]
         for key in ("damping", "friction")
     )
     if damping < 0.0 or friction < 0.0:
-        raise _Problem(f"{what}: its damping or friction is below zero")
+        raise Problem(f"{what}: its damping or friction is below zero")
     limits = _limits(element, kind, what)
-    limit = element.find("limit")
+    limit = only(element, "limit", what)
     most = {}
     for key in ("effort", "velocity"):
-        most[key] = 0.0 if limit is None or key not in limit.attrib else _numbers(limit, key, what, 1)[0]
+        most[key] = 0.0 if limit is None or key not in limit.attrib else numbers(limit, key, what, 1)[0]
         if most[key] < 0.0:
-            raise _Problem(f"{what}: its {key} limit is {most[key]:g}; it must be zero or more")
+            raise Problem(f"{what}: its {key} limit is {most[key]:g}; it must be zero or more")
     return RobotJoint(name, kind, parent, child, _origin(element, what), axis, limits, damping, friction, **most)
 
 
 def _limits(element: ElementTree.Element, kind: str, what: str) -> tuple[float, float] | None:
     if kind not in ("revolute", "prismatic"):
         return None
-    limit = _child(element, "limit", what)
-    low, high = (_numbers(limit, key, what, 1)[0] if key in limit.attrib else 0.0 for key in ("lower", "upper"))
+    limit = child_of(element, "limit", what)
+    low, high = (numbers(limit, key, what, 1)[0] if key in limit.attrib else 0.0 for key in ("lower", "upper"))
     if not low < high:
-        raise _Problem(f"{what}: its limits are {low:g} and {high:g}; the lower one must be below the upper one")
+        raise Problem(f"{what}: its limits are {low:g} and {high:g}; the lower one must be below the upper one")
     return low, high
 
 
 def _origin(element: ElementTree.Element, what: str) -> Placement:
     """Of the child <origin>: fixed axes, roll about x first, then pitch about y, then yaw about z."""
-    origin = element.find("origin")
+    origin = only(element, "origin", what)
     if origin is None:
         return Placement()
     place, angles = (
-        _numbers(origin, key, what, 3) if key in origin.attrib else (0.0, 0.0, 0.0) for key in ("xyz", "rpy")
+        numbers(origin, key, what, 3) if key in origin.attrib else (0.0, 0.0, 0.0) for key in ("xyz", "rpy")
     )
     R = np.eye(3)
     for angle, axis in zip(angles, np.eye(3), strict=True):
         R = rotation_matrix(angle * axis) @ R
     return Placement(R, np.array(place))
-
-
-def _child(element: ElementTree.Element, tag: str, what: str) -> ElementTree.Element:
-    found = element.find(tag)
-    if found is None:
-        raise _Problem(f"{what}: its <{element.tag}> has no <{tag}>")
-    return found
-
-
-def _attribute(element: ElementTree.Element, key: str, what: str) -> str:
-    value = element.get(key, "").strip()
-    if not value:
-        raise _Problem(f"{what}: its <{element.tag}> has no {key}")
-    return value
-
-
-def _numbers(element: ElementTree.Element, key: str, what: str, count: int) -> tuple[float, ...]:
-    text = _attribute(element, key, what)
-    values = tuple(_floats(text))
-    if len(values) != count or not np.isfinite(values).all():
-        wanted = "one finite number" if count == 1 else f"{count} finite numbers"
-        raise _Problem(f"{what}: {key} of its <{element.tag}> is {printable(text)!r}; give {wanted}")
-    return values
-
-
-def _floats(text: str) -> Iterator[float]:
-    for word in text.split():
-        try:
-            yield float(word)
-        except ValueError:
-            yield float("nan")

@@ -4,8 +4,11 @@ Without its generalized force Q the coordinate would be s. Q moves the vertices 
 the coordinate by h^2 Q sum w |ds/dx|^2. The law gives the Q that fits the coordinate which it leads to. Friction at an
 eyelet of a cable then stops its slip, with a force that is at most that of the capstan's law.
 
-An actuator between vertices of one piece is projected with the constraints, before the momentum of the piece is
-restored; one that joins pieces to each other or to the world, after that.
+An actuator between vertices of one piece, without points of rigid bodies, is projected with the constraints, before
+the momentum of the piece is restored; one that joins pieces to each other or to the world, or pulls at a rigid body,
+after that. The latter moves vertices along ds/dx of the beginning of the substep: as the velocity is (x - x_n) / h,
+such forces have no moment (Ryckaert, Ciccotti, Berendsen, "Numerical integration of the cartesian equations of motion
+of a system with constraints", 1977).
 """
 
 from __future__ import annotations
@@ -36,11 +39,10 @@ class ActuatorProjection:
 
     def __init__(self, system: System) -> None:
         self.system = system
-        pieces = [np.unique(system.joined_components[each.coordinate.vertices]) for each in system.actuators]
-        self._inner = [
-            len(piece) == 1 and not each.coordinate.is_anchored
-            for piece, each in zip(pieces, system.actuators, strict=True)
-        ]
+        rigid = np.zeros(len(system.masses), dtype=np.bool_)
+        for part in system.rigid_bodies:
+            rigid[part.vertices] = True
+        self._inner = [_is_inner(each, system.joined_components, rigid) for each in system.actuators]
         self._impulses, self._works, self._parts, self._forces = ([] for _ in range(4))
 
     def begin_frame(self, at: Substep) -> None:
@@ -52,7 +54,7 @@ class ActuatorProjection:
         """Move the vertices of the actuators within one piece, in place."""
         for k, each in enumerate(self.system.actuators):
             if self._inner[k]:
-                self._project(k, each, at)
+                self._project(k, each, at, _own(each, at))
 
     def project_between(self, at: Substep) -> None:
         """Move the vertices of all other actuators, in place, and change their velocities."""
@@ -60,7 +62,7 @@ class ActuatorProjection:
             if not self._inner[k]:
                 rows = each.coordinate.vertices
                 before = at.points[rows, :3].copy()
-                self._project(k, each, at)
+                self._project(k, each, at, at.begun[rows] + at.origins[rows])
                 at.velocities[rows] += (at.points[rows, :3] - before) / at.h
 
     def end_substep(self, at: Substep) -> None:
@@ -88,9 +90,10 @@ class ActuatorProjection:
             out[each.coordinate.vertices] += np.einsum("p,pij->ij", forces, gradients)
         return out
 
-    def _project(self, k: int, each: Actuator, at: Substep) -> None:
+    def _project(self, k: int, each: Actuator, at: Substep, places: Floats) -> None:
+        """Move the vertices of an actuator, in place, along the gradients at `places` (v, 3) of them."""
         rows, own = each.coordinate.vertices, _own(each, at)
-        gradients, parts = each.coordinate.part_gradients(own), each.coordinate.parts(own)
+        gradients, parts = each.coordinate.part_gradients(places), each.coordinate.parts(own)
         grips = np.zeros(len(parts) - 1)
         self._forces[k][:] = 0.0
         total = gradients[0] if len(gradients) == 1 else gradients.sum(axis=0)
@@ -145,6 +148,11 @@ def _stop_slips(gradients, free, longer, turns, friction, tension, moved, grips)
                 for j in range(3):
                     moved[i, j] += grips[e] * free[i] * before[i, j]
         tension -= grips[e]
+
+
+def _is_inner(each: Actuator, pieces: NDArray[np.int32], rigid: NDArray[np.bool_]) -> bool:
+    rows = each.coordinate.vertices
+    return len(np.unique(pieces[rows])) == 1 and not each.coordinate.is_anchored and not rigid[rows].any()
 
 
 def _own(each: Actuator, at: Substep) -> Floats:

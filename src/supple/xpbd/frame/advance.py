@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.readings.energy_balance import add_works
 from supple.state import State
 from supple.xpbd.assessment.surfaces import Overlap
 from supple.xpbd.damping.kelvin_voigt import Damping
@@ -69,7 +70,8 @@ def advance(
         held_back += keep_volumes(ws, end, h, parallel)
         if collides:
             ws.collisions.end_substep()
-        ws.joints.end_substep(ws.points, ws.origins, end)
+        if len(ws.joints):
+            add_works(ws.works.by_name, {"joints": ws.joints.end_substep(ws.points, ws.origins, end, h)})
         note_works(ws, at, damping)
         ws.assessment.balance.note_contacts(ws.collisions.contacts)
     return held_back

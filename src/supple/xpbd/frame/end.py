@@ -109,6 +109,7 @@ def end_frame(
 def _remedy(findings: Findings, used: int, shares: Mapping[str, float], accuracy: float, setting: str) -> str:
     """What helps against what was found."""
     count = enough(used, shares, accuracy)
-    if findings.status is not Status.SOFTENED:
+    if findings.status is not Status.SOFTENED or findings.apart:
         count = max(count, 2 * used)
-    return f"take {setting}={count}"
+    contradicted = ", or remove what contradicts the joint: a pin, a script, contact or another joint"
+    return f"take {setting}={count}{contradicted if findings.apart else ''}"

@@ -7,7 +7,6 @@ from itertools import chain, repeat
 import numpy as np
 from numpy.typing import NDArray
 
-from supple.readings.energy_balance import add_works
 from supple.xpbd.assessment.substep import Substep
 from supple.xpbd.damping.kelvin_voigt import Damping
 from supple.xpbd.integration import to_world, update_velocities
@@ -35,8 +34,7 @@ def move_rigid(ws: XPBDWorkspace, time: float, h: float) -> None:
     ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
     if not len(ws.joints):
         return
-    work = ws.joints.project(ws.points, ws.previous, ws.velocities, ws.origins, time, h)
-    add_works(ws.works.by_name, {"joints": work})
+    ws.joints.project(ws.points, ws.previous, ws.velocities, ws.origins, time, h)
     ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
 
 

@@ -56,14 +56,18 @@ def push(ws: XPBDWorkspace, damping: Damping | None, h: float) -> None:
     """Apply viscous forces, and the contact forces of the substep before, to the prediction."""
     if damping is not None:
         damping.push(ws.points, h)
+    welded = ws.rigid.welding.vertices
+    internal = (ws.points[welded, :3] - ws.previous[welded]) / h - ws.velocities[welded]
     ws.rigid.gather(ws.points, ws.velocities, h)
     if ws.collisions and to_world(ws.points, ws.origins, ws.world):
         to_world(ws.previous, ws.origins, ws.world_previous)
         if ws.collisions.begin_substep(ws.world, ws.world_previous, h):
             ws.apply_changes(h)
-    if len(ws.rigid.welding):
-        # Constraints see welded vertices where their bodies are to be.
+    if len(welded):
+        # Constraints see welded vertices where their bodies are to be. Momenta are restored to those without internal
+        # forces, of which bodies have their part already.
         ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
+        ws.velocities[welded] -= internal
 
 
 def pin_targets(system: System, time: float, h: float, substeps: int) -> NDArray[np.float64]:

@@ -35,12 +35,6 @@ class JointRows(NamedTuple):
     sizes: Floats
 
 
-def changes_by(rows: JointRows, twists: Floats) -> Floats:
-    """(r,) how far the twists (b, 6) have moved each row [m]."""
-    own = np.where((rows.bodies >= 0)[:, :, None], twists[rows.bodies], 0.0)
-    return np.einsum("rbi,rbi->r", rows.actions, own)
-
-
 @njit(cache=True)
 def solve_joint_rows(rows, impulses, twists, most):
     """Solve the rows, in place: impulses (r,) [kg m] and twists (b, 6), displacement and rotation of bodies.

@@ -29,7 +29,7 @@ from supple.joints.laws import Laws, laws_of, wrapped
 from supple.state import State
 from supple.system import System
 from supple.xpbd.rigid.bodies import RigidBodies
-from supple.xpbd.rigid.joint_rows import JointRows, changes_by, solve_joint_rows
+from supple.xpbd.rigid.joint_rows import JointRows, solve_joint_rows
 from supple.xpbd.sweeps.ordering import Layout
 
 Floats = NDArray[np.float64]
@@ -38,6 +38,8 @@ Floats = NDArray[np.float64]
 _MOST_SWEEPS, _SWEEPS_PER_JOINT = 60, 10
 # Of the largest inverse mass of the joint's rows: rows that move less say nothing of their own.
 _IDLE = 1e-5
+# Of the joint's size: what motors may lack in a frame, which contact leaves over in substeps.
+_STALLED = 1e-3
 
 
 class JointProjection:
@@ -63,8 +65,11 @@ class JointProjection:
         self._total = np.zeros((len(g.joints), 6))
         self._motors = np.zeros(len(g.joints))
         self._substeps = 0
-        # Conditions and limits of the substep, and their impulses so far.
-        self._holding, self._held = Laws.of([])[0], np.zeros(0)
+        # The laws of the substep, their multipliers, values at its beginning, and impulses so far.
+        self._laws, self._multipliers = Laws.of([])
+        self._begun, self._impulses = np.zeros(0), np.zeros(0)
+        # What velocity motors that did not reach their largest effort lack in the frame, and their way.
+        self._lacking = np.zeros((len(g.joints), 2))
 
     def __len__(self) -> int:
         return len(self.geometry.joints)
@@ -79,71 +84,72 @@ class JointProjection:
         if len(self):
             self._g = coordinates_at(self._scene, state)
             self._free[:-1, 0] = ~(asleep[self._rigid.numbers] | self._rigid.held)
-            self._total[:], self._motors[:], self._substeps = 0.0, 0.0, 0
+            self._total[:], self._motors[:], self._lacking[:], self._substeps = 0.0, 0.0, 0.0, 0
 
     def project(
         self, points: Floats, previous: Floats, velocities: Floats, origins: Floats, end: float, h: float
-    ) -> float:
-        """Move the bodies, in place, and change their velocities (n, 3); returns the work of the motors [J].
+    ) -> None:
+        """Move the bodies, in place, and change their velocities (n, 3).
 
         Parameters
         ----------
         previous : (n, 3) at the beginning of the substep [m]; end : of the substep [s]; h : its length [s]
         """
         begun = self._functions(previous + origins, end - h)
-        laws, multipliers = laws_of(self.geometry, np.ones(len(self)), begun, (end - h, end), moving=True)
-        rows, now, first = self._rows(points[:, :3] + origins, previous + origins, end, h, laws, multipliers)
-        impulses, twists, _ = self._solve(rows, laws, first, points, previous, velocities, origins, h)
-        holds = laws.holds
-        self._holding, self._held = laws.selected(holds), impulses[first:][holds]
+        self._laws, self._multipliers = laws_of(self.geometry, np.ones(len(self)), begun, (end - h, end), moving=True)
+        self._begun, self._impulses = begun[self._laws.function], np.zeros(len(self._laws.k))
         self._substeps += 1
-        changes = now[laws.function] + changes_by(rows, twists)[first:] - begun[laws.function]
-        return float((impulses[first:] * changes)[laws.is_motor].sum()) / h**2
+        self.project_again(points, previous, velocities, origins, end, h)
 
     def project_again(
         self, points: Floats, previous: Floats, velocities: Floats, origins: Floats, end: float, h: float
     ) -> float:
-        """`project` for positions that have changed since: conditions and limits, without friction and motors.
+        """`project` for positions that have changed since.
 
-        Limits take back what they have pushed too much: only their impulse in total has a sign. Otherwise a push of a
+        Laws take back what they have pushed too much: only their impulse in total has ends. Otherwise a push of a
         contact that sweeps reduce later would leave energy. Returns the largest correction, as a share of the joint's
         size.
         """
-        laws = self._holding
-        zero = np.zeros(len(laws.k))
-        rows, _, first = self._rows(points[:, :3] + origins, previous + origins, end, h, laws, zero)
-        rows.low[first:] -= self._held
-        rows.high[first:] -= self._held
-        impulses, _, largest = self._solve(rows, laws, first, points, previous, velocities, origins, h)
-        self._held += impulses[first:]
+        rows, first = self._rows(points[:, :3] + origins, previous + origins, end, h)
+        rows.missing[first:] += rows.compliance[first:] * self._impulses
+        rows.low[first:] -= self._impulses
+        rows.high[first:] -= self._impulses
+        impulses, largest = self._solve(rows, first, points, previous, velocities, origins, h)
+        self._impulses += impulses[first:]
         return largest
 
     def _solve(
         self,
         rows: JointRows,
-        laws: Laws,
         first_law: int,
         points: Floats,
         previous: Floats,
         velocities: Floats,
         origins: Floats,
         h: float,
-    ) -> tuple[Floats, Floats, float]:
-        """Solve the rows and move the bodies; impulses (r,) [kg m], twists (b, 6), and the largest correction."""
+    ) -> tuple[Floats, float]:
+        """Solve the rows and move the bodies; impulses (r,) [kg m], and the largest correction."""
         impulses, twists = np.zeros(len(rows.total)), np.zeros((len(self._rigid), 6))
         largest = solve_joint_rows(rows, impulses, twists, max(_MOST_SWEEPS, _SWEEPS_PER_JOINT * len(self)))
-        self._note(rows, impulses / h**2, laws, first_law, points[:, :3] + origins)
+        self._note(rows, impulses / h**2, first_law, points[:, :3] + origins)
         control = self._rigid.control
         arms = previous[control] - previous[control].mean(axis=1, keepdims=True)
         moved = twists[:, None, :3] + np.cross(twists[:, None, 3:], arms)
         points[control, :3] += moved
         velocities[control] += moved / h
-        return impulses, twists, largest
+        return impulses, largest
 
-    def end_substep(self, points: Floats, origins: Floats, end: float) -> None:
-        """Follow the angles of hinges over all turns."""
-        if len(self):
-            self._g = self._functions(points[:, :3] + origins, end)
+    def end_substep(self, points: Floats, origins: Floats, end: float, h: float) -> float:
+        """Follow the angles of hinges over all turns; returns the work of the laws in the substep of h [J]."""
+        if not len(self):
+            return 0.0
+        self._g = self._functions(points[:, :3] + origins, end)
+        laws, efforts = self._laws, -self._impulses / h**2
+        motors = laws.is_motor & laws.adapts & (efforts > laws.low) & (efforts < laws.high)
+        rows = laws.function[motors]
+        ways = np.column_stack([laws.start[motors] - self._g[rows], laws.start[motors] - self._begun[motors]])
+        np.add.at(self._lacking, self.geometry.arguments[0].joint[rows], ways / self.geometry.units[rows, None])
+        return float(self._impulses @ (self._g[self._laws.function] - self._begun)) / h**2
 
     def hinge_angles(self) -> dict[str, float]:
         """As of `State`."""
@@ -182,12 +188,20 @@ class JointProjection:
         np.maximum.at(out, joint, beyond / g.units)
         return out
 
-    def apart(self, x: Floats, time: float, tolerated: float) -> list[tuple[float, str]]:
-        """The violations above a share of the joint's size, with the joints' labels."""
+    def apart(self, x: Floats, time: float, tolerated: float) -> list[tuple[float, str, str]]:
+        """Violations above a share of the joint's size, and velocity motors that lack more than that of their way.
+
+        Each with the label of the joint, and what the share is of.
+        """
         if not len(self):
             return []
-        found = zip(self.violations(x, time).tolist(), self.geometry.joints, strict=True)
-        return [(share, joint.label) for share, joint in found if share > tolerated]
+        found = list(
+            zip(self.violations(x, time).tolist(), self.geometry.joints, ["its size"] * len(self), strict=True)
+        )
+        for (lacks, way), joint in zip(np.abs(self._lacking).tolist(), self.geometry.joints, strict=True):
+            share = lacks / max(way, _STALLED)
+            found += [(share, joint, "the way of its motor")] if lacks > _STALLED else []
+        return [(share, joint.label, of) for share, joint, of in found if share > tolerated]
 
     def _functions(self, x: Floats, time: float) -> Floats:
         """(s,) values of the functions, with angles near the last ones."""
@@ -198,10 +212,9 @@ class JointProjection:
         found = values(g.functions, np.stack([_at(g, column, x, poses) for column in g.arguments], axis=1))
         return np.where(self._angles, self._g + wrapped(found - self._g), found)
 
-    def _rows(
-        self, x: Floats, x_prev: Floats, time: float, h: float, laws: Laws, multipliers: Floats
-    ) -> tuple[JointRows, Floats, int]:
-        """All rows, conditions first; the values (s,) of the functions; and the first row of the laws."""
+    def _rows(self, x: Floats, x_prev: Floats, time: float, h: float) -> tuple[JointRows, int]:
+        """All rows, conditions first; and the first row of the laws."""
+        laws, multipliers = self._laws, self._multipliers
         g, poses = self.geometry, self.geometry.poses(time)
         corners = x_prev[g.corners]
         centers = np.stack([corners[:, :4].mean(axis=1), corners[:, 4:].mean(axis=1)], axis=1)
@@ -209,7 +222,7 @@ class JointProjection:
         # Differences: three rows each, along the axes of the world.
         apart = _at(g, g.differences, x, poses)
         gradients = [np.einsum("fk,ij->fikj", g.differences.coefficients, np.eye(3)).reshape(-1, 8, 3)]
-        joint, missing, now = [np.repeat(g.differences.joint, 3)], [apart.ravel()], np.zeros(0)
+        joint, missing = [np.repeat(g.differences.joint, 3)], [apart.ravel()]
         sizes = [g.sizes[joint[0]]]
         count = len(missing[0])
         low, high = [np.full(count, -np.inf)], [np.full(count, np.inf)]
@@ -246,7 +259,7 @@ class JointProjection:
         np.maximum.at(largest, j, total)
         total[total <= _IDLE * largest[j]] = 0.0
         parts = (np.concatenate(each) for each in (missing, compliance, low, high, sizes))
-        return JointRows(np.where(free, bodies, -1), actions, answers, total, *parts), now, count
+        return JointRows(np.where(free, bodies, -1), actions, answers, total, *parts), count
 
     def _turned(self, arms: Floats, bodies: NDArray[np.int64], free: NDArray[np.bool_], moments: Floats) -> Floats:
         """(r, 2, 3) the rotations by moments (r, 2, 3), of corners at arms (r, 8, 3) with equal masses."""
@@ -256,9 +269,9 @@ class JointProjection:
         share = np.where(free, 4.0 / self._rigid.masses[bodies], 0.0)
         return share[:, :, None] * np.linalg.solve(inertia, moments[..., None])[..., 0]
 
-    def _note(self, rows: JointRows, forces: Floats, laws: Laws, first_law: int, x: Floats) -> None:
+    def _note(self, rows: JointRows, forces: Floats, first_law: int, x: Floats) -> None:
         """Add the forces (r,) of a substep to those of the frame, about the joints' points."""
-        g = self.geometry
+        g, laws = self.geometry, self._laws
         joint = np.concatenate([np.repeat(g.differences.joint, 3), g.arguments[0].joint[laws.function]])
         actions = np.zeros((len(self), 6))
         np.add.at(actions, joint, forces[:, None] * rows.actions[:, 0])
