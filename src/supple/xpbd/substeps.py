@@ -6,6 +6,7 @@ The largest of:
 - what lets surfaces approach each other by less than half the mean height of a tet in a substep: contact may not find
   surfaces that pass each other within one substep, and the guard of volumes stops a compression by less than that;
 - what lets rigid bodies turn by less than a tenth of a radian in a substep;
+- what lets rigid bodies fall from rest by less than a small part of the height of their tets in a substep;
 - what lets a heavy body sink little into what is below a light rigid one between them: the light one passes on about
   m / M of the load in each pass, and parting the others again lifts the heavy one;
 - after a frame that had to be repeated with more substeps: a number that falls back from there.
@@ -25,8 +26,7 @@ from supple.xpbd.rigid.bodies import RigidBodies
 
 # Fewer substeps damp slow oscillations too much: a mode of frequency w decays at h w^2 / 2.
 FEWEST = 10
-# Rigid bodies alone have no such modes. In a frame of 1/60 s, a body that falls and others push into an obstacle or
-# another body sinks by less than a fiftieth of its size; docs/rigid_bodies.md.
+# Rigid bodies alone have no such modes.
 FEWEST_RIGID = 7
 # Of the mean height of a tet: how far surfaces may approach each other in a substep.
 APPROACH = 0.5
@@ -35,6 +35,9 @@ MOST_TURN = 0.1
 # Largest r g h^2 / H in a substep h, with the ratio r of the masses of a body and of a lighter rigid one near it, and
 # the mean height H of a tet; and the ratio above which this is asked for. docs/rigid_bodies.md has what it gains.
 MOST_SINKING, LEAST_RATIO = 1.5e-4, 4.0
+# Largest g h^2 / H, with the height H of the smallest rigid body's tet: a stack that sinks farther into itself at an
+# impact gains energy when it is parted again. docs/rigid_bodies.md has the trial.
+MOST_FALL = 3e-3
 # By which a number from an earlier frame falls in every frame.
 FALL = 0.8
 # How many times the number of the other criteria it may be: a blow that lasts for some frames must not raise it to any
@@ -63,7 +66,9 @@ class SubstepChoice:
         Dm_inv = system.rest_shape_inverse
         b = np.concatenate([-Dm_inv.sum(axis=1, keepdims=True), Dm_inv], axis=1)
         heights = 1.0 / np.linalg.norm(b, axis=2).max(axis=1)
-        self.height = min(float(heights[part.tets].mean()) for part in system.bodies)
+        of_bodies = [float(heights[part.tets].mean()) for part in system.bodies]
+        self.height = min(of_bodies)
+        self._smallest = min((of_bodies[k] for k in rigid.numbers[~rigid.held]), default=math.inf)
         free = np.where(
             system.inverse_masses > 0.0, system.masses, 0.0
         )  # what pins hold is heavy, and rests on nothing
@@ -93,6 +98,7 @@ class SubstepChoice:
             Substeps(stiff, f"the stiffness of body {body!r}"),
             Substeps(_count(reach / (APPROACH * self.height)), "the speed of approach"),
             self._for_spins(moment, dt),
+            self._for_falls(dt),
             self._for_masses(moment, dt, reach),
             key=lambda each: each.count,
         )
@@ -107,6 +113,10 @@ class SubstepChoice:
         return Substeps(
             _count(float(spins[fastest]) * dt / MOST_TURN), f"the spin of body {self.rigid.names[fastest]!r}"
         )
+
+    def _for_falls(self, dt: float) -> Substeps:
+        fall = math.hypot(*self.system.gravity) * dt**2 if self.touches else 0.0
+        return Substeps(_count(math.sqrt(fall / self._smallest / MOST_FALL)), "the weight of small rigid bodies")
 
     def _for_masses(self, moment: Moment, dt: float, reach: float) -> Substeps:
         """For heavy bodies on light rigid ones, where surfaces may approach each other by `reach` [m]."""

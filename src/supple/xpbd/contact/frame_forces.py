@@ -289,7 +289,7 @@ def _same(places: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int6
     return order[last], contact
 
 
-def _sums(number: NDArray[np.int64], values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+def _sums(number: NDArray[np.integer], values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     columns = [values] if values.ndim == 1 else values.T
     sums = [np.bincount(number, column, count) for column in columns]
     return np.stack(sums, axis=1).astype(np.float64, copy=False).reshape(count, *values.shape[1:])
