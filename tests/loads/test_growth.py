@@ -147,6 +147,8 @@ def test_what_is_refused():
     for load, body, message in (
         (lambda: sp.Growth("bar", 0.0), None, "stretch"),
         (lambda: sp.Growth("bar", np.nan), None, "stretch"),
+        (lambda: sp.Growth("bar", 1e308), None, r"stretch is 1e\+308; it must be from 0.001 to 1000"),
+        (lambda: sp.Growth("bar", sp.Curve([0, 1], [1, 1e-9])), None, "stretch is 1e-09; it must be from"),
         (lambda: sp.Growth("bar", 1.1, (0, 0, 0)), None, "direction is zero"),
         (lambda: sp.Growth("bar", 1.1, tets=[99]), None, "tet 99 does not exist"),
         (lambda: sp.Growth("bar", 1.1, tets=[1, 1]), None, "names a tet twice"),

@@ -18,7 +18,7 @@ from supple.materials.elastic_tets.active import GROWTH, MUSCLE, ActiveTets
 from supple.scene.body import PlacedBody
 from supple.scene.forces import Force
 from supple.scene.loads.body_force import BodyForce
-from supple.scene.loads.growth import Growth
+from supple.scene.loads.growth import STRETCHES, Growth
 from supple.scene.loads.load import Load
 from supple.scene.loads.muscle import Muscle, check_activation
 from supple.scene.loads.over_time import OverTime, magnitude_at, value_at
@@ -132,7 +132,7 @@ def _first_tet(name: str, bodies: Sequence[PlacedBody]) -> int:
 def _growth(growth: Growth, body: PlacedBody, begin: int, first: int) -> GrownTets:
     rows, directions = growth.growing(body)
     vertices = np.unique(body.mesh.nodes[rows]) + begin
-    stretch = partial(magnitude_at, growth.stretch, what=f"{growth.label}: stretch", zero=False)
+    stretch = partial(magnitude_at, growth.stretch, what=f"{growth.label}: stretch", zero=False, limits=STRETCHES)
     return GrownTets(ActiveTets(GROWTH, rows + first, directions), vertices, stretch)
 
 

@@ -13,9 +13,12 @@ from supple.errors import SceneError
 from supple.materials.edges_and_volume import EdgesAndVolume
 from supple.scene.body import PlacedBody
 from supple.scene.loads.load import OnBody, body_of
-from supple.scene.loads.over_time import OverTime, checked_magnitude
+from supple.scene.loads.over_time import Limits, OverTime, checked_magnitude
 from supple.scene.loads.tet_region import TetRegion, checked_directions, checked_tets, directions_of, tets_in
 from supple.scene.rigid.rigid_body import RigidBody
+
+# Of a stretch: volumes and stiffnesses beyond it are not those of a body in the same scene.
+STRETCHES: Limits = (1e-3, 1e3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +30,7 @@ class Growth(OnBody):
     Parameters
     ----------
     body : name of the soft body.
-    stretch : of lengths, above zero [-]; a number, a `Curve`, or a function of time [s]. For heat, 1 + alpha (T - T0).
+    stretch : of lengths, from 1e-3 to 1e3 [-]; a number, a `Curve`, or a function of time [s]. For heat, 1 + alpha (T - T0).
     direction : None for all directions alike; (3,) for one, or (m, 3) for one of each tet, in the body's own
         coordinates; of any length [-].
     tets : None for all tets of the body, an `InBox` that holds all four corners of a tet at the start, or rows of the
@@ -49,7 +52,8 @@ class Growth(OnBody):
 
     def __post_init__(self) -> None:
         self._check_names()
-        object.__setattr__(self, "stretch", checked_magnitude(self.stretch, f"{self.label}: stretch", zero=False))
+        what = f"{self.label}: stretch"
+        object.__setattr__(self, "stretch", checked_magnitude(self.stretch, what, zero=False, limits=STRETCHES))
         if self.direction is not None:
             object.__setattr__(self, "direction", checked_directions(self.direction, self.label))
         object.__setattr__(self, "tets", checked_tets(self.tets, self.label))

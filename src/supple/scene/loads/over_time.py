@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -10,6 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from supple.errors import SceneError
 from supple.scene.values import float_array
+
+# The least and the largest value that a number may have.
+Limits = tuple[float, float]
+ANY: Limits = (-math.inf, math.inf)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +85,8 @@ def value_at(value: OverTime, time: float, what: str, shape: tuple[int, ...]) ->
     return _checked(value(time), f"{what}({time:g})", shape) if callable(value) else np.asarray(value)
 
 
-def checked_magnitude(value: OverTime, what: str, *, zero: bool = True) -> OverTime:
-    """`checked_over_time` of a number that is never below zero and, without `zero`, always above it.
+def checked_magnitude(value: OverTime, what: str, *, zero: bool = True, limits: Limits = ANY) -> OverTime:
+    """`checked_over_time` of a number within `limits` that is never below zero and, without `zero`, always above it.
 
     Raises
     ------
@@ -90,25 +95,27 @@ def checked_magnitude(value: OverTime, what: str, *, zero: bool = True) -> OverT
     given = checked_over_time(value, what, ())
     known = given.values if isinstance(given, Curve) else () if callable(given) else given
     for number in np.atleast_1d(np.asarray(known, dtype=np.float64)):
-        _check_magnitude(float(number), what, zero)
+        _check_magnitude(float(number), what, zero, limits)
     return given
 
 
-def magnitude_at(value: OverTime, time: float, what: str, *, zero: bool = True) -> float:
+def magnitude_at(value: OverTime, time: float, what: str, *, zero: bool = True, limits: Limits = ANY) -> float:
     """The value of such a number at `time` [s].
 
     Raises
     ------
-    SceneError : where it is not finite, or below its limit.
+    SceneError : where it is not finite, or beyond its limits.
     """
     number = float(value_at(value, time, what, ()))
-    _check_magnitude(number, f"{what}({time:g})", zero)
+    _check_magnitude(number, f"{what}({time:g})", zero, limits)
     return number
 
 
-def _check_magnitude(number: float, what: str, zero: bool) -> None:
+def _check_magnitude(number: float, what: str, zero: bool, limits: Limits) -> None:
     if number < 0.0 or (number == 0.0 and not zero):
         raise SceneError(f"{what} is {number:g}; it must be {'zero or more' if zero else 'above zero'}")
+    if not limits[0] <= number <= limits[1]:
+        raise SceneError(f"{what} is {number:g}; it must be from {limits[0]:g} to {limits[1]:g}")
 
 
 def _checked(value: ArrayLike, what: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
