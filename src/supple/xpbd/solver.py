@@ -216,7 +216,8 @@ class XPBD(Solver):
             most = min(2 * used.count, self.max_substeps)
             if problem is Status.SOFTENED:
                 shares = ws.assessment.softening.by_body(dt / used.count, new.memory.measured)
-                most = min(most, enough(used.count, shares, self.accuracy))
+                needed = enough(used.count, shares, self.accuracy)
+                most = min(most, needed) if needed > used.count else most
             used = Substeps(most, f"a repetition: {problem}")
         if lost >= 0:
             message = lost_position_message(ws.system, ws.layout, lost, time)

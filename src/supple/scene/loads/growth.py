@@ -30,7 +30,8 @@ class Growth(OnBody):
     Parameters
     ----------
     body : name of the soft body.
-    stretch : of lengths, from 1e-3 to 1e3 [-]; a number, a `Curve`, or a function of time [s]. For heat, 1 + alpha (T - T0).
+    stretch : of lengths, from 1e-3 to 1e3 [-]; a number, a `Curve`, or a function of time [s]. For heat,
+        1 + alpha (T - T0).
     direction : None for all directions alike; (3,) for one, or (m, 3) for one of each tet, in the body's own
         coordinates; of any length [-].
     tets : None for all tets of the body, an `InBox` that holds all four corners of a tet at the start, or rows of the

@@ -13,6 +13,7 @@ from supple.xpbd.details import XPBDDetails
 from supple.xpbd.frame.advance import damping_in
 from supple.xpbd.integration import to_world
 from supple.xpbd.memory import XPBDMemory
+from supple.xpbd.rigid.joints import SIZE
 from supple.xpbd.sleep import SleepMemory
 from supple.xpbd.substeps import FALL, Substeps
 from supple.xpbd.workspace import XPBDWorkspace
@@ -59,7 +60,7 @@ def end_frame(
         problem = Status.INTERSECTING
     elif problem is None and held_back:
         problem = Status.INVERTED
-    elif problem is None and findings.softened:
+    elif problem is None and (findings.softened or any(of == SIZE for _, _, of in findings.apart)):
         problem = Status.SOFTENED
     forces, old_points = ws.collisions.forces, ws.layout.old_points
     x, v = ws.world[ws.layout.new_from_old], ws.velocities[ws.layout.new_from_old]

@@ -41,6 +41,11 @@ _IDLE = 1e-5
 # Of the joint's size: what motors may lack in a frame, which contact leaves over in substeps.
 _STALLED = 1e-3
 
+# Of the size of a joint: by how much it may be off in a frame that has converged.
+MOST_APART = 1e-3
+# What a violation is a share of, in messages.
+SIZE = "its size"
+
 
 class JointProjection:
     """The joints of a system in the substeps of a frame.
@@ -195,13 +200,15 @@ class JointProjection:
         """
         if not len(self):
             return []
-        found = list(
-            zip(self.violations(x, time).tolist(), self.geometry.joints, ["its size"] * len(self), strict=True)
-        )
+        found = list(zip(self.violations(x, time).tolist(), self.geometry.joints, [SIZE] * len(self), strict=True))
         for (lacks, way), joint in zip(np.abs(self._lacking).tolist(), self.geometry.joints, strict=True):
             share = lacks / max(way, _STALLED)
             found += [(share, joint, "the way of its motor")] if lacks > _STALLED else []
-        return [(share, joint.label, of) for share, joint, of in found if share > tolerated]
+        return [
+            (share, joint.label, of)
+            for share, joint, of in found
+            if share > (min(tolerated, MOST_APART) if of == SIZE else tolerated)
+        ]
 
     def _functions(self, x: Floats, time: float) -> Floats:
         """(s,) values of the functions, with angles near the last ones."""
