@@ -72,8 +72,7 @@ def find_source(path: Path) -> Path:
     """
     from supple.errors import OutputError
 
-    if path.is_dir():
-        return recording_at(path)
+    path = recording_at(path)
     if not path.exists():
         raise OutputError(f"{path}: there is no such file")
     if path.suffix.lower() not in (*SCENE_FILES, *RECORDINGS):

@@ -27,7 +27,8 @@ class Findings:
     gained : energy from nowhere, in this frame and before, that has not been lost since, over the scene's energy [-]
     gainer : the body whose energy rose most in this frame
     softened : (share, body) for each body that is softer than the accuracy allows
-    apart : (share, joint, of what) for each joint that is farther from holding, or its motor from its target
+    apart : (share of its size, joint) for each joint whose sides are too far apart
+    stalled : (share of its way, joint) for each velocity motor that is too far behind without its largest effort
     """
 
     inverted: dict[str, int] = field(default_factory=dict)
@@ -36,7 +37,8 @@ class Findings:
     gained: float = 0.0
     gainer: str = ""
     softened: list[tuple[float, str]] = field(default_factory=list)
-    apart: list[tuple[float, str, str]] = field(default_factory=list)
+    apart: list[tuple[float, str]] = field(default_factory=list)
+    stalled: list[tuple[float, str]] = field(default_factory=list)
 
     @property
     def status(self) -> Status:
@@ -62,8 +64,8 @@ class Findings:
             found.append((Status.HELD_BACK, f"bodies were held back in {_percent(self.held)} of the substeps"))
         for share, name in self.softened:
             found.append((Status.SOFTENED, f"body {name!r} about {_percent(share)} too soft"))
-        for share, label, of in self.apart:
-            found.append((Status.SOFTENED, f"{label} is off by {_percent(share)} of {of}"))
+        for what, lacks in (("its size", self.apart), ("the way of its motor", self.stalled)):
+            found += [(Status.SOFTENED, f"{label} is off by {_percent(share)} of {what}") for share, label in lacks]
         return found
 
 

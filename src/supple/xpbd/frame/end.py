@@ -13,7 +13,6 @@ from supple.xpbd.details import XPBDDetails
 from supple.xpbd.frame.advance import damping_in
 from supple.xpbd.integration import to_world
 from supple.xpbd.memory import XPBDMemory
-from supple.xpbd.rigid.joints import SIZE
 from supple.xpbd.sleep import SleepMemory
 from supple.xpbd.substeps import FALL, Substeps
 from supple.xpbd.workspace import XPBDWorkspace
@@ -53,14 +52,15 @@ def end_frame(
     findings, ledger = ws.assessment.end(
         ws.moment(time), ws.world, ws.guard.J, h, accuracy, held, sleep.asleep, works, measured
     )
-    findings = replace(findings, apart=ws.joints.apart(ws.world, time, accuracy))
+    joints = {"apart": ws.joints.apart(ws.world, time, accuracy), "stalled": ws.joints.stalled(accuracy)}
+    findings = replace(findings, **joints)
     status = findings.status
     problem = status if status in (Status.INVERTED, Status.ENERGY_GAINED) else None
     if crossings(findings.overlaps) > crossings(overlaps):
         problem = Status.INTERSECTING
     elif problem is None and held_back:
         problem = Status.INVERTED
-    elif problem is None and (findings.softened or any(of == SIZE for _, _, of in findings.apart)):
+    elif problem is None and (findings.softened or findings.apart):
         problem = Status.SOFTENED
     forces, old_points = ws.collisions.forces, ws.layout.old_points
     x, v = ws.world[ws.layout.new_from_old], ws.velocities[ws.layout.new_from_old]
@@ -110,7 +110,8 @@ def end_frame(
 def _remedy(findings: Findings, used: int, shares: Mapping[str, float], accuracy: float, setting: str) -> str:
     """What helps against what was found."""
     count = enough(used, shares, accuracy)
-    if findings.status is not Status.SOFTENED or findings.apart:
+    contradicted = bool(findings.apart or findings.stalled)
+    if findings.status is not Status.SOFTENED or contradicted:
         count = max(count, 2 * used)
-    contradicted = ", or remove what contradicts the joint: a pin, a script, contact or another joint"
-    return f"take {setting}={count}{contradicted if findings.apart else ''}"
+    more = ", or remove what contradicts the joint: a pin, a script, contact or another joint" if contradicted else ""
+    return f"take {setting}={count}{more}"

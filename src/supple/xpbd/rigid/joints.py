@@ -40,11 +40,8 @@ _MOST_SWEEPS, _SWEEPS_PER_JOINT = 60, 10
 _IDLE = 1e-5
 # Of the joint's size: what motors may lack in a frame, which contact leaves over in substeps.
 _STALLED = 1e-3
-
 # Of the size of a joint: by how much it may be off in a frame that has converged.
 MOST_APART = 1e-3
-# What a violation is a share of, in messages.
-SIZE = "its size"
 
 
 class JointProjection:
@@ -193,21 +190,20 @@ class JointProjection:
         np.maximum.at(out, joint, beyond / g.units)
         return out
 
-    def apart(self, x: Floats, time: float, tolerated: float) -> list[tuple[float, str, str]]:
-        """Violations above a share of the joint's size, and velocity motors that lack more than that of their way.
-
-        Each with the label of the joint, and what the share is of.
-        """
+    def apart(self, x: Floats, time: float, accuracy: float) -> list[tuple[float, str]]:
+        """The violations of joints that do not hold, as shares of their sizes, with the joints' labels."""
         if not len(self):
             return []
-        found = list(zip(self.violations(x, time).tolist(), self.geometry.joints, [SIZE] * len(self), strict=True))
-        for (lacks, way), joint in zip(np.abs(self._lacking).tolist(), self.geometry.joints, strict=True):
-            share = lacks / max(way, _STALLED)
-            found += [(share, joint, "the way of its motor")] if lacks > _STALLED else []
+        found = zip(self.violations(x, time).tolist(), self.geometry.joints, strict=True)
+        return [(share, joint.label) for share, joint in found if share > min(accuracy, MOST_APART)]
+
+    def stalled(self, accuracy: float) -> list[tuple[float, str]]:
+        """What velocity motors lack of their way in the frame without their largest effort, with the joints' labels."""
+        found = zip(*np.abs(self._lacking).T.tolist(), self.geometry.joints, strict=True)
         return [
-            (share, joint.label, of)
-            for share, joint, of in found
-            if share > (min(tolerated, MOST_APART) if of == SIZE else tolerated)
+            (lacks / max(way, _STALLED), joint.label)
+            for lacks, way, joint in found
+            if lacks > _STALLED and lacks > accuracy * max(way, _STALLED)
         ]
 
     def _functions(self, x: Floats, time: float) -> Floats:
