@@ -23,7 +23,7 @@ LAYERS = (
     ("simulate",),
     ("xpbd", "implicit"),
     ("contact", "joints", "readings"),
-    ("solver",),
+    ("solver", "stitched_points"),
     ("system",),
     ("loads",),
     ("scene",),

@@ -1,5 +1,7 @@
 """Stitches of single vertices to a triangle that stands still: where they come to rest, in both solvers."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -15,16 +17,13 @@ from supple.implicit.newton.free_motion import FreeMotion
 from supple.implicit.newton.linear_solver import LinearSolver
 from supple.implicit.newton.minimize import Problem, minimize
 from supple.implicit.newton.objective import Objective
-from supple.scene.stitches.elements import Springs
 from supple.scene.stitches.side import Side
-from supple.scene.stitches.stitching import Anchors, Stitching
+from supple.scene.stitches.stitching import no_stitching
 from supple.state import Status
 from supple.system import PinRange, System
 from supple.xpbd.constraints.stitches import stitch_constraints
 from supple.xpbd.damping.element_matrices import matrices_of_tets
 from supple.xpbd.damping.elements import viscous_tets
-
-NO_ANCHORS = Anchors((), np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros((0, 3)))
 
 
 def side(points, triangles=()):
@@ -39,7 +38,8 @@ def stitched_system(vertices, triangle, **stitch):
     first, second = side(vertices), side(triangle, [[0, 1, 2]])
     pairs = described.find(first, second)
     count = len(vertices)
-    tets = described.join(first, second, pairs).numbered(0, np.arange(count, count + 3, dtype=np.int32))
+    numbers = np.arange(count, dtype=np.int32), np.arange(count, count + 3, dtype=np.int32)
+    tets = described.join(first, second, pairs).numbered(*numbers)
     x = np.concatenate([first.points, second.points])
     n = len(x)
     held = np.arange(count, n, dtype=np.int32)
@@ -57,7 +57,7 @@ def stitched_system(vertices, triangle, **stitch):
         triangles=np.zeros((0, 3), np.int32),
         components=np.arange(n, dtype=np.int32),
         gravity=np.zeros(3),
-        stitching=Stitching(n, (), tets, Springs.none(), NO_ANCHORS),
+        stitching=replace(no_stitching(n), tets=tets),
     )
     return system, x, pairs
 

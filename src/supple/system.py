@@ -206,10 +206,11 @@ class System:
 
     @cached_property
     def linked_bodies(self) -> tuple[BodyRange, ...]:
-        """The rigid bodies with a joint or a weld."""
+        """The rigid bodies with a joint, a weld or a stitch."""
         scene = self.scene
         names = {joint.first for joint in scene.joints} | {joint.second for joint in scene.joints}
         names |= {weld.rigid for weld in scene.welds}
+        names |= {stitch.first for stitch in scene.stitches} | {stitch.second for stitch in scene.stitches}
         return tuple(part for part in self.rigid_bodies if part.name in names)
 
     def split(self, values: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from supple.scene.motion import Motion
 from supple.scene.obstacles.obstacle import Obstacle
+from supple.stitched_points import with_stitched_points
 from supple.system import System
 
 
@@ -54,7 +55,11 @@ class ObstacleRange:
 
 
 def with_obstacles(system: System) -> tuple[System, tuple[ObstacleRange, ...]]:
-    """The system with the obstacles' vertices appended and pinned, and their ranges."""
+    """The system with the obstacles' vertices appended and pinned, and their ranges.
+
+    Points of rigid bodies that something is stitched to come before them; see `with_stitched_points`.
+    """
+    system = with_stitched_points(system)
     diagonal = max(float(np.linalg.norm(np.ptp(system.rest_points[p.points], axis=0))) for p in system.bodies)
     ranges: list[ObstacleRange] = []
     n = len(system.rest_positions)

@@ -45,6 +45,7 @@ from supple.readings.energy_balance import add_works, no_works, works_of_actuato
 from supple.scene.scene import Scene
 from supple.solver import Solver
 from supple.state import State, Status, StepReport
+from supple.stitched_points import with_stitched_points
 from supple.system import System
 
 logger = logging.getLogger(__name__)
@@ -145,7 +146,7 @@ class Implicit(Solver):
         SolverError : for what this solver does not support: materials of XPBD, obstacles without contact, free bodies
             with the static integrator, and joints with integrators that do not hold them.
         """
-        method = integrator_of(self.integrator)
+        method, system = integrator_of(self.integrator), with_stitched_points(system)
         # In a step of the midpoint rule, the rigidity of what joints hold is a condition at its end.
         midpoint = isinstance(method, Newmark) and bool(system.linked_bodies)
         elasticity = elasticity_of(system, not midpoint)
@@ -210,7 +211,7 @@ class Implicit(Solver):
         if workspace.joints is not None:
             refuse_apart(workspace.joints, state)
         if workspace.contact is not None:
-            workspace.contact.raise_if_intersecting(workspace.with_obstacles(state).positions, state.time)
+            workspace.contact.raise_if_intersecting(workspace.extended(state).positions, state.time)
         workspace.checked = state
 
     def initial_details(self, system: System, workspace: Workspace) -> ImplicitDetails:
@@ -241,7 +242,7 @@ class Implicit(Solver):
             self.check(system, state, workspace)
         state = replace(state, internal=checked(system.laws.material, state.internal))
         n = len(state.positions)
-        state = workspace.with_obstacles(state)
+        state = workspace.extended(state)
         substepping = Substepping.of(
             workspace.system, state.time, dt, self.path_tolerance * workspace.diagonal, self.max_substeps
         )

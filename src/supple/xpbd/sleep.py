@@ -213,7 +213,9 @@ class Sleep:
 
     def _largest(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """(b,) the largest of the values (n, 3) of each body; NaN where one is not a number."""
-        return np.maximum.reduceat(values.max(axis=1), self._starts)
+        # Stitched points of rigid bodies come after the vertices of bodies, and move as these do.
+        end = self._system.bodies[-1].vertices.stop
+        return np.maximum.reduceat(values[:end].max(axis=1), self._starts)
 
     def _poses_at(self, time: float) -> NDArray[np.float64]:
         R, t = self._poses.at(time)

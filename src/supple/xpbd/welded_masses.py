@@ -1,4 +1,4 @@
-"""Rigid bodies with the masses of what is welded to them.
+"""Rigid bodies with the masses of what is welded to them, and with the points that something is stitched to.
 
 A welded vertex has no motion of its own, so that its mass belongs to its rigid body: mass, center and inertia of the
 body are those of both. The solver works with control points of these bodies, which are affine combinations of those of
@@ -9,6 +9,8 @@ Constraints still move welded vertices one by one, and the impulses that this ta
 s times as far. So each has the share 1 / s of the mass with which the body answers at its place, at least:
 
     1 / m' = s * largest eigenvalue of (1 / M + [r]^T I^-1 [r]).
+
+Stitched points are welded vertices without mass, see `supple.stitched_points`.
 
 Source: Tonge, Benevolenski, Voroshilov, "Mass Splitting for Jitter-Free Parallel Rigid Body Simulation" (2012).
 """
@@ -25,26 +27,40 @@ from scipy.linalg import block_diag
 from supple.scene.rigid.mass_properties import MassProperties
 from supple.scene.rigid.rigid_body import RigidBody
 from supple.state import State
+from supple.stitched_points import stitched_state, with_stitched_points
 from supple.system import BodyRange, PinRange, System, rebuilt_system
 from supple.xpbd.memory import ControlMemory, XPBDMemory
 from supple.xpbd.rigid.bodies import RigidBodies
 
 
 class WeldedMasses:
-    """A system whose rigid bodies have the masses of what is welded to them.
+    """A system whose rigid bodies have the masses of what is welded to them, and stitched points as vertices.
 
     Attributes
     ----------
-    system : that system; where nothing is welded, the given one
+    system : that system; where nothing is welded or stitched to a rigid body, the given one
     """
 
     def __init__(self, system: System) -> None:
-        self.system = system
-        self._masses = system.masses[system.welding.vertices]
+        self._count = len(system.masses)
         # The control points, those of the solver as combinations of those of the scene, and back.
         self._rows = np.zeros(0, dtype=np.int64)
-        if not len(system.welding):
-            return
+        self.system = self._built(system)
+        # Stitched points, which come last, have none.
+        masses = system.masses[system.welding.vertices]
+        self._masses = np.pad(masses, (0, len(self.system.welding) - len(masses)))
+
+    def _built(self, system: System) -> System:
+        if not len(system.welding) and not len(system.stitching.apart):
+            return system
+        built = with_stitched_points(self._with_masses(system) if len(system.welding) else system)
+        masses, seen = built.masses.copy(), built.masses.copy()
+        masses[built.welding.vertices] = 0.0
+        for part in built.rigid_bodies:
+            _split(built, part, seen)
+        return replace(built, masses=masses, effective_masses=seen)
+
+    def _with_masses(self, system: System) -> System:
         heavy = {part.name: _with_welded_masses(system, part) for part in system.rigid_bodies}
         pairs = [(part.body, heavy[part.name]) for part in system.rigid_bodies if isinstance(part.body, RigidBody)]
         self._rows = np.concatenate(
@@ -58,15 +74,13 @@ class WeldedMasses:
         bodies = [heavy.get(part.name, part.body) for part in system.bodies]
         scene = replace(system.scene, bodies=bodies, joints=joints)
         anchors = [self._anchors(pin) for pin in system.pins]
-        built = rebuilt_system(scene, tuple(self.inner(state) for state in system.start_states), anchors)
-        masses, seen = built.masses.copy(), built.masses.copy()
-        masses[built.welding.vertices] = 0.0
-        for part in built.rigid_bodies:
-            _split(built, part, seen)
-        self.system = replace(built, masses=masses, effective_masses=seen)
+        return rebuilt_system(scene, tuple(self._heavy(state) for state in system.start_states), anchors)
 
     def inner(self, state: State) -> State:
         """A state of the scene as one of the solver."""
+        return stitched_state(self.system, self._heavy(state))
+
+    def _heavy(self, state: State) -> State:
         if not len(self._rows):
             return state
         memory = state.memory.control if isinstance(state.memory, XPBDMemory) else None
@@ -76,6 +90,9 @@ class WeldedMasses:
 
     def outer(self, state: State) -> State:
         """A state of the solver as one of the scene."""
+        if len(state.positions) > self._count:
+            rows = slice(self._count)
+            state = replace(state, positions=state.positions[rows].copy(), velocities=state.velocities[rows].copy())
         if not isinstance(state.memory, XPBDMemory) or not len(self._rows):
             return state
         inner = np.stack([state.positions[self._rows], state.velocities[self._rows]])

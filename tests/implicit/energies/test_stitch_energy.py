@@ -1,6 +1,7 @@
 """The energy of stitches against an independent dense evaluation, and its derivatives against differences."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,14 +9,13 @@ import pytest
 import supple as sp
 from supple.implicit.energies.potential import HessianBlocks
 from supple.implicit.energies.stitches import StitchEnergy
-from supple.scene.stitches.elements import Pairs, Springs, StitchTets
+from supple.scene.stitches.elements import Pairs, Springs
 from supple.scene.stitches.side import Side
-from supple.scene.stitches.stitching import Anchors, Stitching
+from supple.scene.stitches.stitching import no_stitching
 from supple.scene.stitches.vertex_triangle import SoftVertexTriangleStitch
 
 D, MU, LAM = 0.05, 3e3, 8e3
 TRIANGLE = np.array([[0.1, 0.2, -0.3], [1.3, 0.1, 0.2], [0.3, 1.1, 0.4]])
-NO_ANCHORS = Anchors((), np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros((0, 3)))
 
 
 def side(points, triangles=()):
@@ -37,8 +37,8 @@ def stitching_of(points, d=D):
     """One soft stitch of the first point to the triangle of the other three."""
     stitch = SoftVertexTriangleStitch("a", "b", pairs=[[0, 0]], mu=MU, lam=LAM, min_separate_distance=d)
     first, second = side(points[:1]), side(points[1:], [[0, 1, 2]])
-    tets = stitch.join(first, second, stitch.find(first, second)).numbered(0, np.arange(1, 4, dtype=np.int32))
-    return Stitching(4, (), tets, Springs.none(), NO_ANCHORS)
+    numbers = np.zeros(1, dtype=np.int32), np.arange(1, 4, dtype=np.int32)
+    return replace(no_stitching(4), tets=stitch.join(first, second, stitch.find(first, second)).numbered(*numbers))
 
 
 def dense_rest(points, d=D):
@@ -144,7 +144,7 @@ def springs_of(rest_lengths):
     vertices = np.array([[0, 1, 1], [0, 1, 2], [3, 2, 1]], dtype=np.int32)
     place = np.array([0.0, 0.3, 1.0])
     springs = Springs(vertices, place, np.array([50.0, 80.0, 20.0]), np.asarray(rest_lengths, float), np.zeros(3))
-    return Stitching(4, (), StitchTets.none(), springs, NO_ANCHORS)
+    return replace(no_stitching(4), springs=springs)
 
 
 def dense_spring_energy(springs, x):

@@ -226,12 +226,6 @@ PIN = sp.Pin("palm")
             lambda: sp.Scene([body()], soft_targets=[sp.SoftTarget("palm", [0], 1.0)]),
             "soft target of body 'palm': soft targets pull soft bodies; move a rigid one with a Pin or a Force",
         ),
-        (
-            lambda: system_of(
-                body(), soft(), stitches=[sp.SoftVertexTriangleStitch("soft", "palm", max_distance=9.0, mu=1, lam=1)]
-            ),
-            "rigid body 'palm' cannot be stitched to; stitches join soft bodies and obstacles",
-        ),
     ],
 )
 def test_one_line_names_what_is_wrong(make, text):

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.output.recording.actions.stitches import no_stitches
 from supple.output.recording.scene import RecordedObstacle
 from supple.viewer.protocol.commands import Watch
 from supple.viewer.protocol.snapshots import BodyDescription, Measures, SceneDescription, Snapshot, Timing
@@ -82,7 +83,7 @@ def describe(*meshes: sp.TetMesh, skin=None, **changes) -> SceneDescription:
         up=np.array([0.0, 1.0, 0.0]),
         low=x.min(axis=0),
         high=x.max(axis=0),
-        stitches=np.zeros((0, 4), dtype=np.int32),
+        stitches=no_stitches(),
         n_vertices=n,
         n_tets=m,
         n_constraints=3 * m,

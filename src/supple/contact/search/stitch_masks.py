@@ -71,7 +71,7 @@ def _welded(system: System, surfaces: ContactSurfaces, start: NDArray[np.float64
         joined |= both | both.T
     joined &= surfaces.allowed
     welded = np.zeros(len(start), dtype=np.bool_)
-    point = _points_of_vertices(system, surfaces)[welding.vertices]
+    point = _points_of_vertices(system, surfaces)[welding.vertices[welding.weld >= 0]]
     welded[point[point >= 0]] = True
     ring = surfaces.triangles[welded[surfaces.triangles].any(axis=1)]
     if not joined.any() or not len(ring):
@@ -95,9 +95,9 @@ def _start(system: System, surfaces: ContactSurfaces, poses: ObstaclePoses) -> N
 def _points_of_vertices(system: System, surfaces: ContactSurfaces) -> NDArray[np.int64]:
     """(n + a,) the point of each vertex and anchor; -1 for vertices inside bodies."""
     anchors = system.stitching.anchors
-    point = np.full(len(system.masses) + len(anchors), -1, dtype=np.int64)
-    vertices = surfaces.embedded.single
-    point[vertices[vertices >= 0]] = np.flatnonzero(vertices >= 0)
+    row = np.full(len(system.points) + 1, -1, dtype=np.int64)  # the last one for what is no point
+    row[surfaces.rows] = np.arange(len(surfaces.rows))
+    point = row[system.stitching.points_of_nodes(system.points)]
     for k in np.unique(anchors.owner):
         mesh = anchors.obstacles[k].surface_mesh
         assert mesh is not None  # others cannot be stitched to
@@ -105,5 +105,5 @@ def _points_of_vertices(system: System, surfaces: ContactSurfaces) -> NDArray[np
         mine = np.flatnonzero(anchors.owner == k)
         # An obstacle's points are those of its vertices that triangles use, in order.
         place = np.searchsorted(mesh.used_vertices, anchors.vertices[mine])
-        point[len(system.masses) + mine] = first + place
+        point[system.stitching.first_anchor + mine] = first + place
     return point

@@ -80,9 +80,9 @@ def contact_mesh(
     number = np.full(sum(map(len, points)), -1, dtype=np.int32)
     number[used] = np.arange(len(used), dtype=np.int32)
     surface = EmbeddedPoints.joined(points).taken(used)
-    of_vertex = np.full(len(system.rest_positions) + 1, -1, dtype=np.int32)  # the last one for nodes without a vertex
-    alone = np.flatnonzero(surface.single >= 0)
-    of_vertex[surface.single[alone]] = alone
+    # Obstacles are vertices here; the last entry is for nodes without one.
+    of_vertex = np.append(system.stitching.points_of_nodes(EmbeddedPoints.joined(points)), -1)
+    of_vertex = np.where(of_vertex >= 0, number[of_vertex], -1).astype(np.int32)
     return mesh_of_triangles(
         surface,
         number[corners],
@@ -98,11 +98,13 @@ def contact_mesh(
 
 
 def _welded_points(system: System, of_vertex: NDArray[np.int32]) -> WeldedPoints | None:
-    if not len(system.welding):
+    welding = system.welding
+    of_weld = welding.vertices[welding.weld >= 0]
+    if not len(of_weld):
         return None
     number = {part.name: k for k, part in enumerate(system.bodies)}
     joined = np.array([(number[weld.body], number[weld.rigid]) for weld in system.scene.welds], dtype=np.int64)
-    points = of_vertex[system.welding.vertices]
+    points = of_vertex[of_weld]
     return WeldedPoints(points[points >= 0], joined)
 
 

@@ -13,6 +13,7 @@ from supple.implicit.contact.model import ContactModel
 from supple.implicit.contact.scales import largest_dhat, scales_of
 from supple.implicit.contact.settings import IPCContact
 from supple.scene.contact_pairs import pair_table
+from supple.stitched_points import stitched_state
 from supple.system import System, initial_state
 
 
@@ -25,14 +26,16 @@ def contact_model(system: System, settings: IPCContact, shear_moduli: NDArray[np
     """
     extended, obstacles = with_obstacles(system)
     table = pair_table(system.scene)
-    placed = np.concatenate([initial_state(system.scene).positions, obstacle_positions(obstacles, 0.0)])
+    begun = stitched_state(extended, initial_state(system.scene)).positions
+    placed = np.concatenate([begun, obstacle_positions(obstacles, 0.0)])
     mesh = contact_mesh(extended, obstacles, table.collide, placed)
     widest = largest_dhat(system)
     planes, collisions = Planes(mesh, obstacles, table.collide, widest), Collisions(mesh, widest)
     # A run that is continued keeps its dhat: what rests on something is nearer to it than at the start.
     gaps = []
     for start in system.start_states:
-        x = np.concatenate([start.positions, obstacle_positions(obstacles, start.time)])
+        there = stitched_state(extended, start).positions
+        x = np.concatenate([there, obstacle_positions(obstacles, start.time)])
         heights = planes.heights(x)  # vertices behind a plane are an error that is found later
         gaps.append(min(collisions.smallest_distance(x), float(heights[heights > 0.0].min(initial=np.inf))))
     scales = scales_of(settings, system, shear_moduli, max(gaps, default=np.inf))

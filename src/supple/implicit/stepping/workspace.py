@@ -19,6 +19,7 @@ from supple.implicit.stepping.conservation import Conservation
 from supple.joints.geometry import JointGeometry
 from supple.materials.elastic_tets.active import Growth
 from supple.state import State
+from supple.stitched_points import stitched_state
 from supple.system import System
 
 
@@ -28,7 +29,7 @@ class Workspace:
 
     Attributes
     ----------
-    system : with the obstacles' vertices after the bodies'
+    system : with the stitched points of rigid bodies after the bodies' vertices, and then the obstacles' vertices
     rigidity : conditions of rigid bodies, where these have no elastic energy
     diagonal : of the smallest body's bounding box at rest [m]
     checked : the state that `Implicit.check` has accepted, or that the latest step ended with
@@ -57,7 +58,8 @@ class Workspace:
     @property
     def bodies_end(self) -> int:
         """The first vertex that is an obstacle's."""
-        return max(part.vertices.stop for part in self.system.bodies)
+        obstacles = () if self.contact is None else self.contact.obstacles
+        return len(self.system.rest_positions) - sum(len(part.vertices) for part in obstacles)
 
     def elasticity_at(self, time: float) -> Elasticity:
         """The elastic energy of the stress-free shapes at `time` [s]."""
@@ -71,8 +73,9 @@ class Workspace:
             self.conservation = replace(self.conservation, elasticity=self.grown[1], latest=None)
         return self.grown[1]
 
-    def with_obstacles(self, state: State) -> State:
-        """The state with the obstacles' vertices after the bodies'."""
+    def extended(self, state: State) -> State:
+        """A state of the bodies as one of all vertices of `system`."""
+        state = stitched_state(self.system, state)
         if self.contact is None or not self.contact.obstacles:
             return state
         there = obstacle_positions(self.contact.obstacles, state.time)

@@ -88,9 +88,14 @@ class Surfaces:
         return x
 
     def _stitched_points(self, recording: Recording) -> NDArray[np.int64]:
-        """The nodes of the stitches, of which anchors are the obstacles' points at the same place."""
+        """The nodes of the stitches, of which those on rigid bodies and obstacles are the points at the same place."""
         stitches = recording.stitches
         number = list(range(len(recording.rest_positions)))
+        skins = {body.vertices.start: (body.skin, row) for body, row in self.skins}
+        for control, weights in zip(stitches.rigid_control.tolist(), stitches.rigid_weights, strict=True):
+            skin, row = skins[control[0]]
+            assert skin is not None
+            number.append(row + int(np.argmin(np.abs(skin.weights - weights).max(axis=1))))
         placed = {obstacle: (points, row) for obstacle, points, row in self.fixed}
         for owner, anchor in zip(stitches.anchor_owners.tolist(), stitches.anchors, strict=True):
             points, row = placed.get(owner, (anchor[None], 0))

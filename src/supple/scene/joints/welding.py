@@ -24,7 +24,7 @@ class Welding:
     Attributes
     ----------
     vertices : (s,); control : (s, 4) control points of their rigid bodies; weights : (s, 4)
-    weld : (s,) the number of each one's weld
+    weld : (s,) the number of each one's weld, -1 where it has none
     """
 
     vertices: NDArray[np.int32]
@@ -39,6 +39,15 @@ class Welding:
     def none(cls) -> Welding:
         """Of a scene without welds."""
         return weld_together((), ())
+
+    def with_vertices(self, vertices: NDArray[np.int32], control: NDArray[np.int32], weights: NDArray) -> Welding:
+        """With more vertices (k,), which have no weld: combinations of control points (k, 4) with weights (k, 4)."""
+        return Welding(
+            np.concatenate([self.vertices, vertices]),
+            np.ascontiguousarray(np.concatenate([self.control, control])),
+            np.ascontiguousarray(np.concatenate([self.weights, weights])),
+            np.concatenate([self.weld, np.full(len(vertices), -1, dtype=np.int64)]),
+        )
 
     def renumbered(self, new: NDArray[np.int32]) -> Welding:
         """The same, where vertex i has the number new[i]."""

@@ -33,9 +33,9 @@ class _Elements:
     def __len__(self) -> int:
         return len(self.vertices)
 
-    def numbered(self, first: int, second: NDArray[np.int32]) -> Self:
-        """The same in other numbers: the first side's plus `first`, the second side's by the table `second`."""
-        vertices = np.column_stack([self.vertices[:, 0] + first, second[self.vertices[:, 1:]]])
+    def numbered(self, first: NDArray[np.int32], second: NDArray[np.int32]) -> Self:
+        """The same in other numbers: each side's by its table."""
+        vertices = np.column_stack([first[self.vertices[:, 0]], second[self.vertices[:, 1:]]])
         return replace(self, vertices=vertices.astype(np.int32))
 
     @classmethod

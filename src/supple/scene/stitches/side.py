@@ -1,4 +1,4 @@
-"""The two things that a stitch joins, each a body or a triangle obstacle, where they are at time 0."""
+"""The two things that a stitch joins, each a body, soft or rigid, or a triangle obstacle, where they are at time 0."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Side:
     Attributes
     ----------
     label : its name in messages
-    points : (n, 3) of all its vertices, in world coordinates [m]
+    points : (n, 3) of all its vertices, of a rigid body those of its surface, in world coordinates [m]
     triangles : (t, 3) of its surface; edges : (e, 2) of its surface, sorted; surface_vertices : (s,)
     """
 
@@ -56,8 +56,8 @@ def side_of(thing: PlacedBody | Obstacle, stitch: str) -> Side:
     SceneError : for other obstacles.
     """
     if isinstance(thing, RigidBody):
-        raise SceneError(f"{stitch}: {thing.label} cannot be stitched to; stitches join soft bodies and obstacles")
-    if isinstance(thing, PlacedBody):
+        label, surface, points = thing.label, thing.surface, thing.place(thing.points)
+    elif isinstance(thing, PlacedBody):
         label, surface, points = f"body {thing.name!r}", thing.mesh.surface, thing.place(thing.mesh.vertices)
     elif thing.surface_mesh is not None:
         R, t = thing.pose(0.0)

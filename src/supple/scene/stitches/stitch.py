@@ -20,7 +20,7 @@ PAIRINGS = ("closest", "all")
 
 @dataclass(frozen=True, eq=False)
 class Stitch(ABC):
-    """Joins vertices of a body to something of another body, or of a triangle obstacle.
+    """Joins vertices of a body to something of another body, or of a triangle obstacle. Bodies are soft or rigid.
 
     Give `pairs`, or `max_distance`; then pairs are found in the world, where the scene places bodies and obstacles at
     the start. Initial positions or a start from another frame change neither pairs nor rest shapes.
@@ -29,7 +29,8 @@ class Stitch(ABC):
     ----------
     first : name of the body whose vertices are stitched
     second : name of what they are stitched to: another body, or a TriangleObstacle, static or scripted
-    pairs : (n, 2) vertex of the first body's mesh, and number of the partner in the second (see the kind of stitch)
+    pairs : (n, 2) vertex of the first body's mesh, and number of the partner in the second (see the kind of stitch);
+        of a rigid body, vertices, edges and triangles are those of its `surface`
     max_distance : vertices of the first body's surface up to this distance from the second are stitched [m]
     pairing : "closest", a vertex's nearest one; of several that are equally near, the one with the largest distance of
         the vertex from its plane; of several with the same (0, where surfaces touch), the one whose normal is most

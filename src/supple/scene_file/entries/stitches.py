@@ -18,7 +18,7 @@ Lengths = NonNegative | Annotated[list[NonNegative], Field(min_length=1)]
 class _StitchModel(Model):
     kind: str
     first: Name = Field(description="the body whose vertices are stitched")
-    second: Name = Field(description="a body, or an obstacle of triangles")
+    second: Name = Field(description="a body, soft or rigid, or an obstacle of triangles")
     max_distance: Positive | None = Field(
         default=None, description="stitch all pairs nearer than this at the start [m]"
     )

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.output.recording.actions.joints import RecordedJoint
+from supple.output.recording.actions.stitches import RecordedStitches
 from supple.output.recording.scene import RecordedObstacle
 from supple.readings.joint_readings import JointReading
 from supple.simulate import Diagnostics
@@ -59,7 +60,7 @@ class SceneDescription:
     solver : "xpbd" or "implicit"; values : of the parameters of solver and scene, by name
     up : (3,) unit vector against gravity
     low, high : (3,) corners of the bounding box of the bodies at the start [m]
-    stitches : (k, 4) global vertices: a vertex and the three of the triangle that it is stitched to
+    stitches : of all kinds
     joints : of rigid bodies
     n_vertices, n_tets, n_constraints : of the whole scene; constraints are the solver's, 0 where it has none
     """
@@ -73,7 +74,7 @@ class SceneDescription:
     up: NDArray[np.float64]
     low: NDArray[np.float64]
     high: NDArray[np.float64]
-    stitches: NDArray[np.int32]
+    stitches: RecordedStitches
     n_vertices: int
     n_tets: int
     n_constraints: int

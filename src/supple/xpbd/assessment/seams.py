@@ -37,10 +37,7 @@ def _stitched(system: System, owner: NDArray[np.int32]) -> NDArray[np.int64]:
     """(k, 2) triangles around stitches of bodies to bodies."""
     nodes, triangles, points = system.stitching.nodes(), system.triangles, system.points
     # Anchors on obstacles are no points of bodies.
-    point = np.full(len(system.masses) + len(system.stitching.anchors), -1, dtype=np.int32)
-    alone = np.flatnonzero(points.single >= 0)
-    point[points.single[alone]] = alone
-    nodes = np.append(point, -1)[nodes].astype(np.int32)
+    nodes = np.append(system.stitching.points_of_nodes(points), -1)[nodes].astype(np.int32)
     nodes = nodes[(nodes[:, 0] >= 0) & (nodes[:, 1] >= 0)]
     if not len(nodes):
         return np.zeros((0, 2), dtype=np.int64)

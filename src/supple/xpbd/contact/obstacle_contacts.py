@@ -81,6 +81,7 @@ class ObstacleContacts:
         self._any_load = False
         self._can_move = inverse_masses > 0.0
         self._can_move[rigid.control] = False
+        self._can_move[system.stitching.rigid.numbers] = False  # these are tested as points of their surface
         body = self._moved.movers.body
         if len(rigid):
             self._can_move |= (body >= 0) & ~rigid.held[body]

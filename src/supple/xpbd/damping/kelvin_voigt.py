@@ -109,8 +109,9 @@ class Damping:
             if len(kind.tau)
         ]
         n = len(system.masses)
+        placed = initial_state(system.scene).positions[layout.old_from_new[: system.bodies[-1].vertices.stop]]
         self._placed = np.concatenate(
-            [initial_state(system.scene).positions[layout.old_from_new], system.stitching.anchors.at(0.0)]
+            [placed, system.stitching.rigid.positions(placed), system.stitching.anchors.at(0.0)]
         )
         touched = np.unique(np.concatenate([vertices.ravel() for vertices, *_ in self._elements])).astype(np.int64)
         movable = inverse_masses[touched] > 0.0

@@ -64,11 +64,13 @@ def make_layout(system: System) -> Layout:
     order, level_of_old = breadth_first_order([system.edges], n)
     rank_of_old = np.empty(n, dtype=np.int32)
     rank_of_old[order] = np.arange(n, dtype=np.int32)
-    body_of_old = np.zeros(n, dtype=np.int32)
+    body_of_old = np.full(n, len(system.bodies), dtype=np.int32)
     for k, part in enumerate(system.bodies):
         body_of_old[part.vertices] = k
-    # The vertices of a body stay contiguous, as its range requires, and follow the levels.
+    # The vertices of a body stay contiguous, as its range requires, and follow the levels. Stitched points are last.
     old_from_new = np.lexsort((rank_of_old, body_of_old)).astype(np.int32)
+    stitched = system.stitching.rigid
+    body_of_old[stitched.numbers] = body_of_old[stitched.control[:, 0]]
     new_from_old = np.empty(n, dtype=np.int32)
     new_from_old[old_from_new] = np.arange(n, dtype=np.int32)
     levels = level_of_old[old_from_new]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from supple.output.drawing import body_color
+from supple.output.recording.actions.stitches import no_stitches
 from supple.output.recording.scene import RecordedObstacle
 from supple.viewer.drawing.coloring.fields import FIELDS
 from supple.viewer.drawing.layers.section import Cut, surface
@@ -103,13 +104,16 @@ def test_springs_with_length_and_pins(server, fake):
     assert [nodes[name].visible for name in ("/springs/lines", "/pusher", "/pins")] == [False] * 3
 
 
-def test_stitches_are_lines_between_vertices_and_triangles(server, fake):
-    description = replace(fake.snapshot.description, stitches=np.array([[0, 30, 31, 33]], dtype=np.int32))
+def test_stitches_are_lines_from_vertices_to_the_places_that_were_nearest(server, fake):
+    drawn = replace(
+        no_stitches(), nodes=np.array([[0, 30, 31, 33]], dtype=np.int32), weights=np.array([[0.2, 0.3, 0.5]])
+    )
+    description = replace(fake.snapshot.description, stitches=drawn)
     stage = Stage(server, MomentBuilder().moment(fake.show(description=description)), ViewOptions())
     assert stage.options.stitches
     x = fake.snapshot.positions
     points = server.scene._handle_from_node_name["/stitches"].points
-    np.testing.assert_allclose(points, [[x[0], x[[30, 31, 33]].mean(axis=0)]], atol=1e-6)
+    np.testing.assert_allclose(points, [[x[0], [0.2, 0.3, 0.5] @ x[[30, 31, 33]]]], atol=1e-6)
 
 
 @pytest.mark.parametrize(("meters", "text"), [(1.234, "1.23 m"), (0.123, "12.3 cm"), (0.00123, "1.2 mm")])

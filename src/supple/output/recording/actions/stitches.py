@@ -34,14 +34,18 @@ class RecordedStitches:
 
     Attributes
     ----------
-    nodes : (k, 4) the vertex, then the corners of what it is stitched to; from n on, vertices of obstacles
+    nodes : (k, 4) the vertex, then the corners of what it is stitched to; from n on, points of rigid bodies, and then
+        vertices of obstacles
     weights : (k, 3) of the corners
+    rigid_control, rigid_weights : (r, 4) vertices, and the combination of these that each point of a rigid body is
     anchor_owners : (a,) which obstacle those vertices belong to; anchors : (a, 3) at time 0, before its pose [m]
     laws : None in recordings of older versions
     """
 
     nodes: NDArray[np.int32]
     weights: NDArray[np.float64]
+    rigid_control: NDArray[np.int32]
+    rigid_weights: NDArray[np.float64]
     anchor_owners: NDArray[np.int32]
     anchors: NDArray[np.float64]
     laws: StitchLaws | None = None
@@ -58,7 +62,8 @@ class RecordedStitches:
         """
         pose = poses[self.anchor_owners]
         there = np.einsum("aij,aj->ai", pose[:, :, :3], self.anchors) + pose[:, :, 3]
-        return np.concatenate([x, there])[self.nodes]
+        on_rigid = np.einsum("rk,rki->ri", self.rigid_weights, x[self.rigid_control])
+        return np.concatenate([x, on_rigid, there])[self.nodes]
 
     def segments(self, x: NDArray[np.float64], poses: NDArray[np.float64]) -> NDArray[np.float64]:
         """(k, 2, 3) ends of the stitches [m]; parameters as of `corners`."""
@@ -66,31 +71,43 @@ class RecordedStitches:
         return np.stack([corners[:, 0], np.einsum("kc,kci->ki", self.weights, corners[:, 1:])], axis=1)
 
 
+def recorded_stitches(system: System) -> RecordedStitches:
+    """The stitches of a system."""
+    stitching = system.stitching
+    nodes, weights = attachments(stitching, stitching.points(initial_state(system.scene).positions, 0.0))
+    rigid, anchors, tets, springs = stitching.apart, stitching.anchors, stitching.tets, stitching.springs
+    laws = StitchLaws(
+        tets.rest_shape_inverse,
+        np.column_stack([tets.mu, tets.lam]),
+        np.column_stack([springs.stiffness, springs.rest_lengths]),
+    )
+    return RecordedStitches(nodes, weights, rigid.control, rigid.weights, anchors.owner, anchors.points, laws)
+
+
 def write_stitches(own: h5py.Group, system: System) -> None:
     """Write the stitches to the group of a recording; nothing where there are none."""
-    stitching = system.stitching
-    if not len(stitching):
+    if not len(system.stitching):
         return
-    start = initial_state(system.scene).positions
-    nodes, weights = attachments(stitching, stitching.points(start, 0.0))
-    group = own.create_group("stitches")
-    group["nodes"], group["weights"] = nodes, weights
-    group["anchor_owners"], group["anchors"] = stitching.anchors.owner, stitching.anchors.points
-    tets, springs = stitching.tets, stitching.springs
-    group["rest_shape_inverse"], group["moduli"] = tets.rest_shape_inverse, np.column_stack([tets.mu, tets.lam])
-    group["springs"] = np.column_stack([springs.stiffness, springs.rest_lengths])
+    group, stitches = own.create_group("stitches"), recorded_stitches(system)
+    for name in ("nodes", "weights", "rigid_control", "rigid_weights", "anchor_owners", "anchors"):
+        group[name] = getattr(stitches, name)
+    for name, values in vars(stitches.laws).items():
+        group[name] = values
 
 
 def read_stitches(file: CheckedFile, n: int, obstacles: int) -> RecordedStitches:
     """The stitches of a recording with n vertices."""
     if "supple/stitches" not in file:
-        nothing = np.zeros(0, dtype=np.int32)
-        return RecordedStitches(nothing.reshape(0, 4), np.zeros((0, 3)), nothing, np.zeros((0, 3)))
+        return no_stitches()
     anchors = file.array("supple/stitches/anchors", "f", (None, 3))
     owners = file.array("supple/stitches/anchor_owners", "i", (len(anchors),))
     if len(owners) and not 0 <= owners.min() <= owners.max() < obstacles:
         raise file.broken("a stitch is attached to an obstacle that does not exist")
-    nodes = file.indices("supple/stitches/nodes", 4, n + len(anchors))
+    control, on_rigid = np.zeros((0, 4), dtype=np.int32), np.zeros((0, 4))
+    if "supple/stitches/rigid_control" in file:  # not in recordings of older versions
+        control = file.indices("supple/stitches/rigid_control", 4, n)
+        on_rigid = file.array("supple/stitches/rigid_weights", "f", (len(control), 4))
+    nodes = file.indices("supple/stitches/nodes", 4, n + len(control) + len(anchors))
     weights = file.array("supple/stitches/weights", "f", (len(nodes), 3))
     laws = None
     if "supple/stitches/moduli" in file:
@@ -98,4 +115,10 @@ def read_stitches(file: CheckedFile, n: int, obstacles: int) -> RecordedStitches
         inverses = file.array("supple/stitches/rest_shape_inverse", "f", (len(moduli), 3, 3))
         springs = file.array("supple/stitches/springs", "f", (len(nodes) - len(moduli), 2))
         laws = StitchLaws(inverses, moduli, springs)
-    return RecordedStitches(nodes, weights, owners, anchors, laws)
+    return RecordedStitches(nodes, weights, control, on_rigid, owners, anchors, laws)
+
+
+def no_stitches() -> RecordedStitches:
+    """Of a scene without stitches."""
+    nothing, rows = np.zeros(0, dtype=np.int32), np.zeros((0, 4), dtype=np.int32)
+    return RecordedStitches(rows, np.zeros((0, 3)), rows, np.zeros((0, 4)), nothing, np.zeros((0, 3)))

@@ -1,4 +1,4 @@
-"""Stitches between bodies: from each stitched vertex to the middle of its triangle."""
+"""Stitches: from each stitched vertex to the point that was nearest to it at the start."""
 
 from __future__ import annotations
 

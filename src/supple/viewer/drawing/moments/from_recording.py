@@ -25,7 +25,7 @@ def model_of_recording(recording: Recording) -> Model:
         recording.rest_positions,
         tets,
         view_of(recording),
-        recorded_stitches=recording.stitches,
+        recording.stitches,
         joints=recording.joints,
     )
 

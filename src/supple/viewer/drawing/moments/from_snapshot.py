@@ -69,7 +69,7 @@ class MomentBuilder:
             np.concatenate([body.rest_positions for body in scene.bodies]),
             np.ascontiguousarray(tets, dtype=np.int32),
             _view_of(scene),
-            np.asarray(scene.stitches).reshape(-1, 4),
+            scene.stitches,
             joints=scene.joints,
         )
 
@@ -97,7 +97,7 @@ def _model_key(scene: SceneDescription) -> tuple[Any, ...]:
     return (
         *bodies,
         *((o.name, o.kind) for o in _scene_obstacles(scene)),
-        _fingerprint(scene.stitches),
+        _fingerprint(scene.stitches.nodes),
         len(scene.joints),
     )
 

@@ -18,7 +18,7 @@ from supple.mesh.topology import TET_FACETS, facet_keys
 from supple.numerics.deformation import deformation_gradients
 from supple.output.drawing import View, body_color
 from supple.output.recording.actions.joints import RecordedJoint
-from supple.output.recording.actions.stitches import RecordedStitches
+from supple.output.recording.actions.stitches import RecordedStitches, no_stitches
 from supple.output.recording.scene import RecordedObstacle
 from supple.output.recording.skinned_surface import SkinnedSurface
 
@@ -61,8 +61,7 @@ class Model:
     obstacles : at time 0
     rest_positions : (n, 3) [m]; tets : (m, 4) rows of them
     view : bounds of the motion, and the up direction
-    stitches : (k, 4) a vertex, and the three vertices of the triangle that it is stitched to
-    recorded_stitches : stitches of a recording, of any kind
+    stitches : of all kinds
     joints : of rigid bodies
     """
 
@@ -71,8 +70,7 @@ class Model:
     rest_positions: NDArray[np.float64]
     tets: NDArray[np.int32]
     view: View
-    stitches: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 4), dtype=np.int32))
-    recorded_stitches: RecordedStitches | None = None
+    stitches: RecordedStitches = field(default_factory=no_stitches)
     joints: tuple[RecordedJoint, ...] = ()
 
     @cached_property
@@ -169,11 +167,7 @@ class Moment:
     @cached_property
     def stitch_segments(self) -> NDArray[np.float64]:
         """(k, 2, 3) the two ends of every stitch [m]."""
-        x, recorded = self.finite_positions, self.model.recorded_stitches
-        if recorded is not None:
-            return np.asarray(recorded.segments(x, self.poses))
-        rows = self.model.stitches
-        return np.stack([x[rows[:, 0]], x[rows[:, 1:]].mean(axis=1)], axis=1)
+        return self.model.stitches.segments(self.finite_positions, self.poses)
 
     @cached_property
     def finite_positions(self) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.output.recording.actions.joints import joints_of
+from supple.output.recording.actions.stitches import recorded_stitches
 from supple.output.recording.scene import RecordedObstacle
 from supple.readings.joint_readings import joint_readings
 from supple.scene.obstacles.obstacle import Obstacle
@@ -38,7 +39,7 @@ def describe(live: LiveScene) -> SceneDescription:
         up=live.up,
         low=positions.min(axis=0),
         high=positions.max(axis=0),
-        stitches=np.asarray(system.stitching.elements(), dtype=np.int32).reshape(-1, 4),
+        stitches=recorded_stitches(system),
         n_vertices=len(live.state.positions),
         n_tets=len(system.tets),
         n_constraints=sum(int(made.count) for made in getattr(live.workspace, "sets", ())),
