@@ -237,10 +237,10 @@ class TestBodies:
             forces=[sp.Force("a", [0], (0, 1, 0)), sp.Force("b", [0], (0, 1, 0))],
         )
         live = LiveScene(LiveSource("stack", scene, sp.XPBD(substeps=4), 0.01))
-        assert describe(live).stitches.shape == (18, 4)
+        assert describe(live).stitches.nodes.shape == (18, 4)
         change(RemoveBody("a"), live)
         left = live.setup.scene
-        assert describe(live).stitches.shape == (9, 4)
+        assert describe(live).stitches.nodes.shape == (9, 4)
         assert [force.body for force in left.forces] == ["b"]
         assert len(left.stitches) == 1
         assert [tuple(pair.first) for pair in left.contact_pairs] == [("b",)]
