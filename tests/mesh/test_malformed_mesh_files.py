@@ -51,6 +51,11 @@ MALFORMED_SURFACES = {
         b"\0" * 80 + struct.pack("<I", 1) + struct.pack("<12fH", *[np.nan] * 12, 0),
         "vertex 0 .*finite",
     ),
+    "signaling nan stl": (
+        "a.stl",
+        b"\0" * 80 + struct.pack("<I", 1) + b"\0" * 12 + 9 * struct.pack("<I", 0x7F800001) + b"\0\0",
+        "not finite",
+    ),
     "flat stl": ("a.stl", b"\0" * 80 + struct.pack("<I", 1) + b"\0" * 50, "degenerate"),
     "text stl word": ("a.stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 x\n", "a.stl:4: vertex is '0 0 x'"),
     "text stl cut": ("a.stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 1\n", "truncated"),

@@ -60,6 +60,19 @@ def test_a_kernel_is_compiled_again_when_a_function_of_another_file_changes(copi
     assert run().endswith(" 1")
 
 
+def test_of_several_processes_one_compiles(tmp_path):
+    """Three processes that need the same kernel at the same time; none leaves a lock."""
+    shutil.copytree(SOURCES, tmp_path / "supple", ignore=shutil.ignore_patterns("__pycache__"))
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    command = [sys.executable, "-c", RUN_KERNEL]
+    running = [
+        subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment, cwd=tmp_path) for _ in range(3)
+    ]
+    hits = sorted(process.communicate()[0].split()[-1] for process in running)
+    assert hits == ["0", "1", "1"]
+    assert not list(tmp_path.rglob("*.lock"))
+
+
 @pytest.mark.parametrize("content", [b"cmoved.module\nkernel\n.", b"\x80\x05"])
 @pytest.mark.slow
 def test_a_cache_that_cannot_be_read_is_made_anew(copied_package, content):

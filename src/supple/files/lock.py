@@ -1,4 +1,4 @@
-"""A lock on a folder. The operating system releases it when its process ends, however that happens."""
+"""Locks on files and folders. The operating system releases them when their process ends, however that happens."""
 
 from __future__ import annotations
 
@@ -16,6 +16,43 @@ LOCK_NAME = ".supple.lock"
 _TRIES, _PAUSE = 5, 0.02
 
 
+class FileLock:
+    """A file that only one process can hold. It is made for that, and deleted by `release`."""
+
+    def __init__(self, path: Path, file: int) -> None:
+        self._path, self.file = path, file
+
+    @classmethod
+    def acquired(cls, path: Path) -> FileLock | None:
+        """The lock; None where something else holds it.
+
+        Raises
+        ------
+        OSError : where the file cannot be made.
+        """
+        while True:
+            file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+            if not _lock(file):
+                os.close(file)
+                return None
+            # The owner of the lock may have deleted the file after it was opened here.
+            with suppress(OSError):
+                if os.path.samestat(os.fstat(file), path.stat()):
+                    return cls(path, file)
+            os.close(file)
+
+    def release(self) -> None:
+        """Unlock the file, and delete it."""
+        if self.file >= 0:
+            if os.name != "posix":  # only POSIX can delete an open file
+                os.close(self.file)
+            with suppress(OSError):
+                self._path.unlink()
+            if os.name == "posix":
+                os.close(self.file)
+            self.file = -1
+
+
 class FolderLock:
     """Held from its construction until `release`. Another one of the same folder is refused, in any process.
 
@@ -29,38 +66,25 @@ class FolderLock:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._path = folder / LOCK_NAME
-        tries = 0
-        while True:
-            try:
-                self._file = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o644)
-            except OSError as error:
-                raise output_error(self._path, error) from None
-            if not _lock(self._file):
-                os.close(self._file)
-                tries += 1
-                if tries == _TRIES:
-                    raise in_use(folder)
+        path = folder / LOCK_NAME
+        for again in range(_TRIES):
+            if again:
                 time.sleep(_PAUSE)
-                continue
-            # The owner of the lock may have deleted the file after it was opened here.
-            with suppress(OSError):
-                if os.path.samestat(os.fstat(self._file), self._path.stat()):
-                    break
-            os.close(self._file)
-        os.ftruncate(self._file, 0)
-        os.write(self._file, f"\n{os.getpid()}\n".encode())
+            try:
+                lock = FileLock.acquired(path)
+            except OSError as error:
+                raise output_error(path, error) from None
+            if lock is not None:
+                break
+        else:
+            raise in_use(folder)
+        self._lock = lock
+        os.ftruncate(lock.file, 0)
+        os.write(lock.file, f"\n{os.getpid()}\n".encode())
 
     def release(self) -> None:
         """Unlock the folder, and delete the file."""
-        if self._file >= 0:
-            if os.name != "posix":  # only POSIX can delete an open file
-                os.close(self._file)
-            with suppress(OSError):
-                self._path.unlink()
-            if os.name == "posix":
-                os.close(self._file)
-            self._file = -1
+        self._lock.release()
 
 
 def in_use(folder: Path) -> OutputError:

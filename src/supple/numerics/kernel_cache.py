@@ -12,6 +12,8 @@ import pickle
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import cached_property, partial
+from pathlib import Path
+from time import monotonic, sleep
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
@@ -22,7 +24,11 @@ from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
 from numba.core.registry import CPUDispatcher
 
+from supple.files.lock import FileLock
 from supple.numerics.parallel_kernel import ParallelKernel
+
+# How long a process waits for another one that compiles the same kernel, and how long between two looks [s].
+_LONGEST_WAIT, _PAUSE = 60.0, 0.02
 
 __all__ = ["KernelCache", "njit", "prange", "reached_code"]
 
@@ -106,11 +112,23 @@ class KernelCache(FunctionCache):
 
     The code is that in memory, not that of the files: a file that is edited after its import cannot be mistaken for
     what is compiled.
+
+    Of several processes that need the kernel at once, as those of a study do, one compiles it and the others wait.
     """
+
+    _lock: FileLock | None = None
 
     def load_overload(self, sig, target_context):
         # A kernel may call what is defined below it, so the stamp waits for the first call. Numba loads, then saves.
         self._cache_file._source_stamp = self._stamp
+        found = self._loaded(sig, target_context)
+        if found is None and self._lock is None and self._wait():
+            found = self._loaded(sig, target_context)
+            if found is not None:
+                self._unlock()
+        return found
+
+    def _loaded(self, sig, target_context):
         try:
             return super().load_overload(sig, target_context)
         except Exception:  # the files name a module that has moved since, or are damaged: unpickling may raise anything
@@ -122,6 +140,24 @@ class KernelCache(FunctionCache):
         # A kernel that is not kept is compiled again next time: a full disk is no reason to end a run.
         with suppress(OSError):
             super().save_overload(sig, data)
+        self._unlock()
+
+    def _wait(self) -> bool:
+        """Lock the kernel, to compile it here; whether another process has had it locked until then."""
+        waited, end = False, monotonic() + _LONGEST_WAIT
+        with suppress(OSError):  # where nothing can be written, nothing is kept
+            self._impl.locator.ensure_cache_path()
+            path = Path(self._cache_path) / f"{self._cache_file._index_name}.lock"
+            while (lock := FileLock.acquired(path)) is None and monotonic() < end:
+                waited = True
+                sleep(_PAUSE)
+            self._lock = lock
+        return waited
+
+    def _unlock(self) -> None:
+        if self._lock is not None:
+            self._lock.release()
+            self._lock = None
 
     @cached_property
     def _stamp(self) -> tuple[Any, bytes]:

@@ -45,7 +45,9 @@ def _read_binary(data: bytes) -> CellSoup:
             "%d bytes after the last triangle of a binary STL file were ignored", len(data) - 84 - 50 * count
         )
     records = np.frombuffer(data, dtype=RECORD, count=count, offset=84)
-    return _soup(records["corners"].reshape(-1, 3).astype(np.float64))
+    with np.errstate(invalid="ignore"):  # of damaged numbers, which the mesh refuses
+        corners = records["corners"].reshape(-1, 3).astype(np.float64)
+    return _soup(corners)
 
 
 def _read_text(data: bytes) -> CellSoup:
