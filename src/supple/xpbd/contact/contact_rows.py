@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.numerics.kernel_cache import njit
-from supple.numerics.mat3 import dot, row
-from supple.xpbd.contact.impulses import apply_impulse, relative
+from supple.numerics.mat3 import row
+from supple.xpbd.contact.impulses import apply_impulse
 from supple.xpbd.contact.response_rates import keep_shares
 
 
@@ -195,13 +195,3 @@ def push_rows(x, x_prev, movers, rows, h):
         if f[0] != 0.0 or f[1] != 0.0 or f[2] != 0.0:
             d = (h * h * f[0], h * h * f[1], h * h * f[2])
             apply_impulse(x, x_prev, movers, vertices, weights, e, d)
-
-
-@njit(cache=True)
-def note_depths(x, movers, chosen, rows, depth):
-    """Increase depth (n,) to how deep points are inside other pieces, after all contacts are resolved [m]."""
-    vertices, weights, normals, _, _, _, _, _, deep = rows
-    for e in chosen:
-        if deep[e]:
-            p = vertices[e, 0]
-            depth[p] = max(depth[p], -dot(relative(x, movers, vertices, weights, e), row(normals, e)))

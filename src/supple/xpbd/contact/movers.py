@@ -85,6 +85,8 @@ class MovedPoints:
         )
         self._total = np.zeros((bodies, 9))
         self._free = np.zeros(bodies, dtype=np.bool_)
+        self._described = points.start, points.vertices, points.weights
+        self._bodies = rigid.control, rigid.masses, self._free, rigid.joined
 
     def begin_step(self, held: NDArray[np.bool_]) -> None:
         """Begin a frame in which some rigid bodies (b,) are held."""
@@ -92,23 +94,27 @@ class MovedPoints:
 
     def take(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
         """Write the places of the points, of those of the vertices x (n, 3), into the first rows of `out`."""
-        take_points(x, self._points.start, self._points.vertices, self._points.weights, out)
+        take_points(x, *self._described, out)
 
-    def begin(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], before: NDArray[np.float64]) -> None:
-        """Begin to move the points whose places at the beginning of the substep are `before`; x, x_prev (n, 3) [m]."""
-        if len(self._rigid):
-            self._total[:] = 0.0
-            _begin(
-                x, x_prev, before, self._rigid.control, self._rigid.masses, self._free, self._rigid.joined, self.movers
-            )
+    def begin(
+        self,
+        x: NDArray[np.float64],
+        x_prev: NDArray[np.float64],
+        places: NDArray[np.float64],
+        before: NDArray[np.float64],
+    ) -> None:
+        """Begin to move the points: take their places at the end and at the beginning of the substep [m].
 
-    def settle(self, *places: NDArray[np.float64]) -> None:
-        """Apply the twists to places of the points: at the end of the substep, then any at its beginning, in place."""
-        if len(self._rigid):
-            settle(places[0], self.movers, True)
-            for each in places[1:]:
-                settle(each, self.movers, False)
-            collect(self.movers, self._total)
+        Parameters
+        ----------
+        x, x_prev : (n, 3) vertices then; places, before : of the points, out
+        """
+        _begin(x, x_prev, self._described, places, before, self._bodies, self.movers, self._total)
+
+    def settle(self, places: NDArray[np.float64], before: NDArray[np.float64], predicted: NDArray[np.float64]) -> None:
+        """Apply the twists to places of the points, in place: at the end of the substep, and two at its beginning."""
+        if len(self._total):
+            settle(places, before, predicted, self.movers, self._total)
 
     def give(
         self,
@@ -118,10 +124,8 @@ class MovedPoints:
         x_prev: NDArray[np.float64],
     ) -> None:
         """Move the vertices (n, 3) as their points moved, at the end and at the beginning of the substep."""
-        for points, vertices in ((places, x), (before, x_prev)):
-            give_rows(points, self._points.start, self._points.vertices, vertices)
-        if len(self._rigid):
-            _give(x, x_prev, self._rigid.control, self._total)
+        start, vertices, _ = self._described
+        _give(places, before, start, vertices, x, x_prev, self._rigid.control, self._total)
 
 
 @njit
@@ -180,20 +184,13 @@ def softness(movers, b, share, moment):
 
 
 @njit(cache=True)
-def settle(x, movers, at_end):
-    """Apply the twists to points x (n, 3), at the end or at the beginning of the substep."""
-    if len(movers.w) == 0:
-        return
-    for i in range(len(x)):
+def settle(places, before, predicted, movers, total):
+    """Apply the twists to the points (n, 3), add them to their sum in the substep (b, 9), and begin new ones."""
+    for i in range(len(places)):
         if movers.body[i] >= 0:
-            p = place(x, movers, i) if at_end else place_before(x, movers, i)
+            p, q, r = place(places, movers, i), place_before(before, movers, i), place_before(predicted, movers, i)
             for j in range(3):
-                x[i, j] = p[j]
-
-
-@njit(cache=True)
-def collect(movers, total):
-    """Add the twists to their sum in the substep (b, 9), and begin new ones."""
+                places[i, j], before[i, j], predicted[i, j] = p[j], q[j], r[j]
     for b in range(len(total)):
         for j in range(9):
             total[b, j] += movers.twists[b, j]
@@ -203,7 +200,14 @@ def collect(movers, total):
 
 
 @njit(cache=True)
-def _begin(x, x_prev, before, control, masses, free, joined, movers):
+def _begin(x, x_prev, points, places, before, bodies, movers, total):
+    start, vertices, weights = points
+    control, masses, free, joined = bodies
+    take_points(x, start, vertices, weights, places)
+    take_points(x_prev, start, vertices, weights, before)
+    if len(control) == 0:
+        return
+    total[:] = 0.0
     movers.twists[:] = 0.0
     centers = np.empty((len(control), 3))
     for b in range(len(control)):
@@ -229,7 +233,9 @@ def _begin(x, x_prev, before, control, masses, free, joined, movers):
 
 
 @njit(cache=True)
-def _give(x, x_prev, control, total):
+def _give(places, before, start, vertices, x, x_prev, control, total):
+    give_rows(places, start, vertices, x)
+    give_rows(before, start, vertices, x_prev)
     for b in range(len(control)):
         center, _ = inertia_of(x_prev, control, b)
         th = (total[b, 3], total[b, 4], total[b, 5])

@@ -16,6 +16,7 @@ from supple.contact.obstacle_poses import ObstaclePoses
 from supple.numerics.geometry.embedded_points import EmbeddedPoints
 from supple.scene.contact_pairs import PairTable
 from supple.system import System
+from supple.xpbd.contact.contact_rows import loaded_rows
 from supple.xpbd.contact.frame_forces import ShapeLoads
 from supple.xpbd.contact.memory import ObstacleMemory
 from supple.xpbd.contact.movers import MovedPoints
@@ -183,7 +184,7 @@ class ObstacleContacts:
 
     def forces(self) -> ShapeLoads:
         """Copies of all contacts that push, as of the substep that was projected last."""
-        k = np.flatnonzero(self._loads[: self._starts[-1]].any(axis=1))
+        k = loaded_rows(self._loads[: self._starts[-1]])
         shapes = np.searchsorted(self._starts, k, side="right") - 1
         return ShapeLoads(shapes.astype(np.int64), self._vertices[k], self._loads[k], self._places[k])
 
@@ -212,9 +213,7 @@ class ObstacleContacts:
         """
         if not len(self._rigid):
             return x, x_prev
-        self._moved.take(x, self._x)
-        self._moved.take(x_prev, self._before)
-        self._moved.begin(x, x_prev, self._before)
+        self._moved.begin(x, x_prev, self._x, self._before)
         return self._x, self._before
 
     def give(self, places: NDArray, before: NDArray, x: NDArray[np.float64], x_prev: NDArray[np.float64]) -> None:
@@ -245,10 +244,9 @@ class ObstacleContacts:
         described = (candidates, self._arrays, self._rules, *frames)
         contacts, smallest = 0, math.inf
         points, h = (self._predicted, self._rates, self._moved.movers, self._begun), times[1] - times[0]
-        for again in range(RIGID_SWEEPS if len(self._rigid) else 1):
-            for _, push, first, last in self._groups:
-                found, gap = push(places, before, points, *described, first, last, h, limit, scales, again > 0)
-                if not again:
-                    contacts += found
-                    smallest = min(smallest, gap)
+        sweeps = RIGID_SWEEPS if len(self._rigid) else 1
+        for _, push, first, last in self._groups:
+            found, gap = push(places, before, points, *described, first, last, h, limit, scales, sweeps)
+            contacts += found
+            smallest = min(smallest, gap)
         return contacts, smallest

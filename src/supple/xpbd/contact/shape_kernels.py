@@ -75,7 +75,7 @@ def _find_candidates(x, reach, tested, shapes, rules, frames, starts, vertices, 
 
 
 def _project_shapes(
-    x, x_prev, points, candidates, shapes, rules, frames, frames_before, first, last, h, limit, scales, rigid_only
+    x, x_prev, points, candidates, shapes, rules, frames, frames_before, first, last, h, limit, scales, sweeps
 ):
     """Push vertices out of the shapes [first, last), in place. Returns the number of contacts and the smallest gap.
 
@@ -96,7 +96,7 @@ def _project_shapes(
     h : length of the substep [s]
     limit : the largest part of an old overlap that is removed at each vertex [m]
     scales : skin, the gap that is kept; near, gaps above this are not reported [m]
-    rigid_only : whether points of rigid bodies are projected once more, and vertices are not
+    sweeps : over points of rigid bodies; the first one is also over vertices
     """
     predicted, rates, movers, begun = points
     starts, vertices, loads, shares, places = candidates
@@ -104,74 +104,75 @@ def _project_shapes(
     owner, _, friction = rules
     skin, near = scales
     contacts, smallest, h2 = 0, math.inf, h * h
-    for k in range(first, last):
-        numbers = parameters[k]
-        for c in range(starts[k], starts[k + 1]):
-            i = vertices[c]
-            is_rigid = movers.body[i] >= 0
-            if rigid_only and not is_rigid:
-                continue
-            p, p_before = place(x, movers, i), place_before(x_prev, movers, i)
-            s = _local(frames, k, p)
-            gap, gap_before, normal = contact(numbers, _local(frames_before, k, p_before), s)
-            if gap_before < near:
-                smallest = min(smallest, gap_before)
-            load = row(loads, c)
-            loaded = load[0] != 0.0 or load[1] != 0.0 or load[2] != 0.0
-            if not gap < skin and not loaded:
-                continue
-            n = _turned(frames, k, normal)
-            load = (h2 * load[0], h2 * load[1], h2 * load[2])
-            pushed, held = max(0.0, dot(load, n)), along_surface(load, n)
-            # A vertex moves by its load; a point of a rigid body by what the body makes of a force.
-            soft = softness(movers, movers.body[i], 1.0, cross(row(movers.arms, i), n)) if is_rigid else 1.0
-            old = max(0.0, skin - gap_before)
-            stays = rigid_only or (is_rigid and movers.loose[movers.body[i]] == 0.0)
-            begun_gap = gap_before
-            if old > 0.0:
-                _, begun_gap, _ = contact(numbers, _local(frames_before, k, row(begun, i)), s)
-            shift = 0.0 if stays else min(old, limit + max(0.0, begun_gap - gap_before))
-            push = max(0.0, pushed + (skin - gap - old) / soft)
-            carried = p  # position, at the beginning, of the obstacle's point that is now at p
-            if moving[k]:
-                d = _turned(frames_before, k, s)
-                carried = (
-                    frames_before[k, 0, 0] + d[0],
-                    frames_before[k, 0, 1] + d[1],
-                    frames_before[k, 0, 2] + d[2],
-                )
-            slip = (carried[0] - p_before[0], carried[1] - p_before[1], carried[2] - p_before[2])
-            more = push - pushed
-            if is_rigid:
-                # The push turns the body, and it answers differently along the surface.
-                push_body(movers, i, (more * n[0], more * n[1], more * n[2]))
-                moved = subtract(place(x, movers, i), p)
-                slip = along_surface((slip[0] + moved[0], slip[1] + moved[1], slip[2] + moved[2]), n)
-                length = math.sqrt(dot(slip, slip))
-                if length > 0.0:
-                    along = (slip[0] / length, slip[1] / length, slip[2] / length)
-                    f = 1.0 / softness(movers, movers.body[i], 1.0, cross(row(movers.arms, i), along))
-                    slip = (f * slip[0], f * slip[1], f * slip[2])
-            hold = friction_total(held, slip, n, friction[owner[i], k] * push)
-            contacts += push > 0.0
-            # What stopped the approach with which the substep began does not return.
-            impact = dot(subtract(p, place_before(predicted, movers, i)), n) + skin - gap - old
-            impact = max(0.0, impact) / soft
-            shares[c] = max(0.0, 1.0 - impact / push) * kept_share(h2 * rates[i]) if push > 0.0 else 0.0
-            if is_rigid:
-                b = movers.body[i]
-                push_body(movers, i, (hold[0] - held[0], hold[1] - held[1], hold[2] - held[2]))
+    for again in range(sweeps):
+        for k in range(first, last):
+            numbers = parameters[k]
+            for c in range(starts[k], starts[k + 1]):
+                i = vertices[c]
+                is_rigid = movers.body[i] >= 0
+                if again and not is_rigid:
+                    continue
+                p, p_before = place(x, movers, i), place_before(x_prev, movers, i)
+                s = _local(frames, k, p)
+                gap, gap_before, normal = contact(numbers, _local(frames_before, k, p_before), s)
+                if gap_before < near and not again:
+                    smallest = min(smallest, gap_before)
+                load = row(loads, c)
+                loaded = load[0] != 0.0 or load[1] != 0.0 or load[2] != 0.0
+                if not gap < skin and not loaded:
+                    continue
+                n = _turned(frames, k, normal)
+                load = (h2 * load[0], h2 * load[1], h2 * load[2])
+                pushed, held = max(0.0, dot(load, n)), along_surface(load, n)
+                # A vertex moves by its load; a point of a rigid body by what the body makes of a force.
+                soft = softness(movers, movers.body[i], 1.0, cross(row(movers.arms, i), n)) if is_rigid else 1.0
+                old = max(0.0, skin - gap_before)
+                stays = again > 0 or (is_rigid and movers.loose[movers.body[i]] == 0.0)
+                begun_gap = gap_before
+                if old > 0.0:
+                    _, begun_gap, _ = contact(numbers, _local(frames_before, k, row(begun, i)), s)
+                shift = 0.0 if stays else min(old, limit + max(0.0, begun_gap - gap_before))
+                push = max(0.0, pushed + (skin - gap - old) / soft)
+                carried = p  # position, at the beginning, of the obstacle's point that is now at p
+                if moving[k]:
+                    d = _turned(frames_before, k, s)
+                    carried = (
+                        frames_before[k, 0, 0] + d[0],
+                        frames_before[k, 0, 1] + d[1],
+                        frames_before[k, 0, 2] + d[2],
+                    )
+                slip = (carried[0] - p_before[0], carried[1] - p_before[1], carried[2] - p_before[2])
+                more = push - pushed
+                if is_rigid:
+                    # The push turns the body, and it answers differently along the surface.
+                    push_body(movers, i, (more * n[0], more * n[1], more * n[2]))
+                    moved = subtract(place(x, movers, i), p)
+                    slip = along_surface((slip[0] + moved[0], slip[1] + moved[1], slip[2] + moved[2]), n)
+                    length = math.sqrt(dot(slip, slip))
+                    if length > 0.0:
+                        along = (slip[0] / length, slip[1] / length, slip[2] / length)
+                        f = 1.0 / softness(movers, movers.body[i], 1.0, cross(row(movers.arms, i), along))
+                        slip = (f * slip[0], f * slip[1], f * slip[2])
+                hold = friction_total(held, slip, n, friction[owner[i], k] * push)
+                contacts += push > 0.0 and not again
+                # What stopped the approach with which the substep began does not return.
+                impact = dot(subtract(p, place_before(predicted, movers, i)), n) + skin - gap - old
+                impact = max(0.0, impact) / soft
+                shares[c] = max(0.0, 1.0 - impact / push) * kept_share(h2 * rates[i]) if push > 0.0 else 0.0
+                if is_rigid:
+                    b = movers.body[i]
+                    push_body(movers, i, (hold[0] - held[0], hold[1] - held[1], hold[2] - held[2]))
+                    for j in range(3):
+                        movers.twists[b, 6 + j] += n[j] * shift
+                else:
+                    for j in range(3):
+                        x[i, j] += n[j] * (more + shift) + (hold[j] - held[j])
+                        x_prev[i, j] += n[j] * shift
+                        predicted[i, j] += n[j] * shift
                 for j in range(3):
-                    movers.twists[b, 6 + j] += n[j] * shift
-            else:
-                for j in range(3):
-                    x[i, j] += n[j] * (more + shift) + (hold[j] - held[j])
-                    x_prev[i, j] += n[j] * shift
-                    predicted[i, j] += n[j] * shift
-            for j in range(3):
-                loads[c, j] = (n[j] * push + hold[j]) / h2
-                places[c, j] = n[j]
-            places[c, 3] = gap + soft * more + shift
+                    loads[c, j] = (n[j] * push + hold[j]) / h2
+                    places[c, j] = n[j]
+                places[c, 3] = gap + soft * more + shift
     return contacts, smallest
 
 

@@ -21,7 +21,6 @@ from supple.xpbd.contact.contact_rows import (
     LoadedRows,
     choose_rows,
     deactivate,
-    note_depths,
     push_rows,
 )
 from supple.xpbd.contact.detection.edge_contacts import (
@@ -227,17 +226,20 @@ class SurfaceCollisions:
 
     def check_parted(self, x: NDArray[np.float64]) -> None:
         """Take notice of what has passed through something in the substep that ends at x (n, 3) [m]."""
-        self.parted = not len(self.passed(x))
+        self.parted = not self._passages(x).any()
 
     def passed(self, x: NDArray[np.float64]) -> NDArray[np.int64]:
         """(k, 2) the pieces of which one has passed through the other in the substep that ends at x (n, 3) [m]."""
+        return np.argwhere(self._passages(x))
+
+    def _passages(self, x: NDArray[np.float64]) -> NDArray[np.bool_]:
         self._moved.take(x, self._x)
         self._look_again()
         shapes, near = (self._x, self._begun), self._near_pairs
         passed = np.zeros_like(self._apart)
         note_point_passages(*shapes, near.points, self._pieces, self._apart, self._stitched, passed)
         note_edge_passages(*shapes, self._pairs, near.edges, self._edges.arrays[0], self._edge_rules, passed)
-        return np.argwhere(passed)
+        return passed
 
     def component(self, labels: NDArray[np.integer]) -> NDArray[np.int64]:
         """(p,) the label of each piece, of the labels of all vertices; -1 for obstacles."""
@@ -270,9 +272,7 @@ class SurfaceCollisions:
             self._look_near()
 
     def _take(self, x: NDArray[np.float64], x_prev: NDArray[np.float64]) -> None:
-        self._moved.take(x, self._x)
-        self._moved.take(x_prev, self._before)
-        self._moved.begin(x, x_prev, self._before)
+        self._moved.begin(x, x_prev, self._x, self._before)
 
     def _settle(self) -> None:
         self._moved.settle(self._x, self._before, self._predicted)
@@ -284,8 +284,7 @@ class SurfaceCollisions:
         """Project the chosen rows of one kind; returns how many push, and the smallest gap before the substep."""
         chosen, described = self._chosen[kind], self._rows.described
         places = (self._x, self._before, self._predicted, self._begun)
-        *found, changed = solve_rows(*places, self._points, chosen, described, h, limit, sweeps)
-        note_depths(self._x, self._movers, chosen, described, self._depth[kind])
+        *found, changed = solve_rows(*places, self._points, chosen, described, h, limit, sweeps, self._depth[kind])
         self._settle()
         self.changed = max(self.changed, changed)
         return found[0], found[1]

@@ -26,7 +26,7 @@ REMAINS = 0.3
 
 
 @njit(cache=True, error_model="numpy")
-def solve_rows(x, x_prev, predicted, begun, points, chosen, rows, h, limit, sweeps):
+def solve_rows(x, x_prev, predicted, begun, points, chosen, rows, h, limit, sweeps, depth):
     """Sweep over the chosen rows, in place.
 
     Returns how many push, the smallest gap before the substep (or inf), and the largest change of a gap between rigid
@@ -47,6 +47,7 @@ def solve_rows(x, x_prev, predicted, begun, points, chosen, rows, h, limit, swee
     h : length of the substep [s]
     limit : the largest part of an old overlap that one substep removes [m]
     sweeps : number of sweeps
+    depth : (n,) how deep points are inside other pieces afterwards, where that is more than it is [m]
     """
     vertices, weights, normals, offsets, friction, forces, shares, _, _ = rows
     movers, rates = points
@@ -96,7 +97,17 @@ def solve_rows(x, x_prev, predicted, begun, points, chosen, rows, h, limit, swee
         shares[e] = share
         for j in range(3):
             forces[e, j] = (pushes[k] * normals[e, j] + holds[k, j]) / h2
+    _note_depths(x, movers, chosen, rows, depth)
     return contacts, smallest, largest
+
+
+@njit
+def _note_depths(x, movers, chosen, rows, depth):
+    vertices, weights, normals, _, _, _, _, _, deep = rows
+    for e in chosen:
+        if deep[e]:
+            p = vertices[e, 0]
+            depth[p] = max(depth[p], -dot(relative(x, movers, vertices, weights, e), row(normals, e)))
 
 
 @njit
