@@ -11,6 +11,7 @@ from benchmarks import (
     live_page,
     projections,
     quadratic_tets,
+    reading_fields,
     rigid_bodies,
     rigid_heap,
     startup,
@@ -29,6 +30,7 @@ if __name__ == "__main__":
     contact_scenes.main()
     bear_pile.main((5, 10))
     quadratic_tets.main()
+    reading_fields.run()
     rigid_bodies.run()
     rigid_heap.main()
     live.run()

@@ -12,7 +12,7 @@ from typing import Any
 
 from benchmarks.latency import live_page_text
 from benchmarks.measuring import ROOT
-from benchmarks.tables import live_text, rigid_bodies_text
+from benchmarks.tables import live_text, reading_text, rigid_bodies_text
 from supple.files.replacing import whole_file
 
 DOCS = ROOT / "docs"
@@ -21,6 +21,7 @@ SHOWN: dict[str, tuple[str, Callable[[Any], str]]] = {
     "live_page": ("live.md", live_page_text),
     "live": ("benchmarks.md", live_text),
     "rigid_bodies": ("benchmarks.md", rigid_bodies_text),
+    "reading_fields": ("forces_and_stresses.md", reading_text),
 }
 
 

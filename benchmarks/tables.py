@@ -51,3 +51,18 @@ def live_text(figures: dict[str, Any]) -> str:
         lines.append(f"| {text} | {one['best']:.1f} | {one['median']:.1f} | {one['ratio']:.2f} |")
     lines += ["", f"In real time, with the page served, it ran at {figures['real_time']:.3f} of real time."]
     return "\n".join(lines)
+
+
+def reading_text(figures: dict[str, Any]) -> str:
+    """The sentences of `benchmarks.reading_fields`."""
+    slowest = sorted(figures["fields"], key=figures["fields"].__getitem__, reverse=True)[:3]
+    parts = ", ".join(f"`{name}` {figures['fields'][name]:.1f} ms" for name in slowest)
+    return "\n".join(
+        [
+            f"Reading all fields of the tables takes {figures['ms_of_reading']:.1f} ms of processor time on one thread "
+            f"for a finger of {figures['tets']:,} tets",
+            f"with cavity and cable in `XPBD`: {100.0 * figures['share']:.0f} % of a step, which takes "
+            f"{figures['ms_per_step']:.0f} ms with {figures['substeps']:.0f} substeps. Most of it: {parts}.",
+            measured_on(figures),
+        ]
+    )

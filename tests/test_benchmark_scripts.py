@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import supple as sp
+from supple.readings.fields import FIELDS
 
 ROOT = Path(__file__).parents[1]
 
@@ -159,3 +160,14 @@ def test_a_pile_of_bears_presses_on_itself_and_stays_apart():
     assert found["statuses"] == "converged"
     assert found["failures"] == []
     assert found["steps"][0][1] > 1000  # contacts
+
+
+@pytest.mark.slow
+def test_reading_all_fields_of_a_finger_is_measured(capsys):
+    from benchmarks import reading_fields, tables
+
+    figures = reading_fields.main(chambers=1, frames=2, skipped=1)
+    assert list(figures["fields"]) == list(FIELDS)
+    assert 0.0 < figures["share"] < 1.0
+    assert f"{figures['tets']:,} tets" in tables.reading_text(figures)
+    assert "all fields" in capsys.readouterr().out

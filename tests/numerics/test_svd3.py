@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from supple.errors import SolverError
-from supple.numerics.svd3 import rotation_variant_svd
+from supple.numerics.svd3 import principal_stretches, rotation_variant_svd
 
 
 def rotations(rng, n):
@@ -29,6 +29,8 @@ def check(F, tolerance=1e-14):
         assert np.abs(np.linalg.det(R) - 1.0).max() <= tolerance
     assert (s[..., 0] >= s[..., 1]).all()
     assert (s[..., 1] >= np.abs(s[..., 2])).all()
+    alone = principal_stretches(np.ascontiguousarray(F.reshape(-1, 3, 3))).reshape(s.shape)
+    assert (np.abs(alone - s) / scale).max() <= tolerance
     return s
 
 
@@ -96,3 +98,13 @@ def test_shapes_and_errors():
 
 def test_values_that_are_not_finite_give_not_a_number():
     assert np.isnan(rotation_variant_svd(np.full((3, 3), np.nan))[1]).all()
+
+
+def test_principal_stretches_are_right_beside_matrices_that_are_zero_huge_or_not_finite():
+    rng = np.random.default_rng(3)
+    F = np.eye(3) + 0.5 * rng.normal(size=(37, 3, 3))
+    F[5], F[17], F[18], F[36] = 0.0, np.nan, 1e200 * F[18], np.diag([1.0, 1.0, -1e-9])
+    together = principal_stretches(F)
+    np.testing.assert_allclose(together, rotation_variant_svd(F)[1], rtol=1e-13, atol=1e-15)
+    assert np.isnan(together[17]).all()
+    assert together[36, 2] == -1e-9

@@ -26,7 +26,7 @@ from supple.numerics.geometry.box_tree import (
 from supple.numerics.kernel_cache import njit, prange
 
 # Points that share one walk through the tree; see docs/xpbd_contact.md.
-GROUP = 8
+GROUP = 16
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
@@ -91,11 +91,11 @@ def _near_group(group, shapes, radii, rules, same, tree, pieces, found, count, s
         if leaf < 0:
             continue
         t = order[leaf]
-        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        if not allowed[mine, triangle_piece[t]]:
-            continue
-        moves = max(radii[a, 1], radii[b, 1], radii[c, 1])
         meets = _which_overlap(nodes, leaves + leaf, boxes)
+        if meets == 0 or not allowed[mine, triangle_piece[t]]:
+            continue
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        moves = max(radii[a, 1], radii[b, 1], radii[c, 1])
         for i in range(len(group)):
             p = group[i]
             if not (meets >> i) & 1 or p in (a, b, c) or in_list(excluded, t, p):

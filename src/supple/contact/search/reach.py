@@ -127,7 +127,8 @@ def any_beyond_radii(x, x_prev, x_gathered, far, near, pieces, all_share, common
         square = 0.0
         for j in range(3):
             square += (x[i, j] - x_prev[i, j]) ** 2
-        excursions[i] = max(excursions[i], math.sqrt(square))
+        if square > excursions[i] ** 2:
+            excursions[i] = math.sqrt(square)
     moved = x - x_gathered
     common_motions(x_gathered, moved, pieces, all_share, common)
     for i in range(len(x)):

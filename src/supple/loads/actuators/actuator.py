@@ -39,13 +39,16 @@ class Coordinate(ABC):
     def described(self) -> dict[str, NDArray]:
         """The arrays that recordings keep, by name."""
 
+    @property
     @abstractmethod
-    def parts(self, own: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(p,)"""
+    def count(self) -> int:
+        """p, the number of parts."""
 
     @abstractmethod
-    def part_gradients(self, own: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(p, v, 3)"""
+    def differentiate(
+        self, own: NDArray[np.float64], parts: NDArray[np.float64], gradients: NDArray[np.float64]
+    ) -> None:
+        """Set the parts (p,) and their gradients (p, v, 3)."""
 
     @abstractmethod
     def hessian(self, own: NDArray[np.float64], factors: NDArray[np.float64], project: bool) -> Couplings | None:
@@ -53,6 +56,19 @@ class Coordinate(ABC):
 
         With `project`, the part of it that is known to be positive semi-definite.
         """
+
+    def parts(self, own: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(p,)"""
+        return self._differentiated(own)[0]
+
+    def part_gradients(self, own: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(p, v, 3)"""
+        return self._differentiated(own)[1]
+
+    def _differentiated(self, own: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        parts, gradients = np.empty(self.count), np.empty((self.count, *own.shape))
+        self.differentiate(own, parts, gradients)
+        return parts, gradients
 
     def value(self, own: NDArray[np.float64]) -> float:
         """s"""

@@ -41,17 +41,21 @@ class CableLength(Coordinate):
     def described(self) -> dict[str, NDArray]:
         return {"vertices": self.vertices[:, None], "weights": self.weights, "offsets": self.offsets}
 
+    @property
+    def count(self) -> int:
+        return len(self.weights) - 1
+
     def spans(self, own: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Lengths (p - 1,) [m] and unit vectors (p - 1, 3), zero where two points coincide."""
-        lengths, directions = np.empty(len(self.weights) - 1), np.empty((len(self.weights) - 1, 3))
+        lengths, directions = np.empty(self.count), np.empty((self.count, 3))
         _spans(self.weights, self.offsets, own, lengths, directions)
         return lengths, directions
 
-    def parts(self, own: NDArray[np.float64]) -> NDArray[np.float64]:
-        return self.spans(own)[0]
-
-    def part_gradients(self, own: NDArray[np.float64]) -> NDArray[np.float64]:
-        return self._differences[:, :, None] * self.spans(own)[1][:, None, :]
+    def differentiate(
+        self, own: NDArray[np.float64], parts: NDArray[np.float64], gradients: NDArray[np.float64]
+    ) -> None:
+        parts[:], directions = self.spans(own)
+        np.multiply(self._differences[:, :, None], directions[:, None, :], out=gradients)
 
     def hessian(self, own: NDArray[np.float64], factors: NDArray[np.float64], project: bool) -> Couplings | None:
         """Positive semi-definite for factors of zero or more: (1 - n n^T) / l between the ends of each span."""

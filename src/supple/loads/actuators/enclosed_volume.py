@@ -37,19 +37,14 @@ class EnclosedVolume(Coordinate):
     def described(self) -> dict[str, NDArray]:
         return {"triangles": self.vertices[self.triangles]}
 
-    def parts(self, own: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.array([self.value(own)])
+    @property
+    def count(self) -> int:
+        return 1
 
-    def part_gradients(self, own: NDArray[np.float64]) -> NDArray[np.float64]:
-        return self.gradient(own)[None]
-
-    def value(self, own: NDArray[np.float64]) -> float:
-        return float(_volume(own, self.triangles))
-
-    def gradient(self, own: NDArray[np.float64]) -> NDArray[np.float64]:
-        out = np.zeros_like(own)
-        _add_gradient(own, self.triangles, out)
-        return out
+    def differentiate(
+        self, own: NDArray[np.float64], parts: NDArray[np.float64], gradients: NDArray[np.float64]
+    ) -> None:
+        _differentiate(own, self.triangles, parts, gradients[0])
 
     def hessian(self, own: NDArray[np.float64], factors: NDArray[np.float64], project: bool) -> Couplings | None:
         """It has no diagonal, so that no part of it is definite."""
@@ -63,27 +58,21 @@ class EnclosedVolume(Coordinate):
 
 
 @njit(cache=True, error_model="numpy")
-def _volume(x, triangles):
-    """About the first vertex, which keeps the digits of a small volume far from the origin."""
+def _differentiate(x, triangles, volume, gradient):
+    """Set volume (1,) and gradient (v, 3): a third of minus the area vector of each triangle at each of its corners.
+
+    The volume is that about the first vertex, which keeps the digits of a small volume far from the origin.
+    """
+    gradient[:] = 0.0
     total = 0.0
-    for t in range(len(triangles)):
-        i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        a0, a1, a2 = x[i, 0] - x[0, 0], x[i, 1] - x[0, 1], x[i, 2] - x[0, 2]
-        b0, b1, b2 = x[j, 0] - x[0, 0], x[j, 1] - x[0, 1], x[j, 2] - x[0, 2]
-        c0, c1, c2 = x[k, 0] - x[0, 0], x[k, 1] - x[0, 1], x[k, 2] - x[0, 2]
-        total -= a0 * (b1 * c2 - b2 * c1) + a1 * (b2 * c0 - b0 * c2) + a2 * (b0 * c1 - b1 * c0)
-    return total / 6.0
-
-
-@njit(cache=True, error_model="numpy")
-def _add_gradient(x, triangles, out):
-    """A third of minus the area vector of each triangle to each of its corners."""
     for t in range(len(triangles)):
         i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         u0, u1, u2 = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
         v0, v1, v2 = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
         n0, n1, n2 = (u1 * v2 - u2 * v1) / 6.0, (u2 * v0 - u0 * v2) / 6.0, (u0 * v1 - u1 * v0) / 6.0
+        total -= (x[i, 0] - x[0, 0]) * n0 + (x[i, 1] - x[0, 1]) * n1 + (x[i, 2] - x[0, 2]) * n2
         for corner in (i, j, k):
-            out[corner, 0] -= n0
-            out[corner, 1] -= n1
-            out[corner, 2] -= n2
+            gradient[corner, 0] -= n0
+            gradient[corner, 1] -= n1
+            gradient[corner, 2] -= n2
+    volume[0] = total

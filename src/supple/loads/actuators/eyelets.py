@@ -24,10 +24,13 @@ from supple.numerics.kernel_cache import njit
 CREEP = 1e-3
 
 
-def angles(directions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(s - 1,) by which eyelets turn a cable with spans along the unit vectors (s, 3) [rad]."""
-    cosines = np.einsum("ij,ij->i", directions[:-1], directions[1:])
-    return np.arccos(np.clip(cosines, -1.0, 1.0))
+@njit(cache=True, error_model="numpy")
+def turn_at(directions, e):
+    """The angle by which eyelet e turns a cable with spans along the unit vectors (s, 3) [rad]."""
+    cosine = 0.0
+    for j in range(3):
+        cosine += directions[e, j] * directions[e + 1, j]
+    return np.arccos(min(max(cosine, -1.0), 1.0))
 
 
 @njit(cache=True, error_model="numpy")
@@ -86,9 +89,9 @@ class EyeletFriction:
 
     def renew(self, parts: NDArray[np.float64], directions: NDArray[np.float64], tension: float) -> None:
         """Take the largest forces of a cable with this tension at the winch [N], from the winch to its other end."""
-        slips, turns = self.slips(parts), angles(directions)
+        slips = self.slips(parts)
         for e in reversed(range(len(slips))):
-            self.limits[e] = limits(tension, float(turns[e]), self.friction)
+            self.limits[e] = limits(tension, turn_at(directions, e), self.friction)
             tension -= self.limits[e][0 if slips[e] >= 0.0 else 1] * smooth_share(float(slips[e]), self.reach)[1]
 
     def _largest(self, parts: NDArray[np.float64]) -> list[float]:

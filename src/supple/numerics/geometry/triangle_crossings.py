@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.numerics.adjacency import in_list
-from supple.numerics.geometry.box_tree import STACK, BoxTree, after_leaf, next_leaf, overlap
+from supple.numerics.geometry.box_tree import STACK, BoxTree, after_leaf, boxes_of_triangles, next_leaf, overlap
 from supple.numerics.geometry.exact_predicates import side_of_line, side_of_plane
 from supple.numerics.geometry.vertex_stars import simple_stars
 from supple.numerics.kernel_cache import njit, prange
@@ -296,9 +296,7 @@ def crossing_triangles(
     """
     if len(triangles) == 0:
         return np.zeros((0, 2), dtype=np.int64), np.zeros(0, dtype=np.int8)
-    corners = x[triangles]
-    boxes = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
-    tree = BoxTree.over(boxes, owner.astype(np.int32))
+    tree = BoxTree.over(boxes_of_triangles(x, triangles), owner.astype(np.int32))
     arrays = tree.nodes, tree.labels, tree.order
     none = np.zeros(len(triangles) + 1, dtype=np.int32)
     lists = (none, none[:0]) if ignored is None else (ignored[0], ignored[1])

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from supple.numerics.geometry.box_tree import boxes_of_triangles
 from supple.numerics.geometry.closest_point import area_normal, closest_on_triangle, combine
 from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import dot, row, subtract
@@ -47,8 +48,7 @@ class TriangleTree(NamedTuple):
         """Build the tree, in O(t log^2 t)."""
         points = np.ascontiguousarray(points, dtype=np.float64)
         triangles = np.ascontiguousarray(triangles, dtype=np.int32)
-        corners = points[triangles]
-        boxes = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
+        boxes = boxes_of_triangles(points, triangles)
         levels = max(0, int(np.ceil(np.log2(max(1, len(triangles)) / _LEAF))))
         return cls(points, triangles, *_build(boxes, levels))
 

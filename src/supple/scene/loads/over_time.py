@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -51,10 +53,17 @@ class Curve:
 
     def __call__(self, time: float) -> NDArray[np.float64]:
         """The value at `time` [s]."""
-        times, values = np.asarray(self.times), np.asarray(self.values)
-        if values.ndim == 1:
-            return np.asarray(np.interp(time, times, values))
-        return np.array([np.interp(time, times, column) for column in values.T])
+        times, values = self._lists
+        k = bisect_right(times, time)
+        if k in (0, len(times)):
+            return values[min(k, len(times) - 1)].copy()
+        slope = (values[k] - values[k - 1]) / (times[k] - times[k - 1])
+        return np.asarray(slope * (time - times[k - 1]) + values[k - 1])
+
+    @cached_property
+    def _lists(self) -> tuple[list[float], list[NDArray[np.float64]]]:
+        """Times and values; to search in a list takes a tenth of the time of `np.interp`."""
+        return np.asarray(self.times).tolist(), list(map(np.asarray, np.asarray(self.values)))
 
 
 OverTime = ArrayLike | Curve | Callable[[float], ArrayLike]

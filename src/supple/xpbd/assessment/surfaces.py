@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.contact.obstacle_poses import ObstaclePoses
-from supple.numerics.geometry.box_tree import near_boxes, overlap
+from supple.numerics.geometry.box_tree import boxes_of_triangles, near_boxes, overlap
 from supple.numerics.geometry.triangle_crossings import CROSSING, crossing_triangles
 from supple.numerics.kernel_cache import njit
 from supple.scene.contact_pairs import pair_table
@@ -114,9 +114,9 @@ class SurfaceCheck:
         points = np.concatenate(
             [self.system.points.positions(x), np.einsum("kij,kj->ki", R[rows], self._fixed) + t[rows]]
         )
-        corners = points[self._triangles]
-        low, high = corners.min(axis=1), corners.max(axis=1)
-        chosen = self._near(low, high, collide)
+        chosen = np.zeros(len(self._triangles), dtype=np.bool_)
+        boxes = np.empty((len(self._names), 6))
+        _note_near(boxes_of_triangles(points, self._triangles), self._owner, collide, boxes, chosen)
         if not chosen.any():
             return []
         picked = np.flatnonzero(chosen)
@@ -129,15 +129,6 @@ class SurfaceCheck:
             Overlap(self._names[a], self._names[b], int(k), numbers=(int(a), int(b)))
             for (a, b), k in zip(found, counts, strict=True)
         ]
-
-    def _near(
-        self, low: NDArray[np.float64], high: NDArray[np.float64], collide: NDArray[np.bool_]
-    ) -> NDArray[np.bool_]:
-        """(t,) the triangles that reach into the box of another thing that they collide with, or of their own."""
-        count = len(self._names)
-        boxes, chosen = np.empty((count, 6)), np.zeros(len(low), dtype=np.bool_)
-        _note_near(low, high, self._owner, collide, boxes, chosen)
-        return chosen
 
     def depths(self, x: NDArray[np.float64], time: float, collide: NDArray[np.bool_] | None = None) -> list[Overlap]:
         """Bodies with vertices deep in obstacles without triangles, of the pairs `collide` (p, p)."""
@@ -155,25 +146,25 @@ class SurfaceCheck:
 
 
 @njit(cache=True)
-def _note_near(low, high, owner, collide, boxes, chosen):
-    """Set chosen (t,); boxes (p, 6) of all things are scratch memory. See `SurfaceCheck._near`."""
+def _note_near(own, owner, collide, boxes, chosen):
+    """Choose the triangles (t,) that reach into the box of another thing that they collide with, or of their own.
+
+    own : (t, 6) boxes of the triangles; boxes : (p, 6) of all things, scratch memory
+    """
     boxes[:, :3] = np.inf
     boxes[:, 3:] = -np.inf
-    box = np.empty(6)
     for t in range(len(owner)):
         for j in range(3):
-            boxes[owner[t], j] = min(boxes[owner[t], j], low[t, j])
-            boxes[owner[t], 3 + j] = max(boxes[owner[t], 3 + j], high[t, j])
+            boxes[owner[t], j] = min(boxes[owner[t], j], own[t, j])
+            boxes[owner[t], 3 + j] = max(boxes[owner[t], 3 + j], own[t, 3 + j])
     starts, near = near_boxes(boxes, collide)
     for t in range(len(owner)):
         k = owner[t]
         chosen[t] = collide[k, k]
-        for j in range(3):
-            box[j], box[3 + j] = low[t, j], high[t, j]
         for i in range(starts[k], starts[k + 1]):
             if chosen[t]:
                 break
-            chosen[t] = overlap(boxes, near[i], box)
+            chosen[t] = overlap(boxes, near[i], own[t])
 
 
 def colliding_pairs(system: System, settings: XPBDContact | None, joined: bool = False) -> NDArray[np.bool_]:

@@ -194,9 +194,12 @@ class SurfaceCollisions:
         contacts, smallest = 0, np.inf
         self.parted = True
         self._look_near()
+        deactivate(self._rows.active)
+        self._chosen = [chosen[:0] for chosen in self._chosen]
+        if not self._near_pairs and not self._rows.loads:
+            return 0, np.inf
         # Obstacles come last because they cannot be moved.
         for kind, part in enumerate(((0, s.body_triangles), (s.body_triangles, len(s.triangles)))):
-            self._chosen[kind] = self._chosen[kind][:0]
             if part[0] < part[1] and len(self._rows.keys):
                 gap = self._find(kind, part, h, parallel)
                 pushes, least = self._solve(kind, h, limit)

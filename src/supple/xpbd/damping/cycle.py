@@ -100,9 +100,10 @@ def correct(start, rows, fields, frames, blocks, H, masses, placed, forces, visc
                     for a in range(4):
                         local[j] += fields[k, a] * coarse[12 * g + 3 * a + j]
                 z = _turn(frames[g], local)
+                inverse = 1.0 / (masses[i] + H * viscous[i, 3])
                 for j in range(3):
                     r = -H * (forces[k, j] + viscous[i, j])
-                    value = share * z[j] + r / (masses[i] + H * viscous[i, 3])
+                    value = share * z[j] + r * inverse
                     motion[i, 3 + j] = value
                     rz += r * value
                     zMz += masses[i] * value * value

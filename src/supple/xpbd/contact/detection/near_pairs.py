@@ -177,11 +177,16 @@ class NearPairs:
         self.points, self.edges = np.zeros((0, 3), dtype=np.int64), np.zeros(0, dtype=np.int64)
         self.lists: tuple = (0,)
 
+    def __bool__(self) -> bool:
+        """Whether any pair was chosen."""
+        return len(self.points) + len(self.edges) > 0
+
     def renew(self, lists: tuple, pairs: tuple) -> None:
         """Choose from these from now on; see `find_contacts` and `find_edge_contacts`."""
         self._all = lists, pairs
         self._distances = np.zeros(len(lists[-1])), np.zeros(len(pairs[0]))
         self._most = -1.0
+        self.points, self.edges, self.lists = self.points[:0], self.edges[:0], (0,)
         self._points = points_of(len(self._ways), lists, self._triangles, pairs, self._ends)
 
     def look(
@@ -196,6 +201,8 @@ class NearPairs:
 
         forces : (k, 3) of the rows; memory : depth (2, n) and entered (n,), see `ContactMemory`
         """
+        if not len(self._points):
+            return
         self._begin[:], self._end[:] = begun, x
         self._choose(margin, forces, memory)
         if len(self.points) + len(self.edges) > self._most:

@@ -1,0 +1,85 @@
+"""The time of a step of a finger with cavity and cable in XPBD, and of reading all fields of its frame.
+
+usage: python -m benchmarks.reading_fields
+
+Processor time on one thread: the medians over some frames, after the first ones, in which the finger begins to move.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from typing import Any
+
+import supple as sp
+from benchmarks.published import circumstances, publish
+from supple.demos.actuators.bellows import bellows
+from supple.readings.fields import FIELDS
+from supple.xpbd.details import XPBDDetails
+
+CELL = 0.01
+
+
+def scene(chambers: int = 3) -> sp.Scene:
+    """A bellows finger of tets of 5 mm, 12,096 of them with three chambers, with air and a cable with friction."""
+    mesh = bellows(chambers, CELL, (2, 2, 2))
+    rubber = sp.StableNeoHookean(youngs=2e4, poisson=0.4, damping=0.02)
+    end, middle = mesh.vertices[:, 0].max(), 0.5 * mesh.vertices[:, 2].max()
+    places = [("finger", (x, 0.1 * CELL, middle)) for x in (end - 1e-4, 0.5 * end, 1e-4)]
+    return sp.Scene(
+        [sp.Body("finger", mesh, rubber)],
+        pins=[sp.Pin("finger", sp.InBox((-1, -1, -1), (1e-6, 1, 1)))],
+        cavities=[sp.Cavity("finger", pressure=sp.Curve([0.0, 0.5], [0.0, 1e3]))],
+        cables=[sp.Cable(places, tension=sp.Curve([0.0, 0.5], [0.0, 0.1]), friction=0.1)],
+    )
+
+
+def measured(given: sp.Scene, frames: int, skipped: int) -> dict[str, Any]:
+    """Medians of a step and of reading each field, in the order of `FIELDS`, which share what they need [ms]."""
+    steps: list[float] = []
+    parts: dict[str, list[float]] = {name: [] for name in FIELDS}
+    substeps = []
+    each = sp.simulate(given, sp.XPBD(threads=1), 1 / 60, skipped + frames)
+    for _ in range(skipped + frames):
+        began = time.process_time()
+        frame = next(each)
+        steps.append(time.process_time() - began)
+        if frame.report.status != "converged":
+            raise RuntimeError(frame.report.message)
+        for name, field in FIELDS.items():
+            began = time.process_time()
+            field.values(frame)
+            parts[name].append(time.process_time() - began)
+        assert isinstance(frame.report.details, XPBDDetails)
+        substeps.append(frame.report.details.substeps)
+    reading = [sum(values) for values in zip(*parts.values(), strict=True)]
+    middle = {name: 1e3 * statistics.median(values[skipped:]) for name, values in parts.items()}
+    return {
+        "substeps": statistics.median(substeps[skipped:]),
+        "ms_per_step": 1e3 * statistics.median(steps[skipped:]),
+        "ms_of_reading": 1e3 * statistics.median(reading[skipped:]),
+        "fields": middle,
+    }
+
+
+def main(chambers: int = 3, frames: int = 40, skipped: int = 20) -> dict[str, Any]:
+    """Print the table; returns its figures."""
+    at_start, given = circumstances(), scene(chambers)
+    figures = measured(given, frames, skipped)
+    tets = len(given.bodies[0].mesh.tets)
+    share = figures["ms_of_reading"] / figures["ms_per_step"]
+    print(f"\na finger of {tets} tets, {figures['substeps']:.0f} substeps, processor time on one thread")
+    print(f"{'a step':32}{figures['ms_per_step']:9.2f} ms")
+    for name, milliseconds in figures["fields"].items():
+        print(f"{name:32}{milliseconds:9.2f} ms")
+    print(f"{'all fields':32}{figures['ms_of_reading']:9.2f} ms, {100 * share:.1f} % of a step")
+    return {**at_start, "tets": tets, "share": share, **figures}
+
+
+def run() -> None:
+    """Measure, and write the figures of docs/forces_and_stresses.md."""
+    publish("reading_fields", main())
+
+
+if __name__ == "__main__":
+    run()
