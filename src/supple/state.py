@@ -27,7 +27,7 @@ class Status(StrEnum):
     INVERTED : a tet is inside out that was not at the start (`XPBD`, as the following)
     INTERSECTING : surfaces are through each other, or vertices deep inside of an obstacle
     HELD_BACK : in too many substeps the motion of bodies was shortened to keep tets positive and surfaces apart
-    ENERGY_GAINED : more energy than the scene and what drives it had
+    ENERGY_GAINED : more energy than the scene and what drives it had (also `Implicit` with "newmark")
     SOFTENED : a body is softer than its material by more than the tolerance
     """
 

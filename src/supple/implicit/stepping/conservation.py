@@ -10,7 +10,8 @@ The rule conserves the energy of a linear system. Of another one, a step of x_n 
 of third order in the step, whatever loads, contacts and pins act besides. Where forces are stiff and their directions
 turn far within a step, it adds up. The sum is followed for every piece. Beyond a share of the piece's energy, it is
 removed from the velocities relative to the piece's rigid motion, which changes neither momentum. With smaller steps the
-sum stays below that share, so that the order of the method is that of the midpoint rule.
+sum stays below that share, so that the order of the method is that of the midpoint rule. Where the velocities do not
+have that energy, as in a stiff body that hardly moves but turns far in a step, the step is too long.
 
 Sources: Hairer, Lubich, Wanner, "Geometric Numerical Integration" (2006), section IV.4 (projection); Simo, Tarnow,
 Wong, "Exact energy-momentum conserving algorithms" (1992) for what the midpoint rule conserves.
@@ -33,6 +34,8 @@ from supple.system import System
 _ALLOWED = 0.01
 # The largest share of the relative kinetic energy that one step removes.
 _MOST_TAKEN = 0.9
+# The share of a piece's energy, that of its rigid motion included, that may remain from nowhere after a step.
+_MOST_MADE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +102,22 @@ class Conservation:
                 v[rows] -= (1.0 - np.sqrt(1.0 - taken / kinetic)) * relative
                 made[k] -= taken
         return EnergyMade(made)
+
+    def gained(self, end: State) -> tuple[float, str] | None:
+        """The share of its energy that a piece with soft bodies has from nowhere after `limit_energy`, and one of them.
+
+        None where no share is too large. Free rigid bodies have it in their strain, which ends with the step.
+        """
+        if not isinstance(end.memory, EnergyMade) or self.latest is None:
+            return None
+        m, v = self.system.masses, end.velocities
+        kinetic = 0.5 * np.bincount(self.piece, weights=m * np.einsum("ij,ij->i", v, v))
+        shares = end.memory.made / np.maximum(self.latest[1] + kinetic, np.finfo(np.float64).tiny)
+        soft = (part for part in self.system.bodies if not part.rigid)
+        share, name = max(
+            ((float(shares[self.piece[part.vertices]].max()), part.name) for part in soft), default=(0.0, "")
+        )
+        return (share, name) if share > _MOST_MADE else None
 
     def _stored(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """(p,) elastic and stitch energy of each piece [J]."""

@@ -155,6 +155,11 @@ def take_substep(state: State, end: float, h: float, settings: StepSettings, wor
     if isinstance(joints, MidpointJoints):
         impact = joints.finish(x, after.velocities, residual, tools)
     after = settings.integrator.finish(plan, state, after, residual, workspace.conservation)
+    gained = workspace.conservation.gained(after)
+    if gained is not None and outcome.status is Status.CONVERGED:
+        share, name = gained
+        text = f"{100.0 * share:.2g} % of the energy of body {name!r} came from nowhere; take a shorter step"
+        outcome = replace(outcome, status=Status.ENERGY_GAINED, message=text)
     if plan.place != 1.0 and system.rigid_bodies and outcome.status is Status.CONVERGED:
         after = rigid_ends(system, state, after, limits)
     acted = state.positions + plan.place * (x - state.positions)
