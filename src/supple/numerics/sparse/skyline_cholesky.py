@@ -82,18 +82,22 @@ def factorize(matrix, first):
                         matrix[k, i, c, r] = block[r, c]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, fastmath={"reassoc", "contract"}, error_model="numpy")
 def solve(factor, first, b):
-    """b <- A^-1 b for a factored matrix; b : (12 n,)."""
+    """b <- A^-1 b for a factored matrix; b : (12 n,).
+
+    Both passes read the lower blocks, which are next to each other in memory; the second one finds most in the cache.
+    """
     count = len(first)
     for i in range(count):
         o = SIZE * i
         for j in range(first[i], i):
             p = SIZE * j
-            for c in range(SIZE):
-                value = b[p + c]
-                for r in range(SIZE):
-                    b[o + r] -= factor[j, i, c, r] * value
+            for r in range(SIZE):
+                value = 0.0
+                for c in range(SIZE):
+                    value += factor[i, j, r, c] * b[p + c]
+                b[o + r] -= value
         for r in range(SIZE):
             value = b[o + r]
             for c in range(r):
