@@ -13,23 +13,24 @@ from benchmarks import (
     quadratic_tets,
     rigid_bodies,
     rigid_heap,
+    small_scenes,
     startup,
     work_precision,
 )
 
 if __name__ == "__main__":
-    startup.main()
-    projections.main()
+    startup.run()
+    projections.run()
     automatic_substeps.main()
-    hanging_beam.main()
-    hanging_beam.main(busy=True)
-    work_precision.main()
-    implicit_scaling.main()
-    candidate_search.main()
-    contact_scenes.main()
-    bear_pile.main((5, 10))
-    quadratic_tets.main()
+    hanging_beam.run()
+    work_precision.run()
+    implicit_scaling.run()
+    candidate_search.run()
+    contact_scenes.run()
+    small_scenes.run()
+    bear_pile.run()
+    quadratic_tets.run()
     rigid_bodies.run()
-    rigid_heap.main()
+    rigid_heap.run()
     live.run()
     live_page.run()
