@@ -1,6 +1,6 @@
 """Cost of implicit steps of piles of 5 to 100 gummy bears: time, memory, and the exponents of growth.
 
-usage: python -m benchmarks.bear_pile [--quick] [--threads N] [COUNT ...]
+usage: python -m benchmarks.bear_pile [COUNT ...]
 
 Bears of 1,575 tets, each squeezed to .72 of its extents, fill a bin without a lid and expand. Times are those of the
 processor, of two steps: in the first the pile expands, and compiled kernels are loaded. `supple check` tests the last
@@ -24,6 +24,8 @@ from numpy.typing import NDArray
 import supple as sp
 from benchmarks.measuring import run_json
 from benchmarks.our_beam import peak_megabytes
+from benchmarks.published import publish
+from benchmarks.table import Table
 from supple.implicit.details import ImplicitDetails
 from supple.output.check.checker import check_recording
 from supple.output.check.settings import CheckSettings
@@ -105,32 +107,40 @@ def one(count: int) -> dict[str, Any]:
     }
 
 
-def main(counts: Sequence[int] = COUNTS, threads: int | None = None) -> None:
-    """Print the table, and the exponents of the second step."""
-    print("\nImplicit steps of piles of bears: contacts, iterations of Newton's method and of CG, processor seconds")
-    print(f"{'bears':>6}{'tets':>9}{'MB':>7}" + f"{'contacts':>11}{'Newton':>8}{'CG':>8}{'s':>8}" * STEPS)
-    times, each = [], []
+def main(counts: Sequence[int] = COUNTS) -> dict[str, Any]:
+    """Print the table, and the exponents of both steps; returns the figures."""
+    columns = {"bears": "d", "tets": ",d", "step": "d", "contacts": ",d", "Newton": "d", "CG": ",d", "seconds": ".1f"}
+    columns |= {"peak, MB": ".0f", "statuses": "", "`supple check`": ""}
+    table = Table("Implicit steps of piles of bears; seconds of the processor", columns, threads=1)
+    times = []
     for count in counts:
-        found = run_json(sys.executable, "benchmarks.bear_pile", "--one", count, threads=threads)
-        peak = "?" if found["peak_MB"] is None else f"{found['peak_MB']:.0f}"
-        steps = "".join(f"{k:11d}{newton:8d}{cg:8d}{seconds:8.1f}" for seconds, k, newton, cg in found["steps"])
-        end = "; ".join([found["statuses"], *(found["failures"] or ["check passed"])])
-        print(f"{count:6d}{found['tets']:9d}{peak:>7}{steps}  {end}", flush=True)
-        times.append(found["steps"][-1][0])
-        each.append(times[-1] / found["steps"][-1][2])
+        found = run_json(sys.executable, "benchmarks.bear_pile", "--one", count, threads=1)
+        for k, (seconds, *numbers) in enumerate(found["steps"]):
+            end = [found["peak_MB"], found["statuses"], "; ".join(found["failures"]) or "passed"]
+            table.add(count, found["tets"], k + 1, *numbers, seconds, *(end if k + 1 == STEPS else [None] * 3))
+        times.append([(seconds, seconds / newton) for seconds, _, newton, _ in found["steps"]])
     if len(counts) > 1:
-        of_steps, of_each = (np.polyfit(np.log(counts), np.log(values), 1)[0] for values in (times, each))
-        print(f"exponents of growth: a step {of_steps:.2f}, an iteration {of_each:.2f} (target: at most 1.15)")
+        growth = np.polyfit(np.log(counts), np.log(times).reshape(len(counts), -1), 1)[0].reshape(STEPS, 2)
+        said = [f"step {k + 1} {whole:.2f}, an iteration of it {each:.2f}" for k, (whole, each) in enumerate(growth)]
+        table.note(f"Exponents of growth in the number of bears: {'; '.join(said)} (target of an iteration: 1.15).")
+    return table.figures()
+
+
+def run() -> None:
+    """Measure the three smallest piles, and write the figures of docs/benchmarks.md."""
+    publish("bear_pile", main(COUNTS[:3]))
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("counts", nargs="*", type=int, metavar="COUNT", help="of 5, 10, 20, 50, 100; all without it")
-    parser.add_argument("--quick", action="store_true", help="the two smallest piles")
-    parser.add_argument("--threads", type=int, default=None, help="of Supple; all without it")
+    parser.add_argument(
+        "counts", nargs="*", type=int, metavar="COUNT", help="of 5, 10, 20, 50, 100; without it, 5 to 20 are written"
+    )
     parser.add_argument("--one", type=int, choices=COUNTS, help="one pile in this process")
     chosen = parser.parse_args()
     if chosen.one is not None:
         print(json.dumps(one(chosen.one)))
+    elif chosen.counts:
+        main(chosen.counts)
     else:
-        main(COUNTS[:2] if chosen.quick else chosen.counts or COUNTS, chosen.threads)
+        run()

@@ -11,12 +11,15 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
+from typing import Any
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
 import supple as sp
+from benchmarks.published import publish
+from benchmarks.table import Table
 from supple.contact.ccd.largest_step import largest_step
 from supple.contact.search.finder import CandidateFinder
 from supple.contact.surface.contact_mesh import ContactMesh, mesh_of_triangles
@@ -61,12 +64,19 @@ def fastest(run: Callable[[int], object], rounds: int = 5) -> float:
     return min(times[1:])
 
 
-def main(counts: tuple[int, ...] = COUNTS) -> float:
-    """Print the table; returns the exponent."""
+def main(counts: tuple[int, ...] = COUNTS) -> dict[str, Any]:
+    """Print the table; returns its figures."""
     before = numba.get_num_threads()
     numba.set_num_threads(1)
-    print("\nSearch for contact in piles of bears, one thread")
-    print(f"{'bears':>6}{'triangles':>11}{'pairs':>8}{'search ms':>11}{'kept ms':>9}{'step ms':>9}")
+    columns = {
+        "bears": "d",
+        "triangles": ",d",
+        "pairs": ",d",
+        "search, ms": ".1f",
+        "kept, ms": ".3f",
+        "step, ms": ".2f",
+    }
+    table = Table("Search for contact in piles of bears", columns, threads=1)
     times = []
     for count in counts:
         mesh, x = pile(count)
@@ -81,18 +91,22 @@ def main(counts: tuple[int, ...] = COUNTS) -> float:
         near = finder.at(places[-1])
         kept = fastest(lambda _, finder=finder, at=places[-1]: finder.at(at))
         step = fastest(lambda _, mesh=mesh, at=places[-1], way=way, near=near: largest_step(mesh, at, way, near))
-        print(
-            f"{count:6d}{len(mesh.triangles):11d}{len(near):8d}"
-            f"{1e3 * times[-1]:11.1f}{1e3 * kept:9.3f}{1e3 * step:9.3f}",
-            flush=True,
-        )
+        table.add(count, len(mesh.triangles), len(near), 1e3 * times[-1], 1e3 * kept, 1e3 * step)
     numba.set_num_threads(before)
     exponent = float(np.polyfit(np.log(counts), np.log(times), 1)[0])
-    print(f"the time of a search grows with the bears to the power {exponent:.2f} (target: at most 1.15)")
-    return exponent
+    table.note(f"The time of a search grows with the bears to the power {exponent:.2f} (target: at most 1.15).")
+    return table.figures()
+
+
+def run() -> None:
+    """Measure, and write the figures of docs/benchmarks.md."""
+    publish("candidate_search", main())
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="the three smallest piles")
-    main(COUNTS[:3] if parser.parse_args().quick else COUNTS)
+    parser.add_argument("--quick", action="store_true", help="the three smallest piles; nothing is written")
+    if parser.parse_args().quick:
+        main(COUNTS[:3])
+    else:
+        run()

@@ -4,7 +4,7 @@ usage: python -m benchmarks.contact_scenes [SCENE ...] [--quick] [--steps N] [--
 
 SCENE is a name such as `stack`, or `stack:small`, `stack:full`, `stack:large`, or `tumbling`, 27 cubes that fall on
 each other; without any, all full and large ones and `tumbling` are run. Means are over the steps that have contacts,
-without the first of them, which loads compiled kernels.
+without the first of them, which loads compiled kernels; times are of the processor, shares of the wall time.
 
 With --against, every scene also runs on the package of another checkout, whose folder `src` is PATH. The two run one
 after the other in processes of their own, and ratios are given: other / this.
@@ -17,13 +17,15 @@ import json
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import supple as sp
+from benchmarks.table import Table
 from supple.demos.torture.registry import TORTURE
 from supple.implicit.details import ImplicitDetails
 
@@ -72,9 +74,12 @@ def case(item: str) -> Case:
 def measured(run: Case, most_steps: int = MAX_STEPS) -> dict[str, float]:
     """Run a case: tets, most contacts in a frame, the smallest distance, and means over the steps with contacts."""
     tets = most = touching = iterations = 0
-    seconds, parts, nearest = 0.0, dict.fromkeys(PARTS, 0.0), float("inf")
+    seconds, wall, parts, nearest = 0.0, 0.0, dict.fromkeys(PARTS, 0.0), float("inf")
+    began = time.process_time()
     converged, loaded = True, False
     for frame in sp.simulate(run.scene, run.solver, run.dt, min(run.steps, most_steps)):
+        now = time.process_time()
+        spent, began = now - began, now
         report, details = frame.report, frame.report.details
         assert isinstance(details, ImplicitDetails)
         tets = len(frame.system.tets)
@@ -86,7 +91,8 @@ def measured(run: Case, most_steps: int = MAX_STEPS) -> dict[str, float]:
             continue
         most, touching = max(most, count), touching + 1
         iterations += report.iterations
-        seconds += report.wall_seconds
+        seconds += spent
+        wall += report.wall_seconds
         for name in PARTS:
             parts[name] += details.seconds[name]
     steps = max(touching, 1)
@@ -95,7 +101,7 @@ def measured(run: Case, most_steps: int = MAX_STEPS) -> dict[str, float]:
         "contacts": most,
         "iterations": iterations / steps,
         "seconds": seconds / steps,
-        **{name: value / max(seconds, 1e-300) for name, value in parts.items()},
+        **{name: value / max(wall, 1e-300) for name, value in parts.items()},
         "nearest": nearest,
         "converged": converged,
     }
@@ -117,47 +123,56 @@ def in_process(item: str, package: Path, steps: int) -> dict[str, float]:
 
 def main(
     names: Sequence[str] = (), quick: bool = False, steps: int = MAX_STEPS, against: str | Path | None = None
-) -> None:
+) -> dict[str, Any]:
+    """Print the table; returns its figures."""
     chosen: list[str] = list(names)
     if not chosen:
         sizes = ("small",) if quick else ("full", "large")
         chosen = [f"{name}:{size}" for size in sizes for name, scene in TORTURE.items() if getattr(scene, size)]
-        chosen += [] if quick else [TUMBLING]
+        chosen.append(TUMBLING)
     other = Path(against).resolve() if against is not None else None
     if other is not None and not (other / "supple" / "__init__.py").exists():
         raise SystemExit(f"--against {against}: there is no package supple in it; give the folder src of a checkout")
-    load = f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
-    print(f"\nSteps with contact; load of the machine at the start: {load}")
-    print(f"{'scene':<16}{'tets':>7}{'contacts':>10}{'Newton':>8}{'s/step':>9}{'contact':>9}{'elastic':>9}{'solve':>7}")
+    columns = {"scene": "", "tets": ",.0f", "contacts": ",.0f", "Newton/step": ".1f", "ms/step": ".1f"}
+    columns |= {"contact": ".0%", "elasticity": ".0%", "linear systems": ".0%", "not as it should be": ""}
+    table = Table("Steps with contact", columns)
     for item in chosen:
         if other is None:
-            _print_row(item, measured(case(item), steps))
+            _add(table, item, measured(case(item), steps))
             continue
         this, that = in_process(item, ROOT / "src", steps), in_process(item, other, steps)
-        _print_row(item, this)
-        _print_row("  other", that)
-        print(
-            f"{'  other / this':<16}{'':17}{that['iterations'] / max(this['iterations'], 1e-300):8.2f}"
-            f"{that['seconds'] / max(this['seconds'], 1e-300):9.2f}",
-            flush=True,
-        )
+        _add(table, item, this)
+        _add(table, "other", that)
+        ratios = [that[name] / max(this[name], 1e-300) for name in ("iterations", "seconds")]
+        print("other / this, Newton/step and ms/step: ", *(f"{ratio:.2f}" for ratio in ratios), flush=True)
+    return table.figures()
 
 
-def _print_row(item: str, result: dict[str, float]) -> None:
-    print(
-        f"{item:<16}{result['tets']:7.0f}{result['contacts']:10.0f}{result['iterations']:8.1f}{result['seconds']:9.3f}"
-        f"{result['contact']:9.0%}{result['elasticity']:9.0%}{result['linear_solve']:7.0%}"
-        f"{'' if result['converged'] else '  not every step converged'}"
-        f"{'' if result['nearest'] > 0.0 else '  surfaces touch'}",
-        flush=True,
+def _add(table: Table, item: str, result: dict[str, float]) -> None:
+    wrong = {"steps that did not converge": not result["converged"], "surfaces touch": result["nearest"] <= 0.0}
+    table.add(
+        item,
+        *(result["tets"], result["contacts"], result["iterations"], 1e3 * result["seconds"]),
+        *(result[name] for name in PARTS),
+        ", ".join(text for text, found in wrong.items() if found),
     )
+
+
+def run() -> None:
+    """Measure the small scenes, and write the figures of docs/benchmarks.md."""
+    from benchmarks.published import publish  # not above: `measured` also runs with the package of other versions
+
+    publish("contact_scenes", main(quick=True))
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", nargs="*", metavar="SCENE")
-    parser.add_argument("--quick", action="store_true", help="the small scenes")
+    parser.add_argument("--quick", action="store_true", help="the small scenes, whose figures are written")
     parser.add_argument("--steps", type=int, default=MAX_STEPS, metavar="N", help="of each scene at most")
     parser.add_argument("--against", metavar="PATH", help="the folder src of another checkout")
     given = parser.parse_args()
-    main(given.scenes, given.quick, given.steps, given.against)
+    if given == parser.parse_args(["--quick"]):
+        run()
+    else:
+        main(given.scenes, given.quick, given.steps, given.against)

@@ -18,7 +18,8 @@ from statistics import median
 from typing import Any
 
 import supple as sp
-from benchmarks.published import circumstances, publish
+from benchmarks.published import publish
+from benchmarks.table import circumstances
 from supple.viewer.app import Address, opened_page
 from supple.viewer.engine.engine import Engine
 from supple.viewer.protocol.commands import Play, Reset, Step

@@ -1,13 +1,11 @@
-"""How benchmarks measure: programs run alternately, and the fastest round counts; optionally with a busy core."""
+"""How benchmarks measure: programs run alternately, and the fastest round counts."""
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import subprocess
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -38,18 +36,6 @@ def run_json(python: str | Path, script: Path | str, *arguments: object, threads
     if done.returncode != 0:
         raise RuntimeError(f"{program[-1]} {arguments} failed:\n{done.stderr[-2000:]}")
     return json.loads(done.stdout.strip().splitlines()[-1])
-
-
-@contextlib.contextmanager
-def busy_core(enabled: bool) -> Iterator[None]:
-    """Keep one core busy with another process during the block, if enabled."""
-    spinner = subprocess.Popen([sys.executable, "-c", "while True: pass"]) if enabled else None
-    try:
-        yield
-    finally:
-        if spinner is not None:
-            spinner.kill()
-            spinner.wait()
 
 
 def peers_installed() -> bool:

@@ -1,14 +1,15 @@
-"""Constraint projections per second, compared with plain C: `python -m benchmarks.projections [--busy] [--quick]`.
+"""Constraint projections per second, compared with plain C: `python -m benchmarks.projections [--quick]`.
 
-All variants run in turn on the same mesh, and the fastest round is reported. C is compiled in the same run. Columns:
+All variants run in turn on the same mesh, and the fastest round is reported: processor time where there is one thread,
+else wall time. C is compiled in the same run. Columns, and the same for two threads where the machine has them:
 
     tets         size of the box mesh
     C            edges + volume in plain C, one thread                       [million projections / s]
-    1, 2         edges + volume in Supple on one and two threads             [million projections / s]
-    /C           the ratio to C
-    ns/tet 1, 2  time of a sweep over edges and volumes per tet               [ns]
-    snh 1, 2     stable Neo-Hookean tets per second                          [million / s]
-    step 1, 2    edges + volume in complete substeps                         [million projections / s]
+    1 thread     edges + volume in Supple                                    [million projections / s]
+    1 / C        the ratio to C
+    ns/tet       time of a sweep over edges and volumes per tet              [ns]
+    tets         stable Neo-Hookean tets per second                          [million / s]
+    step         edges + volume in complete substeps                         [million projections / s]
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numba
 import numpy as np
@@ -28,7 +30,8 @@ from numba.core import config
 from numpy.ctypeslib import ndpointer
 
 import supple as sp
-from benchmarks.measuring import busy_core
+from benchmarks.published import publish
+from benchmarks.table import Table
 from supple.system import System, build_system, initial_state
 from supple.xpbd.solver import XPBD
 
@@ -92,12 +95,13 @@ def fastest(variants: dict[str, Callable[[], None]], repeats: int, rounds: int) 
     for run in variants.values():
         run()
     best = dict.fromkeys(variants, np.inf)
+    clock = time.process_time if thread_counts() == [1] else time.perf_counter
     for _ in range(rounds):
         for name, run in variants.items():
-            start = time.perf_counter()
+            start = clock()
             for _ in range(repeats):
                 run()
-            best[name] = min(best[name], (time.perf_counter() - start) / repeats)
+            best[name] = min(best[name], (clock() - start) / repeats)
     return best
 
 
@@ -130,30 +134,36 @@ def thread_counts() -> list[int]:
     return [1, 2] if config.NUMBA_NUM_THREADS > 1 else [1]  # pyright: ignore[reportAttributeAccessIssue]
 
 
-def main(busy: bool = False, quick: bool = False) -> None:
-    """Print the table."""
-    sizes = list(DIVISIONS)[:3] if quick else list(DIVISIONS)
-    print(f"\nConstraint projections, float64, Numba {numba.__version__}{', one core busy' if busy else ''}")
-    with tempfile.TemporaryDirectory() as folder, busy_core(busy):
+def main(quick: bool = False) -> dict[str, Any]:
+    """Print the table; returns its figures."""
+    columns = {"cells": "", "tets": ",d", "C": ".1f"}
+    for t in thread_counts():
+        columns |= {f"{t} thread{'s' * (t > 1)}": ".1f", f"{t} / C": ".2f", f"ns/tet, {t}": ".1f"}
+        columns |= {f"Neo-Hookean, {t}": ".1f", f"step, {t}": ".1f"}
+    with tempfile.TemporaryDirectory() as folder:
         reference = compile_reference(Path(folder))
+        table = Table("Constraint projections, float64, million per second", columns)
         if reference is None:
-            print("no gcc: the columns of C are omitted")
-        header = ["tets", "C", *(f"{t}" for t in thread_counts()), *(f"{t} /C" for t in thread_counts())]
-        header += [f"{what} {t}" for what in ("ns/tet", "snh", "step") for t in thread_counts()]
-        print("  ".join(f"{name:>8}" for name in header))
-        for size in sizes:
+            table.note("There was no gcc: the columns of C are empty.")
+        for size in list(DIVISIONS)[:3] if quick else DIVISIONS:
             row = measure(DIVISIONS[size], reference, rounds=3 if quick else 7)
+            cells: list[Any] = [size, row["tets"], row.get("C")]
             for t in thread_counts():
-                row[f"{t} /C"] = row[f"{t}"] / row["C"] if "C" in row else np.nan
-            row.setdefault("C", np.nan)
-            cells = [f"{size:>8}", f"{row['C']:8.1f}"]
-            cells += [f"{row[name]:8.2f}" if name.endswith("/C") else f"{row[name]:8.1f}" for name in header[2:]]
-            print("  ".join(cells), flush=True)
+                ratio = row[f"{t}"] / row["C"] if "C" in row else None
+                cells += [row[f"{t}"], ratio, row[f"ns/tet {t}"], row[f"snh {t}"], row[f"step {t}"]]
+            table.add(*cells)
+    return table.figures()
+
+
+def run() -> None:
+    """Measure, and write the figures of docs/benchmarks.md and README.md."""
+    publish("projections", main())
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--busy", action="store_true", help="with another process that spins on one core")
-    parser.add_argument("--quick", action="store_true", help="small meshes only, few rounds")
-    arguments = parser.parse_args()
-    main(arguments.busy, arguments.quick)
+    parser.add_argument("--quick", action="store_true", help="small meshes only, few rounds; nothing is written")
+    if parser.parse_args().quick:
+        main(quick=True)
+    else:
+        run()

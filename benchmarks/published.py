@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-import os
 import re
-import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from benchmarks.latency import live_page_text
 from benchmarks.measuring import ROOT
+<<<<<<< HEAD
 from benchmarks.tables import live_text, reading_text, rigid_bodies_text
 from supple.files.replacing import whole_file
 
@@ -22,23 +21,52 @@ SHOWN: dict[str, tuple[str, Callable[[Any], str]]] = {
     "live": ("benchmarks.md", live_text),
     "rigid_bodies": ("benchmarks.md", rigid_bodies_text),
     "reading_fields": ("forces_and_stresses.md", reading_text),
+=======
+from benchmarks.table import table_text
+from benchmarks.tables import live_text, rigid_bodies_text, speed_text
+from supple.files.replacing import whole_file
+
+DOCS = ROOT / "docs"
+
+
+class Part(NamedTuple):
+    """A part of a page: the page, the files of its figures, and their text."""
+
+    page: str
+    files: tuple[str, ...]
+    text: Callable[..., str]
+
+
+def _tables(page: str, *names: str) -> dict[str, Part]:
+    """Parts that show one table each."""
+    return {name: Part(page, (name,), table_text) for name in names}
+
+
+# By the name between the marks.
+SHOWN = {
+    "live_page": Part("live.md", ("live_page",), live_page_text),
+    "live": Part("benchmarks.md", ("live",), live_text),
+    "rigid_bodies": Part("benchmarks.md", ("rigid_bodies",), rigid_bodies_text),
+    "speed": Part("../README.md", ("hanging_beam", "projections"), speed_text),
+    **_tables("benchmarks.md", "startup", "projections", "hanging_beam", "work_precision", "implicit_scaling"),
+    **_tables("benchmarks.md", "contact_scenes", "small_scenes", "bear_pile", "candidate_search"),
+    **_tables("locking.md", "quadratic_tets"),
+    **_tables("rigid_bodies.md", "rigid_heap"),
+>>>>>>> f417ce3e95075a4494f7c252a1f39a21eeb9e99c
 }
 
 
-def circumstances() -> dict[str, Any]:
-    """The date, the load of the machine, and the number of its cores."""
-    load = f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
-    return {"date": time.strftime("%Y-%m-%d"), "load": load, "cores": os.cpu_count()}
-
-
 def publish(name: str, figures: Any) -> None:
-    """Write the figures of this name, and the text between the two marks of its page."""
+    """Write the figures of this name, and the parts of pages that show them."""
     path = file_of(name)
     path.parent.mkdir(exist_ok=True)
     _write(path, json.dumps(figures, indent=1) + "\n")
-    page = DOCS / SHOWN[name][0]
-    _write(page, with_figures(page.read_text(encoding="utf-8"), name))
-    print(f"written: {path.relative_to(ROOT)} and {page.relative_to(ROOT)}")
+    print(f"written: {path.relative_to(ROOT)}")
+    for mark, part in SHOWN.items():
+        if name in part.files and all(file_of(file).exists() for file in part.files):
+            page = DOCS / part.page
+            _write(page, with_figures(page.read_text(encoding="utf-8"), mark))
+            print(f"written: {page.name}")
 
 
 def _write(path: Path, text: str) -> None:
@@ -51,13 +79,12 @@ def file_of(name: str) -> Path:
     return DOCS / "figures" / f"{name}.json"
 
 
-def with_figures(page: str, name: str) -> str:
-    """The text of a page, with the figures of its file between the two marks; nothing where there is no file."""
-    begin, end = f"<!-- figures: {name} -->\n", "<!-- end of figures -->"
-    text = ""
-    if file_of(name).exists():
-        text = SHOWN[name][1](json.loads(file_of(name).read_text(encoding="utf-8"))) + "\n\n"
+def with_figures(page: str, mark: str) -> str:
+    """The text of a page, with the figures of the files between the two marks."""
+    begin, end = f"<!-- figures: {mark} -->\n", "<!-- end of figures -->"
+    part = SHOWN[mark]
+    text = part.text(*(json.loads(file_of(name).read_text(encoding="utf-8")) for name in part.files))
     pattern = f"{re.escape(begin)}.*?{re.escape(end)}"
-    changed, count = re.subn(pattern, lambda _: f"{begin}\n{text}{end}", page, flags=re.S)
-    assert count == 1, f"the page of {name} needs the marks {begin.strip()} and {end}"
+    changed, count = re.subn(pattern, lambda _: f"{begin}\n{text}\n\n{end}", page, flags=re.S)
+    assert count == 1, f"the page of {mark} needs the marks {begin.strip()} and {end}"
     return changed

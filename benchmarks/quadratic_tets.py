@@ -2,9 +2,9 @@
 
 usage: python -m benchmarks.quadratic_tets
 
-Each line is one mesh: its tets, the error against the finest quadratic mesh, and the time of the static solution, the
-faster of two rounds, in which all meshes take their turns. The last line of a problem compares the best linear mesh
-with the fastest quadratic one that is at least as good.
+Each line is one mesh: its tets, the error against the finest quadratic mesh, and the processor time of the static
+solution, the faster of two rounds, in which all meshes take their turns. Then the best linear mesh of each problem is
+compared with the fastest quadratic one that is at least as good.
 """
 
 from __future__ import annotations
@@ -12,11 +12,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import supple as sp
+from benchmarks.published import publish
+from benchmarks.table import Table
 
 STATIC = sp.Implicit(integrator="static", contact=None)
 SMALL = 1e-4
@@ -41,11 +44,11 @@ class Problem:
 
 def solved(scene: sp.Scene, steps: int = 1) -> tuple[sp.Frame, float]:
     """The equilibrium, and the time that it took, preparation included [s]."""
-    began = time.perf_counter()
+    began = time.process_time()
     *_, frame = sp.simulate(scene, STATIC, 1.0 / steps, steps)
     if frame.report.status != "converged":
         raise RuntimeError(frame.report.message)
-    return frame, time.perf_counter() - began
+    return frame, time.process_time() - began
 
 
 def end_triangles(mesh: sp.TetMesh, x: float) -> NDArray[np.int64]:
@@ -129,21 +132,29 @@ def measure(problem: Problem, rounds: int = 2) -> list[tuple[int, int, int, floa
     return [(order, n, *best[order, n]) for order, n in meshes]
 
 
-def main(problems: tuple[Problem, ...] = PROBLEMS, rounds: int = 2) -> None:
+def main(problems: tuple[Problem, ...] = PROBLEMS, rounds: int = 2) -> dict[str, Any]:
+    """Print the table; returns its figures."""
+    columns = {"problem": "", "tets": "", "across": "d", "number": ",d", "error": ".2%", "seconds": ".3f"}
+    table = Table("Linear and quadratic tets; seconds of the processor", columns)
     for problem in problems:
-        print(f"\n{problem.name}")
-        print(f"{'tets':12}{'across':>8}{'number':>9}{'error':>10}{'s':>9}")
         rows = measure(problem, rounds)
         for order, n, tets, error, seconds in rows:
-            print(f"{('linear', 'quadratic')[order - 1]:12}{n:8d}{tets:9d}{100 * error:9.2f}%{seconds:9.3f}")
+            table.add(problem.name, ("linear", "quadratic")[order - 1], n, tets, error, seconds)
         _, _, tets, error, seconds = min((row for row in rows if row[0] == 1), key=lambda row: row[3])
         good = [row for row in rows if row[0] == 2 and row[3] <= error]
         if good:
             other = min(good, key=lambda row: row[4])
-            print(
-                f"{other[2]} quadratic tets are as good as {tets} linear ones: {seconds / other[4]:.1f} times as fast"
+            table.note(
+                f"{problem.name}: {other[2]} quadratic tets are as good as {tets} linear ones, "
+                f"{seconds / other[4]:.1f} times as fast."
             )
+    return table.figures()
+
+
+def run() -> None:
+    """Measure, and write the figures of docs/locking.md."""
+    publish("quadratic_tets", main())
 
 
 if __name__ == "__main__":
-    main()
+    run()

@@ -2,8 +2,8 @@
 
 usage: python -m benchmarks.rigid_bodies
 
-Times of steps of `Implicit`, without the first ones, the fastest of some rounds in which all scenes take their turns;
-the ratios are to the obstacles.
+Processor times of steps of `Implicit`, without the first ones, the fastest of some rounds in which all scenes
+take their turns; the ratios are to the obstacles.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ import time
 from typing import Any
 
 import supple as sp
-from benchmarks.published import circumstances, publish
+from benchmarks.published import publish
+from benchmarks.table import circumstances
 
 PLATE = sp.shapes.box_surface((0.3, 0.02, 0.3), (4, 1, 4))
 RADIUS, GAP = 0.1, 5e-4
@@ -50,9 +51,9 @@ def seconds_per_step(kind: str, edge: float, steps: int, skipped: int) -> tuple[
         if frame.index > skipped:
             iterations += frame.report.iterations
         elif frame.index == skipped:
-            began = time.perf_counter()
+            began = time.process_time()
     count = steps - skipped
-    return (time.perf_counter() - began) / count, iterations / count
+    return (time.process_time() - began) / count, iterations / count
 
 
 def main(edge: float = 0.03, steps: int = 30, skipped: int = 4, rounds: int = 3) -> dict[str, Any]:

@@ -9,10 +9,13 @@ from __future__ import annotations
 
 import time
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 import supple as sp
+from benchmarks.published import publish
+from benchmarks.table import Table
 from supple.xpbd.details import XPBDDetails
 
 SIZE, PER_SIDE, GAP = 0.1, 5, 1.8
@@ -33,8 +36,9 @@ def scene(count: int) -> sp.Scene:
     return sp.Scene(bodies, obstacles=[sp.HalfSpace(friction=0.5)])
 
 
-def main(count: int = 200, steps: int = 90, dt: float = 1 / 60) -> list[float]:
-    """Print the table; returns the mean CPU time of a frame of each part [s]."""
+def main(count: int = 200, steps: int = 90, dt: float = 1 / 60) -> dict[str, Any]:
+    """Print the table; returns its figures."""
+    table = Table(f"{count} rigid boxes, frames of {1e3 * dt:.1f} ms", {"frames": "", "ms/frame, mean": ".1f"})
     times, substeps, statuses = [time.process_time()], [], []
     for frame in sp.simulate(scene(count), sp.XPBD(), dt, steps):
         times.append(time.process_time())
@@ -43,14 +47,20 @@ def main(count: int = 200, steps: int = 90, dt: float = 1 / 60) -> list[float]:
         statuses.append(frame.report.status)
     # The first two have compiled what was not cached.
     spent = [after - before for before, after in pairwise(times[3:])]
-    means = [float(np.mean(part)) for part in np.array_split(spent, 3)]
-    print(f"\n{count} rigid boxes, {steps} frames of {1e3 * dt:.1f} ms, {np.mean(substeps[1:]):.1f} substeps a frame")
-    print(
-        "CPU time of a frame [ms]:", ", ".join(f"{1e3 * mean:.0f}" for mean in means), f"; most {1e3 * max(spent):.0f}"
+    for name, part in zip(("first third", "second third", "last third"), np.array_split(spent, 3), strict=True):
+        table.add(name, 1e3 * float(np.mean(part)))
+    states = ", ".join(sorted({str(status) for status in statuses}))
+    table.note(
+        f"{count} boxes, {steps} frames: {np.mean(substeps[1:]):.1f} substeps a frame; the longest took "
+        f"{1e3 * max(spent):.0f} ms; statuses: {states}."
     )
-    print("statuses:", ", ".join(sorted({str(status) for status in statuses})))
-    return means
+    return table.figures()
+
+
+def run() -> None:
+    """Measure, and write the figures of docs/rigid_bodies.md."""
+    publish("rigid_heap", main())
 
 
 if __name__ == "__main__":
-    main()
+    run()

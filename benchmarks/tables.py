@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from benchmarks.table import measured_on, row_of
+
 _PLATES = {
     "obstacles": "obstacles of triangles, moved by a script",
     "scripted bodies": "rigid bodies, moved by the same script",
@@ -14,11 +16,6 @@ _WAYS = {
     "engine": "in the live page's simulation process, snapshots read at 60 Hz",
     "page": "the same, with the page served and a websocket that receives everything",
 }
-
-
-def measured_on(figures: dict[str, Any]) -> str:
-    """When the figures were measured, and what else the machine did."""
-    return f"Measured on {figures['date']}, on a machine of load {figures['load']} on {figures['cores']} cores."
 
 
 def rigid_bodies_text(figures: dict[str, Any]) -> str:
@@ -53,6 +50,7 @@ def live_text(figures: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
+<<<<<<< HEAD
 def reading_text(figures: dict[str, Any]) -> str:
     """The sentences of `benchmarks.reading_fields`."""
     slowest = sorted(figures["fields"], key=figures["fields"].__getitem__, reverse=True)[:3]
@@ -65,4 +63,18 @@ def reading_text(figures: dict[str, Any]) -> str:
             f"{figures['ms_per_step']:.0f} ms with {figures['substeps']:.0f} substeps. Most of it: {parts}.",
             measured_on(figures),
         ]
+=======
+def speed_text(beam: dict[str, Any], projections: dict[str, Any]) -> str:
+    """The sentence of README.md about speed, from `benchmarks.hanging_beam` and `benchmarks.projections`."""
+    ours = row_of(beam, "Supple XPBD, 20 substeps")
+    newton = row_of(beam, "Newton XPBD, 20 substeps x 1 iteration")
+    mujoco = row_of(beam, "MuJoCo flex, explicit, 1 ms")
+    column = list(projections["columns"]).index("1 / C")
+    ratios = [row[column] for row in projections["rows"]]
+    return (
+        f"On one thread, a beam of {ours['tets']:,} tets takes {ours['ms/frame']:.1f} ms of the processor a frame (20 "
+        f"substeps):\n{newton['ratio']:.1f} times as fast as Newton's XPBD and {mujoco['ratio']:.1f} times as fast as "
+        f"MuJoCo's flex in the same run; constraint projections\nrun at {min(ratios):.1f} to {max(ratios):.1f} times "
+        "plain C ([how it was measured](docs/benchmarks.md))."
+>>>>>>> f417ce3e95075a4494f7c252a1f39a21eeb9e99c
     )

@@ -1,4 +1,4 @@
-"""The hanging beam after 1/3 s: error against wall time, each solver against its own refined reference.
+"""The hanging beam after 1/3 s: error against time of the processor, each solver against its own refined reference.
 
 usage: python -m benchmarks.work_precision [--quick] [--scale SCALE] [--threads N]
 
@@ -16,11 +16,14 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.measuring import PEERS_PYTHON, alternate, peers_installed, run_json
+from benchmarks.published import publish
+from benchmarks.table import Table
 
 HERE = Path(__file__).parent
 FRAMES = 20
@@ -144,7 +147,7 @@ def measure(family: Family, rounds: int, folder: Path) -> tuple[list[Row], NDArr
     return [Row(family.name, note, float("nan"), 0.0), *rows], reference
 
 
-def converged_step(scale: int, threads: int | None) -> None:
+def converged_step(scale: int, threads: int | None) -> str:
     """A converged step of 1/60 s, compared with MuJoCo's `discrete` one."""
     implicit = ("implicit", scale, 1 / 60, "backward_euler", 0, FRAMES)
     programs = {
@@ -154,54 +157,66 @@ def converged_step(scale: int, threads: int | None) -> None:
     best = alternate(programs, 3)
     ours, theirs = best["ours"], best["theirs"]
     a, b = ours["ms_per_step"], theirs["ms_per_frame"]
-    print(
-        f"\nA step of 1/60 s: Supple Implicit {a:.1f} ms ({ours['tets']} tets, {', '.join(ours['statuses'])}, "
+    return (
+        f"A step of 1/60 s: Supple Implicit {a:.1f} ms ({ours['tets']} tets, {', '.join(ours['statuses'])}, "
         f"{ours['iterations_per_step']:.1f} Newton iterations), MuJoCo discrete {b:.1f} ms ({theirs['tets']} tets): "
-        f"ratio {a / b:.2f}, target at most 2"
+        f"ratio {a / b:.2f}, target at most 2."
     )
 
 
-def verdict(rows: list[Row]) -> None:
-    """Which programs are less accurate at equal wall time, and the factor over VBD with 10 x 10."""
+def verdict(rows: list[Row]) -> list[str]:
+    """Which programs are less accurate at equal time, and the factor over VBD with 10 x 10."""
     rows = [row for row in rows if np.isfinite(row.seconds)]
-    ours = [row for row in rows if row.ours]
+    ours, said = [row for row in rows if row.ours], []
     for peer in (row for row in rows if not row.ours):
         if not any(row.seconds <= peer.seconds and row.error <= peer.error for row in ours):
-            print(f"not beaten at its wall time: {peer.family}, {peer.name} ({peer.seconds:.3f} s, {peer.error:.2e})")
+            said.append(f"Not beaten at its time: {peer.family}, {peer.name} ({peer.seconds:.3f} s, {peer.error:.2e}).")
     for vbd in (row for row in rows if row.name == "10 substeps x 10 iterations"):
         better = [row for row in ours if row.error <= vbd.error]
         if better:
             best = min(better, key=lambda row: row.seconds)
-            print(
+            said.append(
                 f"Newton VBD 10 x 10 against {best.family}, {best.name}: {vbd.seconds / best.seconds:.1f} times slower "
-                f"at {vbd.error / best.error:.1f} times the error (target: 10 times)"
+                f"at {vbd.error / best.error:.1f} times the error (target: 10 times)."
             )
+    return said
 
 
-def main(quick: bool = False, scale: int = 1, threads: int | None = None) -> None:
+def main(quick: bool = False, scale: int = 1, threads: int | None = 1) -> dict[str, Any]:
+    """Print the table; returns its figures."""
     if not peers_installed():
         sys.exit("the peers are not installed; run `make bench`, which does it")
-    print(f"\nHanging beam, scale {scale}, after {FRAMES}/60 s: wall time and error against each one's own reference")
-    print(f"{'solver':18}{'':42}{'s':>9}{'error':>11}")
+    columns = {"solver": "", "": "", "seconds of the processor": ".3f", "error": ".2e", "not converged": ""}
+    table = Table(f"Hanging beam, scale {scale}, after {FRAMES}/60 s", columns, threads)
     all_rows: list[Row] = []
     references = {}
     with tempfile.TemporaryDirectory() as folder:
         for family in families(scale, quick, threads):
             rows, references[family.name] = measure(family, 1 if quick else 2, Path(folder))
             for row in rows:
-                figures = f"{row.seconds:9.3f}{row.error:11.2e}" if np.isfinite(row.seconds) else ""
-                print(f"{row.family:18}{row.name:42}{figures}  {row.note}", flush=True)
+                known = np.isfinite(row.seconds)
+                table.add(row.family, row.name, *((row.seconds, row.error) if known else (None, None)), row.note)
             all_rows += rows
     apart = relative_error(references["Supple XPBD"], references["Supple Implicit"])
-    print(f"\nThe references of Supple Implicit and Supple XPBD are {apart:.2e} of the tip's displacement apart")
-    verdict(all_rows)
-    converged_step(2, threads)
+    table.note(f"The references of Supple Implicit and Supple XPBD are {apart:.2e} of the tip's displacement apart.")
+    for said in verdict(all_rows):
+        table.note(said)
+    table.note(converged_step(2, threads))
+    return table.figures()
+
+
+def run() -> None:
+    """Measure, and write the figures of docs/benchmarks.md."""
+    publish("work_precision", main())
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="one round, coarser references")
+    parser.add_argument("--quick", action="store_true", help="one round, coarser references; nothing is written")
     parser.add_argument("--scale", type=int, default=1, help="1: about 1,000 tets; 2: about 8,000")
-    parser.add_argument("--threads", type=int, default=None, help="of Supple; all without it")
+    parser.add_argument("--threads", type=int, default=1, help="of Supple")
     chosen = parser.parse_args()
-    main(chosen.quick, chosen.scale, chosen.threads)
+    if chosen == parser.parse_args([]):
+        run()
+    else:
+        main(chosen.quick, chosen.scale, chosen.threads)

@@ -1,18 +1,81 @@
 """Figures of pages come from the files that benchmarks write."""
 
+import re
+from pathlib import Path
+
 import pytest
 from benchmarks import published
 from benchmarks.latency import PARTS, STAGES, summary
+from benchmarks.table import Table, table_text
+
+ROOT = Path(__file__).parents[1]
+PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
+SHOWN = r"<!-- figures: (\w+) -->\n.*?<!-- end of figures -->"
+# A number with a unit of time or memory, or a ratio; steps of time such as 1/60 s are none.
+MEASURED = r"(?<![/\d.])\d[\d.,]*(?: to \d[\d.,]*)? ?(?:ms|us|ns|s|MB|GB|times)\b"
+
+
+def beyond_figures(page: str) -> str:
+    """The text of a page without the parts that come from files."""
+    return re.sub(SHOWN, "", page, flags=re.S)
 
 
 @pytest.mark.parametrize("name", published.SHOWN)
-def test_a_page_shows_its_file(name):
-    page = (published.DOCS / published.SHOWN[name][0]).read_text(encoding="utf-8")
+def test_a_page_shows_its_files(name):
+    page = (published.DOCS / published.SHOWN[name].page).read_text(encoding="utf-8")
     assert published.with_figures(page, name) == page
 
 
 def test_every_file_is_shown():
-    assert {path.stem for path in (published.DOCS / "figures").glob("*.json")} <= set(published.SHOWN)
+    shown = {file for part in published.SHOWN.values() for file in part.files}
+    assert {path.stem for path in (published.DOCS / "figures").glob("*.json")} == shown
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_marks_of_a_page_name_parts_that_belong_there(page):
+    text = page.read_text(encoding="utf-8")
+    found = re.findall(SHOWN, text, flags=re.S)
+    assert len(found) == len(re.findall("<!-- *figures", text)) == len(re.findall("<!-- *end of figures", text))
+    assert set(found) == {
+        name for name, part in published.SHOWN.items() if (published.DOCS / part.page).resolve() == page
+    }
+
+
+def test_the_page_of_benchmarks_has_no_figures_of_its_own():
+    text = beyond_figures((ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8"))
+    assert [line for line in text.splitlines() if line.startswith("|")] == []
+    assert re.findall(MEASURED, text) == []
+    assert re.search(MEASURED, "| a step | 12 ms |")
+    assert re.search(MEASURED, "it is 1.5 times as fast")
+    assert not re.search(MEASURED, "frames of 1/60 s")
+
+
+def test_the_speed_in_the_readme_comes_from_files():
+    text = beyond_figures((ROOT / "README.md").read_text(encoding="utf-8"))
+    assert re.findall(r"[^\n]*times as fast[^\n]*|[^\n]*\d ms[^\n]*", text) == []
+
+
+def test_a_file_without_the_key_of_a_table_is_an_error(monkeypatch, tmp_path):
+    monkeypatch.setattr(published, "DOCS", tmp_path)
+    page = "<!-- figures: startup -->\n<!-- end of figures -->\n"
+    with pytest.raises(FileNotFoundError):
+        published.with_figures(page, "startup")
+    (tmp_path / "figures").mkdir()
+    (tmp_path / "figures" / "startup.json").write_text('{"date": "2026-01-31", "load": "0.1", "cores": 2}')
+    with pytest.raises(KeyError, match="columns"):
+        published.with_figures(page, "startup")
+
+
+def test_rows_become_a_table(capsys):
+    table = Table("beams", {"name": "", "tets": ",d", "s": ".2f"}, threads=1)
+    table.add("long", 12345, 1.0)
+    table.add("short", 6, None)
+    table.note("Both hang.")
+    text = table_text(table.figures())
+    assert text.endswith("| name | tets | s |\n|---|---|---|\n| long | 12,345 | 1.00 |\n| short | 6 |  |\n\nBoth hang.")
+    assert text.startswith("Measured on 20")
+    assert ", 1 thread)." in text
+    assert "12,345" in capsys.readouterr().out
 
 
 def test_figures_become_tables(monkeypatch, tmp_path):
@@ -27,6 +90,7 @@ def test_figures_become_tables(monkeypatch, tmp_path):
     figures: dict = {"date": "2026-01-31", "load": 0.1, "load_after": 1.2, "sizes": [size, size], "implicit": blocks}
     monkeypatch.setattr(published, "DOCS", tmp_path)
     monkeypatch.setattr(published, "ROOT", tmp_path)
+    monkeypatch.setattr(published, "SHOWN", {"live_page": published.SHOWN["live_page"]})
     page = tmp_path / "live.md"
     page.write_text("before\n<!-- figures: live_page -->\nold\n<!-- end of figures -->\nafter\n", encoding="utf-8")
     published.publish("live_page", figures)

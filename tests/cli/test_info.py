@@ -75,6 +75,25 @@ def test_a_scene(rows_of, tmp_path):
     assert rows["sensors"] == "force sensor 'foot'"
 
 
+def test_welded_faces_that_touch_do_not_intersect(rows_of, tmp_path):
+    """A soft cube welded to the face of a rigid one; another rigid one is inside of the soft one or beside it."""
+    scene = """bodies:
+  - {name: pad, shape: {kind: box, size: [1, 1, 1], divisions: [2, 2, 2]}, position: [0, 1, 0],
+     material: {kind: stable_neo_hookean, youngs: 1e4, poisson: 0.3}}
+  - {name: plate, rigid: {density: 1000}, shape: {kind: box, size: [1, 1, 1], divisions: [1, 1, 1]}}
+  - {name: other, rigid: {density: 1000}, shape: {kind: box, size: [1, 1, 1], divisions: [1, 1, 1]},
+     position: [PLACE, 1.3, 0]}
+welds: [{body: pad, rigid: plate, max_distance: 1e-6}]
+dt: 0.01
+steps: 1
+"""
+    (tmp_path / "apart.yaml").write_text(scene.replace("PLACE", "1.5"))
+    (tmp_path / "inside.yaml").write_text(scene.replace("PLACE", "0.8"))
+    problem = rows_of("apart.yaml")["intersections"]
+    assert problem == "none at the start; things that are stitched or welded to each other are not compared"
+    assert rows_of("inside.yaml")["intersections"].startswith("body 'pad' overlaps body 'other' at the start")
+
+
 def test_a_scene_whose_frames_are_timed(rows_of, tmp_path):
     (tmp_path / "s.yaml").write_text(
         "bodies: [{name: cube, shape: {kind: box, divisions: [1, 1, 1]}, position: [0, 0.6, 0], "

@@ -13,13 +13,15 @@ from supple.scene.contact_pairs import PairTable
 from supple.system import System
 
 
-def raise_if_intersecting(system: System, positions: NDArray[np.float64], time: float, table: PairTable) -> None:
+def raise_if_intersecting(
+    system: System, positions: NDArray[np.float64], time: float, table: PairTable, joined: bool = True
+) -> None:
     """Raise where surfaces are not apart at the start. Things that are stitched or welded are named last.
 
     Parameters
     ----------
     positions : (n, 3) of the system's vertices [m]; time : [s], where scripted obstacles are
-    table : which things collide
+    table : which things collide; joined : also those that are stitched or welded to each other
 
     Raises
     ------
@@ -27,12 +29,13 @@ def raise_if_intersecting(system: System, positions: NDArray[np.float64], time: 
     """
     surfaces = start_surfaces(system, positions, time)
     found = intersections_of(surfaces, table)
-    if not found:
-        return
     names = [str(thing.name) for thing in (*system.bodies, *system.obstacles)]
     stitched = [{names.index(stitch.first), names.index(stitch.second)} for stitch in system.scene.stitches]
     stitched += [{names.index(weld.body), names.index(weld.rigid)} for weld in system.scene.welds]
-    found = [item for item in found if {item.first, item.second} not in stitched] or found
+    others = [item for item in found if {item.first, item.second} not in stitched]
+    found = others or found if joined else others
+    if not found:
+        return
     mover = Mover(system, table, default_gap(system))
     worst = next((item for item in found if item.kind != "touches"), found[0])
     move = mover.separating_move(surfaces, worst)
