@@ -23,17 +23,6 @@ if __name__ == "__main__":
     startup.run()
     projections.run()
     automatic_substeps.main()
-<<<<<<< HEAD
-    hanging_beam.main()
-    hanging_beam.main(busy=True)
-    work_precision.main()
-    implicit_scaling.main()
-    candidate_search.main()
-    contact_scenes.main()
-    bear_pile.main((5, 10))
-    quadratic_tets.main()
-    reading_fields.run()
-=======
     hanging_beam.run()
     work_precision.run()
     implicit_scaling.run()
@@ -42,7 +31,7 @@ if __name__ == "__main__":
     small_scenes.run()
     bear_pile.run()
     quadratic_tets.run()
->>>>>>> f417ce3e95075a4494f7c252a1f39a21eeb9e99c
+    reading_fields.run()
     rigid_bodies.run()
     rigid_heap.run()
     live.run()

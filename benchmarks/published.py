@@ -10,20 +10,8 @@ from typing import Any, NamedTuple
 
 from benchmarks.latency import live_page_text
 from benchmarks.measuring import ROOT
-<<<<<<< HEAD
-from benchmarks.tables import live_text, reading_text, rigid_bodies_text
-from supple.files.replacing import whole_file
-
-DOCS = ROOT / "docs"
-# The page and the text of each file.
-SHOWN: dict[str, tuple[str, Callable[[Any], str]]] = {
-    "live_page": ("live.md", live_page_text),
-    "live": ("benchmarks.md", live_text),
-    "rigid_bodies": ("benchmarks.md", rigid_bodies_text),
-    "reading_fields": ("forces_and_stresses.md", reading_text),
-=======
 from benchmarks.table import table_text
-from benchmarks.tables import live_text, rigid_bodies_text, speed_text
+from benchmarks.tables import live_text, reading_text, rigid_bodies_text, speed_text
 from supple.files.replacing import whole_file
 
 DOCS = ROOT / "docs"
@@ -47,12 +35,12 @@ SHOWN = {
     "live_page": Part("live.md", ("live_page",), live_page_text),
     "live": Part("benchmarks.md", ("live",), live_text),
     "rigid_bodies": Part("benchmarks.md", ("rigid_bodies",), rigid_bodies_text),
+    "reading_fields": Part("forces_and_stresses.md", ("reading_fields",), reading_text),
     "speed": Part("../README.md", ("hanging_beam", "projections"), speed_text),
     **_tables("benchmarks.md", "startup", "projections", "hanging_beam", "work_precision", "implicit_scaling"),
     **_tables("benchmarks.md", "contact_scenes", "small_scenes", "bear_pile", "candidate_search"),
     **_tables("locking.md", "quadratic_tets"),
     **_tables("rigid_bodies.md", "rigid_heap"),
->>>>>>> f417ce3e95075a4494f7c252a1f39a21eeb9e99c
 }
 
 

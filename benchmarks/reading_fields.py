@@ -12,7 +12,8 @@ import time
 from typing import Any
 
 import supple as sp
-from benchmarks.published import circumstances, publish
+from benchmarks.published import publish
+from benchmarks.table import circumstances
 from supple.demos.actuators.bellows import bellows
 from supple.readings.fields import FIELDS
 from supple.xpbd.details import XPBDDetails

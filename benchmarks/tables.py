@@ -50,7 +50,6 @@ def live_text(figures: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-<<<<<<< HEAD
 def reading_text(figures: dict[str, Any]) -> str:
     """The sentences of `benchmarks.reading_fields`."""
     slowest = sorted(figures["fields"], key=figures["fields"].__getitem__, reverse=True)[:3]
@@ -63,7 +62,9 @@ def reading_text(figures: dict[str, Any]) -> str:
             f"{figures['ms_per_step']:.0f} ms with {figures['substeps']:.0f} substeps. Most of it: {parts}.",
             measured_on(figures),
         ]
-=======
+    )
+
+
 def speed_text(beam: dict[str, Any], projections: dict[str, Any]) -> str:
     """The sentence of README.md about speed, from `benchmarks.hanging_beam` and `benchmarks.projections`."""
     ours = row_of(beam, "Supple XPBD, 20 substeps")
@@ -76,5 +77,4 @@ def speed_text(beam: dict[str, Any], projections: dict[str, Any]) -> str:
         f"substeps):\n{newton['ratio']:.1f} times as fast as Newton's XPBD and {mujoco['ratio']:.1f} times as fast as "
         f"MuJoCo's flex in the same run; constraint projections\nrun at {min(ratios):.1f} to {max(ratios):.1f} times "
         "plain C ([how it was measured](docs/benchmarks.md))."
->>>>>>> f417ce3e95075a4494f7c252a1f39a21eeb9e99c
     )
