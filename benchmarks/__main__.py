@@ -16,13 +16,14 @@ from benchmarks import (
     rigid_heap,
     small_scenes,
     startup,
+    tolerances,
     work_precision,
 )
 
 if __name__ == "__main__":
     startup.run()
     projections.run()
-    automatic_substeps.main()
+    automatic_substeps.run()
     hanging_beam.run()
     work_precision.run()
     implicit_scaling.run()
@@ -30,6 +31,7 @@ if __name__ == "__main__":
     contact_scenes.run()
     small_scenes.run()
     bear_pile.run()
+    tolerances.write()
     quadratic_tets.run()
     reading_fields.run()
     rigid_bodies.run()

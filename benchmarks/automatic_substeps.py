@@ -17,11 +17,14 @@ import logging
 import math
 import sys
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 from scipy.optimize import curve_fit
 
 import supple as sp
+from benchmarks.published import publish
+from benchmarks.table import Table
 
 # Wider than thick: of a square beam, both bending modes have nearly the same frequency, and beat.
 CELLS, WIDTH, DENSITY = (8, 2, 3), 1.5, 1000.0
@@ -85,22 +88,24 @@ def frequency(youngs: float, poisson: float, size: float, dt: float, exact: floa
     return str(report.status), report.iterations, expected / period(frames, size, expected) - 1.0
 
 
-def row(found: list[Found | None]) -> str:
+def row(found: list[Found | None]) -> list[Any]:
     """Errors of the cases that converged, substeps, softened cases and those that were left out."""
     run = [each for each in found if each is not None]
     good = np.array([abs(error) for status, _, error in run if status == "converged"])
     soft = np.array([abs(error) for status, _, error in run if status == "softened"])
     counts = [count for status, count, _ in run if status == "converged"]
-    others = sorted({status for status, _, _ in run} - {"converged", "softened"})
-    softened = f"{len(soft)}, {np.median(soft):.0%}" if len(soft) else "0"
-    errors = f"{np.median(good):.2%}, {good.max():.2%} | {min(counts)} to {max(counts)}" if len(good) else "none |"
-    return f"{len(good)} of {len(run)} | {errors} | {softened} | {len(found) - len(run)} {' '.join(others)}"
+    errors = [float(np.median(good)), float(good.max()), f"{min(counts)} to {max(counts)}"] if len(good) else [None] * 3
+    others = sum(status not in ("converged", "softened") for status, _, _ in run)
+    softened = [len(soft), float(np.median(soft)) if len(soft) else None]
+    return [f"{len(good)} of {len(run)}", *errors, *softened, others, len(found) - len(run)]
 
 
-def main(quick: bool = False) -> None:
-    """Print two rows for each nu."""
+def main(quick: bool = False) -> dict[str, Any]:
+    """Print two rows for each nu; returns the figures."""
     logging.disable(logging.WARNING)
-    print("nu | converged, of cases | their errors: median, largest | substeps | softened, median error | left out")
+    columns = {"nu": "g", "of": "", "converged": "", "median error": ".2%", "largest": ".2%", "substeps": ""}
+    columns |= {"softened": "d", "median error of these": ".0%", "other statuses": "d", "left out": "d"}
+    table = Table("XPBD's automatic number of substeps", columns)
     for poisson in POISSON:
         *_, still = sp.simulate(scene(1e5, poisson, 0.1), sp.Implicit(integrator="static", contact=None), 1 / 60, 2)
         reference = sag(still, 0.1)
@@ -115,10 +120,19 @@ def main(quick: bool = False) -> None:
             for dt in STEPS[:: 2 if quick else 1]
         ]
         sags = [case(youngs, poisson, size, dt, reference) for youngs, size, dt in cases]
-        print(f"{poisson:g} sag | {row(sags)}", flush=True)
+        table.add(poisson, "sag", *row(sags))
         tones = [frequency(youngs, poisson, size, dt, exact) for youngs, size, dt in cases]
-        print(f"{poisson:g} frequency | {row(tones)}", flush=True)
+        table.add(poisson, "frequency", *row(tones))
+    return table.figures()
+
+
+def run() -> None:
+    """Measure, and write the figures of docs/xpbd.md."""
+    publish("automatic_substeps", main())
 
 
 if __name__ == "__main__":
-    main("--quick" in sys.argv[1:])
+    if "--quick" in sys.argv[1:]:
+        main(quick=True)
+    else:
+        run()

@@ -39,8 +39,10 @@ SHOWN = {
     "speed": Part("../README.md", ("hanging_beam", "projections"), speed_text),
     **_tables("benchmarks.md", "startup", "projections", "hanging_beam", "work_precision", "implicit_scaling"),
     **_tables("benchmarks.md", "contact_scenes", "small_scenes", "bear_pile", "candidate_search"),
+    **_tables("implicit.md", "tolerances"),
     **_tables("locking.md", "quadratic_tets"),
     **_tables("rigid_bodies.md", "rigid_heap"),
+    **_tables("xpbd.md", "automatic_substeps"),
 }
 
 

@@ -10,10 +10,13 @@ weight. Scenes in which surfaces bounce amplify errors, so that differences grow
 from __future__ import annotations
 
 import sys
+from typing import Any
 
 import numpy as np
 
 import supple as sp
+from benchmarks.published import publish
+from benchmarks.table import Table
 from supple.implicit.details import ImplicitDetails
 
 TOLERANCES = (None, 1e-1, 1e-2, 1e-3, 1e-4)
@@ -61,8 +64,10 @@ def run(scene: sp.Scene, tolerance: float | None, steps: int) -> tuple[np.ndarra
     return np.array(positions), np.array(forces), iterations / steps
 
 
-def main(steps: int = 30) -> None:
-    print(f"{'scene':<8}{'tolerance':>10}{'Newton':>8}{'positions':>11}{'forces':>9}")
+def main(steps: int = 20) -> dict[str, Any]:
+    """Print the table; returns its figures."""
+    columns = {"scene": "", "`tolerance`": "", "Newton a step": ".1f", "positions": ".1e", "forces": ".1e"}
+    table = Table(f"Largest errors in {steps} steps", columns)
     for name, scene in SCENES.items():
         exact, exact_forces, _ = run(scene(), REFERENCE, steps)
         diagonal = float(np.linalg.norm(np.ptp(scene().bodies[0].mesh.vertices, axis=0)))
@@ -71,9 +76,17 @@ def main(steps: int = 30) -> None:
             x, f, iterations = run(scene(), tolerance, steps)
             moved = np.abs(x - exact).max() / diagonal
             pushed = np.abs(f - exact_forces).max() / weight
-            label = "default" if tolerance is None else f"{tolerance:.0e}"
-            print(f"{name:<8}{label:>10}{iterations:8.1f}{moved:11.1e}{pushed:9.1e}", flush=True)
+            table.add(name, "default" if tolerance is None else f"{tolerance:.0e}", iterations, moved, pushed)
+    return table.figures()
+
+
+def write() -> None:
+    """Measure, and write the figures of docs/implicit.md."""
+    publish("tolerances", main())
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    if sys.argv[1:]:
+        main(*map(int, sys.argv[1:]))
+    else:
+        write()

@@ -1,6 +1,7 @@
 """The page in a browser, with a fake simulation: what is above the picture, keys, themes, phones, values with units."""
 
 import random
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +12,7 @@ from supple.output.viser_server import start_server, stop_server
 from supple.viewer.app import configure_page
 from supple.viewer.live_page import LivePage
 from supple.viewer.protocol.commands import Grab, Pause, Play, ReleaseGrab, Reset, SetParameter, Step
-from supple.viewer.protocol.snapshots import GrabState
+from supple.viewer.protocol.snapshots import GrabState, Timing
 from supple.viewer.server.gate import gate
 from supple.viewer.server.page.served_page import ServedPage
 
@@ -226,6 +227,20 @@ def test_a_phone_has_a_drawer_and_buttons_for_time(fresh):
     assert tab.locator(".mantine-Slider-root").evaluate_all(TOUCHING) == []
     connected.click()
     fresh.screen.wait(lambda: drawer() > 730, "the closed drawer")
+
+
+def test_notifications_do_not_cover_the_state_and_the_warning(fresh):
+    tab, fake = fresh.tab, fresh.fake
+    measures = replace(fresh.start.measures, iterations=20)
+    fake.show(paused=False, timing=Timing(40.0, 25.0, 0.42, keeps_up=False), measures=measures)
+    fresh.screen.wait(lambda: tab.locator("#supple-warning button").count() == 1, "the warning")
+    fresh.screen.client.add_notification("viser", "as where there is no graphics card", auto_close_seconds=None)
+    notification = tab.locator(".mantine-Notification-root").last
+    for size in (WIDE, PHONE):
+        tab.set_viewport_size(size)
+        boxes = [tab.locator(name).bounding_box() for name in ("#supple-state", "#supple-warning")]
+        fresh.screen.wait(lambda: notification.bounding_box()["width"] > 0.5 * PHONE["width"], "the notification")
+        assert all(notification.bounding_box()["y"] >= box["y"] + box["height"] for box in boxes)
 
 
 def test_the_bodies_stay_in_the_picture_of_a_window_that_becomes_a_phone(fresh):
