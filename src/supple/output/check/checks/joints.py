@@ -46,7 +46,7 @@ class Joints(FrameCheck):
     def see(self, at: Snapshot) -> None:
         for joint, frame in zip(self.scene.recording.joints, self._frames, strict=True):
             recorded = self._of_report("joint_coordinates", joint.name, at.number)
-            error, coordinate = frame.error(at, recorded)
+            error, coordinate, strain = frame.error(at, recorded)
             where = joint.name
             before, last = self._last.get(joint.name, (at.time, coordinate))
             self._last[joint.name] = at.time, coordinate
@@ -54,7 +54,8 @@ class Joints(FrameCheck):
                 too_far = (abs(coordinate - last) - joint.max_velocity * (at.time - before)) / frame.unit
                 error, where = (too_far, f"{joint.name}, its rate") if too_far > error else (error, where)
             differs = 0.0 if recorded is None else abs(coordinate - recorded) / frame.unit
-            if differs > max(error, self._most):
+            # Where a body is not quite rigid, an angle depends on the material that it is taken from.
+            if differs > max(error, self._most, strain):
                 error, where = differs, f"{joint.name}, its recorded coordinate"
             effort = self._of_report("motor_forces", joint.name, at.number)
             beyond = effort is not None and not abs(effort) <= joint.max_force * (1.0 + 1e-9)
@@ -99,8 +100,11 @@ class _Frame:
         points = np.einsum("sji,sj->si", R, joint.point - t)
         return cls(scene, joint, points, (axes @ R).astype(np.float64), size, size if joint.kind == "slider" else 1.0)
 
-    def error(self, at: Snapshot, near: float | None) -> tuple[float, float]:
-        """The error and the coordinate; of an angle the one nearest to `near`, or to the middle of the limits."""
+    def error(self, at: Snapshot, near: float | None) -> tuple[float, float, float]:
+        """The error, the coordinate, and the larger |F^T F - 1| of the two sides.
+
+        Of an angle, the coordinate is the one nearest to `near`, or to the middle of the limits.
+        """
         kind = self.joint.kind
         (F, p), (G, q) = (self._side(at, k) for k in (0, 1))
         gap = p - q
@@ -124,7 +128,8 @@ class _Frame:
             errors.append(float(turned.max()))
         low, high = self.joint.limits
         errors.append(max(low - coordinate, coordinate - high, 0.0) / self.unit)
-        return max(errors), coordinate
+        strain = max(float(np.linalg.norm(side.T @ side - np.eye(3))) for side in (F, G))
+        return max(errors), coordinate, strain
 
     def _twisted_beyond(self, R: NDArray[np.float64]) -> float:
         """How far the twist of the rotation R (3, 3), in the joint's axes, is beyond its limits [rad]."""
