@@ -252,6 +252,21 @@ def test_a_motor_that_nothing_can_move_is_named():
     assert "joint 'driven' is off by 100 % of the way of its motor" in frame.report.message
 
 
+@pytest.mark.parametrize(("solver", "refusal"), [(sp.XPBD(), "softened"), (sp.Implicit(), "iteration_limit")])
+def test_a_velocity_motor_at_the_limit_of_another_joint_needs_a_largest_force(solver, refusal):
+    """The limit is reached in the first of two frames."""
+    for force, status in ((20.0, "converged"), (None, refusal)):
+        driven = sp.SliderJoint("bar", axis=(1, 0, 0), motor=sp.VelocityMotor(0.2, max_force=force))
+        stop = sp.SliderJoint("bar", axis=(1, 0, 0), limits=(-2e-3, 2e-3), name="stop")
+        scene = sp.Scene([bar()], joints=[driven, stop], gravity=(0, 0, 0))
+        *_, frame = sp.simulate(scene, solver, 1 / 60, 2)
+        assert frame.report.status == status
+        if force is not None:
+            assert frame.report.joints["stop"].coordinate == pytest.approx(2e-3, abs=1e-6)
+        else:
+            assert "another joint" in frame.report.message
+
+
 @pytest.mark.parametrize("motor", [sp.VelocityMotor(-0.1), sp.PositionMotor(lambda t: -0.1 * t, 1e6, 1e3)])
 def test_motors_push_on_against_contact(motor):
     """Through 25 of 100 mm of soft material. Motors that did not answer to contact fell back by up to 11 mm."""

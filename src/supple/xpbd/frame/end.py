@@ -72,7 +72,7 @@ def end_frame(
         viscous=None if damping is None else damping.memory(v),
         ledger=ledger,
         measured=measured,
-        substeps=float(used.count) if repeats and problem is None else FALL * before.substeps,
+        substeps=float(used.count) if repeats else FALL * before.substeps,
         sleep=rest,
         futile=frozenset() if problem is None else before.futile | ({problem} if repeats else set()),
     )
