@@ -24,14 +24,32 @@ def moved():
     return x, after, far, near, pieces, common
 
 
-def beyond(moved):
+def beyond(moved, each=1):
     x, after, far, near, pieces, common = moved
-    return any_beyond_radii(after, after, x, far, near, pieces, True, common, np.zeros(len(x)))
+    return any_beyond_radii(after, after, x, far, near, pieces, True, each, common, np.zeros(len(x)))
+
+
+def test_some_of_the_points_tell_the_motion_of_a_piece(moved):
+    """Points that are not asked for the common motion are compared with it as all others."""
+    _, after, *_ = moved
+    assert not beyond(moved, each=3)
+    after[7, 1] += 3e-3
+    assert beyond(moved, each=3)
+
+
+def test_what_hardly_moves_needs_no_common_motion(moved):
+    """One point moves against all others, by less than its radius; against their common motion it moves by more."""
+    x, after, *_ = moved
+    after[:] = x - [0.0, 0.0, 9e-4]
+    after[7, 2] += 18e-4
+    assert not beyond(moved)
+    after[7, 2] += 2e-4
+    assert beyond(moved)
 
 
 def test_a_rigid_motion_of_a_piece_changes_no_distance_in_it(moved):
     x, after, _, _, pieces, common = moved
-    common_motions(x, after - x, pieces, True, common)
+    common_motions(x, after - x, pieces, True, 1, common)
     drifts, centers, turns = common
     own = drifts[pieces] + np.einsum("nij,nj->ni", turns[pieces], x - centers[pieces])
     np.testing.assert_allclose(own, after - x, atol=1e-13)

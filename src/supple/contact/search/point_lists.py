@@ -16,17 +16,16 @@ from supple.contact.search.room import Room
 from supple.contact.surface.distances import point_triangle_square
 from supple.numerics.adjacency import in_list
 from supple.numerics.geometry.box_tree import (
+    GROUP,
     STACK,
     BoxTree,
     from_root,
     morton_codes,
     near_boxes,
     next_leaf,
+    which_overlap,
 )
 from supple.numerics.kernel_cache import njit, prange
-
-# Points that share one walk through the tree; see docs/xpbd_contact.md.
-GROUP = 16
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
@@ -41,26 +40,10 @@ def _boxes_of_triangles(points, triangles, radii, out):
 
 
 @njit(error_model="numpy")
-def _which_overlap(nodes, k, boxes):
-    """The boxes (6, GROUP) that node k overlaps, as bits of a number. Without branches, this is vector code."""
-    found = 0
-    for i in range(GROUP):
-        found |= (
-            (boxes[0, i] <= nodes[k, 3])
-            & (boxes[3, i] >= nodes[k, 0])
-            & (boxes[1, i] <= nodes[k, 4])
-            & (boxes[4, i] >= nodes[k, 1])
-            & (boxes[2, i] <= nodes[k, 5])
-            & (boxes[5, i] >= nodes[k, 2])
-        ) << i
-    return found
-
-
-@njit(error_model="numpy")
 def _near_group(group, shapes, radii, rules, same, tree, pieces, found, count, scratch):
     """Append the triangles near the points of a group, of their own piece or of others; returns the number of all.
 
-    One walk through the tree serves all points of the group.
+    One walk through the tree serves all points of the group; see docs/xpbd_contact.md.
 
     Parameters
     ----------
@@ -91,7 +74,7 @@ def _near_group(group, shapes, radii, rules, same, tree, pieces, found, count, s
         if leaf < 0:
             continue
         t = order[leaf]
-        meets = _which_overlap(nodes, leaves + leaf, boxes)
+        meets = which_overlap(nodes, leaves + leaf, boxes)
         if meets == 0 or not allowed[mine, triangle_piece[t]]:
             continue
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]

@@ -21,12 +21,12 @@ def any_beyond_reach(x, x_gathered, reach):
 
 
 @njit(cache=True, error_model="numpy")
-def common_motions(points, motions, pieces, all_share, common):
+def common_motions(points, motions, pieces, all_share, each, common):
     """The motion of each piece as a rigid body, nearest to the motions (n, 3) of its points (n, 3).
 
     Parameters
     ----------
-    pieces : (n,)
+    pieces : (n,); each : only every so many of the points are asked
     all_share : whether the mean motion of all points is common to them; otherwise it counts as zero
     common : drifts (p + 1, 3), centers (p, 3) and turns (p, 3, 3), set here: point X of piece k moves by
         drifts[k] + turns[k] (X - centers[k]); drifts[-1] is the mean motion of all points
@@ -34,7 +34,7 @@ def common_motions(points, motions, pieces, all_share, common):
     drifts, centers, turns = common
     drifts[:], centers[:] = 0.0, 0.0
     counts = np.zeros(len(drifts))
-    for i in range(len(motions)):
+    for i in range(0, len(motions), each):
         k = pieces[i]
         counts[k] += 1.0
         for j in range(3):
@@ -50,14 +50,14 @@ def common_motions(points, motions, pieces, all_share, common):
             drifts[k, j] /= max(1.0, counts[k])
             if k < len(centers):
                 centers[k, j] /= max(1.0, counts[k])
-    _turn(points, motions, pieces, drifts, centers, turns)
+    _turn(points, motions, pieces, each, drifts, centers, turns)
 
 
 @njit(error_model="numpy")
-def _turn(points, motions, pieces, drifts, centers, turns):
+def _turn(points, motions, pieces, each, drifts, centers, turns):
     """Set each turn to Q - 1, with Q the polar factor of sum (X + u - mean) (X - center)^T."""
     turns[:] = 0.0
-    for i in range(len(motions)):
+    for i in range(0, len(motions), each):
         k = pieces[i]
         X = subtract(row(points, i), row(centers, k))
         for r in range(3):
@@ -113,24 +113,32 @@ def search_radii(points, motions, moved, excursions, pieces, common, scales, far
 
 
 @njit(cache=True)
-def any_beyond_radii(x, x_prev, x_gathered, far, near, pieces, all_share, common, excursions):
+def any_beyond_radii(x, x_prev, x_gathered, far, near, pieces, all_share, each, common, excursions):
     """Whether some point has moved farther than `search_radii` allowed, absolutely or relative to its piece.
 
     Parameters
     ----------
     x, x_prev, x_gathered : (n, 3) now, at the beginning of the substep, and when lists were made [m]
-    far, near : from `search_radii`; pieces : (n,); all_share : see `common_motions`
+    far, near : from `search_radii`; pieces : (n,); all_share, each : see `common_motions`
     common : scratch memory, see `common_motions`
     excursions : (n,) increased to the motion of each point within this substep, where that is larger [m]
     """
+    far_enough = False
     for i in range(len(x)):
-        square = 0.0
+        square = total = 0.0
         for j in range(3):
             square += (x[i, j] - x_prev[i, j]) ** 2
+            total += (x[i, j] - x_gathered[i, j]) ** 2
         if square > excursions[i] ** 2:
             excursions[i] = math.sqrt(square)
+        if not (total <= far[i, 2] ** 2 and total <= near[i, 2] ** 2):
+            far_enough = True
+    # What moves less than its radii allow does so relative to anything that is at rest, too.
+    if not far_enough:
+        return False
     moved = x - x_gathered
-    common_motions(x_gathered, moved, pieces, all_share, common)
+    # No distance depends on which motions are taken for common.
+    common_motions(x_gathered, moved, pieces, all_share, each, common)
     for i in range(len(x)):
         absolute, relative = _relative_squares(x_gathered, moved, i, pieces[i], common)
         # The negated form is also true for positions that are not finite.

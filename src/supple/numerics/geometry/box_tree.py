@@ -28,6 +28,8 @@ from supple.numerics.kernel_cache import njit, prange
 
 # Entries of a search's stack: a tree over 2^31 primitives has 32 levels, and a search begins with one node of each.
 STACK = 80
+# Boxes that are compared with one node at once.
+GROUP = 16
 # Subtrees that are refitted independently of each other.
 _SUBTREES = 64
 # A tree is sorted again where its nodes have grown by this factor since it was sorted.
@@ -125,6 +127,22 @@ def overlap(nodes, i, box):
         & (nodes[i, 2] <= box[5])
         & (nodes[i, 5] >= box[2])
     )
+
+
+@njit(error_model="numpy")
+def which_overlap(nodes, i, boxes):
+    """The boxes (6, GROUP) that node i overlaps, as bits of a number. Without branches, this is vector code."""
+    found = 0
+    for k in range(GROUP):
+        found |= (
+            (boxes[0, k] <= nodes[i, 3])
+            & (boxes[3, k] >= nodes[i, 0])
+            & (boxes[1, k] <= nodes[i, 4])
+            & (boxes[4, k] >= nodes[i, 1])
+            & (boxes[2, k] <= nodes[i, 5])
+            & (boxes[5, k] >= nodes[i, 2])
+        ) << k
+    return found
 
 
 @njit(error_model="numpy")

@@ -8,7 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.numerics.adjacency import in_list
-from supple.numerics.geometry.box_tree import STACK, BoxTree, after_leaf, boxes_of_triangles, next_leaf, overlap
+from supple.numerics.geometry.box_tree import (
+    GROUP,
+    STACK,
+    BoxTree,
+    after_leaf,
+    boxes_of_triangles,
+    next_leaf,
+    overlap,
+    which_overlap,
+)
 from supple.numerics.geometry.exact_predicates import side_of_line, side_of_plane
 from supple.numerics.geometry.vertex_stars import simple_stars
 from supple.numerics.kernel_cache import njit, prange
@@ -18,8 +27,6 @@ APART, TOUCHING, CROSSING = 0, 1, 2
 
 # Triangles are divided into this many runs, whatever the number of threads.
 _RUNS = 64
-# Leaves of a block: their walk through the tree is one. A power of two.
-_BLOCK = 16
 
 
 @njit
@@ -124,47 +131,68 @@ def _unit(v):
 
 
 @njit
-def _clearly_apart(x, first, second):
-    """Whether a plane normal to the line between the triangles' centers separates them, by more than round-off.
+def _between_centers(x, first, second):
+    """Whether a plane normal to the line between the centers of two triangles without common vertices separates them,
+    by more than round-off. This separates nearly all of them, in a small part of the time of the exact test."""
+    o = row(x, first[0])
+    b, c = subtract(row(x, first[1]), o), subtract(row(x, first[2]), o)
+    p, q, r = subtract(row(x, second[0]), o), subtract(row(x, second[1]), o), subtract(row(x, second[2]), o)
+    d = (
+        b[0] + c[0] - (p[0] + q[0] + r[0]),
+        b[1] + c[1] - (p[1] + q[1] + r[1]),
+        b[2] + c[2] - (p[2] + q[2] + r[2]),
+    )
+    least, most = min(0.0, dot(d, b), dot(d, c)), max(dot(d, p), dot(d, q), dot(d, r))
+    size = max(_size(b), _size(c), _size(p), _size(q), _size(r))
+    return least - most > 1e-12 * (abs(d[0]) + abs(d[1]) + abs(d[2])) * size
 
-    Where they share a vertex, the plane passes through it, halfway between the directions to both centers, and the
-    other vertices must be clearly on their sides. This separates nearly all neighbours on a surface, in a small part of
-    the time of the exact test.
+
+@njit
+def _size(v):
+    return max(abs(v[0]), abs(v[1]), abs(v[2]))
+
+
+@njit
+def _beside_corner(x, first, second, at):
+    """Whether a plane through the one common vertex `at` of two triangles separates them, by more than round-off.
+
+    It is halfway between the directions to both centers, and the other vertices must be clearly on their sides.
     """
-    origin = row(x, first[0])
-    shared = False
-    for k in range(3):
-        if _is_corner(first[k], second):
-            origin, shared = row(x, first[k]), True
-    to_first, to_second = _to_center(x, first, origin), _to_center(x, second, origin)
-    if shared:
-        to_first, to_second = _unit(to_first), _unit(to_second)
-    dx, dy, dz = subtract(to_first, to_second)
+    origin = row(x, at)
+    d = subtract(_unit(_to_center(x, first, origin)), _unit(_to_center(x, second, origin)))
     least, most, size = np.inf, -np.inf, 0.0
     for k in range(3):
-        u, v = subtract(row(x, first[k]), origin), subtract(row(x, second[k]), origin)
-        size = max(size, abs(u[0]), abs(u[1]), abs(u[2]), abs(v[0]), abs(v[1]), abs(v[2]))
-        if not (shared and u[0] == 0.0 and u[1] == 0.0 and u[2] == 0.0):
-            least = min(least, dx * u[0] + dy * u[1] + dz * u[2])
-        if not (shared and v[0] == 0.0 and v[1] == 0.0 and v[2] == 0.0):
-            most = max(most, dx * v[0] + dy * v[1] + dz * v[2])
-    margin = 1e-12 * (abs(dx) + abs(dy) + abs(dz)) * size
-    if shared:
-        return least > margin and most < -margin
-    return least - most > margin
+        if first[k] != at:
+            u = subtract(row(x, first[k]), origin)
+            least, size = min(least, dot(d, u)), max(size, _size(u))
+        if second[k] != at:
+            v = subtract(row(x, second[k]), origin)
+            most, size = max(most, dot(d, v)), max(size, _size(v))
+    margin = 1e-12 * (abs(d[0]) + abs(d[1]) + abs(d[2])) * size
+    return least > margin and most < -margin
+
+
+@njit
+def _shared(first, second):
+    """The number of common vertices of two triangles, and one of them."""
+    shared, at = 0, 0
+    for k in range(3):
+        if _is_corner(first[k], second):
+            shared, at = shared + 1, first[k]
+    return shared, at
 
 
 @njit
 def triangles_meet(x, first, second, sides):
-    """Whether two triangles (3,) of indices into x (n, 3) are apart, touch or cross; shared vertices do not count.
+    """Whether two triangles are apart, touch or cross, beside the vertices that they share.
 
-    `sides` (2, 3) is work space.
+    They are tuples of three indices into x (n, 3); `sides` (2, 3) is work space.
     """
-    shared = 0
-    for k in range(3):
-        shared += _is_corner(first[k], second)
+    shared, at = _shared(first, second)
     # Where they share an edge, every edge of one has a vertex of the other.
-    if shared > 1 or _clearly_apart(x, first, second):
+    if shared > 1:
+        return APART
+    if _between_centers(x, first, second) if shared == 0 else _beside_corner(x, first, second, at):
         return APART
     if _sides(x, first, second, sides[0]) or _sides(x, second, first, sides[1]):
         return APART
@@ -185,28 +213,16 @@ def triangles_meet(x, first, second, sides):
 
 
 @njit(error_model="numpy")
-def _is_separate(triangles, i, j, simple):
-    """Whether triangles i and j share an edge, or a vertex that `simple_stars` says is simple."""
-    a, b, c = triangles[j, 0], triangles[j, 1], triangles[j, 2]
-    shared, at = 0, 0
-    for k in range(3):
-        v = triangles[i, k]
-        if v in (a, b, c):
-            shared, at = shared + 1, v
-    # Where they share an edge, every edge of one has a vertex of the other.
-    return shared > 1 or (shared == 1 and simple[at])
-
-
-@njit(error_model="numpy")
 def _crossings_of_run(r, x, triangles, owner, collide, ignored, tree, simple, most, pairs, kinds):
     """Write the pairs of every `_RUNS`-th block, in it and with later ones, as far as they fit; returns how many."""
     nodes, labels, _ = tree
     leaves = len(nodes) // 2
-    blocks = max(1, leaves // _BLOCK)
+    blocks = max(1, leaves // GROUP)
     # The tree of which the blocks are the leaves.
     upper = nodes[: 2 * blocks]
     stack = np.empty(STACK, dtype=np.int64)
-    sides = np.zeros((2, 3), dtype=np.int64)
+    # Where the tree has fewer leaves than a block, the last boxes overlap nothing.
+    scratch = np.zeros((2, 3), dtype=np.int64), np.full((6, GROUP), np.nan)
     count = 0
     for one in range(r, blocks, _RUNS):
         label = labels[blocks + one]
@@ -217,7 +233,7 @@ def _crossings_of_run(r, x, triangles, owner, collide, ignored, tree, simple, mo
         other = one
         while other >= 0:
             count = _crossings_of_blocks(
-                one, other, x, triangles, owner, collide, ignored, tree, simple, most, sides, count, pairs, kinds
+                one, other, x, triangles, owner, collide, ignored, tree, simple, most, scratch, count, pairs, kinds
             )
             if count == most:
                 return count
@@ -227,28 +243,38 @@ def _crossings_of_run(r, x, triangles, owner, collide, ignored, tree, simple, mo
 
 @njit(error_model="numpy")
 def _crossings_of_blocks(
-    one, other, x, triangles, owner, collide, ignored, tree, simple, most, sides, count, pairs, kinds
+    one, other, x, triangles, owner, collide, ignored, tree, simple, most, scratch, count, pairs, kinds
 ):
     """Write the pairs of triangles of two blocks, or of one, after `count` pairs; returns the number of all."""
     nodes, _, order = tree
+    sides, boxes = scratch
     leaves = len(nodes) // 2
-    size = min(_BLOCK, leaves)
-    whole = leaves // size + other
+    size = min(GROUP, leaves)
+    whole, begin = leaves // size + other, other * size
+    for k in range(size):
+        for j in range(6):
+            boxes[j, k] = nodes[leaves + begin + k, j]
     for q in range(one * size, min((one + 1) * size, len(order))):
         box = nodes[leaves + q]
         if not overlap(nodes, whole, box):
             continue
+        meets = which_overlap(nodes, leaves + q, boxes)
+        if meets >> max(q + 1 - begin, 0) == 0:
+            continue
         i = order[q]
-        for leaf in range(max(q + 1, other * size), min((other + 1) * size, len(order))):
-            if not overlap(nodes, leaves + leaf, box):
+        first = triangles[i, 0], triangles[i, 1], triangles[i, 2]
+        for leaf in range(max(q + 1, begin), min(begin + size, len(order))):
+            if not (meets >> (leaf - begin)) & 1:
                 continue
             j = order[leaf]
             low, high = min(i, j), max(i, j)
-            if not collide[owner[i], owner[j]] or _is_separate(triangles, i, j, simple):
+            second = triangles[j, 0], triangles[j, 1], triangles[j, 2]
+            shared, at = _shared(first, second)
+            if shared > 1 or (shared == 1 and simple[at]):
                 continue
-            if in_list(ignored, low, high):
+            if not collide[owner[i], owner[j]] or in_list(ignored, low, high):
                 continue
-            kind = triangles_meet(x, triangles[i], triangles[j], sides)
+            kind = triangles_meet(x, first, second, sides)
             if kind == APART:
                 continue
             if count < len(pairs):

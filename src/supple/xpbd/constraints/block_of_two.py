@@ -54,13 +54,18 @@ def block_of_two(x, w, b, material, k, h2):
     material : mu V, lam V [J], 1 + mu / lam, and the longest step [s^2]
     k : diagonal of sum w b b^T [1/(kg m^2)]; h2 : square of the length of the substep [s^2]
     """
+    step = min(h2, material[3])
+    f, c, J = deformation_of(x, b)
+    return moved_by_stress(x, w, b, stress_of_step(f, c, J, material, k, step), step)
+
+
+@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+def moved_by_stress(x, w, b, s, step):
+    """The corners after the impulses of a stress s, times V, over a step [s^2]; see `stress_of_step`."""
     x0, y0, z0, x1, y1, z1, x2, y2, z2, x3, y3, z3 = x
     w0, w1, w2, w3 = w
     b10, b11, b12, b20, b21, b22, b30, b31, b32 = b
-    step = min(h2, material[3])
-    f, c, J = deformation_of(x, b)
-    s00, s01, s02, s10, s11, s12, s20, s21, s22 = stress_of_step(f, c, J, material, k, step)
-
+    s00, s01, s02, s10, s11, s12, s20, s21, s22 = s
     # dx_i = -w_i step S b_i, with b_0 = -(b_1 + b_2 + b_3)
     d1x, d1y, d1z = (
         s00 * b10 + s01 * b11 + s02 * b12,

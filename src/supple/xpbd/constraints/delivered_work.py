@@ -22,10 +22,11 @@ from numpy.typing import NDArray
 
 from supple.numerics.kernel_cache import njit
 from supple.system import System
-from supple.xpbd.constraints.block_of_two import constants_of_tet, deformation_of, stress_of_step
+from supple.xpbd.constraints.block_of_two import constants_of_tet, deformation_of, moved_by_stress, stress_of_step
 from supple.xpbd.constraints.stable_neo_hookean import StableNeoHookeanConstraints
 from supple.xpbd.sweeps.compilation import FLAGS
-from supple.xpbd.sweeps.lanes import nine
+from supple.xpbd.sweeps.groups import WIDTH
+from supple.xpbd.sweeps.lanes import nine, put_twelve, twelve
 
 if TYPE_CHECKING:
     from supple.xpbd.constraints.registry import ConstraintSet
@@ -79,44 +80,46 @@ class DeliveredWork:
 @njit(cache=True, fastmath=FLAGS, error_model="numpy")
 def _works(before, after, corners, counts, active, data, pointers, h2, out):
     """Sweep over `before` as `Sweep` does: even chunks, then odd ones."""
+    X, Y, sums = np.zeros((12, WIDTH)), np.zeros((12, WIDTH)), np.zeros((3, WIDTH))
     for parity in range(2):
         for chunk in range(parity, len(pointers) - 1, 2):
             for g in range(pointers[chunk], pointers[chunk + 1]):
                 if active[g]:
                     for lane in range(counts[g]):
-                        _add_tet(before, after, corners[g, lane], data, g, lane, h2, out[g])
-
-
-@njit(fastmath=FLAGS, error_model="numpy")
-def _add_tet(before, after, corners, data, g, lane, h2, out):
-    b = nine(data[g], lane)
-    material, k, w = constants_of_tet(data, g, lane)
-    step = min(h2, material[3])
-    f, c, J = deformation_of(_places(before, corners), b)
-    s = stress_of_step(f, c, J, material, k, step)
-    for j in range(3):
-        d1 = s[3 * j] * b[0] + s[3 * j + 1] * b[1] + s[3 * j + 2] * b[2]
-        d2 = s[3 * j] * b[3] + s[3 * j + 1] * b[4] + s[3 * j + 2] * b[5]
-        d3 = s[3 * j] * b[6] + s[3 * j + 1] * b[7] + s[3 * j + 2] * b[8]
-        before[corners[0], j] += w[0] * step * (d1 + d2 + d3)
-        before[corners[1], j] -= w[1] * step * d1
-        before[corners[2], j] -= w[2] * step * d2
-        before[corners[3], j] -= w[3] * step * d3
-    f, c, J = deformation_of(_places(after, corners), b)
-    t = stress_of_step(f, c, J, material, k, 0.0)
-    lacks, has = 0.0, 0.0
-    for j in range(9):
-        u = 0.5 * (f[j] - c[j] / max(J, LEAST_J))
-        lacks += (t[j] - s[j] * step / h2) * u
-        has += t[j] * u
-    out[0] += lacks
-    out[1] += has
-    out[2] += abs(lacks)
+                        _gather(before, corners[g, lane], lane, X)
+                        _gather(after, corners[g, lane], lane, Y)
+                    _works_of_group(X, Y, data, g, h2, sums)
+                    for lane in range(counts[g]):
+                        for c in range(4):
+                            for j in range(3):
+                                before[corners[g, lane, c], j] = X[3 * c + j, lane]
+                        for j in range(3):
+                            out[g, j] += sums[j, lane]
 
 
 @njit(error_model="numpy", forceinline=True)
-def _places(x, corners):
-    a, b, c, d = corners
-    return (
-        x[a, 0], x[a, 1], x[a, 2], x[b, 0], x[b, 1], x[b, 2], x[c, 0], x[c, 1], x[c, 2], x[d, 0], x[d, 1], x[d, 2],
-    )  # fmt: skip
+def _gather(x, corners, lane, out):
+    for c in range(4):
+        for j in range(3):
+            out[3 * c + j, lane] = x[corners[c], j]
+
+
+@njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
+def _works_of_group(X, Y, data, g, h2, sums):
+    """Project the tets in the columns of X, and set what each adds to the sums (3,), with its positions Y afterwards."""
+    for i in range(WIDTH):
+        b = nine(data[g], i)
+        material, k, w = constants_of_tet(data, g, i)
+        step = min(h2, material[3])
+        x = twelve(X, i)
+        f, c, J = deformation_of(x, b)
+        s = stress_of_step(f, c, J, material, k, step)
+        put_twelve(X, i, moved_by_stress(x, w, b, s, step))
+        f, c, J = deformation_of(twelve(Y, i), b)
+        t = stress_of_step(f, c, J, material, k, 0.0)
+        lacks, has = 0.0, 0.0
+        for j in range(9):
+            u = 0.5 * (f[j] - c[j] / max(J, LEAST_J))
+            lacks += (t[j] - s[j] * step / h2) * u
+            has += t[j] * u
+        sums[0, i], sums[1, i], sums[2, i] = lacks, has, abs(lacks)

@@ -41,7 +41,7 @@ from supple.xpbd.rigid.bodies import RigidBodies
 
 # Of the mean surface edge: the least and the largest motion of a point that lists of candidates allow for, and the
 # largest gap that is reported.
-LEAST_REACH, MOST_REACH, NEAR = 0.05, 0.3, 1.0
+LEAST_REACH, MOST_REACH, NEAR = 0.05, 0.45, 1.0
 # The largest motion of points of rigid bodies, whose lists are short: one body that is too fast makes all lists new.
 RIGID_REACH = 0.6
 # Of the mean surface edge: how far contacts may move a point in a substep, where edges are looked for.
@@ -51,6 +51,8 @@ SLACK = 0.05
 SWEEPS, MORE_SWEEPS = 2, 4
 # How often contacts are solved again because edges have passed through each other.
 MOST_PASSAGES = 5
+# Points of each piece from which its motion as a rigid body is found in a substep.
+ENOUGH_POINTS = 64
 # Below this many active points, contacts are found before a second thread has started.
 PARALLEL_FROM = 500
 
@@ -114,6 +116,7 @@ class SurfaceCollisions:
         self._common = np.zeros((pieces + 1, 3)), np.zeros((pieces, 3)), np.zeros((pieces, 3, 3))
         # Obstacles stand still, so that no motion is common to all points where there is one.
         self._all_share = len(s.fixed_points) == 0
+        self._each = max(1, int(np.bincount(s.point_piece).min(initial=n)) // ENOUGH_POINTS)
         self._complete = np.zeros(n)
         self._most_reach = np.where(self._movers.body >= 0, RIGID_REACH, MOST_REACH) * edge_length
         self._gap = np.where(s.allowed, s.gaps, 0.0).max(axis=1)[s.point_piece]
@@ -188,7 +191,7 @@ class SurfaceCollisions:
         s.place_obstacles(self.poses, times[0], self._before)
         self._begun[len(s.rows) :] = self._before[len(s.rows) :]
         self._predicted[len(s.rows) :] = self._x[len(s.rows) :]
-        allowed = (self._far, self._near, s.point_piece, self._all_share, self._common)
+        allowed = (self._far, self._near, s.point_piece, self._all_share, self._each, self._common)
         if any_beyond_radii(self._x, self._before, self._gathered, *allowed, self._excursions):
             self._gather((self._x - self._before) * (self._dt / h), parallel)
         contacts, smallest = 0, np.inf
@@ -364,7 +367,7 @@ class SurfaceCollisions:
     def _gather(self, motions: NDArray[np.float64], parallel: bool) -> None:
         """List what may touch while no point moves farther than in a frame of these motions (n, 3) [m]."""
         s = self.surfaces
-        common_motions(self._x, motions, s.point_piece, self._all_share, self._common)
+        common_motions(self._x, motions, s.point_piece, self._all_share, 1, self._common)
         scales = (LEAST_REACH * self.edge_length, self._most_reach)
         points = (self._x - self._before, self._excursions, s.point_piece)
         search_radii(self._x, motions, *points, self._common, scales, self._far, self._near)
