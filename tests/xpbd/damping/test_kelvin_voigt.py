@@ -6,6 +6,7 @@ from scipy.linalg import eigh
 
 import supple as sp
 from supple.system import build_system, initial_state
+from supple.xpbd.damping import kelvin_voigt
 from supple.xpbd.damping.coarse_space import CoarseMatrix, vertex_groups
 from supple.xpbd.damping.element_matrices import matrices_of_springs, matrices_of_tets
 from supple.xpbd.damping.elements import viscous_springs, viscous_tets
@@ -79,6 +80,13 @@ def test_a_beam_is_damped_as_kelvin_voigt_damps_it(first_mode, tau):
     np.testing.assert_allclose(q, released(omega, tau, t), atol=0.03)
 
 
+def test_a_part_of_the_elements_suffices_for_the_length_of_a_step(first_mode, monkeypatch):
+    """In turn, and here in a body that has a few groups only."""
+    monkeypatch.setattr(kelvin_voigt, "ENOUGH_GROUPS", 1)
+    t, q = coordinate(beam(0.02), first_mode, 40, 60)
+    np.testing.assert_allclose(q, released(first_mode[0], 0.02, t), atol=0.03)
+
+
 def test_damping_below_the_own_damping_of_the_method_changes_nothing(first_mode):
     """XPBD damps like tau = h."""
     omega, _ = first_mode
@@ -137,6 +145,14 @@ def test_the_power_of_the_forces_is_the_quadratic_form_of_their_matrix():
         damping._motion[:, :3], damping._motion[:, 3:] = x[order], v[order]
         expected = v.ravel() @ viscosity(system, x) @ v.ravel()
         assert damping._powers(0.0, False).sum() == pytest.approx(expected, rel=1e-12)
+
+
+def test_each_element_counts_once_in_the_parts_of_its_body():
+    bodies = np.repeat([0, 1, 2], [70, 5, kelvin_voigt.ENOUGH_GROUPS])
+    weights = kelvin_voigt._weights_of_parts(bodies)
+    np.testing.assert_array_equal((weights > 0.0).sum(axis=0), np.where(bodies == 1, kelvin_voigt.PARTS, 1))
+    for part in weights:
+        np.testing.assert_allclose(np.bincount(bodies, part), np.bincount(bodies))
 
 
 def test_the_coarse_matrix_is_the_projected_one():

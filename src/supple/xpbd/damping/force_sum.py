@@ -26,7 +26,7 @@ class ForceSum:
     ----------
     members : (g, WIDTH) the elements of each group
     rates : (g,) largest square of a rate of strain of its elements in the last sum [1/s^2]
-    powers : (g,) forces times velocities of its elements [W], see `find_powers`
+    powers : (g,) forces times velocities of its elements [W], weighted, see `find_powers`
     """
 
     def __init__(
@@ -61,9 +61,9 @@ class ForceSum:
         elements = (self._corners, self._counts, self._active, self._data, self._pointers)
         self._kernels[parallel](motion, *elements, h, out, self.rates)
 
-    def find_powers(self, motion: NDArray[np.float64], h: float, parallel: bool) -> None:
-        """Set `powers`, with which the forces resist the velocities; less work than to sum the forces."""
-        elements = (self._corners, self._counts, self._active, self._data, self._pointers)
+    def find_powers(self, motion: NDArray[np.float64], h: float, weights: NDArray[np.float64], parallel: bool) -> None:
+        """Set `powers`, with which the forces resist the velocities, times weights (g,); less work than the forces."""
+        elements = (self._corners, self._counts, np.where(self._active, weights, 0.0), self._data, self._pointers)
         self._power_kernels[parallel](motion, *elements, h, self.powers)
 
 
@@ -133,20 +133,20 @@ def _sum(motion, corners, counts, active, data, pointers, h, out, rates):
             _sum_chunk(motion, corners, counts, active, data, pointers[c], pointers[c + 1], h, out, rates)
 
 
-def _power_chunk(motion, corners, counts, active, data, first, last, h, out):
+def _power_chunk(motion, corners, counts, weights, data, first, last, h, out):
     X = np.zeros((3 * CORNERS, WIDTH))
     V = np.zeros((3 * CORNERS, WIDTH))
     k = np.zeros((1, WIDTH))
     for g in range(first, last):
         total = 0.0
-        if active[g]:
+        if weights[g] > 0.0:
             _gather(motion, corners, g, counts[g], CORNERS, X, V)
             powers(X, V, k, data, g, h)
             for lane in range(counts[g]):
                 total += k[0, lane]
-        out[g] = total
+        out[g] = weights[g] * total
 
 
-def _powers(motion, corners, counts, active, data, pointers, h, out):
+def _powers(motion, corners, counts, weights, data, pointers, h, out):
     for c in prange(len(pointers) - 1):
-        _power_chunk(motion, corners, counts, active, data, pointers[c], pointers[c + 1], h, out)
+        _power_chunk(motion, corners, counts, weights, data, pointers[c], pointers[c + 1], h, out)
