@@ -106,7 +106,7 @@ def _gather(x, corners, lane, out):
 
 @njit(fastmath=FLAGS, error_model="numpy", forceinline=True)
 def _works_of_group(X, Y, data, g, h2, sums):
-    """Project the tets in the columns of X, and set what each adds to the sums (3,), with its positions Y afterwards."""
+    """Project the tets in the columns of X, and set what each adds to the sums, with its positions Y afterwards."""
     for i in range(WIDTH):
         b = nine(data[g], i)
         material, k, w = constants_of_tet(data, g, i)
