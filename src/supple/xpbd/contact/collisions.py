@@ -73,6 +73,8 @@ class Collisions:
         )
         self.skin = SKIN * self.thickness
         self.contacts, self._dipped = 0, False
+        # Whether the last projection may have moved a vertex.
+        self.moved = False
         self._owners = _owners(system, self.obstacles, surfaces, rigid)
         self.forces = FrameForces(self._owners)
         self._smallest = math.inf
@@ -166,9 +168,11 @@ class Collisions:
         parallel : whether contacts are searched on several threads.
         """
         self.contacts, self._dipped = 0, False
+        self.moved = bool(self.obstacles)
         limit, self._removed = self._removed, 0.0
         if self.surfaces is not None:
             self._count(self.surfaces.project(x, x_prev, (time - h, time), limit, parallel))
+            self.moved |= self.surfaces.moved
         between = self.contacts
         self._project_obstacles(x, x_prev, time, h, limit)
         if self.surfaces is not None:
@@ -190,7 +194,7 @@ class Collisions:
     def project_again(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], time: float, h: float) -> int:
         """`project` for positions that have changed since, without a new search for contacts of surfaces."""
         self.contacts = 0 if self.surfaces is None else self.surfaces.project_again(x, x_prev, h)
-        self._dipped = False
+        self._dipped, self.moved = False, True
         self._project_obstacles(x, x_prev, time, h, 0.0)
         return self.contacts
 

@@ -16,18 +16,8 @@ from supple.contact.search.reach import any_beyond_radii, common_motions, search
 from supple.contact.search.stitch_masks import stitched_points
 from supple.contact.search.surfaces import ContactSurfaces
 from supple.system import System
-from supple.xpbd.contact.contact_rows import (
-    ContactRows,
-    LoadedRows,
-    choose_rows,
-    deactivate,
-    push_rows,
-)
-from supple.xpbd.contact.detection.edge_contacts import (
-    find_edge_contacts,
-    find_edge_passages,
-    note_edge_passages,
-)
+from supple.xpbd.contact.contact_rows import ContactRows, LoadedRows, choose_rows, deactivate, push_rows
+from supple.xpbd.contact.detection.edge_contacts import find_edge_contacts, find_edge_passages, note_edge_passages
 from supple.xpbd.contact.detection.edge_pairs import EdgePairs
 from supple.xpbd.contact.detection.near_pairs import NearPairs
 from supple.xpbd.contact.detection.piece_runs import PieceRuns
@@ -108,8 +98,9 @@ class SurfaceCollisions:
         # The contacts between pieces that sleep.
         self._standing = LoadedRows.none()
         self._smallest = np.zeros(n)
-        # Whether nothing had passed through anything after the last projection; how much it changed a gap, at most [m].
-        self.parted, self.changed = True, 0.0
+        # Whether nothing had passed through anything after the last projection; whether it moved anything; how much it
+        # changed a gap, at most [m].
+        self.parted, self.moved, self.changed = True, False, 0.0
         # Of the last search: the rows of each kind that take part.
         self._chosen = [np.zeros(0, dtype=np.int64)] * 2
         self._far, self._near = np.zeros((n, 3)), np.zeros((n, 3))
@@ -195,7 +186,7 @@ class SurfaceCollisions:
         if any_beyond_radii(self._x, self._before, self._gathered, *allowed, self._excursions):
             self._gather((self._x - self._before) * (self._dt / h), parallel)
         contacts, smallest = 0, np.inf
-        self.parted = True
+        self.parted, self.moved = True, False
         self._look_near()
         deactivate(self._rows.active)
         self._chosen = [chosen[:0] for chosen in self._chosen]
@@ -215,7 +206,8 @@ class SurfaceCollisions:
                 contacts, smallest = contacts + pushes, min(smallest, gap, least)
         # Larger gaps in this frame are of no interest.
         self._least_gap = min(self._least_gap, smallest)
-        self._give(x, x_prev)
+        if self.moved:
+            self._give(x, x_prev)
         return contacts, smallest
 
     def project_again(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> int:
@@ -226,7 +218,7 @@ class SurfaceCollisions:
         self._take(x, x_prev)
         self.changed = 0.0
         sweeps = SWEEPS if self.parted else MORE_SWEEPS
-        contacts = sum(self._solve(kind, h, 0.0, sweeps)[0] for kind, chosen in enumerate(self._chosen) if len(chosen))
+        contacts = sum(self._solve(kind, h, 0.0, sweeps)[0] for kind in range(2))
         self._give(x, x_prev)
         return contacts
 
@@ -289,6 +281,9 @@ class SurfaceCollisions:
     def _solve(self, kind: int, h: float, limit: float, sweeps: int = SWEEPS) -> tuple[int, float]:
         """Project the chosen rows of one kind; returns how many push, and the smallest gap before the substep."""
         chosen, described = self._chosen[kind], self._rows.described
+        if not len(chosen):
+            return 0, np.inf
+        self.moved = True
         places = (self._x, self._before, self._predicted, self._begun)
         *found, changed = solve_rows(*places, self._points, chosen, described, h, limit, sweeps, self._depth[kind])
         self._settle()

@@ -66,7 +66,8 @@ def collide_again(ws: XPBDWorkspace, time: float, h: float) -> bool:
 
 
 def _apply(ws: XPBDWorkspace, time: float, h: float) -> None:
-    ws.apply_changes(h)
+    if ws.collisions.moved:
+        ws.apply_changes(h)
     if len(ws.rigid):
         # Contacts turn bodies by small rotations; the turn that follows from their momenta ends a little elsewhere.
         ws.rigid.advance(ws.points, ws.previous, ws.velocities, h)
