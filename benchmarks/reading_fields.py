@@ -2,14 +2,18 @@
 
 usage: python -m benchmarks.reading_fields
 
-Processor time on one thread: the medians over some frames, after the first ones, in which the finger begins to move.
+Processor time on one thread, and the frames a second of wall time with two threads: the medians over some frames, after
+the first ones, in which the finger begins to move.
 """
 
 from __future__ import annotations
 
 import statistics
 import time
+from itertools import pairwise
 from typing import Any
+
+from numba import config, threading_layer
 
 import supple as sp
 from benchmarks.published import publish
@@ -63,10 +67,20 @@ def measured(given: sp.Scene, frames: int, skipped: int) -> dict[str, Any]:
     }
 
 
+def frames_a_second(given: sp.Scene, threads: int, frames: int, skipped: int) -> float:
+    """The median of those of wall time, without reading any field."""
+    each = sp.simulate(given, sp.XPBD(threads=threads), 1 / 60, skipped + frames)
+    times = [time.perf_counter() for _ in each]
+    return 1.0 / statistics.median(after - before for before, after in pairwise(times[skipped:]))
+
+
 def main(chambers: int = 3, frames: int = 40, skipped: int = 20) -> dict[str, Any]:
     """Print the table; returns its figures."""
     at_start, given = circumstances(), scene(chambers)
     figures = measured(given, frames, skipped)
+    threads = min(2, int(config.NUMBA_NUM_THREADS))  # pyright: ignore[reportAttributeAccessIssue]
+    rate = frames_a_second(given, threads, frames, skipped)
+    live = {"threads_live": threads, "layer": threading_layer() if threads > 1 else "", "frames_a_second": rate}
     tets = len(given.bodies[0].mesh.tets)
     share = figures["ms_of_reading"] / figures["ms_per_step"]
     print(f"\na finger of {tets} tets, {figures['substeps']:.0f} substeps, processor time on one thread")
@@ -74,7 +88,8 @@ def main(chambers: int = 3, frames: int = 40, skipped: int = 20) -> dict[str, An
     for name, milliseconds in figures["fields"].items():
         print(f"{name:32}{milliseconds:9.2f} ms")
     print(f"{'all fields':32}{figures['ms_of_reading']:9.2f} ms, {100 * share:.1f} % of a step")
-    return {**at_start, "tets": tets, "share": share, **figures}
+    print(f"{'with threads: ' + str(threads):32}{rate:9.1f} frames/s")
+    return {**at_start, "tets": tets, "share": share, **figures, **live}
 
 
 def run() -> None:

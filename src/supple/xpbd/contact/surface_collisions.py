@@ -31,7 +31,7 @@ from supple.xpbd.rigid.bodies import RigidBodies
 
 # Of the mean surface edge: the least and the largest motion of a point that lists of candidates allow for, and the
 # largest gap that is reported.
-LEAST_REACH, MOST_REACH, NEAR = 0.05, 0.45, 1.0
+LEAST_REACH, MOST_REACH, NEAR = 0.05, 0.2, 1.0
 # The largest motion of points of rigid bodies, whose lists are short: one body that is too fast makes all lists new.
 RIGID_REACH = 0.6
 # Of the mean surface edge: how far contacts may move a point in a substep, where edges are looked for.
