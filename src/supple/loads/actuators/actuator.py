@@ -45,6 +45,10 @@ class Coordinate(ABC):
         """p, the number of parts."""
 
     @abstractmethod
+    def measure(self, own: NDArray[np.float64], parts: NDArray[np.float64]) -> None:
+        """Set the parts (p,)."""
+
+    @abstractmethod
     def differentiate(
         self, own: NDArray[np.float64], parts: NDArray[np.float64], gradients: NDArray[np.float64]
     ) -> None:
@@ -59,16 +63,15 @@ class Coordinate(ABC):
 
     def parts(self, own: NDArray[np.float64]) -> NDArray[np.float64]:
         """(p,)"""
-        return self._differentiated(own)[0]
+        parts = np.empty(self.count)
+        self.measure(own, parts)
+        return parts
 
     def part_gradients(self, own: NDArray[np.float64]) -> NDArray[np.float64]:
         """(p, v, 3)"""
-        return self._differentiated(own)[1]
-
-    def _differentiated(self, own: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        parts, gradients = np.empty(self.count), np.empty((self.count, *own.shape))
-        self.differentiate(own, parts, gradients)
-        return parts, gradients
+        gradients = np.empty((self.count, *own.shape))
+        self.differentiate(own, np.empty(self.count), gradients)
+        return gradients
 
     def value(self, own: NDArray[np.float64]) -> float:
         """s"""

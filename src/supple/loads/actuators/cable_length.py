@@ -51,6 +51,9 @@ class CableLength(Coordinate):
         _spans(self.weights, self.offsets, own, lengths, directions)
         return lengths, directions
 
+    def measure(self, own: NDArray[np.float64], parts: NDArray[np.float64]) -> None:
+        _spans(self.weights, self.offsets, own, parts, np.empty((self.count, 3)))
+
     def differentiate(
         self, own: NDArray[np.float64], parts: NDArray[np.float64], gradients: NDArray[np.float64]
     ) -> None:

@@ -41,6 +41,9 @@ class EnclosedVolume(Coordinate):
     def count(self) -> int:
         return 1
 
+    def measure(self, own: NDArray[np.float64], parts: NDArray[np.float64]) -> None:
+        _measure(own, self.triangles, parts)
+
     def differentiate(
         self, own: NDArray[np.float64], parts: NDArray[np.float64], gradients: NDArray[np.float64]
     ) -> None:
@@ -58,21 +61,38 @@ class EnclosedVolume(Coordinate):
 
 
 @njit(cache=True, error_model="numpy")
-def _differentiate(x, triangles, volume, gradient):
-    """Set volume (1,) and gradient (v, 3): a third of minus the area vector of each triangle at each of its corners.
+def _measure(x, triangles, volume):
+    """Set volume (1,).
 
-    The volume is that about the first vertex, which keeps the digits of a small volume far from the origin.
+    It is that about the first vertex, which keeps the digits of a small volume far from the origin.
     """
+    total = 0.0
+    for t in range(len(triangles)):
+        n = _third_of_area(x, triangles, t)
+        i = triangles[t, 0]
+        total -= (x[i, 0] - x[0, 0]) * n[0] + (x[i, 1] - x[0, 1]) * n[1] + (x[i, 2] - x[0, 2]) * n[2]
+    volume[0] = total
+
+
+@njit(cache=True, error_model="numpy")
+def _differentiate(x, triangles, volume, gradient):
+    """`_measure`, and set gradient (v, 3): a third of minus the area vector of each triangle at each of its corners."""
     gradient[:] = 0.0
     total = 0.0
     for t in range(len(triangles)):
+        n = _third_of_area(x, triangles, t)
         i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        u0, u1, u2 = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
-        v0, v1, v2 = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
-        n0, n1, n2 = (u1 * v2 - u2 * v1) / 6.0, (u2 * v0 - u0 * v2) / 6.0, (u0 * v1 - u1 * v0) / 6.0
-        total -= (x[i, 0] - x[0, 0]) * n0 + (x[i, 1] - x[0, 1]) * n1 + (x[i, 2] - x[0, 2]) * n2
+        total -= (x[i, 0] - x[0, 0]) * n[0] + (x[i, 1] - x[0, 1]) * n[1] + (x[i, 2] - x[0, 2]) * n[2]
         for corner in (i, j, k):
-            gradient[corner, 0] -= n0
-            gradient[corner, 1] -= n1
-            gradient[corner, 2] -= n2
+            gradient[corner, 0] -= n[0]
+            gradient[corner, 1] -= n[1]
+            gradient[corner, 2] -= n[2]
     volume[0] = total
+
+
+@njit(error_model="numpy")
+def _third_of_area(x, triangles, t):
+    i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+    u0, u1, u2 = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
+    v0, v1, v2 = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
+    return (u1 * v2 - u2 * v1) / 6.0, (u2 * v0 - u0 * v2) / 6.0, (u0 * v1 - u1 * v0) / 6.0

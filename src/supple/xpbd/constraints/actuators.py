@@ -127,7 +127,8 @@ class _Projected:
         _move(at.points, rows, self._moved)
 
     def end_substep(self, at: Substep) -> None:
-        self._place(at)
+        _gather(at.points, at.origins, self.coordinate.vertices, self._own)
+        self.coordinate.measure(self._own, self._parts)
         _add_works(self.forces, self._parts, at.h, self.begun, self.impulses, self.works)
 
     def _place(self, at: Substep) -> None:

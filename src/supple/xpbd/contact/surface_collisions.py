@@ -293,7 +293,8 @@ class SurfaceCollisions:
     def _find_passages(self, kind: int, part: tuple[int, int], h: float) -> bool:
         """Let points and edges that have passed through something take part. Returns whether there are any."""
         s, described = self.surfaces, self._rows.described
-        self._look_again()
+        if self.moved:
+            self._look_again()
         near = self._near_pairs
         points = (self._x, self._begun, near.points, self._pieces, self._apart, part, self._stitched)
         passed = find_point_passages(*points, described, self._entered)
