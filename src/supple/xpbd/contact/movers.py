@@ -26,7 +26,7 @@ from supple.numerics.kernel_cache import njit
 from supple.numerics.mat3 import cross, dot, row, subtract
 from supple.xpbd.contact.rows_of_points import give_rows, take_points
 from supple.xpbd.rigid.bodies import RigidBodies
-from supple.xpbd.rigid.motion import inertia_of, solve_symmetric
+from supple.xpbd.rigid.motion import center_of, inertia_of, solve_symmetric
 
 
 class Movers(NamedTuple):
@@ -87,10 +87,15 @@ class MovedPoints:
         self._free = np.zeros(bodies, dtype=np.bool_)
         self._described = points.start, points.vertices, points.weights
         self._bodies = rigid.control, rigid.masses, self._free, rigid.joined
+        self._known = False
 
     def begin_step(self, held: NDArray[np.bool_]) -> None:
         """Begin a frame in which some rigid bodies (b,) are held."""
         self._free[:] = ~held
+
+    def begin_substep(self) -> None:
+        """Begin a substep. Contact only shifts the bodies at its beginning, so that arms and inertia are found once."""
+        self._known = False
 
     def take(self, x: NDArray[np.float64], out: NDArray[np.float64]) -> None:
         """Write the places of the points, of those of the vertices x (n, 3), into the first rows of `out`."""
@@ -109,7 +114,8 @@ class MovedPoints:
         ----------
         x, x_prev : (n, 3) vertices then; places, before : of the points, out
         """
-        _begin(x, x_prev, self._described, places, before, self._bodies, self.movers, self._total)
+        _begin(x, x_prev, self._described, places, before, self._bodies, self._known, self.movers, self._total)
+        self._known = True
 
     def settle(self, places: NDArray[np.float64], before: NDArray[np.float64], predicted: NDArray[np.float64]) -> None:
         """Apply the twists to places of the points, in place: at the end of the substep, and two at its beginning."""
@@ -200,24 +206,29 @@ def settle(places, before, predicted, movers, total):
 
 
 @njit(cache=True)
-def _begin(x, x_prev, points, places, before, bodies, movers, total):
+def _begin(x, x_prev, points, places, before, bodies, known, movers, total):
     start, vertices, weights = points
-    control, masses, free, joined = bodies
+    control = bodies[0]
     take_points(x, start, vertices, weights, places)
     take_points(x_prev, start, vertices, weights, before)
     if len(control) == 0:
         return
     total[:] = 0.0
     movers.twists[:] = 0.0
-    centers = np.empty((len(control), 3))
+    if not known:
+        _describe(x_prev, before, bodies, movers)
     for b in range(len(control)):
-        center, S = inertia_of(x_prev, control, b)
+        now, then = center_of(x, control, b), center_of(x_prev, control, b)
         for j in range(3):
-            centers[b, j] = center[j]
-            movers.steps[b, j] = -center[j]
-        for i in control[b]:
-            for j in range(3):
-                movers.steps[b, j] += 0.25 * x[i, j]
+            movers.steps[b, j] = now[j] - then[j]
+
+
+@njit
+def _describe(x_prev, before, bodies, movers):
+    """Set what movers have of bodies and points where the substep begins."""
+    control, masses, free, joined = bodies
+    for b in range(len(control)):
+        S = inertia_of(x_prev, control, b)[1]
         movers.w[b] = 1.0 / masses[b] if free[b] else 0.0
         movers.loose[b] = 0.0 if joined[b] else movers.w[b]
         f = 4.0 / masses[b] if free[b] else 0.0
@@ -226,8 +237,9 @@ def _begin(x, x_prev, points, places, before, bodies, movers, total):
             for k in range(3):
                 movers.J[b, k, j] = f * column[k]
     for i in range(len(movers.body)):
-        if movers.body[i] >= 0:
-            r = subtract(row(before, i), row(centers, movers.body[i]))
+        b = movers.body[i]
+        if b >= 0:
+            r = subtract(row(before, i), center_of(x_prev, control, b))
             for j in range(3):
                 movers.arms[i, j] = r[j]
 
@@ -237,7 +249,7 @@ def _give(places, before, start, vertices, x, x_prev, control, total):
     give_rows(places, start, vertices, x)
     give_rows(before, start, vertices, x_prev)
     for b in range(len(control)):
-        center, _ = inertia_of(x_prev, control, b)
+        center = center_of(x_prev, control, b)
         th = (total[b, 3], total[b, 4], total[b, 5])
         for i in control[b]:
             turned = cross(th, subtract(row(x_prev, i), center))

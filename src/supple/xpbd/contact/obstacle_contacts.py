@@ -193,6 +193,7 @@ class ObstacleContacts:
 
         What other bodies press onto an obstacle approaches it by their forces. This is no impact either.
         """
+        self._moved.begin_substep()
         self._moved.take(x, self._predicted)
         self._moved.take(x_prev, self._begun)
         # What rests on a point approaches it in every substep by its fall; this is no impact.

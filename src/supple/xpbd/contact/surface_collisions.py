@@ -155,6 +155,7 @@ class SurfaceCollisions:
     def begin_substep(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> bool:
         """See `Collisions.begin_substep`."""
         rows = self._rows
+        self._moved.begin_substep()
         self._moved.take(x, self._predicted)
         self._moved.take(x_prev, self._begun)
         if len(self._rigid):

@@ -34,16 +34,22 @@ _EXACT, _MOST_ITERATIONS = 1e-15, 10
 _LARGEST = 0.6
 
 
-@njit(cache=True)
-def inertia_of(x, control, b):
-    """Center (3,) of the control points of body b, and sum r_k.r_k 1 - r_k r_k^T as six numbers: xx yy zz xy yz zx."""
+@njit
+def center_of(x, control, b):
+    """Center (3,) of the control points of body b."""
     cx = cy = cz = 0.0
     for k in range(4):
         i = control[b, k]
         cx += 0.25 * x[i, 0]
         cy += 0.25 * x[i, 1]
         cz += 0.25 * x[i, 2]
-    center = (cx, cy, cz)
+    return (cx, cy, cz)
+
+
+@njit(cache=True)
+def inertia_of(x, control, b):
+    """Center (3,) of the control points of body b, and sum r_k.r_k 1 - r_k r_k^T as six numbers: xx yy zz xy yz zx."""
+    center = center_of(x, control, b)
     xx = yy = zz = xy = yz = zx = 0.0
     for k in range(4):
         r = subtract(row(x, control[b, k]), center)
