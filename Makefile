@@ -11,7 +11,7 @@ else
   PEERS_BIN := .venv-peers/bin
 endif
 # uv installs in seconds; where it cannot be had or cannot reach the index, pip reads the same lock file.
-# Bytecode is compiled now, so that no later start has to (it is 1.3 s of one).
+# Bytecode is compiled now, also that of src, so that no later start has to (it is 1.3 s of one, and 0.4 s for src).
 install = ($(BIN)/python -m uv pip install -q --compile-bytecode --python $(BIN)/python $(1) || $(BIN)/python -m pip install -q $(1))
 
 .PHONY: demo test test-all fuzz soak bench blender lint format docs dist lock clean
@@ -85,6 +85,7 @@ lock: .venv/.dev
 .venv/.base: .venv/.made requirements/base.lock pyproject.toml
 	$(call install,-r requirements/base.lock)
 	$(call install,--no-deps -e .)
+	$(BIN)/python -m compileall -q src
 	$(BIN)/python -c "open('.venv/.base', 'w')"
 
 .venv/.dev: .venv/.base requirements/dev.lock

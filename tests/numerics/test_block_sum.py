@@ -110,7 +110,7 @@ def test_a_pattern_serves_all_couplings_that_have_blocks_in_it():
     elements, matrices, own, dense = random_elements(rng, 20, 5)
     row_of = np.arange(20, dtype=np.int32)
     many = random_couplings(rng, 20, 30)
-    few = Couplings(many.columns[7:12], many.rows[7:12], many.blocks[7:12].transpose(0, 2, 1))
+    few = Couplings(many.columns[7:12], many.rows[7:12], many.blocks[7:12].transpose(0, 2, 1).copy())
     joint = JointPattern.of(build_pattern(elements, 20), many, row_of)
     data = joint.pattern.to_scipy(assembled(joint, matrices, own, few)).toarray()
     expected = dense + dense_couplings(few, 20)
@@ -124,7 +124,7 @@ def test_couplings_of_pinned_vertices_are_left_out():
     row_of = np.array([0, 1, 2, 3, -1, -1], dtype=np.int32)
     pattern = build_pattern(np.array([[0, 1, 2, 3]], dtype=np.int32), 4)
     pairs = np.array([[0, 4], [4, 5], [5, 5]], dtype=np.int32)
-    joint = JointPattern.of(pattern, Couplings(*pairs.T, rng.normal(size=(3, 3, 3))), row_of)
+    joint = JointPattern.of(pattern, Couplings(*pairs.T.copy(), rng.normal(size=(3, 3, 3))), row_of)
     assert np.array_equal(joint.pattern.columns, pattern.columns)
     assert np.array_equal(joint.pattern.row_start, pattern.row_start)
 
@@ -209,7 +209,7 @@ def test_free_pieces_in_contact_move_as_one():
 
     def touching(*pairs):
         ends = np.array([[first[a], first[b]] for a, b in pairs], dtype=np.int32)
-        return Couplings(*ends.T, np.zeros((len(ends), 3, 3)))
+        return Couplings(*ends.T.copy(), np.zeros((len(ends), 3, 3)))
 
     joined = motion.joined([touching((3, 1), (0, 0)), touching((1, 4), (2, 5))])
     pieces = [set(joined.piece[part.vertices].tolist()) for part in system.bodies]

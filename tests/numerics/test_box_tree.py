@@ -28,7 +28,7 @@ def pairs_of(nodes, labels, order, label_of, same, out):
         while top > 0:
             leaf, top = next_leaf(nodes, labels, nodes[leaves + q], label_of[order[q]], same, stack, top)
             if leaf >= 0:
-                out[count] = (min(order[q], order[leaf]), max(order[q], order[leaf]))
+                out[count, 0], out[count, 1] = min(order[q], order[leaf]), max(order[q], order[leaf])
                 count += 1
     return count
 

@@ -26,7 +26,7 @@ def meets(x, triangles):
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
 def test_all_vertices_of_a_ball_are_simple(size):
     mesh = shapes.sphere(radius=size, edge_length=0.4 * size)
-    simple = simple_stars(mesh.vertices, mesh.surface.triangles)
+    simple = simple_stars(mesh.vertices.copy(), mesh.surface.triangles.copy())
     on_surface = np.unique(mesh.surface.triangles)
     assert simple[on_surface].all()
     assert not simple[np.setdiff1d(np.arange(len(simple)), on_surface)].any()

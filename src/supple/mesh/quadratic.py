@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from supple.errors import MeshError
 from supple.mesh.topology import TET_FACETS
+from supple.numerics.kernel_cache import read_only
 from supple.numerics.quadratic_tets.bernstein import determinant_coefficients, positive_elements
 from supple.numerics.quadratic_tets.shape_functions import (
     BETWEEN,
@@ -78,7 +79,7 @@ def node_volumes(vertices: NDArray[np.float64], nodes: NDArray[np.int32]) -> NDA
 def positive_tets(vertices: NDArray[np.float64], nodes: NDArray[np.int32]) -> NDArray[np.bool_]:
     """(m,) whether the determinant of a quadratic tet is positive everywhere in it."""
     positive = np.empty(len(nodes), dtype=np.bool_)
-    positive_elements(vertices, np.ascontiguousarray(nodes), positive)
+    positive_elements(read_only(vertices), read_only(nodes), positive)
     return positive
 
 

@@ -23,6 +23,7 @@ from numba import prange
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
 from numba.core.registry import CPUDispatcher
+from numpy.typing import NDArray
 
 from supple.files.lock import FileLock
 from supple.numerics.parallel_kernel import ParallelKernel
@@ -30,7 +31,7 @@ from supple.numerics.parallel_kernel import ParallelKernel
 # How long a process waits for another one that compiles the same kernel, and how long between two looks [s].
 _LONGEST_WAIT, _PAUSE = 60.0, 0.02
 
-__all__ = ["KernelCache", "njit", "prange", "reached_code"]
+__all__ = ["KernelCache", "njit", "prange", "reached_code", "read_only"]
 
 
 def njit(function: FunctionType | None = None, *, cache: bool = False, parallel: bool = False, **options: Any) -> Any:
@@ -54,6 +55,13 @@ def njit(function: FunctionType | None = None, *, cache: bool = False, parallel:
     several = _compiled(_form(function, "parallel"), cache, {**options, "parallel": True} if parallel else options)
     # Where NUMBA_DISABLE_JIT is set, both are plain functions.
     return ParallelKernel(function, serial, several) if isinstance(several, Dispatcher) else several
+
+
+def read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """The array in C order, without leave to write: a kernel that gets arrays with and without it is compiled twice."""
+    view = np.ascontiguousarray(array).view()
+    view.flags.writeable = False
+    return view
 
 
 def _compiled(function: FunctionType, cache: bool, options: dict[str, Any]) -> Any:

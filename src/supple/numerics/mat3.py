@@ -137,3 +137,14 @@ def jacobi_rotation(app, aqq, apq):
         t = -t
     c = 1.0 / (1.0 + t * t) ** 0.5
     return c, t * c, t
+
+
+@njit(error_model="numpy")
+def copy_elements(source, target):
+    """Copy an array into one of the same shape, both of them contiguous.
+
+    Numba takes up to two seconds to compile `target[:] = source`, for the text of the error where shapes differ.
+    """
+    to, given = target.reshape(-1), source.reshape(-1)
+    for k in range(len(to)):
+        to[k] = given[k]

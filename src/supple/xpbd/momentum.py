@@ -56,7 +56,9 @@ class MomentumRestore:
         # Where vertices are welded, those with which constraints see them. What a held body holds is not free.
         given = system.masses if system.effective_masses is None else system.effective_masses
         self.masses = np.where(np.isfinite(given), given, 0.0)
-        self.totals = np.bincount(labels[soft], weights=self.masses[soft], minlength=count)
+        # NumPy counts nothing in integers, with weights too.
+        totals = np.bincount(labels[soft], weights=self.masses[soft], minlength=count)
+        self.totals = totals.astype(np.float64)
         self._sums = np.zeros((len(self.blocks), _SUMS))
         self._motion = np.zeros((count, 9))
 
@@ -166,14 +168,16 @@ def _rigid_corrections(blocks, totals, sums, motion):
         # The columns of the adjugate are cross products of the rows.
         c0, c1, c2 = _cross(A[1], A[2]), _cross(A[2], A[0]), _cross(A[0], A[1])
         det = A[0, 0] * c0[0] + A[0, 1] * c0[1] + A[0, 2] * c0[2]
-        motion[component, 0:3] = P / M
-        motion[component, 6:9] = s
+        for i in range(3):
+            motion[component, i] = P[i] / M
+            motion[component, 6 + i] = s[i]
         # Where all vertices are in a line, or the body turned over within the substep, no rotation is defined.
         if abs(det) > 1e-12 * abs(trace) ** 3:
             for i in range(3):
                 motion[component, 3 + i] = (c0[i] * L[0] + c1[i] * L[1] + c2[i] * L[2]) / det
         else:
-            motion[component, 3:6] = 0.0
+            for i in range(3):
+                motion[component, 3 + i] = 0.0
 
 
 @njit(cache=True)

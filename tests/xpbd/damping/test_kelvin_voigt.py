@@ -45,7 +45,7 @@ def viscosity(system, x, tau=1.0):
 def first_mode():
     """The angular frequency [1/s] and shape (n, 3) of the beam's first bending mode, of unit modal mass."""
     system = build_system(beam(1.0))
-    K = viscosity(system, BEAM.vertices)
+    K = viscosity(system, BEAM.vertices.copy())
     free = np.flatnonzero(np.repeat(system.inverse_masses > 0.0, 3))
     squares, modes = eigh(K[np.ix_(free, free)], np.diag(np.repeat(system.masses, 3)[free]), subset_by_index=[0, 0])
     shape = np.zeros(K.shape[0])
@@ -98,7 +98,7 @@ def test_damping_below_the_own_damping_of_the_method_changes_nothing(first_mode)
 def test_the_viscosity_at_rest_is_the_stiffness_of_the_material():
     material = sp.StableNeoHookean(youngs=YOUNGS, poisson=POISSON, damping=1.0)
     system = build_system(sp.Scene([sp.Body("ball", BALL, material)]))
-    K = viscosity(system, BALL.vertices)
+    K = viscosity(system, BALL.vertices.copy())
     H = material.hessian(np.eye(3))
     expected = np.zeros_like(K)
     for nodes, B, V in zip(system.tets, system.rest_shape_inverse, system.rest_volumes, strict=True):

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from supple.implicit.energies.quadratic.term import SERIAL_ELEMENTS
 from supple.materials.elastic_tets.quadratic import QuadraticTets
+from supple.numerics.kernel_cache import read_only
 from supple.numerics.quadratic_tets.bernstein import positive_coefficients, positive_elements
 from supple.numerics.quadratic_tets.noninverting_step import noninverting_step
 from supple.numerics.threads import threads_for
@@ -60,5 +61,5 @@ def are_positive(tets: QuadraticTets, x: NDArray[np.float64]) -> NDArray[np.bool
     """(k,) whether J is positive everywhere in a quadratic tet."""
     positive = np.empty(len(tets.rows), dtype=np.bool_)
     with threads_for(len(positive), SERIAL_ELEMENTS):
-        positive_elements(x, tets.nodes, positive)
+        positive_elements(read_only(x), read_only(tets.nodes), positive)
     return positive

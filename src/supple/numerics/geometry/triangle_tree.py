@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from supple.numerics.geometry.box_tree import boxes_of_triangles
 from supple.numerics.geometry.closest_point import area_normal, closest_on_triangle, combine
-from supple.numerics.kernel_cache import njit, prange
-from supple.numerics.mat3 import dot, row, subtract
+from supple.numerics.kernel_cache import njit, prange, read_only
+from supple.numerics.mat3 import copy_elements, dot, row, subtract
 
 _LEAF = 4
 _DEPTH = 64  # of a balanced tree; more than any memory can hold
@@ -46,8 +46,8 @@ class TriangleTree(NamedTuple):
     @classmethod
     def of(cls, points: NDArray[np.float64], triangles: NDArray[np.int32]) -> TriangleTree:
         """Build the tree, in O(t log^2 t)."""
-        points = np.ascontiguousarray(points, dtype=np.float64)
-        triangles = np.ascontiguousarray(triangles, dtype=np.int32)
+        points = read_only(np.asarray(points, dtype=np.float64))
+        triangles = read_only(np.asarray(triangles, dtype=np.int32))
         boxes = boxes_of_triangles(points, triangles)
         levels = max(0, int(np.ceil(np.log2(max(1, len(triangles)) / _LEAF))))
         return cls(points, triangles, *_build(boxes, levels))
@@ -119,7 +119,7 @@ def _build(boxes, levels):
                 axis = k
         part = order[low:high].copy()
         middle = boxes[part, axis] + boxes[part, 3 + axis]
-        order[low:high] = part[np.argsort(middle, kind="mergesort")]
+        copy_elements(part[np.argsort(middle, kind="mergesort")], order[low:high])
         half = low + (high - low + 1) // 2
         bounds[left, 0], bounds[left, 1] = low, half
         bounds[left + 1, 0], bounds[left + 1, 1] = half, high
@@ -168,7 +168,7 @@ def closest_places(
 @njit(cache=True, error_model="numpy")
 def _closest_places(queries, points, triangles, out):
     for k in range(len(queries)):
-        out[k] = closest_on_triangle(row(queries, k), *_corners(points, triangles, k))
+        out[k, 0], out[k, 1], out[k, 2] = closest_on_triangle(row(queries, k), *_corners(points, triangles, k))
 
 
 @njit(error_model="numpy")

@@ -19,6 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from supple.numerics.kernel_cache import njit, prange
+from supple.numerics.mat3 import copy_elements
 from supple.numerics.quadratic_tets.shape_functions import BETWEEN
 
 # The coefficient that each arrangement (a, b, c) of corners belongs to; those of the corners come first.
@@ -126,6 +127,16 @@ def bisect(values, i, j):
 
 
 @njit(error_model="numpy")
+def _all_above(values, least):
+    for a in range(4):
+        for b in range(4):
+            for c in range(4):
+                if not values[a, b, c] > least:
+                    return False
+    return True
+
+
+@njit(error_model="numpy")
 def _is_positive(coefficients, least):
     """Whether the cubic is above `least` on the whole element, as far as `DEEPEST` bisections tell."""
     unsure = False
@@ -148,8 +159,7 @@ def _is_positive(coefficients, least):
     count = 1
     while count > 0:
         top = count - 1
-        smallest = values[top].min()
-        if smallest > least:
+        if _all_above(values[top], least):
             count = top
             continue
         for c in range(4):
@@ -158,7 +168,8 @@ def _is_positive(coefficients, least):
         if depths[top] == DEEPEST:
             return False
         i, j = longest_edge(corners[top])
-        values[count], corners[count] = values[top], corners[top]
+        copy_elements(values[top], values[count])
+        copy_elements(corners[top], corners[count])
         depths[top] += 1
         depths[count] = depths[top]
         bisect(values[top], i, j)

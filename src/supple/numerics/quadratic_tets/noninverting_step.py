@@ -18,6 +18,7 @@ import numpy as np
 
 from supple.numerics.cubic import last_positive_before_root
 from supple.numerics.kernel_cache import njit, prange
+from supple.numerics.mat3 import copy_elements
 from supple.numerics.quadratic_tets.bernstein import (
     ROUND_OFF,
     TERM,
@@ -154,7 +155,8 @@ def _bisected_step(terms):
             count = top
             continue
         i, j = longest_edge(corners[top])
-        values[count], corners[count] = values[top], corners[top]
+        copy_elements(v, values[count])
+        copy_elements(corners[top], corners[count])
         depths[top] += 1
         depths[count] = depths[top]
         for k in range(4):

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple.numerics.kernel_cache import njit
+from supple.numerics.mat3 import copy_elements
 from supple.numerics.sparse.gauss_seidel import backward, forward, update
 from supple.numerics.sparse.preconditioner import TwoLevel
 from supple.numerics.sparse.skyline_cholesky import solve
@@ -156,7 +157,7 @@ def _solve(
     for m in range(len(low)):
         # With p = 0 the sweep forward takes its right side from Ut: Ap becomes g and w becomes (D + L)^-1 g.
         forward(alone, colors, 0.0, start, *lower, diagonal, inverse, t, low[m], p, Up, Ap, W[m], sums)
-        r[:] = low[m]
+        copy_elements(low[m], r)
         update(alone, 0.0, groups, start, fields, p, Ap, w, x, r, y, restricted)
         _coarse_solution(restricted, coarse, first, coefficients)
         backward(alone, colors, groups, start, *upper, inverse, fields, coefficients, r, W[m], s, Y[m], UY[m], sums)
