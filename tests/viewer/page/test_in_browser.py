@@ -14,6 +14,26 @@ from supple.viewer.protocol.live_source import LiveSource
 RADIUS, START = 0.3, 0.5
 MASS = 1000.0 * 4.0 / 3.0 * np.pi * RADIUS**3
 
+# Whether the first picture after a message with vertices is drawn with them.
+IN_NEXT_PICTURE = """() => { window.inNextPicture = new Promise((resolve) => {
+  const client = suppleViewer.mutable.current, { scene, messageQueue } = client, before = scene.onBeforeRender;
+  let sent = null;
+  messageQueue.push = (message) => {
+    sent = message.updates?.vertices?.slice() ?? sent;
+    return Array.prototype.push.call(messageQueue, message);
+  };
+  scene.onBeforeRender = (renderer) => {
+    before(renderer);
+    if (!sent) return;
+    delete messageQueue.push;
+    scene.onBeforeRender = before;
+    let mesh;
+    client.nodeRefFromName["/bodies/0 ball"].traverse((each) => { mesh ??= each.geometry; });
+    resolve(sent.every((value, k) => value === mesh.attributes.position.array[k]));
+  };
+  setTimeout(resolve, 5000, false);
+}); }"""
+
 
 @pytest.fixture(scope="module")
 def live(look, spot):
@@ -123,6 +143,35 @@ def test_pictures_arrive_in_order_and_the_last_one_is_the_state(still):
     assert 2 <= len(meshes) <= len(drawn)
     first = np.flatnonzero((stage.moment.positions.astype(np.float32) == np.float32(meshes[-1])).all(axis=1))
     assert len(first) == 1
+
+
+def test_a_message_is_in_the_next_picture(still):
+    tab = still.screen.tab
+
+    def steps():
+        tab.evaluate(IN_NEXT_PICTURE)
+        still.screen.press("step")
+        return tab.evaluate("inNextPicture")
+
+    # One that comes soon after another may be in the picture after the next.
+    assert any(steps() for _ in range(4))
+
+
+def test_shadows_follow_less_often_where_pictures_take_long(still):
+    tab = still.screen.tab
+    still.screen.wait(
+        lambda: tab.evaluate("suppleViewer.mutable.current.scene.onBeforeRender.name === 'beforePicture'"),
+        "the function that is called before each picture",
+    )
+    starts, gaps = (0.0, 10_000.0, 30_000.0, 60_000.0), (10.0, 50.0, 300.0, 10.0)  # of pictures [ms]
+    times = [start + gap * k for start, gap in zip(starts, gaps, strict=True) for k in range(100)]
+    drawn = tab.evaluate("(times) => { const needs = suppleShadows(); return times.map(needs); }", times)
+    quick, slow, seldom, later = np.reshape(drawn, (4, 100))
+    assert quick.all()
+    assert (np.diff(np.flatnonzero(slow[20:])) == 5).all()  # four times a second
+    assert not slow[20:].all()
+    assert seldom.all()
+    assert later.all()
 
 
 def test_a_body_follows_the_mouse_until_it_is_released(resting):

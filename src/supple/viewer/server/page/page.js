@@ -20,6 +20,12 @@
     // Messages are drawn when they arrive: the client would hold them back to smooth their rate, after a late one for
     // many pictures.
     pacing: [/(\w+)>3\)\{let (\w+)=\.95;(?=setTimeout)/, "$1>1/0){let $2=.95;"],
+    // The first message after a picture changes the scene at once, so that the next picture shows it. The client would
+    // take it up while it draws that picture, and show it in the one after.
+    queue: [
+      /(\w+)(&&document\.hidden\?\((\w+)\(\),(\w+)\.requestRender\(\)\):\w+\?\3\(\):)\4\.requestRender\(\)/,
+      "$1$2($1&&suppleIsFirst()&&$3(),$4.requestRender())",
+    ],
     // The arrow keys to the sides: the right one takes a step.
     keys: [/\.has\(`Arrow(?:Left|Right)`\)/g, ".has(``)"],
   };
@@ -33,6 +39,42 @@
     if (suppleMissing.length) console.warn(`Supple: not changed in viser's client: ${suppleMissing}`);
     return code;
   };
+
+  // Once for each picture, so that a slow browser takes up all that came meanwhile together.
+  let taken = false;
+  globalThis.suppleIsFirst = () => {
+    if (taken) return false;
+    requestAnimationFrame(() => { taken = false; });
+    return (taken = true);
+  };
+
+  // For shadows, the scene is drawn three times more. Where pictures take long, shadows follow only every SHADOWS [ms],
+  // for SPARING [ms]; then the browser is tried again. Called at every picture: whether it needs new shadows.
+  const SLOW = 22, SHADOWS = 250, SPARING = 30_000;
+  globalThis.suppleShadows = () => {
+    let drawnAt = -Infinity, shadowsAt = -Infinity, sparingUntil = -Infinity, pace = 0;
+    return (now) => {
+      const gap = now - drawnAt;
+      drawnAt = now;
+      if (gap < SHADOWS) pace += 0.1 * (Math.min(gap, 50) - pace);  // otherwise there was nothing to draw
+      if (now < sparingUntil) pace = 0;
+      else if (pace > SLOW) [sparingUntil, pace] = [now + SPARING, 0];
+      if (now < sparingUntil && now - shadowsAt < SHADOWS) return false;
+      shadowsAt = now;
+      return true;
+    };
+  };
+  const needsShadows = suppleShadows();
+  function beforePicture({ shadowMap }) {
+    shadowMap.autoUpdate = false;
+    const captured = suppleViewer.mutable.current.getRenderRequestState !== "ready";
+    if (needsShadows(performance.now()) || captured) shadowMap.needsUpdate = true;
+  }
+  let attached = null;
+  function attachToPictures() {
+    const scene = suppleViewer.mutable.current.scene;
+    if (scene && scene !== attached) (attached = scene).onBeforeRender = beforePicture;
+  }
 
   // The body that was under the pointer when the button went down is held until the button goes up.
   const onCanvas = (event) => event.target instanceof HTMLCanvasElement;
@@ -192,7 +234,7 @@
     suppleViewer.useGui.subscribe(follow);
     dark.addEventListener("change", follow);
     addEventListener("resize", place);
-    setInterval(() => { findOverlays(); place(); sendPointer(); findValues(); }, 80);
+    setInterval(() => { attachToPictures(); findOverlays(); place(); sendPointer(); findValues(); }, 80);
     attachKeys();
   }
   addEventListener("DOMContentLoaded", begin);
