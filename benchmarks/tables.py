@@ -54,6 +54,10 @@ def reading_text(figures: dict[str, Any]) -> str:
     """The sentences of `benchmarks.reading_fields`."""
     slowest = sorted(figures["fields"], key=figures["fields"].__getitem__, reverse=True)[:3]
     parts = ", ".join(f"`{name}` {figures['fields'][name]:.1f} ms" for name in slowest)
+    rates = " and ".join(
+        f"{one['frames_a_second']:.0f} frames a second at E = {1e-3 * one['youngs']:g} kPa ({one['substeps']} substeps)"
+        for one in figures["live"]
+    )
     return "\n".join(
         [
             f"Reading all fields of the tables takes {figures['ms_of_reading']:.1f} ms of processor time on one thread "
@@ -61,7 +65,8 @@ def reading_text(figures: dict[str, Any]) -> str:
             f"with cavity and cable in `XPBD`: {100.0 * figures['share']:.0f} % of a step, which takes "
             f"{figures['ms_per_step']:.0f} ms with {figures['substeps']:.0f} substeps. Most of it: {parts}.",
             f"Without reading, threads={figures['threads_live']} ({figures['layer'] or 'one thread'}) simulates "
-            f"{figures['frames_a_second']:.0f} frames of 1/60 s a second of wall time.",
+            f"{rates}",
+            "(frames of 1/60 s, wall time): the number of substeps grows with the root of the modulus.",
             measured_on(figures),
         ]
     )
