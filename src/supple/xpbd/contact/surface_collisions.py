@@ -26,7 +26,8 @@ from supple.xpbd.contact.detection.surface_contacts import find_contacts
 from supple.xpbd.contact.detection.surface_edges import surface_edges
 from supple.xpbd.contact.memory import SurfaceMemory
 from supple.xpbd.contact.movers import MovedPoints
-from supple.xpbd.contact.sweeps.row_sweeps import solve_rows
+from supple.xpbd.contact.sweeps.prepared_rows import PreparedRows, prepare_rows
+from supple.xpbd.contact.sweeps.row_sweeps import note_shares, solve_rows
 from supple.xpbd.rigid.bodies import RigidBodies
 
 # Of the mean surface edge: the least and the largest motion of a point that lists of candidates allow for, and the
@@ -103,6 +104,7 @@ class SurfaceCollisions:
         self.parted, self.moved, self.changed = True, False, 0.0
         # Of the last search: the rows of each kind that take part.
         self._chosen = [np.zeros(0, dtype=np.int64)] * 2
+        self._prepared: list[PreparedRows | None] = [None] * 2
         self._far, self._near = np.zeros((n, 3)), np.zeros((n, 3))
         self._common = np.zeros((pieces + 1, 3)), np.zeros((pieces, 3)), np.zeros((pieces, 3, 3))
         # Obstacles stand still, so that no motion is common to all points where there is one.
@@ -115,7 +117,7 @@ class SurfaceCollisions:
         self._depth = np.zeros((2, n))
         self._entered = np.zeros(n, dtype=np.int32)
         self._excursions = np.zeros(n)
-        self._dt = self._least_gap = 0.0
+        self._dt = self._h = self._least_gap = 0.0
 
     def begin_step(
         self,
@@ -154,7 +156,7 @@ class SurfaceCollisions:
 
     def begin_substep(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> bool:
         """See `Collisions.begin_substep`."""
-        rows = self._rows
+        rows, self._h = self._rows, h
         self._moved.begin_substep()
         self._moved.take(x, self._predicted)
         self._moved.take(x_prev, self._begun)
@@ -190,7 +192,7 @@ class SurfaceCollisions:
         self.parted, self.moved = True, False
         self._look_near()
         deactivate(self._rows.active)
-        self._chosen = [chosen[:0] for chosen in self._chosen]
+        self._chosen, self._prepared = [chosen[:0] for chosen in self._chosen], [None] * 2
         if not self._near_pairs and not self._rows.loads:
             return 0, np.inf
         # Obstacles come last because they cannot be moved.
@@ -258,6 +260,7 @@ class SurfaceCollisions:
 
     def end_substep(self) -> None:
         """Keep the share of the forces with which the next substep begins."""
+        note_shares(self._before, self._predicted, self._points, self._rows.described, self._h)
         self._rows.keep()
 
     def _look_near(self) -> None:
@@ -285,8 +288,9 @@ class SurfaceCollisions:
         if not len(chosen):
             return 0, np.inf
         self.moved = True
-        places = (self._x, self._before, self._predicted, self._begun)
-        *found, changed = solve_rows(*places, self._points, chosen, described, h, limit, sweeps, self._depth[kind])
+        prepared = self._prepared[kind] = self._prepared[kind] or prepare_rows(chosen, self._movers, described)
+        places = (self._x, self._before, self._predicted, self._begun, self._movers)
+        *found, changed = solve_rows(*places, chosen, described, prepared, h, limit, sweeps, self._depth[kind])
         self._settle()
         self.changed = max(self.changed, changed)
         return found[0], found[1]
@@ -302,7 +306,7 @@ class SurfaceCollisions:
         found = (self._x, self._begun, self._pairs, near.edges, self._edges.arrays[0], self._edge_rules)
         passed += find_edge_passages(*found, len(s.rows), kind, described)
         if passed:
-            self._chosen[kind] = choose_rows(self._x, self._before, self._movers, described, len(s.rows), kind, h)
+            self._choose(kind, h)
         return passed > 0
 
     def _find(self, kind: int, part: tuple[int, int], h: float, parallel: bool) -> float:
@@ -324,8 +328,13 @@ class SurfaceCollisions:
             which = (near, bodies, kind)
             found = (self._x, self._before, self._pairs, self._near_pairs.edges, self._edges.arrays, self._edge_rules)
             smallest = min(smallest, find_edge_contacts(*found, *which, described))
-        self._chosen[kind] = choose_rows(self._x, self._before, self._movers, described, bodies, kind, h)
+        self._choose(kind, h)
         return float(smallest)
+
+    def _choose(self, kind: int, h: float) -> None:
+        places, first_obstacle = (self._x, self._before, self._movers), len(self.surfaces.rows)
+        self._chosen[kind] = choose_rows(*places, self._rows.described, first_obstacle, kind, h)
+        self._prepared[kind] = None
 
     def memory(self, x: NDArray[np.float64]) -> SurfaceMemory:
         """What the next step needs; `x` (n, 3) are the positions at the end of this one, after all contacts [m]."""

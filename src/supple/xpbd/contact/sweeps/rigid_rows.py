@@ -10,55 +10,16 @@ J (A - f r_prev) x d: r_prev x d is the moment that `impulses` takes away, f of 
 neither points nor weights.
 """
 
-from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
-
 from supple.numerics.kernel_cache import njit
-from supple.numerics.mat3 import cross, dot, row, subtract
+from supple.numerics.mat3 import cross, dot, subtract
+from supple.xpbd.contact.sweeps.columns import set_three, three
 
-
-class RigidRows(NamedTuple):
-    """k rows, as kernels receive them.
-
-    Attributes
-    ----------
-    bodies : (k, 2) the rigid bodies of each row, -1 for none; -2 for the first where the row has free vertices
-    shares : (k, 2) C; arms : (k, 2, 3) A; levers : (k, 2, 3) A - f r_prev [m]
-    turns : (k, 2, 3) how a unit push turns each body [1/(kg m)]
-    slips : (k, 3) slip_0 [m]; answers : (k, 3) how the slip changes by a unit push [1/kg]
-    softness : (k, 6) sum w C^2 1 - [A] J [A], symmetric: xx yy zz xy yz zx [1/kg]
-    """
-
-    bodies: NDArray[np.int32]
-    shares: NDArray[np.float64]
-    arms: NDArray[np.float64]
-    levers: NDArray[np.float64]
-    turns: NDArray[np.float64]
-    slips: NDArray[np.float64]
-    answers: NDArray[np.float64]
-    softness: NDArray[np.float64]
-
-
-@njit(error_model="numpy")
-def empty_rows(k):
-    """Rows to be prepared."""
-    return RigidRows(
-        np.empty((k, 2), dtype=np.int32),
-        np.zeros((k, 2)),
-        np.zeros((k, 2, 3)),
-        np.empty((k, 2, 3)),
-        np.empty((k, 2, 3)),
-        np.empty((k, 3)),
-        np.empty((k, 3)),
-        np.empty((k, 6)),
-    )
-
-
-@njit(error_model="numpy")
-def _entry(a, k, j):
-    return (a[k, j, 0], a[k, j, 1], a[k, j, 2])
+# f; the relative place at the beginning of the substep, without the shifts of a pass [m]; slip_0 [m]; how the slip
+# changes by a unit push [1/kg]; sum w C^2 1 - [A] J [A], symmetric: xx yy zz xy yz zx [1/kg].
+COUPLE, PLACE, SLIP, ANSWER, SOFTNESS = 0, 1, 4, 7, 10
+# Of each of two bodies: C, w C, A, A - f r_prev [m], and how a unit push turns it [1/(kg m)].
+SHARE, MOBILITY, ARM, LEVER, TURN = 16, 17, 18, 21, 24
+PER_BODY, RIGID_COLUMNS = 11, 38
 
 
 @njit(error_model="numpy")
@@ -72,89 +33,132 @@ def _turned(J, b, m):
 
 
 @njit(error_model="numpy")
-def _join_points(rows, k, places, movers, vertices, weights, e):
-    """Sum up the points; returns whether all are rigid or held, f, and sum c_i x_i at the places, without twists."""
-    x, x_prev = places
-    bodies, count, couple = rows.bodies, 0, 1.0
-    bodies[k, 0] = bodies[k, 1] = -1
-    now, before = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+def join_points(bodies, numbers, movers, vertices, weights):
+    """Sum up the points (4,) of a row, where they are rigid or held; returns whether they are on two bodies at most."""
+    count, couple = 0, 1.0
+    bodies[0] = bodies[1] = -1
     for i in range(4):
-        p, c = vertices[e, i], weights[e, i]
+        p, c = vertices[i], weights[i]
         b = movers.body[p]
         if b < 0:
-            if movers.inverse_masses[p] != 0.0:
-                return False, 0.0, now, before
             couple = 0.0
-        else:
-            j = 0
-            while j < count and bodies[k, j] != b:
-                j += 1
-            if j == 2:
-                return False, 0.0, now, before
-            count = max(count, j + 1)
-            bodies[k, j] = b
-            rows.shares[k, j] += c
-            for a in range(3):
-                rows.arms[k, j, a] += c * movers.arms[p, a]
-            if movers.w[b] == 0.0:
-                couple = 0.0
-        now = (now[0] + c * x[p, 0], now[1] + c * x[p, 1], now[2] + c * x[p, 2])
-        before = (before[0] + c * x_prev[p, 0], before[1] + c * x_prev[p, 1], before[2] + c * x_prev[p, 2])
-    return True, couple if count == 1 else 0.5 * couple, now, before
+            continue
+        j = 0
+        while j < count and bodies[j] != b:
+            j += 1
+        if j == 2:
+            return False
+        count = max(count, j + 1)
+        bodies[j] = b
+        numbers[PER_BODY * j + SHARE] += c
+        for a in range(3):
+            numbers[PER_BODY * j + ARM + a] += c * movers.arms[p, a]
+        if movers.w[b] == 0.0:
+            couple = 0.0
+    numbers[COUPLE] = couple if count == 1 else 0.5 * couple
+    return True
 
 
 @njit(error_model="numpy")
-def prepare_row(rows, k, places, movers, vertices, weights, e, n):
-    """Set the row k from the contact e with the normal n, at places x, x_prev (n, 3) without twists [m].
-
-    Bodies have no twists yet, but shifts. Returns whether the row is between rigid bodies; what a unit push changes
-    the relative place by along n [1/kg]; and the relative place at the beginning of the substep [m].
-    """
-    whole, couple, now, before = _join_points(rows, k, places, movers, vertices, weights, e)
-    if not whole:
-        rows.bodies[k, 0] = -2
-        return False, 0.0, before
-    slip = subtract(now, before)
-    for j in range(2):
-        b = rows.bodies[k, j]
-        if b >= 0:
-            c, t = rows.shares[k, j], movers.twists
-            before = (before[0] + c * t[b, 6], before[1] + c * t[b, 7], before[2] + c * t[b, 8])
-    xx = yy = zz = xy = yz = zx = 0.0
-    answer = (0.0, 0.0, 0.0)
-    for j in range(2):
-        b = rows.bodies[k, j]
+def prepare_bodies(bodies, numbers, w, J):
+    """Set what remains the same in all passes of a substep, after `join_points`."""
+    for k in range(2):
+        b, at = bodies[k], PER_BODY * k
         if b < 0:
             continue
-        A, w = _entry(rows.arms, k, j), movers.w[b] * rows.shares[k, j] ** 2
-        lever = (A[0] - couple * before[0], A[1] - couple * before[1], A[2] - couple * before[2])
-        turn = _turned(movers.J, b, cross(lever, n))
-        spun = cross(turn, A)
-        answer = (answer[0] + w * n[0] + spun[0], answer[1] + w * n[1] + spun[1], answer[2] + w * n[2] + spun[2])
+        C, A = numbers[at + SHARE], three(numbers, at + ARM)
+        numbers[at + MOBILITY] = w[b] * C
         # Columns of -[A] J [A]: (J (A x e)) x A.
-        p = cross(_turned(movers.J, b, (0.0, A[2], -A[1])), A)
-        q = cross(_turned(movers.J, b, (-A[2], 0.0, A[0])), A)
-        r = cross(_turned(movers.J, b, (A[1], -A[0], 0.0)), A)
-        xx, yy, zz = xx + w + p[0], yy + w + q[1], zz + w + r[2]
-        xy, yz, zx = xy + p[1], yz + q[2], zx + r[0]
-        for a in range(3):
-            rows.levers[k, j, a], rows.turns[k, j, a] = lever[a], turn[a]
-    S = rows.softness
-    S[k, 0], S[k, 1], S[k, 2], S[k, 3], S[k, 4], S[k, 5] = xx, yy, zz, xy, yz, zx
-    for a in range(3):
-        rows.slips[k, a], rows.answers[k, a] = slip[a], answer[a]
-    return True, softness_along(rows, k, n), before
+        p = cross(_turned(J, b, (0.0, A[2], -A[1])), A)
+        q = cross(_turned(J, b, (-A[2], 0.0, A[0])), A)
+        r = cross(_turned(J, b, (A[1], -A[0], 0.0)), A)
+        for j, s in enumerate((p[0] + w[b] * C * C, q[1] + w[b] * C * C, r[2] + w[b] * C * C, p[1], q[2], r[0])):
+            numbers[SOFTNESS + j] += s
 
 
 @njit(error_model="numpy")
-def _moved(rows, k, twists):
-    """sum (C u + th x A)"""
-    x = y = z = 0.0
+def begin_bodies(numbers, x_prev, vertices, weights):
+    """Begin a pass, at the beginning of the substep x_prev (n, 3) without twists [m]."""
+    set_three(numbers, PLACE, _combined(x_prev, vertices, weights))
+
+
+@njit(error_model="numpy")
+def _combined(x, vertices, weights):
+    at = (0.0, 0.0, 0.0)
+    for i in range(4):
+        p, c = vertices[i], weights[i]
+        at = (at[0] + c * x[p, 0], at[1] + c * x[p, 1], at[2] + c * x[p, 2])
+    return at
+
+
+@njit(error_model="numpy")
+def place_of_bodies(bodies, numbers, twists):
+    """The relative place at the beginning of the substep, with the shifts of this pass so far [m]."""
+    at = three(numbers, PLACE)
     for j in range(2):
-        b = rows.bodies[k, j]
+        b, c = bodies[j], numbers[PER_BODY * j + SHARE]
         if b >= 0:
-            share = rows.shares[k, j]
-            spun = cross((twists[b, 3], twists[b, 4], twists[b, 5]), _entry(rows.arms, k, j))
+            at = (at[0] + c * twists[b, 6], at[1] + c * twists[b, 7], at[2] + c * twists[b, 8])
+    return at
+
+
+@njit(error_model="numpy")
+def shift_bodies(bodies, numbers, movers, d):
+    """`impulses.shift_both` of the row, by the shift d [kg m]."""
+    twists, u = movers.twists, (0.0, 0.0, 0.0)
+    for j in range(2):
+        b, c = bodies[j], numbers[PER_BODY * j + SHARE]
+        if b >= 0:
+            f, steps = movers.loose[b] * c, movers.steps
+            for a in range(3):
+                twists[b, 6 + a] += f * d[a]
+            u = (
+                u[0] + c * (steps[b, 0] + twists[b, 0]),
+                u[1] + c * (steps[b, 1] + twists[b, 1]),
+                u[2] + c * (steps[b, 2] + twists[b, 2]),
+            )
+    f, m = numbers[COUPLE], cross(d, u)
+    for j in range(2):
+        b = bodies[j]
+        if b >= 0:
+            turn = _turned(movers.J, b, (f * m[0], f * m[1], f * m[2]))
+            for a in range(3):
+                twists[b, 3 + a] -= turn[a]
+
+
+@njit(error_model="numpy")
+def begin_sweeps(bodies, numbers, x, before, J, vertices, weights, n):
+    """Begin the sweeps of a pass.
+
+    Parameters
+    ----------
+    x : (n, 3) without twists [m]; before : the relative place, with shifts [m]; J : see `Movers`; n : the normal
+    """
+    set_three(numbers, SLIP, subtract(_combined(x, vertices, weights), three(numbers, PLACE)))
+    f, answer = numbers[COUPLE], (0.0, 0.0, 0.0)
+    for j in range(2):
+        b, at = bodies[j], PER_BODY * j
+        if b < 0:
+            continue
+        A, w = three(numbers, at + ARM), numbers[at + MOBILITY] * numbers[at + SHARE]
+        lever = (A[0] - f * before[0], A[1] - f * before[1], A[2] - f * before[2])
+        turn = _turned(J, b, cross(lever, n))
+        spun = cross(turn, A)
+        answer = (answer[0] + w * n[0] + spun[0], answer[1] + w * n[1] + spun[1], answer[2] + w * n[2] + spun[2])
+        set_three(numbers, at + LEVER, lever)
+        set_three(numbers, at + TURN, turn)
+    set_three(numbers, ANSWER, answer)
+
+
+@njit(error_model="numpy")
+def slip_of_bodies(bodies, numbers, twists):
+    """The relative motion over the substep [m]."""
+    x, y, z = three(numbers, SLIP)
+    for j in range(2):
+        b, at = bodies[j], PER_BODY * j
+        if b >= 0:
+            share = numbers[at + SHARE]
+            spun = cross((twists[b, 3], twists[b, 4], twists[b, 5]), three(numbers, at + ARM))
             x += share * twists[b, 0] + spun[0]
             y += share * twists[b, 1] + spun[1]
             z += share * twists[b, 2] + spun[2]
@@ -162,31 +166,30 @@ def _moved(rows, k, twists):
 
 
 @njit(error_model="numpy")
-def slip_of(rows, k, movers):
-    """The relative motion over the substep [m]."""
-    moved, slip = _moved(rows, k, movers.twists), row(rows.slips, k)
-    return (slip[0] + moved[0], slip[1] + moved[1], slip[2] + moved[2])
+def answer_of(numbers):
+    """How the slip changes by a unit push [1/kg]."""
+    return three(numbers, ANSWER)
 
 
 @njit(error_model="numpy")
-def softness_along(rows, k, t):
+def softness_along(numbers, t):
     """The square of the vector t (3,), times the change of the relative place along it by a unit impulse along it."""
-    S = rows.softness
-    x = S[k, 0] * t[0] + S[k, 3] * t[1] + S[k, 5] * t[2]
-    y = S[k, 3] * t[0] + S[k, 1] * t[1] + S[k, 4] * t[2]
-    z = S[k, 5] * t[0] + S[k, 4] * t[1] + S[k, 2] * t[2]
+    xx, yy, zz = three(numbers, SOFTNESS)
+    xy, yz, zx = three(numbers, SOFTNESS + 3)
+    x = xx * t[0] + xy * t[1] + zx * t[2]
+    y = xy * t[0] + yy * t[1] + yz * t[2]
+    z = zx * t[0] + yz * t[1] + zz * t[2]
     return dot((x, y, z), t)
 
 
 @njit(error_model="numpy")
-def push_bodies(rows, k, movers, n, more, d):
+def push_bodies(bodies, numbers, twists, J, n, more, d):
     """Move the bodies by the impulse more n + d [kg m], d along the surface."""
-    twists = movers.twists
     for j in range(2):
-        b = rows.bodies[k, j]
+        b, at = bodies[j], PER_BODY * j
         if b >= 0:
-            f = movers.w[b] * rows.shares[k, j]
-            turn = _turned(movers.J, b, cross(_entry(rows.levers, k, j), d))
+            f = numbers[at + MOBILITY]
+            turn = _turned(J, b, cross(three(numbers, at + LEVER), d))
             for a in range(3):
                 twists[b, a] += f * (more * n[a] + d[a])
-                twists[b, 3 + a] += more * rows.turns[k, j, a] + turn[a]
+                twists[b, 3 + a] += more * numbers[at + TURN + a] + turn[a]
