@@ -110,7 +110,8 @@ class SurfaceCollisions:
         # Obstacles stand still, so that no motion is common to all points where there is one.
         self._all_share = len(s.fixed_points) == 0
         self._each = max(1, int(np.bincount(s.point_piece).min(initial=n)) // ENOUGH_POINTS)
-        self._complete = np.zeros(n)
+        self._complete = np.full(n, -1.0)
+        self._listed = np.zeros_like(s.allowed)
         self._most_reach = np.where(self._movers.body >= 0, RIGID_REACH, MOST_REACH) * edge_length
         self._gap = np.where(s.allowed, s.gaps, 0.0).max(axis=1)[s.point_piece]
         # See `SurfaceMemory`.
@@ -151,7 +152,10 @@ class SurfaceCollisions:
         self._before[:] = self._x
         self._recall(memory, still[s.point_piece])
         if not still.all():
-            self._gather(motions, False)
+            if self._covers():
+                self._number()
+            else:
+                self._gather(motions, False)
             self._excursions[:] = 0.0
 
     def begin_substep(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> bool:
@@ -390,6 +394,16 @@ class SurfaceCollisions:
         self._runs.renew()
         near = (self._finder.starts, self._finder.triangles)
         self._edges.renew(self._x, (self._far[:, 1], self._near[:, 1]), self._gap, near, parallel)
+        self._listed[:] = self._allowed
+        self._number()
+
+    def _covers(self) -> bool:
+        """Whether the lists of an earlier step still hold what may touch, until a point has moved too far."""
+        deep = self._complete < self._gap + LEAST_REACH * self.edge_length + self._depth.max(axis=0)
+        return not deep.any() and np.array_equal(self._listed, self._allowed)
+
+    def _number(self) -> None:
+        """Give the listed pairs their rows."""
         # Keys of points come before keys of edges.
         self._rows.renew(np.concatenate([self._runs.keys, self._edges.keys]))
         self._pairs = self._edges.numbered(np.searchsorted(self._rows.keys, self._edges.keys))
