@@ -55,6 +55,8 @@ from supple.xpbd.workspace import XPBDWorkspace
 MOST_REPEATS, MOST_FOR_CROSSINGS = 2, 1
 # Below this much work, in edges or volumes, a sweep ends before a second thread has started.
 PARALLEL_FROM = 20_000
+# What a point of a rigid body costs in contact, in the same units: such a scene may have no elastic constraints.
+RIGID_POINT = 15
 _MOST_THREADS: int = config.NUMBA_NUM_THREADS  # pyright: ignore[reportAttributeAccessIssue]
 
 
@@ -132,11 +134,12 @@ class XPBD(Solver):
         extended[: len(system.masses), 3] = inner.inverse_masses
         sets = [*build_constraint_sets(inner, layout), *stitch_constraints(inner, extended[:, 3])]
         threads = self.threads or numba.get_num_threads()
-        large = sum(made.work for made in sets) >= PARALLEL_FROM
-        parallel = threads > 1 and (large or self.threads is not None)
         collisions = Collisions(inner, self.contact)
         assessment = Assessment(inner, self.contact, collisions.edge_length)
         rigid = RigidBodies(inner)
+        work = sum(made.work for made in sets) + RIGID_POINT * collisions.rigid_points
+        large = work >= PARALLEL_FROM
+        parallel = threads > 1 and (large or self.threads is not None)
         return XPBDWorkspace(
             system=inner,
             layout=layout,

@@ -92,7 +92,7 @@ def test_flat_edges_take_part_and_so_do_those_of_bodies_that_may_touch_themselve
 
     def edges(bodies, **settings):
         surfaces = Collisions(build_system(sp.Scene(bodies)), XPBDContact(**settings)).surfaces
-        return 0 if surfaces is None else len(surfaces._edges)
+        return 0 if surfaces is None else len(surfaces._lists.edges)
 
     assert edges([box, other]) == edges([box, other], self_collision=False) == 108 * 3 // 2 + 12 * 3 // 2
     assert edges([box]) == 108 * 3 // 2

@@ -89,6 +89,11 @@ class Collisions:
         return bool(self.obstacles) or self.surfaces is not None
 
     @property
+    def rigid_points(self) -> int:
+        """Number of points of rigid bodies' surfaces that take part in contact with other surfaces."""
+        return 0 if self.surfaces is None else self.surfaces.rigid_points
+
+    @property
     def smallest_gap(self) -> float | None:
         return self._smallest if math.isfinite(self._smallest) else None
 

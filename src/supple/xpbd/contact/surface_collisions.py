@@ -9,41 +9,29 @@ from numpy.typing import NDArray
 
 from supple.contact.obstacle_poses import ObstaclePoses
 from supple.contact.search.boxes import boxes_of_pieces
-from supple.contact.search.excluded_pairs import excluded_pairs
 from supple.contact.search.point_inside import depths_inside
-from supple.contact.search.point_lists import PairFinder
-from supple.contact.search.reach import any_beyond_radii, common_motions, search_radii
 from supple.contact.search.stitch_masks import stitched_points
 from supple.contact.search.surfaces import ContactSurfaces
 from supple.system import System
 from supple.xpbd.contact.contact_rows import ContactRows, LoadedRows, choose_rows, deactivate, push_rows
 from supple.xpbd.contact.detection.edge_contacts import find_edge_contacts, find_edge_passages, note_edge_passages
-from supple.xpbd.contact.detection.edge_pairs import EdgePairs
-from supple.xpbd.contact.detection.near_pairs import NearPairs
-from supple.xpbd.contact.detection.piece_runs import PieceRuns
 from supple.xpbd.contact.detection.point_passages import find_point_passages, note_point_passages
 from supple.xpbd.contact.detection.surface_contacts import find_contacts
-from supple.xpbd.contact.detection.surface_edges import surface_edges
+from supple.xpbd.contact.detection.surface_lists import LEAST_REACH, SurfaceLists
 from supple.xpbd.contact.memory import SurfaceMemory
 from supple.xpbd.contact.movers import MovedPoints
 from supple.xpbd.contact.sweeps.prepared_rows import PreparedRows, prepare_rows
 from supple.xpbd.contact.sweeps.row_sweeps import note_shares, solve_rows
 from supple.xpbd.rigid.bodies import RigidBodies
 
-# Of the mean surface edge: the least and the largest motion of a point that lists of candidates allow for, and the
-# largest gap that is reported.
-LEAST_REACH, MOST_REACH, NEAR = 0.05, 0.2, 1.0
-# The largest motion of points of rigid bodies, whose lists are short: one body that is too fast makes all lists new.
-RIGID_REACH = 0.6
-# Of the mean surface edge: how far contacts may move a point in a substep, where edges are looked for.
-SLACK = 0.05
+# Of the mean surface edge: the largest gap that is reported, and how far contacts may move a point in a substep, where
+# edges are looked for.
+NEAR, SLACK = 1.0, 0.05
 # Sweeps over all contacts of a substep; see docs/xpbd_contact.md for what more of them would change. The second number:
 # where they are solved again because something has still passed through something.
 SWEEPS, MORE_SWEEPS = 2, 4
 # How often contacts are solved again because edges have passed through each other.
 MOST_PASSAGES = 5
-# Points of each piece from which its motion as a rigid body is found in a substep.
-ENOUGH_POINTS = 64
 # Below this many active points, contacts are found before a second thread has started.
 PARALLEL_FROM = 500
 
@@ -69,32 +57,26 @@ class SurfaceCollisions:
         n, pieces = len(s.point_piece), len(s.closed)
         rest = np.concatenate([system.rest_points[s.rows], s.fixed_points])
         widest = float(np.diagonal(s.gaps).max(initial=0.0))
-        excluded = excluded_pairs(s, rest, 2.0 * min(widest, 0.5 * edge_length))
         self._stitched = stitched_points(system, s, poses)
-        self._allowed = s.allowed.copy()
-        self._rules = (self._allowed, *excluded)
         self._apart = np.ones((pieces, pieces), dtype=np.bool_)
         self._edge_rules = (s.point_piece, s.closed, s.gaps, s.friction, self._apart)
         self._slack = widest + SLACK * edge_length
-        edges = surface_edges(s, rest)
-        self._edges = EdgePairs(edges, s, rest, self._stitched)
-        self._near_pairs = NearPairs(n, s.triangles, self._edges.arrays[0])
-        self._finder = PairFinder(~edges.blunt)
-        self._x, self._before, self._gathered = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
+        self._x, self._before = np.zeros((n, 3)), np.zeros((n, 3))
         # Where the substep began; `_before` also has the shifts that remove old overlaps.
         self._begun = np.zeros((n, 3))
-        self._shapes = (self._x, s.point_piece, s.triangles, s.triangle_piece)
         self._pieces = (s.point_piece, s.triangles, s.triangle_piece, s.closed, s.gaps, s.friction)
         self._predicted = np.zeros((n, 3))
         self._inverse_masses = s.inverse_masses.copy()
         self._moved = MovedPoints(s.embedded, len(s.fixed_points), rigid, self._inverse_masses)
         self._free_masses = self._inverse_masses.copy()
         self._movers, self._rigid = self._moved.movers, rigid
+        # Number of points on rigid bodies.
+        self.rigid_points = int(np.count_nonzero(self._movers.body >= 0))
         own = rates[s.embedded.vertices[s.embedded.start[:-1]]]
         self._points = (self._movers, np.concatenate([own, np.zeros(len(s.fixed_points))]))
         # How far gravity moves the prediction of rigid bodies [m/s^2]; see `begin_substep`.
         self._falling = np.where(self._movers.body >= 0, 1.0, 0.0)[:, None] * system.gravity
-        self._runs = PieceRuns(self._finder, n, s.triangle_piece)
+        self._lists = SurfaceLists(s, rest, edge_length, self._movers.body, self._stitched)
         self._rows = ContactRows()
         # The contacts between pieces that sleep.
         self._standing = LoadedRows.none()
@@ -105,19 +87,9 @@ class SurfaceCollisions:
         # Of the last search: the rows of each kind that take part.
         self._chosen = [np.zeros(0, dtype=np.int64)] * 2
         self._prepared: list[PreparedRows | None] = [None] * 2
-        self._far, self._near = np.zeros((n, 3)), np.zeros((n, 3))
-        self._common = np.zeros((pieces + 1, 3)), np.zeros((pieces, 3)), np.zeros((pieces, 3, 3))
-        # Obstacles stand still, so that no motion is common to all points where there is one.
-        self._all_share = len(s.fixed_points) == 0
-        self._each = max(1, int(np.bincount(s.point_piece).min(initial=n)) // ENOUGH_POINTS)
-        self._complete = np.full(n, -1.0)
-        self._listed = np.zeros_like(s.allowed)
-        self._most_reach = np.where(self._movers.body >= 0, RIGID_REACH, MOST_REACH) * edge_length
-        self._gap = np.where(s.allowed, s.gaps, 0.0).max(axis=1)[s.point_piece]
         # See `SurfaceMemory`.
         self._depth = np.zeros((2, n))
         self._entered = np.zeros(n, dtype=np.int32)
-        self._excursions = np.zeros(n)
         self._dt = self._h = self._least_gap = 0.0
 
     def begin_step(
@@ -133,8 +105,7 @@ class SurfaceCollisions:
         """See `Collisions.begin_step`; `asleep` are the bodies (b,) that take no part."""
         s, owner = self.surfaces, self.surfaces.owner
         still = np.where(owner < len(asleep), asleep[np.minimum(owner, len(asleep) - 1)], True)
-        np.logical_and(s.allowed, ~(still[:, None] & still), out=self._allowed)
-        self._edges.choose(self._allowed)
+        self._lists.choose(s.allowed & ~(still[:, None] & still))
         self._inverse_masses[:] = np.where(still[s.point_piece], 0.0, self._free_masses)
         self._apart[:] = True
         for a, b in crossing:
@@ -152,23 +123,21 @@ class SurfaceCollisions:
         self._before[:] = self._x
         self._recall(memory, still[s.point_piece])
         if not still.all():
-            if self._covers():
-                self._number()
-            else:
-                self._gather(motions, False)
-            self._excursions[:] = 0.0
+            if not self._lists.hold(self._depth.max(axis=0)):
+                self._list(motions, False)
+            self._lists.number(self._rows)
+            self._lists.excursions[:] = 0.0
 
     def begin_substep(self, x: NDArray[np.float64], x_prev: NDArray[np.float64], h: float) -> bool:
         """See `Collisions.begin_substep`."""
         rows, self._h = self._rows, h
         self._moved.begin_substep()
-        self._moved.take(x, self._predicted)
-        self._moved.take(x_prev, self._begun)
+        self._take(x, x_prev)
+        self._predicted[:], self._begun[:] = self._x, self._before
         if len(self._rigid):
             # What rests on a point approaches it in every substep by its fall; this is no impact.
             self._predicted -= h * h * self._falling
         if rows.loads:
-            self._take(x, x_prev)
             push_rows(self._x, self._before, self._movers, rows.described, h)
             self._settle()
             self._give(x, x_prev)
@@ -189,15 +158,15 @@ class SurfaceCollisions:
         s.place_obstacles(self.poses, times[0], self._before)
         self._begun[len(s.rows) :] = self._before[len(s.rows) :]
         self._predicted[len(s.rows) :] = self._x[len(s.rows) :]
-        allowed = (self._far, self._near, s.point_piece, self._all_share, self._each, self._common)
-        if any_beyond_radii(self._x, self._before, self._gathered, *allowed, self._excursions):
-            self._gather((self._x - self._before) * (self._dt / h), parallel)
+        if self._lists.left(self._x, self._before):
+            self._list((self._x - self._before) * (self._dt / h), parallel)
+            self._lists.number(self._rows)
         contacts, smallest = 0, np.inf
         self.parted, self.moved = True, False
         self._look_near()
         deactivate(self._rows.active)
-        self._chosen, self._prepared = [chosen[:0] for chosen in self._chosen], [None] * 2
-        if not self._near_pairs and not self._rows.loads:
+        self._chosen = [chosen[:0] for chosen in self._chosen]
+        if not self._lists.near and not self._rows.loads:
             return 0, np.inf
         # Obstacles come last because they cannot be moved.
         for kind, part in enumerate(((0, s.body_triangles), (s.body_triangles, len(s.triangles)))):
@@ -240,10 +209,11 @@ class SurfaceCollisions:
     def _passages(self, x: NDArray[np.float64]) -> NDArray[np.bool_]:
         self._moved.take(x, self._x)
         self._look_again()
-        shapes, near = (self._x, self._begun), self._near_pairs
+        shapes, lists = (self._x, self._begun), self._lists
         passed = np.zeros_like(self._apart)
-        note_point_passages(*shapes, near.points, self._pieces, self._apart, self._stitched, passed)
-        note_edge_passages(*shapes, self._pairs, near.edges, self._edges.arrays[0], self._edge_rules, passed)
+        note_point_passages(*shapes, lists.near.points, self._pieces, self._apart, self._stitched, passed)
+        edges = (lists.pairs, lists.near.edges, lists.edges.arrays[0], self._edge_rules)
+        note_edge_passages(*shapes, *edges, passed)
         return passed
 
     def component(self, labels: NDArray[np.integer]) -> NDArray[np.int64]:
@@ -270,11 +240,11 @@ class SurfaceCollisions:
     def _look_near(self) -> None:
         """Set which listed pairs come as near in this substep that contacts may still make them meet."""
         margin, memory = max(self._slack, self._least_gap), (self._depth, self._entered)
-        self._near_pairs.look(self._begun, self._x, margin, self._rows.forces, memory)
+        self._lists.near.look(self._begun, self._x, margin, self._rows.forces, memory)
 
     def _look_again(self) -> None:
         """`_look_near`, where contacts have moved a point that far that this could change anything."""
-        if self._near_pairs.left(self._x, 0.5 * self._slack):
+        if self._lists.near.left(self._x, 0.5 * self._slack):
             self._look_near()
 
     def _take(self, x: NDArray[np.float64], x_prev: NDArray[np.float64]) -> None:
@@ -304,33 +274,32 @@ class SurfaceCollisions:
         s, described = self.surfaces, self._rows.described
         if self.moved:
             self._look_again()
-        near = self._near_pairs
-        points = (self._x, self._begun, near.points, self._pieces, self._apart, part, self._stitched)
-        passed = find_point_passages(*points, described, self._entered)
-        found = (self._x, self._begun, self._pairs, near.edges, self._edges.arrays[0], self._edge_rules)
-        passed += find_edge_passages(*found, len(s.rows), kind, described)
+        shapes, lists = (self._x, self._begun), self._lists
+        points = (lists.near.points, self._pieces, self._apart, part, self._stitched)
+        passed = find_point_passages(*shapes, *points, described, self._entered)
+        edges = (lists.pairs, lists.near.edges, lists.edges.arrays[0], self._edge_rules)
+        passed += find_edge_passages(*shapes, *edges, len(s.rows), kind, described)
         if passed:
             self._choose(kind, h)
         return passed > 0
 
     def _find(self, kind: int, part: tuple[int, int], h: float, parallel: bool) -> float:
         """Find the contacts with the triangles of one part, of bodies (0) or of obstacles (1); the smallest gap [m]."""
-        s, rows = self.surfaces, self._rows
-        bodies, near = len(s.rows), self._least_gap
+        rows, lists = self._rows, self._lists
+        bodies, near = len(self.surfaces.rows), self._least_gap
         described = rows.described
         smallest = np.inf
         deactivate(rows.active)
-        lists = self._near_pairs.lists
-        n_active = lists[0]
+        n_active = lists.near.lists[0]
         if n_active:
-            shapes = (self._pieces, (self._depth[kind], self._entered, self._complete))
+            shapes = (self._pieces, (self._depth[kind], self._entered, lists.complete))
             several = parallel and n_active >= PARALLEL_FROM
-            places, which = (self._x, self._before, lists), (near, part, self._stitched)
+            places, which = (self._x, self._before, lists.near.lists), (near, part, self._stitched)
             find_contacts[several](*places, *shapes, *which, described, self._smallest)
             smallest = self._smallest[:n_active].min()
-        if len(self._edges.keys):
+        if len(lists.edges.keys):
             which = (near, bodies, kind)
-            found = (self._x, self._before, self._pairs, self._near_pairs.edges, self._edges.arrays, self._edge_rules)
+            found = (self._x, self._before, lists.pairs, lists.near.edges, lists.edges.arrays, self._edge_rules)
             smallest = min(smallest, find_edge_contacts(*found, *which, described))
         self._choose(kind, h)
         return float(smallest)
@@ -349,7 +318,7 @@ class SurfaceCollisions:
             positions,
             self._depth.copy(),
             self._entered.copy(),
-            self._excursions.copy(),
+            self._lists.excursions.copy(),
             self._rows.loaded().joined(self._standing),
         )
 
@@ -359,13 +328,13 @@ class SurfaceCollisions:
         Contacts between points (n,) that are `still` are standing.
         """
         s = self.surfaces
-        self._entered[:], self._excursions[:] = -1, 0.0
+        self._entered[:], self._lists.excursions[:] = -1, 0.0
         known, loaded = 0, LoadedRows.none()
         if memory is not None:
             triangles = s.triangles[: s.body_triangles]
             known = memory.matching_points(triangles, self._x, LEAST_REACH * self.edge_length)
             self._entered[:known] = memory.entered[:known]
-            self._excursions[:known] = memory.excursions[:known]
+            self._lists.excursions[:known] = memory.excursions[:known]
             self._depth[:, :known] = memory.depth[:, :known]
             loaded = memory.loaded.chosen(np.asarray((memory.loaded.vertices < known).all(axis=1)))
         standing = np.asarray(still[loaded.vertices].all(axis=1))
@@ -374,41 +343,8 @@ class SurfaceCollisions:
         if known < len(self._x):
             self._find_overlaps()
 
-    def _gather(self, motions: NDArray[np.float64], parallel: bool) -> None:
-        """List what may touch while no point moves farther than in a frame of these motions (n, 3) [m]."""
-        s = self.surfaces
-        common_motions(self._x, motions, s.point_piece, self._all_share, 1, self._common)
-        scales = (LEAST_REACH * self.edge_length, self._most_reach)
-        points = (self._x - self._before, self._excursions, s.point_piece)
-        search_radii(self._x, motions, *points, self._common, scales, self._far, self._near)
-        together = self._allowed | self._allowed.T
-        alone = np.diagonal(together).astype(int) == together.sum(axis=1)
-        # No list depends on how far these move.
-        self._far[alone[s.point_piece], 2] = np.inf
-        self._near[~np.diagonal(together)[s.point_piece], 2] = np.inf
-        self._complete[:] = self._gap + LEAST_REACH * self.edge_length + self._depth.max(axis=0)
-        self._far[:, 0] += self._complete
-        self._near[:, 0] += self._complete
-        self._finder.gather(self._shapes, (self._far, self._near), self._rules)
-        self._gathered[:] = self._x
-        self._runs.renew()
-        near = (self._finder.starts, self._finder.triangles)
-        self._edges.renew(self._x, (self._far[:, 1], self._near[:, 1]), self._gap, near, parallel)
-        self._listed[:] = self._allowed
-        self._number()
-
-    def _covers(self) -> bool:
-        """Whether the lists of an earlier step still hold what may touch, until a point has moved too far."""
-        deep = self._complete < self._gap + LEAST_REACH * self.edge_length + self._depth.max(axis=0)
-        return not deep.any() and np.array_equal(self._listed, self._allowed)
-
-    def _number(self) -> None:
-        """Give the listed pairs their rows."""
-        # Keys of points come before keys of edges.
-        self._rows.renew(np.concatenate([self._runs.keys, self._edges.keys]))
-        self._pairs = self._edges.numbered(np.searchsorted(self._rows.keys, self._edges.keys))
-        lists = self._runs.lists(np.searchsorted(self._rows.keys, self._runs.keys))
-        self._near_pairs.renew(lists, self._pairs)
+    def _list(self, motions: NDArray[np.float64], parallel: bool) -> None:
+        self._lists.renew(self._x, self._before, motions, self._depth.max(axis=0), parallel)
 
     def _find_overlaps(self) -> None:
         """Set how deep each point is inside other pieces, from positions alone."""

@@ -133,7 +133,7 @@ def _remove_overlaps(x, x_prev, predicted, begun, movers, chosen, rows, prepared
         if old > 0.0 and numbers[k, YIELD] > 0.0:
             s = old / numbers[k, YIELD]
             shift = (s * n[0], s * n[1], s * n[2])
-            if kind == VERTICES or kind == BOTH:
+            if kind in (VERTICES, BOTH):
                 shift_both(x, x_prev, predicted, movers, vertices, weights, e, shift)
             else:
                 shift_bodies(bodies[k], mine, movers, shift)
