@@ -8,7 +8,7 @@ from supple.numerics.kernel_cache import njit, prange
 from supple.numerics.mat3 import dot, row, subtract
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)
 def point_triangle_square(x, v, triangles, t):
     """The squared distance of point v and triangle t."""
     p, a, b, c = row(x, v), row(x, triangles[t, 0]), row(x, triangles[t, 1]), row(x, triangles[t, 2])
@@ -16,7 +16,7 @@ def point_triangle_square(x, v, triangles, t):
     return dot(r, r)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)
 def edge_edge_square(x, edges, e, f):
     """The squared distance of two edges."""
     a, b, c, d = row(x, edges[e, 0]), row(x, edges[e, 1]), row(x, edges[f, 0]), row(x, edges[f, 1])

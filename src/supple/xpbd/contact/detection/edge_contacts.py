@@ -49,7 +49,7 @@ def _supports(x, opposite, e, origin, n, sign):
     return True
 
 
-@njit
+@njit(forceinline=True)
 def _edge_contact(x, x_prev, edges, e, f, closed_e, closed_f, held):
     """Contact of the edges e and f: whether it exists, s, t, the unit normal from f to e, the signed distance [m].
 
@@ -90,7 +90,7 @@ def _between_lines(a, b, c, d, s, t):
     return subtract(between(a, b, s), between(c, d, t))
 
 
-@njit
+@njit(forceinline=True)
 def _lines(x, ends, e, f):
     """Origins and directions of two edges, and six times the volume that they span."""
     p, q = row(x, ends[e, 0]), row(x, ends[f, 0])
@@ -98,7 +98,7 @@ def _lines(x, ends, e, f):
     return p, u, q, v, dot(subtract(p, q), cross(u, v))
 
 
-@njit
+@njit(forceinline=True)
 def _passage(x, x_prev, ends, e, f):
     """Whether edge e has passed through edge f in this substep, s, t, and the unit normal to the side where e was.
 
@@ -120,7 +120,7 @@ def _passage(x, x_prev, ends, e, f):
     return True, s, t, (n[0] / length, n[1] / length, n[2] / length)
 
 
-@njit
+@njit(forceinline=True)
 def _enter(rows, r, ends, e, f, s, t, n, gap, mu):
     """Fill in the row r of a contact of the edges e and f."""
     vertices, weights, normals, offsets, mus, _, _, active, deep = rows

@@ -22,7 +22,7 @@ from supple.numerics.kernel_cache import njit
 MORE, SOME = 1.25, 50
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)
 def _relative(ways, i, j, most):
     """The larger of `most` and the squares of how far i has moved relative to j: at the beginning, and at the end."""
     begin = end = 0.0
@@ -41,7 +41,7 @@ def set_ways(points, reference, begun, x, ways):
             ways[i, 3 + k] = x[i, k] - reference[i, k]
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)
 def _triangle_apart(ways, triangles, t, p, free):
     """Whether point p moves by less than `free` [m] relative to the corners of triangle t."""
     if not free > 0.0:
@@ -50,7 +50,7 @@ def _triangle_apart(ways, triangles, t, p, free):
     return _relative(ways, p, c, _relative(ways, p, b, _relative(ways, p, a, 0.0))) < free * free
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", forceinline=True)
 def _edges_apart(ways, ends, e, f, free):
     """The same of two edges."""
     if not free > 0.0:

@@ -33,7 +33,7 @@ def corners_of(x, triangles, t):
     return row(x, triangles[t, 0]), row(x, triangles[t, 1]), row(x, triangles[t, 2])
 
 
-@njit
+@njit(forceinline=True)
 def passage(p, p0, corners, corners0, both_ways):
     """The time in the substep (0..1) at which the point passed through the triangle, otherwise 2; the side; the place.
 
@@ -63,7 +63,7 @@ def passage(p, p0, corners, corners0, both_ways):
     return t, (1.0 if d0 >= 0.0 else -1.0), where
 
 
-@njit
+@njit(forceinline=True)
 def _select_triangle(x, x_prev, p, triangles, near, same, closed, entered, reach, bound):
     """The triangle for the contact of point p, the barycentric point on it, the side of p, and the distance.
 
@@ -126,7 +126,7 @@ def _select_triangle(x, x_prev, p, triangles, near, same, closed, entered, reach
     return best, where, side, math.sqrt(least)
 
 
-@njit
+@njit(forceinline=True)
 def direction(x, p, triangle, where, passed, side, open_sheet):
     """The unit normal of the contact, out of the piece."""
     a, b, c = triangle
@@ -141,7 +141,7 @@ def direction(x, p, triangle, where, passed, side, open_sheet):
     return (f * n[0], f * n[1], f * n[2])
 
 
-@njit
+@njit(forceinline=True)
 def enter_contact(rows, r, p, triangles, t, where, n, gap, mu):
     """Fill in the row r of a contact of point p with triangle t."""
     vertices, weights, normals, offsets, mus, _, _, active, _ = rows
@@ -152,7 +152,7 @@ def enter_contact(rows, r, p, triangles, t, where, n, gap, mu):
     offsets[r], mus[r], active[r] = gap, mu, True
 
 
-@njit
+@njit(forceinline=True)
 def _find_contacts_of(x, x_prev, p, runs, lists, surfaces, memory, near, part, stitched, rows):
     """The contacts of point p with the pieces near it; returns the smallest distance that is no contact, or inf."""
     first_run, last_run = runs
