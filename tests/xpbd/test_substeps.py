@@ -59,6 +59,12 @@ def test_beyond_the_largest_number_a_body_is_softened_and_the_message_says_what_
     assert f"; take max_substeps={report.details.substeps_reason.split()[-1]}" in report.message
 
 
+def test_the_remedy_for_a_body_that_hardly_deforms_is_no_enormous_number_of_substeps():
+    report = first(cube(1e12), max_substeps=20)
+    assert report.status == "softened"
+    assert "take Implicit, or a RigidBody for what hardly deforms (max_substeps=" in report.message
+
+
 def hit(youngs=2e5, accuracy=0.5):
     """A body that is allowed to be far too soft, so that its impact has to be repeated."""
     scene = cube(youngs, speed=2.0, height=0.07)

@@ -17,6 +17,9 @@ from supple.xpbd.sleep import SleepMemory
 from supple.xpbd.substeps import FALL, Substeps
 from supple.xpbd.workspace import XPBDWorkspace
 
+# From this number of substeps, the remedy is another solver or a rigid body.
+IMPRACTICAL = 5000
+
 
 def end_frame(
     ws: XPBDWorkspace,
@@ -114,4 +117,6 @@ def _remedy(findings: Findings, used: int, shares: Mapping[str, float], accuracy
     if findings.status is not Status.SOFTENED or contradicted:
         count = max(count, 2 * used)
     more = ", or remove what contradicts the joint: a pin, a script, contact or another joint" if contradicted else ""
+    if count > IMPRACTICAL:
+        return f"take Implicit, or a RigidBody for what hardly deforms ({setting}={count} would do){more}"
     return f"take {setting}={count}{more}"
